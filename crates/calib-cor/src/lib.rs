@@ -1,0 +1,1 @@
+//! Center-of-rotation estimators.

@@ -1,0 +1,1 @@
+//! Frame graph, loop closures, parameters, the estimation problem and its solution.

@@ -1,0 +1,1 @@
+//! SE(3), twists, lines and screw axes, rotation means and the decompositions that everything trusts.

@@ -1,0 +1,1 @@
+//! Robot profiles: YAML to a checked profile in SI units.

@@ -1,0 +1,1 @@
+//! The canonical recording, readers for what laboratories have, data checks.

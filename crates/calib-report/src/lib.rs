@@ -1,0 +1,1 @@
+//! The report as data; Markdown, JSON and HTML; scene export.

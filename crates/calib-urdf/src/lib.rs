@@ -1,0 +1,1 @@
+//! Robot model and forward kinematics from a URDF; edits of the URDF's text.
