@@ -1,0 +1,399 @@
+//! The decompositions that estimation trusts: one-sided Jacobi SVD behind a Householder QR, cyclic
+//! Jacobi for symmetric matrices, and the pencil `DᵀD u = λ C u`.
+//!
+//! A general-purpose SVD that iterates on a bidiagonal form can return wrong factors for repeated or
+//! vanishing singular values, which is what an exact hinge or a one-axis sweep produces. Jacobi methods
+//! are slower and have no such case: each rotation is orthogonal to rounding, and small singular
+//! values keep their relative accuracy (Demmel & Veselić 1992).
+
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+/// Sweeps after which Jacobi has converged for every matrix met (typically 6–10); a bound, not a tuning.
+const MAX_SWEEPS: usize = 60;
+
+/// Thin singular value decomposition `A = U diag(s) Vᵀ`, singular values descending.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Svd {
+    /// m × k, orthonormal columns, k = min(m, n).
+    pub u: DMatrix<f64>,
+    /// k singular values, descending, ≥ 0.
+    pub s: DVector<f64>,
+    /// n × k, orthonormal columns.
+    pub v: DMatrix<f64>,
+}
+
+/// SVD of a small square matrix, on the stack.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SvdSmall<const N: usize> {
+    /// Left singular vectors, orthogonal.
+    pub u: SMatrix<f64, N, N>,
+    /// Singular values, descending.
+    pub s: SVector<f64, N>,
+    /// Right singular vectors, orthogonal.
+    pub v: SMatrix<f64, N, N>,
+}
+
+/// Eigenvalues ascending with their orthonormal eigenvectors as columns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SymmetricEigen {
+    /// Eigenvalues, ascending.
+    pub values: DVector<f64>,
+    /// Column i belongs to value i.
+    pub vectors: DMatrix<f64>,
+}
+
+/// Eigen decomposition of a small symmetric matrix, on the stack.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SymmetricEigenSmall<const N: usize> {
+    /// Eigenvalues, ascending.
+    pub values: SVector<f64, N>,
+    /// Column i belongs to value i.
+    pub vectors: SMatrix<f64, N, N>,
+}
+
+/// One eigenpair of the pencil `DᵀD u = λ C u`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PencilPair {
+    /// λ; infinite where `u'Cu` vanishes.
+    pub lambda: f64,
+    /// The eigenvector, scaled to `‖D u‖ = 1` (or to unit length where `D u` vanishes).
+    pub u: DVector<f64>,
+    /// `u' C u`.
+    pub c_norm: f64,
+}
+
+/// Minimum-norm least-squares solution and the rank it used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeastSquares {
+    /// x of least ‖x‖ among the minimisers of ‖Ax − b‖.
+    pub x: DVector<f64>,
+    /// Singular values that counted.
+    pub rank: usize,
+    /// All singular values of A, descending.
+    pub singular_values: DVector<f64>,
+}
+
+/// Thin SVD of any real matrix with finite entries.
+///
+/// Householder QR first when A is tall, then one-sided Jacobi on the small factor.
+#[must_use]
+pub fn svd(a: &DMatrix<f64>) -> Svd {
+    let (m, n) = a.shape();
+    if m < n {
+        let t = svd(&a.transpose());
+        return Svd {
+            u: t.v,
+            s: t.s,
+            v: t.u,
+        };
+    }
+    if n == 0 {
+        return Svd {
+            u: DMatrix::zeros(m, 0),
+            s: DVector::zeros(0),
+            v: DMatrix::zeros(0, 0),
+        };
+    }
+    let (q, mut work) = if m > n {
+        let qr = a.clone().qr();
+        (Some(qr.q()), qr.r())
+    } else {
+        (None, a.clone())
+    };
+    let mut v = DMatrix::identity(n, n);
+    let mut s = DVector::zeros(n);
+    one_sided_jacobi(work.as_mut_slice(), v.as_mut_slice(), s.as_mut_slice(), n);
+    let u = match q {
+        Some(q) => q * work,
+        None => work,
+    };
+    Svd { u, s, v }
+}
+
+/// Singular values only, descending; as accurate as [`svd`], without the m × n factor.
+#[must_use]
+pub fn singular_values(a: &DMatrix<f64>) -> DVector<f64> {
+    let (m, n) = a.shape();
+    if m < n {
+        return singular_values(&a.transpose());
+    }
+    let mut r = if m > n { a.clone().qr().r() } else { a.clone() };
+    let mut v = DMatrix::identity(n, n);
+    let mut s = DVector::zeros(n);
+    one_sided_jacobi(r.as_mut_slice(), v.as_mut_slice(), s.as_mut_slice(), n);
+    s
+}
+
+/// SVD of a small square matrix without allocation.
+#[must_use]
+pub fn svd_small<const N: usize>(a: &SMatrix<f64, N, N>) -> SvdSmall<N> {
+    let mut u = *a;
+    let mut v = SMatrix::<f64, N, N>::identity();
+    let mut s = SVector::<f64, N>::zeros();
+    one_sided_jacobi(u.as_mut_slice(), v.as_mut_slice(), s.as_mut_slice(), N);
+    SvdSmall { u, s, v }
+}
+
+/// Eigen decomposition of a symmetric matrix; only the lower triangle is read.
+#[must_use]
+pub fn symmetric_eigen(a: &DMatrix<f64>) -> SymmetricEigen {
+    let n = a.nrows();
+    let mut work = a.clone();
+    let mut vectors = DMatrix::identity(n, n);
+    let mut values = DVector::zeros(n);
+    cyclic_jacobi(
+        work.as_mut_slice(),
+        vectors.as_mut_slice(),
+        values.as_mut_slice(),
+        n,
+    );
+    SymmetricEigen { values, vectors }
+}
+
+/// Eigen decomposition of a small symmetric matrix without allocation.
+#[must_use]
+pub fn symmetric_eigen_small<const N: usize>(a: &SMatrix<f64, N, N>) -> SymmetricEigenSmall<N> {
+    let mut work = *a;
+    let mut vectors = SMatrix::<f64, N, N>::identity();
+    let mut values = SVector::<f64, N>::zeros();
+    cyclic_jacobi(
+        work.as_mut_slice(),
+        vectors.as_mut_slice(),
+        values.as_mut_slice(),
+        N,
+    );
+    SymmetricEigenSmall { values, vectors }
+}
+
+/// All eigenpairs of `DᵀD u = λ C u` for a tall D (m × n) and a symmetric, possibly indefinite C (n × n).
+///
+/// With `D = U Σ Vᵀ` and `y = Σ Vᵀ u` the pencil becomes the symmetric problem
+/// `Σ⁻¹ Vᵀ C V Σ⁻¹ y = (1/λ) y`: it never forms `DᵀD`, and a vanishing singular value (exact data)
+/// is raised to rounding level instead of failing. Ascending in 1/λ.
+#[must_use]
+pub fn pencil_eigen(d: &DMatrix<f64>, c: &DMatrix<f64>) -> Vec<PencilPair> {
+    let Svd { s, v, .. } = svd(d);
+    let n = s.len();
+    let floor = s[0].max(f64::MIN_POSITIVE) * f64::EPSILON;
+    // columns of V Σ⁻¹
+    let mut w = v;
+    for i in 0..n {
+        w.column_mut(i).unscale_mut(s[i].max(floor));
+    }
+    let reduced = w.transpose() * c * &w;
+    let eigen = symmetric_eigen(&reduced);
+    (0..n)
+        .map(|i| {
+            let u = &w * eigen.vectors.column(i);
+            let c_norm = (u.transpose() * c * &u)[(0, 0)];
+            PencilPair {
+                lambda: 1.0 / eigen.values[i],
+                u,
+                c_norm,
+            }
+        })
+        .collect()
+}
+
+/// Number of singular values above `relative_tolerance` times the largest.
+#[must_use]
+pub fn rank(singular_values: &DVector<f64>, relative_tolerance: f64) -> usize {
+    let largest = singular_values.iter().copied().fold(0.0, f64::max);
+    singular_values
+        .iter()
+        .filter(|&&s| s > relative_tolerance * largest)
+        .count()
+}
+
+/// Minimum-norm least squares by the pseudo-inverse: singular values at or below
+/// `relative_tolerance` times the largest are treated as zero.
+#[must_use]
+pub fn solve_least_squares(
+    a: &DMatrix<f64>,
+    b: &DVector<f64>,
+    relative_tolerance: f64,
+) -> LeastSquares {
+    let Svd { u, s, v } = svd(a);
+    let rank = rank(&s, relative_tolerance);
+    let mut y = u.tr_mul(b);
+    for i in 0..y.len() {
+        y[i] = if i < rank { y[i] / s[i] } else { 0.0 };
+    }
+    LeastSquares {
+        x: v * y,
+        rank,
+        singular_values: s,
+    }
+}
+
+/// One-sided Jacobi (Hestenes) on an n × n column-major matrix `a`: on return `a` holds U, `v` V.
+fn one_sided_jacobi(a: &mut [f64], v: &mut [f64], s: &mut [f64], n: usize) {
+    // Scale to avoid overflow and underflow of the squared norms.
+    let scale = a.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    if scale == 0.0 || !scale.is_finite() {
+        complete_basis(a, n, 0);
+        s.fill(if scale == 0.0 { 0.0 } else { f64::NAN });
+        return;
+    }
+    a.iter_mut().for_each(|x| *x /= scale);
+    let threshold = f64::EPSILON;
+    for _ in 0..MAX_SWEEPS {
+        let mut rotated = false;
+        for p in 0..n {
+            for q in p + 1..n {
+                let (mut alpha, mut beta, mut gamma) = (0.0, 0.0, 0.0);
+                for k in 0..n {
+                    let (x, y) = (a[p * n + k], a[q * n + k]);
+                    alpha += x * x;
+                    beta += y * y;
+                    gamma += x * y;
+                }
+                // Underflowing columns are zero columns.
+                if gamma == 0.0
+                    || gamma.abs() <= threshold * (alpha * beta).sqrt()
+                    || alpha * beta == 0.0
+                {
+                    continue;
+                }
+                rotated = true;
+                let zeta = (beta - alpha) / (2.0 * gamma);
+                let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
+                let c = 1.0 / t.hypot(1.0);
+                rotate(a, p, q, n, c, c * t);
+                rotate(v, p, q, n, c, c * t);
+            }
+        }
+        if !rotated {
+            break;
+        }
+    }
+    for j in 0..n {
+        s[j] = (0..n)
+            .map(|k| a[j * n + k] * a[j * n + k])
+            .sum::<f64>()
+            .sqrt();
+    }
+    sort_descending(a, v, s, n);
+    let smallest_meaningful = s[0] * f64::EPSILON * n as f64;
+    let mut independent = n;
+    for j in 0..n {
+        if s[j] <= smallest_meaningful {
+            independent = j;
+            break;
+        }
+        for k in 0..n {
+            a[j * n + k] /= s[j];
+        }
+    }
+    complete_basis(a, n, independent);
+    s.iter_mut().for_each(|x| *x *= scale);
+}
+
+/// Columns p and q ← (c p − s q, s p + c q).
+fn rotate(a: &mut [f64], p: usize, q: usize, n: usize, c: f64, s: f64) {
+    for k in 0..n {
+        let (x, y) = (a[p * n + k], a[q * n + k]);
+        a[p * n + k] = c * x - s * y;
+        a[q * n + k] = s * x + c * y;
+    }
+}
+
+fn sort_descending(a: &mut [f64], v: &mut [f64], s: &mut [f64], n: usize) {
+    for i in 0..n {
+        let largest = (i..n).fold(i, |best, j| if s[j] > s[best] { j } else { best });
+        if largest != i {
+            s.swap(i, largest);
+            for k in 0..n {
+                a.swap(i * n + k, largest * n + k);
+                v.swap(i * n + k, largest * n + k);
+            }
+        }
+    }
+}
+
+/// Replaces columns `from..n` of `a` by unit vectors orthogonal to all others (Gram–Schmidt, twice).
+fn complete_basis(a: &mut [f64], n: usize, from: usize) {
+    for j in from..n {
+        let mut best = (0.0, 0);
+        for axis in 0..n {
+            // Squared norm of e_axis outside the span of the columns before j.
+            let inside: f64 = (0..j).map(|c| a[c * n + axis] * a[c * n + axis]).sum();
+            if 1.0 - inside > best.0 {
+                best = (1.0 - inside, axis);
+            }
+        }
+        for k in 0..n {
+            a[j * n + k] = if k == best.1 { 1.0 } else { 0.0 };
+        }
+        for _ in 0..2 {
+            for c in 0..j {
+                let dot: f64 = (0..n).map(|k| a[c * n + k] * a[j * n + k]).sum();
+                for k in 0..n {
+                    a[j * n + k] -= dot * a[c * n + k];
+                }
+            }
+            let norm = (0..n)
+                .map(|k| a[j * n + k] * a[j * n + k])
+                .sum::<f64>()
+                .sqrt();
+            for k in 0..n {
+                a[j * n + k] /= norm;
+            }
+        }
+    }
+}
+
+/// Cyclic Jacobi on a symmetric column-major matrix; eigenvalues ascending into `values`.
+fn cyclic_jacobi(a: &mut [f64], v: &mut [f64], values: &mut [f64], n: usize) {
+    // The lower triangle is authoritative.
+    for j in 0..n {
+        for i in 0..j {
+            a[j * n + i] = a[i * n + j];
+        }
+    }
+    for _ in 0..MAX_SWEEPS {
+        let mut rotated = false;
+        for p in 0..n {
+            for q in p + 1..n {
+                let off = a[p * n + q];
+                let (app, aqq) = (a[p * n + p], a[q * n + q]);
+                // Relative to both diagonal entries: keeps small eigenvalues of graded matrices.
+                if off == 0.0 || off.abs() <= f64::EPSILON * 0.5 * (app * aqq).abs().sqrt() {
+                    continue;
+                }
+                if off.abs() < f64::MIN_POSITIVE / f64::EPSILON {
+                    continue;
+                }
+                rotated = true;
+                let theta = (aqq - app) / (2.0 * off);
+                let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
+                let c = 1.0 / t.hypot(1.0);
+                let s = c * t;
+                rotate(a, p, q, n, c, s);
+                for k in 0..n {
+                    let (x, y) = (a[k * n + p], a[k * n + q]);
+                    a[k * n + p] = c * x - s * y;
+                    a[k * n + q] = s * x + c * y;
+                }
+                a[p * n + q] = 0.0;
+                a[q * n + p] = 0.0;
+                rotate(v, p, q, n, c, s);
+            }
+        }
+        if !rotated {
+            break;
+        }
+    }
+    for i in 0..n {
+        values[i] = a[i * n + i];
+    }
+    for i in 0..n {
+        let smallest = (i..n).fold(i, |best, j| if values[j] < values[best] { j } else { best });
+        if smallest != i {
+            values.swap(i, smallest);
+            for k in 0..n {
+                v.swap(i * n + k, smallest * n + k);
+            }
+        }
+    }
+}
