@@ -1,1 +1,35 @@
 //! Robot model and forward kinematics from a URDF; edits of the URDF's text.
+//!
+//! A URDF is a tree of links. Joint `j` hangs `child` on `parent`; at position `q_j` (rad or m)
+//!
+//! ```text
+//! parent_from_child(q_j) = parent_from_joint · motion(q_j)                                    (1)
+//! parent_from_joint      = Trans(x, y, z) · Rz(yaw) · Ry(pitch) · Rx(roll)                    (2)
+//! motion(q)              = Rot(axis, q) | Trans(q · axis) | 1     revolute | prismatic | fixed
+//! q_j                    = multiplier · q_source + offset         where joint j mimics another
+//! root_from_link         = ∏ parent_from_child(q_j) along the path from the root to the link  (3)
+//! ```
+//!
+//! (2) is the URDF's `<origin xyz rpy>`: fixed-axis X-Y-Z angles. `parent_from_joint` is what a
+//! calibration corrects, so the way back, from a rotation to three decimals in a text, has to be
+//! exact as well: see [`rpy`].
+//!
+//! The file is text that we were lent : attribute values are exchanged by their byte range, and every other
+//! byte (comments, quotes, order, line endings) stays. `revert` gives the original bytes back.
+//!
+//! What this crate does **not** do: it opens no mesh (`package://` stays a text), expands no xacro,
+//! and knows no closed kinematic loops.
+
+pub mod error;
+pub mod kinematics;
+pub mod model;
+pub mod nearest;
+pub mod read;
+pub mod rpy;
+pub mod source;
+
+pub use error::{Place, Problem, ReadError, ReadProblem};
+pub use model::{
+    Inertial, Joint, JointId, JointKind, JointLimits, Link, LinkId, Mimic, MimicLaw, RobotModel,
+    UnknownName,
+};
