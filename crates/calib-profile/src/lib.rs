@@ -1,1 +1,52 @@
-//! Robot profiles: YAML to a checked profile in SI units.
+//! Robot profiles: from the YAML a person writes to a checked profile in SI units.
+//!
+//! ```text
+//! robots/x.yaml ── parse ──► RawProfile ── check (against the robot's links and joints) ──► Profile
+//! ```
+//!
+//! [`RawProfile`](raw::RawProfile) is what was written: units in key names, unknown keys refused.
+//! [`Profile`] is what the program needs: m, rad, ids of the robot model, every cross reference resolved.
+//! Neither stage opens another file. Every problem is reported with file, line and caret, what was found and
+//! what was expected; the check collects all of them rather than stopping at the first.
+//!
+//! What this crate does not check: whether recordings hold what the profile asks of them.
+
+mod check;
+mod error;
+mod locate;
+mod profile;
+pub mod raw;
+mod schema;
+mod units;
+
+pub use check::check;
+pub use error::{Problem, ProfileError};
+pub use locate::Place;
+pub use profile::{
+    Body, BodyKind, Error3, Free, JointException, JointFree, JointFreedom, Limits, LinkTransform,
+    Loop, Method, Noise, Orientation, Origin, OriginFreedom, Outputs, PointChoice, Prior, Profile,
+    Protocol, RecordingSpec, SimErrors, SimMount, SimNoise, Simulation, Solve, Steps, SweptAxis,
+    Tracker, Usage,
+};
+pub use schema::json_schema;
+
+use error::from_yaml;
+use raw::RawProfile;
+
+/// Reads the YAML text of a profile; `file` is its name in messages.
+///
+/// # Errors
+/// [`ProfileError`] with line, caret and the nearest valid word.
+pub fn parse(text: &str, file: &str) -> Result<RawProfile, ProfileError> {
+    /// A profile is written by hand; anything larger is another kind of file.
+    const LARGEST: usize = 1 << 20;
+    if text.len() > LARGEST {
+        let problem = Problem::new(
+            None,
+            format!("{} bytes are no profile", text.len()),
+            "give the YAML profile, not a recording; profiles have at most 1 MiB",
+        );
+        return Err(ProfileError::new(file, "", vec![problem]));
+    }
+    serde_saphyr::from_str(text).map_err(|error| from_yaml(&error, text, file))
+}

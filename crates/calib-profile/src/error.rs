@@ -1,0 +1,152 @@
+//! Messages about a profile: file, line, caret, what was found, what was expected.
+
+use std::fmt;
+
+use calib_urdf::nearest::nearest;
+
+use crate::locate::Place;
+
+/// One problem.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Problem {
+    /// Where in the text, when it has one place.
+    pub place: Option<Place>,
+    /// What was found.
+    pub finding: String,
+    /// What to do about it.
+    pub remedy: String,
+}
+
+impl Problem {
+    /// A problem at a place.
+    pub fn new(
+        place: Option<Place>,
+        finding: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self {
+            place,
+            finding: finding.into(),
+            remedy: remedy.into(),
+        }
+    }
+}
+
+/// Everything that is wrong with one profile.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProfileError {
+    file: String,
+    lines: Vec<String>,
+    /// The problems, in the order of the text.
+    pub problems: Vec<Problem>,
+}
+
+impl ProfileError {
+    pub(crate) fn new(file: &str, text: &str, mut problems: Vec<Problem>) -> Self {
+        problems.sort_by_key(|p| p.place);
+        Self {
+            file: file.to_owned(),
+            lines: text.lines().map(str::to_owned).collect(),
+            problems,
+        }
+    }
+}
+
+impl std::error::Error for ProfileError {}
+
+impl fmt::Display for ProfileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, problem) in self.problems.iter().enumerate() {
+            if i > 0 {
+                writeln!(f)?;
+            }
+            match problem.place {
+                Some(place) => {
+                    write!(
+                        f,
+                        "{}:{}:{}: {}",
+                        self.file, place.line, place.column, problem.finding
+                    )?;
+                    if let Some(line) = self.lines.get(place.line.saturating_sub(1)) {
+                        let number = place.line.to_string();
+                        write!(f, "\n{number} | {line}")?;
+                        let caret = " ".repeat(place.column.saturating_sub(1));
+                        write!(f, "\n{:width$} | {caret}^", "", width = number.len())?;
+                    }
+                }
+                None => write!(f, "{}: {}", self.file, problem.finding)?,
+            }
+            if !problem.remedy.is_empty() {
+                write!(f, "\n  help: {}", problem.remedy)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// `a, b or c`.
+pub(crate) fn one_of<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
+    let names: Vec<String> = names
+        .into_iter()
+        .map(|n| format!("`{}`", n.as_ref()))
+        .collect();
+    match names.split_last() {
+        None => "nothing".to_owned(),
+        Some((only, [])) => only.clone(),
+        Some((last, rest)) => format!("{} or {last}", rest.join(", ")),
+    }
+}
+
+/// `did you mean …? expected one of …`, the nearest word first.
+pub(crate) fn expected<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    if known.is_empty() {
+        return "the profile declares none".to_owned();
+    }
+    match nearest(wrong, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`? known: {}", one_of(&known)),
+        None => format!("expected {}", one_of(&known)),
+    }
+}
+
+pub(crate) fn from_yaml(error: &serde_saphyr::Error, text: &str, file: &str) -> ProfileError {
+    use serde_saphyr::Error as Yaml;
+    let error = error.without_snippet();
+    let place = error.location().filter(|at| at.line() > 0).map(|at| Place {
+        line: at.line() as usize,
+        column: at.column() as usize,
+    });
+    let (finding, remedy) = match error {
+        Yaml::SerdeUnknownField {
+            field,
+            expected: known,
+            ..
+        } => (
+            format!("unknown key `{field}`"),
+            expected(field, known.iter().copied()),
+        ),
+        Yaml::SerdeUnknownVariant {
+            variant,
+            expected: known,
+            ..
+        } => (
+            format!("unknown word `{variant}`"),
+            expected(variant, known.iter().copied()),
+        ),
+        Yaml::SerdeMissingField { field, .. } => (
+            format!("the key `{field}` is missing here"),
+            format!("add `{field}: …`"),
+        ),
+        other => {
+            let full = other.to_string();
+            (
+                full.lines()
+                    .next()
+                    .unwrap_or("not readable as YAML")
+                    .to_owned(),
+                String::new(),
+            )
+        }
+    };
+    ProfileError::new(file, text, vec![Problem::new(place, finding, remedy)])
+}

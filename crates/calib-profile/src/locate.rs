@@ -1,0 +1,157 @@
+//! Where in the YAML text a key or value stands.
+
+use std::fmt;
+
+use serde::Deserialize;
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_saphyr::Spanned;
+
+/// A 1-based place in the text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Place {
+    /// Line, from 1.
+    pub line: usize,
+    /// Column, from 1.
+    pub column: usize,
+}
+
+/// The places of every key and value of a YAML document.
+pub struct Places(Option<Tree>);
+
+impl Places {
+    /// Reads the structure; a text that is no YAML has no places.
+    #[must_use]
+    pub fn of(text: &str) -> Self {
+        Self(serde_saphyr::from_str::<Tree>(text).ok())
+    }
+
+    /// Place of the value at `path` (keys, or list positions as decimal numbers); the nearest enclosing one
+    /// when the path ends early.
+    #[must_use]
+    pub fn value(&self, path: &[&str]) -> Option<Place> {
+        let mut tree = self.0.as_ref()?;
+        for step in path {
+            match tree.child(step) {
+                Some(child) => tree = child,
+                None => break,
+            }
+        }
+        Some(tree.place)
+    }
+
+    /// Place of the last key of `path`.
+    #[must_use]
+    pub fn key(&self, path: &[&str]) -> Option<Place> {
+        let (last, parents) = path.split_last()?;
+        let mut tree = self.0.as_ref()?;
+        for step in parents {
+            tree = tree.child(step)?;
+        }
+        match &tree.kind {
+            Kind::Map(entries) => entries
+                .iter()
+                .find(|e| e.0.value == **last)
+                .map(|e| place_of(&e.0)),
+            _ => None,
+        }
+    }
+}
+
+struct Tree {
+    place: Place,
+    kind: Kind,
+}
+
+enum Kind {
+    Leaf,
+    List(Vec<Tree>),
+    Map(Vec<(Spanned<String>, Tree)>),
+}
+
+impl Tree {
+    fn child(&self, step: &str) -> Option<&Self> {
+        match &self.kind {
+            Kind::Leaf => None,
+            Kind::List(items) => items.get(step.parse::<usize>().ok()?),
+            Kind::Map(entries) => entries.iter().find(|e| e.0.value == step).map(|e| &e.1),
+        }
+    }
+}
+
+fn place_of<T>(spanned: &Spanned<T>) -> Place {
+    let at = &spanned.referenced;
+    Place {
+        line: at.line() as usize,
+        column: at.column() as usize,
+    }
+}
+
+impl<'de> Deserialize<'de> for Tree {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = Spanned::<Kind>::deserialize(deserializer)?;
+        Ok(Self {
+            place: place_of(&spanned),
+            kind: spanned.value,
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Kind {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(KindVisitor)
+    }
+}
+
+struct KindVisitor;
+
+impl<'de> Visitor<'de> for KindVisitor {
+    type Value = Kind;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("any YAML value")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Kind, A::Error> {
+        let mut entries = Vec::new();
+        while let Some(entry) = map.next_entry()? {
+            entries.push(entry);
+        }
+        Ok(Kind::Map(entries))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Kind, A::Error> {
+        let mut items = Vec::new();
+        while let Some(item) = seq.next_element()? {
+            items.push(item);
+        }
+        Ok(Kind::List(items))
+    }
+
+    fn visit_bool<E>(self, _: bool) -> Result<Kind, E> {
+        Ok(Kind::Leaf)
+    }
+
+    fn visit_i64<E>(self, _: i64) -> Result<Kind, E> {
+        Ok(Kind::Leaf)
+    }
+
+    fn visit_u64<E>(self, _: u64) -> Result<Kind, E> {
+        Ok(Kind::Leaf)
+    }
+
+    fn visit_f64<E>(self, _: f64) -> Result<Kind, E> {
+        Ok(Kind::Leaf)
+    }
+
+    fn visit_str<E>(self, _: &str) -> Result<Kind, E> {
+        Ok(Kind::Leaf)
+    }
+
+    fn visit_unit<E>(self) -> Result<Kind, E> {
+        Ok(Kind::Leaf)
+    }
+
+    fn visit_none<E>(self) -> Result<Kind, E> {
+        Ok(Kind::Leaf)
+    }
+}

@@ -1,0 +1,418 @@
+//! The profile as the program needs it: SI, ids, every reference resolved.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use calib_recording::ColumnMap;
+use calib_urdf::{JointId, LinkId};
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
+
+pub use crate::raw::{
+    RawFree as Free, RawJointFree as JointFree, RawMethod as Method, RawUse as Usage,
+};
+
+/// A checked profile. Lengths m, angles rad, torques N m.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// Name of the robot in reports.
+    pub robot: String,
+    /// URDF file, relative to the profile.
+    pub urdf: String,
+    /// The tracker.
+    pub tracker: Tracker,
+    /// Tracking bodies by name.
+    pub bodies: BTreeMap<String, Body>,
+    /// Recordings by name.
+    pub recordings: BTreeMap<String, RecordingSpec>,
+    /// Unknown transforms by name.
+    pub origins: BTreeMap<String, Origin>,
+    /// Transforms between links to report, by name.
+    pub transforms: BTreeMap<String, LinkTransform>,
+    /// Loop closures by name.
+    pub loops: BTreeMap<String, Loop>,
+    /// How to solve.
+    pub solve: Solve,
+    /// What is written.
+    pub outputs: Outputs,
+    /// How to simulate, when the profile says.
+    pub simulate: Option<Simulation>,
+}
+
+/// The tracker and what its maker states about its noise (standard deviations).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tracker {
+    /// Name of its world frame.
+    pub frame: String,
+    /// One marker coordinate, m.
+    pub marker_sigma: Option<f64>,
+    /// One coordinate of a body's position, m.
+    pub body_sigma: Option<f64>,
+    /// A body's orientation about each axis, rad.
+    pub body_sigma_rad: Option<f64>,
+}
+
+/// A tracking body on a link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Body {
+    /// The link that carries it.
+    pub link: LinkId,
+    /// What is recorded of it.
+    pub kind: BodyKind,
+    /// `link_from_body` where known by construction.
+    pub mount: Option<Isometry3<f64>>,
+}
+
+/// What is recorded of a tracking body.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BodyKind {
+    /// Markers, in the order that defines the body frame; with their positions in it (m) where known.
+    Markers {
+        /// Names as in the recordings.
+        names: Vec<String>,
+        /// Positions in the body frame, one per name, m.
+        template: Option<Vec<Point3<f64>>>,
+    },
+    /// Poses of the body.
+    Pose,
+}
+
+/// A recording and what it is for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordingSpec {
+    /// File, relative to the profile.
+    pub file: String,
+    /// What it is for.
+    pub usage: Usage,
+    /// Range asked of each moved joint, rad or m, lower first.
+    pub ranges: BTreeMap<JointId, (f64, f64)>,
+    /// Joints that stood still and are not in the file, rad or m.
+    pub hold: BTreeMap<JointId, f64>,
+    /// Text column that groups the poses.
+    pub group: Option<String>,
+    /// Meaning of columns that do not follow our own names.
+    pub columns: Option<ColumnMap>,
+}
+
+/// An unknown transform `body_from_joint`, the joint's frame being that of its child link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Origin {
+    /// The joint.
+    pub joint: JointId,
+    /// Link whose frame is reported, fixed to the joint's child link (the child link itself by default).
+    pub link: LinkId,
+    /// The body that moves with it.
+    pub body: String,
+    /// The recording that sweeps it.
+    pub sweep: String,
+    /// Center estimator, by id.
+    pub center: String,
+    /// Axis estimator, by id.
+    pub axis: String,
+    /// The swept joints, proximal first.
+    pub axes: Vec<SweptAxis>,
+    /// Where the orientation comes from.
+    pub orientation: Orientation,
+    /// With one axis only: which point of the line is the origin.
+    pub point: Option<PointChoice>,
+}
+
+/// A swept joint and the direction it turns about in the origin's joint frame at the zero position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SweptAxis {
+    /// The joint.
+    pub joint: JointId,
+    /// Unit direction in the joint frame of the origin, at the zero position of all joints.
+    pub direction: Unit<Vector3<f64>>,
+}
+
+/// Where the orientation of an origin comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Orientation {
+    /// From the axes of rotation.
+    Axes,
+    /// Taken from the URDF relative to the link that carries this body: an assumption.
+    FromBody(String),
+}
+
+/// The point that is called the origin where only a line is observable.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PointChoice {
+    /// The foot of the other origin's center on the axis, moved along it by the URDF's nominal distance.
+    NominalDistanceFrom(String),
+    /// The foot of the body's origin on the axis, moved along it by this distance, m.
+    FromBody(f64),
+}
+
+/// A transform between two links at the zero position of all joints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LinkTransform {
+    /// Link in whose frame it is expressed.
+    pub parent: LinkId,
+    /// Link whose frame it is.
+    pub child: LinkId,
+    /// Fixed joint that takes up the difference with `method: paper`.
+    pub correct: Option<JointId>,
+}
+
+/// Two origins measured by the tracker against forward kinematics.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Loop {
+    /// Reference origin.
+    pub from: String,
+    /// Measured origin.
+    pub to: String,
+    /// Recording; all validation recordings when absent.
+    pub recording: Option<String>,
+}
+
+/// How to solve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solve {
+    /// Closed forms or maximum likelihood.
+    pub method: Method,
+    /// What is free for all moved joints.
+    pub free: BTreeSet<Free>,
+    /// Exceptions by joint.
+    pub joints: BTreeMap<JointId, JointException>,
+    /// Prior standard deviations.
+    pub prior: Prior,
+    /// Noise levels.
+    pub noise: Noise,
+    /// Detect and remove outliers and swapped markers.
+    pub robust: bool,
+    /// Limits of the verdict.
+    pub limits: Limits,
+}
+
+/// What one joint does differently.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct JointException {
+    /// What is free, instead of the general list.
+    pub free: Option<BTreeSet<JointFree>>,
+    /// Prior of its position numbers, m.
+    pub sigma_m: Option<f64>,
+    /// Prior of its angle numbers, rad.
+    pub sigma_rad: Option<f64>,
+    /// Joints whose motion it follows by an unknown share.
+    pub coupled_to: Vec<JointId>,
+}
+
+/// How much of a joint origin is free.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OriginFreedom {
+    /// Held at the URDF's value.
+    Held,
+    /// The axis line: two tilts, two shifts.
+    Axis,
+    /// All six numbers.
+    Full,
+}
+
+/// What is free of one joint, with its priors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointFreedom {
+    /// Its origin.
+    pub origin: OriginFreedom,
+    /// Zero offset.
+    pub offset: bool,
+    /// Gain.
+    pub gain: bool,
+    /// First-harmonic eccentricity.
+    pub eccentricity: bool,
+    /// Compliance about the axis.
+    pub compliance: bool,
+    /// Compliance across the axis.
+    pub lateral_compliance: bool,
+    /// Joints whose motion it follows.
+    pub coupled_to: Vec<JointId>,
+    /// Prior of position numbers, m.
+    pub position_sigma: f64,
+    /// Prior of orientation numbers, rad.
+    pub angle_sigma: f64,
+    /// Prior of the zero offset, rad (or m for a prismatic joint).
+    pub offset_sigma: f64,
+}
+
+impl Solve {
+    /// What is free of `joint`; `moved` tells whether the fitted recordings move it, `slides` whether it is prismatic.
+    #[must_use]
+    pub fn freedom(&self, joint: JointId, moved: bool, slides: bool) -> JointFreedom {
+        let exception = self.joints.get(&joint).cloned().unwrap_or_default();
+        let general = |free: Free| moved && self.free.contains(&free);
+        let has = |own: JointFree, all: Free| match &exception.free {
+            Some(list) => list.contains(&own),
+            None => general(all),
+        };
+        let origin = if has(JointFree::Origin, Free::JointOrigins) {
+            OriginFreedom::Full
+        } else if has(JointFree::Axis, Free::JointAxes) {
+            OriginFreedom::Axis
+        } else {
+            OriginFreedom::Held
+        };
+        let offset_prior = if slides {
+            self.prior.offset_m
+        } else {
+            self.prior.offset_rad
+        };
+        JointFreedom {
+            origin,
+            offset: has(JointFree::Offset, Free::JointOffsets),
+            gain: has(JointFree::Gain, Free::JointGains),
+            eccentricity: has(JointFree::Eccentricity, Free::Eccentricity),
+            compliance: has(JointFree::Compliance, Free::Compliance),
+            lateral_compliance: has(JointFree::LateralCompliance, Free::LateralCompliance),
+            coupled_to: exception.coupled_to,
+            position_sigma: exception.sigma_m.unwrap_or(self.prior.position),
+            angle_sigma: exception.sigma_rad.unwrap_or(self.prior.angle),
+            offset_sigma: if slides {
+                exception.sigma_m
+            } else {
+                exception.sigma_rad
+            }
+            .unwrap_or(offset_prior),
+        }
+    }
+}
+
+/// Prior standard deviations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// Position numbers of joint origins, m.
+    pub position: f64,
+    /// Orientation numbers of joint origins, rad.
+    pub angle: f64,
+    /// Zero offsets of revolute joints, rad.
+    pub offset_rad: f64,
+    /// Zero offsets of prismatic joints, m.
+    pub offset_m: f64,
+    /// Gains and couplings, 1.
+    pub gain: f64,
+    /// Eccentricity, rad.
+    pub eccentricity: f64,
+    /// Compliance, rad per N m.
+    pub compliance: f64,
+}
+
+/// Noise levels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Joint angle from pose to pose, rad.
+    pub joint: Option<f64>,
+    /// Take stated levels as true.
+    pub known: bool,
+}
+
+/// Limits of the verdict.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Limits {
+    /// rms position error on held-out poses, m.
+    pub held_out_rms: Option<f64>,
+    /// Largest position error on held-out poses, m.
+    pub held_out_max: Option<f64>,
+    /// Mean translation error by loop, m.
+    pub loop_mean: BTreeMap<String, f64>,
+    /// Standard deviation of an origin's observable position, m.
+    pub origin_sigma: Option<f64>,
+}
+
+/// What is written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Outputs {
+    /// Patched URDF.
+    pub urdf: String,
+    /// Scene.
+    pub scene: String,
+    /// Bodies added to the patched URDF.
+    pub add_bodies: Vec<String>,
+}
+
+/// How to simulate recordings with known truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulation {
+    /// Seed.
+    pub seed: u64,
+    /// `tracker_from_root`.
+    pub tracker_from_root: Isometry3<f64>,
+    /// Nominal mounts by body.
+    pub mounts: BTreeMap<String, SimMount>,
+    /// Differences between the true robot and its description.
+    pub errors: SimErrors,
+    /// Measurement noise.
+    pub noise: SimNoise,
+    /// Protocol by recording.
+    pub recordings: BTreeMap<String, Protocol>,
+}
+
+/// A simulated mount.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimMount {
+    /// `link_from_body`.
+    pub link_from_body: Isometry3<f64>,
+    /// Markers in the body frame, m.
+    pub markers: BTreeMap<String, Point3<f64>>,
+}
+
+/// Position and angle standard deviations, m and rad.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Error3 {
+    /// m.
+    pub position: f64,
+    /// rad.
+    pub angle: f64,
+}
+
+/// Differences between the true robot and its description (standard deviations, or exact where said).
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SimErrors {
+    /// Zero offsets, rad.
+    pub joint_offset: f64,
+    /// Axis lines.
+    pub axis: Error3,
+    /// Mounts.
+    pub mount: Error3,
+    /// Exact right-hand changes of fixed joints' origins.
+    pub fixed: BTreeMap<JointId, Isometry3<f64>>,
+    /// Exact compliance, rad per N m.
+    pub compliance: BTreeMap<JointId, f64>,
+}
+
+/// Measurement noise, standard deviations.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SimNoise {
+    /// One marker coordinate, m.
+    pub marker: f64,
+    /// A body's pose.
+    pub body: Error3,
+    /// A joint, rad.
+    pub joint: f64,
+    /// Share of lost samples.
+    pub occluded: f64,
+}
+
+/// The poses of one simulated recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Protocol {
+    /// Grid joints; the last varies fastest.
+    pub grid: Vec<(JointId, Steps)>,
+    /// Random joints and ranges, rad or m.
+    pub random: BTreeMap<JointId, (f64, f64)>,
+    /// Number of random poses.
+    pub poses: usize,
+    /// One group of all poses per value of this joint.
+    pub repeat_at: Option<(JointId, Vec<f64>)>,
+    /// Held joints.
+    pub hold: BTreeMap<JointId, f64>,
+    /// Bodies in view.
+    pub bodies: Vec<String>,
+}
+
+/// Equal steps, ends included, rad or m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steps {
+    /// First.
+    pub from: f64,
+    /// Last.
+    pub to: f64,
+    /// How many.
+    pub poses: usize,
+}
