@@ -1,1 +1,42 @@
-//! The canonical recording, readers for what laboratories have, data checks.
+//! Recordings: what trackers and robots write, brought into one form, and checked before anything is fitted.
+//!
+//! A recording is a set of streams, each sampled at instants `t_i` of its own clock:
+//!
+//! ```text
+//! joints   q_i ∈ R (rad, m)              torques  τ_i (N·m)
+//! markers  p_i ∈ R³ (m)                  bodies   tracker_from_body_i ∈ SE(3)
+//! ```
+//!
+//! Every sample may be lost, and lost is a state of its own: no zeros, no NaN. Files of static poses have one row
+//! per pose and no useful time; [`Poses`] is that table. Bodies are read as such, or computed from three or more
+//! markers whose arrangement `m_k` is learned from the data ([`rigid_body`]):
+//!
+//! ```text
+//! min over m, {R_i, t_i}   Σ_i Σ_{k seen at i} ‖ R_i m_k + t_i − p_ik ‖²                  (1)
+//! ```
+//!
+//! Readers ([`readers`]) convert to SI and write down what they converted; errors name file, line and column.
+//! What no reader can know: whether a marker's name is on the right marker, or two clocks on the same second.
+
+mod column_map;
+mod error;
+mod finding;
+mod model;
+mod poses;
+pub mod readers;
+pub mod rigid_body;
+mod table;
+mod text;
+mod units;
+
+pub use column_map::{BodyColumns, ColumnMap, Delimiter, LongColumns, PRESETS, TimeColumn};
+pub use error::{At, Error, Problem, nearest_word};
+pub use finding::{Finding, Severity};
+pub use model::{
+    BodyStream, Filled, JointStream, JointUnit, MarkerSample, MarkerStream, Meta, Recording,
+    Timeline, TorqueStream,
+};
+pub use poses::{NotOneTable, Poses};
+pub use readers::{ReadOptions, read_bytes, read_path};
+pub use table::{NotWritten, WriteOptions, write_poses};
+pub use units::{AngleUnit, LengthUnit, TimeUnit};

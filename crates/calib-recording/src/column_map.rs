@@ -1,0 +1,248 @@
+//! A column map: what the columns of somebody else's table mean. The profile embeds it under a recording.
+
+use crate::units::{AngleUnit, LengthUnit, TimeUnit};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Meaning of the columns of a delimited table whose header does not follow our own rules.
+///
+/// Columns that the map does not mention are read by our own rules when their names follow them, and are
+/// otherwise ignored (and listed in the report).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ColumnMap {
+    /// Start from a known log and change what else is given: `ur_rtde`, `franka`, `ndi`, `vive`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub preset: Option<String>,
+    /// What separates the cells; found from the header line when not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delimiter: Option<Delimiter>,
+    /// Lines above the header line that are not part of the table.
+    pub skip_lines: u64,
+    /// Column names, for a table without a header line (or with a useless one: count it in `skip_lines`).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub names: Vec<String>,
+    /// Numbers are written `1,5`.
+    pub decimal_comma: bool,
+    /// Unit of joint angles, rotation vectors and Euler angles in the mapped columns.
+    pub angles: AngleUnit,
+    /// Unit of positions and prismatic joints in the mapped columns.
+    pub lengths: LengthUnit,
+    /// The column of time, and its unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<TimeColumn>,
+    /// Revolute joints: joint name → column.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub joints: BTreeMap<String, String>,
+    /// Columns that are revolute joints and have the joint's own name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub joint_columns: Vec<String>,
+    /// Prismatic joints: joint name → column.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub prismatic: BTreeMap<String, String>,
+    /// Joint torques in N·m: joint name → column.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub torques: BTreeMap<String, String>,
+    /// Markers: marker name → its x, y and z column.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub markers: BTreeMap<String, [String; 3]>,
+    /// Bodies: body name → its position and rotation columns.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub bodies: BTreeMap<String, BodyColumns>,
+    /// One row per body or marker and frame, its name in a column.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub long: Option<LongColumns>,
+    /// Text columns to keep, e.g. `trial`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub labels: Vec<String>,
+    /// Cell texts that mean *lost*, besides an empty cell and `NaN`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<String>,
+    /// A marker at exactly (0, 0, 0) is a measured point, not a lost one.
+    pub zero_is_a_point: bool,
+}
+
+/// What separates cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Delimiter {
+    /// `,`
+    Comma,
+    /// `;`
+    Semicolon,
+    /// Tab.
+    Tab,
+    /// Any run of blanks.
+    Space,
+}
+
+/// The column of time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TimeColumn {
+    /// Its name.
+    pub column: String,
+    /// Its unit.
+    #[serde(default)]
+    pub unit: TimeUnit,
+}
+
+/// Position and rotation columns of a body. Exactly one of the rotations must be given.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct BodyColumns {
+    /// Columns of x, y, z.
+    pub position: [String; 3],
+    /// Columns of a quaternion, scalar last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quaternion_xyzw: Option<[String; 4]>,
+    /// Columns of a quaternion, scalar first (NDI).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quaternion_wxyz: Option<[String; 4]>,
+    /// Columns of a rotation vector (axis times angle).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation_vector: Option<[String; 3]>,
+    /// Columns of angles about fixed x, y, z: `R = Rz(c)·Ry(b)·Rx(a)`, as URDF's rpy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fixed_xyz: Option<[String; 3]>,
+}
+
+/// A table with one row per body or marker and frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LongColumns {
+    /// Column with the name of the body or marker.
+    pub name: String,
+    /// Column with the frame number; rows of one frame stand together.
+    pub frame: String,
+    /// Columns of x, y, z of a marker.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub marker: Option<[String; 3]>,
+    /// Columns of a body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body: Option<BodyColumns>,
+}
+
+/// Names of the presets.
+pub const PRESETS: [&str; 4] = ["ur_rtde", "franka", "ndi", "vive"];
+
+impl ColumnMap {
+    /// The map of a known log; `None` when there is no such preset.
+    pub fn preset(name: &str) -> Option<ColumnMap> {
+        let text = |text: &str| text.to_string();
+        match name {
+            // record.py of UR's RTDE client: blanks, controller uptime in s, rad.
+            "ur_rtde" => Some(ColumnMap {
+                delimiter: Some(Delimiter::Space),
+                time: Some(TimeColumn {
+                    column: text("timestamp"),
+                    unit: TimeUnit::S,
+                }),
+                joints: [
+                    "shoulder_pan",
+                    "shoulder_lift",
+                    "elbow",
+                    "wrist_1",
+                    "wrist_2",
+                    "wrist_3",
+                ]
+                .iter()
+                .enumerate()
+                .map(|(i, joint)| (format!("{joint}_joint"), format!("actual_q_{i}")))
+                .collect(),
+                ..ColumnMap::default()
+            }),
+            // libfranka's logToCSV: integer ms, rad, N·m.
+            "franka" => Some(ColumnMap {
+                delimiter: Some(Delimiter::Comma),
+                time: Some(TimeColumn {
+                    column: text("time"),
+                    unit: TimeUnit::Ms,
+                }),
+                joints: (0..7)
+                    .map(|i| (format!("panda_joint{}", i + 1), format!("state.q[{i}]")))
+                    .collect(),
+                ..ColumnMap::default()
+            }),
+            // NDI combined API sample: one row per tool, scalar first, mm, `Missing`.
+            "ndi" => Some(ColumnMap {
+                delimiter: Some(Delimiter::Comma),
+                lengths: LengthUnit::Mm,
+                lost: vec![text("Missing")],
+                long: Some(LongColumns {
+                    name: text("ToolHandle"),
+                    frame: text("Frame#"),
+                    marker: None,
+                    body: Some(BodyColumns {
+                        position: [text("tx"), text("ty"), text("tz")],
+                        quaternion_wxyz: Some([text("q0"), text("qx"), text("qy"), text("qz")]),
+                        ..BodyColumns::default()
+                    }),
+                }),
+                ..ColumnMap::default()
+            }),
+            // OpenVR samples as `x,y,z,A,B,C,button,T,delta`: mm, rad, epoch ms. The order of A, B, C is not
+            // documented; fixed x-y-z is an assumption and the reader says so.
+            "vive" => Some(ColumnMap {
+                delimiter: Some(Delimiter::Comma),
+                lengths: LengthUnit::Mm,
+                time: Some(TimeColumn {
+                    column: text("T"),
+                    unit: TimeUnit::Ms,
+                }),
+                bodies: BTreeMap::from([(
+                    text("controller"),
+                    BodyColumns {
+                        position: [text("x"), text("y"), text("z")],
+                        fixed_xyz: Some([text("A"), text("B"), text("C")]),
+                        ..BodyColumns::default()
+                    },
+                )]),
+                ..ColumnMap::default()
+            }),
+            _ => None,
+        }
+    }
+
+    /// This map on top of its preset: what is given here wins, maps of the preset are replaced as a whole.
+    /// `None` when the preset does not exist.
+    pub fn resolved(&self) -> Option<ColumnMap> {
+        let Some(name) = &self.preset else {
+            return Some(self.clone());
+        };
+        let base = ColumnMap::preset(name)?;
+        let default = ColumnMap::default();
+        fn or<T: PartialEq + Clone>(given: &T, default: &T, base: &T) -> T {
+            if given == default {
+                base.clone()
+            } else {
+                given.clone()
+            }
+        }
+        Some(ColumnMap {
+            preset: None,
+            delimiter: self.delimiter.or(base.delimiter),
+            skip_lines: or(&self.skip_lines, &default.skip_lines, &base.skip_lines),
+            names: or(&self.names, &default.names, &base.names),
+            decimal_comma: self.decimal_comma || base.decimal_comma,
+            angles: or(&self.angles, &default.angles, &base.angles),
+            lengths: or(&self.lengths, &default.lengths, &base.lengths),
+            time: self.time.clone().or(base.time),
+            joints: or(&self.joints, &default.joints, &base.joints),
+            joint_columns: or(
+                &self.joint_columns,
+                &default.joint_columns,
+                &base.joint_columns,
+            ),
+            prismatic: or(&self.prismatic, &default.prismatic, &base.prismatic),
+            torques: or(&self.torques, &default.torques, &base.torques),
+            markers: or(&self.markers, &default.markers, &base.markers),
+            bodies: or(&self.bodies, &default.bodies, &base.bodies),
+            long: self.long.clone().or(base.long),
+            labels: or(&self.labels, &default.labels, &base.labels),
+            lost: or(&self.lost, &default.lost, &base.lost),
+            zero_is_a_point: self.zero_is_a_point || base.zero_is_a_point,
+        })
+    }
+}

@@ -1,0 +1,70 @@
+//! Our own tables, and any delimited table with a column map.
+
+use super::{Input, ReadOptions, Reader};
+use crate::error::{At, Placed, Problem, nearest_word};
+use crate::model::Recording;
+use crate::table::{is_canonical, read_table};
+use crate::text::{Separator, cells};
+use std::io::BufReader;
+
+pub(super) const READER: Reader = Reader {
+    id: "csv",
+    name: "table with units in the column names, or with a column map",
+    extensions: &["csv", "tsv", "txt"],
+    detect,
+    read,
+};
+
+fn detect(head: &[u8]) -> bool {
+    header_line(head).is_some_and(|line| is_canonical(cells(line, Separator::guess(line))))
+}
+
+/// The first line that is neither blank nor a comment.
+fn header_line(head: &[u8]) -> Option<&str> {
+    let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
+    let text = match std::str::from_utf8(head) {
+        Ok(text) => text,
+        Err(error) => std::str::from_utf8(&head[..error.valid_up_to()]).ok()?,
+    };
+    text.lines()
+        .find(|line| !line.trim().is_empty() && !line.starts_with('#'))
+}
+
+/// Several cells, none of them binary; or nothing but comments.
+pub(super) fn looks_like_a_table(head: &[u8]) -> bool {
+    !head.contains(&0)
+        && header_line(head).is_none_or(|line| {
+            cells(line, Separator::guess(line)).count() >= 2
+                && !line.chars().any(|c| c.is_control() && c != '\t')
+        })
+}
+
+fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
+    let map = match &options.columns {
+        None => None,
+        Some(map) => Some(map.resolved().ok_or_else(|| {
+            let id = map.preset.clone().unwrap_or_default();
+            let known = crate::column_map::PRESETS;
+            let nearest = nearest_word(&id, known);
+            (
+                At::File,
+                Problem::UnknownReader {
+                    id,
+                    known: known.join(", "),
+                    nearest,
+                },
+            )
+        })?),
+    };
+    let mut recording = read_table(BufReader::with_capacity(1 << 16, input), map.as_ref())?;
+    if options
+        .columns
+        .as_ref()
+        .and_then(|map| map.preset.as_deref())
+        == Some("vive")
+    {
+        let note = "angles A, B, C taken as turns about fixed x, y, z (the log does not say)";
+        recording.meta.conversions.push(note.to_string());
+    }
+    Ok(recording)
+}

@@ -1,0 +1,160 @@
+//! The table of readers: what a file can be, how it is recognised, how it is read.
+
+mod canonical;
+
+use crate::column_map::ColumnMap;
+use crate::error::{At, Error, Placed, Problem, in_file, nearest_word};
+use crate::model::Recording;
+use std::io::{Cursor, Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// Bytes of a file that a reader sees when it says whether it can read it.
+pub const HEAD_BYTES: usize = 16 << 10;
+
+/// A file being read: any place in it can be reached.
+pub trait Input: Read + Seek {}
+impl<T: Read + Seek> Input for T {}
+
+/// How to read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReadOptions {
+    /// Id of the reader; found from the content when `None`.
+    pub format: Option<String>,
+    /// Meaning of the columns of a table that is not ours; then the reader is the table reader.
+    pub columns: Option<ColumnMap>,
+    /// Files above this size are refused, bytes.
+    pub max_bytes: u64,
+}
+
+impl Default for ReadOptions {
+    /// Found from the content, at most 8 GiB.
+    fn default() -> Self {
+        ReadOptions {
+            format: None,
+            columns: None,
+            max_bytes: 8 << 30,
+        }
+    }
+}
+
+/// One format.
+pub struct Reader {
+    /// Stable id, as profiles name it.
+    pub id: &'static str,
+    /// Name for people.
+    pub name: &'static str,
+    /// Usual file name extensions, lower case, without dot.
+    pub extensions: &'static [&'static str],
+    /// Whether the first bytes (at most [`HEAD_BYTES`]) are this format's.
+    pub detect: fn(&[u8]) -> bool,
+    /// Reads from the start of the input.
+    pub(crate) read: ReadFn,
+}
+
+type ReadFn = fn(&mut dyn Input, &ReadOptions) -> Placed<Recording>;
+
+/// All built-in readers; the first whose `detect` says yes reads the file.
+pub fn readers() -> &'static [Reader] {
+    const READERS: &[Reader] = &[canonical::READER];
+    READERS
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// [`Error`] with the file as `path` is written, the place and the problem.
+pub fn read_path(path: &Path, options: &ReadOptions) -> Result<Recording, Error> {
+    let name = path.display().to_string();
+    let open = || -> Placed<(std::fs::File, u64)> {
+        let io = |source| (At::File, Problem::Io(source));
+        let file = std::fs::File::open(path).map_err(io)?;
+        let bytes = file.metadata().map_err(io)?.len();
+        Ok((file, bytes))
+    };
+    let (mut file, bytes) = in_file(&name, open())?;
+    if bytes > options.max_bytes {
+        return in_file(
+            &name,
+            Err((
+                At::File,
+                Problem::TooLarge {
+                    bytes,
+                    limit: options.max_bytes,
+                },
+            )),
+        );
+    }
+    read_input(&name, &mut file, options)
+}
+
+/// Reads bytes that are in memory; `name` stands in messages.
+///
+/// # Errors
+/// As [`read_path`].
+pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Recording, Error> {
+    read_input(name, &mut Cursor::new(bytes), options)
+}
+
+fn read_input(
+    name: &str,
+    input: &mut dyn Input,
+    options: &ReadOptions,
+) -> Result<Recording, Error> {
+    let mut recording = in_file(name, read_placed(input, options))?;
+    recording.meta.source = name.to_string();
+    Ok(recording)
+}
+
+fn read_placed(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
+    let io = |source| (At::File, Problem::Io(source));
+    let mut head = Vec::new();
+    input
+        .take(HEAD_BYTES as u64)
+        .read_to_end(&mut head)
+        .map_err(io)?;
+    if head.is_empty() {
+        return Err((At::File, Problem::Empty));
+    }
+    input.seek(SeekFrom::Start(0)).map_err(io)?;
+    let reader = choose(&head, options)?;
+    let mut recording = (reader.read)(input, options)?;
+    recording.meta.format = reader.id.to_string();
+    Ok(recording)
+}
+
+fn choose(head: &[u8], options: &ReadOptions) -> Placed<&'static Reader> {
+    let known = || {
+        readers()
+            .iter()
+            .map(|reader| reader.id)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    if let Some(id) = &options.format {
+        return readers()
+            .iter()
+            .find(|reader| reader.id == id)
+            .ok_or_else(|| {
+                let nearest = nearest_word(id, readers().iter().map(|reader| reader.id));
+                (
+                    At::File,
+                    Problem::UnknownReader {
+                        id: id.clone(),
+                        known: known(),
+                        nearest,
+                    },
+                )
+            });
+    }
+    if options.columns.is_some() {
+        return Ok(&canonical::READER);
+    }
+    if let Some(reader) = readers().iter().find(|reader| (reader.detect)(head)) {
+        return Ok(reader);
+    }
+    // A table with a header of text, though not of our names: read it as ours, whose message names the column.
+    if canonical::looks_like_a_table(head) {
+        return Ok(&canonical::READER);
+    }
+    Err((At::File, Problem::UnknownFormat { known: known() }))
+}

@@ -1,0 +1,220 @@
+//! The pose of a body in every row, how certain it is, and how rigid the body was.
+
+use super::learn::{MarkerFit, NotABody, Template, register};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3};
+use std::ops::AddAssign;
+
+/// One row's pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowPose {
+    /// `tracker_from_body`.
+    pub tracker_from_body: Isometry3<f64>,
+    /// Markers used.
+    pub markers: usize,
+    /// Root mean square distance of the markers from the template, m.
+    pub rms: f64,
+    /// Covariance in the body frame, `[ω; v]`, rad² and m², from [`BodyPoses::sigma`]: eq. (2) of the module.
+    /// `None` when σ is not known.
+    pub covariance: Option<Matrix6<f64>>,
+}
+
+/// Why a row has no pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WithoutPose {
+    /// Fewer than three markers were seen.
+    TooFewSeen {
+        /// Markers seen.
+        seen: usize,
+    },
+    /// Those seen lie on a line.
+    OnALine {
+        /// Markers seen.
+        seen: usize,
+    },
+}
+
+/// A body over all rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyPoses {
+    /// Where the markers sit.
+    pub template: Template,
+    /// A pose, or why there is none, for every row.
+    pub rows: Vec<Result<RowPose, WithoutPose>>,
+    /// Standard deviation of one marker coordinate, m: given, or estimated from the residuals. `None` when there
+    /// is nothing to estimate it from (three markers in one row fit exactly).
+    pub sigma: Option<f64>,
+    /// How well each marker keeps its place.
+    pub fits: Vec<MarkerFit>,
+}
+
+impl BodyPoses {
+    /// `tracker_from_body` per row; `None` where there is none.
+    pub fn track(&self) -> Vec<Option<Isometry3<f64>>> {
+        self.rows
+            .iter()
+            .map(|row| row.as_ref().ok().map(|pose| pose.tracker_from_body))
+            .collect()
+    }
+
+    /// The marker that moves on the body and by how much (m, [`MarkerFit::wandering`]), if one does by more than
+    /// `limit`.
+    pub fn moving_marker(&self, limit: f64) -> Option<(&MarkerFit, f64)> {
+        let worst = self
+            .fits
+            .iter()
+            .max_by(|a, b| a.wandering.total_cmp(&b.wandering))?;
+        (worst.wandering > limit).then_some((worst, worst.wandering))
+    }
+}
+
+/// Poses of a body from its markers' tracks (as [`Template::learn`]); the template is learned when `template` is
+/// `None`, and σ estimated when `sigma` (m, per coordinate) is `None`.
+///
+/// # Errors
+/// [`NotABody`] when the template cannot be learned or a track is missing or has another length.
+pub fn body_poses(
+    names: &[String],
+    tracks: &[&[Option<Point3<f64>>]],
+    template: Option<Template>,
+    sigma: Option<f64>,
+) -> Result<BodyPoses, NotABody> {
+    let learned = template.is_none();
+    let template = match template {
+        Some(template) => template,
+        None => Template::learn(names, tracks)?,
+    };
+    if template.points.len() != tracks.len() {
+        return Err(NotABody::TooFewMarkers { got: tracks.len() });
+    }
+    let n = tracks.iter().map(|track| track.len()).max().unwrap_or(0);
+    if let Some(i) = tracks.iter().position(|track| track.len() != n) {
+        return Err(NotABody::Length {
+            name: template.names[i].clone(),
+            got: tracks[i].len(),
+            expected: n,
+        });
+    }
+    let mut rows = Vec::with_capacity(n);
+    let mut squares = vec![0.0; tracks.len()];
+    let mut seen_rows = vec![0usize; tracks.len()];
+    let mut worst = vec![(0.0, 0usize); tracks.len()];
+    let mut freedom = if learned {
+        6.0 - 3.0 * tracks.len() as f64
+    } else {
+        0.0
+    };
+    for row in 0..n {
+        let seen: Vec<usize> = (0..tracks.len())
+            .filter(|&k| tracks[k][row].is_some())
+            .collect();
+        let from: Vec<Point3<f64>> = seen.iter().map(|&k| template.points[k]).collect();
+        let to: Vec<Point3<f64>> = seen.iter().filter_map(|&k| tracks[k][row]).collect();
+        let Some(tracker_from_body) = register(&from, &to) else {
+            let count = seen.len();
+            rows.push(Err(if count < 3 {
+                WithoutPose::TooFewSeen { seen: count }
+            } else {
+                WithoutPose::OnALine { seen: count }
+            }));
+            continue;
+        };
+        let mut sum = 0.0;
+        for ((&k, m), p) in seen.iter().zip(&from).zip(&to) {
+            let distance = (tracker_from_body * m - p).norm();
+            sum += distance * distance;
+            squares[k] += distance * distance;
+            seen_rows[k] += 1;
+            if distance > worst[k].0 {
+                worst[k] = (distance, row);
+            }
+        }
+        freedom += 3.0 * seen.len() as f64 - 6.0;
+        let information = information(&from);
+        rows.push(Ok(RowPose {
+            tracker_from_body,
+            markers: seen.len(),
+            rms: (sum / seen.len() as f64).sqrt(),
+            covariance: information.try_inverse(),
+        }));
+    }
+    let total: f64 = squares.iter().sum();
+    let sigma = sigma.or_else(|| (freedom > 0.0).then(|| (total / freedom).sqrt()));
+    for pose in rows.iter_mut().flatten() {
+        let scaled = |unit: Matrix6<f64>| sigma.map(|sigma| symmetric(unit * (sigma * sigma)));
+        pose.covariance = pose.covariance.and_then(scaled);
+    }
+    let wandering = wandering(tracks, n);
+    let fits = template
+        .names
+        .iter()
+        .enumerate()
+        .map(|(k, name)| MarkerFit {
+            name: name.clone(),
+            rows: seen_rows[k],
+            rms: (squares[k] / seen_rows[k].max(1) as f64).sqrt(),
+            worst: worst[k],
+            wandering: wandering[k],
+        })
+        .collect();
+    Ok(BodyPoses {
+        template,
+        rows,
+        sigma,
+        fits,
+    })
+}
+
+/// Σ J_kᵀ J_k with J_k = [ −[m_k]ₓ  I ].
+fn information(points: &[Point3<f64>]) -> Matrix6<f64> {
+    let mut sum = Matrix6::zeros();
+    for m in points {
+        let cross = m.coords.cross_matrix();
+        sum.fixed_view_mut::<3, 3>(0, 0)
+            .add_assign(&(cross.transpose() * cross));
+        // (−[m]ₓ)ᵀ·I = [m]ₓ
+        sum.fixed_view_mut::<3, 3>(0, 3).add_assign(&cross);
+        sum.fixed_view_mut::<3, 3>(3, 0)
+            .add_assign(&cross.transpose());
+        sum.fixed_view_mut::<3, 3>(3, 3)
+            .add_assign(&Matrix3::identity());
+    }
+    sum
+}
+
+fn symmetric(m: Matrix6<f64>) -> Matrix6<f64> {
+    (m + m.transpose()) * 0.5
+}
+
+/// For each marker the lower median, over the others, of the standard deviation of their distance.
+fn wandering(tracks: &[&[Option<Point3<f64>>]], rows: usize) -> Vec<f64> {
+    let count = tracks.len();
+    let mut deviations = vec![Vec::new(); count];
+    for i in 0..count {
+        for j in 0..i {
+            let (mut n, mut mean, mut sum) = (0.0, 0.0, 0.0);
+            for row in 0..rows {
+                if let (Some(a), Some(b)) = (tracks[i][row], tracks[j][row]) {
+                    let distance = (a - b).norm();
+                    n += 1.0;
+                    let before: f64 = distance - mean;
+                    mean += before / n;
+                    sum += before * (distance - mean);
+                }
+            }
+            if n >= 2.0 {
+                let deviation = f64::sqrt(sum / (n - 1.0));
+                deviations[i].push(deviation);
+                deviations[j].push(deviation);
+            }
+        }
+    }
+    deviations
+        .into_iter()
+        .map(|mut all: Vec<f64>| {
+            all.sort_by(f64::total_cmp);
+            all.get(all.len().saturating_sub(1) / 2)
+                .copied()
+                .unwrap_or(0.0)
+        })
+        .collect()
+}

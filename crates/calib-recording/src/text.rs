@@ -1,0 +1,304 @@
+//! Lines, cells and numbers of text files: streamed, counted, and checked as they come.
+
+use crate::error::{At, Placed, Problem, excerpt};
+use std::io::{BufRead, Read};
+
+/// Longest line that is still a table: a Nexus row with a thousand markers has about 30 kB.
+const MAX_LINE: usize = 64 << 20;
+
+/// Lines of a text file, from 1; without their ends (LF or CRLF) and without a byte order mark.
+pub(crate) struct Lines<R> {
+    input: R,
+    buffer: Vec<u8>,
+    number: u64,
+}
+
+impl<R: BufRead> Lines<R> {
+    pub(crate) fn new(input: R) -> Self {
+        Lines {
+            input,
+            buffer: Vec::new(),
+            number: 0,
+        }
+    }
+
+    /// Number of the line that [`next`](Self::next) returned last.
+    pub(crate) fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// The next line, or `None` at the end.
+    pub(crate) fn next(&mut self) -> Placed<Option<&str>> {
+        self.buffer.clear();
+        let at = At::Line(self.number + 1);
+        let read = (&mut self.input)
+            .take(MAX_LINE as u64 + 1)
+            .read_until(b'\n', &mut self.buffer)
+            .map_err(|source| (at.clone(), Problem::Io(source)))?;
+        if read == 0 {
+            return Ok(None);
+        }
+        if read > MAX_LINE {
+            return Err((at, Problem::LineTooLong { limit: MAX_LINE }));
+        }
+        self.number += 1;
+        let mut line: &[u8] = &self.buffer;
+        line = line.strip_suffix(b"\n").unwrap_or(line);
+        line = line.strip_suffix(b"\r").unwrap_or(line);
+        if self.number == 1 {
+            line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
+        }
+        match std::str::from_utf8(line) {
+            Ok(text) => Ok(Some(text)),
+            Err(error) => Err((
+                at,
+                Problem::NotUtf8 {
+                    byte: error.valid_up_to(),
+                },
+            )),
+        }
+    }
+}
+
+/// What separates cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Separator {
+    Byte(u8),
+    /// Any run of blanks and tabs; leading and trailing ones do not count.
+    Blanks,
+}
+
+impl Separator {
+    /// The one that occurs in a header line: `;` and tab win over `,`, which also occurs inside names.
+    pub(crate) fn guess(header: &str) -> Self {
+        for byte in [b';', b'\t', b','] {
+            if header.bytes().any(|b| b == byte) {
+                return Separator::Byte(byte);
+            }
+        }
+        if header.trim().contains(' ') {
+            Separator::Blanks
+        } else {
+            Separator::Byte(b',')
+        }
+    }
+}
+
+/// The cells of a line, trimmed, quotes removed.
+pub(crate) fn cells(line: &str, separator: Separator) -> Cells<'_> {
+    let rest = if separator == Separator::Blanks {
+        line.trim()
+    } else {
+        line
+    };
+    Cells {
+        rest: Some(rest),
+        separator,
+    }
+}
+
+pub(crate) struct Cells<'a> {
+    rest: Option<&'a str>,
+    separator: Separator,
+}
+
+impl<'a> Iterator for Cells<'a> {
+    type Item = &'a str;
+
+    #[inline]
+    fn next(&mut self) -> Option<&'a str> {
+        let rest = self.rest?;
+        let bytes = rest.as_bytes();
+        let (end, next) = match self.separator {
+            Separator::Byte(separator) => {
+                let from = if bytes.first() == Some(&b'"') {
+                    // A quoted cell ends at the next quote that is not doubled.
+                    let mut i = 1;
+                    while i < bytes.len() && (bytes[i] != b'"' || bytes.get(i + 1) == Some(&b'"')) {
+                        i += if bytes[i] == b'"' { 2 } else { 1 };
+                    }
+                    i
+                } else {
+                    0
+                };
+                let from = from.min(bytes.len());
+                match bytes[from..].iter().position(|&b| b == separator) {
+                    Some(offset) => (from + offset, Some(from + offset + 1)),
+                    None => (bytes.len(), None),
+                }
+            }
+            Separator::Blanks => match bytes.iter().position(u8::is_ascii_whitespace) {
+                Some(end) => {
+                    let blanks = bytes[end..]
+                        .iter()
+                        .take_while(|b| b.is_ascii_whitespace())
+                        .count();
+                    (end, Some(end + blanks))
+                }
+                None => (bytes.len(), None),
+            },
+        };
+        // Separators are ASCII, so both cuts are character borders.
+        let cell = &rest[..end];
+        self.rest = next.map(|next| &rest[next..]);
+        Some(trimmed(cell))
+    }
+}
+
+#[inline]
+fn trimmed(cell: &str) -> &str {
+    let bytes = cell.as_bytes();
+    let plain = |b: Option<&u8>| b.is_some_and(|&b| b > b' ' && b != b'"');
+    if plain(bytes.first()) && plain(bytes.last()) {
+        return cell;
+    }
+    let cell = cell.trim();
+    match cell
+        .strip_prefix('"')
+        .and_then(|inner| inner.strip_suffix('"'))
+    {
+        Some(inner) => inner.trim(),
+        None => cell,
+    }
+}
+
+/// A cell that should be a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Number {
+    Value(f64),
+    Empty,
+    /// The text says that there is no number: `nan`, `NA`, `NULL`.
+    Nan,
+    /// Infinite, or beyond what a double can hold.
+    Infinite,
+    /// Something else.
+    Text,
+}
+
+/// Reads a number; accepts a leading `+`, rejects hexadecimal and thousands separators.
+#[inline]
+pub(crate) fn number(cell: &str) -> Number {
+    if cell.is_empty() {
+        return Number::Empty;
+    }
+    if let Some(value) = short_decimal(cell.as_bytes()) {
+        return Number::Value(value);
+    }
+    match cell.parse::<f64>() {
+        Ok(value) if value.is_finite() => Number::Value(value),
+        Ok(value) if value.is_nan() => Number::Nan,
+        Ok(_) => Number::Infinite,
+        Err(_) => match cell.to_ascii_lowercase().as_str() {
+            "na" | "n/a" | "null" | "none" | "-nan" | "nan(ind)" | "-nan(ind)" | "--" => {
+                Number::Nan
+            }
+            _ => Number::Text,
+        },
+    }
+}
+
+/// Decimal numbers of at most 15 digits without exponent, exactly as `str::parse` gives them: both the digits
+/// (< 2⁵³) and the power of ten (≤ 10²²) are exact doubles, and one division rounds once.
+#[inline]
+fn short_decimal(bytes: &[u8]) -> Option<f64> {
+    const POWERS: [f64; 16] = [
+        1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+    ];
+    let (negative, digits) = match bytes {
+        [b'-', rest @ ..] => (true, rest),
+        rest => (false, rest),
+    };
+    if digits.len() > 16 {
+        return None;
+    }
+    let (mut mantissa, mut count, mut decimals, mut seen_point) = (0u64, 0usize, 0usize, false);
+    for &b in digits {
+        match b {
+            b'0'..=b'9' => {
+                mantissa = mantissa * 10 + u64::from(b - b'0');
+                count += 1;
+                decimals += usize::from(seen_point);
+            }
+            b'.' if !seen_point => seen_point = true,
+            _ => return None,
+        }
+    }
+    if count == 0 || count > 15 {
+        return None;
+    }
+    let value = mantissa as f64 / POWERS[decimals];
+    Some(if negative { -value } else { value })
+}
+
+/// The problem of a cell that is no number.
+pub(crate) fn not_a_number(cell: &str, kind: Number, expected: &str) -> Problem {
+    match kind {
+        Number::Infinite | Number::Nan => Problem::NotFinite {
+            found: excerpt(cell, 40),
+        },
+        _ => Problem::Unexpected {
+            found: excerpt(cell, 40),
+            expected: expected.to_string(),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn split(line: &str, separator: Separator) -> Vec<&str> {
+        cells(line, separator).collect()
+    }
+
+    #[test]
+    fn cells_are_trimmed_and_unquoted() {
+        let comma = Separator::Byte(b',');
+        assert_eq!(split("a, b ,,\"x,y\",", comma), ["a", "b", "", "x,y", ""]);
+        assert_eq!(split("", comma), [""]);
+        assert_eq!(split("\"open,a", comma), ["\"open,a"]);
+        assert_eq!(split("  a \t b  ", Separator::Blanks), ["a", "b"]);
+        assert_eq!(split("\"\"\"", comma), ["\""]);
+    }
+
+    #[test]
+    fn lines_have_no_ends_and_no_bom() {
+        let mut lines = Lines::new(&b"\xef\xbb\xbfa\r\nb\n\nc"[..]);
+        let mut all = Vec::new();
+        while let Some(line) = lines.next().expect("valid text") {
+            all.push(line.to_string());
+        }
+        assert_eq!(all, ["a", "b", "", "c"]);
+        let mut bad = Lines::new(&b"ok\na\xffb"[..]);
+        assert!(bad.next().is_ok());
+        assert!(matches!(
+            bad.next(),
+            Err((At::Line(2), Problem::NotUtf8 { byte: 1 }))
+        ));
+    }
+
+    #[test]
+    fn what_is_no_number_is_told_apart() {
+        assert_eq!(number("-1.5e-3"), Number::Value(-1.5e-3));
+        assert_eq!(number(""), Number::Empty);
+        assert_eq!(number("NaN"), Number::Nan);
+        assert_eq!(number("NULL"), Number::Nan);
+        assert_eq!(number("-inf"), Number::Infinite);
+        assert_eq!(number("1e999"), Number::Infinite);
+        for text in ["1,5", "0x10", "1.2.3", "-", ".", "1 2", "--5"] {
+            assert_eq!(number(text), Number::Text, "{text}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn short_decimals_are_what_the_standard_library_reads(whole in -999_999i64..999_999, part in 0u32..999_999_999, digits in 0usize..10) {
+            let text = format!("{whole}.{part:09}");
+            let text = &text[..text.len() - digits];
+            let expected: f64 = text.parse().unwrap();
+            prop_assert_eq!(number(text), Number::Value(expected));
+            prop_assert_eq!(short_decimal(text.as_bytes()).map(f64::to_bits).unwrap_or(expected.to_bits()), expected.to_bits());
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! What is wrong with a table is said with a place: the messages are what a person reads.
+
+use calib_recording::{BodyColumns, ColumnMap, Error, ReadOptions, read_bytes, read_path};
+
+fn error(text: impl AsRef<[u8]>) -> String {
+    read_bytes("poses.csv", text.as_ref(), &ReadOptions::default())
+        .map(|_| ())
+        .map_err(|e| e.to_string())
+        .expect_err("bad table")
+}
+
+#[test]
+fn every_bad_table_has_its_message() {
+    let wide = "pose,elbow_rad,m.x_m,m.y_m,m.z_m";
+    let cases: &[(&str, String)] = &[
+        ("empty file", String::new()),
+        ("only comments", "# nothing\n".into()),
+        ("no rows", format!("{wide}\n")),
+        (
+            "duplicated column",
+            "elbow_rad,m.x_m,elbow_rad\n1,2,3\n".into(),
+        ),
+        (
+            "same joint in two units",
+            "elbow_rad,elbow_deg\n1,2\n".into(),
+        ),
+        ("missing unit", "pose,elbow\n0,1\n".into()),
+        ("misspelt unit", "pose,elbow_dge\n0,1\n".into()),
+        ("misspelt word", "trail,elbow_deg\n0,1\n".into()),
+        ("marker without z", "m.x_m,m.y_m\n0,1\n".into()),
+        (
+            "body without qw",
+            "b.x_m,b.y_m,b.z_m,b.qx,b.qy,b.qz\n1,2,3,0,0,0\n".into(),
+        ),
+        (
+            "one axis in two units",
+            "m.x_m,m.x_mm,m.y_m,m.z_m\n1,1,1,1\n".into(),
+        ),
+        ("ragged row", format!("{wide}\n0,1,2,3,4\n1,1,2,3\n")),
+        ("row too long", format!("{wide}\n0,1,2,3,4,5\n")),
+        (
+            "not a number",
+            format!("{wide}\n0,1,2,3,4\n1,1,2,three,4\n"),
+        ),
+        ("decimal comma", "elbow_rad;lift_m\n1,5;2\n".into()),
+        ("infinite", format!("{wide}\n0,1,2,inf,4\n")),
+        ("joint is NaN", format!("{wide}\n0,NaN,2,3,4\n")),
+        ("partly lost marker", format!("{wide}\n0,1,2,,4\n")),
+        (
+            "partly lost body",
+            "x_m,y_m,z_m,qx,qy,qz,qw\n1,2,3,0,0,,1\n".into(),
+        ),
+        (
+            "quaternion of length 2",
+            "x_m,y_m,z_m,qx,qy,qz,qw\n1,2,3,0,0,0,2\n".into(),
+        ),
+        (
+            "time goes back",
+            "t_s,elbow_rad\n0.1,1\n0.3,1\n0.2,1\n".into(),
+        ),
+        ("row without time", "t_s,elbow_rad\n,1\n".into()),
+        (
+            "frame goes back",
+            "frame,marker,x_m,y_m,z_m\n2,a,1,1,1\n1,a,1,1,1\n".into(),
+        ),
+        (
+            "marker twice in a frame",
+            "frame,marker,x_m,y_m,z_m\n2,a,1,1,1\n2,a,1,1,1\n".into(),
+        ),
+        (
+            "marker without name",
+            "frame,marker,x_m,y_m,z_m\n2,,1,1,1\n".into(),
+        ),
+        (
+            "long table with joints",
+            "frame,marker,elbow_rad,x_m,y_m,z_m\n2,a,1,1,1,1\n".into(),
+        ),
+        (
+            "long table without frames",
+            "marker,x_m,y_m,z_m\na,1,1,1\n".into(),
+        ),
+        ("no quantities", "pose,trial\n0,a\n".into()),
+        ("a sentence", "this is no table\n".into()),
+        (
+            "unknown state",
+            "m.x_m,m.y_m,m.z_m,m.state\n1,1,1,guessed\n".into(),
+        ),
+    ];
+    let messages: Vec<String> = cases
+        .iter()
+        .map(|(what, text)| format!("{what}\n    {}\n", error(text)))
+        .collect();
+    insta::assert_snapshot!(messages.join(""));
+}
+
+#[test]
+fn what_is_no_text_is_refused() {
+    assert_eq!(
+        error(b"q_rad\n1\n\xff\xfe\n"),
+        "poses.csv:3: byte 0 of this line is not UTF-8; save the file as UTF-8"
+    );
+    assert!(
+        error([0u8; 600]).contains("no reader recognises"),
+        "{}",
+        error([0u8; 600])
+    );
+}
+
+#[test]
+fn missing_and_huge_files_are_refused_without_reading_them() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let missing =
+        read_path(&dir.path().join("none.csv"), &ReadOptions::default()).expect_err("missing");
+    assert!(
+        missing.to_string().contains("none.csv: cannot be read"),
+        "{missing}"
+    );
+    assert!(std::error::Error::source(&missing).is_some());
+    let huge = dir.path().join("huge.csv");
+    let file = std::fs::File::create(&huge).expect("writable");
+    file.set_len(1 << 40).expect("sparse file");
+    let error = read_path(&huge, &ReadOptions::default()).expect_err("huge");
+    assert!(error.to_string().contains("limit"), "{error}");
+    let folder = read_path(dir.path(), &ReadOptions::default()).expect_err("a folder");
+    assert!(folder.to_string().contains("cannot be read"), "{folder}");
+}
+
+#[test]
+fn a_name_column_that_is_no_name_does_not_fill_memory() {
+    let mut text = String::from("frame,marker,x_m,y_m,z_m\n");
+    for i in 0..60_000 {
+        text.push_str(&format!("{i},m{i},1,2,3\n"));
+    }
+    assert!(
+        error(&text).contains("is the name column right"),
+        "{}",
+        error(&text)
+    );
+}
+
+fn mapped(map: ColumnMap, text: &str) -> Result<(), Error> {
+    read_bytes(
+        "log.csv",
+        text.as_bytes(),
+        &ReadOptions {
+            columns: Some(map),
+            ..ReadOptions::default()
+        },
+    )
+    .map(|_| ())
+}
+
+#[test]
+fn a_column_map_that_does_not_fit_says_which_column() {
+    let joints = |column: &str| ColumnMap {
+        joint_columns: vec![column.into()],
+        ..ColumnMap::default()
+    };
+    let message = mapped(joints("arm_1_jonit"), "arm_1_joint\n1\n")
+        .expect_err("misspelt")
+        .to_string();
+    assert_eq!(
+        message,
+        "log.csv:1: joint `arm_1_jonit` needs column `arm_1_jonit`, which the header does not have; did you mean `arm_1_joint`?"
+    );
+    let preset = ColumnMap {
+        preset: Some("ur_rdte".into()),
+        ..ColumnMap::default()
+    };
+    let message = mapped(preset, "a b\n1 2\n")
+        .expect_err("no such preset")
+        .to_string();
+    assert!(message.contains("did you mean `ur_rtde`?"), "{message}");
+    let columns = ["x", "y", "z"].map(String::from);
+    let body = BodyColumns {
+        position: columns,
+        ..BodyColumns::default()
+    };
+    let map = ColumnMap {
+        bodies: [("b".to_string(), body)].into(),
+        ..ColumnMap::default()
+    };
+    let message = mapped(map, "x,y,z\n1,2,3\n")
+        .expect_err("no rotation")
+        .to_string();
+    assert!(message.contains("quaternion_xyzw"), "{message}");
+    let twice = ColumnMap {
+        joint_columns: vec!["a".into(), "a".into()],
+        ..ColumnMap::default()
+    };
+    assert!(mapped(twice, "a\n1\n").is_err());
+}
+
+#[test]
+fn a_reader_that_does_not_exist_is_named() {
+    let options = ReadOptions {
+        format: Some("cvs".into()),
+        ..ReadOptions::default()
+    };
+    let message = read_bytes("a.csv", b"q_rad\n1\n", &options)
+        .expect_err("no such reader")
+        .to_string();
+    assert!(message.contains("did you mean `csv`?"), "{message}");
+}

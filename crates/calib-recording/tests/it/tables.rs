@@ -1,0 +1,381 @@
+//! Reading and writing of our own tables.
+
+use calib_recording::{
+    ColumnMap, Filled, JointUnit, MarkerSample, Poses, ReadOptions, Recording, WriteOptions,
+    read_bytes, write_poses,
+};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+
+fn read(text: &str) -> Recording {
+    read_bytes("poses.csv", text.as_bytes(), &ReadOptions::default())
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn poses(text: &str) -> Poses {
+    read(text).poses(Filled::Exclude).expect("one table")
+}
+
+#[test]
+fn a_wide_table_is_read_in_si() {
+    let poses = poses(
+        "# made by hand\npose,trial,elbow_deg,lift_mm,elbow_nm,m1.x_mm,m1.y_mm,m1.z_mm,hand.x_m,hand.y_m,hand.z_m,hand.qx,hand.qy,hand.qz,hand.qw\n\
+         0,a,180,250,1.5,1000,2000,3000,0.1,0.2,0.3,0,0,0,1\n\
+         1,b,-90,,,,,,,,,,,,\n",
+    );
+    assert_eq!(poses.rows, [3, 4]);
+    assert_eq!(
+        poses.joints["elbow"],
+        [
+            Some(std::f64::consts::PI),
+            Some(-std::f64::consts::FRAC_PI_2)
+        ]
+    );
+    assert_eq!(poses.joints["lift"], [Some(0.25), None]);
+    assert_eq!(poses.joint_units["elbow"], JointUnit::Angle);
+    assert_eq!(poses.joint_units["lift"], JointUnit::Length);
+    assert_eq!(poses.torques["elbow"], [Some(1.5), None]);
+    assert_eq!(
+        poses.markers["m1"],
+        [Some(Point3::new(1.0, 2.0, 3.0)), None]
+    );
+    assert_eq!(
+        poses.bodies["hand"],
+        [Some(Isometry3::translation(0.1, 0.2, 0.3)), None]
+    );
+    assert_eq!(poses.labels["trial"], ["a", "b"]);
+    assert!(poses.t.is_none());
+}
+
+#[test]
+fn the_header_comment_is_kept() {
+    let recording =
+        read("# made by calib simulate --seed 7\n#truth beside it\nq_rad\n0.5\n# later\n0.6\n");
+    assert_eq!(
+        recording.meta.comments,
+        [
+            "made by calib simulate --seed 7",
+            "truth beside it",
+            "later"
+        ]
+    );
+    assert_eq!(recording.meta.source, "poses.csv");
+    assert_eq!(recording.meta.format, "csv");
+    assert_eq!(recording.timelines[0].rows, [4, 6]);
+}
+
+#[test]
+fn underscores_make_markers_where_three_axes_are_given_and_joints_where_one_is() {
+    let table = poses("frame,RGT_x_m,RGT_y_m,RGT_z_m,gantry_x_m,wrist_x_deg\n300,1,2,3,0.5,90\n");
+    assert_eq!(table.markers.keys().collect::<Vec<_>>(), ["RGT"]);
+    assert_eq!(
+        table.joints.keys().collect::<Vec<_>>(),
+        ["gantry_x", "wrist_x"]
+    );
+    assert_eq!(table.joint_units["gantry_x"], JointUnit::Length);
+    assert_eq!(table.joint_units["wrist_x"], JointUnit::Angle);
+}
+
+#[test]
+fn a_table_of_one_body_or_one_marker_needs_no_name() {
+    let body = poses(
+        "frame,x_mm,y_mm,z_mm,qx,qy,qz,qw\n0,4.29,-128.91,-1025.49,0.114906,-0.700638,0.19231,0.677436\n",
+    );
+    let pose = body.bodies["body"][0].expect("measured");
+    assert!((pose.translation.vector - Vector3::new(0.00429, -0.12891, -1.02549)).norm() < 1e-15);
+    assert!((pose.rotation.coords.norm() - 1.0).abs() < 1e-15);
+    let marker = poses("x_m,y_m,z_m\n1,2,3\n");
+    assert_eq!(marker.markers["marker"], [Some(Point3::new(1.0, 2.0, 3.0))]);
+}
+
+#[test]
+fn a_long_table_is_one_stream_per_marker_and_absence_is_lost() {
+    let poses =
+        poses("frame,marker,x_mm,y_mm,z_mm\n5,b,1,2,3\n5,a,4,5,6\n7,a,7,8,9\n8,c,,,\n8,b,1,1,1\n");
+    assert_eq!(poses.rows, [2, 4, 5]);
+    assert_eq!(
+        poses.markers["a"][0],
+        Some(Point3::new(0.004, 0.005, 0.006))
+    );
+    assert_eq!(poses.markers["a"][2], None);
+    assert_eq!(
+        poses.markers["b"]
+            .iter()
+            .map(Option::is_some)
+            .collect::<Vec<_>>(),
+        [true, false, true]
+    );
+    assert_eq!(poses.markers["c"], [None, None, None]);
+}
+
+#[test]
+fn a_long_table_of_bodies_with_time() {
+    let poses = poses(
+        "t_s,body,x_m,y_m,z_m,qx,qy,qz,qw\n0.5,hand,1,2,3,0,0,0,1\n0.6,hand,1,2,4,0,0,1,0\n0.6,base,0,0,1,0,0,0,1\n",
+    );
+    assert_eq!(poses.t.as_deref(), Some([0.5, 0.6].as_slice()));
+    assert_eq!(
+        poses.bodies["base"]
+            .iter()
+            .map(Option::is_some)
+            .collect::<Vec<_>>(),
+        [false, true]
+    );
+}
+
+#[test]
+fn zeros_and_nan_are_lost_with_a_finding() {
+    let recording = read(
+        "m.x_m,m.y_m,m.z_m,n.x_m,n.y_m,n.z_m\n0,0,0,1,2,3\n1,1,1,nan,NaN,NULL\n0.0,-0,0,1,2,3\n",
+    );
+    assert_eq!(recording.markers[0].lost(), 2);
+    assert_eq!(recording.markers[1].lost(), 1);
+    let found: Vec<_> = recording
+        .meta
+        .findings
+        .iter()
+        .map(|f| (f.id, f.subject.as_str(), f.rows.clone()))
+        .collect();
+    assert_eq!(found[0], ("all-zero-triplet", "m", vec![2, 4]));
+    assert_eq!(found[1], ("not-a-number", "n.x_m", vec![3]));
+}
+
+#[test]
+fn filled_samples_are_kept_apart() {
+    let recording = read("m.x_m,m.y_m,m.z_m,m.state\n1,1,1,measured\n2,2,2,filled\n3,3,3,lost\n");
+    assert_eq!(
+        recording.markers[0].samples[1],
+        MarkerSample::Filled(Point3::new(2.0, 2.0, 2.0))
+    );
+    let counted = |filled| {
+        recording.poses(filled).expect("one table").markers["m"]
+            .iter()
+            .flatten()
+            .count()
+    };
+    assert_eq!((counted(Filled::Exclude), counted(Filled::Include)), (1, 2));
+}
+
+#[test]
+fn separators_bom_and_line_ends_do_not_matter() {
+    let expected = poses("q_rad,m.x_m,m.y_m,m.z_m\n0.5,1,2,3\n");
+    for text in [
+        "\u{feff}q_rad,m.x_m,m.y_m,m.z_m\r\n0.5,1,2,3\r\n",
+        "q_rad;m.x_m;m.y_m;m.z_m\n0.5;1;2;3",
+        "q_rad\tm.x_m\tm.y_m\tm.z_m\n0.5\t1\t2\t3\n",
+        "q_rad m.x_m m.y_m m.z_m\n 0.5  1 2 3\n",
+        "q_rad,m.x_m,m.y_m,m.z_m,\n0.5, 1 ,\"2\",3,\n\n",
+    ] {
+        assert_eq!(poses(text), expected, "{text:?}");
+    }
+}
+
+fn map(map: ColumnMap) -> ReadOptions {
+    ReadOptions {
+        columns: Some(map),
+        ..ReadOptions::default()
+    }
+}
+
+#[test]
+fn a_column_map_reads_names_without_units() {
+    let text = "x1,y1,z1,torso_lift_joint,arm_1_joint,shipped_row\n380.2,480.8,335.9,237,90,0\n";
+    let three = |i: usize| [format!("x{i}"), format!("y{i}"), format!("z{i}")];
+    let columns = ColumnMap {
+        angles: calib_recording::AngleUnit::Deg,
+        lengths: calib_recording::LengthUnit::Mm,
+        joint_columns: vec!["arm_1_joint".into()],
+        prismatic: BTreeMap::from([(
+            "torso_lift_joint".to_string(),
+            "torso_lift_joint".to_string(),
+        )]),
+        markers: BTreeMap::from([("BL".to_string(), three(1))]),
+        ..ColumnMap::default()
+    };
+    let recording = read_bytes("tiago.csv", text.as_bytes(), &map(columns)).expect("readable");
+    let poses = recording.poses(Filled::Exclude).expect("one table");
+    assert_eq!(
+        poses.joints["arm_1_joint"],
+        [Some(std::f64::consts::FRAC_PI_2)]
+    );
+    assert_eq!(poses.joints["torso_lift_joint"], [Some(0.237)]);
+    assert!(
+        (poses.markers["BL"][0].expect("seen") - Point3::new(0.3802, 0.4808, 0.3359)).norm()
+            < 1e-15
+    );
+    assert!(
+        recording
+            .meta
+            .conversions
+            .iter()
+            .any(|c| c.contains("shipped_row"))
+    );
+}
+
+#[test]
+fn presets_read_logs_of_their_kind() {
+    let ur = "timestamp actual_q_0 actual_q_1 actual_q_2 actual_q_3 actual_q_4 actual_q_5 runtime_state\r\n81234.536 0.0 0.25 0.27 0.04 -0.22 -0.28 2\r\n81234.544 0.1 0.25 0.27 0.04 -0.22 -0.28 2\r\n";
+    let preset = |name: &str| {
+        map(ColumnMap {
+            preset: Some(name.into()),
+            ..ColumnMap::default()
+        })
+    };
+    let poses = read_bytes("ur.csv", ur.as_bytes(), &preset("ur_rtde"))
+        .expect("readable")
+        .poses(Filled::Exclude)
+        .expect("one");
+    assert_eq!(poses.joints["shoulder_pan_joint"], [Some(0.0), Some(0.1)]);
+    assert_eq!(poses.t.as_deref(), Some([81234.536, 81234.544].as_slice()));
+
+    let ndi = "Frame#,ToolHandle,Face,TransformStatus,q0,qx,qy,qz,tx,ty,tz,error,#markers\n1,02,0,Enabled,0,1,0,0,10,20,30,0.1,4\n1,03,0,Missing,,,,,,,,,0\n2,03,0,Enabled,1,0,0,0,1,2,3,0.1,4\n2,02,0,Missing,Missing,,,,,,,,0\n";
+    let poses = read_bytes("ndi.csv", ndi.as_bytes(), &preset("ndi"))
+        .expect("readable")
+        .poses(Filled::Exclude)
+        .expect("one");
+    let pose = poses.bodies["02"][0].expect("seen");
+    assert!((pose.translation.vector - Vector3::new(0.01, 0.02, 0.03)).norm() < 1e-15);
+    assert!((pose.rotation.angle() - std::f64::consts::PI).abs() < 1e-12);
+    assert!(poses.bodies["02"][1].is_none() && poses.bodies["03"][1].is_some());
+
+    let vive = "x,y,z,A,B,C,button,T,delta\n100,200,300,0.1,0.2,0.3,0,1600000000123,11\n";
+    let recording = read_bytes("vive.csv", vive.as_bytes(), &preset("vive")).expect("readable");
+    let expected = UnitQuaternion::from_euler_angles(0.1, 0.2, 0.3);
+    let pose = recording.bodies[0].tracker_from_body[0].expect("seen");
+    assert!(pose.rotation.angle_to(&expected) < 1e-12);
+    assert!(
+        recording
+            .meta
+            .conversions
+            .iter()
+            .any(|c| c.contains("fixed x, y, z"))
+    );
+
+    let franka = "time,success_rate,state.q[0],state.q[1],state.q[2],state.q[3],state.q[4],state.q[5],state.q[6]\n1234567,1,0.1,0.2,0.3,0.4,0.5,0.6,0.7\n";
+    let poses = read_bytes("franka.csv", franka.as_bytes(), &preset("franka"))
+        .expect("readable")
+        .poses(Filled::Exclude)
+        .expect("one");
+    assert_eq!(poses.joints["panda_joint7"], [Some(0.7)]);
+}
+
+fn a_pose() -> impl Strategy<Value = Option<Isometry3<f64>>> {
+    proptest::option::weighted(
+        0.8,
+        (
+            prop::array::uniform3(-2.0..2.0),
+            prop::array::uniform3(-3.0..3.0),
+        ),
+    )
+    .prop_map(|pose| {
+        pose.map(|(t, r): ([f64; 3], [f64; 3])| {
+            Isometry3::from_parts(
+                Translation3::from(Vector3::from(t)),
+                UnitQuaternion::from_scaled_axis(Vector3::from(r)),
+            )
+        })
+    })
+}
+
+prop_compose! {
+    fn some_poses()(rows in prop::collection::vec(
+        (proptest::option::of(-3.0..3.0), proptest::option::of(prop::array::uniform3(0.1..9.0)), a_pose(), proptest::option::of(-50.0..50.0), "[a-c]{1,3}"), 1..12), timed: bool) -> Poses {
+        let n = rows.len();
+        Poses {
+            rows: (0..n as u64).collect(),
+            t: timed.then(|| (0..n).map(|i| i as f64 * 0.01).collect()),
+            joints: BTreeMap::from([("q".to_string(), rows.iter().map(|r| r.0).collect())]),
+            joint_units: BTreeMap::from([("q".to_string(), JointUnit::Angle)]),
+            torques: BTreeMap::from([("q".to_string(), rows.iter().map(|r| r.3).collect())]),
+            bodies: BTreeMap::from([("hand".to_string(), rows.iter().map(|r| r.2).collect())]),
+            markers: BTreeMap::from([("m_1".to_string(), rows.iter().map(|r| r.1.map(Point3::from)).collect())]),
+            labels: BTreeMap::from([("trial".to_string(), rows.iter().map(|r| r.4.clone()).collect())]),
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn what_is_written_is_read_back(poses in some_poses()) {
+        let text = write_poses(&poses, &WriteOptions::default()).expect("finite");
+        let back = read_bytes("x.csv", text.as_bytes(), &ReadOptions::default()).expect("own table").poses(Filled::Exclude).expect("one");
+        prop_assert_eq!(&back.joints, &poses.joints);
+        prop_assert_eq!(&back.torques, &poses.torques);
+        prop_assert_eq!(&back.markers, &poses.markers);
+        prop_assert_eq!(&back.labels, &poses.labels);
+        prop_assert_eq!(&back.t, &poses.t);
+        for (a, b) in back.bodies["hand"].iter().zip(&poses.bodies["hand"]) {
+            prop_assert_eq!(a.is_some(), b.is_some());
+            if let (Some(a), Some(b)) = (a, b) {
+                prop_assert_eq!(a.translation, b.translation);
+                prop_assert!(a.rotation.angle_to(&b.rotation) < 1e-15);
+            }
+        }
+        // Written again, the bytes are the same (quaternions are normalised on reading: to 1e-12).
+        let options = WriteOptions { quaternion_decimals: Some(12), ..WriteOptions::default() };
+        let once = write_poses(&poses, &options).expect("finite");
+        prop_assert_eq!(&write_poses(&back, &options).expect("finite"), &once);
+    }
+
+    #[test]
+    fn micrometres_stay_micrometres(poses in some_poses()) {
+        let text = write_poses(&poses, &WriteOptions::micro()).expect("finite");
+        let back = read_bytes("x.csv", text.as_bytes(), &ReadOptions::default()).expect("own table").poses(Filled::Exclude).expect("one");
+        for (a, b) in back.markers["m_1"].iter().flatten().zip(poses.markers["m_1"].iter().flatten()) {
+            prop_assert!((a - b).norm() < 1e-6);
+        }
+        for (a, b) in back.bodies["hand"].iter().flatten().zip(poses.bodies["hand"].iter().flatten()) {
+            prop_assert!(a.rotation.angle_to(&b.rotation) < 3e-9);
+        }
+    }
+}
+
+#[test]
+fn the_written_table_looks_like_this() {
+    let poses = poses(
+        "t_s,trial,b_deg,m.x_mm,m.y_mm,m.z_mm,h.x_m,h.y_m,h.z_m,h.qx,h.qy,h.qz,h.qw\n0.01,up,90,1,2,3,0.1,0.2,0.3,0,0,0.6,-0.8\n0.02,up,,,,,,,,,,,\n",
+    );
+    let options = WriteOptions {
+        comments: vec!["two rows".into()],
+        ..WriteOptions::micro()
+    };
+    assert_eq!(
+        write_poses(&poses, &options).expect("finite"),
+        "# two rows\ntrial,t_s,b_rad,h.x_m,h.y_m,h.z_m,h.qx,h.qy,h.qz,h.qw,m.x_m,m.y_m,m.z_m\n\
+         up,0.01,1.570796,0.1,0.2,0.3,0,0,-0.6,0.8,0.001,0.002,0.003\nup,0.02,,,,,,,,,,,\n"
+    );
+}
+
+#[test]
+fn a_table_that_would_not_read_back_is_not_written() {
+    let mut poses = poses("trial,q_rad\na,1\n");
+    poses.labels.insert("trial".into(), vec!["a,b".into()]);
+    assert!(write_poses(&poses, &WriteOptions::default()).is_err());
+    poses.labels.insert("trial".into(), vec!["a".into()]);
+    poses.joints.insert("q".into(), vec![Some(f64::NAN)]);
+    assert!(write_poses(&poses, &WriteOptions::default()).is_err());
+    poses.joints.insert("q".into(), vec![]);
+    assert!(write_poses(&poses, &WriteOptions::default()).is_err());
+}
+
+#[test]
+fn rows_can_be_chosen_and_grouped() {
+    let table = poses("trial,q_rad,m.x_m,m.y_m,m.z_m\nb,1,1,1,1\na,2,2,2,2\nb,3,3,3,3\n");
+    assert_eq!(
+        table.groups("trial"),
+        [("b".to_string(), vec![0, 2]), ("a".to_string(), vec![1])]
+    );
+    let chosen = table.select(&[2, 0, 99]);
+    assert_eq!(chosen.joints["q"], [Some(3.0), Some(1.0)]);
+    assert_eq!(chosen.rows, [4, 2]);
+    assert_eq!(table.groups("nothing").len(), 1);
+    assert_eq!(
+        table
+            .clone()
+            .into_recording()
+            .poses(Filled::Exclude)
+            .expect("one"),
+        table
+    );
+}
