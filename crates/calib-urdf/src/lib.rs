@@ -20,13 +20,23 @@
 //! What this crate does **not** do: it opens no mesh (`package://` stays a text), expands no xacro,
 //! and knows no closed kinematic loops.
 
+pub mod decimal;
+pub mod edit;
 pub mod error;
+mod insert;
 pub mod kinematics;
 pub mod model;
 pub mod nearest;
+pub mod patch;
 pub mod read;
 pub mod rpy;
 pub mod source;
+pub mod verify;
+mod xacro;
+
+pub use edit::{Change, EditError, UrdfEdit};
+pub use patch::{Patched, patch};
+pub use verify::{SecondReader, Verification, verify};
 
 pub use error::{Place, Problem, ReadError, ReadProblem};
 pub use model::{

@@ -189,6 +189,22 @@ pub struct UnknownName {
     pub nearest: Option<String>,
 }
 
+impl UnknownName {
+    pub(crate) fn among<'a>(
+        robot: &str,
+        kind: &'static str,
+        name: &str,
+        known: impl IntoIterator<Item = &'a str>,
+    ) -> Self {
+        Self {
+            robot: robot.to_owned(),
+            kind,
+            name: name.to_owned(),
+            nearest: nearest(name, known).map(str::to_owned),
+        }
+    }
+}
+
 fn hint(nearest: Option<&str>) -> String {
     nearest.map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
 }
@@ -304,26 +320,26 @@ impl RobotModel {
     /// # Errors
     /// [`UnknownName`], with the nearest name that exists.
     pub fn link_id(&self, name: &str) -> Result<LinkId, UnknownName> {
-        self.link_ids.get(name).copied().ok_or_else(|| UnknownName {
-            robot: self.name.clone(),
-            kind: "link",
-            name: name.to_owned(),
-            nearest: nearest(name, self.link_ids.keys().map(String::as_str)).map(str::to_owned),
+        self.link_ids.get(name).copied().ok_or_else(|| {
+            UnknownName::among(
+                &self.name,
+                "link",
+                name,
+                self.link_ids.keys().map(String::as_str),
+            )
         })
     }
 
     /// # Errors
     /// [`UnknownName`], with the nearest name that exists.
     pub fn joint_id(&self, name: &str) -> Result<JointId, UnknownName> {
-        self.joint_ids
-            .get(name)
-            .copied()
-            .ok_or_else(|| UnknownName {
-                robot: self.name.clone(),
-                kind: "joint",
-                name: name.to_owned(),
-                nearest: nearest(name, self.joint_ids.keys().map(String::as_str))
-                    .map(str::to_owned),
-            })
+        self.joint_ids.get(name).copied().ok_or_else(|| {
+            UnknownName::among(
+                &self.name,
+                "joint",
+                name,
+                self.joint_ids.keys().map(String::as_str),
+            )
+        })
     }
 }

@@ -15,6 +15,9 @@ use std::f64::consts::{PI, TAU};
 /// Below this `|cos pitch|`, roll is not in the matrix but only its rounding noise.
 const GIMBAL_COS: f64 = 1e-15;
 
+/// What quaternion → matrix → angles → quaternion costs, rad.
+const ROUNDING: f64 = 2e-15;
+
 /// The rotation of a URDF's `rpy`, `Rz(yaw) · Ry(pitch) · Rx(roll)`; angles in rad.
 #[must_use]
 pub fn rotation_from_rpy(rpy: &Vector3<f64>) -> UnitQuaternion<f64> {
@@ -44,12 +47,12 @@ pub fn rpy_from_rotation(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
 #[must_use]
 pub fn rpy_near(rotation: &UnitQuaternion<f64>, near: &Vector3<f64>) -> Vector3<f64> {
     let matrix = rotation.to_rotation_matrix().into_inner();
-    let cos_pitch = matrix[(2, 1)].hypot(matrix[(2, 2)]);
-    let roll = if cos_pitch < GIMBAL_COS {
-        near.x
-    } else {
-        matrix[(2, 1)].atan2(matrix[(2, 2)])
-    };
+    // Near pitch ±π/2 many rolls fit within rounding: the text's own is then the one to keep.
+    let kept = with_roll(&matrix, near.x).zip_map(near, nearest_turn);
+    if angle_between(&rotation_from_rpy(&kept), rotation) <= ROUNDING {
+        return kept;
+    }
+    let roll = matrix[(2, 1)].atan2(matrix[(2, 2)]);
     let mut best = with_roll(&matrix, roll);
     let mut best_distance = f64::INFINITY;
     for branch in [with_roll(&matrix, roll), with_roll(&matrix, roll + PI)] {
@@ -169,10 +172,10 @@ mod tests {
 
     #[test]
     fn the_near_triplet_stays_on_the_branch_of_the_text() {
-        // 1.5708 is just beyond π/2: the plain answer would turn roll and yaw by π.
-        let text = Vector3::new(1.5708, 1.5708, 3.1416);
+        // 1.57081 is just beyond π/2: the plain answer would turn roll and yaw by π.
+        let text = Vector3::new(1.57081, 1.57081, 3.14);
         let near = rpy_near(&rotation_from_rpy(&text), &text);
-        // cos p = 3.7e-6: roll and yaw alone carry 1e-16 / 3.7e-6.
+        // cos p = 1.4e-5: roll and yaw alone carry 1e-16 / 1.4e-5.
         assert!((near - text).norm() < 1e-9, "{near:?}");
         assert!((rpy_from_rotation(&rotation_from_rpy(&text)) - text).norm() > 3.0);
     }

@@ -147,6 +147,11 @@ pub(crate) fn is_element(node: Node<'_, '_>, name: &str) -> bool {
         && node.tag_name().namespace() == node.document().root_element().tag_name().namespace()
 }
 
+/// The first child element with that name.
+pub(crate) fn child<'a, 'b>(node: Node<'a, 'b>, name: &str) -> Option<Node<'a, 'b>> {
+    node.children().find(|child| is_element(*child, name))
+}
+
 /// The elements of that name directly under `<robot>`: not the `<joint>` of a `<transmission>`.
 pub(crate) fn top_level<'a, 'b: 'a>(
     document: &'a Document<'b>,

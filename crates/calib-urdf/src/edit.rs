@@ -1,0 +1,197 @@
+//! What may be changed in a URDF, what was changed, and why a change was refused.
+
+use crate::error::{Place, ReadError};
+use crate::model::UnknownName;
+use nalgebra::{Isometry3, Unit, Vector3};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// One change of a URDF. Lengths m, angles rad.
+#[derive(Debug, Clone, PartialEq)]
+pub enum UrdfEdit {
+    /// A joint's `<origin>`.
+    SetOrigin {
+        /// Which joint.
+        joint: String,
+        /// The new origin.
+        parent_link_from_joint: Isometry3<f64>,
+    },
+    /// A joint's `<axis>`.
+    SetAxis {
+        /// Which joint; it must not be fixed.
+        joint: String,
+        /// In the joint's frame.
+        axis: Unit<Vector3<f64>>,
+    },
+    /// The position limits of a joint's `<limit>`.
+    SetLimits {
+        /// Which joint; it must have a `<limit>`, since a URDF wants effort and velocity there too.
+        joint: String,
+        /// rad or m.
+        lower: f64,
+        /// rad or m.
+        upper: f64,
+    },
+    /// A new link on a new fixed joint: a tracking body, a table, a camera.
+    AddFixedFrame {
+        /// The new link.
+        name: String,
+        /// The link that carries it; an earlier edit may have added it.
+        parent_link: String,
+        /// The new joint.
+        joint_name: String,
+        /// Its origin.
+        parent_from_frame: Isometry3<f64>,
+        /// Written above the link.
+        comment: Option<String>,
+    },
+    /// An XML comment above `<robot>`: where the numbers come from.
+    AddProvenance {
+        /// What it says.
+        text: String,
+    },
+}
+
+/// One attribute that a patch changed, or one element that it added (`old` is then empty).
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Change {
+    /// Line in the original text, from 1.
+    pub line: usize,
+    /// The joint, empty for a comment above `<robot>`.
+    pub joint: String,
+    /// `origin xyz`, `axis xyz`, `limit upper`, …, or `<link>` for an added frame.
+    pub attribute: String,
+    /// The value before, as written.
+    pub old: String,
+    /// The value after, as written.
+    pub new: String,
+}
+
+/// Why a text is not patched. Nothing is changed then.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "each variant's text is its documentation")]
+pub enum EditError {
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    #[error("{file}: {source}")]
+    UnknownName { file: String, source: UnknownName },
+    #[error(
+        "the new {what} of joint `{joint}` is not a finite number: the solution must not be written"
+    )]
+    NotFinite { joint: String, what: &'static str },
+    #[error("joint `{joint}` is given two new values for its {what}")]
+    EditedTwice { joint: String, what: &'static str },
+    #[error("{file}:{place}: joint `{joint}` is fixed, so it has no axis to set")]
+    NoAxis {
+        file: String,
+        place: Place,
+        joint: String,
+    },
+    #[error(
+        "{file}:{place}: joint `{joint}` has no <limit>\nhelp: write <limit lower=\"…\" upper=\"…\" effort=\"…\" velocity=\"…\"/>; effort and velocity cannot be guessed"
+    )]
+    NoLimit {
+        file: String,
+        place: Place,
+        joint: String,
+    },
+    #[error("the new lower limit {lower} of joint `{joint}` is above the new upper limit {upper}")]
+    LimitsReversed {
+        joint: String,
+        lower: String,
+        upper: String,
+    },
+    #[error(
+        "{file}: the {kind} `{name}` exists already and is not the frame to be added\nhelp: choose another name for the frame, for example with a prefix"
+    )]
+    NameTaken {
+        file: String,
+        kind: &'static str,
+        name: String,
+    },
+    #[error("a {kind} cannot be named `{name}`: {reason}")]
+    BadName {
+        kind: &'static str,
+        name: String,
+        reason: &'static str,
+    },
+    #[error(
+        "{file}:{place}: `{attribute}` of joint `{joint}` is \"{found}\", which xacro computes, so there is no number to replace\nhelp: patch the expanded URDF, or the property that the expression uses"
+    )]
+    XacroExpression {
+        file: String,
+        place: Place,
+        joint: String,
+        attribute: String,
+        found: String,
+    },
+    #[error(
+        "{file}:{place}: joint `{joint}` comes from `{template}`, whose name xacro computes\nhelp: patch the expanded URDF"
+    )]
+    XacroTemplate {
+        file: String,
+        place: Place,
+        joint: String,
+        template: String,
+    },
+    #[error(
+        "{file}:{place}: joint `{joint}` stands in the macro `{macro_name}`, which is used {}: one text, several joints\nhelp: patch the expanded URDF, or give the macro a parameter for this origin",
+        uses(lines)
+    )]
+    XacroMacro {
+        file: String,
+        place: Place,
+        joint: String,
+        macro_name: String,
+        lines: Vec<usize>,
+    },
+    #[error(
+        "{file}: joint `{joint}` is written in several places (lines {}), of which xacro chooses\nhelp: patch the expanded URDF",
+        comma_list(lines)
+    )]
+    XacroAmbiguous {
+        file: String,
+        joint: String,
+        lines: Vec<usize>,
+    },
+    #[error(
+        "{file}: the frame of link `{link}` is {translation_m:.1e} m and {rotation_rad:.1e} rad away from what was asked for after re-reading ({reader})"
+    )]
+    NotReproduced {
+        file: String,
+        link: String,
+        translation_m: Rounded,
+        rotation_rad: Rounded,
+        reader: &'static str,
+    },
+    #[error("{file}: after the patch, {what}")]
+    StructureChanged { file: String, what: String },
+}
+
+/// A number in a message.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rounded(pub f64);
+
+impl Eq for Rounded {}
+
+impl std::fmt::LowerExp for Rounded {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        std::fmt::LowerExp::fmt(&self.0, f)
+    }
+}
+
+fn comma_list(lines: &[usize]) -> String {
+    lines
+        .iter()
+        .map(ToString::to_string)
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+fn uses(lines: &[usize]) -> String {
+    match lines {
+        [] => "nowhere in this file, so perhaps more than once elsewhere".to_owned(),
+        _ => format!("{} times (lines {})", lines.len(), comma_list(lines)),
+    }
+}

@@ -1,0 +1,187 @@
+//! Joints in a xacro file, as far as their text can be patched without expanding it.
+//!
+//! A number may be replaced where the text is literal and stands for one joint. It does not where xacro
+//! computes the number or the name, where a macro is used more than once, and where branches give several texts.
+
+use crate::edit::EditError;
+use crate::error::Place;
+use crate::model::UnknownName;
+use crate::source::is_element;
+use roxmltree::{Document, Node};
+
+/// Does xacro compute this text?
+pub(crate) fn is_expression(value: &str) -> bool {
+    value.contains("${") || value.contains("$(")
+}
+
+/// The one `<joint>` of a xacro text that gives the joint of that name.
+///
+/// # Errors
+/// Those of [`EditError`] that begin with `Xacro`, or [`EditError::UnknownName`].
+pub(crate) fn joint<'a, 'b>(
+    document: &'a Document<'b>,
+    text: &str,
+    name: &str,
+    file: &str,
+) -> Result<Node<'a, 'b>, EditError> {
+    let place = |node: Node<'_, '_>| Place::of_byte(text, node.range().start);
+    let joints: Vec<Node<'_, '_>> = document
+        .descendants()
+        .filter(|node| is_joint(*node))
+        .collect();
+    let named: Vec<Node<'_, '_>> = joints
+        .iter()
+        .copied()
+        .filter(|node| node.attribute("name") == Some(name))
+        .collect();
+    match named.as_slice() {
+        [] => {
+            let template = joints.iter().find(|node| {
+                node.attribute("name")
+                    .is_some_and(|pattern| matches(pattern, name))
+            });
+            Err(match template {
+                Some(node) => EditError::XacroTemplate {
+                    file: file.to_owned(),
+                    place: place(*node),
+                    joint: name.to_owned(),
+                    template: node.attribute("name").unwrap_or("").to_owned(),
+                },
+                None => EditError::UnknownName {
+                    file: file.to_owned(),
+                    source: UnknownName::among(
+                        document.root_element().attribute("name").unwrap_or(""),
+                        "joint",
+                        name,
+                        joints.iter().filter_map(|node| node.attribute("name")),
+                    ),
+                },
+            })
+        }
+        [node] => match enclosing_macro(*node) {
+            None => Ok(*node),
+            Some(definition) => {
+                let lines = use_lines(document, definition, text);
+                if lines.len() == 1 {
+                    return Ok(*node);
+                }
+                Err(EditError::XacroMacro {
+                    file: file.to_owned(),
+                    place: place(*node),
+                    joint: name.to_owned(),
+                    macro_name: definition.attribute("name").unwrap_or("").to_owned(),
+                    lines,
+                })
+            }
+        },
+        several => Err(EditError::XacroAmbiguous {
+            file: file.to_owned(),
+            joint: name.to_owned(),
+            lines: several.iter().map(|node| place(*node).line).collect(),
+        }),
+    }
+}
+
+/// A robot's joint, and not the `<joint>` of a `<transmission>`, `<gazebo>` or `<ros2_control>`.
+fn is_joint(node: Node<'_, '_>) -> bool {
+    let foreign = |above: Node<'_, '_>| {
+        above.is_element()
+            && above.tag_name().name() != "robot"
+            && !above
+                .tag_name()
+                .namespace()
+                .is_some_and(|uri| uri.contains("xacro"))
+    };
+    is_element(node, "joint")
+        && node.has_attribute("name")
+        && !node.ancestors().skip(1).any(foreign)
+}
+
+fn is_xacro(node: Node<'_, '_>, name: &str) -> bool {
+    node.tag_name()
+        .namespace()
+        .is_some_and(|uri| uri.contains("xacro"))
+        && node.tag_name().name() == name
+}
+
+fn enclosing_macro<'a, 'b>(node: Node<'a, 'b>) -> Option<Node<'a, 'b>> {
+    node.ancestors()
+        .skip(1)
+        .find(|above| is_xacro(*above, "macro"))
+}
+
+/// The lines of the uses of a macro, a use inside another macro counting once for each use of that.
+fn use_lines(document: &Document<'_>, definition: Node<'_, '_>, text: &str) -> Vec<usize> {
+    /// Macros nested deeper than this call themselves, and then the count says "more than once" already.
+    const DEEPEST: usize = 16;
+    fn collect(
+        document: &Document<'_>,
+        definition: Node<'_, '_>,
+        text: &str,
+        depth: usize,
+        lines: &mut Vec<usize>,
+    ) {
+        let Some(name) = definition.attribute("name") else {
+            return;
+        };
+        for call in document.descendants().filter(|node| is_xacro(*node, name)) {
+            match enclosing_macro(call) {
+                Some(outer) if depth < DEEPEST && outer != definition => {
+                    collect(document, outer, text, depth + 1, lines)
+                }
+                _ => lines.push(Place::of_byte(text, call.range().start).line),
+            }
+            // Two decide already; a chain of doubling macros would otherwise never end.
+            if lines.len() > 8 {
+                return;
+            }
+        }
+    }
+    let mut lines = Vec::new();
+    collect(document, definition, text, 0, &mut lines);
+    lines
+}
+
+/// Could xacro turn `pattern`, such as `${side}_elbow`, into `name`?
+fn matches(pattern: &str, name: &str) -> bool {
+    if !is_expression(pattern) {
+        return false;
+    }
+    let mut rest = name;
+    let mut first = true;
+    let mut open = pattern;
+    loop {
+        let begin = open.find("${").into_iter().chain(open.find("$(")).min();
+        let literal = &open[..begin.unwrap_or(open.len())];
+        let fits = match (first, begin) {
+            (true, _) => rest.strip_prefix(literal),
+            (false, None) => rest.ends_with(literal).then_some(""),
+            (false, Some(_)) => rest.find(literal).map(|at| &rest[at + literal.len()..]),
+        };
+        let (Some(left), Some(begin)) = (fits, begin) else {
+            return fits.is_some();
+        };
+        rest = left;
+        first = false;
+        let Some(close) = open[begin..].find(['}', ')']) else {
+            return false;
+        };
+        open = &open[begin + close + 1..];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patterns() {
+        assert!(matches("${side}_elbow", "left_elbow"));
+        assert!(matches("$(arg prefix)elbow${i}", "ur_elbow3"));
+        assert!(matches("${name}", "anything"));
+        assert!(!matches("${side}_elbow", "left_wrist"));
+        assert!(!matches("arm_${i}", "leg_1"));
+        assert!(!matches("elbow", "elbow"));
+        assert!(!matches("${open", "open"));
+    }
+}
