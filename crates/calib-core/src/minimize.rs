@@ -1,0 +1,263 @@
+//! Levenberg–Marquardt with scaled columns and a cost-checked step.
+//!
+//! ```text
+//! (H + λ diag H) δ = −g,   x ⊞ δ accepted when F falls;   stop when −gᵀδ (in σ²) vanishes       (1)
+//! ```
+//!
+//! Directions that neither data nor prior see have zero gradient and stay where they start.
+
+use serde::{Deserialize, Serialize};
+
+use crate::bounded::bounded_step;
+use crate::edge::EdgeKind;
+use crate::model::{Model, Values, coordinates};
+use crate::normal::{NormalEquations, Workspace, accumulate, cost};
+
+/// How the minimisation ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SolveStatus {
+    /// The gradient vanishes: a further step would change the fit by less than 1e-6 σ.
+    Converged,
+    /// No step lowers the cost although the gradient has not vanished: rounding, or a kink.
+    Stalled,
+    /// The allowed iterations did not suffice.
+    MaxIterations,
+    /// The model could not be evaluated at the start values.
+    NotEvaluable,
+}
+
+impl SolveStatus {
+    /// Whether the values may be used.
+    #[must_use]
+    pub fn is_converged(self) -> bool {
+        self == Self::Converged
+    }
+}
+
+/// Limits of the minimisation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MinimizeSettings {
+    /// Linearisations allowed; a coarse start takes 5–15.
+    pub max_iterations: usize,
+    /// Stop when the decrement −gᵀδ falls below this (units of σ²).
+    pub decrement: f64,
+    /// First damping, relative to diag H; small because closed forms give the start.
+    pub damping: f64,
+}
+
+impl Default for MinimizeSettings {
+    fn default() -> Self {
+        Self {
+            max_iterations: 100,
+            decrement: 1e-12,
+            damping: 1e-6,
+        }
+    }
+}
+
+/// Damping beyond which a step is shorter than rounding.
+const MAX_DAMPING: f64 = 1e16;
+/// A rise of the cost by this fraction is rounding of its sum.
+const COST_ROUNDING: f64 = 1e-13;
+
+/// Where a minimisation ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Minimum {
+    /// Values of all parameters.
+    pub values: Values,
+    /// Why it ended.
+    pub status: SolveStatus,
+    /// Linearisations used.
+    pub iterations: usize,
+    /// eᵀV⁻¹e over the data.
+    pub data_cost: f64,
+    /// Squared prior deviations over their variances.
+    pub prior_cost: f64,
+    /// −gᵀδ of the last step: the squared distance to the minimum in units of σ.
+    pub decrement: f64,
+}
+
+/// Minimises `eᵀV⁻¹e + prior` from `start` with given weights (one per observation) and variances
+/// `theta` (σ² per noise group).
+#[must_use]
+pub fn minimize(
+    model: &Model,
+    start: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    settings: &MinimizeSettings,
+) -> Minimum {
+    let mut work = Workspace::new(model);
+    minimize_in(model, start, weights, theta, settings, &mut work)
+}
+
+pub(crate) fn minimize_in(
+    model: &Model,
+    start: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    settings: &MinimizeSettings,
+    work: &mut Workspace,
+) -> Minimum {
+    let n = model.free();
+    let mut values = start.clone();
+    let mut system = NormalEquations::new(n);
+    let mut factor = vec![0.0; n * n];
+    let mut step = vec![0.0; n];
+    let mut trial = values.clone();
+    let mut damping = settings.damping;
+    let mut decrement = f64::INFINITY;
+    let bounded = model
+        .columns
+        .iter()
+        .any(|&p| model.problem.parameters[p].bounds.is_some());
+    let mut iterations = 0;
+    let status = loop {
+        if !accumulate(model, &values, weights, theta, work, &mut system) {
+            break SolveStatus::NotEvaluable;
+        }
+        iterations += 1;
+        let current = system.cost();
+        let accepted = loop {
+            let solved = damped_step(&system, damping, &mut factor, &mut step)
+                && (!bounded || bounded_step(model, &values, &system, damping, &mut step));
+            if solved {
+                decrement = -dot(&system.g, &step);
+                retract(model, &values, &step, &mut trial);
+                if decrement <= settings.decrement {
+                    break true;
+                }
+                let cost = cost(model, &trial, weights, theta, work);
+                if cost <= current * (1.0 + COST_ROUNDING) {
+                    damping = (damping * 0.1).max(1e-12);
+                    break true;
+                }
+            }
+            damping = (damping * 10.0).max(1e-8);
+            if damping > MAX_DAMPING {
+                break false;
+            }
+        };
+        if !accepted {
+            // At the minimum of a cost that is only rounding (exact data) nothing can fall further.
+            break if decrement <= 1e-6 + current * 1e-9 {
+                SolveStatus::Converged
+            } else {
+                SolveStatus::Stalled
+            };
+        }
+        if decrement <= settings.decrement {
+            std::mem::swap(&mut values, &mut trial);
+            break SolveStatus::Converged;
+        }
+        std::mem::swap(&mut values, &mut trial);
+        if iterations >= settings.max_iterations {
+            break SolveStatus::MaxIterations;
+        }
+    };
+    Minimum {
+        values,
+        status,
+        iterations,
+        data_cost: system.data,
+        prior_cost: system.prior,
+        decrement,
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Solves (1) by Cholesky of the column-scaled system; `false` when it is not positive definite.
+pub(crate) fn damped_step(
+    system: &NormalEquations,
+    damping: f64,
+    factor: &mut [f64],
+    step: &mut [f64],
+) -> bool {
+    let n = system.n;
+    // S H S with unit diagonal, S = diag(1/√H_ii)
+    for i in 0..n {
+        let d = system.h[i * n + i];
+        step[i] = if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 };
+    }
+    for i in 0..n {
+        for j in 0..=i {
+            factor[i * n + j] = system.h[j * n + i] * step[i] * step[j];
+        }
+        factor[i * n + i] = 1.0 + damping;
+    }
+    if !cholesky_in_place(factor, n) {
+        return false;
+    }
+    // Two triangular solves on −S g; the scales sit in `step` until the end.
+    let mut y: Vec<f64> = (0..n).map(|i| -system.g[i] * step[i]).collect();
+    solve_in_place(factor, n, &mut y);
+    for i in 0..n {
+        step[i] *= y[i];
+    }
+    step.iter().all(|x| x.is_finite())
+}
+
+/// Lower Cholesky factor in place (row-major, lower triangle).
+pub(crate) fn cholesky_in_place(a: &mut [f64], n: usize) -> bool {
+    for i in 0..n {
+        for j in 0..=i {
+            let (ri, rj) = (&a[i * n..i * n + j], &a[j * n..j * n + j]);
+            let sum = a[i * n + j] - dot(ri, rj);
+            if i == j {
+                if !(sum > 0.0 && sum.is_finite()) {
+                    return false;
+                }
+                a[i * n + i] = sum.sqrt();
+            } else {
+                a[i * n + j] = sum / a[j * n + j];
+            }
+        }
+    }
+    true
+}
+
+/// y ← (L Lᵀ)⁻¹ y.
+pub(crate) fn solve_in_place(l: &[f64], n: usize, y: &mut [f64]) {
+    for i in 0..n {
+        let sum = dot(&l[i * n..i * n + i], &y[..i]);
+        y[i] = (y[i] - sum) / l[i * n + i];
+    }
+    for i in (0..n).rev() {
+        y[i] /= l[i * n + i];
+        let yi = y[i];
+        for j in 0..i {
+            y[j] -= l[i * n + j] * yi;
+        }
+    }
+}
+
+/// x ⊞ δ: coordinates add; a rotation vector that passed π is replaced by the shorter one.
+pub(crate) fn retract(model: &Model, values: &Values, step: &[f64], out: &mut Values) {
+    out.0.copy_from_slice(&values.0);
+    for (c, &p) in model.columns.iter().enumerate() {
+        out.0[p] += step[c];
+    }
+    for edge in &model.problem.edges {
+        let EdgeKind::Unknown(u) = &edge.kind else {
+            continue;
+        };
+        if let [Some(a), Some(b), Some(c), ..] = u.parameters {
+            let ids = [a.index(), b.index(), c.index()];
+            if ids.iter().any(|&p| model.column_of[p].is_none()) {
+                continue;
+            }
+            let omega = coordinates(u, out).fixed_rows::<3>(0).into_owned();
+            let angle = omega.norm();
+            if angle > std::f64::consts::PI {
+                let shorter = omega * (1.0 - 2.0 * std::f64::consts::PI / angle);
+                for (i, &p) in ids.iter().enumerate() {
+                    out.0[p] = shorter[i];
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,633 @@
+//! A checked problem, laid out for the solver: columns, compiled paths, observations by sample.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+use nalgebra::{Isometry3, Matrix6, Vector6};
+
+use crate::edge::{EdgeKind, FeatureKind};
+use crate::error::Error;
+use crate::head::{HeadKind, PoseNoise};
+use crate::ids::{EdgeId, FrameId};
+use crate::path::CompiledPath;
+use crate::pose::Pose;
+use crate::problem::Problem;
+
+/// A joint whose reading varies by less than this (rad or m) over the samples that use it did not
+/// move: 1 mrad on a lever of 1 m is the tracker's noise, so its axis cannot be seen.
+pub const MIN_JOINT_RANGE: f64 = 1e-3;
+
+/// A compiled [`Problem`].
+#[derive(Debug, Clone)]
+pub struct Model {
+    pub(crate) problem: Problem,
+    /// Column → parameter.
+    pub(crate) columns: Vec<usize>,
+    /// Parameter → column.
+    pub(crate) column_of: Vec<Option<usize>>,
+    /// One per head.
+    pub(crate) paths: Vec<CompiledPath>,
+    /// Sorted by (sample, head, order given).
+    pub(crate) observations: Vec<Observation>,
+    /// Observations of each sample.
+    pub(crate) of_sample: Vec<Range<usize>>,
+    /// Random effects of a sample.
+    pub(crate) slots: Vec<Slot>,
+    /// Residual rows over all observations.
+    pub(crate) rows: usize,
+    /// Largest number of rows in one sample.
+    pub(crate) max_rows: usize,
+    unmoved: Vec<EdgeId>,
+    skipped: usize,
+}
+
+/// One observation (vector-valued) of one head.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Observation {
+    pub sample: usize,
+    pub head: usize,
+    /// Index into the head's own list.
+    pub item: usize,
+    pub rows: usize,
+}
+
+/// One scalar random effect per sample; its direction already carries any given scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Slot {
+    pub edge: usize,
+    pub direction: usize,
+    /// `None`: unit variance (a measured edge's own covariance).
+    pub group: Option<usize>,
+}
+
+/// Values of every parameter (free and fixed), in the order of the problem.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Values(pub Vec<f64>);
+
+impl Model {
+    /// Checks a problem and lays it out.
+    ///
+    /// # Errors
+    /// [`Error`] names what cannot be used: lengths, non-finite numbers, frames that do not join.
+    pub fn new(problem: &Problem) -> Result<Self, Error> {
+        check(problem)?;
+        let mut problem = problem.clone();
+        let mut walks = Vec::with_capacity(problem.heads.len());
+        for head in &problem.heads {
+            walks.push(walk(
+                &problem,
+                head.from,
+                head.to,
+                head.path.as_deref(),
+                &head.name,
+            )?);
+        }
+
+        let mut observations = Vec::new();
+        let mut skipped = 0;
+        for (h, head) in problem.heads.iter().enumerate() {
+            let rows = head.kind.rows();
+            for (item, sample) in head.kind.samples().into_iter().enumerate() {
+                let lost = walks[h].iter().any(|&(e, _)| {
+                    matches!(&problem.edges[e.index()].kind,
+                        EdgeKind::Measured { poses, .. } if poses[sample].is_none())
+                });
+                if lost {
+                    skipped += 1;
+                } else {
+                    observations.push(Observation {
+                        sample,
+                        head: h,
+                        item,
+                        rows,
+                    });
+                }
+            }
+        }
+        if observations.is_empty() {
+            return Err(Error::NoObservations);
+        }
+        observations.sort_by_key(|o| (o.sample, o.head, o.item));
+        let mut of_sample = Vec::with_capacity(problem.samples);
+        let mut start = 0;
+        for s in 0..problem.samples {
+            let mut end = start;
+            while end < observations.len() && observations[end].sample == s {
+                end += 1;
+            }
+            of_sample.push(start..end);
+            start = end;
+        }
+
+        let unmoved = contract_unmoved(&mut problem, &walks, &of_sample);
+
+        // Only parameters that some observation can feel, or that are free by themselves, get columns.
+        let mut column_of = vec![None; problem.parameters.len()];
+        let mut columns = Vec::new();
+        for (p, parameter) in problem.parameters.iter().enumerate() {
+            if !parameter.fixed {
+                column_of[p] = Some(columns.len());
+                columns.push(p);
+            }
+        }
+
+        let slots = random_slots(&problem, &walks);
+        let start_values = Values(problem.parameters.iter().map(|p| p.start).collect());
+        let paths = walks
+            .iter()
+            .map(|w| CompiledPath::new(&problem, &start_values, &column_of, &slots, w))
+            .collect();
+        let rows = observations.iter().map(|o| o.rows).sum();
+        let max_rows = of_sample
+            .iter()
+            .map(|r| observations[r.clone()].iter().map(|o| o.rows).sum())
+            .max()
+            .unwrap_or(0);
+        Ok(Self {
+            problem,
+            columns,
+            column_of,
+            paths,
+            observations,
+            of_sample,
+            slots,
+            rows,
+            max_rows,
+            unmoved,
+            skipped,
+        })
+    }
+
+    /// The problem as it is solved (parameters of joints that never moved are held).
+    #[must_use]
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// Joints that never moved: contracted, not fitted.
+    #[must_use]
+    pub fn unmoved(&self) -> &[EdgeId] {
+        &self.unmoved
+    }
+
+    /// Observations whose sample lacks a measured edge of their path.
+    #[must_use]
+    pub fn skipped(&self) -> usize {
+        self.skipped
+    }
+
+    /// Number of free parameters.
+    #[must_use]
+    pub fn free(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Residual rows (3 per marker, 6 per pose, …).
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Start values of all parameters.
+    #[must_use]
+    pub fn start(&self) -> Values {
+        Values(self.problem.parameters.iter().map(|p| p.start).collect())
+    }
+
+    /// Number of observations (vectors, not rows).
+    #[must_use]
+    pub fn observation_count(&self) -> usize {
+        self.observations.len()
+    }
+
+    /// Sample, head name and index within the head of an observation.
+    #[must_use]
+    pub fn describe(&self, observation: usize) -> (usize, &str, usize) {
+        let o = self.observations[observation];
+        (o.sample, &self.problem.heads[o.head].name, o.item)
+    }
+
+    /// Current `parent_from_child` of a constant edge (known or unknown); `None` for the others.
+    #[must_use]
+    pub fn edge_pose(&self, edge: EdgeId, values: &Values) -> Option<Isometry3<f64>> {
+        match &self.problem.edges.get(edge.index())?.kind {
+            EdgeKind::Known(x) => Some(*x),
+            EdgeKind::Unknown(u) => Some(u.nominal * u.chart.displacement(&coordinates(u, values))),
+            _ => None,
+        }
+    }
+
+    /// Current coordinates of a point in its frame, m.
+    #[must_use]
+    pub fn point_position(&self, point: usize, values: &Values) -> nalgebra::Point3<f64> {
+        let point = &self.problem.points[point];
+        match point.parameters {
+            None => point.position,
+            Some(ids) => nalgebra::Point3::new(
+                values.0[ids[0].index()],
+                values.0[ids[1].index()],
+                values.0[ids[2].index()],
+            ),
+        }
+    }
+
+    /// Compiles the way between two frames that need not be measured.
+    pub(crate) fn compile_between(
+        &self,
+        from: FrameId,
+        to: FrameId,
+        values: &Values,
+    ) -> Result<CompiledPath, Error> {
+        let walk = walk(&self.problem, from, to, None, "derived quantity")?;
+        Ok(CompiledPath::new(
+            &self.problem,
+            values,
+            &self.column_of,
+            &self.slots,
+            &walk,
+        ))
+    }
+}
+
+/// Chart coordinates of an unknown pose.
+pub(crate) fn coordinates(u: &crate::edge::UnknownPose, values: &Values) -> Vector6<f64> {
+    let mut c = Vector6::zeros();
+    for i in 0..6 {
+        if let Some(p) = u.parameters[i] {
+            c[i] = values.0[p.index()];
+        }
+    }
+    c
+}
+
+/// The edges of a path, with the frames checked where they are joined.
+fn walk(
+    problem: &Problem,
+    from: FrameId,
+    to: FrameId,
+    given: Option<&[(EdgeId, bool)]>,
+    head: &str,
+) -> Result<Vec<(EdgeId, bool)>, Error> {
+    let Some(given) = given else {
+        return problem.path(from, to);
+    };
+    let mut here = from;
+    for &(id, inverse) in given {
+        let edge = &problem.edges[id.index()];
+        let (begin, end) = if inverse {
+            (edge.child, edge.parent)
+        } else {
+            (edge.parent, edge.child)
+        };
+        if begin != here {
+            return Err(Error::BrokenPath {
+                head: head.to_owned(),
+                edge: edge.name.clone(),
+                found: problem.frame_name(begin).to_owned(),
+                expected: problem.frame_name(here).to_owned(),
+            });
+        }
+        here = end;
+    }
+    if here != to {
+        return Err(Error::NoPath {
+            from: problem.frame_name(from).to_owned(),
+            to: problem.frame_name(to).to_owned(),
+        });
+    }
+    Ok(given.to_vec())
+}
+
+/// Holds every parameter that only unmoved joints feel; returns those joints.
+fn contract_unmoved(
+    problem: &mut Problem,
+    walks: &[Vec<(EdgeId, bool)>],
+    of_sample: &[Range<usize>],
+) -> Vec<EdgeId> {
+    let on_path: BTreeSet<usize> = walks.iter().flatten().map(|&(e, _)| e.index()).collect();
+    let used: Vec<usize> = (0..problem.samples)
+        .filter(|&s| !of_sample[s].is_empty())
+        .collect();
+    let range_of = |f: &dyn Fn(usize) -> f64| {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for &s in &used {
+            low = low.min(f(s));
+            high = high.max(f(s));
+        }
+        high - low
+    };
+    let mut unmoved = Vec::new();
+    let mut moving_parameters = BTreeSet::new();
+    let mut still_parameters = BTreeSet::new();
+    for &e in &on_path {
+        let EdgeKind::Joint(joint) = &problem.edges[e].kind else {
+            continue;
+        };
+        let reading = |s: usize| {
+            joint.q[s]
+                + joint
+                    .features
+                    .iter()
+                    .filter(|f| f.kind.lateral().is_none())
+                    .map(|f| f.value(s) * problem.parameters[f.parameter.index()].start)
+                    .sum::<f64>()
+        };
+        let driven = joint.features.iter().any(|f| {
+            matches!(f.kind, FeatureKind::Coupling | FeatureKind::Other)
+                && !problem.parameters[f.parameter.index()].fixed
+                && range_of(&|s| f.value(s)) > MIN_JOINT_RANGE
+        });
+        let own: Vec<usize> = joint.features.iter().map(|f| f.parameter.index()).collect();
+        if driven || range_of(&reading) > MIN_JOINT_RANGE {
+            moving_parameters.extend(own);
+        } else {
+            unmoved.push(EdgeId::of(e));
+            still_parameters.extend(own);
+        }
+    }
+    for &e in &unmoved {
+        let name = problem.edges[e.index()].name.clone();
+        for edge in &problem.edges {
+            if let EdgeKind::Unknown(u) = &edge.kind {
+                if u.role == crate::edge::Role::JointOrigin && u.joint.as_deref() == Some(&name) {
+                    still_parameters.extend(u.parameters.iter().flatten().map(|p| p.index()));
+                }
+            }
+        }
+    }
+    for p in still_parameters.difference(&moving_parameters) {
+        problem.parameters[*p].fixed = true;
+    }
+    unmoved
+}
+
+/// One slot per noisy joint, per random direction, per dimension of a measured edge's covariance.
+fn random_slots(problem: &Problem, walks: &[Vec<(EdgeId, bool)>]) -> Vec<Slot> {
+    let on_path: BTreeSet<usize> = walks.iter().flatten().map(|&(e, _)| e.index()).collect();
+    let mut slots = Vec::new();
+    for &edge in &on_path {
+        let (count, group) = match &problem.edges[edge].kind {
+            EdgeKind::Joint(j) => (usize::from(j.noise.is_some()), j.noise.map(|g| g.index())),
+            EdgeKind::Random { directions, group } => (directions.len(), Some(group.index())),
+            EdgeKind::Measured {
+                covariance: Some(_),
+                ..
+            } => (6, None),
+            _ => (0, None),
+        };
+        slots.extend((0..count).map(|direction| Slot {
+            edge,
+            direction,
+            group,
+        }));
+    }
+    slots
+}
+
+/// Directions of a measured edge's noise: columns of the Cholesky factor of its covariance.
+pub(crate) fn covariance_directions(covariance: &Matrix6<f64>) -> Option<Matrix6<f64>> {
+    nalgebra::Cholesky::new(*covariance).map(|c| c.l())
+}
+
+/// Everything that can be wrong before paths are known.
+fn check(problem: &Problem) -> Result<(), Error> {
+    let length = |what: &str, found: usize| {
+        if found == problem.samples {
+            Ok(())
+        } else {
+            Err(Error::Length {
+                what: what.to_owned(),
+                found,
+                expected: problem.samples,
+            })
+        }
+    };
+    let finite = |what: &str, values: &[f64]| match values.iter().position(|v| !v.is_finite()) {
+        Some(sample) => Err(Error::NotFinite {
+            what: what.to_owned(),
+            sample,
+        }),
+        None => Ok(()),
+    };
+    let pose = |what: &str, sample: usize, x: &Isometry3<f64>| {
+        if x.translation.vector.iter().all(|v| v.is_finite())
+            && x.rotation.coords.iter().all(|v| v.is_finite())
+        {
+            Ok(())
+        } else {
+            Err(Error::NotFinite {
+                what: what.to_owned(),
+                sample,
+            })
+        }
+    };
+    for edge in &problem.edges {
+        match &edge.kind {
+            EdgeKind::Known(x) => pose(&edge.name, 0, x)?,
+            EdgeKind::Unknown(u) => pose(&edge.name, 0, &u.nominal)?,
+            EdgeKind::Measured { poses, covariance } => {
+                length(&edge.name, poses.len())?;
+                for (s, x) in poses.iter().enumerate() {
+                    if let Some(x) = x {
+                        pose(&edge.name, s, x)?;
+                    }
+                }
+                if let Some(c) = covariance {
+                    if covariance_directions(c).is_none() {
+                        return Err(Error::NotPositive {
+                            what: format!("{} covariance", edge.name),
+                            value: c.determinant(),
+                        });
+                    }
+                }
+            }
+            EdgeKind::Joint(joint) => {
+                length(&edge.name, joint.q.len())?;
+                finite(&edge.name, &joint.q)?;
+                for f in &joint.features {
+                    if let Some(v) = &f.values {
+                        let what = format!("{}.{}", edge.name, f.kind.label());
+                        length(&what, v.len())?;
+                        finite(&what, v)?;
+                    }
+                }
+                for c in &joint.candidates {
+                    length(&c.name, c.values.len())?;
+                    finite(&c.name, &c.values)?;
+                }
+            }
+            EdgeKind::Random { directions, .. } => {
+                for d in directions {
+                    finite(&edge.name, d.as_slice())?;
+                }
+            }
+        }
+    }
+    let mut names = BTreeSet::new();
+    for p in &problem.parameters {
+        if !names.insert(p.name.as_str()) {
+            return Err(Error::DuplicateName {
+                name: p.name.clone(),
+            });
+        }
+        finite(&p.name, &[p.nominal, p.start])?;
+        if let Some(sigma) = p.prior_sigma {
+            positive(&format!("{} prior", p.name), sigma)?;
+        }
+        if let Some((lower, upper)) = p.bounds {
+            if !(lower <= p.start && p.start <= upper) {
+                return Err(Error::OutOfBounds {
+                    name: p.name.clone(),
+                    start: p.start,
+                    lower,
+                    upper,
+                });
+            }
+        }
+    }
+    for g in &problem.groups {
+        positive(&g.name, g.sigma)?;
+    }
+    if let Some(t) = &problem.times {
+        length("times", t.len())?;
+        finite("times", t)?;
+    }
+    for head in &problem.heads {
+        for sample in head.kind.samples() {
+            if sample >= problem.samples {
+                return Err(Error::NoSuchSample {
+                    what: head.name.clone(),
+                    sample,
+                    samples: problem.samples,
+                });
+            }
+        }
+        let at_frame = |point: crate::ids::PointId| {
+            let p = &problem.points[point.index()];
+            if p.frame == head.to {
+                Ok(())
+            } else {
+                Err(Error::PointFrame {
+                    head: head.name.clone(),
+                    point: p.name.clone(),
+                    found: problem.frame_name(p.frame).to_owned(),
+                    expected: problem.frame_name(head.to).to_owned(),
+                })
+            }
+        };
+        match &head.kind {
+            HeadKind::Markers { observations, .. } => {
+                for o in observations {
+                    at_frame(o.point)?;
+                    if !o.position.iter().all(|v| v.is_finite()) {
+                        return Err(Error::NotFinite {
+                            what: head.name.clone(),
+                            sample: o.sample,
+                        });
+                    }
+                    if let Some(shape) = o.shape {
+                        if nalgebra::Cholesky::new(shape).is_none() {
+                            return Err(Error::NotPositive {
+                                what: format!("{} covariance", head.name),
+                                value: shape.determinant(),
+                            });
+                        }
+                    }
+                }
+            }
+            HeadKind::Poses {
+                observations,
+                noise,
+            } => {
+                for o in observations {
+                    pose(&head.name, o.sample, &o.pose)?;
+                }
+                check_noise(&head.name, noise)?;
+            }
+            HeadKind::Loop { noise, .. } => check_noise(&head.name, noise)?,
+            HeadKind::Plane {
+                point,
+                observations,
+                ..
+            }
+            | HeadKind::Distance {
+                point,
+                observations,
+                ..
+            } => {
+                at_frame(*point)?;
+                for &(s, h) in observations {
+                    if !h.is_finite() {
+                        return Err(Error::NotFinite {
+                            what: head.name.clone(),
+                            sample: s,
+                        });
+                    }
+                }
+            }
+            HeadKind::Line { point, .. } => at_frame(*point)?,
+            HeadKind::Directions { .. } => {}
+        }
+    }
+    Ok(())
+}
+
+fn check_noise(head: &str, noise: &PoseNoise) -> Result<(), Error> {
+    if let PoseNoise::Full { shape, .. } = noise {
+        if nalgebra::Cholesky::new(*shape).is_none() {
+            return Err(Error::NotPositive {
+                what: format!("{head} covariance"),
+                value: shape.determinant(),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn positive(what: &str, value: f64) -> Result<(), Error> {
+    if value > 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(Error::NotPositive {
+            what: what.to_owned(),
+            value,
+        })
+    }
+}
+
+/// Poses and right-twist columns of the unknown edges at the current values: constant over samples.
+#[derive(Debug, Clone)]
+pub(crate) struct EdgeCache {
+    pub pose: Vec<Pose>,
+    /// Columns per coordinate, for the edge walked forward and backward.
+    pub forward: Vec<[Vector6<f64>; 6]>,
+    pub backward: Vec<[Vector6<f64>; 6]>,
+}
+
+impl EdgeCache {
+    pub(crate) fn new(problem: &Problem) -> Self {
+        let n = problem.edges.len();
+        Self {
+            pose: vec![Pose::identity(); n],
+            forward: vec![[Vector6::zeros(); 6]; n],
+            backward: vec![[Vector6::zeros(); 6]; n],
+        }
+    }
+
+    pub(crate) fn update(&mut self, problem: &Problem, values: &Values) {
+        for (e, edge) in problem.edges.iter().enumerate() {
+            if let EdgeKind::Unknown(u) = &edge.kind {
+                let c = coordinates(u, values);
+                let x = Pose::of(&(u.nominal * u.chart.displacement(&c)));
+                let d = u.chart.differential(&c);
+                for i in 0..6 {
+                    let column: Vector6<f64> = d.column(i).into_owned();
+                    self.forward[e][i] = column;
+                    // X⁻¹ moves by exp(−δ)·X⁻¹ = X⁻¹·exp(−Ad(X) δ)
+                    self.backward[e][i] = -x.push_forward(&column);
+                }
+                self.pose[e] = x;
+            }
+        }
+    }
+}

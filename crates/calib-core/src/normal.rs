@@ -1,0 +1,156 @@
+//! Normal equations, summed sample by sample: the dense Jacobian of all samples never exists.
+//!
+//! ```text
+//! H = Σ_s J_sᵀ V_s⁻¹ J_s + Λ,   g = Σ_s J_sᵀ V_s⁻¹ e_s + Λ (x − x₀),   Λ = diag(1/σ²)        (1)
+//! F = ½ Σ_s e_sᵀ V_s⁻¹ e_s + ½ (x − x₀)ᵀ Λ (x − x₀)                                          (2)
+//! ```
+
+use crate::model::{EdgeCache, Model, Values};
+use crate::path::Derivatives;
+use crate::rows::SampleRows;
+
+/// H (upper triangle, row-major n × n), g, and twice F split into data and prior.
+#[derive(Debug, Clone)]
+pub(crate) struct NormalEquations {
+    pub n: usize,
+    pub h: Vec<f64>,
+    pub g: Vec<f64>,
+    pub data: f64,
+    pub prior: f64,
+}
+
+impl NormalEquations {
+    pub(crate) fn new(n: usize) -> Self {
+        Self {
+            n,
+            h: vec![0.0; n * n],
+            g: vec![0.0; n],
+            data: 0.0,
+            prior: 0.0,
+        }
+    }
+
+    pub(crate) fn cost(&self) -> f64 {
+        self.data + self.prior
+    }
+}
+
+/// Everything that the passes over the samples need; allocated once.
+#[derive(Debug, Clone)]
+pub(crate) struct Workspace {
+    pub cache: EdgeCache,
+    pub rows: SampleRows,
+}
+
+impl Workspace {
+    pub(crate) fn new(model: &Model) -> Self {
+        Self {
+            cache: EdgeCache::new(&model.problem),
+            rows: SampleRows::new(model),
+        }
+    }
+}
+
+/// Equation (1). `false` when some V_s is not positive definite or a number is not finite.
+pub(crate) fn accumulate(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+    out: &mut NormalEquations,
+) -> bool {
+    let n = out.n;
+    out.h.fill(0.0);
+    out.g.fill(0.0);
+    out.data = 0.0;
+    work.cache.update(&model.problem, values);
+    let rows = &mut work.rows;
+    for sample in 0..model.problem.samples {
+        if model.of_sample[sample].is_empty() {
+            continue;
+        }
+        rows.fill(
+            model,
+            &work.cache,
+            values,
+            weights,
+            sample,
+            Derivatives::All,
+        );
+        rows.covariance(model, weights, theta);
+        if rows.factor().is_none() {
+            return false;
+        }
+        rows.whiten(true);
+        out.data += rows.squared_norm();
+        for i in 0..rows.m {
+            let row = &rows.j[i * n..(i + 1) * n];
+            let r = rows.r[i];
+            for a in 0..n {
+                let ja = row[a];
+                if ja != 0.0 {
+                    out.g[a] += ja * r;
+                    for (h, &jb) in out.h[a * n + a..(a + 1) * n].iter_mut().zip(&row[a..]) {
+                        *h += ja * jb;
+                    }
+                }
+            }
+        }
+    }
+    add_prior(model, values, out);
+    out.cost().is_finite()
+}
+
+fn add_prior(model: &Model, values: &Values, out: &mut NormalEquations) {
+    let n = out.n;
+    out.prior = 0.0;
+    for (c, &p) in model.columns.iter().enumerate() {
+        let parameter = &model.problem.parameters[p];
+        if let Some(sigma) = parameter.prior_sigma {
+            let information = 1.0 / (sigma * sigma);
+            let off = values.0[p] - parameter.nominal;
+            out.h[c * n + c] += information;
+            out.g[c] += information * off;
+            out.prior += information * off * off;
+        }
+    }
+}
+
+/// Equation (2), doubled; infinite where it cannot be computed.
+pub(crate) fn cost(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+) -> f64 {
+    work.cache.update(&model.problem, values);
+    let rows = &mut work.rows;
+    let wanted = if model.slots.is_empty() {
+        Derivatives::None
+    } else {
+        Derivatives::Random
+    };
+    let mut sum = 0.0;
+    for sample in 0..model.problem.samples {
+        if model.of_sample[sample].is_empty() {
+            continue;
+        }
+        rows.fill(model, &work.cache, values, weights, sample, wanted);
+        rows.covariance(model, weights, theta);
+        if rows.factor().is_none() {
+            return f64::INFINITY;
+        }
+        rows.whiten(false);
+        sum += rows.squared_norm();
+    }
+    for &p in &model.columns {
+        let parameter = &model.problem.parameters[p];
+        if let Some(sigma) = parameter.prior_sigma {
+            let z = (values.0[p] - parameter.nominal) / sigma;
+            sum += z * z;
+        }
+    }
+    if sum.is_finite() { sum } else { f64::INFINITY }
+}

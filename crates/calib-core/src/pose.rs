@@ -1,0 +1,66 @@
+//! A pose as rotation matrix and translation: what the inner loop multiplies.
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Vector3, Vector6};
+
+use calib_geometry::so3;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Pose {
+    pub r: Matrix3<f64>,
+    pub t: Vector3<f64>,
+}
+
+impl Pose {
+    pub(crate) fn identity() -> Self {
+        Self {
+            r: Matrix3::identity(),
+            t: Vector3::zeros(),
+        }
+    }
+
+    pub(crate) fn of(x: &Isometry3<f64>) -> Self {
+        Self {
+            r: *x.rotation.to_rotation_matrix().matrix(),
+            t: x.translation.vector,
+        }
+    }
+
+    pub(crate) fn isometry(&self) -> Isometry3<f64> {
+        Isometry3::from_parts(
+            Translation3::from(self.t),
+            so3::quaternion_of(&Rotation3::from_matrix_unchecked(self.r)),
+        )
+    }
+
+    #[inline]
+    pub(crate) fn then(&self, rhs: &Self) -> Self {
+        Self {
+            r: self.r * rhs.r,
+            t: self.t + self.r * rhs.t,
+        }
+    }
+
+    pub(crate) fn inverse(&self) -> Self {
+        let rt = self.r.transpose();
+        Self {
+            r: rt,
+            t: -(rt * self.t),
+        }
+    }
+
+    /// Ad(self⁻¹) [ω; v] = [Rᵀω; Rᵀ(v + ω × t)]
+    #[inline]
+    pub(crate) fn pull_back(&self, xi: &Vector6<f64>) -> Vector6<f64> {
+        let omega = Vector3::new(xi[0], xi[1], xi[2]);
+        let v = Vector3::new(xi[3], xi[4], xi[5]) + omega.cross(&self.t);
+        let (a, b) = (self.r.tr_mul(&omega), self.r.tr_mul(&v));
+        Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
+    }
+
+    /// Ad(self) [ω; v] = [Rω; t × Rω + Rv]
+    pub(crate) fn push_forward(&self, xi: &Vector6<f64>) -> Vector6<f64> {
+        let omega = self.r * Vector3::new(xi[0], xi[1], xi[2]);
+        let v = self.r * Vector3::new(xi[3], xi[4], xi[5]) + self.t.cross(&omega);
+        Vector6::new(omega.x, omega.y, omega.z, v.x, v.y, v.z)
+    }
+}
