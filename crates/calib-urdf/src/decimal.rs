@@ -31,6 +31,19 @@ pub fn decimals(values: &[f64]) -> String {
         .join(" ")
 }
 
+/// An angle that came through a rotation, without the noise of that: 0.09999999999999999 is 0.1.
+///
+/// Moves it by less than a rounding of the rotation itself, 2.3e-16 rad.
+#[must_use]
+pub fn tidy_angle(angle: f64) -> f64 {
+    let rounded = (angle * 1e15).round() / 1e15;
+    if (rounded - angle).abs() <= f64::EPSILON {
+        rounded
+    } else {
+        angle
+    }
+}
+
 /// Is the number in the text still the right one?
 #[must_use]
 pub fn same_number(old: f64, new: f64) -> bool {

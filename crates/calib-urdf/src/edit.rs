@@ -110,6 +110,8 @@ pub enum EditError {
         kind: &'static str,
         name: String,
     },
+    #[error("the frame `{name}` is to be added twice")]
+    FrameTwice { name: String },
     #[error("a {kind} cannot be named `{name}`: {reason}")]
     BadName {
         kind: &'static str,
@@ -190,8 +192,11 @@ fn comma_list(lines: &[usize]) -> String {
 }
 
 fn uses(lines: &[usize]) -> String {
-    match lines {
+    let mut distinct = lines.to_vec();
+    distinct.dedup();
+    match distinct.as_slice() {
         [] => "nowhere in this file, so perhaps more than once elsewhere".to_owned(),
-        _ => format!("{} times (lines {})", lines.len(), comma_list(lines)),
+        [line] => format!("{} times (line {line})", lines.len()),
+        _ => format!("{} times (lines {})", lines.len(), comma_list(&distinct)),
     }
 }

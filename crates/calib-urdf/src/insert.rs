@@ -1,6 +1,6 @@
 //! New elements and attributes in the hand of the file: its indentation, line ending and quotes.
 
-use crate::decimal::decimals;
+use crate::decimal::{decimals, tidy_angle};
 use crate::edit::EditError;
 use crate::rpy::rpy_from_rotation;
 use crate::source::top_level;
@@ -14,7 +14,10 @@ pub(crate) fn attribute(
     name: &str,
     value: &str,
 ) -> (usize, String) {
-    match element.attributes().last() {
+    match element
+        .attributes()
+        .max_by_key(|attribute| attribute.range().start)
+    {
         // After the last one, in its own manner: `\r\n\t\txyz='…'` is followed by `\r\n\t\trpy='…'`.
         Some(last) => {
             let range = last.range();
@@ -136,10 +139,15 @@ impl<'t> Style<'t> {
         } else {
             &inner
         };
-        let above =
-            comment_text.map_or_else(String::new, |words| format!("{outer}{}", comment(words)));
+        let above = comment_text.map_or_else(String::new, |words| {
+            format!("{outer}{}", comment(words, self.line_ending))
+        });
         let xyz = decimals(parent_from_frame.translation.vector.as_slice());
-        let rpy = decimals(rpy_from_rotation(&parent_from_frame.rotation).as_slice());
+        let rpy = decimals(
+            rpy_from_rotation(&parent_from_frame.rotation)
+                .map(tidy_angle)
+                .as_slice(),
+        );
         format!(
             "{above}{outer}<link name=\"{}\"/>{outer}<joint name=\"{}\" type=\"fixed\">{inner}<parent link=\"{}\"/>\
              {inner}<child link=\"{}\"/>{inner}<origin xyz=\"{xyz}\" rpy=\"{rpy}\"/>{outer}</joint>",
@@ -152,7 +160,7 @@ impl<'t> Style<'t> {
 }
 
 /// A comment that is well-formed whatever the words are: no `--`, no control characters.
-pub(crate) fn comment(words: &str) -> String {
+pub(crate) fn comment(words: &str, line_ending: &str) -> String {
     let mut safe: String = words
         .chars()
         .filter(|c| !c.is_control() || *c == '\n' || *c == '\t')
@@ -160,7 +168,12 @@ pub(crate) fn comment(words: &str) -> String {
     while safe.contains("--") {
         safe = safe.replace("--", "- -");
     }
-    format!("<!-- {} -->", safe.trim())
+    let line_ending = if line_ending.is_empty() {
+        " "
+    } else {
+        line_ending
+    };
+    format!("<!-- {} -->", safe.trim().replace('\n', line_ending))
 }
 
 fn escaped(name: &str) -> String {

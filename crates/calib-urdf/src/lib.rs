@@ -14,13 +14,15 @@
 //! calibration corrects, so the way back, from a rotation to three decimals in a text, has to be
 //! exact as well: see [`rpy`].
 //!
-//! The file is text that we were lent : attribute values are exchanged by their byte range, and every other
-//! byte (comments, quotes, order, line endings) stays. `revert` gives the original bytes back.
+//! The file is text that we were lent: [`patch()`] exchanges attribute values by their byte range, and every other
+//! byte (comments, quotes, order, line endings) stays. [`revert()`] gives the original bytes back.
 //!
 //! What this crate does **not** do: it opens no mesh (`package://` stays a text), expands no xacro,
 //! and knows no closed kinematic loops.
 
+pub mod axes;
 pub mod decimal;
+pub mod diff;
 pub mod edit;
 pub mod error;
 mod insert;
@@ -29,13 +31,17 @@ pub mod model;
 pub mod nearest;
 pub mod patch;
 pub mod read;
+pub mod revert;
 pub mod rpy;
 pub mod source;
 pub mod verify;
 mod xacro;
 
+pub use axes::{AxisPair, AxisRelation};
+pub use diff::{Changed, JointDiff, ModelDiff, diff, diff_models, unified};
 pub use edit::{Change, EditError, UrdfEdit};
 pub use patch::{Patched, patch};
+pub use revert::{ChangeRecord, Replacement, RevertError, revert, sha256_hex};
 pub use verify::{SecondReader, Verification, verify};
 
 pub use error::{Place, Problem, ReadError, ReadProblem};

@@ -83,7 +83,7 @@ impl JointKind {
 }
 
 /// `<limit>` of a joint; each number as far as the file gives it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct JointLimits {
     /// Smallest position, rad or m.
     pub lower: Option<f64>,

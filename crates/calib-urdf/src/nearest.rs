@@ -16,20 +16,30 @@ pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
         .map(|(_, name)| name)
 }
 
-/// Levenshtein distance in characters, one row at a time.
+/// Letters to insert, delete, exchange or swap with their neighbour: `wirst` is one slip away from `wrist`.
 fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let substituted = diagonal + usize::from(x != *y);
-            diagonal = row[j + 1];
-            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    // distance[i][j] between the first i letters of a and the first j of b
+    let mut distance = vec![vec![0; b.len() + 1]; a.len() + 1];
+    for i in 0..=a.len() {
+        for j in 0..=b.len() {
+            distance[i][j] = if i == 0 || j == 0 {
+                i + j
+            } else {
+                let exchanged = distance[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
+                let best = exchanged
+                    .min(distance[i - 1][j] + 1)
+                    .min(distance[i][j - 1] + 1);
+                let swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+                if swapped {
+                    best.min(distance[i - 2][j - 2] + 1)
+                } else {
+                    best
+                }
+            };
         }
     }
-    row[b.len()]
+    distance[a.len()][b.len()]
 }
 
 #[cfg(test)]
@@ -40,6 +50,7 @@ mod tests {
     fn distances_known_by_hand() {
         assert_eq!(edit_distance("kitten", "sitting"), 3);
         assert_eq!(edit_distance("", "abc"), 3);
+        assert_eq!(edit_distance("wirst", "wrist"), 1);
         assert_eq!(edit_distance("abc", "abc"), 0);
     }
 

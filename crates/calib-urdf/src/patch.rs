@@ -4,7 +4,9 @@
 //! `<axis>` and attributes are inserted in the style of their neighbours (indentation, line ending, quotes). The text of a
 //! number that already is the new one within [`SAME_NUMBER`] stays, so a second patch with the same values changes nothing.
 
-use crate::decimal::{SAME_NUMBER, Splice, apply, decimals, same_number, splice_numbers};
+use crate::decimal::{
+    SAME_NUMBER, Splice, apply, decimals, same_number, splice_numbers, tidy_angle,
+};
 use crate::edit::{Change, EditError, UrdfEdit};
 use crate::error::{Place, Problem, ReadError, ReadProblem};
 use crate::insert;
@@ -30,7 +32,7 @@ pub struct Patched {
 
 /// Makes the edits in a URDF's text, or in a xacro's where the text is literal.
 ///
-/// For a URDF, the result is read again and compared with the request ([`crate::verify`]) before it is returned.
+/// For a URDF, the result is read again and compared with the request ([`crate::verify()`]) before it is returned.
 ///
 /// # Errors
 /// [`EditError`]: an unreadable text, an unknown name, a number that is not finite, a text that xacro computes.
@@ -136,10 +138,16 @@ fn check_values(edits: &[UrdfEdit]) -> Result<(), EditError> {
                 (joint, "limits", lower.is_finite() && upper.is_finite())
             }
             UrdfEdit::AddFixedFrame {
+                name,
                 joint_name,
                 parent_from_frame,
                 ..
-            } => (joint_name, "origin", is_finite(parent_from_frame)),
+            } => {
+                if !seen.insert((name, "link")) {
+                    return Err(EditError::FrameTwice { name: name.clone() });
+                }
+                (joint_name, "origin", is_finite(parent_from_frame))
+            }
             UrdfEdit::AddProvenance { .. } => continue,
         };
         if !finite {
@@ -202,7 +210,7 @@ impl<'t, 'd> Patcher<'t, 'd> {
         let node = self.joint(joint)?;
         let xyz = wanted.translation.vector;
         let Some(origin) = child(node, "origin") else {
-            let rpy = rpy_from_rotation(&wanted.rotation);
+            let rpy = rpy_from_rotation(&wanted.rotation).map(tidy_angle);
             if is_zero(&xyz)
                 && angle_between(&wanted.rotation, &UnitQuaternion::identity()) <= SAME_NUMBER
             {
@@ -233,7 +241,7 @@ impl<'t, 'd> Patcher<'t, 'd> {
             if angle_between(&rotation_from_rpy(&old), &wanted.rotation) <= SAME_NUMBER {
                 old.into()
             } else {
-                rpy_near(&wanted.rotation, &old).into()
+                rpy_near(&wanted.rotation, &old).map(tidy_angle).into()
             }
         })
     }
@@ -456,7 +464,8 @@ impl<'t, 'd> Patcher<'t, 'd> {
     }
 
     fn add_provenance(&mut self, text: &str) {
-        let comment = insert::comment(text);
+        let style = insert::Style::of(self.text, self.document);
+        let comment = insert::comment(text, style.line_ending);
         if self
             .document
             .descendants()
@@ -465,7 +474,6 @@ impl<'t, 'd> Patcher<'t, 'd> {
             return;
         }
         let at = self.document.root_element().range().start;
-        let style = insert::Style::of(self.text, self.document);
         self.changes.push(Change {
             line: self.place(at).line,
             joint: String::new(),

@@ -3,7 +3,7 @@
 //! Everything that kinematics needs is checked here, with its place, and all findings are reported at once. Readers
 //! elsewhere are more trusting: urdf-rs 0.10 takes `xyz="0 abc 0"`, doubled names, unknown parents and circles without
 //! a word, and turns a `quat_xyzw` near pitch ±π/2 by up to 0.26°. It is therefore the second reader, whose
-//! forward kinematics a patched file has to agree with (see `verify`), and not the first.
+//! forward kinematics a patched file has to agree with (see [`crate::verify()`]), and not the first.
 //!
 //! What does not bear on kinematics (visuals, collisions, meshes, `<gazebo>`, `<ros2_control>`) is not looked at.
 

@@ -282,7 +282,7 @@ impl RobotModel {
         Ok(self)
     }
 
-    /// Adds the frame, or moves the one of that name (whose place in the tree [`crate::patch`] has checked).
+    /// Adds the frame, or moves the one of that name (whose place in the tree [`crate::patch()`] has checked).
     fn add_fixed_frame(
         &mut self,
         name: &str,
