@@ -1,0 +1,131 @@
+//! Several markers around one center: Gamage & Lasenby 2002, and Halvorsen's 2003 bias compensation.
+//!
+//! ```text
+//! minimise Σ_p (1/n_p) Σ_k (|x_pk − m|² − r_p²)²                                        (1)
+//! noise adds  σ² I  to each marker's covariance and  2σ² x̄_p  to its correlation with |x|²:
+//! (Σ_p Cov_p − P σ² I) m = ½ Σ_p cov_p(x, |x|²) − σ² Σ_p x̄_p                             (2)
+//! σ² = (1/N) Σ_p Σ_k (|x_pk − m|² − r_p²)² / (4 r_p²)                                     (3)
+//! ```
+//!
+//! For equally many samples (1) is Kåsa's fit of several markers; for one marker (2) with (3) is Taubin's.
+
+use calib_geometry::{Verdict, factor::Factor, measured::Cloud};
+use nalgebra::Vector3;
+
+use crate::{
+    algebraic::{Algebraic, solve},
+    input::{Input, cloud_of},
+    options::Options,
+    outcome::{CorError, Outcome},
+    sphere::{Candidate, judge, prepare},
+};
+
+/// Rounds of (2) and (3); each gains a factor σ²/s₃², so well-posed data need about ten.
+const ROUNDS: usize = 200;
+
+/// Gamage & Lasenby's linear fit.
+///
+/// # Errors
+/// [`CorError`] for data that are no numbers or of another kind.
+pub fn gamage_lasenby(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+    run("gamage_lasenby", input, options, |cloud, factor| {
+        solve(cloud, factor, Algebraic::Kasa)
+    })
+}
+
+/// Halvorsen's bias-compensated fit.
+///
+/// # Errors
+/// [`CorError`] for data that are no numbers or of another kind.
+pub fn halvorsen(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+    run("halvorsen", input, options, |cloud, factor| {
+        let (center, _) = compensate(cloud, factor);
+        (center, rms_radii(cloud, &center))
+    })
+}
+
+fn run(
+    estimator: &'static str,
+    input: &Input<'_>,
+    options: &Options,
+    fit: impl Fn(&Cloud, &Factor) -> (Vector3<f64>, Vec<f64>),
+) -> Result<Outcome, CorError> {
+    options.check()?;
+    let cloud = cloud_of(input, &[])?;
+    let equal_markers = match prepare(estimator, &cloud, true) {
+        Ok(factor) => factor,
+        Err(answer) => return Ok(answer),
+    };
+    // The test counts samples, so it needs the factor in which each sample weighs the same.
+    let factor = Factor::of(&cloud, false);
+    let judged = |(center, radii): (Vector3<f64>, Vec<f64>)| {
+        let candidate = Candidate {
+            estimator,
+            center,
+            radii,
+            radius_bias: 1.5,
+            weights: Vec::new(),
+            absolute: false,
+            rejected: Vec::new(),
+        };
+        judge(&cloud, &factor, candidate, options)
+    };
+    let outcome = judged(fit(&cloud, &equal_markers));
+    if outcome.verdict() == Verdict::Diverged {
+        // The compensation runs away where the spread is noise: say that rather than "diverged".
+        let linear = judged(solve(&cloud, &equal_markers, Algebraic::Kasa));
+        if linear.estimate().is_none() {
+            return Ok(linear);
+        }
+    }
+    Ok(outcome)
+}
+
+fn rms_radii(cloud: &Cloud, center: &Vector3<f64>) -> Vec<f64> {
+    (0..cloud.markers())
+        .map(|p| {
+            let points = cloud.marker(p);
+            let square: f64 = points.iter().map(|x| (x - center).norm_squared()).sum();
+            (square / points.len() as f64).sqrt()
+        })
+        .collect()
+}
+
+/// The fixed point of (2) and (3): center and σ². Not finite where the noise exceeds the spread.
+pub(crate) fn compensate(cloud: &Cloud, factor: &Factor) -> (Vector3<f64>, f64) {
+    let markers = cloud.markers() as f64;
+    let means: Vector3<f64> = (0..cloud.markers())
+        .map(|p| cloud.marker(p).iter().sum::<Vector3<f64>>() / cloud.marker(p).len() as f64)
+        .sum();
+    let mut center = factor.center(0.0);
+    let mut sigma2 = 0.0;
+    for _ in 0..ROUNDS {
+        sigma2 = (0..cloud.markers())
+            .map(|p| {
+                let points = cloud.marker(p);
+                let n = points.len() as f64;
+                let squares = points.iter().map(|x| (x - center).norm_squared());
+                let mean = squares.clone().sum::<f64>() / n;
+                squares.map(|q| (q - mean) * (q - mean)).sum::<f64>() / (4.0 * mean)
+            })
+            .sum::<f64>()
+            / cloud.points.len() as f64;
+        let shift = markers * sigma2;
+        if shift >= factor.s[2] * factor.s[2] {
+            return (Vector3::repeat(f64::NAN), sigma2);
+        }
+        // (2) in the basis of singular directions
+        let next: Vector3<f64> = (0..3)
+            .map(|k| {
+                let (v, s) = (factor.v.column(k), factor.s[k]);
+                v * ((0.5 * s * factor.c[k] - sigma2 * v.dot(&means)) / (s * s - shift))
+            })
+            .sum();
+        let moved = (next - center).norm();
+        center = next;
+        if moved <= 1e-15 * (center.norm() + factor.s[0]) {
+            break;
+        }
+    }
+    (center, sigma2)
+}

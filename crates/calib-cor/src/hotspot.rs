@@ -1,0 +1,346 @@
+//! Hot spot: the point of a body that stands still in the world (HSE, HSA).
+//!
+//! ```text
+//! R_i p − o = −t_i,        A x = b with A = [R_i  −I], x = [p; o]        (paper Eq. 2)
+//! HSE: x = A⁺ b             HSA: min ‖b − Ax‖² by conjugate gradients     (paper Eqs. 3–5)
+//! ```
+//!
+//! Both are the same least-squares point. It is inconsistent: noise in R_i enters the matrix, and the answer
+//! is drawn towards the mean position by about σ_r² over the spread of the rotations (7 mm at ±10° and 1°).
+//! [`crate::hotspot_ml`] has no such bias. The covariance is that of the noise the residuals show along and across p.
+
+use calib_geometry::{Line, Verdict, measured::Pose, pose_sums::PoseSums};
+use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
+
+use crate::{
+    input::{Input, InputKind},
+    options::Options,
+    outcome::{CorError, CorEstimate, Known, Noise, NotObservable, Outcome, Rejected, Shape},
+};
+
+/// Conjugate gradients end after as many steps as there are unknowns; twice for rounding.
+const CG_STEPS: usize = 24;
+
+/// A body point and a center, with the sums they came from.
+#[derive(Debug, Clone)]
+pub(crate) struct HotSpot {
+    pub sums: PoseSums,
+    pub body_point: Vector3<f64>,
+    pub center: Vector3<f64>,
+}
+
+/// Residuals `R_iᵀ(o − t_i) − p` split along and across p.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Spread {
+    /// Σ of squares along p.
+    pub along: f64,
+    /// Σ of squares across p.
+    pub across: f64,
+    /// Σ (R_i p̂)(R_i p̂)ᵀ.
+    pub directions: Matrix3<f64>,
+}
+
+impl Spread {
+    pub fn of(poses: &[Option<Pose>], body_point: &Vector3<f64>, center: &Vector3<f64>) -> Self {
+        let unit = body_point.try_normalize(0.0).unwrap_or_else(Vector3::x);
+        let (mut along, mut total) = (0.0, 0.0);
+        let mut directions = Matrix3::zeros();
+        for pose in poses.iter().flatten() {
+            let turned = pose.rotation * unit;
+            let e = center - pose.translation - pose.rotation * body_point;
+            let a = e.dot(&turned);
+            along += a * a;
+            total += e.norm_squared();
+            directions += turned * turned.transpose();
+        }
+        Self {
+            along,
+            across: (total - along).max(0.0),
+            directions,
+        }
+    }
+
+    /// (σ along, σ across) with the degrees of freedom n − 2 and 2n − 4.
+    pub fn sigmas(&self, n: usize) -> (f64, f64) {
+        let dof = (n as f64 - 2.0).max(1.0);
+        (
+            (self.along / dof).sqrt(),
+            (self.across / (2.0 * dof)).sqrt(),
+        )
+    }
+}
+
+/// HSE.
+///
+/// # Errors
+/// [`CorError`] for poses that are no rotations or not finite, or another kind of data.
+pub fn hse(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+    let poses = poses_of(input)?;
+    linear("hse", poses, options, Vec::new(), |sums, _| {
+        sums.body_point(0)
+    })
+}
+
+/// HSA: the same by conjugate gradients on the normal equations, without factorising them.
+///
+/// # Errors
+/// As [`hse`].
+pub fn hsa(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+    let poses = poses_of(input)?;
+    linear("hsa", poses, options, Vec::new(), conjugate_gradients)
+}
+
+pub(crate) fn poses_of<'a>(input: &Input<'a>) -> Result<&'a [Option<Pose>], CorError> {
+    match *input {
+        Input::Poses(poses) => Ok(poses),
+        _ => Err(CorError::WrongInput {
+            expects: InputKind::Poses,
+            got: input.kind(),
+        }),
+    }
+}
+
+pub(crate) fn linear(
+    estimator: &'static str,
+    poses: &[Option<Pose>],
+    options: &Options,
+    rejected: Vec<Rejected>,
+    solve: impl Fn(&PoseSums, &[Option<Pose>]) -> Vector3<f64>,
+) -> Result<Outcome, CorError> {
+    options.check()?;
+    let sums = match prepare(estimator, poses)? {
+        Ok(sums) => sums,
+        Err(answer) => return Ok(answer),
+    };
+    let body_point = solve(&sums, poses);
+    let center = sums.center(&body_point);
+    let spot = HotSpot {
+        sums,
+        body_point,
+        center,
+    };
+    let spread = Spread::of(poses, &spot.body_point, &spot.center);
+    if let Some(answer) = single_axis(estimator, &spot, &spread, options) {
+        return Ok(answer);
+    }
+    let (sigma_along, sigma_across) = spread.sigmas(spot.sums.n);
+    let covariance = sandwich(&spot, &spread, sigma_along, sigma_across);
+    let reach = spot.body_point.norm();
+    let sigma_r2 = (sigma_across * sigma_across - sigma_along * sigma_along) / (reach * reach);
+    let noise = Noise {
+        sigma_t: sigma_along,
+        sigma_r: (sigma_r2 > 0.0 && sigma_r2.is_finite()).then(|| sigma_r2.sqrt()),
+        estimated: true,
+    };
+    Ok(finish(
+        estimator, &spot, &spread, covariance, noise, rejected, options,
+    ))
+}
+
+/// Sums and rank; the inner `Err` is the answer where the rank already says no.
+pub(crate) fn prepare(
+    estimator: &'static str,
+    poses: &[Option<Pose>],
+) -> Result<Result<PoseSums, Outcome>, CorError> {
+    let sums = PoseSums::of(poses)?;
+    Ok(match sums.rank_verdict() {
+        None => Ok(sums),
+        Some(Verdict::TooFew) => Err(Outcome::too_few(estimator, sums.n, 3, "poses")),
+        Some(verdict) => {
+            let (s1, s6) = sums.extreme_singular_values();
+            let reason = match verdict {
+                Verdict::NoRotation => format!(
+                    "the body does not turn: its rotations differ by {:.1e} rad rms",
+                    (sums.lambda.sum().max(0.0) / 2.0 / sums.n as f64).sqrt()
+                ),
+                _ if sums.n == 2 => "two poses always share one axis of rotation".to_string(),
+                _ => format!(
+                    "all rotations share one axis (smallest singular value {s6:.1e} of {s1:.1e}): every \
+                     point of the axis fits equally well"
+                ),
+            };
+            Err(not_observable(estimator, &sums, verdict, reason))
+        }
+    })
+}
+
+/// The statistical tests, with the noise that the residuals of a fit allow.
+pub(crate) fn single_axis(
+    estimator: &'static str,
+    spot: &HotSpot,
+    spread: &Spread,
+    options: &Options,
+) -> Option<Outcome> {
+    let (_, sigma_across) = spread.sigmas(spot.sums.n);
+    let bound = sigma_across / spot.body_point.norm();
+    let (verdict, reason) =
+        spot.sums
+            .noise_verdict(options.sigma_r, bound, 1.0, options.significance)?;
+    Some(not_observable(estimator, &spot.sums, verdict, reason))
+}
+
+fn not_observable(
+    estimator: &'static str,
+    sums: &PoseSums,
+    verdict: Verdict,
+    reason: String,
+) -> Outcome {
+    let known = if verdict == Verdict::SingleAxis {
+        let (_, world) = sums.axis();
+        let point = sums.center(&sums.body_point(1));
+        Known::AxisLine(Line {
+            point: Point3::from(point),
+            direction: world,
+        })
+    } else {
+        Known::Nothing
+    };
+    Outcome::NotObservable(NotObservable {
+        estimator,
+        verdict,
+        reason,
+        known,
+    })
+}
+
+/// (A'A)⁻¹ (Σ A_iᵀ Σ_i A_i) (A'A)⁻¹ over [o; p], Σ_i = R_i (σ_a² p̂p̂ᵀ + σ_x² (I − p̂p̂ᵀ)) R_iᵀ.
+fn sandwich(spot: &HotSpot, spread: &Spread, sigma_along: f64, sigma_across: f64) -> Matrix6<f64> {
+    let n = spot.sums.n as f64;
+    let unit = spot
+        .body_point
+        .try_normalize(0.0)
+        .unwrap_or_else(Vector3::x);
+    let (a2, x2) = (sigma_along * sigma_along, sigma_across * sigma_across);
+    let body = unit * unit.transpose() * (a2 - x2) + Matrix3::identity() * x2;
+    let world = spread.directions * (a2 - x2) + Matrix3::identity() * (x2 * n);
+    // A_i over [o; p] is [I  −R_i]
+    let mut middle = Matrix6::zeros();
+    middle.fixed_view_mut::<3, 3>(0, 0).copy_from(&world);
+    middle.fixed_view_mut::<3, 3>(3, 3).copy_from(&(body * n));
+    // Σ_i A_i couples through Σ R_i S
+    let cross = -(spot.sums.mean_r * n) * body;
+    middle.fixed_view_mut::<3, 3>(0, 3).copy_from(&cross);
+    middle
+        .fixed_view_mut::<3, 3>(3, 0)
+        .copy_from(&cross.transpose());
+    let bread = inverse_normal(&spot.sums);
+    bread * middle * bread
+}
+
+/// (A'A)⁻¹ over [o; p], by eliminating o: the block of p is M⁻¹.
+fn inverse_normal(sums: &PoseSums) -> Matrix6<f64> {
+    let n = sums.n as f64;
+    let mut m_inverse = Matrix3::zeros();
+    for k in 0..3 {
+        let v = sums.directions.column(k);
+        m_inverse += v * v.transpose() / sums.lambda[k];
+    }
+    let r = &sums.mean_r;
+    let mut out = Matrix6::zeros();
+    let top = Matrix3::identity() / n + r * m_inverse * r.transpose();
+    let side = r * m_inverse;
+    out.fixed_view_mut::<3, 3>(0, 0).copy_from(&top);
+    out.fixed_view_mut::<3, 3>(0, 3).copy_from(&side);
+    out.fixed_view_mut::<3, 3>(3, 0)
+        .copy_from(&side.transpose());
+    out.fixed_view_mut::<3, 3>(3, 3).copy_from(&m_inverse);
+    out
+}
+
+/// The estimate, `weak` where its worst direction is.
+pub(crate) fn finish(
+    estimator: &'static str,
+    spot: &HotSpot,
+    spread: &Spread,
+    covariance: Matrix6<f64>,
+    noise: Noise,
+    rejected: Vec<Rejected>,
+    options: &Options,
+) -> Outcome {
+    let of_center: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into_owned();
+    let eigen = calib_geometry::decompose::symmetric_eigen_small(&of_center);
+    let weakest = eigen.values[2].max(0.0).sqrt();
+    let reach = spot.body_point.norm();
+    let n = spot.sums.n;
+    // A body whose origin sits in the center needs no lever: σ of one position is then the measure.
+    let limit = (options.weak_fraction * reach).max(noise.sigma_t);
+    let (verdict, reason) = if weakest > limit {
+        let axis = eigen.vectors.column(2);
+        let text = format!(
+            "σ = {weakest:.3e} along ({:.2}, {:.2}, {:.2}) exceeds {:.0} % of the distance {reach:.3e} \
+             between body and center",
+            axis[0],
+            axis[1],
+            axis[2],
+            100.0 * options.weak_fraction
+        );
+        (Verdict::Weak, Some(text))
+    } else {
+        (Verdict::Ok, None)
+    };
+    Outcome::Estimate(Box::new(CorEstimate {
+        estimator,
+        center: Point3::from(spot.center),
+        covariance: of_center,
+        shape: Shape::BodyPoint {
+            body_point: Point3::from(spot.body_point),
+            covariance,
+        },
+        noise,
+        rms: ((spread.along + spread.across) / (3 * n) as f64).sqrt(),
+        used: n,
+        rejected,
+        verdict,
+        reason,
+    }))
+}
+
+/// CGLS (Hestenes & Stiefel) on the rows `(R_i − R̄) p = −(t_i − t̄)`: the center is eliminated, since the
+/// mean of the rows gives it.
+fn conjugate_gradients(sums: &PoseSums, poses: &[Option<Pose>]) -> Vector3<f64> {
+    let apply = |p: &Vector3<f64>, f: &mut dyn FnMut(&Pose, Vector3<f64>)| {
+        for pose in poses.iter().flatten() {
+            f(pose, pose.rotation * p - sums.mean_r * p);
+        }
+    };
+    let mut x = Vector3::zeros();
+    // gradient: s = Aᵀ(b − A x)
+    let gradient = |x: &Vector3<f64>| {
+        let mut s = Vector3::zeros();
+        apply(x, &mut |pose, ax| {
+            let residual = sums.mean_t - pose.translation - ax;
+            s += (pose.rotation - sums.mean_r).tr_mul(&residual);
+        });
+        s
+    };
+    let mut s = gradient(&x);
+    let mut direction = s;
+    let start = s.norm();
+    for _ in 0..CG_STEPS {
+        let gamma = s.norm_squared();
+        if gamma.sqrt() <= 1e-16 * start {
+            break;
+        }
+        let mut curvature = 0.0;
+        apply(&direction, &mut |_, ad| curvature += ad.norm_squared());
+        if curvature <= 0.0 {
+            break;
+        }
+        x += direction * (gamma / curvature);
+        s = gradient(&x);
+        direction = s + direction * (s.norm_squared() / gamma);
+    }
+    x
+}
+
+/// Unknowns `[o; p]` as one vector.
+pub(crate) fn stack(center: &Vector3<f64>, body_point: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(
+        center.x,
+        center.y,
+        center.z,
+        body_point.x,
+        body_point.y,
+        body_point.z,
+    )
+}

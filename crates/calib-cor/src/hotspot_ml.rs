@@ -1,0 +1,250 @@
+//! Hot spot by maximum likelihood: rotation noise is weighed against position noise.
+//!
+//! ```text
+//! q_i = R_iᵀ (o − t_i)      where sample i sees the center in the body
+//! minimise Σ (|q_i| − |p|)² / σ_t² + ∠(q_i, p)² / (σ_r² + σ_t² / (|q_i||p|))              (1)
+//! ```
+//!
+//! The distance from body to center carries position noise alone, the direction mostly orientation noise.
+//! For σ_r → 0 this is the hot spot of least squares, for σ_r → ∞ a sphere fit: it contains both and beats both.
+//! The gradient of (1) is exact, weights included; the Hessian is Gauss–Newton's. Where σ are not stated
+//! they follow from the residuals: σ_t² = Σ(|q|−|p|)²/(n−2) and
+//! σ_t² + |p|² σ_r² = Σ∠²|q||p|/(2n−4).
+//! Without the test of one axis it runs away along the axis; the test is part of it.
+
+use calib_geometry::{
+    Verdict,
+    levenberg::{Problem, Stop, minimise},
+    measured::Pose,
+};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+
+use crate::{
+    hotspot::{HotSpot, Spread, finish, poses_of, prepare, single_axis, stack},
+    input::Input,
+    options::Options,
+    outcome::{CorError, Known, Noise, NotObservable, Outcome, Rejected},
+};
+
+/// Levenberg–Marquardt steps; the Hessian is approximate, so some dozens at 5° of noise.
+const MAX_STEPS: usize = 200;
+/// Rounds of re-estimating σ_t and σ_r.
+const NOISE_ROUNDS: usize = 200;
+/// σ_t as a part of the geometry's size below which data count as exact.
+const EXACT: f64 = 1e-12;
+
+/// The maximum-likelihood hot spot; σ_t and σ_r from [`Options`] or estimated.
+///
+/// # Errors
+/// [`CorError`] for poses that are no rotations or not finite, or another kind of data.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+    fit_poses("hotspot_ml", poses_of(input)?, options, Vec::new())
+}
+
+pub(crate) fn fit_poses(
+    estimator: &'static str,
+    poses: &[Option<Pose>],
+    options: &Options,
+    rejected: Vec<Rejected>,
+) -> Result<Outcome, CorError> {
+    options.check()?;
+    let sums = match prepare(estimator, poses)? {
+        Ok(sums) => sums,
+        Err(answer) => return Ok(answer),
+    };
+    let body_point = sums.body_point(0);
+    let center = sums.center(&body_point);
+    let mut spot = HotSpot {
+        sums,
+        body_point,
+        center,
+    };
+    let spread = Spread::of(poses, &spot.body_point, &spot.center);
+    if let Some(answer) = single_axis(estimator, &spot, &spread, options) {
+        return Ok(answer);
+    }
+    let (sigma_t, sigma_r, normal) = maximise(poses, &mut spot, &spread, options);
+    let reach = spot.body_point.norm();
+    let start_reach = body_point.norm() + spread.sigmas(spot.sums.n).1;
+    let covariance = normal.hessian.cholesky().map(|c| c.inverse());
+    let (Some(covariance), true) = (covariance, reach.is_finite() && reach < 100.0 * start_reach)
+    else {
+        return Ok(Outcome::NotObservable(NotObservable {
+            estimator,
+            verdict: Verdict::Diverged,
+            reason: format!("the center ran away to {reach:.1e} from the body"),
+            known: Known::Nothing,
+        }));
+    };
+    let noise = Noise {
+        sigma_t,
+        sigma_r: Some(sigma_r),
+        estimated: options.sigma_t.is_none() || options.sigma_r.is_none(),
+    };
+    let spread = Spread::of(poses, &spot.body_point, &spot.center);
+    Ok(finish(
+        estimator, &spot, &spread, covariance, noise, rejected, options,
+    ))
+}
+
+/// Moves `spot` to the maximum; returns σ_t, σ_r and the normal equations there.
+fn maximise(
+    poses: &[Option<Pose>],
+    spot: &mut HotSpot,
+    spread: &Spread,
+    options: &Options,
+) -> (f64, f64, Normal) {
+    let n = spot.sums.n as f64;
+    let scale = spot.body_point.norm() + spread.sigmas(spot.sums.n).1;
+    let floor = EXACT * scale.max(f64::MIN_POSITIVE);
+    let (along, across) = spread.sigmas(spot.sums.n);
+    let mut sigma_t = options.sigma_t.unwrap_or(along.max(floor));
+    let mut sigma_r = options.sigma_r.unwrap_or_else(|| {
+        ((across * across - along * along).max(0.0)).sqrt() / spot.body_point.norm().max(floor)
+    });
+    let mut x = stack(&(spot.center - spot.sums.mean_t), &spot.body_point);
+    let mut last;
+    let mut round = 0;
+    loop {
+        let problem = Likelihood {
+            poses,
+            origin: spot.sums.mean_t,
+            sigma_t,
+            sigma_r,
+            scale,
+        };
+        let end = minimise(&problem, x, MAX_STEPS);
+        if end.stop == Stop::Broken {
+            x.fill(f64::NAN);
+        } else {
+            x = end.x;
+        }
+        last = end.normal;
+        round += 1;
+        let (old_t, old_r) = (sigma_t, sigma_r);
+        if options.sigma_t.is_none() {
+            sigma_t = (last.radial / (n - 2.0)).sqrt().max(floor);
+        }
+        if options.sigma_r.is_none() {
+            let across2 = last.arc / (2.0 * n - 4.0);
+            let reach = x.fixed_rows::<3>(3).norm().max(floor);
+            sigma_r = (across2 - sigma_t * sigma_t).max(0.0).sqrt() / reach;
+        }
+        let settled = (sigma_t / old_t - 1.0).abs() < 1e-11
+            && (sigma_r - old_r).abs() <= 1e-11 * (sigma_r + sigma_t / scale);
+        if settled || round >= NOISE_ROUNDS || !x.iter().all(|v| v.is_finite()) {
+            break;
+        }
+    }
+    spot.center = x.fixed_rows::<3>(0) + spot.sums.mean_t;
+    spot.body_point = x.fixed_rows::<3>(3).into_owned();
+    (sigma_t, sigma_r, last)
+}
+
+struct Likelihood<'a> {
+    poses: &'a [Option<Pose>],
+    /// Centers are relative to it.
+    origin: Vector3<f64>,
+    sigma_t: f64,
+    sigma_r: f64,
+    /// Size of the unknowns.
+    scale: f64,
+}
+
+struct Normal {
+    hessian: Matrix6<f64>,
+    gradient: Vector6<f64>,
+    cost: f64,
+    /// Σ (|q| − |p|)².
+    radial: f64,
+    /// Σ ∠² |q||p|: squared arcs.
+    arc: f64,
+}
+
+impl Problem for Likelihood<'_> {
+    type Point = Vector6<f64>;
+    type Normal = Normal;
+    type Step = Vector6<f64>;
+
+    fn linearize(&self, x: &Vector6<f64>) -> Normal {
+        let (o, p): (Vector3<f64>, Vector3<f64>) =
+            (x.fixed_rows::<3>(0).into(), x.fixed_rows::<3>(3).into());
+        let (t2, r2) = (self.sigma_t * self.sigma_t, self.sigma_r * self.sigma_r);
+        let length_p = p.norm();
+        let unit_p = p / length_p;
+        let across_p = Matrix3::identity() - unit_p * unit_p.transpose();
+        let (mut h_oo, mut h_op, mut h_pp) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
+        let (mut g_o, mut g_p) = (Vector3::zeros(), Vector3::zeros());
+        let (mut cost, mut radial, mut arc) = (0.0, 0.0, 0.0);
+        for pose in self.poses.iter().flatten() {
+            let q = pose
+                .rotation
+                .tr_mul(&(o - (pose.translation - self.origin)));
+            let length_q = q.norm();
+            let unit_q = q / length_q;
+            let e = length_q - length_p;
+            // ∠ from sine and cosine: accurate at both ends
+            let cross = unit_q.cross(&unit_p);
+            let (sine, cosine) = (cross.norm(), unit_q.dot(&unit_p));
+            let phi = sine.atan2(cosine);
+            let ratio = if sine > 1e-9 { phi / sine } else { 1.0 };
+            let product = length_q * length_p;
+            let w = 1.0 / (r2 + t2 / product);
+            cost += e * e / t2 + phi * phi * w;
+            radial += e * e;
+            arc += phi * phi * product;
+            // ∇_q ∠²/2 = φ/sin φ (cos φ q̂ − p̂)/|q|, and likewise for p; ∂w/∂|q| = w² σ_t²/(|q|²|p|)
+            let pull = 0.5 * phi * phi * w * w * t2 / product;
+            let g_q = unit_q * (e / t2 + pull / length_q)
+                + (unit_q * cosine - unit_p) * (ratio * w / length_q);
+            g_p += unit_p * (pull / length_p - e / t2)
+                + (unit_p * cosine - unit_q) * (ratio * w / length_p);
+            g_o += pose.rotation * g_q;
+            // Gauss–Newton blocks: radial q̂, p̂; tangential (I − q̂q̂ᵀ)/|q|, (I − p̂p̂ᵀ)/|p|
+            let across_q = Matrix3::identity() - unit_q * unit_q.transpose();
+            let h_qq = unit_q * unit_q.transpose() / t2 + across_q * (w / (length_q * length_q));
+            let h_qp = -(unit_q * unit_p.transpose()) / t2 - across_q * across_p * (w / product);
+            h_oo += pose.rotation * h_qq * pose.rotation.transpose();
+            h_op += pose.rotation * h_qp;
+            h_pp += unit_p * unit_p.transpose() / t2 + across_p * (w / (length_p * length_p));
+        }
+        let mut hessian = Matrix6::zeros();
+        hessian.fixed_view_mut::<3, 3>(0, 0).copy_from(&h_oo);
+        hessian.fixed_view_mut::<3, 3>(0, 3).copy_from(&h_op);
+        hessian
+            .fixed_view_mut::<3, 3>(3, 0)
+            .copy_from(&h_op.transpose());
+        hessian.fixed_view_mut::<3, 3>(3, 3).copy_from(&h_pp);
+        Normal {
+            hessian,
+            gradient: stack(&g_o, &g_p),
+            cost,
+            radial,
+            arc,
+        }
+    }
+
+    fn cost(&self, normal: &Normal) -> f64 {
+        normal.cost
+    }
+
+    fn solve(&self, normal: &Normal, damping: f64) -> Option<(Vector6<f64>, f64)> {
+        let mut h = normal.hessian;
+        for k in 0..6 {
+            h[(k, k)] *= 1.0 + damping;
+        }
+        let step = -h.cholesky()?.solve(&normal.gradient);
+        Some((
+            step,
+            -(step.dot(&normal.gradient) * 2.0 + step.dot(&(normal.hessian * step))),
+        ))
+    }
+
+    fn retract(&self, x: &Vector6<f64>, step: &Vector6<f64>) -> Vector6<f64> {
+        x + step
+    }
+
+    fn is_negligible(&self, _: &Vector6<f64>, step: &Vector6<f64>) -> bool {
+        step.norm() <= 1e-15 * self.scale
+    }
+}

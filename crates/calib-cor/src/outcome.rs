@@ -1,0 +1,225 @@
+//! What an estimator answers: an estimate with its uncertainty, or why there is none.
+
+use calib_geometry::{Line, Verdict, measured::DataError};
+use nalgebra::{Matrix3, Matrix6, Point3, Unit, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::input::InputKind;
+
+/// Input that no estimator can read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CorError {
+    /// No estimator of this name.
+    #[error("unknown estimator `{id}`, expected one of {}", known.join(", "))]
+    Unknown {
+        /// The name asked for.
+        id: String,
+        /// The names there are.
+        known: Vec<&'static str>,
+    },
+    /// The estimator needs another kind of data.
+    #[error("this estimator needs {expects:?}, got {got:?}")]
+    WrongInput {
+        /// What it needs.
+        expects: InputKind,
+        /// What was given.
+        got: InputKind,
+    },
+    /// Samples that cannot be read.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// A standard deviation that is not a positive number.
+    #[error("option {name} must be a positive number, got {value}")]
+    BadOption {
+        /// Its name.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+impl CorError {
+    /// The verdict word that belongs to this error, for those that describe data.
+    #[must_use]
+    pub fn verdict(&self) -> Option<Verdict> {
+        match self {
+            Self::Data(error) => error.verdict(),
+            _ => None,
+        }
+    }
+}
+
+/// Why a sample was left out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RejectReason {
+    /// Its residual lies outside the gate, both in units of the noise.
+    Outlier {
+        /// Residual divided by the noise.
+        residual_sigmas: f64,
+        /// Largest accepted.
+        gate_sigmas: f64,
+    },
+}
+
+/// A sample that was left out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Rejected {
+    /// Marker (0 for poses).
+    pub marker: usize,
+    /// Row in the caller's table.
+    pub row: usize,
+    /// Why.
+    pub reason: RejectReason,
+}
+
+/// Measurement noise behind a covariance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Noise {
+    /// Position noise, one coordinate, in the unit of the points.
+    pub sigma_t: f64,
+    /// Orientation noise about one axis, rad; absent where only points are used or it is not separable.
+    pub sigma_r: Option<f64>,
+    /// True when estimated from the residuals, false when stated by the caller.
+    pub estimated: bool,
+}
+
+/// What the estimator learned beside the center.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Shape {
+    /// Spheres: one radius for each marker that was seen at least twice.
+    Radii {
+        /// Radii, the second-order bias taken off.
+        radii: Vec<f64>,
+        /// The bias that was taken off: the estimator's own radius is `radii + bias`.
+        bias: Vec<f64>,
+    },
+    /// One body: the center in the body's frame, and the covariance of `[center; body_point]`.
+    BodyPoint {
+        /// Center in the body.
+        body_point: Point3<f64>,
+        /// 6 × 6 over `[center (world); body_point]`.
+        covariance: Matrix6<f64>,
+    },
+    /// Two bodies: the center in both, and the covariance of `[in_first; in_second]`.
+    BodyPoints {
+        /// Center in the first body.
+        in_first: Point3<f64>,
+        /// Center in the second body.
+        in_second: Point3<f64>,
+        /// 6 × 6 over `[in_first; in_second]`.
+        covariance: Matrix6<f64>,
+        /// Mean distance between the two bodies' ideas of the center.
+        mean_gap: f64,
+    },
+}
+
+/// A center of rotation.
+///
+/// For two bodies the center moves; [`CorEstimate::center`] is then its position in the second
+/// body's frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CorEstimate {
+    /// Id of the estimator.
+    pub estimator: &'static str,
+    /// The center in the tracker's frame.
+    pub center: Point3<f64>,
+    /// Covariance of the center.
+    pub covariance: Matrix3<f64>,
+    /// Radii or body point.
+    pub shape: Shape,
+    /// Noise level the covariance rests on.
+    pub noise: Noise,
+    /// Root mean square of the residuals (points: radial; poses: per coordinate; bodies: per coordinate).
+    pub rms: f64,
+    /// Samples used.
+    pub used: usize,
+    /// Samples left out, with the reason.
+    pub rejected: Vec<Rejected>,
+    /// [`Verdict::Ok`], or [`Verdict::Weak`] with the reason beside it.
+    pub verdict: Verdict,
+    /// Why the verdict is not `ok`, with numbers.
+    pub reason: Option<String>,
+}
+
+/// What is known although the center is not.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Known {
+    /// Every point of this line (tracker frame) is an equally good center.
+    AxisLine(Line),
+    /// The points lie in this plane.
+    Plane {
+        /// A point of it.
+        point: Point3<f64>,
+        /// Its normal.
+        normal: Unit<Vector3<f64>>,
+    },
+    /// Nothing useful.
+    Nothing,
+}
+
+/// The data cannot say where the center is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NotObservable {
+    /// Id of the estimator.
+    pub estimator: &'static str,
+    /// The kind of degeneracy.
+    pub verdict: Verdict,
+    /// The reason, with numbers.
+    pub reason: String,
+    /// What the data do determine.
+    pub known: Known,
+}
+
+/// Estimate, or the reason why not.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum Outcome {
+    /// A center with its covariance; look at its verdict for `weak`.
+    Estimate(Box<CorEstimate>),
+    /// No center.
+    NotObservable(NotObservable),
+}
+
+impl Outcome {
+    /// The verdict of either branch.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        match self {
+            Self::Estimate(e) => e.verdict,
+            Self::NotObservable(n) => n.verdict,
+        }
+    }
+
+    /// True when a center is determined (`ok`); false for `weak` and all degeneracies.
+    #[must_use]
+    pub fn is_observable(&self) -> bool {
+        self.verdict() == Verdict::Ok
+    }
+
+    /// The estimate, weak or not.
+    #[must_use]
+    pub fn estimate(&self) -> Option<&CorEstimate> {
+        match self {
+            Self::Estimate(e) => Some(e),
+            Self::NotObservable(_) => None,
+        }
+    }
+
+    /// Why the verdict is not `ok`.
+    #[must_use]
+    pub fn reason(&self) -> Option<&str> {
+        match self {
+            Self::Estimate(e) => e.reason.as_deref(),
+            Self::NotObservable(n) => Some(&n.reason),
+        }
+    }
+
+    pub(crate) fn too_few(estimator: &'static str, got: usize, needed: usize, of: &str) -> Self {
+        Self::NotObservable(NotObservable {
+            estimator,
+            verdict: Verdict::TooFew,
+            reason: format!("{got} {of}, at least {needed} are needed"),
+            known: Known::Nothing,
+        })
+    }
+}

@@ -1,0 +1,191 @@
+//! All estimators in one table: what each needs and how to call it by name.
+
+use serde::Serialize;
+
+use crate::{
+    algebraic::{self, Algebraic},
+    ball_bundle, gamage, hotspot, hotspot_ml,
+    input::{Input, InputKind},
+    options::Options,
+    outcome::{CorError, Outcome},
+    robust, score, sfa, sphere_ml,
+};
+
+/// The entry point all estimators share.
+pub type Fit = fn(&Input<'_>, &Options) -> Result<Outcome, CorError>;
+
+/// One estimator.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct EstimatorInfo {
+    /// Name in profiles and on the command line.
+    pub id: &'static str,
+    /// Its full name.
+    pub name: &'static str,
+    /// The data it needs.
+    pub input: InputKind,
+    /// What it does, in a line.
+    pub summary: &'static str,
+    /// Where it was published.
+    pub source: &'static str,
+    /// The function.
+    #[serde(skip)]
+    pub fit: Fit,
+}
+
+const TABLE: &[EstimatorInfo] = &[
+    EstimatorInfo {
+        id: "hse",
+        name: "hot spot, exact",
+        input: InputKind::Poses,
+        summary: "linear least squares by singular values; biased by orientation noise",
+        source: "Tuceryan et al. 1995; paper §3.1.1",
+        fit: hotspot::hse,
+    },
+    EstimatorInfo {
+        id: "hsa",
+        name: "hot spot, iterative",
+        input: InputKind::Poses,
+        summary: "the same least squares by conjugate gradients",
+        source: "paper §3.1.2",
+        fit: hotspot::hsa,
+    },
+    EstimatorInfo {
+        id: "sfe",
+        name: "sphere fit, Pratt's constraint, exact",
+        input: InputKind::Points,
+        summary: "closed form on centered data",
+        source: "Pratt 1987; Chang & Pollard 2007; paper §3.2.1",
+        fit: |input, options| algebraic::fit(Algebraic::Pratt, input, options),
+    },
+    EstimatorInfo {
+        id: "sfa",
+        name: "sphere fit, Pratt's constraint, COBYLA",
+        input: InputKind::Points,
+        summary: "constrained linear approximation from ten seeded starts",
+        source: "Powell 1994; paper §3.2.2",
+        fit: sfa::fit,
+    },
+    EstimatorInfo {
+        id: "kasa",
+        name: "sphere fit, linear",
+        input: InputKind::Points,
+        summary: "one linear solve; radius and center shrink on small ranges of motion",
+        source: "Kåsa 1976",
+        fit: |input, options| algebraic::fit(Algebraic::Kasa, input, options),
+    },
+    EstimatorInfo {
+        id: "taubin",
+        name: "sphere fit, gradient-weighted",
+        input: InputKind::Points,
+        summary: "closed form, radius bias 3/5 of Pratt's",
+        source: "Taubin 1991",
+        fit: |input, options| algebraic::fit(Algebraic::Taubin, input, options),
+    },
+    EstimatorInfo {
+        id: "hyper",
+        name: "sphere fit without second-order bias",
+        input: InputKind::Points,
+        summary: "closed form with the constraint (5T − 3P)/2",
+        source: "Al-Sharadqah & Chernov 2009, in three dimensions",
+        fit: |input, options| algebraic::fit(Algebraic::Hyper, input, options),
+    },
+    EstimatorInfo {
+        id: "gamage_lasenby",
+        name: "several markers, linear",
+        input: InputKind::Points,
+        summary: "each marker weighs the same; the several-marker Kåsa fit",
+        source: "Gamage & Lasenby 2002",
+        fit: gamage::gamage_lasenby,
+    },
+    EstimatorInfo {
+        id: "halvorsen",
+        name: "several markers, bias-compensated",
+        input: InputKind::Points,
+        summary: "Gamage & Lasenby with the noise taken off; one marker: Taubin",
+        source: "Halvorsen 2003",
+        fit: gamage::halvorsen,
+    },
+    EstimatorInfo {
+        id: "ml_sphere",
+        name: "several markers, maximum likelihood",
+        input: InputKind::Points,
+        summary: "common center, own radii; per-marker noise and 3 × 3 covariances on request",
+        source: "orthogonal-distance sphere, joint likelihood, see the book",
+        fit: sphere_ml::fit,
+    },
+    EstimatorInfo {
+        id: "hotspot_ml",
+        name: "hot spot, errors in variables",
+        input: InputKind::Poses,
+        summary: "weighs orientation against position noise, stated or estimated",
+        source: "joint likelihood, see the book",
+        fit: hotspot_ml::fit,
+    },
+    EstimatorInfo {
+        id: "score",
+        name: "center between two moving bodies",
+        input: InputKind::TwoBodies,
+        summary: "least squares over both local centers",
+        source: "Ehrig et al. 2006 (SCoRE)",
+        fit: score::fit,
+    },
+    EstimatorInfo {
+        id: "ball_bundle",
+        name: "markers of a rigid body, jointly",
+        input: InputKind::Markers,
+        summary: "center, marker layout and all orientations at once; markers may be occluded",
+        source: "joint likelihood, see the book",
+        fit: ball_bundle::fit,
+    },
+    EstimatorInfo {
+        id: "robust",
+        name: "center with outliers",
+        input: InputKind::PointsOrPoses,
+        summary: "consensus, Huber, Geman–McClure, χ² gate, plain fit of the inliers",
+        source: "Huber 1964; Yang et al. 2020",
+        fit: robust::robust,
+    },
+    EstimatorInfo {
+        id: "consensus",
+        name: "center by random subsets",
+        input: InputKind::PointsOrPoses,
+        summary: "MSAC with stated noise, least median of squares without; inliers refitted",
+        source: "Torr & Zisserman 2000; Rousseeuw 1984",
+        fit: robust::consensus,
+    },
+];
+
+/// All estimators, the paper's four first.
+#[must_use]
+pub fn estimators() -> &'static [EstimatorInfo] {
+    TABLE
+}
+
+/// The estimator called `id`.
+///
+/// # Errors
+/// [`CorError::Unknown`] with the names there are.
+pub fn estimator(id: &str) -> Result<&'static EstimatorInfo, CorError> {
+    TABLE
+        .iter()
+        .find(|e| e.id == id)
+        .ok_or_else(|| CorError::Unknown {
+            id: id.to_string(),
+            known: TABLE.iter().map(|e| e.id).collect(),
+        })
+}
+
+/// Runs the estimator called `id`.
+///
+/// # Errors
+/// [`CorError`] for an unknown name, data of another kind, or data that are no numbers.
+pub fn fit(id: &str, input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+    let info = estimator(id)?;
+    if !input.serves(info.input) {
+        return Err(CorError::WrongInput {
+            expects: info.input,
+            got: input.kind(),
+        });
+    }
+    (info.fit)(input, options)
+}

@@ -1,0 +1,160 @@
+//! SCoRE: the center between two moving bodies.
+//!
+//! ```text
+//! R_i c₁ + t_i = S_i c₂ + d_i,       [R_i  −S_i] [c₁; c₂] = d_i − t_i                       (1)
+//! ```
+//!
+//! Least squares over both local centers at once. Ehrig et al. 2006, J. Biomech. 39(15), 2798–2809. Seen from
+//! the second body it is the hot spot of the relative motion, so the same tests tell a hinge from a ball.
+
+use calib_geometry::{
+    Line, Verdict,
+    decompose::svd_small,
+    measured::{DataError, Pose},
+    row_qr::RowQr,
+};
+use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
+
+use crate::{
+    input::{Input, InputKind},
+    options::Options,
+    outcome::{CorError, CorEstimate, Known, Noise, NotObservable, Outcome, Shape},
+};
+
+/// SCoRE on all rows where both bodies were seen.
+///
+/// # Errors
+/// [`CorError`] for tables of different length, poses that are no rotations, or another kind of data.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+    options.check()?;
+    let Input::TwoBodies { first, second } = *input else {
+        return Err(CorError::WrongInput {
+            expects: InputKind::TwoBodies,
+            got: input.kind(),
+        });
+    };
+    if first.len() != second.len() {
+        return Err(CorError::Data(DataError::Lengths {
+            what: "poses of the two bodies",
+            left: first.len(),
+            right: second.len(),
+        }));
+    }
+    // second_from_first, whose rotations carry the question of one axis
+    let mut relative = Vec::with_capacity(first.len());
+    for (row, pair) in first.iter().zip(second).enumerate() {
+        relative.push(match pair {
+            (Some(a), Some(b)) => {
+                a.check(row)?;
+                b.check(row)?;
+                Some(Pose {
+                    rotation: b.rotation.tr_mul(&a.rotation),
+                    translation: b.rotation.tr_mul(&(a.translation - b.translation)),
+                })
+            }
+            _ => None,
+        });
+    }
+    let sums = match crate::hotspot::prepare("score", &relative)? {
+        Ok(sums) => sums,
+        Err(answer) => return Ok(in_second(answer)),
+    };
+
+    let pairs = || {
+        first
+            .iter()
+            .zip(second)
+            .filter_map(|(a, b)| Some((a.as_ref()?, b.as_ref()?)))
+    };
+    let mut qr = RowQr::<7>::default();
+    for (a, b) in pairs() {
+        for k in 0..3 {
+            let (r, s) = (a.rotation.row(k), b.rotation.row(k));
+            let rhs = b.translation[k] - a.translation[k];
+            qr.push([r[0], r[1], r[2], -s[0], -s[1], -s[2], rhs]);
+        }
+    }
+    let r = qr.factor();
+    let svd = svd_small(&r.fixed_view::<6, 6>(0, 0).into_owned());
+    let y = svd.u.tr_mul(&r.fixed_view::<6, 1>(0, 6));
+    let x: Vector6<f64> = svd.v * y.component_div(&svd.s);
+    let (in_first, in_second_body): (Vector3<f64>, Vector3<f64>) =
+        (x.fixed_rows::<3>(0).into(), x.fixed_rows::<3>(3).into());
+
+    let n = sums.n;
+    let (mut rss, mut gaps) = (0.0, 0.0);
+    for (a, b) in pairs() {
+        let gap = a.transform(&in_first) - b.transform(&in_second_body);
+        rss += gap.norm_squared();
+        gaps += gap.norm();
+    }
+    let sigma2 = rss / (3 * n - 6) as f64;
+    // A gap holds position noise of both bodies and their orientation noise times the levers.
+    let lever = (in_first.norm_squared() + in_second_body.norm_squared()).sqrt();
+    // Relative orientation noise is √2 that of one body; two thirds of it act across a lever.
+    let bound = (3.0 * sigma2).sqrt() / lever;
+    if let Some((verdict, reason)) =
+        sums.noise_verdict(options.sigma_r, bound, 2.0, options.significance)
+    {
+        let known = if verdict == Verdict::SingleAxis {
+            let (_, direction) = sums.axis();
+            let point = sums.center(&sums.body_point(1));
+            Known::AxisLine(Line {
+                point: Point3::from(point),
+                direction,
+            })
+        } else {
+            Known::Nothing
+        };
+        return Ok(Outcome::NotObservable(NotObservable {
+            estimator: "score",
+            verdict,
+            reason,
+            known,
+        }));
+    }
+    let mut covariance = Matrix6::zeros();
+    for k in 0..6 {
+        let v = svd.v.column(k);
+        covariance += v * v.transpose() * (sigma2 / (svd.s[k] * svd.s[k]));
+    }
+    let of_center: Matrix3<f64> = covariance.fixed_view::<3, 3>(3, 3).into_owned();
+    let weakest = svd.s[5].recip() * sigma2.sqrt();
+    let reach = in_first.norm().max(in_second_body.norm());
+    let weak = weakest > options.weak_fraction * reach;
+    Ok(Outcome::Estimate(Box::new(CorEstimate {
+        estimator: "score",
+        center: Point3::from(in_second_body),
+        covariance: of_center,
+        shape: Shape::BodyPoints {
+            in_first: Point3::from(in_first),
+            in_second: Point3::from(in_second_body),
+            covariance,
+            mean_gap: gaps / n as f64,
+        },
+        noise: Noise { sigma_t: sigma2.sqrt(), sigma_r: None, estimated: true },
+        rms: (rss / (3 * n) as f64).sqrt(),
+        used: n,
+        rejected: Vec::new(),
+        verdict: if weak { Verdict::Weak } else { Verdict::Ok },
+        reason: weak.then(|| {
+            format!(
+                "σ = {weakest:.3e} along the weakest direction exceeds {:.0} % of the longest lever {reach:.3e}",
+                100.0 * options.weak_fraction
+            )
+        }),
+    })))
+}
+
+/// Text of a rank verdict, with the frame its line is given in.
+fn in_second(answer: Outcome) -> Outcome {
+    match answer {
+        Outcome::NotObservable(mut n) => {
+            if matches!(n.known, Known::AxisLine(_)) {
+                n.reason += " (line in the second body's frame)";
+            }
+            Outcome::NotObservable(n)
+        }
+        estimate @ Outcome::Estimate(_) => estimate,
+    }
+}

@@ -1,0 +1,154 @@
+//! SFA: Pratt's constrained problem by constrained linear approximation (COBYLA), ten seeded starts.
+//!
+//! ```text
+//! minimise u'Su  subject to  u'Cu = 1,      u = (a, b, c, d, e)              (paper §3.2.2, Eq. 7)
+//! ```
+//!
+//! The points are centered and scaled to unit mean square first; in raw millimetres the entries of S
+//! span 10¹² and the method stops anywhere. On centered data it equals the closed form to its own
+//! tolerance. It is here because the paper compares it; [`crate::algebraic`] is faster and exact.
+
+use nalgebra::{SMatrix, SVector, Vector3};
+
+use crate::{
+    input::{Input, cloud_of},
+    options::Options,
+    outcome::{CorError, Outcome},
+    seeded::Seeded,
+    sphere::{Candidate, judge, prepare},
+};
+
+/// The paper's number of starts.
+const STARTS: usize = 10;
+/// Evaluations allowed for each start; five unknowns need a few hundred.
+const EVALUATIONS: usize = 4000;
+/// First and last size of the trust region, in units of u (whose components are of order one here).
+const FIRST_STEP: f64 = 0.3;
+/// The best start is taken up again, each time from a tenth of the step: on a flat valley (a small range of
+/// motion) the linear models stop early.
+const RESTARTS: i32 = 8;
+/// Below this the linear models are rounding.
+const LAST_STEP: f64 = 1e-9;
+
+/// SFA on all markers of `input` (one marker as in the paper; several share a, b, c, d).
+///
+/// # Errors
+/// [`CorError`] for data that are no numbers or of another kind.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+    options.check()?;
+    let cloud = cloud_of(input, &[])?;
+    let factor = match prepare("sfa", &cloud, false) {
+        Ok(factor) => factor,
+        Err(answer) => return Ok(answer),
+    };
+    let scale = factor.mean_square.sqrt();
+    let scaled: Vec<Vector3<f64>> = cloud.points.iter().map(|x| x / scale).collect();
+    let (a, b) = minimise_algebraic(&scaled, &cloud.starts, options.seed);
+    let center = b * (-0.5 / a) * scale;
+    let radii = crate::sphere::mean_radii(&cloud, &center);
+    let candidate = Candidate {
+        estimator: "sfa",
+        center,
+        radii,
+        radius_bias: 1.0,
+        weights: Vec::new(),
+        absolute: false,
+        rejected: Vec::new(),
+    };
+    Ok(judge(&cloud, &factor, candidate, options))
+}
+
+/// (a, b) of least cost over all starts. The offsets e_p follow from (a, b) in closed form for all
+/// markers but enter the constraint through their mean, which is the fifth unknown.
+fn minimise_algebraic(points: &[Vector3<f64>], starts: &[usize], seed: u64) -> (f64, Vector3<f64>) {
+    // S/n over (w, x, y, z, 1) with each marker's mean taken out of the first four, and the mean offset back in.
+    let n = points.len() as f64;
+    let mut s = SMatrix::<f64, 5, 5>::zeros();
+    let mut mean = SVector::<f64, 4>::zeros();
+    let row = |x: &Vector3<f64>| SVector::<f64, 4>::new(x.norm_squared(), x.x, x.y, x.z);
+    for p in 1..starts.len() {
+        let marker = &points[starts[p - 1]..starts[p]];
+        let own = marker.iter().map(row).sum::<SVector<f64, 4>>() / marker.len() as f64;
+        for x in marker {
+            let d = row(x) - own;
+            let mut block = s.fixed_view_mut::<4, 4>(0, 0);
+            block += d * d.transpose() / n;
+        }
+        mean += own * (marker.len() as f64 / n);
+    }
+    let mut full = SVector::<f64, 5>::zeros();
+    full.fixed_rows_mut::<4>(0).copy_from(&mean);
+    full[4] = 1.0;
+    s += full * full.transpose();
+
+    let cost = |u: &[f64], _: &mut ()| {
+        let u = SVector::<f64, 5>::from_column_slice(u);
+        (u.transpose() * s * u)[(0, 0)]
+    };
+    // u'Cu = |b|² − 4ae, held at 1 from both sides
+    let norm = |u: &[f64]| u[1] * u[1] + u[2] * u[2] + u[3] * u[3] - 4.0 * u[0] * u[4];
+    let below = move |u: &[f64], _: &mut ()| norm(u) - 1.0;
+    let above = move |u: &[f64], _: &mut ()| 1.0 - norm(u);
+    let constraints: Vec<&dyn cobyla::Func<()>> = vec![&below, &above];
+
+    let run = |start: &[f64; 5], step: f64| -> Option<(f64, [f64; 5])> {
+        let tolerances = cobyla::StopTols {
+            xtol_abs: vec![LAST_STEP; 5],
+            ..Default::default()
+        };
+        let end = cobyla::minimize(
+            cost,
+            start,
+            &[(-1e3, 1e3); 5],
+            &constraints,
+            (),
+            EVALUATIONS,
+            cobyla::RhoBeg::All(step),
+            Some(tolerances),
+        );
+        // Rounding-limited with the right answer is how it ends on exact data.
+        let (Ok((_, u, _)) | Err((cobyla::FailStatus::RoundoffLimited, u, _))) = end else {
+            return None;
+        };
+        let held = norm(&u);
+        if !((held - 1.0).abs() < 1e-3 && u.iter().all(|x| x.is_finite())) {
+            return None;
+        }
+        // Back onto the constraint exactly.
+        let scale = held.sqrt().recip();
+        let on: [f64; 5] = std::array::from_fn(|k| u[k] * scale);
+        Some((cost(&on, &mut ()), on))
+    };
+
+    let mut random = Seeded::new(seed);
+    let mut best: Option<(f64, [f64; 5])> = None;
+    for _ in 0..STARTS {
+        // A sphere of random center around the data with a radius of their own size: u scaled to u'Cu = 1.
+        let center = Vector3::from_fn(|_, _| random.symmetric());
+        let radius = 0.5 + random.unit();
+        let a = 0.5 / radius;
+        let b = center * (-2.0 * a);
+        let start = [
+            a,
+            b.x,
+            b.y,
+            b.z,
+            a * (center.norm_squared() - radius * radius),
+        ];
+        if let Some(end) = run(&start, FIRST_STEP)
+            && best.as_ref().is_none_or(|(lowest, _)| end.0 < *lowest)
+        {
+            best = Some(end);
+        }
+    }
+    for k in 1..=RESTARTS {
+        let Some((lowest, u)) = best else { break };
+        match run(&u, FIRST_STEP * 0.1_f64.powi(k % 4)) {
+            Some(end) if end.0 < lowest => best = Some(end),
+            _ => {}
+        }
+    }
+    best.map_or((f64::NAN, Vector3::repeat(f64::NAN)), |(_, u)| {
+        (u[0], Vector3::new(u[1], u[2], u[3]))
+    })
+}

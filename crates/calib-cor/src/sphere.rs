@@ -1,0 +1,298 @@
+//! What all sphere fits share: the judgement of a fitted center.
+//!
+//! ```text
+//! σ̂² = Σ (|x − m| − r_p)² / (n − P − 3)                                                     (1)
+//! κ = (s₃² / (n − P − 2)) / σ̂²  ~  F(n − P − 2, n − P − 3)   if every marker stays in a plane   (2)
+//! C = σ² (JᵀJ)⁻¹,  J = −(u − ū_p),   the weakest variance divided by 1 − 1/κ                    (3)
+//! ```
+//!
+//! With noise J has full rank even for a sweep about one axis, and (3) alone would look trustworthy; the test
+//! (2) compares the spread across the best planes (s₃, [`calib_geometry::factor`]) with the noise.
+
+use calib_geometry::{
+    Line, Verdict,
+    chance::{chi2_tail, f_tail},
+    decompose::symmetric_eigen_small,
+    factor::{Factor, rank_verdict},
+    measured::Cloud,
+};
+use nalgebra::{Matrix3, Point3, Unit, Vector3};
+
+use crate::{
+    options::Options,
+    outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Rejected, Shape},
+};
+
+/// Residual degrees of freedom from which the residuals say more about the noise than the tracker does.
+const ENOUGH_DOF: usize = 10;
+
+/// Rank check of a cloud; `Err` carries the answer.
+pub(crate) fn prepare(
+    estimator: &'static str,
+    cloud: &Cloud,
+    equal_markers: bool,
+) -> Result<Factor, Outcome> {
+    let needed = cloud.markers().max(1) + 3;
+    if cloud.points.len() < needed {
+        return Err(Outcome::too_few(
+            estimator,
+            cloud.points.len(),
+            needed,
+            "samples (of markers seen at least twice)",
+        ));
+    }
+    let factor = Factor::of(cloud, equal_markers);
+    if let Some(verdict) = rank_verdict(cloud, &factor) {
+        let s = factor.s;
+        let reason = format!(
+            "the points are {verdict}: singular values {:.3e}, {:.3e}, {:.3e}",
+            s[0], s[1], s[2]
+        );
+        return Err(not_observable(estimator, verdict, reason, cloud, &factor));
+    }
+    Ok(factor)
+}
+
+fn not_observable(
+    estimator: &'static str,
+    verdict: Verdict,
+    reason: String,
+    cloud: &Cloud,
+    factor: &Factor,
+) -> Outcome {
+    let known = match verdict {
+        Verdict::Coplanar => {
+            // Centers that explain the points equally well lie on the normal through the circle's center.
+            let center = cloud.origin + factor.truncated_center(0.0, 2);
+            Line::new(Point3::from(center), factor.v.column(2).into_owned())
+                .map_or(Known::Nothing, Known::AxisLine)
+        }
+        Verdict::Collinear => Known::Plane {
+            point: Point3::from(cloud.origin),
+            normal: Unit::new_normalize(factor.v.column(0).into_owned()),
+        },
+        _ => Known::Nothing,
+    };
+    Outcome::NotObservable(NotObservable {
+        estimator,
+        verdict,
+        reason,
+        known,
+    })
+}
+
+/// Mean distance of each marker's samples from the center: the radius of least squares.
+pub(crate) fn mean_radii(cloud: &Cloud, center: &Vector3<f64>) -> Vec<f64> {
+    (0..cloud.markers())
+        .map(|p| {
+            let points = cloud.marker(p);
+            points.iter().map(|x| (x - center).norm()).sum::<f64>() / points.len() as f64
+        })
+        .collect()
+}
+
+/// A center to be judged.
+pub(crate) struct Candidate {
+    pub estimator: &'static str,
+    /// Relative to the cloud's origin.
+    pub center: Vector3<f64>,
+    /// Radii as the estimator states them.
+    pub radii: Vec<f64>,
+    /// Bias of those radii in units of σ²/r (second-order noise analysis).
+    pub radius_bias: f64,
+    /// Inverse noise variance of each sample, relative to a unit variance; empty: all 1.
+    pub weights: Vec<f64>,
+    /// True where the weights are inverse variances in the points' unit: nothing is left to estimate.
+    pub absolute: bool,
+    pub rejected: Vec<Rejected>,
+}
+
+/// Residuals, noise, covariance and the observability test around a fitted center.
+pub(crate) fn judge(
+    cloud: &Cloud,
+    factor: &Factor,
+    candidate: Candidate,
+    options: &Options,
+) -> Outcome {
+    let Candidate {
+        estimator,
+        center,
+        radii,
+        radius_bias,
+        weights,
+        absolute,
+        rejected,
+    } = candidate;
+    let (n, markers) = (cloud.points.len(), cloud.markers());
+    let scatter = factor.s[0];
+    if !center.iter().all(|x| x.is_finite()) || center.norm() > 1e6 * scatter {
+        return Outcome::NotObservable(NotObservable {
+            estimator,
+            verdict: Verdict::Diverged,
+            reason: format!(
+                "the center ran away to {:.1e} from points that spread {:.1e}",
+                center.norm(),
+                scatter
+            ),
+            known: Known::Nothing,
+        });
+    }
+    let weight = |k: usize| if weights.is_empty() { 1.0 } else { weights[k] };
+    // JᵀWJ with J = −(u − ū_p): the radii are eliminated by centering each marker's directions.
+    let mut information = Matrix3::zeros();
+    let (mut rss, mut weighted_rss) = (0.0, 0.0);
+    for p in 0..markers {
+        let range = cloud.starts[p]..cloud.starts[p + 1];
+        let (mut sum, mut sum_u, mut sum_d) = (0.0, Vector3::zeros(), 0.0);
+        let (mut scatter_u, mut sum_dd, mut plain_d) = (Matrix3::zeros(), 0.0, 0.0);
+        let guess = radii[p];
+        let mut plain_dd = 0.0;
+        for k in range.clone() {
+            let d = cloud.points[k] - center;
+            let length = d.norm();
+            let u = if length > 0.0 {
+                d / length
+            } else {
+                Vector3::zeros()
+            };
+            let w = weight(k);
+            let e = length - guess;
+            sum += w;
+            sum_u += u * w;
+            scatter_u += u * (u * w).transpose();
+            sum_d += w * e;
+            sum_dd += w * e * e;
+            plain_d += e;
+            plain_dd += e * e;
+        }
+        let mean_u = sum_u / sum;
+        information += scatter_u - mean_u * mean_u.transpose() * sum;
+        // Residuals about the least-squares radius, whatever radius the estimator states.
+        weighted_rss += (sum_dd - sum_d * sum_d / sum).max(0.0);
+        rss += (plain_dd - plain_d * plain_d / range.len() as f64).max(0.0);
+    }
+    let dof = n - markers - 3;
+    let estimated = if dof > 0 {
+        (weighted_rss / dof as f64).sqrt()
+    } else {
+        0.0
+    };
+    let (sigma, from_data) = match options.sigma_t {
+        _ if absolute => (1.0, false),
+        Some(stated) => (stated, false),
+        None => (estimated, true),
+    };
+    let eigen = symmetric_eigen_small(&information);
+    if eigen.values[0] <= 0.0 || !eigen.values[0].is_finite() {
+        let reason = "the directions from the center to the points span no volume".to_string();
+        return not_observable(estimator, Verdict::Coplanar, reason, cloud, factor);
+    }
+
+    let plain_sigma = if dof > 0 {
+        (rss / dof as f64).sqrt()
+    } else {
+        0.0
+    };
+    let kappa = match leaves_its_plane(estimator, cloud, factor, plain_sigma, dof, options) {
+        Ok(kappa) => kappa,
+        Err(answer) => return answer,
+    };
+
+    // Noise inflates the spread of the weakest direction: take its share off the information.
+    let mut covariance = Matrix3::zeros();
+    for k in 0..3 {
+        let axis = eigen.vectors.column(k);
+        let trust = if k == 0 { 1.0 - 1.0 / kappa } else { 1.0 };
+        covariance += axis * axis.transpose() * (sigma * sigma / (eigen.values[k] * trust));
+    }
+    let weakest = sigma / (eigen.values[0] * (1.0 - 1.0 / kappa)).sqrt();
+    let radius = radii.iter().sum::<f64>() / markers as f64;
+    let (verdict, reason) = if weakest > options.weak_fraction * radius {
+        let axis = eigen.vectors.column(0);
+        (
+            Verdict::Weak,
+            Some(format!(
+                "σ = {weakest:.3e} along ({:.2}, {:.2}, {:.2}) exceeds {:.0} % of the radius {radius:.3e}",
+                axis[0],
+                axis[1],
+                axis[2],
+                100.0 * options.weak_fraction
+            )),
+        )
+    } else {
+        (Verdict::Ok, None)
+    };
+    let point_sigma = if absolute { plain_sigma } else { sigma };
+    let bias: Vec<f64> = radii
+        .iter()
+        .map(|r| radius_bias * point_sigma * point_sigma / r.max(f64::MIN_POSITIVE))
+        .collect();
+    Outcome::Estimate(Box::new(CorEstimate {
+        estimator,
+        center: Point3::from(cloud.origin + center),
+        covariance,
+        shape: Shape::Radii {
+            radii: radii.iter().zip(&bias).map(|(r, b)| r - b).collect(),
+            bias,
+        },
+        noise: Noise {
+            sigma_t: point_sigma,
+            sigma_r: None,
+            estimated: from_data,
+        },
+        rms: (rss / n as f64).sqrt(),
+        used: n,
+        rejected,
+        verdict,
+        reason,
+    }))
+}
+
+/// H₀: every marker stays in a plane, so that s₃² is noise alone. Returns κ, the spread across the
+/// planes in units of the noise variance, or the answer that H₀ cannot be excluded.
+///
+/// `sigma` is the noise that the fit's own residuals show with `dof` degrees of freedom.
+pub(crate) fn leaves_its_plane(
+    estimator: &'static str,
+    cloud: &Cloud,
+    factor: &Factor,
+    sigma: f64,
+    dof: usize,
+    options: &Options,
+) -> Result<f64, Outcome> {
+    let (n, markers) = (cloud.points.len(), cloud.markers());
+    let (noise, noise_dof, how) = match options.sigma_t {
+        Some(stated) if dof < ENOUGH_DOF => (stated, None, "stated"),
+        _ if dof == 0 => return Ok(f64::INFINITY),
+        _ => (sigma, Some(dof as f64), "estimated"),
+    };
+    // κ_k = (s_k² / degrees of freedom) / σ² and the chance of such a value from noise alone
+    let test = |k: usize, test_dof: usize| {
+        let d = test_dof as f64;
+        let kappa = factor.s[k] * factor.s[k] / d / (noise * noise);
+        let chance = match noise_dof {
+            Some(noise_dof) => f_tail(kappa, d, noise_dof),
+            None => chi2_tail(kappa * d, d),
+        };
+        (kappa, chance)
+    };
+    let (kappa, chance) = test(2, n - markers - 2);
+    if chance <= options.significance {
+        return Ok(kappa);
+    }
+    let verdict = if test(1, n - markers - 1).1 <= options.significance {
+        Verdict::Coplanar
+    } else if test(0, n - markers).1 <= options.significance {
+        Verdict::Collinear
+    } else {
+        Verdict::Coincident
+    };
+    let reason = format!(
+        "the points are {verdict} within their noise: their spread across the best plane{} is {:.2} times \
+         the {how} noise of {noise:.3e} (chance {chance:.1e}, accepted below {:.0e})",
+        if markers > 1 { "s" } else { "" },
+        kappa.sqrt(),
+        options.significance
+    );
+    Err(not_observable(estimator, verdict, reason, cloud, factor))
+}
