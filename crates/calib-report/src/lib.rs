@@ -1,1 +1,56 @@
-//! The report as data; Markdown, JSON and HTML; scene export.
+//! The report as data, its renderers, and the scene that other programs read.
+//!
+//! A calibration is `n` residuals, `m` parameters and one question: may I trust it? The answer is a set of numbers that were
+//! computed elsewhere:
+//!
+//! ```text
+//! x̂ ± σ,  C = (JᵀWJ + prior)⁻¹                    what was found, and how well
+//! {u : J·u ≈ 0}                                    what the data cannot say
+//! e_s = p_predicted(s) − p_observed(s), s held out  what to expect on a pose that was not fitted: [m]
+//! ```
+//!
+//! [`Report`] holds them as a plain struct (SI: m, rad, s); [`markdown`], [`terminal`], [`json`], [`csv`] and [`html`] turn the
+//! struct into text and compute nothing. A renderer changes units and rounds ([`number`]): that is all. What has to be
+//! *summarised* (quantiles, bins, a verdict from limits) is a constructor of the data, next to its struct: [`Stats::of`],
+//! [`ErrorStats::of`], [`HeldOut::from_poses`], [`Residuals::from_rows`], [`JointCoverage::of`], [`judge`].
+//!
+//! [`Scene`] is the calibrated world for a situation model: frames with covariance and status, markers, robot, provenance;
+//! [`Scene::json`] keeps every bit, [`Scene::ros_launch`] and [`Scene::sdf`] are derived and lossy.
+//!
+//! What this crate does **not** protect against: a report that was filled wrongly. It holds no clock and takes no
+//! absolute path: whoever fills it passes paths relative to the profile. Same report, same bytes.
+
+mod answers;
+pub mod csv;
+mod data;
+mod error;
+pub mod json;
+pub mod markdown;
+pub mod number;
+mod quantity;
+mod report;
+mod residuals;
+mod results;
+pub mod scene;
+mod schema;
+mod table;
+pub mod terminal;
+mod verification;
+
+pub use answers::{Answer, answers};
+pub use data::{
+    AccuracyLimit, Clock, Finding, FitSummary, Input, JointCoverage, Lost, Noise, Output,
+    RecordingSummary, RecordingUse, Rejected, Severity, Workspace, WorkspacePoint,
+};
+pub use error::ReportError;
+pub use quantity::{JointValue, Unit};
+pub use report::{FormatVersion, Limit, Method, Outcome, Report, Verdict, judge};
+pub use residuals::{JointResiduals, ResidualBin, ResidualGroup, ResidualRow, Residuals};
+pub use results::{
+    Change, Class, EstimatorResult, NotObservable, Parameter, Status, Term, Transform, Unobservable,
+};
+pub use scene::Scene;
+pub use schema::{report_schema, scene_schema};
+pub use verification::{
+    ErrorStats, ExpectedError, HeldOut, LoopClosure, LoopGroup, PoseError, Stats, Verification,
+};

@@ -1,0 +1,379 @@
+use crate::Unit;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How bad a finding is.
+#[derive(
+    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// Good to know.
+    #[default]
+    Info,
+    /// The result may be worse than it looks.
+    Warning,
+    /// The result, or a part of it, cannot be used.
+    Error,
+}
+
+impl Severity {
+    /// The word for people.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Info => "info",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        }
+    }
+}
+
+/// What a check found in the data or the result.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Finding {
+    /// Stable id: the page of the book that explains it.
+    pub id: String,
+    /// How bad.
+    pub severity: Severity,
+    /// What it is about: a recording, body, marker, joint.
+    pub subject: String,
+    /// Rows of the recording, counted from 1 without the header; empty when it is about all.
+    pub rows: Vec<u64>,
+    /// What was found, with numbers.
+    pub text: String,
+    /// What to do.
+    pub remedy: String,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Input {
+    /// Relative to the profile.
+    pub path: String,
+    /// Of its bytes, 64 hexadecimal digits.
+    pub sha256: String,
+}
+
+/// A file that was written.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Output {
+    /// Relative to the output folder.
+    pub path: String,
+    /// What it is, in words: "URDF with 12 changed values".
+    pub what: String,
+    /// Of its bytes; null for the report itself, which cannot hold its own.
+    pub sha256: Option<String>,
+    /// The file that it replaces when the user applies it (the original stays untouched); null when there is none.
+    pub changes: Option<String>,
+}
+
+/// What a recording was used for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RecordingUse {
+    /// Joints swept for the fit.
+    #[default]
+    Sweep,
+    /// Static poses for the fit.
+    Static,
+    /// Held out.
+    Validation,
+}
+
+impl RecordingUse {
+    /// The word for people.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Sweep => "sweep",
+            Self::Static => "static poses",
+            Self::Validation => "validation",
+        }
+    }
+}
+
+/// One recording.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RecordingSummary {
+    /// Its name in the profile.
+    pub name: String,
+    /// The file, relative to the profile.
+    pub path: String,
+    /// What it was used for.
+    pub used_for: RecordingUse,
+    /// Rows in the file.
+    pub rows: usize,
+    /// Rows that took part.
+    pub used: usize,
+    /// Rows that were rejected.
+    pub rejected: usize,
+    /// Samples that the tracker or encoder lost.
+    pub lost: Vec<Lost>,
+}
+
+/// Lost samples of one marker, body or joint.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Lost {
+    /// The marker, body or joint.
+    pub subject: String,
+    /// How many samples are missing.
+    pub lost: usize,
+    /// Of how many.
+    pub of: usize,
+}
+
+/// Rows that did not take part in the fit.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Rejected {
+    /// The recording.
+    pub recording: String,
+    /// The body or marker; empty when the whole row was rejected.
+    pub subject: String,
+    /// Rows, counted from 1 without the header.
+    pub rows: Vec<u64>,
+    /// Why.
+    pub reason: String,
+}
+
+/// The noise of a group of observations.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Noise {
+    /// What is noisy: "marker position", "joint position".
+    pub group: String,
+    /// SI unit of the numbers.
+    pub unit: Unit,
+    /// Standard deviation per component that the data show; null when the data cannot tell it.
+    pub sigma: Option<f64>,
+    /// What the profile or the tracker's maker states.
+    pub stated: Option<f64>,
+    /// Observations behind it.
+    pub samples: usize,
+    /// How it was found, or why it was not: "variance components (REML)".
+    pub text: String,
+}
+
+/// The offset between two clocks.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Clock {
+    /// The recording.
+    pub recording: String,
+    /// Which clock is late: "tracker".
+    pub clock: String,
+    /// Against which: "joints".
+    pub against: String,
+    /// How late, s; null when it could not be estimated.
+    pub offset_s: Option<f64>,
+    /// Standard deviation, s.
+    pub sigma_s: Option<f64>,
+    /// Whether the clocks agree well enough for this recording; null when it could not be told.
+    pub agrees: Option<bool>,
+    /// Why, or "static poses: the clocks do not matter".
+    pub text: String,
+}
+
+/// Where a joint was during the fit.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct JointCoverage {
+    /// The joint's name in the URDF.
+    pub joint: String,
+    /// rad or m.
+    pub unit: Unit,
+    /// Lower limit of the URDF; null for a continuous joint.
+    pub lower_limit: Option<f64>,
+    /// Upper limit of the URDF.
+    pub upper_limit: Option<f64>,
+    /// Smallest position in the data.
+    pub min: f64,
+    /// Largest position in the data.
+    pub max: f64,
+    /// Number of samples.
+    pub samples: usize,
+    /// (max − min) / (upper − lower), at most 1; a continuous joint counts against one turn; null when there is no range.
+    pub share: Option<f64>,
+    /// Left end of the first bin and right end of the last.
+    pub bins_from: f64,
+    /// Right end of the last bin.
+    pub bins_to: f64,
+    /// Samples in equal bins from `bins_from` to `bins_to`.
+    pub bins: Vec<u64>,
+}
+
+/// Bins of a joint's range: 15° each over a full turn.
+const COVERAGE_BINS: usize = 24;
+
+impl JointCoverage {
+    /// Count positions into bins over the joint's limits, or over one turn or the data's own range where it has none. Positions outside count at the ends.
+    ///
+    /// `None` when there is no finite position.
+    #[must_use]
+    pub fn of(
+        joint: impl Into<String>,
+        unit: Unit,
+        limits: Option<(f64, f64)>,
+        positions: &[f64],
+    ) -> Option<Self> {
+        let finite: Vec<f64> = positions
+            .iter()
+            .copied()
+            .filter(|x| x.is_finite())
+            .collect();
+        let min = finite.iter().copied().reduce(f64::min)?;
+        let max = finite.iter().copied().reduce(f64::max)?;
+        let limits =
+            limits.filter(|(lower, upper)| lower.is_finite() && upper.is_finite() && lower < upper);
+        let turn = std::f64::consts::PI;
+        let (from, to) = match limits {
+            Some(limits) => limits,
+            None if unit == Unit::Radian && -turn <= min && max <= turn => (-turn, turn),
+            None => (min, max),
+        };
+        let mut bins = vec![0; COVERAGE_BINS];
+        for position in &finite {
+            let place = if to > from {
+                (position - from) / (to - from) * COVERAGE_BINS as f64
+            } else {
+                0.0
+            };
+            bins[(place.max(0.0) as usize).min(COVERAGE_BINS - 1)] += 1;
+        }
+        let whole = limits
+            .map(|(lower, upper)| upper - lower)
+            .or((unit == Unit::Radian).then_some(2.0 * turn));
+        Some(Self {
+            joint: joint.into(),
+            unit,
+            lower_limit: limits.map(|limits| limits.0),
+            upper_limit: limits.map(|limits| limits.1),
+            min,
+            max,
+            samples: finite.len(),
+            share: whole.map(|whole| ((max - min) / whole).min(1.0)),
+            bins_from: from,
+            bins_to: to,
+            bins,
+        })
+    }
+}
+
+/// How the solver ended.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FitSummary {
+    /// In words: "converged after 7 iterations: step below 1e-10".
+    pub status: String,
+    /// Whether the solver reached an optimum. It is not the verdict.
+    pub converged: bool,
+    /// Iterations.
+    pub iterations: usize,
+    /// Scalar observations.
+    pub observations: usize,
+    /// Scalar unknowns.
+    pub unknowns: usize,
+    /// χ² per degree of freedom: about 1 when the noise explains the residuals; null for the closed forms.
+    pub chi2_per_dof: Option<f64>,
+}
+
+/// The predicted uncertainty of the tool over the workspace.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Workspace {
+    /// Which point: the link or tool.
+    pub link: String,
+    /// The frame of the positions.
+    pub frame: String,
+    /// Positions and their uncertainty.
+    pub points: Vec<WorkspacePoint>,
+    /// Root mean square of σ over the points, m.
+    pub rms_sigma_m: f64,
+    /// Largest σ, m.
+    pub max_sigma_m: f64,
+}
+
+/// The tool at one place.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WorkspacePoint {
+    /// m.
+    pub position_m: [f64; 3],
+    /// √trace of the 3×3 covariance of the position, m.
+    pub sigma_m: f64,
+}
+
+impl Workspace {
+    /// From points; the summary over the finite ones. `None` when there is none.
+    #[must_use]
+    pub fn of(
+        link: impl Into<String>,
+        frame: impl Into<String>,
+        points: Vec<WorkspacePoint>,
+    ) -> Option<Self> {
+        let points: Vec<_> = points
+            .into_iter()
+            .filter(|p| p.sigma_m.is_finite() && p.position_m.iter().all(|x| x.is_finite()))
+            .collect();
+        let sigmas: Vec<f64> = points.iter().map(|p| p.sigma_m).collect();
+        let stats = crate::Stats::of(&sigmas)?;
+        Some(Self {
+            link: link.into(),
+            frame: frame.into(),
+            points,
+            rms_sigma_m: stats.rms,
+            max_sigma_m: stats.max,
+        })
+    }
+}
+
+/// One source of the remaining error.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AccuracyLimit {
+    /// "joint position noise", "gravity compliance that is not modelled".
+    pub source: String,
+    /// What it contributes to the tool's error, m; null when only its presence is known.
+    pub sigma_m: Option<f64>,
+    /// Its share of the variance, in [0, 1].
+    pub share: Option<f64>,
+    /// How this was found.
+    pub text: String,
+    /// What would reduce it.
+    pub remedy: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coverage_counts_every_sample_once() {
+        let positions = [-3.0, -1.0, 0.0, 0.999, 1.0, 5.0, f64::NAN];
+        let coverage =
+            JointCoverage::of("j", Unit::Radian, Some((-1.0, 1.0)), &positions).expect("positions");
+        assert_eq!(coverage.bins.iter().sum::<u64>(), 6);
+        assert_eq!(
+            (coverage.bins[0], coverage.bins[12], coverage.bins[23]),
+            (2, 1, 3)
+        );
+        assert_eq!(coverage.share, Some(1.0));
+    }
+
+    #[test]
+    fn a_joint_without_limits_or_motion_still_has_a_picture() {
+        let still = JointCoverage::of("j", Unit::Metre, None, &[0.2, 0.2]).expect("positions");
+        assert_eq!((still.bins[0], still.share), (2, None));
+        let turning = JointCoverage::of("j", Unit::Radian, None, &[0.0, std::f64::consts::PI])
+            .expect("positions");
+        assert_eq!(turning.share, Some(0.5));
+        assert_eq!(turning.bins_from, -std::f64::consts::PI);
+        assert_eq!(JointCoverage::of("j", Unit::Radian, None, &[]), None);
+        let backwards =
+            JointCoverage::of("j", Unit::Radian, Some((0.0, 0.0)), &[0.5]).expect("positions");
+        assert_eq!(backwards.lower_limit, None);
+    }
+
+    #[test]
+    fn a_workspace_without_points_is_none() {
+        assert_eq!(Workspace::of("tool", "base", vec![]), None);
+        let point = WorkspacePoint {
+            position_m: [0.0; 3],
+            sigma_m: f64::NAN,
+        };
+        assert_eq!(Workspace::of("tool", "base", vec![point]), None);
+    }
+}

@@ -1,0 +1,162 @@
+//! JSON that is the same text for the same report: keys in the order of the structs, floats with 12 significant digits.
+//!
+//! Twelve digits are a picometre in a metre: below what any optimiser repeats over machines, above what anybody measures.
+
+use crate::{Report, ReportError};
+use serde::Serialize;
+use serde_json::Value;
+
+/// Significant digits of a float in `report.json`.
+pub const DIGITS: usize = 12;
+
+/// `report.json`: SI, floats with [`DIGITS`] significant digits, ordered keys, one trailing newline.
+///
+/// # Errors
+/// [`ReportError::NotFinite`] when a number that must be known is NaN or infinite (an unknown one is `None`).
+pub fn report_json(report: &Report) -> Result<String, ReportError> {
+    Ok(pretty(&report_value(report)?))
+}
+
+/// The value behind [`report_json`].
+///
+/// # Errors
+/// As [`report_json`].
+pub fn report_value(report: &Report) -> Result<Value, ReportError> {
+    let value = rounded(to_value(report)?);
+    // serde_json writes NaN as null; a null where a number must be does not read back.
+    serde_json::from_value::<Report>(value.clone())
+        .map_err(|source| ReportError::NotFinite(source.to_string()))?;
+    Ok(value)
+}
+
+/// Read a `report.json`.
+///
+/// # Errors
+/// [`ReportError::Json`] when the text is not a report; the message has line and column.
+pub fn read_report(text: &str) -> Result<Report, ReportError> {
+    serde_json::from_str(text).map_err(|source| ReportError::Json(source.to_string()))
+}
+
+/// Any serialisable value as JSON, floats untouched: shortest decimals that read back to the same number.
+///
+/// # Errors
+/// [`ReportError::Json`] when the value has no JSON form.
+pub fn exact_json<T: Serialize>(value: &T) -> Result<String, ReportError> {
+    Ok(pretty(&to_value(value)?))
+}
+
+fn to_value<T: Serialize>(value: &T) -> Result<Value, ReportError> {
+    serde_json::to_value(value).map_err(|source| ReportError::Json(source.to_string()))
+}
+
+/// Every float rounded to [`DIGITS`] significant digits; −0 becomes 0.
+#[must_use]
+pub fn rounded(value: Value) -> Value {
+    rounded_to(value, DIGITS)
+}
+
+pub(crate) fn rounded_to(value: Value, digits: usize) -> Value {
+    match value {
+        Value::Number(number) if number.is_f64() => number
+            .as_f64()
+            .map_or(Value::Null, |x| Value::from(round(x, digits))),
+        Value::Array(items) => items
+            .into_iter()
+            .map(|item| rounded_to(item, digits))
+            .collect(),
+        Value::Object(map) => Value::Object(
+            map.into_iter()
+                .map(|(key, item)| (key, rounded_to(item, digits)))
+                .collect(),
+        ),
+        other => other,
+    }
+}
+
+fn round(x: f64, digits: usize) -> f64 {
+    let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
+    if rounded == 0.0 { 0.0 } else { rounded }
+}
+
+/// Indented by two spaces; an array of plain values stands on one line, so that a matrix looks like one.
+#[must_use]
+pub fn pretty(value: &Value) -> String {
+    let mut text = String::new();
+    write_value(&mut text, value, 0);
+    text.push('\n');
+    text
+}
+
+fn write_value(text: &mut String, value: &Value, indent: usize) {
+    match value {
+        Value::Array(items) if items.iter().any(|item| item.is_array() || item.is_object()) => {
+            text.push('[');
+            for (i, item) in items.iter().enumerate() {
+                text.push_str(if i == 0 { "\n" } else { ",\n" });
+                text.push_str(&" ".repeat(indent + 2));
+                write_value(text, item, indent + 2);
+            }
+            text.push('\n');
+            text.push_str(&" ".repeat(indent));
+            text.push(']');
+        }
+        Value::Array(items) => {
+            text.push('[');
+            for (i, item) in items.iter().enumerate() {
+                if i > 0 {
+                    text.push_str(", ");
+                }
+                text.push_str(&item.to_string());
+            }
+            text.push(']');
+        }
+        Value::Object(map) if !map.is_empty() => {
+            text.push('{');
+            for (i, (key, item)) in map.iter().enumerate() {
+                text.push_str(if i == 0 { "\n" } else { ",\n" });
+                text.push_str(&" ".repeat(indent + 2));
+                text.push_str(&Value::from(key.as_str()).to_string());
+                text.push_str(": ");
+                write_value(text, item, indent + 2);
+            }
+            text.push('\n');
+            text.push_str(&" ".repeat(indent));
+            text.push('}');
+        }
+        other => text.push_str(&other.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use serde_json::json;
+
+    #[test]
+    fn floats_keep_twelve_digits_and_integers_all() {
+        let value = json!({"a": 0.1 + 0.2, "b": [1.0 / 3.0, -0.0, 1e-300], "n": 12_345_678_901_234_567_u64, "t": "0.30000000000000004"});
+        let expected = json!({"a": 0.3, "b": [0.333333333333, 0.0, 1e-300], "n": 12_345_678_901_234_567_u64, "t": "0.30000000000000004"});
+        assert_eq!(rounded(value), expected);
+        assert_eq!(rounded(json!(-0.0)).to_string(), "0.0");
+    }
+
+    #[test]
+    fn a_matrix_looks_like_a_matrix() {
+        let text = pretty(&json!({"m": [[1, 2], [3, 4]], "v": [1, 2], "o": {}, "e": []}));
+        assert_eq!(
+            text,
+            "{\n  \"m\": [\n    [1, 2],\n    [3, 4]\n  ],\n  \"v\": [1, 2],\n  \"o\": {},\n  \"e\": []\n}\n"
+        );
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { rng_seed: proptest::test_runner::RngSeed::Fixed(12), ..ProptestConfig::default() })]
+        #[test]
+        fn rounding_is_idempotent_and_close(x in proptest::num::f64::NORMAL) {
+            let once = round(x, DIGITS);
+            prop_assert_eq!(round(once, DIGITS), once);
+            prop_assert!((once - x).abs() <= x.abs() * 0.51e-11);
+        }
+    }
+}

@@ -1,0 +1,316 @@
+use crate::verification::quantile;
+use crate::{JointValue, Stats, Unit};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// One observation and what the model says: predicted − observed. The rows of `residuals.csv`; not part of `report.json`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ResidualRow {
+    /// The recording's name.
+    pub recording: String,
+    /// Row in the recording, counted from 1 without the header.
+    pub row: u64,
+    /// Time in the recording, s; `None` for static poses.
+    pub time_s: Option<f64>,
+    /// The marker, or the body for a pose.
+    pub subject: String,
+    /// predicted − observed, in the tracker frame, m.
+    pub residual_m: [f64; 3],
+    /// Rotation part for a body's pose, rad; `None` for a marker.
+    pub rotation_rad: Option<f64>,
+    /// Length of the residual in standard deviations; `None` without a noise model.
+    pub normalised: Option<f64>,
+    /// Whether it took part in the fit.
+    pub used: bool,
+    /// Where the joints were.
+    pub joints: Vec<JointValue>,
+}
+
+impl ResidualRow {
+    /// ‖predicted − observed‖, m.
+    #[must_use]
+    pub fn length_m(&self) -> f64 {
+        self.residual_m.iter().map(|x| x * x).sum::<f64>().sqrt()
+    }
+}
+
+/// Residuals of the observations that took part in the fit, summarised four ways.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Residuals {
+    /// Over all.
+    pub all: Option<ResidualGroup>,
+    /// Per marker or body, by name.
+    pub by_marker: Vec<ResidualGroup>,
+    /// Along the tracker's x, y, z: `mean_m` is the signed mean, the others are of magnitudes.
+    pub by_direction: Vec<ResidualGroup>,
+    /// Over each joint's position.
+    pub by_joint: Vec<JointResiduals>,
+    /// Over time, or over the row where there is no time; recording by recording.
+    pub over_time: Vec<JointResiduals>,
+}
+
+/// Residual lengths of a group, m.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ResidualGroup {
+    /// The marker, body or direction.
+    pub name: String,
+    /// Observations.
+    pub samples: usize,
+    /// Mean length; the signed mean for a direction.
+    pub mean_m: f64,
+    /// Root of the mean square.
+    pub rms_m: f64,
+    /// 95 % quantile of the magnitude.
+    pub p95_m: f64,
+    /// Largest magnitude.
+    pub max_m: f64,
+}
+
+/// Residuals over one variable, in bins of equal width.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct JointResiduals {
+    /// The joint, or the recording for residuals over time.
+    pub name: String,
+    /// SI unit of the variable; 1 for a row number.
+    pub unit: Unit,
+    /// Bins that hold observations, left to right.
+    pub bins: Vec<ResidualBin>,
+}
+
+/// One bin.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ResidualBin {
+    /// Middle of the bin.
+    pub center: f64,
+    /// Observations in it.
+    pub samples: usize,
+    /// Root of the mean square length, m.
+    pub rms_m: f64,
+    /// Largest length, m.
+    pub max_m: f64,
+    /// Mean residual vector in the tracker frame, m: a wave here is something that is not modelled.
+    pub mean_m: [f64; 3],
+}
+
+/// Bins over a variable: enough to see a wave of three periods, few enough to have samples in each.
+const BINS: usize = 24;
+
+/// A row and where it stands on the variable.
+type At<'a> = (f64, &'a ResidualRow);
+
+impl Residuals {
+    /// Summarise the rows that took part in the fit; rows with numbers that are not finite are left out.
+    #[must_use]
+    pub fn from_rows(rows: &[ResidualRow]) -> Self {
+        let used: Vec<&ResidualRow> = rows
+            .iter()
+            .filter(|row| row.used && row.residual_m.iter().all(|x| x.is_finite()))
+            .collect();
+        let lengths: Vec<f64> = used.iter().map(|row| row.length_m()).collect();
+        let mut by_marker: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+        let mut by_joint: BTreeMap<&str, (Unit, Vec<At<'_>>)> = BTreeMap::new();
+        let mut over_time: BTreeMap<&str, Vec<&ResidualRow>> = BTreeMap::new();
+        for &row in &used {
+            by_marker
+                .entry(&row.subject)
+                .or_default()
+                .push(row.length_m());
+            over_time.entry(&row.recording).or_default().push(row);
+            for joint in &row.joints {
+                by_joint
+                    .entry(&joint.joint)
+                    .or_insert((joint.unit, Vec::new()))
+                    .1
+                    .push((joint.value, row));
+            }
+        }
+        let over_time = over_time.into_iter().map(|(recording, rows)| {
+            let timed = rows.iter().all(|row| row.time_s.is_some());
+            let unit = if timed { Unit::Second } else { Unit::One };
+            let at = |row: &ResidualRow| row.time_s.filter(|_| timed).unwrap_or(row.row as f64);
+            JointResiduals {
+                name: recording.to_owned(),
+                unit,
+                bins: bins(rows.into_iter().map(|row| (at(row), row)).collect()),
+            }
+        });
+        let axis = |i: usize, name: &str| {
+            let components: Vec<f64> = used.iter().map(|row| row.residual_m[i]).collect();
+            let magnitudes: Vec<f64> = components.iter().map(|x| x.abs()).collect();
+            let mean_m = components.iter().sum::<f64>() / components.len().max(1) as f64;
+            ResidualGroup::of(name, &magnitudes).map(|group| ResidualGroup { mean_m, ..group })
+        };
+        Self {
+            all: ResidualGroup::of("all", &lengths),
+            by_marker: by_marker
+                .into_iter()
+                .filter_map(|(name, lengths)| ResidualGroup::of(name, &lengths))
+                .collect(),
+            by_direction: ["x", "y", "z"]
+                .iter()
+                .enumerate()
+                .filter_map(|(i, name)| axis(i, name))
+                .collect(),
+            by_joint: by_joint
+                .into_iter()
+                .map(|(name, (unit, rows))| JointResiduals {
+                    name: name.to_owned(),
+                    unit,
+                    bins: bins(rows),
+                })
+                .collect(),
+            over_time: over_time.collect(),
+        }
+    }
+
+    /// Whether there is nothing to show.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.all.is_none()
+    }
+}
+
+impl ResidualGroup {
+    /// Of magnitudes; `None` when none is finite.
+    #[must_use]
+    pub fn of(name: impl Into<String>, magnitudes_m: &[f64]) -> Option<Self> {
+        let stats = Stats::of(magnitudes_m)?;
+        let mut sorted: Vec<f64> = magnitudes_m
+            .iter()
+            .copied()
+            .filter(|x| x.is_finite())
+            .collect();
+        sorted.sort_by(f64::total_cmp);
+        let p95_m = quantile(&sorted, 0.95);
+        Some(Self {
+            name: name.into(),
+            samples: sorted.len(),
+            mean_m: stats.mean,
+            rms_m: stats.rms,
+            p95_m,
+            max_m: stats.max,
+        })
+    }
+}
+
+fn bins(rows: Vec<At<'_>>) -> Vec<ResidualBin> {
+    let rows: Vec<_> = rows.into_iter().filter(|(at, _)| at.is_finite()).collect();
+    let from = rows.iter().map(|row| row.0).fold(f64::INFINITY, f64::min);
+    let to = rows
+        .iter()
+        .map(|row| row.0)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let width = if to > from {
+        (to - from) / BINS as f64
+    } else {
+        0.0
+    };
+    let mut parts: BTreeMap<usize, Vec<&ResidualRow>> = BTreeMap::new();
+    for (at, row) in rows {
+        let bin = if width > 0.0 {
+            (((at - from) / width) as usize).min(BINS - 1)
+        } else {
+            0
+        };
+        parts.entry(bin).or_default().push(row);
+    }
+    let summary = |(bin, rows): (usize, Vec<&ResidualRow>)| {
+        let lengths: Vec<f64> = rows.iter().map(|row| row.length_m()).collect();
+        let stats = Stats::of(&lengths)?;
+        let mean_m = std::array::from_fn(|i| {
+            rows.iter().map(|row| row.residual_m[i]).sum::<f64>() / rows.len() as f64
+        });
+        let center = from + (bin as f64 + 0.5) * width;
+        Some(ResidualBin {
+            center,
+            samples: rows.len(),
+            rms_m: stats.rms,
+            max_m: stats.max,
+            mean_m,
+        })
+    };
+    parts.into_iter().filter_map(summary).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(subject: &str, at: f64, residual_m: [f64; 3]) -> ResidualRow {
+        let joints = vec![JointValue::radians("elbow", at)];
+        ResidualRow {
+            recording: "r".into(),
+            row: 1,
+            subject: subject.into(),
+            residual_m,
+            used: true,
+            joints,
+            ..ResidualRow::default()
+        }
+    }
+
+    #[test]
+    fn no_rows_no_residuals() {
+        assert!(Residuals::from_rows(&[]).is_empty());
+        assert!(
+            Residuals::from_rows(&[ResidualRow {
+                used: false,
+                ..row("m", 0.0, [1.0; 3])
+            }])
+            .is_empty()
+        );
+        assert!(Residuals::from_rows(&[row("m", 0.0, [f64::NAN, 0.0, 0.0])]).is_empty());
+    }
+
+    #[test]
+    fn every_used_row_is_in_every_summary_once() {
+        let rows: Vec<_> = (0..100)
+            .map(|i| {
+                row(
+                    if i % 4 == 0 { "a" } else { "b" },
+                    f64::from(i) * 0.01,
+                    [0.001, -0.002, 0.002],
+                )
+            })
+            .collect();
+        let residuals = Residuals::from_rows(&rows);
+        assert_eq!(
+            residuals
+                .by_marker
+                .iter()
+                .map(|g| (g.name.as_str(), g.samples))
+                .collect::<Vec<_>>(),
+            [("a", 25), ("b", 75)]
+        );
+        assert_eq!(
+            residuals.by_joint[0]
+                .bins
+                .iter()
+                .map(|bin| bin.samples)
+                .sum::<usize>(),
+            100
+        );
+        assert_eq!(
+            residuals.over_time[0]
+                .bins
+                .iter()
+                .map(|bin| bin.samples)
+                .sum::<usize>(),
+            100
+        );
+        let y = &residuals.by_direction[1];
+        assert!((y.mean_m + 0.002).abs() < 1e-15 && (y.rms_m - 0.002).abs() < 1e-15);
+        assert!((residuals.all.expect("rows").rms_m - 0.003).abs() < 1e-15);
+        let bin = residuals.by_joint[0].bins[3];
+        assert!((bin.mean_m[2] - 0.002).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_joint_that_never_moved_has_one_bin() {
+        let residuals =
+            Residuals::from_rows(&[row("a", 0.5, [0.001; 3]), row("a", 0.5, [0.001; 3])]);
+        assert_eq!(residuals.by_joint[0].bins.len(), 1);
+        assert_eq!(residuals.by_joint[0].bins[0].center, 0.5);
+    }
+}

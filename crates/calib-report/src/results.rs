@@ -1,0 +1,292 @@
+use crate::Unit;
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A transform `parent_from_child` that was found, or assumed.
+///
+/// The covariance is of the perturbation ξ = [ω; v] in `parent_from_child · exp(ξ)`, in axes of the child (rad², rad·m, m²).
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Transform {
+    /// The origin's or body's name in the profile.
+    pub name: String,
+    /// The frame that it is expressed in.
+    pub parent: String,
+    /// The frame that it places.
+    pub child: String,
+    /// The child's origin in the parent, m.
+    pub translation_m: [f64; 3],
+    /// Unit quaternion x, y, z, w.
+    pub rotation_xyzw: [f64; 4],
+    /// 6×6 in [ω; v] of the child, or null when it is not known.
+    pub covariance: Option<[[f64; 6]; 6]>,
+    /// Whether all six directions that were asked for are observable.
+    pub observable: bool,
+    /// The directions that are not.
+    pub unobservable: Vec<Unobservable>,
+    /// Fixed-axis roll, pitch, yaw of the URDF: `Rz(yaw)·Ry(pitch)·Rx(roll)`, rad.
+    #[serde(default)]
+    pub rpy_rad: [f64; 3],
+    /// σ of the origin along the axes of the *parent*, m: what stands behind `translation_m ±`.
+    #[serde(default)]
+    pub sigma_translation_m: Option<[f64; 3]>,
+    /// σ of the rotation about the axes of the *child*, rad.
+    #[serde(default)]
+    pub sigma_rotation_rad: Option<[f64; 3]>,
+    /// Where the numbers come from.
+    #[serde(default)]
+    pub status: Status,
+}
+
+impl Transform {
+    /// From `parent_from_child` and its covariance in [ω; v] of the child. Entries of a covariance that are not finite make it unknown.
+    #[must_use]
+    pub fn new(
+        name: impl Into<String>,
+        parent: impl Into<String>,
+        child: impl Into<String>,
+        parent_from_child: &Isometry3<f64>,
+        covariance: Option<&Matrix6<f64>>,
+        status: Status,
+    ) -> Self {
+        let covariance = covariance.filter(|c| c.iter().all(|x| x.is_finite()));
+        let (roll, pitch, yaw) = parent_from_child.rotation.euler_angles();
+        let q = parent_from_child.rotation.coords;
+        let rotation = parent_from_child.rotation.to_rotation_matrix();
+        Self {
+            name: name.into(),
+            parent: parent.into(),
+            child: child.into(),
+            translation_m: parent_from_child.translation.vector.into(),
+            rotation_xyzw: [q.x, q.y, q.z, q.w],
+            covariance: covariance
+                .map(|c| std::array::from_fn(|i| std::array::from_fn(|j| c[(i, j)]))),
+            observable: true,
+            unobservable: Vec::new(),
+            rpy_rad: [roll, pitch, yaw],
+            sigma_translation_m: covariance.map(|c| {
+                // C_parent = R · C_vv · Rᵀ
+                let c_vv: Matrix3<f64> = c.fixed_view::<3, 3>(3, 3).into();
+                sigmas(&(rotation.matrix() * c_vv * rotation.matrix().transpose()))
+            }),
+            sigma_rotation_rad: covariance.map(|c| sigmas(&c.fixed_view::<3, 3>(0, 0).into())),
+            status,
+        }
+    }
+
+    /// The same with directions that the data cannot give; none leaves it observable.
+    #[must_use]
+    pub fn with_unobservable(mut self, unobservable: Vec<Unobservable>) -> Self {
+        self.observable = unobservable.is_empty();
+        self.unobservable = unobservable;
+        self
+    }
+}
+
+fn sigmas(covariance: &Matrix3<f64>) -> [f64; 3] {
+    let variances: Vector3<f64> = covariance.diagonal();
+    [variances.x, variances.y, variances.z].map(|variance| variance.max(0.0).sqrt())
+}
+
+/// Where a number comes from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Read from the tracker or another instrument.
+    Measured,
+    /// Solved for here.
+    Calibrated,
+    /// Taken from the URDF or the profile and not checked.
+    #[default]
+    Assumed,
+}
+
+impl Status {
+    /// The word for people and files.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Calibrated => "calibrated",
+            Self::Assumed => "assumed",
+        }
+    }
+}
+
+/// A direction of one transform that the data cannot give.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Unobservable {
+    /// Unit twist [ω; v] in axes of the child.
+    pub direction: [f64; 6],
+    /// In words: "the point may slide along the axis of wrist_roll".
+    pub text: String,
+    /// What to record, or to choose.
+    pub remedy: String,
+}
+
+/// One term of a combination of parameters.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Term {
+    /// A parameter's name.
+    pub parameter: String,
+    /// Its coefficient in the combination, in the parameter's SI unit.
+    pub coefficient: f64,
+}
+
+/// A combination of parameters that the data cannot tell from nothing.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NotObservable {
+    /// What is asked: a joint, an origin, a pair of them.
+    pub subject: String,
+    /// The direction in parameter space.
+    pub direction: Vec<Term>,
+    /// In words: "`shoulder.z` trades against `elbow.z`: parallel axes".
+    pub text: String,
+    /// What to record, or to choose.
+    pub remedy: String,
+}
+
+/// How well a parameter is known.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Class {
+    /// The data decide.
+    Solid,
+    /// The data help, the prior decides.
+    Weak,
+    /// The prior alone.
+    Prior,
+    /// Nothing.
+    #[default]
+    NotObservable,
+}
+
+impl Class {
+    /// The word for people.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Solid => "solid",
+            Self::Weak => "weak",
+            Self::Prior => "prior only",
+            Self::NotObservable => "not observable",
+        }
+    }
+}
+
+/// One scalar unknown.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Parameter {
+    /// Unique: `shoulder.origin.x`.
+    pub name: String,
+    /// The joint of the URDF that it belongs to, if any.
+    pub joint: Option<String>,
+    /// `origin`, `joint_offset`, `gain`, `compliance`, `clock`, …
+    pub kind: String,
+    /// SI unit of the numbers.
+    pub unit: Unit,
+    /// Before.
+    pub nominal: f64,
+    /// After.
+    pub value: f64,
+    /// Standard deviation; null when it is not known.
+    pub sigma: Option<f64>,
+    /// 1 − posterior variance / prior variance; null without a prior.
+    pub data_share: Option<f64>,
+    /// How well it is known.
+    pub class: Class,
+}
+
+/// One number that differs between the original and the patched URDF.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Change {
+    /// The joint of the URDF.
+    pub joint: String,
+    /// Which number: `origin x`, `origin yaw`, `zero offset`.
+    pub what: String,
+    /// SI unit of the numbers.
+    pub unit: Unit,
+    /// Before; null when the joint was added.
+    pub old: Option<f64>,
+    /// After.
+    pub new: f64,
+    /// new − old; null when the joint was added.
+    pub delta: Option<f64>,
+    /// Standard deviation of `delta`.
+    pub sigma: Option<f64>,
+    /// How much of it the data said, in [0, 1].
+    pub data_share: Option<f64>,
+}
+
+/// A quantity by one estimator, beside the value that the report uses.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EstimatorResult {
+    /// What was estimated: `base center`.
+    pub quantity: String,
+    /// By which estimator: `sfe`, `hse`, `ml`.
+    pub estimator: String,
+    /// The components, SI; null when the estimator could not answer.
+    pub value: Option<Vec<f64>>,
+    /// Their standard deviations.
+    pub sigma: Option<Vec<f64>>,
+    /// Whether it agrees with the value that the report uses, within both uncertainties. No answer does not agree.
+    pub agrees: bool,
+    /// SI unit of the components.
+    #[serde(default)]
+    pub unit: Unit,
+    /// Distance to the value that the report uses.
+    #[serde(default)]
+    pub distance: Option<f64>,
+    /// Why it has no answer or does not agree; empty otherwise.
+    #[serde(default)]
+    pub text: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+
+    #[test]
+    fn sigma_of_the_origin_is_in_the_axes_it_is_printed_in() {
+        // The child's x is the parent's y: what is uncertain along x of the child is uncertain along y of the parent.
+        let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2);
+        let parent_from_child =
+            Isometry3::from_parts(nalgebra::Translation3::new(1.0, 2.0, 3.0), turn);
+        let mut covariance = Matrix6::zeros();
+        covariance[(3, 3)] = 4e-6;
+        covariance[(2, 2)] = 9e-6;
+        let transform = Transform::new(
+            "t",
+            "p",
+            "c",
+            &parent_from_child,
+            Some(&covariance),
+            Status::Calibrated,
+        );
+        let sigma = transform
+            .sigma_translation_m
+            .expect("a covariance was given");
+        assert!(
+            sigma[0].abs() < 1e-12 && (sigma[1] - 2e-3).abs() < 1e-12 && sigma[2].abs() < 1e-12,
+            "{sigma:?}"
+        );
+        assert_eq!(transform.sigma_rotation_rad, Some([0.0, 0.0, 3e-3]));
+        assert!((transform.rpy_rad[2] - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_covariance_that_is_not_finite_is_unknown() {
+        let covariance = Matrix6::from_diagonal_element(f64::INFINITY);
+        let transform = Transform::new(
+            "t",
+            "p",
+            "c",
+            &Isometry3::identity(),
+            Some(&covariance),
+            Status::Calibrated,
+        );
+        assert_eq!(transform.covariance, None);
+        assert_eq!(transform.sigma_translation_m, None);
+    }
+}
