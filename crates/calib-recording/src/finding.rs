@@ -23,8 +23,8 @@ pub struct Finding {
     pub severity: Severity,
     /// The marker, body, joint or file it is about.
     pub subject: String,
-    /// The rows it is about, numbered as [`Poses::rows`](crate::Poses::rows) numbers them: lines of a text
-    /// file from 1, frames of a binary one. Empty = the whole recording.
+    /// The rows it is about, numbered as [`Poses::rows`](crate::Poses::rows) numbers them: lines from
+    /// 1 of our own tables, frames of a tracker's file. Empty = the whole recording.
     pub rows: Vec<u64>,
     /// What was found, with numbers and units.
     pub text: String,

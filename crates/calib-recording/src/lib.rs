@@ -37,6 +37,6 @@ pub use model::{
     Timeline, TorqueStream,
 };
 pub use poses::{NotOneTable, Poses};
-pub use readers::{ReadOptions, read_bytes, read_path};
+pub use readers::{ReadOptions, RotationForm, read_bytes, read_path};
 pub use table::{NotWritten, WriteOptions, write_poses};
 pub use units::{AngleUnit, LengthUnit, TimeUnit};

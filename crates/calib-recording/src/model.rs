@@ -46,7 +46,8 @@ pub struct Timeline {
     /// Which clock the times are read from, e.g. `tracker frames at 100 Hz`. Two timelines share a clock only
     /// when these texts are equal.
     pub clock: String,
-    /// Where each sample stands in the file: line number of a text file (from 1), frame number of a binary one.
+    /// Where each sample stands in the file: the frame number where the format numbers its frames, else the line
+    /// (from 1).
     pub rows: Vec<u64>,
     /// Times, s, never decreasing. `None` for a table of static poses, which has no useful time.
     pub t: Option<Vec<f64>>,

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// A table of `n` rows: every vector in it has `rows.len()` entries, `None` = lost or not given. SI.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Poses {
-    /// Where each row stands in its file: line number from 1 (text), frame number (binary).
+    /// Where each row stands in its file: line number from 1 of our own tables, frame number of a tracker's file.
     pub rows: Vec<u64>,
     /// Time, s, when the rows have one.
     pub t: Option<Vec<f64>>,

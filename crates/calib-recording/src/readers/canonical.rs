@@ -15,6 +15,53 @@ pub(super) const READER: Reader = Reader {
     read,
 };
 
+/// The controller log of UR's `record.py`.
+pub(super) const UR_RTDE: Reader = Reader {
+    id: "ur_rtde",
+    name: "UR RTDE log",
+    extensions: &["csv"],
+    detect: |head| has_columns(head, &["timestamp", "actual_q_0"]),
+    read: |input, options| with_preset("ur_rtde", input, options),
+};
+
+/// libfranka's `logToCSV`.
+pub(super) const FRANKA: Reader = Reader {
+    id: "franka",
+    name: "Franka log",
+    extensions: &["csv"],
+    detect: |head| has_columns(head, &["time", "state.q[0]", "state.q[6]"]),
+    read: |input, options| with_preset("franka", input, options),
+};
+
+/// NDI's combined API sample.
+pub(super) const NDI: Reader = Reader {
+    id: "ndi",
+    name: "NDI tool log",
+    extensions: &["csv"],
+    detect: |head| has_columns(head, &["Frame#", "ToolHandle", "q0", "tx"]),
+    read: |input, options| with_preset("ndi", input, options),
+};
+
+fn has_columns(head: &[u8], wanted: &[&str]) -> bool {
+    let line = header_line(head).unwrap_or("");
+    wanted
+        .iter()
+        .all(|name| cells(line, Separator::guess(line)).any(|cell| cell == *name))
+}
+
+/// The preset, or the caller's own map on top of it.
+fn with_preset(preset: &str, input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
+    let mut map = options.columns.clone().unwrap_or_default();
+    map.preset.get_or_insert_with(|| preset.to_string());
+    read(
+        input,
+        &ReadOptions {
+            columns: Some(map),
+            ..options.clone()
+        },
+    )
+}
+
 fn detect(head: &[u8]) -> bool {
     header_line(head).is_some_and(|line| is_canonical(cells(line, Separator::guess(line))))
 }

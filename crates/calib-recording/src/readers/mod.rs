@@ -1,6 +1,13 @@
 //! The table of readers: what a file can be, how it is recognised, how it is read.
 
+mod c3d;
 mod canonical;
+mod common;
+mod dtrack;
+mod motive;
+mod qualisys;
+mod trc;
+mod vicon;
 
 use crate::column_map::ColumnMap;
 use crate::error::{At, Error, Placed, Problem, in_file, nearest_word};
@@ -22,6 +29,10 @@ pub struct ReadOptions {
     pub format: Option<String>,
     /// Meaning of the columns of a table that is not ours; then the reader is the table reader.
     pub columns: Option<ColumnMap>,
+    /// The axis that points up, for formats that do not say (`+Y`); recorded, nothing is turned.
+    pub up_axis: Option<String>,
+    /// What three rotation columns mean, where a file leaves it open (Vicon objects).
+    pub rotation: Option<RotationForm>,
     /// Files above this size are refused, bytes.
     pub max_bytes: u64,
 }
@@ -32,8 +43,31 @@ impl Default for ReadOptions {
         ReadOptions {
             format: None,
             columns: None,
+            up_axis: None,
+            rotation: None,
             max_bytes: 8 << 30,
         }
+    }
+}
+
+/// What rotation columns hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RotationForm {
+    /// Axis times angle.
+    RotationVector,
+    /// Turns about the moving axes: `R = Rx(a)·Ry(b)·Rz(c)`.
+    EulerXyz,
+    /// `x, y, z, w`.
+    Quaternion,
+}
+
+impl std::fmt::Display for RotationForm {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            RotationForm::RotationVector => "a rotation vector",
+            RotationForm::EulerXyz => "Euler angles about the moving axes x, y, z",
+            RotationForm::Quaternion => "a quaternion x, y, z, w",
+        })
     }
 }
 
@@ -55,7 +89,18 @@ type ReadFn = fn(&mut dyn Input, &ReadOptions) -> Placed<Recording>;
 
 /// All built-in readers; the first whose `detect` says yes reads the file.
 pub fn readers() -> &'static [Reader] {
-    const READERS: &[Reader] = &[canonical::READER];
+    const READERS: &[Reader] = &[
+        c3d::READER,
+        vicon::READER,
+        motive::READER,
+        qualisys::READER,
+        dtrack::READER,
+        trc::READER,
+        canonical::UR_RTDE,
+        canonical::FRANKA,
+        canonical::NDI,
+        canonical::READER,
+    ];
     READERS
 }
 

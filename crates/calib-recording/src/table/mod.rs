@@ -5,5 +5,5 @@ mod rows;
 mod write;
 
 pub(crate) use header::is_canonical;
-pub(crate) use rows::read_table;
+pub(crate) use rows::{UNIT_TOLERANCE, read_table};
 pub use write::{NotWritten, WriteOptions, write_poses};

@@ -2,5 +2,17 @@
 
 mod bad_tables;
 mod bodies;
+mod fixtures;
+mod mutations;
+mod real_formats;
 mod real_tables;
 mod tables;
+
+/// Property tests that are the same on every run.
+fn fixed_seed() -> proptest::test_runner::Config {
+    proptest::test_runner::Config {
+        rng_seed: proptest::test_runner::RngSeed::Fixed(20_110),
+        failure_persistence: None,
+        ..Default::default()
+    }
+}

@@ -1,0 +1,280 @@
+//! What the readers of tracker files share: rows of numbers, three coordinates to a sample, unique names.
+
+use crate::error::{At, Placed, Problem};
+use crate::finding::{Finding, Severity};
+use crate::model::{BodyStream, MarkerSample, MarkerStream};
+use crate::table::UNIT_TOLERANCE;
+use crate::text::{Number, Separator, cells, not_a_number, number};
+use calib_geometry::so3;
+use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, UnitQuaternion};
+use std::collections::BTreeMap;
+
+/// How far a written rotation matrix may be from orthonormal: three decimals are rounded to 5e-4.
+const MATRIX_TOLERANCE: f64 = 5e-3;
+
+/// The numbers of a row; NaN = empty or a word for it. The row may be shorter than `columns` (trackers drop what is
+/// lost at the end), not longer except by empty cells. `values` keeps its length.
+pub(super) fn numbers(
+    line: u64,
+    text: &str,
+    separator: Separator,
+    columns: usize,
+    values: &mut Vec<f64>,
+) -> Placed<()> {
+    values.clear();
+    for (i, cell) in cells(text, separator).enumerate() {
+        let value = match number(cell) {
+            Number::Value(value) => value,
+            Number::Empty | Number::Nan => f64::NAN,
+            kind => {
+                let at = At::Cell {
+                    line,
+                    column: format!("#{}", i + 1),
+                };
+                return Err((
+                    at,
+                    not_a_number(cell, kind, "a number, or nothing where the sample was lost"),
+                ));
+            }
+        };
+        if i < columns {
+            values.push(value);
+        } else if !value.is_nan() {
+            let found = cells(text, separator).count();
+            return Err((
+                At::Line(line),
+                Problem::Ragged {
+                    found,
+                    expected: columns,
+                },
+            ));
+        }
+    }
+    values.resize(columns, f64::NAN);
+    Ok(())
+}
+
+/// A group of coordinates: all, none (lost), or a mistake.
+pub(super) enum Triplet {
+    Lost,
+    Zero,
+    Point(Point3<f64>),
+}
+
+pub(super) fn triplet(
+    line: u64,
+    name: &str,
+    [x, y, z]: [f64; 3],
+    units_per_metre: f64,
+) -> Placed<Triplet> {
+    let given = [x, y, z].iter().filter(|value| !value.is_nan()).count();
+    match given {
+        0 => Ok(Triplet::Lost),
+        3 if x == 0.0 && y == 0.0 && z == 0.0 => Ok(Triplet::Zero),
+        3 => Ok(Triplet::Point(Point3::new(
+            x / units_per_metre,
+            y / units_per_metre,
+            z / units_per_metre,
+        ))),
+        given => Err((
+            At::Line(line),
+            Problem::PartlyLost {
+                entity: "marker",
+                name: name.to_string(),
+                given,
+                needed: 3,
+            },
+        )),
+    }
+}
+
+/// A marker that is being read.
+pub(super) struct MarkerTrack {
+    pub stream: MarkerStream,
+    /// Columns of x, y, z.
+    pub columns: [usize; 3],
+    /// The device computes these points instead of measuring them.
+    pub filled: bool,
+    zeros: Vec<u64>,
+}
+
+impl MarkerTrack {
+    pub(super) fn new(name: &str, columns: [usize; 3], filled: bool) -> Self {
+        let stream = MarkerStream {
+            name: name.to_string(),
+            body: None,
+            unlabelled: false,
+            timeline: 0,
+            samples: Vec::new(),
+        };
+        MarkerTrack {
+            stream,
+            columns,
+            filled,
+            zeros: Vec::new(),
+        }
+    }
+
+    /// Takes this row's sample; `row` is its number in findings.
+    pub(super) fn read(
+        &mut self,
+        line: u64,
+        row: u64,
+        values: &[f64],
+        units_per_metre: f64,
+    ) -> Placed<()> {
+        let coordinates = self
+            .columns
+            .map(|column| values.get(column).copied().unwrap_or(f64::NAN));
+        self.stream.samples.push(
+            match triplet(line, &self.stream.name, coordinates, units_per_metre)? {
+                Triplet::Point(point) if self.filled => MarkerSample::Filled(point),
+                Triplet::Point(point) => MarkerSample::Measured(point),
+                Triplet::Lost => MarkerSample::Lost,
+                Triplet::Zero => {
+                    self.zeros.push(row);
+                    MarkerSample::Lost
+                }
+            },
+        );
+        Ok(())
+    }
+
+    pub(super) fn finish(self, findings: &mut Vec<Finding>) -> MarkerStream {
+        findings.extend(all_zero(&self.stream.name, self.zeros));
+        self.stream
+    }
+}
+
+/// The finding about samples at exactly zero; `None` without such.
+pub(super) fn all_zero(subject: &str, rows: Vec<u64>) -> Option<Finding> {
+    let text = format!(
+        "{} samples are exactly (0, 0, 0); taken as lost",
+        rows.len()
+    );
+    let remedy = "let the tracker export lost samples as empty";
+    (!rows.is_empty()).then(|| {
+        Finding::new("all-zero-triplet", Severity::Warning, subject, text, remedy).at_rows(rows)
+    })
+}
+
+/// An empty stream of a body.
+pub(super) fn body_stream(name: &str) -> BodyStream {
+    BodyStream {
+        name: name.to_string(),
+        timeline: 0,
+        tracker_from_body: Vec::new(),
+        quality: Vec::new(),
+        covariance: Vec::new(),
+    }
+}
+
+/// A unit quaternion from its parts `[x, y, z, w]`.
+pub(super) fn quaternion(
+    at: At,
+    body: &str,
+    [x, y, z, w]: [f64; 4],
+) -> Placed<UnitQuaternion<f64>> {
+    let q = Quaternion::new(w, x, y, z);
+    let norm = q.norm();
+    if norm.is_nan() || (norm - 1.0).abs() > UNIT_TOLERANCE {
+        return Err((
+            at,
+            Problem::NotUnit {
+                body: body.to_string(),
+                norm,
+                tolerance: UNIT_TOLERANCE,
+            },
+        ));
+    }
+    Ok(UnitQuaternion::from_quaternion(q))
+}
+
+/// The rotation nearest to a written matrix, if it is one but for rounding; a mirrored one is refused.
+pub(super) fn rotation(at: At, body: &str, matrix: &Matrix3<f64>) -> Placed<UnitQuaternion<f64>> {
+    let departure = (matrix.transpose() * matrix - Matrix3::identity())
+        .abs()
+        .max();
+    let determinant = matrix.determinant();
+    let nearest = (departure <= MATRIX_TOLERANCE && determinant > 0.0)
+        .then(|| so3::nearest_rotation(matrix))
+        .flatten();
+    nearest.ok_or_else(|| {
+        let body = body.to_string();
+        (
+            at,
+            Problem::NotRotation {
+                body,
+                determinant,
+                departure,
+                tolerance: MATRIX_TOLERANCE,
+            },
+        )
+    })
+}
+
+pub(super) fn pose(position: Point3<f64>, rotation: UnitQuaternion<f64>) -> Isometry3<f64> {
+    Isometry3::from_parts(Translation3::from(position.coords), rotation)
+}
+
+/// Makes names unique by `#2`, `#3` … and says so.
+pub(super) fn unique_names(
+    names: Vec<String>,
+    what: &str,
+    findings: &mut Vec<Finding>,
+) -> Vec<String> {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    let taken: std::collections::BTreeSet<String> = names.iter().cloned().collect();
+    names
+        .into_iter()
+        .map(|name| {
+            let count = counts.entry(name.clone()).or_insert(0);
+            *count += 1;
+            if *count == 1 {
+                return name;
+            }
+            let mut unique = format!("{name}#{count}");
+            while taken.contains(&unique) {
+                unique.push('\'');
+            }
+            let text =
+                format!("{what} `{name}` occurs {count} times; this one is called `{unique}`");
+            let remedy = "give every marker and body its own name in the tracker's software";
+            findings.push(Finding::new(
+                "duplicate-name",
+                Severity::Warning,
+                &unique,
+                text,
+                remedy,
+            ));
+            unique
+        })
+        .collect()
+}
+
+/// Text of the file's head, as far as it is UTF-8.
+pub(super) fn head_text(head: &[u8]) -> &str {
+    let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
+    match std::str::from_utf8(head) {
+        Ok(text) => text,
+        Err(error) => std::str::from_utf8(&head[..error.valid_up_to()]).unwrap_or(""),
+    }
+}
+
+/// First cell of the file's first line.
+pub(super) fn first_cell(head: &[u8]) -> &str {
+    let line = head_text(head).lines().next().unwrap_or("");
+    line.split([',', ';', '\t']).next().unwrap_or("").trim()
+}
+
+/// A problem of the form *found, expected* at a line.
+pub(super) fn unexpected<T>(line: u64, found: &str, expected: &str) -> Placed<T> {
+    let found = crate::error::excerpt(found, 60);
+    Err((
+        At::Line(line),
+        Problem::Unexpected {
+            found,
+            expected: expected.to_string(),
+        },
+    ))
+}
