@@ -25,7 +25,7 @@ pub enum UrdfEdit {
     },
     /// The position limits of a joint's `<limit>`.
     SetLimits {
-        /// Which joint; it must have a `<limit>`, since a URDF wants effort and velocity there too.
+        /// Which joint, revolute or prismatic; it must have a `<limit>`, since a URDF wants effort and velocity there too.
         joint: String,
         /// rad or m.
         lower: f64,
@@ -95,6 +95,13 @@ pub enum EditError {
         file: String,
         place: Place,
         joint: String,
+    },
+    #[error("{file}:{place}: joint `{joint}` is {kind}, so it has no position limits")]
+    NoPositionLimits {
+        file: String,
+        place: Place,
+        joint: String,
+        kind: String,
     },
     #[error("the new lower limit {lower} of joint `{joint}` is above the new upper limit {upper}")]
     LimitsReversed {

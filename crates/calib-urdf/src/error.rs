@@ -353,7 +353,11 @@ impl fmt::Display for ReadError {
             }
         }
         if self.problems.len() > SHOWN {
-            write!(f, "\n… and {} more findings", self.problems.len() - SHOWN)?;
+            write!(
+                f,
+                "
+… and more findings"
+            )?;
         }
         Ok(())
     }

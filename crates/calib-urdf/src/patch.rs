@@ -37,20 +37,48 @@ pub struct Patched {
 /// # Errors
 /// [`EditError`]: an unreadable text, an unknown name, a number that is not finite, a text that xacro computes.
 pub fn patch(text: &str, name_for_errors: &str, edits: &[UrdfEdit]) -> Result<Patched, EditError> {
-    let document = parse(text, name_for_errors)?;
-    let is_xacro = xacro_evidence(&document).is_some();
-    let nominal = if is_xacro {
-        None
-    } else {
-        Some(RobotModel::from_urdf_text(text, name_for_errors)?)
-    };
     check_values(edits)?;
+    let document = parse(text, name_for_errors)?;
+    if xacro_evidence(&document).is_none() {
+        let nominal = RobotModel::from_urdf_text(text, name_for_errors)?;
+        let patched = splice_edits(text, name_for_errors, &document, false, edits)?;
+        crate::verify::verify(
+            &patched.text,
+            &nominal.with_edits(name_for_errors, edits)?,
+            name_for_errors,
+        )?;
+        return Ok(patched);
+    }
+    // A xacro is not expanded here: the new text has at least to hold the numbers that were asked for.
+    let patched = splice_edits(text, name_for_errors, &document, true, edits)?;
+    let again = parse(&patched.text, name_for_errors)?;
+    let left = splice_edits(&patched.text, name_for_errors, &again, true, edits)?;
+    match left.changes.first() {
+        None => Ok(patched),
+        Some(change) => Err(EditError::StructureChanged {
+            file: name_for_errors.to_owned(),
+            what: format!(
+                "`{}` of joint `{}` still reads \"{}\"",
+                change.attribute, change.joint, change.old
+            ),
+        }),
+    }
+}
+
+/// The edits as splices of the text, without a look at the result.
+fn splice_edits(
+    text: &str,
+    file: &str,
+    document: &Document<'_>,
+    is_xacro: bool,
+    edits: &[UrdfEdit],
+) -> Result<Patched, EditError> {
     let mut patcher = Patcher {
         text,
-        file: name_for_errors,
-        document: &document,
+        file,
+        document,
         is_xacro,
-        quaternions: has_quaternions(&document),
+        quaternions: has_quaternions(document),
         changes: Vec::new(),
         splices: Vec::new(),
     };
@@ -90,24 +118,14 @@ pub fn patch(text: &str, name_for_errors: &str, edits: &[UrdfEdit]) -> Result<Pa
         mut splices,
         ..
     } = patcher;
+    // Stable: insertions at one place stay in the order of the edits.
     splices.sort_by_key(|splice| splice.range.start);
     changes.sort_by_key(|change| change.line);
-    let patched = Patched {
+    Ok(Patched {
         text: apply(text, &splices),
         changes,
         splices,
-    };
-    match nominal {
-        Some(nominal) => {
-            let expected = nominal.with_edits(name_for_errors, edits)?;
-            crate::verify::verify(&patched.text, &expected, name_for_errors)?;
-        }
-        // A xacro cannot be expanded here; it has at least to be well-formed, and the same edits must find nothing left to do.
-        None => {
-            parse(&patched.text, name_for_errors)?;
-        }
-    }
-    Ok(patched)
+    })
 }
 
 /// Numbers that must not reach a file, and edits that contradict each other.
@@ -281,6 +299,14 @@ impl<'t, 'd> Patcher<'t, 'd> {
 
     fn set_limits(&mut self, joint: &str, lower: f64, upper: f64) -> Result<(), EditError> {
         let node = self.joint(joint)?;
+        if let Some(kind @ ("fixed" | "continuous")) = node.attribute("type") {
+            return Err(EditError::NoPositionLimits {
+                file: self.file.to_owned(),
+                place: self.place(node.range().start),
+                joint: joint.to_owned(),
+                kind: kind.to_owned(),
+            });
+        }
         let Some(limit) = child(node, "limit") else {
             let place = self.place(node.range().start);
             return Err(EditError::NoLimit {
@@ -289,8 +315,9 @@ impl<'t, 'd> Patcher<'t, 'd> {
                 joint: joint.to_owned(),
             });
         };
-        self.set_numbers::<1>(limit, joint, "lower", [0.0], |_| [lower])?;
-        self.set_numbers::<1>(limit, joint, "upper", [0.0], |_| [upper])
+        // NaN: a limit that is not written is written, also when it is 0.
+        self.set_numbers::<1>(limit, joint, "lower", [f64::NAN], |_| [lower])?;
+        self.set_numbers::<1>(limit, joint, "upper", [f64::NAN], |_| [upper])
     }
 
     /// Sets the numbers of one attribute; `new` gets the old ones, or `default` where there is no attribute.

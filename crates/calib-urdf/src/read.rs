@@ -21,6 +21,8 @@ use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// Findings that are collected of one file.
+const MAX_FINDINGS: usize = 50;
 /// The types of the standard that move one coordinate or none.
 const JOINT_TYPES: [&str; 4] = ["revolute", "continuous", "prismatic", "fixed"];
 /// The types of the standard (and of URDF 1.2) that a chain of single motions does not cover.
@@ -95,10 +97,21 @@ struct Reader<'t> {
 
 impl Reader<'_> {
     fn report(&mut self, offset: usize, problem: Problem) {
+        if self.full() {
+            return;
+        }
         self.found.push(ReadProblem::at(self.text, offset, problem));
     }
 
+    /// More than a screen shows: the rest is not even looked up, since each place costs a walk through the text.
+    fn full(&self) -> bool {
+        self.found.len() >= MAX_FINDINGS
+    }
+
     fn line_of(&self, node: Node<'_, '_>) -> usize {
+        if self.full() {
+            return 0;
+        }
         crate::error::Place::of_byte(self.text, node.range().start).line
     }
 
@@ -621,7 +634,7 @@ impl Reader<'_> {
     ) -> Option<LinkId> {
         let attribute = node.attribute_node("link")?;
         let id = link_ids.get(attribute.value()).copied();
-        if id.is_none() {
+        if id.is_none() && !self.full() {
             let near = nearest(attribute.value(), link_ids.keys().map(String::as_str));
             let problem = Problem::UnknownLink {
                 joint: joint.name.to_owned(),

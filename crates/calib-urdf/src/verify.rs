@@ -4,8 +4,9 @@
 //! at zero and at positions that bend every joint, to [`POSITION_TOLERANCE`]. urdf-rs reads the same text as the second,
 //! independent reader (also the one of urdf-viz), with the matrices of [`matrix_from_rpy`] instead of quaternions.
 
+use crate::decimal::same_number;
 use crate::edit::{EditError, Rounded, UrdfEdit};
-use crate::model::{Joint, JointId, JointKind, Link, LinkId, MimicLaw, RobotModel};
+use crate::model::{Joint, JointId, JointKind, JointLimits, Link, LinkId, MimicLaw, RobotModel};
 use crate::rpy::{angle_between, matrix_from_rpy};
 use crate::source::{has_quaternions, parse};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -151,7 +152,7 @@ fn same_structure(found: &RobotModel, expected: &RobotModel, file: &str) -> Resu
     }
     for (a, b) in found.joints().iter().zip(expected.joints()) {
         if (&a.name, a.parent, a.child, a.mimic) != (&b.name, b.parent, b.child, b.mimic)
-            || a.limits != b.limits
+            || !same_limits(&a.limits, &b.limits)
         {
             return changed(format!(
                 "joint `{}` differs from joint `{}`",
@@ -164,6 +165,20 @@ fn same_structure(found: &RobotModel, expected: &RobotModel, file: &str) -> Resu
         }
     }
     Ok(())
+}
+
+fn same_limits(a: &JointLimits, b: &JointLimits) -> bool {
+    let pairs = [
+        (a.lower, b.lower),
+        (a.upper, b.upper),
+        (a.effort, b.effort),
+        (a.velocity, b.velocity),
+    ];
+    pairs.iter().all(|pair| match pair {
+        (Some(a), Some(b)) => same_number(*a, *b),
+        (None, None) => true,
+        _ => false,
+    })
 }
 
 /// Zero, and two positions in which no joint stands at zero or at the same angle as its neighbour.
@@ -311,7 +326,7 @@ impl RobotModel {
             child,
             parent_link_from_joint: *parent_from_frame,
             kind: JointKind::Fixed,
-            limits: crate::model::JointLimits::default(),
+            limits: JointLimits::default(),
             mimic: None,
             law: MimicLaw {
                 source: id,

@@ -229,10 +229,7 @@ fn bytes_that_are_not_text() {
     );
     let huge = vec![b' '; (64 << 20) + 1];
     insta::assert_snapshot!("huge", decode(&huge, "arm.urdf").unwrap_err());
-    assert_eq!(
-        decode(b"", "arm.urdf").map(|text| message_of(text)),
-        Ok(message_of(""))
-    );
+    assert_eq!(decode(b"", "arm.urdf").map(message_of), Ok(message_of("")));
 }
 
 #[test]
@@ -276,6 +273,23 @@ fn nested_rubbish_does_not_overflow_the_stack() {
             .collect::<String>()
         + "]><robot name=\"&m;\"/>";
     assert_ne!(message_of(&bomb), "accepted");
+}
+
+#[test]
+fn a_file_with_a_hundred_thousand_mistakes_is_answered_soon() {
+    let begin = std::time::Instant::now();
+    let links = "<link name=\"same\"/>\n<joint name=\"j\"/>\n".repeat(50_000);
+    let message = message_of(&format!("<robot>\n{links}</robot>"));
+    assert!(
+        message.ends_with("… and more findings"),
+        "{}",
+        &message[message.len() - 100..]
+    );
+    let strangers: String = (0..5_000).map(|i| format!("<link name=\"link_{i}\"/><joint name=\"j{i}\" type=\"fixed\"><parent link=\"lnk_{i}\"/><child link=\"lkn_{i}\"/></joint>\n")).collect();
+    assert!(
+        message_of(&format!("<robot>\n{strangers}</robot>")).contains("did you mean `link_0`?")
+    );
+    assert!(begin.elapsed().as_secs() < 10, "{:?}", begin.elapsed());
 }
 
 #[test]

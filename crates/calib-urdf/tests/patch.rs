@@ -314,7 +314,11 @@ fn refusals() {
                 origin("elbow", [1.0; 3], [0.0; 3]),
             ],
         ),
-        ("no limit", vec![limits("elbow", 0.0, 1.0)]),
+        ("no limit", vec![limits("wrist", 0.0, 1.0)]),
+        (
+            "limits of a continuous joint",
+            vec![limits("elbow", 0.0, 1.0)],
+        ),
         ("reversed", vec![limits("shoulder", 2.0, 1.0)]),
         ("link taken", vec![frame("hand", "base", [0.0; 3])]),
         ("unknown parent", vec![frame("body", "hnd", [0.0; 3])]),
@@ -365,4 +369,26 @@ fn comments_are_always_well_formed() {
         got.contains("<!-- - -two- - -\r\nlines - -->\r\n<robot"),
         "{got}"
     );
+}
+
+#[test]
+fn limits_are_written_where_they_were_left_out() {
+    let text = ARM.replace(" lower=\"-1\" upper=\"1.0\"", "");
+    let edits = [UrdfEdit::SetLimits {
+        joint: "shoulder".to_owned(),
+        lower: 0.0,
+        upper: 0.5,
+    }];
+    let got = patched(&text, &edits);
+    assert!(
+        got.contains("<limit effort=\"1\" velocity=\"1\" lower=\"0\" upper=\"0.5\"/>"),
+        "{got}"
+    );
+    // As good as equal is equal.
+    let edits = [UrdfEdit::SetLimits {
+        joint: "shoulder".to_owned(),
+        lower: -1.0,
+        upper: 1.0 + 1e-15,
+    }];
+    assert_eq!(patched(ARM, &edits), ARM);
 }
