@@ -84,8 +84,19 @@ pub(crate) fn before_closing_tag(text: &str, document: &Document<'_>) -> usize {
     end_tag - space_before(text, end_tag).len()
 }
 
+/// `urdf:` where the file writes its elements with a prefix.
+pub(crate) fn prefix<'t>(text: &'t str, node: Node<'_, '_>) -> &'t str {
+    let tag = &text[node.range().start + 1..];
+    let name = &tag[..tag
+        .find(|c: char| c.is_whitespace() || c == '>' || c == '/')
+        .unwrap_or(0)];
+    name.find(':').map_or("", |colon| &name[..=colon])
+}
+
 /// How a file is written.
 pub(crate) struct Style<'t> {
+    /// `urdf:` where the elements are written with a prefix.
+    prefix: &'t str,
     /// `"\n"`, `"\r\n"`, or nothing where the whole robot stands in one line.
     pub(crate) line_ending: &'static str,
     /// Before a top-level element.
@@ -112,6 +123,7 @@ impl<'t> Style<'t> {
             .filter_map(indent_of)
             .last();
         Self {
+            prefix: prefix(text, document.root_element()),
             line_ending,
             indent,
             inner: inner.unwrap_or(if indent.is_empty() { "  " } else { indent }),
@@ -148,9 +160,10 @@ impl<'t> Style<'t> {
                 .map(tidy_angle)
                 .as_slice(),
         );
+        let p = self.prefix;
         format!(
-            "{above}{outer}<link name=\"{}\"/>{outer}<joint name=\"{}\" type=\"fixed\">{inner}<parent link=\"{}\"/>\
-             {inner}<child link=\"{}\"/>{inner}<origin xyz=\"{xyz}\" rpy=\"{rpy}\"/>{outer}</joint>",
+            "{above}{outer}<{p}link name=\"{}\"/>{outer}<{p}joint name=\"{}\" type=\"fixed\">{inner}<{p}parent link=\"{}\"/>\
+             {inner}<{p}child link=\"{}\"/>{inner}<{p}origin xyz=\"{xyz}\" rpy=\"{rpy}\"/>{outer}</{p}joint>",
             escaped(name),
             escaped(joint_name),
             escaped(parent_link),

@@ -29,6 +29,7 @@ mod insert;
 pub mod kinematics;
 pub mod model;
 pub mod nearest;
+mod numbers;
 pub mod patch;
 pub mod read;
 pub mod revert;

@@ -11,7 +11,7 @@ use crate::edit::{Change, EditError, UrdfEdit};
 use crate::error::{Place, Problem, ReadError, ReadProblem};
 use crate::insert;
 use crate::model::{RobotModel, UnknownName};
-use crate::read::parse_numbers;
+use crate::numbers::parse_numbers;
 use crate::rpy::{angle_between, rotation_from_rpy, rpy_from_rotation, rpy_near};
 use crate::source::{child, has_quaternions, parse, top_level, xacro_evidence};
 use crate::xacro;
@@ -236,7 +236,7 @@ impl<'t, 'd> Patcher<'t, 'd> {
             }
             let element = format!(
                 "<{}origin xyz=\"{}\" rpy=\"{}\"/>",
-                prefix(self.text, node),
+                insert::prefix(self.text, node),
                 decimals(xyz.as_slice()),
                 decimals(rpy.as_slice())
             );
@@ -288,7 +288,7 @@ impl<'t, 'd> Patcher<'t, 'd> {
             None => {
                 let element = format!(
                     "<{}axis xyz=\"{}\"/>",
-                    prefix(self.text, node),
+                    insert::prefix(self.text, node),
                     decimals(wanted.as_slice())
                 );
                 self.insert_element(node, joint, "axis", element);
@@ -531,15 +531,6 @@ fn quaternion_near(wanted: &UnitQuaternion<f64>, old: [f64; 4]) -> [f64; 4] {
     } else {
         wanted.coords.into()
     }
-}
-
-/// `urdf:` where the file writes its elements with a prefix.
-fn prefix<'t>(text: &'t str, node: Node<'_, '_>) -> &'t str {
-    let tag = &text[node.range().start + 1..];
-    let name = &tag[..tag
-        .find(|c: char| c.is_whitespace() || c == '>' || c == '/')
-        .unwrap_or(0)];
-    name.find(':').map_or("", |colon| &name[..=colon])
 }
 
 /// The bytes between an attribute's quotes, found in the text itself (the parser's own range fails after 255 spaces).
