@@ -136,6 +136,17 @@ pub enum EditError {
         found: String,
     },
     #[error(
+        "{file}:{place}: the origin or axis of joint `{joint}` takes the property `{property}`, which is {}: a new value would change more than this joint\nhelp: give this origin a property of its own, or patch the expanded URDF",
+        property_uses(lines)
+    )]
+    XacroProperty {
+        file: String,
+        place: Place,
+        joint: String,
+        property: String,
+        lines: Vec<usize>,
+    },
+    #[error(
         "{file}:{place}: joint `{joint}` comes from `{template}`, whose name xacro computes\nhelp: patch the expanded URDF"
     )]
     XacroTemplate {
@@ -196,6 +207,13 @@ fn comma_list(lines: &[usize]) -> String {
         .map(ToString::to_string)
         .collect::<Vec<_>>()
         .join(", ")
+}
+
+fn property_uses(lines: &[usize]) -> String {
+    match lines {
+        [] | [_] => "perhaps used by the included files too".to_owned(),
+        _ => format!("used {}", uses(lines)),
+    }
 }
 
 fn uses(lines: &[usize]) -> String {

@@ -343,13 +343,7 @@ impl<'t, 'd> Patcher<'t, 'd> {
         let raw = value_range(self.text, &attribute);
         let value = &self.text[raw.clone()];
         if self.is_xacro && xacro::is_expression(attribute.value()) {
-            return Err(EditError::XacroExpression {
-                file: self.file.to_owned(),
-                place: self.place(raw.start),
-                joint: joint.to_owned(),
-                attribute: name.to_owned(),
-                found: attribute.value().to_owned(),
-            });
+            return self.set_properties(element, joint, name, raw, new);
         }
         let old: [f64; N] = parse_numbers(attribute.value()).map_err(|fault| {
             // A URDF was checked before; a xacro was not.
@@ -381,6 +375,61 @@ impl<'t, 'd> Patcher<'t, 'd> {
             new: apply(value, &local),
         });
         self.splices.extend(splices);
+        Ok(())
+    }
+
+    /// [`Self::set_numbers`] where xacro computes the attribute, and all it does is to look up properties.
+    fn set_properties<const N: usize>(
+        &mut self,
+        element: Node<'_, '_>,
+        joint: &str,
+        name: &str,
+        raw: std::ops::Range<usize>,
+        new: impl FnOnce([f64; N]) -> [f64; N],
+    ) -> Result<(), EditError> {
+        let place = self.place(raw.start);
+        let Some(cells) = xacro::cells::<N>(self.document, self.text, raw.clone(), element) else {
+            return Err(EditError::XacroExpression {
+                file: self.file.to_owned(),
+                place,
+                joint: joint.to_owned(),
+                attribute: name.to_owned(),
+                found: self.text[raw].to_owned(),
+            });
+        };
+        let wanted = new(std::array::from_fn(|i| cells[i].value));
+        for (cell, wanted) in cells
+            .iter()
+            .zip(wanted)
+            .filter(|(cell, wanted)| !same_number(cell.value, *wanted))
+        {
+            let mut attribute = format!("{} {name}", element.tag_name().name());
+            if let Some(property) = cell.property {
+                let lines = xacro::property_lines(self.document, self.text, property);
+                if lines.len() != 1 || xacro::has_includes(self.document) {
+                    return Err(EditError::XacroProperty {
+                        file: self.file.to_owned(),
+                        place,
+                        joint: joint.to_owned(),
+
+                        property: property.to_owned(),
+                        lines,
+                    });
+                }
+                attribute = format!("{attribute} (property {property})");
+            }
+            self.changes.push(Change {
+                line: self.place(cell.range.start).line,
+                joint: joint.to_owned(),
+                attribute,
+                old: self.text[cell.range.clone()].to_owned(),
+                new: decimals(&[wanted]),
+            });
+            self.splices.push(Splice {
+                range: cell.range.clone(),
+                new: decimals(&[wanted]),
+            });
+        }
         Ok(())
     }
 

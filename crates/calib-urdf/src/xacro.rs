@@ -1,13 +1,15 @@
 //! Joints in a xacro file, as far as their text can be patched without expanding it.
 //!
-//! A number may be replaced where the text is literal and stands for one joint. It does not where xacro
-//! computes the number or the name, where a macro is used more than once, and where branches give several texts.
+//! A number may be replaced where the text is literal, or one property that nothing else uses, and stands for one joint. It
+//! may not where xacro computes the number or the name, where a macro is used more than once, and where branches give several texts.
 
 use crate::edit::EditError;
 use crate::error::Place;
 use crate::model::UnknownName;
+use crate::numbers::{parse_numbers, tokens};
 use crate::source::is_element;
 use roxmltree::{Document, Node};
+use std::ops::Range;
 
 /// Does xacro compute this text?
 pub(crate) fn is_expression(value: &str) -> bool {
@@ -140,6 +142,108 @@ fn use_lines(document: &Document<'_>, definition: Node<'_, '_>, text: &str) -> V
     let mut lines = Vec::new();
     collect(document, definition, text, 0, &mut lines);
     lines
+}
+
+/// One number of an attribute that xacro computes, where it is a literal or just one property: `0 0 ${height}`.
+pub(crate) struct Cell<'a> {
+    /// Where the number is written: in the attribute, or in the property.
+    pub(crate) range: Range<usize>,
+    pub(crate) value: f64,
+    /// The property's name.
+    pub(crate) property: Option<&'a str>,
+}
+
+/// The numbers of an attribute at byte `start` of the text; `None` where xacro does more than to look up a property.
+pub(crate) fn cells<'a, const N: usize>(
+    document: &Document<'_>,
+    text: &'a str,
+    raw: Range<usize>,
+    joint: Node<'_, '_>,
+) -> Option<[Cell<'a>; N]> {
+    let cells: Option<Vec<Cell<'a>>> = tokens(&text[raw.clone()])
+        .map(|(offset, token)| {
+            let range = raw.start + offset..raw.start + offset + token.len();
+            match token
+                .strip_prefix("${")
+                .and_then(|rest| rest.strip_suffix('}'))
+            {
+                None => parse_numbers::<1>(token).ok().map(|[value]| Cell {
+                    range,
+                    value,
+                    property: None,
+                }),
+                Some(name) => property(document, text, name, joint),
+            }
+        })
+        .collect();
+    cells?.try_into().ok()
+}
+
+/// The one literal definition of a property, directly under `<robot>`; `None` where another one might count.
+fn property<'a>(
+    document: &Document<'_>,
+    text: &'a str,
+    name: &'a str,
+    joint: Node<'_, '_>,
+) -> Option<Cell<'a>> {
+    let is_parameter = enclosing_macro(joint).is_some_and(|definition| {
+        let parameters = definition.attribute("params").unwrap_or("");
+        words(parameters).any(|word| word == name)
+    });
+    let mut definitions = document
+        .descendants()
+        .filter(|node| is_xacro(*node, "property") && node.attribute("name") == Some(name));
+    let (definition, none) = (definitions.next()?, definitions.next());
+    if is_parameter || none.is_some() || definition.parent() != Some(document.root_element()) {
+        return None;
+    }
+    let attribute = definition.attribute_node("value")?;
+    let [value] = parse_numbers(attribute.value()).ok()?;
+    let range = attribute.range_value();
+    // The number itself, without spaces around it.
+    let (offset, token) = tokens(text.get(range.clone())?).next()?;
+    let range = range.start + offset..range.start + offset + token.len();
+    token.parse::<f64>().is_ok().then_some(Cell {
+        range,
+        value,
+        property: Some(name),
+    })
+}
+
+/// The lines in which xacro's expressions name a property; included files are not seen.
+pub(crate) fn property_lines(document: &Document<'_>, text: &str, name: &str) -> Vec<usize> {
+    let named = |value: &str| {
+        value
+            .split("${")
+            .skip(1)
+            .flat_map(|rest| words(rest.split('}').next().unwrap_or("")))
+            .filter(|word| *word == name)
+            .count()
+    };
+    let mut lines = Vec::new();
+    for node in document.descendants() {
+        for attribute in node.attributes() {
+            let line = Place::of_byte(text, attribute.range().start).line;
+            lines.extend(std::iter::repeat_n(line, named(attribute.value())));
+        }
+        if let Some(words) = node.text().filter(|_| node.is_text()) {
+            lines.extend(std::iter::repeat_n(
+                Place::of_byte(text, node.range().start).line,
+                named(words),
+            ));
+        }
+    }
+    lines
+}
+
+/// Does the file take text from another one, which may use its properties too?
+pub(crate) fn has_includes(document: &Document<'_>) -> bool {
+    document.descendants().any(|node| is_xacro(node, "include"))
+}
+
+/// The names in an expression.
+fn words(expression: &str) -> impl Iterator<Item = &str> {
+    expression.split(|c: char| !(c.is_alphanumeric() || c == '_'))
 }
 
 /// Could xacro turn `pattern`, such as `${side}_elbow`, into `name`?

@@ -5,6 +5,9 @@ use nalgebra::Isometry3;
 
 const ARM: &str = r#"<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
   <xacro:property name="h" value="0.3"/>
+  <xacro:property name="reach" value=" 0.40 "/>
+  <xacro:property name="twice_named" value="0.5"/>
+  <xacro:property name="computed" value="${h * 2}"/>
   <xacro:macro name="finger" params="side">
     <link name="${side}_finger"/>
     <joint name="${side}_knuckle" type="revolute">
@@ -29,6 +32,10 @@ const ARM: &str = r#"<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacr
     <parent link="upper"/><child link="hand"/>
     <origin xyz="0.4 0 0" rpy="0 0 ${pi/2}"/>
   </joint>
+  <joint name="sleeve" type="fixed"><origin xyz="${reach}  0 0.25"/></joint>
+  <joint name="shared" type="fixed"><origin xyz="${twice_named} 0 0"/></joint>
+  <joint name="other" type="fixed"><origin xyz="0 0 ${twice_named}"/></joint>
+  <joint name="indirect" type="fixed"><origin xyz="0 0 ${computed}"/></joint>
   <xacro:if value="$(arg long)"><joint name="tool" type="fixed"><origin xyz="0 0 2"/></joint></xacro:if>
   <xacro:unless value="$(arg long)"><joint name="tool" type="fixed"><origin xyz="0 0 1"/></joint></xacro:unless>
   <joint name="wrist" type="revolute">
@@ -65,10 +72,30 @@ fn literal_text_is_patched() {
 }
 
 #[test]
+fn a_property_of_one_joint_is_patched_where_it_is_defined() {
+    let done = patch(ARM, "arm.xacro", &to("sleeve")).unwrap();
+    let expected = ARM
+        .replace("\" 0.40 \"", "\" 0.125 \"")
+        .replace("${reach}  0 0.25", "${reach}  0 0");
+    assert_eq!(done.text, expected);
+    assert_eq!(revert(&done.text, &done.record(ARM)).unwrap(), ARM);
+    let with_include = ARM.replace(
+        "  <xacro:finger side=\"left\"/>",
+        "  <xacro:include filename=\"hand.xacro\"/>",
+    );
+    insta::assert_snapshot!(
+        "included",
+        patch(&with_include, "arm.xacro", &to("sleeve")).unwrap_err()
+    );
+}
+
+#[test]
 fn what_xacro_computes_is_refused() {
     let joints = [
         "shoulder",
         "elbow",
+        "shared",
+        "indirect",
         "left_knuckle",
         "twice",
         "elsewhere",
