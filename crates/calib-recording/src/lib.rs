@@ -18,6 +18,7 @@
 //! Readers ([`readers`]) convert to SI and write down what they converted; errors name file, line and column.
 //! What no reader can know: whether a marker's name is on the right marker, or two clocks on the same second.
 
+pub mod checks;
 mod column_map;
 mod error;
 mod finding;

@@ -263,7 +263,7 @@ fn trc_with_tabs_and_with_commas() {
             recording
                 .markers
                 .iter()
-                .map(|m| m.lost())
+                .map(calib_recording::MarkerStream::lost)
                 .collect::<Vec<_>>(),
             [0, 1]
         );

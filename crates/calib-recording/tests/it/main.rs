@@ -2,6 +2,7 @@
 
 mod bad_tables;
 mod bodies;
+mod checks;
 mod fixtures;
 mod mutations;
 mod real_formats;

@@ -70,7 +70,7 @@ fn checked_size(recording: &Recording) -> usize {
     recording
         .timelines
         .iter()
-        .map(|timeline| timeline.len())
+        .map(calib_recording::Timeline::len)
         .sum::<usize>()
         * (recording.markers.len() + recording.bodies.len())
 }

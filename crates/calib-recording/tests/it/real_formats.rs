@@ -9,7 +9,11 @@ fn read(path: &str) -> Option<Recording> {
 }
 
 fn lost(recording: &Recording) -> usize {
-    recording.markers.iter().map(|marker| marker.lost()).sum()
+    recording
+        .markers
+        .iter()
+        .map(calib_recording::MarkerStream::lost)
+        .sum()
 }
 
 #[test]

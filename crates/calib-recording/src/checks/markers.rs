@@ -1,0 +1,312 @@
+//! Single markers: lost ones coded as zero, columns written twice, frozen and computed points, the unit of length.
+
+use super::Expectations;
+use super::statistics::{range, robust_sigma};
+use crate::finding::{Finding, Severity};
+use crate::poses::Poses;
+use nalgebra::Point3;
+use std::collections::BTreeMap;
+
+/// Rows of exactly equal values that make a frozen marker: two may happen by rounding.
+const FROZEN_ROWS: usize = 3;
+/// Movement of anything else, m, in which a marker cannot stand exactly still.
+const MOVED: f64 = 1e-3;
+/// Distances between measured markers scatter by at least this, m (the best trackers: 10 µm). Less is computed.
+const TOO_CONSTANT: f64 = 1.5e-6;
+/// Rows from which the scatter of a distance is known well enough.
+const ROWS_FOR_SCATTER: usize = 5;
+/// A tracked volume is smaller than this, m; more is millimetres taken for metres.
+const LARGEST_VOLUME: f64 = 60.0;
+
+type Track = [Option<Point3<f64>>];
+
+pub(super) fn zeros(poses: &Poses) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (name, track) in &poses.markers {
+        let rows: Vec<u64> = (0..poses.len())
+            .filter(|&i| track[i] == Some(Point3::origin()))
+            .map(|i| poses.rows[i])
+            .collect();
+        if !rows.is_empty() {
+            let text = format!("{} samples are exactly (0, 0, 0)", rows.len());
+            let remedy = "a lost sample is an empty cell";
+            findings.push(
+                Finding::new("all-zero-triplet", Severity::Warning, name, text, remedy)
+                    .at_rows(rows),
+            );
+        }
+    }
+    findings
+}
+
+pub(super) fn length_unit(poses: &Poses, expected: &Expectations) -> Option<Finding> {
+    let points = poses
+        .markers
+        .values()
+        .flatten()
+        .flatten()
+        .map(|point| point.coords);
+    let poses_at = poses
+        .bodies
+        .values()
+        .flatten()
+        .flatten()
+        .map(|pose| pose.translation.vector);
+    let all: Vec<_> = points.chain(poses_at).collect();
+    let largest_extent = (0..3)
+        .filter_map(|axis| range(all.iter().map(|p| p[axis])))
+        .map(|(low, high)| high - low)
+        .fold(0.0, f64::max);
+    let farthest = all.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
+    let finding = |text: String, remedy: &str| {
+        Some(Finding::new(
+            "unit-mismatch",
+            Severity::Error,
+            "lengths",
+            text,
+            remedy,
+        ))
+    };
+    let too_far = expected
+        .reach
+        .is_some_and(|reach| largest_extent > 20.0 * reach)
+        || farthest > LARGEST_VOLUME;
+    if too_far {
+        let text = format!(
+            "points spread over {largest_extent:.1} m, up to {farthest:.1} m from the tracker's origin"
+        );
+        return finding(
+            text,
+            "are these millimetres? name the columns `…_mm`, or set `lengths: mm` in the column map",
+        );
+    }
+    // Below 1 cm from the tracker's origin at all times: metres divided by a thousand.
+    if all.len() >= 3 && farthest < 1e-2 && farthest > 0.0 {
+        let text = format!(
+            "all points lie within {:.2} mm of the tracker's origin",
+            farthest * 1e3
+        );
+        return finding(
+            text,
+            "are these metres? name the columns `…_m`, or set `lengths: m` in the column map",
+        );
+    }
+    None
+}
+
+/// Markers that are equal wherever both are seen.
+pub(super) fn duplicates(poses: &Poses) -> Vec<Finding> {
+    let tracks: Vec<(&String, &Vec<Option<Point3<f64>>>)> = poses.markers.iter().collect();
+    let mut findings = Vec::new();
+    for (i, (a, track_a)) in tracks.iter().enumerate() {
+        for (b, track_b) in &tracks[..i] {
+            let (mut count, mut equal) = (0, 0);
+            let mut rows = Vec::new();
+            for (row, (p, q)) in track_a
+                .iter()
+                .zip(track_b.iter())
+                .enumerate()
+                .filter_map(|(row, (a, b))| Some((row, (a.as_ref()?, b.as_ref()?))))
+            {
+                count += 1;
+                if p == q {
+                    equal += 1;
+                    rows.push(poses.rows[row]);
+                }
+            }
+            if equal >= 2 && 2 * equal >= count {
+                let text = format!("equals marker `{b}` in {equal} of {count} rows");
+                let remedy = "one column was written twice: check the marker's label in the tracker's software, or leave it out";
+                findings.push(
+                    Finding::new("duplicate-column", Severity::Error, *a, text, remedy)
+                        .at_rows(rows),
+                );
+            }
+        }
+    }
+    findings
+}
+
+/// Runs of exactly equal values while another marker of the body (or, without bodies, any other) moves.
+pub(super) fn frozen(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (name, track) in &poses.markers {
+        let siblings: Vec<&str> = expected
+            .bodies
+            .values()
+            .filter(|markers| markers.contains(name))
+            .flatten()
+            .map(String::as_str)
+            .filter(|other| other != name)
+            .collect();
+        let others: Vec<&Track> = poses
+            .markers
+            .iter()
+            .filter(|(other, _)| {
+                *other != name && (siblings.is_empty() || siblings.contains(&other.as_str()))
+            })
+            .map(|(_, track)| track.as_slice())
+            .collect();
+        if siblings.is_empty() && travel(track, 0, track.len()) < MOVED {
+            continue;
+        }
+        let mut rows = Vec::new();
+        for (start, end) in runs(track) {
+            let moved = others
+                .iter()
+                .map(|other| travel(other, start, end))
+                .fold(0.0, f64::max);
+            if end - start >= FROZEN_ROWS && moved > MOVED {
+                rows.extend((start..end).map(|i| poses.rows[i]));
+            }
+        }
+        if !rows.is_empty() {
+            let text = format!(
+                "stands exactly still in {} rows while other markers move",
+                rows.len()
+            );
+            let remedy =
+                "the tracker repeated its last value: set it to export lost samples as empty";
+            findings
+                .push(Finding::new("frozen", Severity::Error, name, text, remedy).at_rows(rows));
+        }
+    }
+    findings.extend(frozen_bodies(poses));
+    findings
+}
+
+fn frozen_bodies(poses: &Poses) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (name, track) in &poses.bodies {
+        let own: Vec<Option<Point3<f64>>> = track
+            .iter()
+            .map(|pose| pose.map(|pose| pose.translation.vector.into()))
+            .collect();
+        if travel(&own, 0, own.len()) < MOVED {
+            continue;
+        }
+        let others: Vec<Vec<Option<Point3<f64>>>> = poses
+            .bodies
+            .iter()
+            .filter(|(other, _)| *other != name)
+            .map(|(_, track)| {
+                track
+                    .iter()
+                    .map(|pose| pose.map(|pose| pose.translation.vector.into()))
+                    .collect()
+            })
+            .collect();
+        let mut rows = Vec::new();
+        let mut start = 0;
+        for i in 1..=track.len() {
+            if i < track.len() && track[i].is_some() && track[i] == track[start] {
+                continue;
+            }
+            let joints = poses
+                .joints
+                .values()
+                .filter_map(|q| range(q[start..i].iter().flatten().copied()));
+            let moved = others.iter().any(|other| travel(other, start, i) > MOVED)
+                || joints.map(|(low, high)| high - low).any(|turn| turn > 0.02);
+            if track[start].is_some() && i - start >= FROZEN_ROWS && moved {
+                rows.extend((start..i).map(|i| poses.rows[i]));
+            }
+            start = i;
+        }
+        if !rows.is_empty() {
+            let text = format!(
+                "stands exactly still in {} rows while joints or other bodies move",
+                rows.len()
+            );
+            let remedy =
+                "the tracker repeated its last pose: set it to export lost samples as empty";
+            findings
+                .push(Finding::new("frozen", Severity::Error, name, text, remedy).at_rows(rows));
+        }
+    }
+    findings
+}
+
+/// Maximal runs `start..end` of equal points.
+fn runs(track: &Track) -> Vec<(usize, usize)> {
+    let mut runs = Vec::new();
+    let mut start = 0;
+    for i in 1..=track.len() {
+        if i == track.len() || track[i] != track[start] {
+            if track[start].is_some() {
+                runs.push((start, i));
+            }
+            start = i;
+        }
+    }
+    runs
+}
+
+/// Largest distance from the first point seen in `start..end`, m.
+fn travel(track: &Track, start: usize, end: usize) -> f64 {
+    let mut seen = track[start..end.min(track.len())].iter().flatten();
+    let Some(first) = seen.next() else { return 0.0 };
+    seen.map(|point| (point - first).norm()).fold(0.0, f64::max)
+}
+
+/// Groups of three or more moving markers whose distances do not scatter: points of a fitted body, not measurements.
+pub(super) fn virtual_points(poses: &Poses) -> Vec<Finding> {
+    let tracks: Vec<(&String, &Vec<Option<Point3<f64>>>)> = poses
+        .markers
+        .iter()
+        .filter(|(_, track)| travel(track, 0, track.len()) > 10.0 * MOVED)
+        .collect();
+    // Markers joined by a distance that does not scatter.
+    let mut group: Vec<usize> = (0..tracks.len()).collect();
+    let mut worst: BTreeMap<usize, f64> = BTreeMap::new();
+    for i in 0..tracks.len() {
+        for j in 0..i {
+            let distances: Vec<f64> = tracks[i]
+                .1
+                .iter()
+                .zip(tracks[j].1)
+                .filter_map(|(a, b)| Some((a.as_ref()? - b.as_ref()?).norm()))
+                .collect();
+            if distances.len() < ROWS_FOR_SCATTER || distances.iter().all(|&d| d == 0.0) {
+                continue;
+            }
+            let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+            let Some(sigma) = robust_sigma(distances.into_iter(), mean) else {
+                continue;
+            };
+            if sigma < TOO_CONSTANT {
+                let (from, to) = (group[i], group[j]);
+                group
+                    .iter_mut()
+                    .filter(|g| **g == from)
+                    .for_each(|g| *g = to);
+                let before = worst.remove(&from).unwrap_or(0.0);
+                let entry = worst.entry(to).or_insert(0.0);
+                *entry = entry.max(before).max(sigma);
+            }
+        }
+    }
+    let mut findings = Vec::new();
+    for g in 0..tracks.len() {
+        let members: Vec<&str> = (0..tracks.len())
+            .filter(|&i| group[i] == g)
+            .map(|i| tracks[i].0.as_str())
+            .collect();
+        if members.len() >= 3 {
+            let scatter = worst.get(&g).copied().unwrap_or(0.0) * 1e6;
+            let text = format!(
+                "the distances between {} scatter by at most {scatter:.2} µm",
+                members.join(", ")
+            );
+            let remedy = "these points were computed from a fitted body: export the measured markers, or use them as one body pose";
+            findings.push(Finding::new(
+                "virtual-points",
+                Severity::Warning,
+                members.join(", "),
+                text,
+                remedy,
+            ));
+        }
+    }
+    findings
+}

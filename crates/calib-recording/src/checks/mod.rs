@@ -1,0 +1,92 @@
+//! What is wrong with a recording, said before anything is fitted to it.
+//!
+//! [`checks`] looks at the table alone, against what is known beforehand ([`Expectations`]). Checks that need the
+//! robot's model take its predictions as plain arrays ([`model`]). Every check is made so that clean data with
+//! Gaussian noise stay silent (thresholds are 8σ and more), and its limits are named constants.
+
+mod held_out;
+mod joints;
+mod markers;
+pub mod model;
+mod motion;
+mod rigidity;
+mod statistics;
+
+pub use held_out::held_out_in_training;
+
+use crate::finding::Finding;
+use crate::poses::Poses;
+use crate::rigid_body::Template;
+use std::collections::BTreeMap;
+
+/// What is known about a recording beforehand. Everything may be left out; what is not given is not checked.
+#[derive(Clone, Debug, Default)]
+pub struct Expectations {
+    /// Body → its markers.
+    pub bodies: BTreeMap<String, Vec<String>>,
+    /// Body → where its markers sit, m, when known beforehand (a drawing, an earlier calibration).
+    pub templates: BTreeMap<String, Template>,
+    /// Joint → limits from the robot's description, rad or m.
+    pub limits: BTreeMap<String, (f64, f64)>,
+    /// Joint → range of motion that the sweep asks for, rad or m. These joints must move.
+    pub asked: BTreeMap<String, (f64, f64)>,
+    /// Longest distance of anything on the robot from its base, m.
+    pub reach: Option<f64>,
+    /// Fewest rows that the fit can use.
+    pub min_poses: usize,
+    /// Standard deviation of a marker coordinate, m, when known.
+    pub marker_sigma: Option<f64>,
+}
+
+/// All checks that need no model, in a fixed order.
+pub fn checks(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    findings.extend(joints::too_few(poses, expected));
+    findings.extend(joints::units(poses, expected));
+    findings.extend(joints::limits(poses, expected));
+    findings.extend(joints::coverage(poses, expected));
+    findings.extend(joints::duplicates(poses));
+    findings.extend(markers::zeros(poses));
+    findings.extend(markers::length_unit(poses, expected));
+    findings.extend(markers::duplicates(poses));
+    findings.extend(markers::frozen(poses, expected));
+    findings.extend(markers::virtual_points(poses));
+    findings.extend(rigidity::rigidity(poses, expected));
+    findings.extend(motion::rotations(poses));
+    findings.extend(motion::flips(poses));
+    findings.extend(motion::jumps(poses));
+    findings.extend(motion::gaps(poses));
+    findings.extend(motion::unsettled(poses, expected));
+    findings
+}
+
+/// Ids of all findings that this module can make, each a page of the book.
+pub const IDS: [&str; 27] = [
+    "all-zero-triplet",
+    "body-flip",
+    "body-redefined",
+    "clock-lag",
+    "coverage",
+    "duplicate-column",
+    "frozen",
+    "held-out-in-training",
+    "joint-duplicate",
+    "joint-never-moved",
+    "joint-order",
+    "joint-outside-limits",
+    "joint-sign",
+    "jump",
+    "many-lost",
+    "marker-outlier",
+    "marker-swap",
+    "mirrored",
+    "missing-marker",
+    "not-rigid",
+    "not-unit-rotation",
+    "time-gap",
+    "too-few-poses",
+    "unit-mismatch",
+    "unsettled-rows",
+    "virtual-points",
+    "wrong-mount",
+];

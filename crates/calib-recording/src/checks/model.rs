@@ -1,0 +1,208 @@
+//! Checks against the robot's model, whose predictions come as plain arrays.
+//!
+//! A body bolted to a link obeys `tracker_from_body_i = X · base_from_link_i · Y` with unknown, constant `X`, `Y`. The
+//! relative motions of two rows are then conjugate, so they turn by the same angle θ and slide by the same length d
+//! along their screw axis, whatever `X` and `Y` are:
+//!
+//! ```text
+//! (θ, d) of tracker_from_body_i⁻¹ · tracker_from_body_j  =  (θ, d) of base_from_link_i⁻¹ · base_from_link_j    (1)
+//! ```
+//!
+//! The angles alone do not tell an arm from its mirror image (one joint of three orthogonal ones with the other
+//! sign); the slide does. It is compared in units of the arm's size: `√(Δθ² + (Δd/L)²)`, L the median distance moved.
+//!
+//! What this cannot see: a sign error of the only joint that moves (a mount turned by half a turn explains it), and
+//! links between which no joint moved.
+
+use super::statistics::median;
+use crate::finding::{Finding, Severity};
+use crate::poses::Poses;
+use nalgebra::Isometry3;
+
+/// Disagreement, rad (1°), below which the model is not blamed: nominal robots are that good.
+const GOOD_ENOUGH: f64 = 0.0175;
+/// Another explanation must be this many times better.
+const MUCH_BETTER: f64 = 4.0;
+/// A row that disagrees with the others by this many times their usual disagreement does not belong to them.
+const SPOILED_RATIO: f64 = 6.0;
+/// Turn that counts, rad: pairs of rows that turned less say nothing.
+const TURNED: f64 = 0.05;
+
+/// Angles, rad, between which a motion's axis is known to about its rotation noise; at π its sign is open.
+const WELL_TURNED: std::ops::Range<f64> = 0.4..2.9;
+
+/// Predictions under one assumption, for the rows of a table.
+#[derive(Clone, Debug)]
+pub struct Prediction {
+    /// What is assumed: a link's name, or `joint elbow with the other sign`.
+    pub assumption: String,
+    /// Id of the finding when this explains the data and the nominal prediction does not: `joint-sign`,
+    /// `joint-order`, `wrong-mount`, `clock-lag`.
+    pub id: &'static str,
+    /// `base_from_link` per row.
+    pub base_from_link: Vec<Isometry3<f64>>,
+}
+
+/// Median disagreement of the motions (1) over pairs of rows, rad; `None` when no pair turned.
+pub fn disagreement(
+    tracker_from_body: &[Option<Isometry3<f64>>],
+    base_from_link: &[Isometry3<f64>],
+) -> Option<f64> {
+    median(
+        pairs(tracker_from_body, base_from_link)
+            .map(|(_, _, off)| off)
+            .collect(),
+    )
+}
+
+/// Pairs of rows that turned in one of the two, and by how much they disagree. At most a few thousand.
+fn pairs<'a>(
+    tracker_from_body: &'a [Option<Isometry3<f64>>],
+    base_from_link: &'a [Isometry3<f64>],
+) -> impl Iterator<Item = (usize, usize, f64)> + 'a {
+    let n = tracker_from_body.len().min(base_from_link.len());
+    // Every row with every other for small tables; with steps of growing size for long ones.
+    let steps: Vec<usize> = if n <= 128 {
+        (1..n).collect()
+    } else {
+        (0..24).map(|k| 1 + k * k * n / 1200).collect()
+    };
+    let size = size(base_from_link);
+    steps
+        .into_iter()
+        .flat_map(move |step| (0..n.saturating_sub(step)).map(move |i| (i, i + step)))
+        .filter_map(move |(i, j)| {
+            let measured = screw(&tracker_from_body[i]?, &tracker_from_body[j]?);
+            let predicted = screw(&base_from_link[i], &base_from_link[j]);
+            let slides = measured.1.zip(predicted.1);
+            let slide = slides.map_or(0.0, |(a, b)| (a - b) / size);
+            (measured.0.max(predicted.0) > TURNED)
+                .then(|| (i, j, (measured.0 - predicted.0).hypot(slide)))
+        })
+}
+
+/// Median distance of the link from the middle of its way, m; at least a centimetre.
+fn size(base_from_link: &[Isometry3<f64>]) -> f64 {
+    let n = base_from_link.len().max(1) as f64;
+    let centre = base_from_link
+        .iter()
+        .map(|pose| pose.translation.vector)
+        .sum::<nalgebra::Vector3<f64>>()
+        / n;
+    let distances = base_from_link
+        .iter()
+        .map(|pose| (pose.translation.vector - centre).norm());
+    median(distances.collect()).unwrap_or(0.0).max(0.01)
+}
+
+/// Angle of the motion from `a` to `b`, rad, and its slide along the axis, m, where the axis is well defined.
+fn screw(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, Option<f64>) {
+    let a_from_b = a.inverse() * b;
+    let angle = a_from_b.rotation.angle();
+    let axis = a_from_b
+        .rotation
+        .axis()
+        .filter(|_| WELL_TURNED.contains(&angle));
+    (
+        angle,
+        axis.map(|axis| a_from_b.translation.vector.dot(&axis)),
+    )
+}
+
+/// Whether one of `alternatives` explains a body's track much better than the nominal prediction does.
+pub fn better_explanation(
+    body: &str,
+    tracker_from_body: &[Option<Isometry3<f64>>],
+    nominal: &Prediction,
+    alternatives: &[Prediction],
+) -> Option<Finding> {
+    let as_claimed = disagreement(tracker_from_body, &nominal.base_from_link)?;
+    if as_claimed < GOOD_ENOUGH {
+        return None;
+    }
+    let judged = alternatives.iter().filter_map(|other| {
+        Some((
+            disagreement(tracker_from_body, &other.base_from_link)?,
+            other,
+        ))
+    });
+    let (off, best) = judged.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    if off * MUCH_BETTER > as_claimed {
+        return None;
+    }
+    let text = format!(
+        "its motion disagrees with {} by {:.2}°, with {} only by {:.2}°",
+        nominal.assumption,
+        as_claimed.to_degrees(),
+        best.assumption,
+        off.to_degrees()
+    );
+    let remedy = match best.id {
+        "wrong-mount" => "correct the body's link in the profile",
+        "joint-sign" => {
+            "turn the sign of this joint's column, or of its axis in the robot's description"
+        }
+        "joint-order" => "exchange these joints' columns",
+        "clock-lag" => "the joint values lag behind the tracker: synchronise, or record in holds",
+        _ => "check the profile",
+    };
+    Some(Finding::new(best.id, Severity::Error, body, text, remedy))
+}
+
+/// Rows that disagree with all others while the others agree among themselves: not settled, or read while the clocks
+/// were apart.
+pub fn spoiled_rows(
+    poses: &Poses,
+    body: &str,
+    tracker_from_body: &[Option<Isometry3<f64>>],
+    base_from_link: &[Isometry3<f64>],
+) -> Option<Finding> {
+    let n = tracker_from_body
+        .len()
+        .min(base_from_link.len())
+        .min(poses.len());
+    let mut spoiled = vec![false; n];
+    let mut reported = (0.0, 0.0);
+    // The worst row leaves first: it weighs on all others.
+    for _ in 0..n {
+        let mut off: Vec<Vec<f64>> = vec![Vec::new(); n];
+        for (i, j, angle) in pairs(&tracker_from_body[..n], &base_from_link[..n])
+            .filter(|(i, j, _)| !spoiled[*i] && !spoiled[*j])
+        {
+            off[i].push(angle);
+            off[j].push(angle);
+        }
+        let medians: Vec<(usize, f64)> = off
+            .into_iter()
+            .enumerate()
+            .filter_map(|(i, all)| Some((i, median(all)?)))
+            .collect();
+        if medians.len() < 5 {
+            break;
+        }
+        let usual = median(medians.iter().map(|m| m.1).collect())?;
+        let Some(&(row, worst)) = medians.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else {
+            break;
+        };
+        if worst < (SPOILED_RATIO * usual).max(GOOD_ENOUGH) {
+            break;
+        }
+        spoiled[row] = true;
+        reported = (worst.max(reported.0), usual);
+    }
+    let rows: Vec<u64> = (0..n)
+        .filter(|&i| spoiled[i])
+        .map(|i| poses.rows[i])
+        .collect();
+    if rows.is_empty() {
+        return None;
+    }
+    let text = format!(
+        "{} rows disagree with the robot's model by up to {:.2}°, {:.2}° is usual",
+        rows.len(),
+        reported.0.to_degrees(),
+        reported.1.to_degrees()
+    );
+    let remedy = "the robot had not settled, or tracker and robot were read at different times: drop these rows or synchronise the clocks";
+    Some(Finding::new("unsettled-rows", Severity::Warning, body, text, remedy).at_rows(rows))
+}

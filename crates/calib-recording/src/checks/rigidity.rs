@@ -1,0 +1,432 @@
+//! Bodies of markers: swapped, loose and shifted markers, a body that became another, mirrored or scaled ones.
+//!
+//! Everything is read from the distances `d_ij` between markers, which no motion changes.
+
+use super::Expectations;
+use super::statistics::{median, robust_sigma};
+use crate::finding::{Finding, Severity};
+use crate::poses::Poses;
+use crate::rigid_body::Template;
+use calib_geometry::registration::rigid_registration;
+use nalgebra::Point3;
+
+/// Gaussian distances stay within this many σ: one in 10¹⁵ does not.
+const SIGMAS: f64 = 8.0;
+/// Smallest deviation of a distance that is called a fault, m: refraction and calibration of good trackers.
+const SMALLEST_FAULT: f64 = 4e-4;
+/// Rows on either side of a change, and rows for a body to be judged at all.
+const ROWS: usize = 5;
+/// Markers up to which all permutations are tried; beyond, exchanges of two.
+const ALL_PERMUTATIONS: usize = 5;
+
+/// One body's markers over all rows.
+struct Body<'a> {
+    name: &'a str,
+    markers: Vec<&'a str>,
+    tracks: Vec<&'a [Option<Point3<f64>>]>,
+    pairs: Vec<Pair>,
+    /// Deviation of a distance that is a fault, m.
+    tolerance: f64,
+}
+
+struct Pair {
+    i: usize,
+    j: usize,
+    /// Median distance, m.
+    distance: f64,
+    /// Robust σ of the distance, m.
+    sigma: f64,
+}
+
+pub(super) fn rigidity(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (name, markers) in &expected.bodies {
+        let missing: Vec<&str> = markers
+            .iter()
+            .map(String::as_str)
+            .filter(|marker| !poses.markers.contains_key(*marker))
+            .collect();
+        if !missing.is_empty() {
+            let known: Vec<&str> = poses.markers.keys().map(String::as_str).collect();
+            let text = format!(
+                "has no column for marker {}; the recording has {}",
+                missing.join(", "),
+                known.join(", ")
+            );
+            findings.push(Finding::new(
+                "missing-marker",
+                Severity::Error,
+                name,
+                text,
+                "correct the marker's name in the profile",
+            ));
+            continue;
+        }
+        let Some(body) = Body::new(name, markers, poses, expected) else {
+            continue;
+        };
+        if let Some(template) = expected.templates.get(name) {
+            findings.extend(body.against_template(template));
+        }
+        if let Some(finding) = body.redefined(poses) {
+            findings.push(finding);
+        } else if let Some(finding) = body.loose_marker() {
+            findings.push(finding);
+        } else {
+            findings.extend(body.bad_rows(poses));
+        }
+    }
+    findings
+}
+
+impl<'a> Body<'a> {
+    fn new(
+        name: &'a str,
+        markers: &'a [String],
+        poses: &'a Poses,
+        expected: &Expectations,
+    ) -> Option<Self> {
+        let tracks: Vec<&[Option<Point3<f64>>]> = markers
+            .iter()
+            .map(|marker| poses.markers[marker].as_slice())
+            .collect();
+        let mut pairs = Vec::new();
+        for i in 0..tracks.len() {
+            for j in 0..i {
+                let distances: Vec<f64> = distances(tracks[i], tracks[j]).map(|(_, d)| d).collect();
+                if distances.len() < ROWS {
+                    continue;
+                }
+                let distance = median(distances.clone())?;
+                let sigma = robust_sigma(distances.into_iter(), distance)?;
+                pairs.push(Pair {
+                    i,
+                    j,
+                    distance,
+                    sigma,
+                });
+            }
+        }
+        if pairs.len() < 3 {
+            return None;
+        }
+        // The quieter pairs tell the noise, even when one marker is loose.
+        let mut sigmas: Vec<f64> = pairs.iter().map(|pair| pair.sigma).collect();
+        sigmas.sort_by(f64::total_cmp);
+        let quiet = sigmas[(sigmas.len() - 1) / 4];
+        // A distance has the noise of two coordinates along the line between the markers.
+        let sigma = quiet.max(
+            expected
+                .marker_sigma
+                .map_or(0.0, |sigma| sigma * std::f64::consts::SQRT_2),
+        );
+        let tolerance = (SIGMAS * sigma).max(SMALLEST_FAULT);
+        Some(Body {
+            name,
+            markers: markers.iter().map(String::as_str).collect(),
+            tracks,
+            pairs,
+            tolerance,
+        })
+    }
+
+    /// Another shape from some row on: distances that are steady on both sides of it and differ.
+    fn redefined(&self, poses: &Poses) -> Option<Finding> {
+        let mut best: Option<(f64, usize, &Pair)> = None;
+        for pair in &self.pairs {
+            let series: Vec<(usize, f64)> =
+                distances(self.tracks[pair.i], self.tracks[pair.j]).collect();
+            let mean = series.iter().map(|(_, d)| d).sum::<f64>() / series.len() as f64;
+            // The largest cumulative sum marks the change.
+            let mut sum = 0.0;
+            let mut at = (0.0, 0);
+            for (k, (_, d)) in series.iter().enumerate() {
+                sum += d - mean;
+                if f64::abs(sum) > at.0 {
+                    at = (f64::abs(sum), k + 1);
+                }
+            }
+            let (before, after) = series.split_at(at.1);
+            if before.len() < ROWS || after.len() < ROWS {
+                continue;
+            }
+            let level = |part: &[(usize, f64)]| median(part.iter().map(|(_, d)| *d).collect());
+            let (Some(a), Some(b)) = (level(before), level(after)) else {
+                continue;
+            };
+            let close = |part: &[(usize, f64)], level: f64| {
+                part.iter()
+                    .filter(|(_, d)| (d - level).abs() < self.tolerance / 2.0)
+                    .count()
+                    * 10
+                    >= part.len() * 9
+            };
+            let change = (a - b).abs();
+            if change > self.tolerance
+                && close(before, a)
+                && close(after, b)
+                && best.is_none_or(|(most, _, _)| change > most)
+            {
+                best = Some((change, after[0].0, pair));
+            }
+        }
+        let (change, row, pair) = best?;
+        let text = format!(
+            "the distance {}–{} changes by {:.2} mm for good from row {} on",
+            self.markers[pair.j],
+            self.markers[pair.i],
+            change * 1e3,
+            poses.rows[row]
+        );
+        let remedy =
+            "a marker was moved, relabelled, or the body was created anew: cut the recording there";
+        Some(
+            Finding::new("body-redefined", Severity::Error, self.name, text, remedy)
+                .at_rows([poses.rows[row]]),
+        )
+    }
+
+    /// A marker whose distances to the others are unsteady while those of the others are not.
+    fn loose_marker(&self) -> Option<Finding> {
+        let unsteadiness = |k: usize| -> f64 {
+            let mut sigmas: Vec<f64> = self
+                .pairs
+                .iter()
+                .filter(|pair| pair.i == k || pair.j == k)
+                .map(|pair| pair.sigma)
+                .collect();
+            sigmas.sort_by(f64::total_cmp);
+            sigmas
+                .get(sigmas.len().saturating_sub(1) / 2)
+                .copied()
+                .unwrap_or(0.0)
+        };
+        let (worst, sigma) = (0..self.markers.len())
+            .map(|k| (k, unsteadiness(k)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        if sigma <= self.tolerance / 2.0 {
+            return None;
+        }
+        let text = format!(
+            "marker {} moves on the body: its distances to the others scatter by {:.2} mm",
+            self.markers[worst],
+            sigma * 1e3
+        );
+        let remedy = "fix the marker, or leave it out of the body";
+        Some(Finding::new(
+            "not-rigid",
+            Severity::Error,
+            self.name,
+            text,
+            remedy,
+        ))
+    }
+
+    /// Rows in which markers are exchanged, or one is out of place.
+    fn bad_rows(&self, poses: &Poses) -> Vec<Finding> {
+        let mut swapped: Vec<(u64, String)> = Vec::new();
+        let mut outliers: Vec<(u64, String, f64)> = Vec::new();
+        for row in 0..poses.len() {
+            let points: Vec<Option<Point3<f64>>> =
+                self.tracks.iter().map(|track| track[row]).collect();
+            let worst = self.deviation(&points);
+            if worst <= self.tolerance {
+                continue;
+            }
+            match self.exchange(&points) {
+                Some(exchanged) => swapped.push((poses.rows[row], exchanged)),
+                None => {
+                    let (marker, off) = self.out_of_place(&points);
+                    outliers.push((poses.rows[row], marker, off));
+                }
+            }
+        }
+        let mut findings = Vec::new();
+        if let Some((_, which)) = swapped.first() {
+            let text = format!(
+                "markers {which} are exchanged, {} rows in all",
+                swapped.len()
+            );
+            let remedy = "correct the labels in the tracker's software, or drop these rows";
+            let finding = Finding::new("marker-swap", Severity::Error, self.name, text, remedy);
+            findings.push(finding.at_rows(swapped.iter().map(|(row, _)| *row)));
+        }
+        if let Some((_, marker, off)) = outliers.iter().max_by(|a, b| a.2.total_cmp(&b.2)) {
+            let text = format!(
+                "a marker is out of place in {} rows, most {marker} by {:.2} mm",
+                outliers.len(),
+                off * 1e3
+            );
+            let remedy =
+                "a reflection or a neighbouring marker was taken for it: drop these samples";
+            let finding =
+                Finding::new("marker-outlier", Severity::Warning, self.name, text, remedy);
+            findings.push(finding.at_rows(outliers.iter().map(|(row, _, _)| *row)));
+        }
+        findings
+    }
+
+    /// Largest departure of a distance from its median.
+    fn deviation(&self, points: &[Option<Point3<f64>>]) -> f64 {
+        let departures = self.pairs.iter().filter_map(|pair| {
+            Some(((points[pair.i]? - points[pair.j]?).norm() - pair.distance).abs())
+        });
+        departures.fold(0.0, f64::max)
+    }
+
+    /// The permutation of the markers seen that brings all distances back, as `A ↔ B`.
+    fn exchange(&self, points: &[Option<Point3<f64>>]) -> Option<String> {
+        let n = points.len();
+        let mut best: Option<(f64, Vec<usize>)> = None;
+        let mut consider = |order: &[usize]| {
+            let moved: Vec<Option<Point3<f64>>> = order.iter().map(|&k| points[k]).collect();
+            let deviation = self.deviation(&moved);
+            if deviation < self.tolerance
+                && best.as_ref().is_none_or(|(least, _)| deviation < *least)
+            {
+                best = Some((deviation, order.to_vec()));
+            }
+        };
+        if n <= ALL_PERMUTATIONS {
+            permutations(n, &mut consider);
+        } else {
+            for i in 0..n {
+                for j in 0..i {
+                    let mut order: Vec<usize> = (0..n).collect();
+                    order.swap(i, j);
+                    consider(&order);
+                }
+            }
+        }
+        // At least four markers, or a triangle, must be seen for a permutation to mean anything.
+        let seen = points.iter().flatten().count();
+        let (_, order) = best.filter(|_| seen >= 3)?;
+        let moved: Vec<&str> = (0..n)
+            .filter(|&k| order[k] != k)
+            .map(|k| self.markers[k])
+            .collect();
+        Some(moved.join(" ↔ "))
+    }
+
+    /// The marker whose distances are most off, and by how much.
+    fn out_of_place(&self, points: &[Option<Point3<f64>>]) -> (String, f64) {
+        let off = |k: usize| {
+            let departures: Vec<f64> = self
+                .pairs
+                .iter()
+                .filter(|pair| pair.i == k || pair.j == k)
+                .filter_map(|pair| {
+                    Some(((points[pair.i]? - points[pair.j]?).norm() - pair.distance).abs())
+                })
+                .collect();
+            median(departures).unwrap_or(0.0)
+        };
+        let worst = (0..self.markers.len())
+            .map(|k| (k, off(k)))
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        worst.map_or((String::new(), 0.0), |(k, off)| {
+            (self.markers[k].to_string(), off)
+        })
+    }
+
+    /// Scale and handedness against a template that is known beforehand.
+    fn against_template(&self, template: &Template) -> Option<Finding> {
+        let place = |k: usize| {
+            let at = template
+                .names
+                .iter()
+                .position(|name| name == self.markers[k])?;
+            template.points.get(at).copied()
+        };
+        let ratios = self.pairs.iter().filter_map(|pair| {
+            let known = (place(pair.i)? - place(pair.j)?).norm();
+            (known > 0.0).then(|| pair.distance / known)
+        });
+        let ratio = median(ratios.collect())?;
+        for (factor, taken) in [
+            (1e3, "millimetres taken for metres"),
+            (1e-3, "metres taken for millimetres"),
+            (10.0, "a factor of ten"),
+            (0.1, "a factor of ten"),
+        ] {
+            if (0.8..1.25).contains(&(ratio / factor)) {
+                let text = format!("is {ratio:.4} times as large as its template: {taken}");
+                return Some(Finding::new(
+                    "unit-mismatch",
+                    Severity::Error,
+                    self.name,
+                    text,
+                    "correct the unit of length of the recording or of the template",
+                ));
+            }
+        }
+        let off = self
+            .pairs
+            .iter()
+            .filter_map(|pair| {
+                Some((pair.distance - (place(pair.i)? - place(pair.j)?).norm()).abs())
+            })
+            .fold(0.0, f64::max);
+        if off > self.tolerance.max(2e-3) {
+            let text = format!(
+                "differs from its template by up to {:.2} mm in a distance",
+                off * 1e3
+            );
+            return Some(Finding::new(
+                "not-rigid",
+                Severity::Error,
+                self.name,
+                text,
+                "check the markers' order, or learn the template from the recording",
+            ));
+        }
+        self.mirrored(&place)
+    }
+
+    /// The mirror image of the template fits, the template does not.
+    fn mirrored(&self, place: &dyn Fn(usize) -> Option<Point3<f64>>) -> Option<Finding> {
+        let row = (0..self.tracks[0].len())
+            .find(|&row| self.tracks.iter().all(|track| track[row].is_some()))?;
+        let seen: Vec<Point3<f64>> = self.tracks.iter().filter_map(|track| track[row]).collect();
+        let known: Vec<Point3<f64>> = (0..self.markers.len()).filter_map(place).collect();
+        let mirror: Vec<Point3<f64>> = known.iter().map(|p| Point3::new(p.x, p.y, -p.z)).collect();
+        let rms = |from: &[Point3<f64>]| {
+            rigid_registration(from, &seen, None)
+                .ok()
+                .map(|registration| registration.rms)
+        };
+        let (plain, mirrored) = (rms(&known)?, rms(&mirror)?);
+        (plain > self.tolerance && mirrored < self.tolerance && plain > 5.0 * mirrored).then(|| {
+            let text = format!("fits the mirror image of its template to {:.2} mm, the template only to {:.2} mm", mirrored * 1e3, plain * 1e3);
+            let remedy = "the recording's frame is left-handed, or an axis has the wrong sign: check the export's axes";
+            Finding::new("mirrored", Severity::Error, self.name, text, remedy)
+        })
+    }
+}
+
+/// Rows and distances where both are seen.
+fn distances<'a>(
+    a: &'a [Option<Point3<f64>>],
+    b: &'a [Option<Point3<f64>>],
+) -> impl Iterator<Item = (usize, f64)> + 'a {
+    a.iter()
+        .zip(b)
+        .enumerate()
+        .filter_map(|(row, (a, b))| Some((row, (a.as_ref()? - b.as_ref()?).norm())))
+}
+
+/// Calls `visit` with every order of `0..n`.
+fn permutations(n: usize, visit: &mut dyn FnMut(&[usize])) {
+    fn place(k: usize, order: &mut Vec<usize>, visit: &mut dyn FnMut(&[usize])) {
+        if k == order.len() {
+            visit(order);
+            return;
+        }
+        for i in k..order.len() {
+            order.swap(k, i);
+            place(k + 1, order, visit);
+            order.swap(k, i);
+        }
+    }
+    place(0, &mut (0..n).collect(), visit);
+}

@@ -1,0 +1,666 @@
+//! Every fault class injected into simulated recordings: found in (nearly) all, and clean ones stay silent.
+
+use calib_recording::checks::model::{Prediction, better_explanation, disagreement, spoiled_rows};
+use calib_recording::checks::{Expectations, IDS, checks, held_out_in_training};
+use calib_recording::rigid_body::Template;
+use calib_recording::{Finding, JointUnit, Poses, Severity};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::collections::BTreeMap;
+
+/// σ of a marker coordinate, m.
+const SIGMA: f64 = 1e-4;
+const SEEDS: u64 = 60;
+
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// `base_from_hand` of an arm with three axes that do not meet.
+fn forward(q: [f64; 3]) -> Isometry3<f64> {
+    let turn = |axis: Vector3<f64>, angle: f64| {
+        Isometry3::from_parts(
+            Translation3::identity(),
+            UnitQuaternion::from_scaled_axis(axis * angle),
+        )
+    };
+    let shift = Isometry3::translation;
+    turn(Vector3::z(), q[0])
+        * shift(0.02, 0.0, 0.355)
+        * turn(Vector3::y(), q[1])
+        * shift(0.375, 0.01, 0.0)
+        * turn(Vector3::x(), q[2])
+        * shift(0.1, 0.0, 0.05)
+}
+
+const JOINTS: [&str; 3] = ["waist", "shoulder", "roll"];
+
+fn hand_markers() -> Vec<Point3<f64>> {
+    [
+        [0.0, 0.0, 0.0],
+        [0.08, 0.01, 0.0],
+        [0.03, 0.065, 0.01],
+        [-0.03, 0.02, 0.05],
+    ]
+    .map(Point3::from)
+    .to_vec()
+}
+
+struct Recorded {
+    poses: Poses,
+    expected: Expectations,
+    q: Vec<[f64; 3]>,
+}
+
+/// Static poses on a 4 × 3 × 3 grid, or a continuous motion of 300 rows at 100 Hz.
+fn record(seed: u64, timed: bool) -> Recorded {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let q: Vec<[f64; 3]> = if timed {
+        (0..300)
+            .map(|i| {
+                let t = f64::from(i) * 0.01;
+                [
+                    1.2 * (2.3 * t).sin(),
+                    0.8 * (3.1 * t).sin(),
+                    1.4 * (2.7 * t + 0.3).sin(),
+                ]
+            })
+            .collect()
+    } else {
+        let steps = |n: i32, i: i32, low: f64, high: f64| {
+            low + (high - low) * f64::from(i) / f64::from(n - 1)
+        };
+        (0..36)
+            .map(|i| {
+                [
+                    steps(4, i / 9, -1.2, 1.2),
+                    steps(3, i / 3 % 3, -0.8, 0.8),
+                    steps(3, i % 3, -1.4, 1.4),
+                ]
+            })
+            .collect()
+    };
+    let n = q.len();
+    let tracker_from_base = Isometry3::new(
+        Vector3::new(0.5, -0.3, 0.9),
+        Vector3::new(0.1, 0.2, rng.random_range(-3.0..3.0)),
+    );
+    let hand_from_body = Isometry3::new(
+        Vector3::new(0.02, 0.03, 0.04),
+        Vector3::new(0.5, -0.4, rng.random_range(-1.0..1.0)),
+    );
+    let mut poses = Poses {
+        rows: (2..n as u64 + 2).collect(),
+        ..Poses::default()
+    };
+    poses.t = timed.then(|| (0..n).map(|i| i as f64 * 0.01).collect());
+    let mut noisy = |p: Point3<f64>| p + Vector3::from_fn(|_, _| SIGMA * normal(&mut rng));
+    for (k, m) in hand_markers().iter().enumerate() {
+        let track = q
+            .iter()
+            .map(|&q| Some(noisy(tracker_from_base * forward(q) * hand_from_body * m)))
+            .collect();
+        poses.markers.insert(format!("hand_{k}"), track);
+    }
+    for (k, m) in [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.2, 0.0]]
+        .iter()
+        .enumerate()
+    {
+        let track = q
+            .iter()
+            .map(|_| Some(noisy(tracker_from_base * Point3::from(*m))))
+            .collect();
+        poses.markers.insert(format!("table_{k}"), track);
+    }
+    let track: Vec<Option<Isometry3<f64>>> = q
+        .iter()
+        .map(|&q| {
+            let wobble = Isometry3::new(
+                Vector3::from_fn(|_, _| SIGMA * normal(&mut rng)),
+                Vector3::from_fn(|_, _| 1e-3 * normal(&mut rng)),
+            );
+            Some(tracker_from_base * forward(q) * hand_from_body * wobble)
+        })
+        .collect();
+    poses.bodies.insert("tool".to_string(), track);
+    for (k, joint) in JOINTS.iter().enumerate() {
+        poses.joints.insert(
+            joint.to_string(),
+            q.iter()
+                .map(|q| Some(q[k] + 1e-4 * normal(&mut rng)))
+                .collect(),
+        );
+        poses
+            .joint_units
+            .insert(joint.to_string(), JointUnit::Angle);
+    }
+    let names = |body: &str, count: usize| {
+        (0..count)
+            .map(|k| format!("{body}_{k}"))
+            .collect::<Vec<_>>()
+    };
+    let expected = Expectations {
+        bodies: BTreeMap::from([
+            ("hand".to_string(), names("hand", 4)),
+            ("table".to_string(), names("table", 3)),
+        ]),
+        templates: BTreeMap::from([(
+            "hand".to_string(),
+            Template::given(names("hand", 4), hand_markers()).expect("a body"),
+        )]),
+        limits: JOINTS
+            .iter()
+            .map(|joint| (joint.to_string(), (-1.6, 1.6)))
+            .collect(),
+        asked: BTreeMap::from([
+            ("waist".to_string(), (-1.2, 1.2)),
+            ("shoulder".to_string(), (-0.8, 0.8)),
+            ("roll".to_string(), (-1.4, 1.4)),
+        ]),
+        reach: Some(0.9),
+        min_poses: 12,
+        marker_sigma: Some(SIGMA),
+    };
+    Recorded { poses, expected, q }
+}
+
+type Fault = fn(&mut Recorded, &mut ChaCha8Rng);
+
+fn marker<'a>(r: &'a mut Recorded, name: &str) -> &'a mut Vec<Option<Point3<f64>>> {
+    r.poses.markers.get_mut(name).expect("recorded")
+}
+
+fn joint<'a>(r: &'a mut Recorded, name: &str) -> &'a mut Vec<Option<f64>> {
+    r.poses.joints.get_mut(name).expect("recorded")
+}
+
+fn scale_all(r: &mut Recorded, factor: f64) {
+    r.poses
+        .markers
+        .values_mut()
+        .flatten()
+        .flatten()
+        .for_each(|p| p.coords *= factor);
+    r.poses
+        .bodies
+        .values_mut()
+        .flatten()
+        .flatten()
+        .for_each(|p| p.translation.vector *= factor);
+}
+
+/// Id of the finding expected, whether the recording has time, and how the fault comes about.
+fn faults() -> Vec<(&'static str, &'static str, bool, Fault)> {
+    vec![
+        (
+            "all-zero-triplet",
+            "lost samples written as zero",
+            false,
+            |r, rng| {
+                let row = rng.random_range(0..36);
+                marker(r, "hand_2")[row] = Some(Point3::origin());
+            },
+        ),
+        (
+            "duplicate-column",
+            "a marker exported twice",
+            false,
+            |r, _| {
+                let copy = marker(r, "hand_2").clone();
+                *marker(r, "hand_3") = copy;
+            },
+        ),
+        (
+            "frozen",
+            "a marker keeps its last value for 4 rows",
+            false,
+            |r, rng| {
+                let row = rng.random_range(0..31);
+                let value = marker(r, "hand_1")[row];
+                (row..row + 4).for_each(|i| marker(r, "hand_1")[i] = value);
+            },
+        ),
+        (
+            "frozen",
+            "a body keeps its last pose for 10 samples",
+            true,
+            |r, rng| {
+                let row = rng.random_range(0..280);
+                let track = r.poses.bodies.get_mut("tool").expect("recorded");
+                let value = track[row];
+                track[row..row + 10].fill(value);
+            },
+        ),
+        (
+            "virtual-points",
+            "points computed from the body's pose",
+            false,
+            |r, _| {
+                let poses = r.poses.bodies["tool"].clone();
+                for (k, m) in hand_markers().iter().enumerate() {
+                    *marker(r, &format!("hand_{k}")) =
+                        poses.iter().map(|pose| pose.map(|pose| pose * m)).collect();
+                }
+            },
+        ),
+        (
+            "marker-swap",
+            "two markers exchanged in 3 rows",
+            false,
+            |r, rng| {
+                let row = rng.random_range(0..34);
+                for i in row..row + 3 {
+                    let (a, b) = (marker(r, "hand_0")[i], marker(r, "hand_2")[i]);
+                    marker(r, "hand_0")[i] = b;
+                    marker(r, "hand_2")[i] = a;
+                }
+            },
+        ),
+        (
+            "marker-outlier",
+            "a reflection 5 mm off in 2 rows",
+            false,
+            |r, rng| {
+                let row = rng.random_range(0..35);
+                for i in row..row + 2 {
+                    let direction = Vector3::from_fn(|_, _| normal(rng)).normalize();
+                    let point = marker(r, "hand_1")[i].as_mut().expect("seen");
+                    *point += direction * 5e-3;
+                }
+            },
+        ),
+        (
+            "not-rigid",
+            "a loose marker, 2 mm to and fro",
+            false,
+            |r, rng| {
+                for point in marker(r, "hand_3").iter_mut().flatten() {
+                    *point += Vector3::from_fn(|_, _| 2e-3 * normal(rng));
+                }
+            },
+        ),
+        (
+            "body-redefined",
+            "a marker knocked by 4 mm half way",
+            false,
+            |r, rng| {
+                let row = rng.random_range(8..28);
+                let (markers, q) = (hand_markers(), r.q.clone());
+                let knocked = markers[2] + Vector3::new(3e-3, -2e-3, 2e-3);
+                // The marker's place in the tracker frame, from the other markers' body pose.
+                for i in row..q.len() {
+                    let pose = r.poses.bodies["tool"][i].expect("tracked");
+                    marker(r, "hand_2")[i] =
+                        Some(pose * knocked + Vector3::from_fn(|_, _| SIGMA * normal(rng)));
+                }
+                // The wobble of the tool's pose would be noise of that marker: use the other markers' own.
+                for i in 0..row {
+                    let pose = r.poses.bodies["tool"][i].expect("tracked");
+                    marker(r, "hand_2")[i] =
+                        Some(pose * markers[2] + Vector3::from_fn(|_, _| SIGMA * normal(rng)));
+                }
+            },
+        ),
+        ("mirrored", "a left-handed export", false, |r, _| {
+            r.poses
+                .markers
+                .values_mut()
+                .flatten()
+                .flatten()
+                .for_each(|p| p.y = -p.y);
+        }),
+        ("unit-mismatch", "millimetres as metres", false, |r, _| {
+            scale_all(r, 1e3)
+        }),
+        ("unit-mismatch", "metres as millimetres", false, |r, _| {
+            scale_all(r, 1e-3)
+        }),
+        ("unit-mismatch", "degrees as radians", false, |r, _| {
+            joint(r, "roll")
+                .iter_mut()
+                .flatten()
+                .for_each(|q| *q = q.to_degrees())
+        }),
+        ("unit-mismatch", "radians as degrees", false, |r, _| {
+            joint(r, "roll")
+                .iter_mut()
+                .flatten()
+                .for_each(|q| *q = q.to_radians())
+        }),
+        (
+            "joint-outside-limits",
+            "a joint beyond its limit",
+            false,
+            |r, rng| joint(r, "roll")[rng.random_range(0..36)] = Some(1.7),
+        ),
+        (
+            "joint-never-moved",
+            "a joint's column stands still",
+            false,
+            |r, _| joint(r, "waist").iter_mut().for_each(|q| *q = Some(0.4)),
+        ),
+        (
+            "joint-duplicate",
+            "a joint's column twice",
+            false,
+            |r, _| {
+                let copy = joint(r, "waist").clone();
+                *joint(r, "roll") = copy;
+            },
+        ),
+        ("coverage", "half of the range", false, |r, _| {
+            let kept: Vec<usize> = (0..36).filter(|&i| r.q[i][0] > 0.0).collect();
+            r.poses = r.poses.select(&kept);
+        }),
+        ("too-few-poses", "ten poses", false, |r, _| {
+            r.poses = r.poses.select(&(0..10).collect::<Vec<_>>())
+        }),
+        (
+            "missing-marker",
+            "a marker of another name",
+            false,
+            |r, _| {
+                let track = r.poses.markers.remove("hand_1").expect("recorded");
+                r.poses.markers.insert("hand1".to_string(), track);
+            },
+        ),
+        (
+            "many-lost",
+            "a marker hidden most of the time",
+            false,
+            |r, _| {
+                marker(r, "hand_1")
+                    .iter_mut()
+                    .take(20)
+                    .for_each(|p| *p = None)
+            },
+        ),
+        ("not-unit-rotation", "quaternions scaled", false, |r, _| {
+            for pose in r
+                .poses
+                .bodies
+                .get_mut("tool")
+                .expect("recorded")
+                .iter_mut()
+                .flatten()
+            {
+                pose.rotation = UnitQuaternion::new_unchecked(pose.rotation.into_inner() * 1.01);
+            }
+        }),
+        (
+            "body-flip",
+            "half a turn on the spot for 20 samples",
+            true,
+            |r, rng| {
+                let row = rng.random_range(10..270);
+                let half = UnitQuaternion::from_scaled_axis(Vector3::z() * std::f64::consts::PI);
+                r.poses.bodies.get_mut("tool").expect("recorded")[row..row + 20]
+                    .iter_mut()
+                    .flatten()
+                    .for_each(|pose| pose.rotation *= half);
+            },
+        ),
+        ("jump", "one sample 30 mm off", true, |r, rng| {
+            let row = rng.random_range(1..299);
+            let point = marker(r, "hand_1")[row].as_mut().expect("seen");
+            *point += Vector3::new(0.03, 0.0, 0.0);
+        }),
+        ("time-gap", "five frames dropped", true, |r, rng| {
+            let row = rng.random_range(1..290);
+            r.poses = r.poses.select(
+                &(0..300)
+                    .filter(|i| !(row..row + 5).contains(i))
+                    .collect::<Vec<_>>(),
+            );
+        }),
+        ("unsettled-rows", "a hold in motion", true, |r, rng| {
+            let row = rng.random_range(0..280);
+            let label = |i: usize| {
+                if (row..row + 15).contains(&i) {
+                    "h1".to_string()
+                } else {
+                    String::new()
+                }
+            };
+            r.poses
+                .labels
+                .insert("hold".to_string(), (0..300).map(label).collect());
+        }),
+    ]
+}
+
+#[test]
+fn clean_recordings_are_silent() {
+    let mut alarms: Vec<Finding> = Vec::new();
+    for seed in 0..4 * SEEDS {
+        let Recorded {
+            poses, expected, ..
+        } = record(1000 + seed, seed % 4 == 0);
+        alarms.extend(checks(&poses, &expected));
+    }
+    assert!(alarms.is_empty(), "{alarms:#?}");
+}
+
+#[test]
+fn every_fault_is_found() {
+    let mut table = Vec::new();
+    for (id, what, timed, inject) in faults() {
+        assert!(IDS.contains(&id), "{id} is not listed");
+        let mut found = 0;
+        for seed in 0..SEEDS {
+            let mut recorded = record(seed, timed);
+            inject(&mut recorded, &mut ChaCha8Rng::seed_from_u64(9000 + seed));
+            found += u64::from(
+                checks(&recorded.poses, &recorded.expected)
+                    .iter()
+                    .any(|finding| finding.id == id),
+            );
+        }
+        table.push((id, what, found));
+    }
+    for (id, what, found) in &table {
+        println!("{id:24} {what:45} {found}/{SEEDS}");
+    }
+    let missed: Vec<_> = table
+        .iter()
+        .filter(|(_, _, found)| (*found as f64) < 0.99 * SEEDS as f64)
+        .collect();
+    assert!(missed.is_empty(), "{missed:?}");
+}
+
+fn prediction(
+    assumption: &str,
+    id: &'static str,
+    q: impl Iterator<Item = [f64; 3]>,
+    link: fn([f64; 3]) -> Isometry3<f64>,
+) -> Prediction {
+    Prediction {
+        assumption: assumption.to_string(),
+        id,
+        base_from_link: q.map(link).collect(),
+    }
+}
+
+fn recorded_q(poses: &Poses) -> Vec<[f64; 3]> {
+    (0..poses.len())
+        .map(|i| JOINTS.map(|joint| poses.joints[joint][i].expect("recorded")))
+        .collect()
+}
+
+fn alternatives(q: &[[f64; 3]]) -> Vec<Prediction> {
+    let each = || q.iter().copied();
+    let mut all = vec![
+        prediction("link upper_arm", "wrong-mount", each(), |q| {
+            forward([q[0], q[1], 0.0])
+        }),
+        prediction("link turret", "wrong-mount", each(), |q| {
+            forward([q[0], 0.0, 0.0])
+        }),
+        prediction(
+            "joints waist and shoulder exchanged",
+            "joint-order",
+            each(),
+            |q| forward([q[1], q[0], q[2]]),
+        ),
+        prediction(
+            "joints shoulder and roll exchanged",
+            "joint-order",
+            each(),
+            |q| forward([q[0], q[2], q[1]]),
+        ),
+        prediction(
+            "joint waist with the other sign",
+            "joint-sign",
+            each(),
+            |q| forward([-q[0], q[1], q[2]]),
+        ),
+        prediction(
+            "joint shoulder with the other sign",
+            "joint-sign",
+            each(),
+            |q| forward([q[0], -q[1], q[2]]),
+        ),
+        prediction(
+            "joint roll with the other sign",
+            "joint-sign",
+            each(),
+            |q| forward([q[0], q[1], -q[2]]),
+        ),
+    ];
+    let lagged: Vec<[f64; 3]> = (0..q.len()).map(|i| q[(i + 1).min(q.len() - 1)]).collect();
+    all.push(prediction(
+        "joint values of the next row",
+        "clock-lag",
+        lagged.into_iter(),
+        forward,
+    ));
+    all
+}
+
+#[test]
+fn the_model_tells_wrong_mounts_signs_orders_and_lags() {
+    let mut found: BTreeMap<&str, u64> = BTreeMap::new();
+    type Bend = fn([f64; 3]) -> [f64; 3];
+    let bends: [(&str, Bend); 4] = [
+        ("clean", |q| q),
+        ("joint-sign", |q| [q[0], -q[1], q[2]]),
+        ("joint-order", |q| [q[1], q[0], q[2]]),
+        ("wrong-mount", |q| q),
+    ];
+    for seed in 0..SEEDS {
+        for (id, bend) in bends {
+            let mut recorded = record(seed, false);
+            for i in 0..recorded.q.len() {
+                let q = bend(recorded.q[i]);
+                JOINTS.iter().zip(q).for_each(|(name, q)| {
+                    recorded.poses.joints.get_mut(*name).expect("recorded")[i] = Some(q)
+                });
+            }
+            let mut track = recorded.poses.bodies["tool"].clone();
+            if id == "wrong-mount" {
+                track = recorded
+                    .q
+                    .iter()
+                    .map(|q| {
+                        Some(forward([q[0], q[1], 0.0]) * Isometry3::translation(0.1, 0.0, 0.0))
+                    })
+                    .collect();
+            }
+            let q = recorded_q(&recorded.poses);
+            let nominal = prediction("link hand", "", q.iter().copied(), forward);
+            let finding = better_explanation("tool", &track, &nominal, &alternatives(&q));
+            *found.entry(id).or_default() +=
+                u64::from(finding.map(|f| f.id).unwrap_or("clean") == id);
+        }
+        // The joint values of a continuous motion lag by 20 ms, the rows are 10 ms apart.
+        let recorded = record(seed, true);
+        let every: Vec<usize> = (0..300).step_by(10).collect();
+        let poses = recorded.poses.select(&every);
+        let lagged: Vec<[f64; 3]> = every
+            .iter()
+            .map(|&i| recorded.q[i.saturating_sub(10)])
+            .collect();
+        let nominal = prediction("link hand", "", lagged.iter().copied(), forward);
+        let finding = better_explanation(
+            "tool",
+            &poses.bodies["tool"],
+            &nominal,
+            &alternatives(&lagged),
+        );
+        *found.entry("clock-lag").or_default() +=
+            u64::from(finding.is_some_and(|f| f.id == "clock-lag"));
+    }
+    println!("{found:?} of {SEEDS}");
+    assert!(found.values().all(|&count| count == SEEDS), "{found:?}");
+}
+
+#[test]
+fn spoiled_rows_are_exactly_those() {
+    for seed in 0..20 {
+        let recorded = record(seed, false);
+        let mut q = recorded.q.clone();
+        let spoiled = [3, 7, 8, 20, 21, 22, 30];
+        for &i in &spoiled {
+            q[i] = [q[i][0] + 0.3, q[i][1] - 0.25, q[i][2] + 0.35];
+        }
+        let predicted: Vec<_> = q.iter().map(|&q| forward(q)).collect();
+        let track = &recorded.poses.bodies["tool"];
+        let finding = spoiled_rows(&recorded.poses, "tool", track, &predicted).expect("spoiled");
+        let expected: Vec<u64> = spoiled.iter().map(|&i| i as u64 + 2).collect();
+        assert_eq!(finding.rows, expected, "seed {seed}");
+        let clean: Vec<_> = recorded.q.iter().map(|&q| forward(q)).collect();
+        assert!(spoiled_rows(&recorded.poses, "tool", track, &clean).is_none());
+        assert!(disagreement(track, &clean).expect("turned") < 0.005);
+    }
+}
+
+#[test]
+fn held_out_rows_of_the_fit_are_found() {
+    let training = record(1, false).poses;
+    let other = record(2, false).poses;
+    let shifted = |mut poses: Poses| {
+        poses
+            .joints
+            .values_mut()
+            .flatten()
+            .flatten()
+            .for_each(|q| *q += 0.02);
+        poses
+    };
+    assert!(held_out_in_training(&shifted(other.clone()), &training).is_none());
+    let repeated = held_out_in_training(&other.select(&[0, 5]), &training).expect("same grid");
+    assert_eq!(
+        (repeated.severity, repeated.rows.len()),
+        (Severity::Warning, 2)
+    );
+    let same = held_out_in_training(&training.select(&[4]), &training).expect("same data");
+    assert_eq!((same.severity, same.rows), (Severity::Error, vec![6]));
+}
+
+#[test]
+fn nothing_known_and_nothing_recorded_is_no_panic() {
+    assert!(checks(&Poses::default(), &Expectations::default()).is_empty());
+    let Recorded {
+        mut poses,
+        expected,
+        ..
+    } = record(0, true);
+    poses
+        .markers
+        .values_mut()
+        .for_each(|track| track.fill(None));
+    poses.bodies.values_mut().for_each(|track| track.fill(None));
+    poses.joints.values_mut().for_each(|q| q.fill(None));
+    let ids: Vec<&str> = checks(&poses, &expected)
+        .iter()
+        .map(|finding| finding.id)
+        .collect();
+    assert!(
+        ids.contains(&"too-few-poses")
+            && ids.contains(&"many-lost")
+            && ids.contains(&"joint-never-moved"),
+        "{ids:?}"
+    );
+}
