@@ -9,7 +9,7 @@ pub struct Answer {
     pub id: &'static str,
     /// The heading.
     pub question: &'static str,
-    /// One statement a line, the decisive first; plain text.
+    /// One statement a line, the decisive first; plain text, commands between backticks.
     pub lines: Vec<String>,
 }
 
@@ -58,7 +58,7 @@ pub fn answers(report: &Report) -> Vec<Answer> {
             "undo",
             "How do I undo it?",
             or(
-                report.undo.clone(),
+                commands(&report.undo),
                 "Nothing to undo: no file of yours was changed.",
             ),
         ),
@@ -72,6 +72,14 @@ fn or(lines: Vec<String>, otherwise: &str) -> Vec<String> {
     } else {
         lines
     }
+}
+
+/// Commands stand between backticks.
+fn commands(commands: &[String]) -> Vec<String> {
+    commands
+        .iter()
+        .map(|command| format!("`{command}`"))
+        .collect()
 }
 
 fn short(items: &[String]) -> Vec<String> {
@@ -303,7 +311,7 @@ fn clocks(report: &Report) -> Vec<String> {
 }
 
 fn reproduce(report: &Report) -> Vec<String> {
-    let mut lines = or(report.reproduce.clone(), "Run the same profile again.");
+    let mut lines = or(commands(&report.reproduce), "Run the same profile again.");
     let inputs = if report.inputs.len() == 1 {
         "1 input".to_owned()
     } else {

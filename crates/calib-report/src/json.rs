@@ -45,7 +45,7 @@ pub fn exact_json<T: Serialize>(value: &T) -> Result<String, ReportError> {
     Ok(pretty(&to_value(value)?))
 }
 
-fn to_value<T: Serialize>(value: &T) -> Result<Value, ReportError> {
+pub(crate) fn to_value<T: Serialize>(value: &T) -> Result<Value, ReportError> {
     serde_json::to_value(value).map_err(|source| ReportError::Json(source.to_string()))
 }
 

@@ -24,18 +24,23 @@ mod answers;
 pub mod csv;
 mod data;
 mod error;
+pub mod html;
 pub mod json;
 pub mod markdown;
 pub mod number;
+pub mod plots;
 mod quantity;
 mod report;
 mod residuals;
 mod results;
 pub mod scene;
 mod schema;
+mod sections;
+mod svg;
 mod table;
 pub mod terminal;
 mod verification;
+pub mod view3d;
 
 pub use answers::{Answer, answers};
 pub use data::{
@@ -54,3 +59,4 @@ pub use schema::{report_schema, scene_schema};
 pub use verification::{
     ErrorStats, ExpectedError, HeldOut, LoopClosure, LoopGroup, PoseError, Stats, Verification,
 };
+pub use view3d::View3d;

@@ -33,6 +33,32 @@ impl Table {
         self.rows.push(cells);
     }
 
+    /// A column in which no row says anything is left out.
+    pub(crate) fn without_empty_columns(self) -> Self {
+        let says: Vec<bool> = (0..self.heads.len())
+            .map(|i| self.rows.iter().any(|row| !row[i].is_empty()))
+            .collect();
+        fn keep<T>(cells: Vec<T>, says: &[bool]) -> Vec<T> {
+            cells
+                .into_iter()
+                .zip(says)
+                .filter_map(|(cell, says)| says.then_some(cell))
+                .collect()
+        }
+        Self {
+            heads: keep(self.heads, &says),
+            rows: self.rows.into_iter().map(|row| keep(row, &says)).collect(),
+        }
+    }
+
+    pub(crate) fn heads(&self) -> &[(String, Align)] {
+        &self.heads
+    }
+
+    pub(crate) fn rows(&self) -> &[Vec<String>] {
+        &self.rows
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }

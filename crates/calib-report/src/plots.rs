@@ -1,0 +1,437 @@
+//! What is drawn in `report.html`, as data: every number of a picture stands here, in the unit of its axis.
+
+use crate::{Change, JointResiduals, Report, ResidualGroup, Unit, number};
+use serde::Serialize;
+
+/// A picture.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Plot {
+    /// Unique in the page.
+    pub id: String,
+    /// The section it belongs to.
+    pub section: &'static str,
+    /// Above the picture.
+    pub title: String,
+    /// What it shows, for those who do not see it, and how to read it.
+    pub description: String,
+    /// The picture.
+    pub kind: PlotKind,
+}
+
+/// Kinds of pictures.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PlotKind {
+    /// One row per thing: a bar, a mark with whiskers, a tick.
+    Rows {
+        /// Label of the axis.
+        axis: String,
+        /// Top to bottom.
+        rows: Vec<PlotRow>,
+    },
+    /// Points and lines over two axes.
+    Xy {
+        /// Label of the horizontal axis.
+        x: String,
+        /// Label of the vertical axis.
+        y: String,
+        /// Whether the vertical axis is logarithmic.
+        log_y: bool,
+        /// In the order of the legend; at most four.
+        series: Vec<Series>,
+    },
+    /// Counts per bin, one strip per joint, each over its own range.
+    Strips {
+        /// Top to bottom.
+        rows: Vec<Strip>,
+    },
+    /// Values at places, seen along an axis.
+    Map {
+        /// Label of the values.
+        value: String,
+        /// Views.
+        panels: Vec<Panel>,
+    },
+}
+
+/// A row of [`PlotKind::Rows`].
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct PlotRow {
+    /// Left of the row.
+    pub label: String,
+    /// Length of the bar from zero.
+    pub bar: Option<f64>,
+    /// A dot.
+    pub mark: Option<f64>,
+    /// A thin line from, to.
+    pub whisker: Option<[f64; 2]>,
+    /// A short upright line: the largest value.
+    pub tick: Option<f64>,
+    /// The number in words, right of the row.
+    pub text: String,
+}
+
+/// A series of [`PlotKind::Xy`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Series {
+    /// In the legend.
+    pub name: String,
+    /// Whether the points are joined.
+    pub line: bool,
+    /// x, y.
+    pub points: Vec<[f64; 2]>,
+}
+
+/// A row of [`PlotKind::Strips`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Strip {
+    /// The joint.
+    pub label: String,
+    /// Left end, in words.
+    pub from: String,
+    /// Right end, in words.
+    pub to: String,
+    /// Samples per bin.
+    pub counts: Vec<u64>,
+}
+
+/// A view of [`PlotKind::Map`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Panel {
+    /// Label of the horizontal axis.
+    pub x: String,
+    /// Label of the vertical axis.
+    pub y: String,
+    /// x, y, value.
+    pub points: Vec<[f64; 3]>,
+}
+
+/// Rows in one picture: more are not read.
+const ROWS: usize = 40;
+
+/// Half width of an error bar in standard deviations: about 95 %.
+const SIGMAS: f64 = 2.0;
+
+/// All pictures of a report, in the order of the page.
+#[must_use]
+pub fn plots(report: &Report) -> Vec<Plot> {
+    let mut plots = Vec::new();
+    held_out(&mut plots, report);
+    changes(&mut plots, report);
+    loops(&mut plots, report);
+    coverage(&mut plots, report);
+    residuals(&mut plots, report);
+    workspace(&mut plots, report);
+    accuracy(&mut plots, report);
+    plots
+}
+
+fn mm(metres: f64) -> f64 {
+    metres * 1e3
+}
+
+fn held_out(plots: &mut Vec<Plot>, report: &Report) {
+    let Some(held_out) = &report.verification.held_out else {
+        return;
+    };
+    let models = [
+        ("nominal", held_out.nominal),
+        ("registration only", held_out.registration_only),
+        ("calibrated", held_out.calibrated),
+    ];
+    let rows: Vec<PlotRow> = models
+        .iter()
+        .filter_map(|(name, stats)| stats.map(|stats| (name, stats)))
+        .map(|(name, stats)| PlotRow {
+            label: (*name).to_owned(),
+            bar: Some(mm(stats.rms_m)),
+            whisker: Some([mm(stats.rms_m), mm(stats.p95_m)]),
+            tick: Some(mm(stats.max_m)),
+            text: number::plain(stats.rms_m, Unit::Metre),
+            ..PlotRow::default()
+        })
+        .collect();
+    if !rows.is_empty() {
+        plots.push(Plot {
+            id: "plot-held-out-models".into(),
+            section: "held-out",
+            title: "Nominal, registration only, calibrated".into(),
+            description: "Bar: rms error over the held-out poses; line: to the 95 % quantile; tick: the largest.".into(),
+            kind: PlotKind::Rows { axis: "error [mm]".into(), rows },
+        });
+    }
+    let over = |error: fn(&crate::PoseError) -> Option<f64>| -> Vec<[f64; 2]> {
+        let at = held_out.poses.iter().enumerate();
+        at.filter_map(|(i, pose)| error(pose).map(|error| [(i + 1) as f64, mm(error)]))
+            .collect()
+    };
+    let series: Vec<Series> = [
+        ("nominal", over(|pose| pose.nominal_m)),
+        ("registration only", over(|pose| pose.registration_only_m)),
+        ("calibrated", over(|pose| pose.calibrated_m)),
+    ]
+    .into_iter()
+    .filter(|(_, points)| !points.is_empty())
+    .map(|(name, points)| Series {
+        name: name.into(),
+        line: false,
+        points,
+    })
+    .collect();
+    if !series.is_empty() {
+        plots.push(Plot {
+            id: "plot-held-out-poses".into(),
+            section: "held-out",
+            title: "Pose by pose".into(),
+            description: "Error of every held-out pose in the order of the recording; logarithmic."
+                .into(),
+            kind: PlotKind::Xy {
+                x: "pose".into(),
+                y: "error [mm]".into(),
+                log_y: true,
+                series,
+            },
+        });
+    }
+}
+
+fn changes(plots: &mut Vec<Plot>, report: &Report) {
+    for (unit, id, title) in [
+        (Unit::Metre, "plot-changes-length", "Changed lengths"),
+        (Unit::Radian, "plot-changes-angle", "Changed angles"),
+    ] {
+        let scale = if unit == Unit::Metre {
+            1e3
+        } else {
+            180.0 / std::f64::consts::PI
+        };
+        let row = |change: &Change| {
+            let delta = change.delta?;
+            let reach = change
+                .sigma
+                .filter(|sigma| sigma.is_finite())
+                .map(|sigma| SIGMAS * sigma);
+            Some(PlotRow {
+                label: format!("{} {}", change.joint, change.what),
+                mark: Some(delta * scale),
+                whisker: reach.map(|reach| [(delta - reach) * scale, (delta + reach) * scale]),
+                text: number::change(delta, change.sigma, unit),
+                ..PlotRow::default()
+            })
+        };
+        let rows: Vec<PlotRow> = report
+            .changes
+            .iter()
+            .filter(|change| change.unit == unit)
+            .filter_map(row)
+            .take(ROWS)
+            .collect();
+        if !rows.is_empty() {
+            let axis = format!("change [{}]", number::unit_name(unit));
+            plots.push(Plot {
+                id: id.into(),
+                section: "changes",
+                title: title.into(),
+                description: "Dot: the change; line: ± 2 σ. A line that crosses zero is a change that the data do not show.".into(),
+                kind: PlotKind::Rows { axis, rows },
+            });
+        }
+    }
+}
+
+fn loops(plots: &mut Vec<Plot>, report: &Report) {
+    for (i, closure) in report
+        .loops
+        .iter()
+        .enumerate()
+        .filter(|(_, closure)| closure.groups.len() > 1)
+    {
+        let row = |group: &crate::LoopGroup| PlotRow {
+            label: group.name.clone(),
+            bar: Some(mm(group.translation_m.mean)),
+            whisker: Some([
+                mm(group.translation_m.mean - group.translation_m.std),
+                mm(group.translation_m.mean + group.translation_m.std),
+            ]),
+            tick: Some(mm(group.translation_m.max)),
+            text: number::plain(group.translation_m.mean, Unit::Metre),
+            ..PlotRow::default()
+        };
+        plots.push(Plot {
+            id: format!("plot-loop-{}", i + 1),
+            section: "loops",
+            title: format!("{} by {}", closure.name, if closure.grouped_by.is_empty() { "group" } else { &closure.grouped_by }),
+            description: "Bar: mean length of e_t; line: ± one standard deviation of the samples; tick: the largest.".into(),
+            kind: PlotKind::Rows { axis: "‖e_t‖ [mm]".into(), rows: closure.groups.iter().map(row).take(ROWS).collect() },
+        });
+    }
+}
+
+fn coverage(plots: &mut Vec<Plot>, report: &Report) {
+    let rows: Vec<Strip> = report
+        .coverage
+        .iter()
+        .map(|joint| Strip {
+            label: joint.joint.clone(),
+            from: number::plain(joint.bins_from, joint.unit),
+            to: number::plain(joint.bins_to, joint.unit),
+            counts: joint.bins.clone(),
+        })
+        .collect();
+    if !rows.is_empty() {
+        plots.push(Plot {
+            id: "plot-coverage".into(),
+            section: "data",
+            title: "Where the joints were".into(),
+            description: "Every joint over its range: the darker a cell, the more samples; an empty cell was never visited.".into(),
+            kind: PlotKind::Strips { rows },
+        });
+    }
+}
+
+fn residuals(plots: &mut Vec<Plot>, report: &Report) {
+    let row = |group: &ResidualGroup| PlotRow {
+        label: group.name.clone(),
+        bar: Some(mm(group.rms_m)),
+        whisker: Some([mm(group.rms_m), mm(group.p95_m)]),
+        tick: Some(mm(group.max_m)),
+        text: number::plain(group.rms_m, Unit::Metre),
+        ..PlotRow::default()
+    };
+    for (id, title, groups) in [
+        (
+            "plot-residuals-marker",
+            "Residuals per marker",
+            &report.residuals.by_marker,
+        ),
+        (
+            "plot-residuals-direction",
+            "Residuals per direction of the tracker",
+            &report.residuals.by_direction,
+        ),
+    ] {
+        if !groups.is_empty() {
+            plots.push(Plot {
+                id: id.into(),
+                section: "residuals",
+                title: title.into(),
+                description: "Bar: rms; line: to the 95 % quantile; tick: the largest.".into(),
+                kind: PlotKind::Rows {
+                    axis: "residual [mm]".into(),
+                    rows: groups.iter().map(row).take(ROWS).collect(),
+                },
+            });
+        }
+    }
+    for (i, joint) in report.residuals.by_joint.iter().enumerate() {
+        plots.push(over_bins(
+            format!("plot-residuals-joint-{}", i + 1),
+            format!("Residuals over {}", joint.name),
+            joint,
+        ));
+    }
+    for (i, recording) in report.residuals.over_time.iter().enumerate() {
+        plots.push(over_bins(
+            format!("plot-residuals-time-{}", i + 1),
+            format!("Residuals in the order of {}", recording.name),
+            recording,
+        ));
+    }
+}
+
+fn over_bins(id: String, title: String, residuals: &JointResiduals) -> Plot {
+    let (scale, x) = match residuals.unit {
+        Unit::Radian => (
+            180.0 / std::f64::consts::PI,
+            format!("{} [deg]", residuals.name),
+        ),
+        Unit::Metre => (1e3, format!("{} [mm]", residuals.name)),
+        Unit::Second => (1.0, "time [s]".to_owned()),
+        _ => (1.0, "row".to_owned()),
+    };
+    let component = |name: &str, i: usize| Series {
+        name: format!("mean {name}"),
+        line: true,
+        points: residuals
+            .bins
+            .iter()
+            .map(|bin| [bin.center * scale, mm(bin.mean_m[i])])
+            .collect(),
+    };
+    let rms = Series {
+        name: "rms".into(),
+        line: false,
+        points: residuals
+            .bins
+            .iter()
+            .map(|bin| [bin.center * scale, mm(bin.rms_m)])
+            .collect(),
+    };
+    Plot {
+        id,
+        section: "residuals",
+        title,
+        description: "Lines: mean residual along the tracker's x, y, z; a wave is something that is not modelled. Dots: rms length.".into(),
+        kind: PlotKind::Xy { x, y: "residual [mm]".into(), log_y: false, series: vec![component("x", 0), component("y", 1), component("z", 2), rms] },
+    }
+}
+
+fn workspace(plots: &mut Vec<Plot>, report: &Report) {
+    let Some(workspace) = &report.workspace else {
+        return;
+    };
+    let panel = |i: usize, j: usize| {
+        let axis = |i: usize| format!("{} [m]", ["x", "y", "z"][i]);
+        let points = workspace
+            .points
+            .iter()
+            .map(|point| [point.position_m[i], point.position_m[j], mm(point.sigma_m)]);
+        Panel {
+            x: axis(i),
+            y: axis(j),
+            points: points.collect(),
+        }
+    };
+    plots.push(Plot {
+        id: "plot-workspace".into(),
+        section: "workspace",
+        title: format!("Predicted σ of {} in {}", workspace.link, workspace.frame),
+        description:
+            "From above and from the side; the darker a place, the less certain the tool is there."
+                .into(),
+        kind: PlotKind::Map {
+            value: "σ [mm]".into(),
+            panels: vec![panel(0, 1), panel(0, 2)],
+        },
+    });
+}
+
+fn accuracy(plots: &mut Vec<Plot>, report: &Report) {
+    let row = |limit: &crate::AccuracyLimit| {
+        let share = limit.share.filter(|share| share.is_finite())?;
+        Some(PlotRow {
+            label: limit.source.clone(),
+            bar: Some(share * 100.0),
+            text: number::percent(share),
+            ..PlotRow::default()
+        })
+    };
+    let rows: Vec<PlotRow> = report
+        .accuracy_limits
+        .iter()
+        .filter_map(row)
+        .take(ROWS)
+        .collect();
+    if !rows.is_empty() {
+        plots.push(Plot {
+            id: "plot-accuracy".into(),
+            section: "accuracy",
+            title: "Shares of the remaining error".into(),
+            description: "Share of the variance of the tool's position.".into(),
+            kind: PlotKind::Rows {
+                axis: "share [%]".into(),
+                rows,
+            },
+        });
+    }
+}

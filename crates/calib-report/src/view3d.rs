@@ -1,0 +1,362 @@
+//! The 3-D view of `report.html`, as data: everything is in the tracker's (or world's) frame, m and rad.
+
+use crate::ReportError;
+use crate::json::{rounded_to, to_value};
+use crate::svg::Body;
+use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
+use serde::Serialize;
+
+/// What the 3-D view shows.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct View3d {
+    /// The frame that all coordinates are in.
+    pub frame: String,
+    /// Residual arrows and uncertainties are drawn this many times longer to begin with.
+    pub magnification: f64,
+    /// Frames of the robot; the parents make the links.
+    pub frames: Vec<ViewFrame>,
+    /// Poses to step through, the validation poses first.
+    pub poses: Vec<ViewPose>,
+    /// Points of the sweeps.
+    pub clouds: Vec<Cloud>,
+    /// Spheres of centers of rotation.
+    pub spheres: Vec<Sphere>,
+    /// Circles of axes of rotation.
+    pub circles: Vec<Circle>,
+    /// Axes.
+    pub axes: Vec<Axis>,
+}
+
+/// A frame of the robot.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ViewFrame {
+    /// Its name.
+    pub name: String,
+    /// Index of the parent in [`View3d::frames`]; a line is drawn to it.
+    pub parent: Option<usize>,
+}
+
+/// The robot in one pose.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ViewPose {
+    /// Its label.
+    pub name: String,
+    /// What a reader should know about it: "error 0.31 mm".
+    pub text: String,
+    /// x, y, z, qx, qy, qz, qw of every frame with the delivered robot; empty when it is not shown.
+    pub nominal: Vec<[f64; 7]>,
+    /// The same with the calibrated robot.
+    pub calibrated: Vec<[f64; 7]>,
+    /// Markers or bodies that were seen.
+    pub markers: Vec<ViewMarker>,
+}
+
+/// A marker in one pose.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ViewMarker {
+    /// Its name.
+    pub name: String,
+    /// Where the tracker saw it; `None` when it was lost.
+    pub observed: Option<[f64; 3]>,
+    /// Where the calibrated robot puts it.
+    pub predicted: [f64; 3],
+}
+
+/// Points of one marker or body over a sweep.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Cloud {
+    /// The sweep and the marker.
+    pub name: String,
+    /// Places.
+    pub points: Vec<[f64; 3]>,
+}
+
+/// A sphere around a center of rotation.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Sphere {
+    /// The joint.
+    pub name: String,
+    /// Center.
+    pub center: [f64; 3],
+    /// m.
+    pub radius: f64,
+    /// σ of the center, m; `None` when it is not known.
+    pub sigma: Option<f64>,
+}
+
+/// A circle around an axis of rotation.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Circle {
+    /// The joint.
+    pub name: String,
+    /// Center.
+    pub center: [f64; 3],
+    /// Unit normal.
+    pub normal: [f64; 3],
+    /// m.
+    pub radius: f64,
+}
+
+/// An axis of rotation.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Axis {
+    /// The joint.
+    pub name: String,
+    /// A point on it.
+    pub point: [f64; 3],
+    /// Unit direction.
+    pub direction: [f64; 3],
+    /// Half of the length that is drawn, m.
+    pub half_length: f64,
+    /// σ of the point across the axis, m.
+    pub sigma_point: Option<f64>,
+    /// σ of the direction, rad.
+    pub sigma_direction: Option<f64>,
+}
+
+/// Digits of a coordinate in the page: 10 µm in a metre, below what a pixel shows.
+const DIGITS: usize = 5;
+
+/// Points of all clouds together in the page: 20 bytes each, a third of a megabyte.
+const CLOUD_POINTS: usize = 15_000;
+
+/// Poses in the page.
+const POSES: usize = 200;
+
+/// The row of [`ViewPose::calibrated`] for a frame.
+#[must_use]
+pub fn pose_row(world_from_frame: &Isometry3<f64>) -> [f64; 7] {
+    let (t, q) = (
+        world_from_frame.translation.vector,
+        world_from_frame.rotation.coords,
+    );
+    [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
+}
+
+impl View3d {
+    /// The same without what no page can carry: every n-th point of the clouds, every n-th pose; what is not finite or points to no frame is left out.
+    #[must_use]
+    pub fn thinned(&self) -> Self {
+        let mut view = self.clone();
+        let total: usize = view.clouds.iter().map(|cloud| cloud.points.len()).sum();
+        let step = total.div_ceil(CLOUD_POINTS).max(1);
+        for cloud in &mut view.clouds {
+            cloud.points = cloud
+                .points
+                .iter()
+                .filter(|p| finite(p))
+                .step_by(step)
+                .copied()
+                .collect();
+        }
+        let frames = view.frames.len();
+        for frame in &mut view.frames {
+            frame.parent = frame.parent.filter(|parent| *parent < frames);
+        }
+        let fits = |rows: &Vec<[f64; 7]>| rows.len() == frames && rows.iter().all(finite);
+        let step = view.poses.len().div_ceil(POSES).max(1);
+        view.poses = view
+            .poses
+            .into_iter()
+            .step_by(step)
+            .filter(|pose| fits(&pose.calibrated))
+            .collect();
+        for pose in &mut view.poses {
+            if !fits(&pose.nominal) {
+                pose.nominal.clear();
+            }
+            pose.markers
+                .retain(|marker| finite(&marker.predicted) && marker.observed.iter().all(finite));
+        }
+        view.spheres
+            .retain(|sphere| finite(&sphere.center) && sphere.radius.is_finite());
+        view.circles.retain(|circle| {
+            finite(&circle.center) && finite(&circle.normal) && circle.radius.is_finite()
+        });
+        view.axes.retain(|axis| {
+            finite(&axis.point) && finite(&axis.direction) && axis.half_length.is_finite()
+        });
+        if !(view.magnification.is_finite() && view.magnification >= 1.0) {
+            view.magnification = 1.0;
+        }
+        view
+    }
+
+    /// JSON for a `<script type="application/json">` element: one line, no `<`.
+    ///
+    /// # Errors
+    /// [`ReportError::Json`] when it has no JSON form.
+    pub(crate) fn embedded(&self) -> Result<String, ReportError> {
+        Ok(rounded_to(to_value(self)?, DIGITS)
+            .to_string()
+            .replace('<', "\\u003c"))
+    }
+
+    /// The first pose as a picture without script: parallel projection from the front right, a little above.
+    pub(crate) fn still(&self) -> String {
+        const SIZE: [f64; 2] = [640.0, 400.0];
+        let camera = Rotation3::from_axis_angle(&Vector3::x_axis(), -65f64.to_radians())
+            * Rotation3::from_axis_angle(&Vector3::z_axis(), 40f64.to_radians());
+        let flat = |p: &[f64; 3]| {
+            let p = camera * Point3::from(*p);
+            [p.x, -p.y]
+        };
+        let everything = self
+            .poses
+            .first()
+            .into_iter()
+            .flat_map(|pose| pose.calibrated.iter().map(origin))
+            .chain(
+                self.clouds
+                    .iter()
+                    .flat_map(|cloud| cloud.points.iter().copied()),
+            );
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for place in everything.map(|p| flat(&p)) {
+            for k in 0..2 {
+                low[k] = low[k].min(place[k]);
+                high[k] = high[k].max(place[k]);
+            }
+        }
+        if low[0] > high[0] {
+            (low, high) = ([-1.0; 2], [1.0; 2]);
+        }
+        let scale = (0..2)
+            .map(|k| 0.86 * SIZE[k] / (high[k] - low[k]).max(1e-6))
+            .fold(f64::INFINITY, f64::min);
+        let place = |p: &[f64; 3]| {
+            let at = flat(p);
+            [0, 1].map(|k| 0.5 * SIZE[k] + scale * (at[k] - 0.5 * (low[k] + high[k])))
+        };
+        let mut body = Body(String::new());
+        for cloud in &self.clouds {
+            // A still picture needs an impression of the sweep, not every point.
+            for point in cloud
+                .points
+                .iter()
+                .step_by(cloud.points.len().div_ceil(200).max(1))
+            {
+                body.circle("dot", place(point), 1.2);
+            }
+        }
+        for sphere in &self.spheres {
+            body.circle("thin", place(&sphere.center), sphere.radius * scale);
+        }
+        for circle in &self.circles {
+            let turn =
+                UnitQuaternion::rotation_between(&Vector3::z(), &Vector3::from(circle.normal))
+                    .unwrap_or_default();
+            let around = (0..=48).map(|i| {
+                let (sin, cos) = (f64::from(i) / 48.0 * std::f64::consts::TAU).sin_cos();
+                place(
+                    &(Point3::from(circle.center)
+                        + turn * Vector3::new(cos, sin, 0.0) * circle.radius)
+                        .into(),
+                )
+            });
+            body.path("thin", &around.collect::<Vec<_>>());
+        }
+        for axis in &self.axes {
+            let end = |sign: f64| {
+                place(
+                    &(Point3::from(axis.point)
+                        + Vector3::from(axis.direction) * (sign * axis.half_length))
+                        .into(),
+                )
+            };
+            body.line("line s2", end(-1.0), end(1.0));
+        }
+        if let Some(pose) = self.poses.first() {
+            for (class, rows) in [
+                ("line dashed s1", &pose.nominal),
+                ("line thick s0", &pose.calibrated),
+            ] {
+                for (row, frame) in rows.iter().zip(&self.frames) {
+                    if let Some(parent) = frame.parent.and_then(|parent| rows.get(parent)) {
+                        body.line(class, place(&origin(parent)), place(&origin(row)));
+                    }
+                }
+            }
+            for observed in pose.markers.iter().filter_map(|marker| marker.observed) {
+                body.circle("mark s3", place(&observed), 3.0);
+            }
+        }
+        format!(
+            "<svg role=\"img\" viewBox=\"0 0 {} {}\" aria-label=\"The robot in its first pose: calibrated solid, nominal dashed, markers as dots\">{}</svg>",
+            SIZE[0], SIZE[1], body.0
+        )
+    }
+}
+
+fn origin(row: &[f64; 7]) -> [f64; 3] {
+    [row[0], row[1], row[2]]
+}
+
+fn finite<const N: usize>(numbers: &[f64; N]) -> bool {
+    numbers.iter().all(|x| x.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_drawn_is_left_out() {
+        let view = View3d {
+            magnification: f64::NAN,
+            frames: vec![ViewFrame {
+                name: "a".into(),
+                parent: Some(7),
+            }],
+            poses: vec![
+                ViewPose {
+                    calibrated: vec![[f64::NAN; 7]],
+                    ..ViewPose::default()
+                },
+                ViewPose {
+                    calibrated: vec![pose_row(&Isometry3::identity())],
+                    nominal: vec![],
+                    ..ViewPose::default()
+                },
+            ],
+            clouds: vec![Cloud {
+                name: "c".into(),
+                points: vec![[0.0; 3]; 40_000],
+            }],
+            spheres: vec![Sphere {
+                radius: f64::INFINITY,
+                ..Sphere::default()
+            }],
+            ..View3d::default()
+        };
+        let thinned = view.thinned();
+        assert_eq!(
+            (
+                thinned.frames[0].parent,
+                thinned.poses.len(),
+                thinned.spheres.len(),
+                thinned.magnification
+            ),
+            (None, 1, 0, 1.0)
+        );
+        assert!(thinned.clouds[0].points.len() <= CLOUD_POINTS);
+        assert!(!thinned.still().contains("NaN"));
+    }
+
+    #[test]
+    fn an_empty_view_is_still_a_picture() {
+        let text = View3d::default().thinned().still();
+        roxmltree::Document::parse(&text).expect("well-formed");
+    }
+
+    #[test]
+    fn embedded_data_cannot_end_its_script() {
+        let view = View3d {
+            frame: "</script>".into(),
+            ..View3d::default()
+        };
+        let text = view.embedded().expect("JSON");
+        assert!(!text.contains('<'));
+        assert!(serde_json::from_str::<serde_json::Value>(&text).is_ok());
+    }
+}

@@ -1,0 +1,248 @@
+"use strict";
+(function () {
+  const view = JSON.parse(document.getElementById("view-data").textContent);
+  const canvas = document.getElementById("canvas");
+  const ink = canvas.getContext && canvas.getContext("2d");
+  if (!ink) return; // The still picture stays.
+  document.getElementById("still").hidden = true;
+  document.getElementById("live").hidden = false;
+
+  // The camera looks at `target`; angles in rad, z is up.
+  const start = { turn: -0.9, tilt: 0.42, zoom: 1, target: [0, 0, 0] };
+  const camera = {};
+  let size = 1, floor = 0, pose = 0, colours = {}, factor = view.magnification;
+  const layers = [
+    ["calibrated", "Calibrated", "s0", true], ["nominal", "Nominal", "s1", true], ["markers", "Markers", "s3", true],
+    ["residuals", "Errors", "bad", true], ["sweeps", "Sweeps", "soft", true], ["joints", "Spheres, circles, axes", "s2", true], ["names", "Names", "ink", false],
+  ];
+  const shown = {};
+
+  function places() {
+    const all = [];
+    for (const p of view.poses) { for (const row of p.calibrated) all.push(row); for (const m of p.markers) all.push(m.observed || m.predicted); }
+    for (const cloud of view.clouds) for (const point of cloud.points) all.push(point);
+    return all;
+  }
+  function frameAll() {
+    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+    for (const p of places()) for (let i = 0; i < 3; i++) { low[i] = Math.min(low[i], p[i]); high[i] = Math.max(high[i], p[i]); }
+    if (!(low[0] <= high[0])) return;
+    for (let i = 0; i < 3; i++) start.target[i] = (low[i] + high[i]) / 2;
+    size = Math.max(1e-3, Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]));
+    floor = low[2];
+  }
+  // Look at everything, as large as it goes; perspective needs a second and third look.
+  function reset() {
+    Object.assign(camera, start, { target: start.target.slice() });
+    for (let i = 0; i < 3; i++) {
+      let reach = 0;
+      for (const p of places()) {
+        const at = project(p);
+        if (at) reach = Math.max(reach, Math.abs(at[0] / canvas.clientWidth - 0.5), Math.abs(at[1] / canvas.clientHeight - 0.5));
+      }
+      if (reach > 0) camera.zoom *= 0.45 / reach;
+    }
+    camera.zoom = Math.max(0.2, Math.min(60, camera.zoom));
+    draw();
+  }
+
+  // World to picture: [x, y, pixels per metre at that depth], or null behind the camera.
+  function project(p) {
+    const x = p[0] - camera.target[0], y = p[1] - camera.target[1], z = p[2] - camera.target[2];
+    const ct = Math.cos(camera.turn), st = Math.sin(camera.turn), ce = Math.cos(camera.tilt), se = Math.sin(camera.tilt);
+    const right = ct * x - st * y, away = st * x + ct * y;
+    const up = ce * z + se * away, depth = ce * away - se * z + 1.9 * size / camera.zoom;
+    if (depth < 0.02 * size) return null;
+    const scale = 1.35 * Math.min(canvas.clientWidth, canvas.clientHeight * 1.3) / depth;
+    return [canvas.clientWidth / 2 + right * scale, canvas.clientHeight / 2 - up * scale, scale];
+  }
+  function rotate(q, v) {
+    const [x, y, z, w] = q, tx = 2 * (y * v[2] - z * v[1]), ty = 2 * (z * v[0] - x * v[2]), tz = 2 * (x * v[1] - y * v[0]);
+    return [v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx];
+  }
+  function add(a, b, k) { return [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]]; }
+  function line(a, b, colour, width, dash) {
+    const p = project(a), q = project(b);
+    if (!p || !q) return;
+    ink.strokeStyle = colour; ink.lineWidth = width; ink.setLineDash(dash || []);
+    ink.beginPath(); ink.moveTo(p[0], p[1]); ink.lineTo(q[0], q[1]); ink.stroke();
+  }
+  function dot(a, colour, radius, hollow) {
+    const p = project(a);
+    if (!p) return;
+    ink.setLineDash([]); ink.beginPath(); ink.arc(p[0], p[1], radius, 0, 7);
+    if (hollow) { ink.strokeStyle = colour; ink.lineWidth = 1.5; ink.stroke(); } else { ink.fillStyle = colour; ink.fill(); }
+  }
+  function text(a, words, colour) {
+    const p = project(a);
+    if (p) { ink.fillStyle = colour; ink.fillText(words, p[0] + 6, p[1] - 5); }
+  }
+  function across(n) {
+    const helper = Math.abs(n[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0];
+    const u = cross(n, helper), k = 1 / (Math.hypot(u[0], u[1], u[2]) || 1), a = [u[0] * k, u[1] * k, u[2] * k];
+    return [a, cross(n, a)];
+  }
+  function cross(a, b) { return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]; }
+  function ring(center, normal, radius, colour, width, dash) {
+    const [u, v] = across(normal);
+    ink.strokeStyle = colour; ink.lineWidth = width; ink.setLineDash(dash || []); ink.beginPath();
+    for (let i = 0; i <= 48; i++) {
+      const t = i / 48 * 2 * Math.PI, p = project(add(add(center, u, radius * Math.cos(t)), v, radius * Math.sin(t)));
+      if (!p) return;
+      if (i) ink.lineTo(p[0], p[1]); else ink.moveTo(p[0], p[1]);
+    }
+    ink.stroke();
+  }
+  function arrow(from, to, colour) {
+    line(from, to, colour, 2);
+    const p = project(from), q = project(to);
+    if (!p || !q) return;
+    const dx = q[0] - p[0], dy = q[1] - p[1], length = Math.hypot(dx, dy);
+    if (length < 3) return;
+    const h = Math.min(9, length / 2) / length;
+    ink.setLineDash([]); ink.beginPath(); ink.moveTo(q[0] - h * (dx + dy * 0.5), q[1] - h * (dy - dx * 0.5)); ink.lineTo(q[0], q[1]); ink.lineTo(q[0] - h * (dx - dy * 0.5), q[1] - h * (dy + dx * 0.5)); ink.stroke();
+  }
+
+  function drawFloor() {
+    const step = Math.pow(10, Math.floor(Math.log10(size / 2))), half = Math.ceil(size / step / 2) * step;
+    const cx = Math.round(start.target[0] / step) * step, cy = Math.round(start.target[1] / step) * step;
+    for (let k = -half; k <= half + step / 2; k += step) {
+      line([cx + k, cy - half, floor], [cx + k, cy + half, floor], colours.line, 1);
+      line([cx - half, cy + k, floor], [cx + half, cy + k, floor], colours.line, 1);
+    }
+  }
+  function drawRobot(rows, colour, width, dash) {
+    view.frames.forEach(function (frame, i) {
+      if (frame.parent !== null) line(rows[frame.parent], rows[i], colour, width, dash);
+    });
+  }
+  function drawAxes(rows) {
+    const long = size * 0.035, names = [colours.bad, colours.s2, colours.s0];
+    rows.forEach(function (row) {
+      for (let k = 0; k < 3; k++) { const e = [0, 0, 0]; e[k] = long; line(row, add(row, rotate(row.slice(3), e), 1), names[k], 1.5); }
+    });
+  }
+  function drawJoints() {
+    for (const s of view.spheres) {
+      for (const n of [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) ring(s.center, n, s.radius, colours.s2, 0.7);
+      dot(s.center, colours.s2, 3);
+      if (s.sigma) for (const n of [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) ring(s.center, n, factor * s.sigma, colours.bad, 1, [3, 3]);
+      if (shown.names) text(s.center, s.name, colours.s2);
+    }
+    for (const c of view.circles) ring(c.center, c.normal, c.radius, colours.s2, 1);
+    for (const a of view.axes) {
+      const ends = [-1, 1].map(function (sign) { return add(a.point, a.direction, sign * a.half_length); });
+      line(ends[0], ends[1], colours.s2, 2);
+      const sigma = Math.hypot(a.sigma_point || 0, (a.sigma_direction || 0) * a.half_length);
+      if (sigma > 0) {
+        for (const end of ends) ring(end, a.direction, factor * sigma, colours.bad, 1, [3, 3]);
+        ring(a.point, a.direction, factor * (a.sigma_point || 0), colours.bad, 1, [3, 3]);
+      }
+      if (shown.names) text(ends[1], a.name, colours.s2);
+    }
+  }
+  function draw() {
+    const ratio = window.devicePixelRatio || 1, w = canvas.clientWidth, h = canvas.clientHeight;
+    if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) { canvas.width = Math.round(w * ratio); canvas.height = Math.round(h * ratio); }
+    ink.setTransform(ratio, 0, 0, ratio, 0, 0);
+    ink.fillStyle = colours.paper; ink.fillRect(0, 0, w, h);
+    ink.font = "12px system-ui, sans-serif"; ink.lineCap = "round";
+    drawFloor();
+    if (shown.sweeps) for (const cloud of view.clouds) {
+      ink.globalAlpha = 0.55;
+      for (const p of cloud.points) dot(p, colours.soft, 1.3);
+      ink.globalAlpha = 1;
+    }
+    if (shown.joints) drawJoints();
+    const now = view.poses[pose];
+    if (!now) return;
+    if (shown.nominal && now.nominal.length) drawRobot(now.nominal, colours.s1, 2, [6, 5]);
+    if (shown.calibrated) { drawRobot(now.calibrated, colours.s0, 4); drawAxes(now.calibrated); for (const row of now.calibrated) dot(row, colours.s0, 3.5); }
+    for (const m of now.markers) {
+      if (shown.markers) { if (m.observed) dot(m.observed, colours.s3, 4); dot(m.predicted, colours.s3, 5.5, true); }
+      if (shown.residuals && m.observed) arrow(m.observed, add(m.observed, [0, 1, 2].map(function (i) { return m.predicted[i] - m.observed[i]; }), factor), colours.bad);
+    }
+    if (shown.names && shown.calibrated) view.frames.forEach(function (frame, i) { text(now.calibrated[i], frame.name, colours.ink); });
+  }
+
+  function readColours() {
+    const style = getComputedStyle(document.documentElement);
+    for (const name of ["paper", "ink", "soft", "line", "bad", "s0", "s1", "s2", "s3"]) colours[name] = style.getPropertyValue("--" + name).trim();
+    draw();
+  }
+  function setPose(i) {
+    pose = Math.max(0, Math.min(view.poses.length - 1, i));
+    const now = view.poses[pose], slider = document.getElementById("pose");
+    if (slider) slider.value = pose;
+    const words = now ? "Pose " + (pose + 1) + " of " + view.poses.length + ": " + now.name + (now.text ? ", " + now.text : "") : "";
+    if (slider) slider.setAttribute("aria-valuetext", words);
+    document.getElementById("view-status").textContent = words;
+    draw();
+  }
+  function turn(dx, dy) { camera.turn += dx; camera.tilt = Math.max(-1.5, Math.min(1.55, camera.tilt + dy)); draw(); }
+  function move(dx, dy) {
+    const k = size / camera.zoom / 500, ct = Math.cos(camera.turn), st = Math.sin(camera.turn);
+    const ce = Math.cos(camera.tilt), se = Math.sin(camera.tilt);
+    camera.target = add(add(camera.target, [ct, -st, 0], -dx * k), [se * st, se * ct, ce], dy * k);
+    draw();
+  }
+  function zoom(by) { camera.zoom = Math.max(0.2, Math.min(60, camera.zoom * by)); draw(); }
+
+  for (const [id, name, colour, on] of layers) {
+    shown[id] = on;
+    const label = document.createElement("label"), box = document.createElement("input"), swatch = document.createElement("i");
+    box.type = "checkbox"; box.checked = on; swatch.style.background = "var(--" + colour + ")"; swatch.setAttribute("aria-hidden", "true");
+    box.addEventListener("change", function () { shown[id] = box.checked; draw(); });
+    label.append(box, swatch, name);
+    document.getElementById("layers").append(label);
+  }
+  const slider = document.getElementById("pose");
+  if (slider) slider.addEventListener("input", function () { setPose(Number(slider.value)); });
+  const magnify = document.getElementById("factor");
+  magnify.value = Math.log10(Math.max(1, factor));
+  magnify.addEventListener("input", function () {
+    factor = Math.round(Math.pow(10, Number(magnify.value)));
+    document.getElementById("factor-text").textContent = factor;
+    draw();
+  });
+  document.getElementById("reset").addEventListener("click", reset);
+
+  const touches = new Map();
+  canvas.addEventListener("pointerdown", function (e) { touches.set(e.pointerId, [e.clientX, e.clientY]); canvas.setPointerCapture(e.pointerId); });
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, function (e) { touches.delete(e.pointerId); });
+  canvas.addEventListener("pointermove", function (e) {
+    const before = touches.get(e.pointerId);
+    if (!before) return;
+    const dx = e.clientX - before[0], dy = e.clientY - before[1];
+    if (touches.size === 2) {
+      const other = [...touches].find(function (t) { return t[0] !== e.pointerId; })[1];
+      const apart = Math.hypot(e.clientX - other[0], e.clientY - other[1]), was = Math.hypot(before[0] - other[0], before[1] - other[1]);
+      if (was > 0) zoom(apart / was);
+    } else if (e.shiftKey || e.buttons === 2 || e.buttons === 4) move(dx, dy); else turn(dx * 0.008, dy * 0.008);
+    touches.set(e.pointerId, [e.clientX, e.clientY]);
+  });
+  canvas.addEventListener("contextmenu", function (e) { e.preventDefault(); });
+  canvas.addEventListener("wheel", function (e) { e.preventDefault(); zoom(Math.exp(-e.deltaY * 0.0012)); }, { passive: false });
+  canvas.addEventListener("keydown", function (e) {
+    const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[e.key];
+    if (arrows && e.shiftKey) move(arrows[0] * 20, arrows[1] * 20);
+    else if (arrows) turn(arrows[0] * 0.1, arrows[1] * 0.1);
+    else if (e.key === "+" || e.key === "=") zoom(1.15);
+    else if (e.key === "-") zoom(1 / 1.15);
+    else if (e.key === "0") reset();
+    else if (e.key === "PageUp") setPose(pose - 1);
+    else if (e.key === "PageDown") setPose(pose + 1);
+    else return;
+    e.preventDefault();
+  });
+
+  frameAll();
+  reset();
+  readColours();
+  setPose(0);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readColours);
+  window.addEventListener("beforeprint", readColours);
+  window.addEventListener("afterprint", readColours);
+  if (window.ResizeObserver) new ResizeObserver(draw).observe(canvas); else window.addEventListener("resize", draw);
+  canvas.dataset.ready = "yes";
+})();

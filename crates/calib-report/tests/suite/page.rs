@@ -1,0 +1,192 @@
+//! `report.html`: its data as snapshots, its rules as tests, its answers as a browser shows them.
+
+use crate::examples;
+use calib_report::{Report, View3d, answers, html::html, json, plots};
+use insta::assert_snapshot;
+use std::path::PathBuf;
+use std::process::Command;
+
+/// The issue's limit for one file that is mailed around.
+const MAX_BYTES: usize = 3_000_000;
+
+fn pages() -> Vec<(&'static str, Report, String)> {
+    let view = examples::view();
+    let page = |(name, report): (&'static str, Report)| {
+        let text = html(&report, (name == "accepted").then_some(&view)).expect("a page");
+        (name, report, text)
+    };
+    examples::all().into_iter().map(page).collect()
+}
+
+#[test]
+fn the_pictures_of_the_examples_as_data() {
+    for (name, report) in examples::all() {
+        let mut plots = plots::plots(&report);
+        for plot in &mut plots {
+            match &mut plot.kind {
+                plots::PlotKind::Map { panels, .. } => {
+                    panels.iter_mut().for_each(|panel| panel.points.truncate(2))
+                }
+                plots::PlotKind::Xy { series, .. } => series
+                    .iter_mut()
+                    .for_each(|series| series.points.truncate(3)),
+                plots::PlotKind::Rows { .. } | plots::PlotKind::Strips { .. } => {}
+            }
+        }
+        let value = json::rounded(serde_json::to_value(&plots).expect("JSON"));
+        assert_snapshot!(format!("plots_{name}"), json::pretty(&value));
+    }
+}
+
+#[test]
+fn a_page_loads_nothing_and_is_small() {
+    for (name, _, text) in pages() {
+        assert!(text.len() < MAX_BYTES, "{name}: {} bytes", text.len());
+        for forbidden in ["http://", "https://", "src=", "@import", "url(", "NaN"] {
+            assert!(!text.contains(forbidden), "{name} contains {forbidden}");
+        }
+        assert!(text.contains("default-src 'none'"));
+    }
+}
+
+#[test]
+fn a_large_report_stays_below_the_limit() {
+    let mut report = examples::rejected();
+    let poses = report
+        .verification
+        .held_out
+        .as_mut()
+        .expect("held-out poses");
+    poses.poses = poses.poses.iter().cycle().take(2000).cloned().collect();
+    let mut view = examples::view();
+    view.clouds[0].points = vec![[0.123_456, -1.234_567, 0.765_432]; 200_000];
+    view.poses = view.poses.iter().cycle().take(2000).cloned().collect();
+    let text = html(&report, Some(&view)).expect("a page");
+    assert!(text.len() < MAX_BYTES, "{} bytes", text.len());
+}
+
+#[test]
+fn ids_are_unique_and_every_link_has_a_target() {
+    for (name, _, text) in pages() {
+        let after = |mark: &str| {
+            text.split(mark)
+                .skip(1)
+                .filter_map(|rest| rest.split('"').next())
+                .map(str::to_owned)
+                .collect::<Vec<_>>()
+        };
+        let mut ids = after(" id=\"");
+        for target in after("href=\"#").into_iter().chain(
+            after("aria-labelledby=\"")
+                .iter()
+                .flat_map(|ids| ids.split(' ').map(str::to_owned).collect::<Vec<_>>()),
+        ) {
+            assert!(ids.contains(&target), "{name}: nothing has the id {target}");
+        }
+        let count = ids.len();
+        ids.sort();
+        ids.dedup();
+        assert_eq!(ids.len(), count, "{name}");
+    }
+}
+
+#[test]
+fn hostile_names_stay_text() {
+    let mut report = examples::accepted();
+    let hostile = "</script><img src=x onerror=alert(1)>`\"'&";
+    report.robot = hostile.into();
+    report.reasons = vec![hostile.into()];
+    report.transforms[0].name = hostile.into();
+    report.coverage[0].joint = hostile.into();
+    report.reproduce = vec![hostile.into()];
+    let mut view = examples::view();
+    view.poses[0].name = hostile.into();
+    let text = html(&report, Some(&view)).expect("a page");
+    assert!(!text.contains("<img"), "markup got through");
+}
+
+#[test]
+fn a_report_without_a_view_has_no_script() {
+    let text = html(&examples::rejected(), None).expect("a page");
+    assert!(!text.contains("<script"));
+    let text = html(&examples::rejected(), Some(&View3d::default())).expect("a page");
+    assert!(!text.contains("<script"));
+}
+
+/// The page as Chromium builds it, with what it said on the console; `None` when no browser is installed.
+fn in_browser(name: &str, text: &str) -> Option<(String, String)> {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("page-{name}"));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let page = folder.join("report.html");
+    std::fs::write(&page, text).expect("a file");
+    for browser in ["chromium", "chromium-browser", "google-chrome"] {
+        let out = Command::new(browser)
+            .args([
+                "--headless",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--disable-quic",
+                "--no-first-run",
+                "--disable-background-networking",
+            ])
+            .args([
+                "--disable-component-update",
+                "--disable-sync",
+                "--enable-logging=stderr",
+                "--dump-dom",
+                "--virtual-time-budget=2000",
+            ])
+            .arg(format!(
+                "--user-data-dir={}",
+                folder.join("profile").display()
+            ))
+            .arg(format!("file://{}", page.display()))
+            .output();
+        if let Ok(out) = out {
+            return Some((
+                String::from_utf8_lossy(&out.stdout).into_owned(),
+                String::from_utf8_lossy(&out.stderr).into_owned(),
+            ));
+        }
+    }
+    None
+}
+
+#[test]
+fn a_browser_finds_the_twelve_answers_by_their_headings() {
+    for (name, report, text) in pages() {
+        let Some((dom, log)) = in_browser(name, &text) else {
+            println!("skipped: no Chromium is installed");
+            return;
+        };
+        let console: Vec<&str> = log
+            .lines()
+            .filter(|line| line.contains("CONSOLE"))
+            .collect();
+        assert!(console.is_empty(), "{name}: {console:?}");
+        for answer in answers(&report) {
+            let heading = format!("<h2 id=\"{}\">{}</h2>", answer.id, answer.question);
+            let after = dom
+                .split(&heading)
+                .nth(1)
+                .unwrap_or_else(|| panic!("{name}: no heading {heading}"));
+            let part = after.split("</section>").next().unwrap_or("");
+            assert_eq!(
+                part.matches("<p>").count(),
+                answer.lines.len(),
+                "{name}: {}",
+                answer.id
+            );
+        }
+        if name == "accepted" {
+            assert!(
+                dom.contains("data-ready=\"yes\""),
+                "the 3-D view did not start"
+            );
+            assert!(
+                dom.contains("Pose 1 of 10: check 1"),
+                "the view does not say its pose"
+            );
+        }
+    }
+}
