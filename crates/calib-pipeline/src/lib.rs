@@ -1,1 +1,23 @@
-//! The stages of a calibration, in order.
+//! The stages of a calibration, in order. The only crate that knows them all.
+//!
+//! ```text
+//! profile ─ load ─► Inputs ─ tracks ─► BodyTracks ─┬─ paper ─► OriginEstimate[]      closed forms, each origin alone
+//!                                                  └─ ml ────► MlFit                 all loops at once
+//! estimates ─ kinematics ─► Calibration (corrected robot, mounts, where the robot stands)
+//! Calibration + validation ─ verify, closure ─► held-out errors, loops
+//! Calibration ─ export ─► patched URDF, scene        everything ─ assemble ─► Report
+//! ```
+//!
+//! Stages are functions of plain values. Only [`load`] reads files and only [`write`] writes them.
+
+pub mod error;
+pub mod kinematics;
+pub mod load;
+pub mod loads;
+pub mod ml;
+pub mod simulate;
+pub mod start;
+pub mod tracks;
+pub mod write;
+
+pub use error::{ExitCode, PipelineError};

@@ -232,6 +232,23 @@ pub struct JointFreedom {
     pub offset_sigma: f64,
 }
 
+impl JointFreedom {
+    /// The same joint with nothing free.
+    #[must_use]
+    pub fn held(self) -> Self {
+        Self {
+            origin: OriginFreedom::Held,
+            offset: false,
+            gain: false,
+            eccentricity: false,
+            compliance: false,
+            lateral_compliance: false,
+            coupled_to: Vec::new(),
+            ..self
+        }
+    }
+}
+
 impl Solve {
     /// What is free of `joint`; `moved` tells whether the fitted recordings move it, `slides` whether it is prismatic.
     #[must_use]

@@ -1,0 +1,139 @@
+//! What can go wrong, and with which exit code the program ends.
+
+use std::path::{Path, PathBuf};
+
+/// Exit codes of the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ExitCode {
+    /// Finished and accepted.
+    Accepted = 0,
+    /// Finished; the verdict is not a pass.
+    VerdictFail = 1,
+    /// Wrong usage, or a wrong profile or robot description.
+    Usage = 2,
+    /// The data cannot be read or are not usable.
+    Data = 3,
+    /// A requested quantity is not observable.
+    NotObservable = 4,
+    /// The solver did not converge.
+    NotConverged = 5,
+    /// A plugin failed.
+    Plugin = 6,
+    /// The output could not be written.
+    NotWritten = 7,
+}
+
+/// Why a stage stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum PipelineError {
+    /// A file that must be read cannot be.
+    #[error("{path}: cannot be read: {source}")]
+    Read {
+        /// The file.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file that must be text is not.
+    #[error("{path}: is not UTF-8 text (byte {offset}); save it as UTF-8")]
+    NotText {
+        /// The file.
+        path: String,
+        /// First bad byte.
+        offset: usize,
+    },
+    /// The profile is wrong.
+    #[error("{0}")]
+    Profile(#[from] calib_profile::ProfileError),
+    /// The robot description is wrong.
+    #[error("{0}")]
+    Urdf(#[from] calib_urdf::ReadError),
+    /// A recording is wrong.
+    #[error("{0}")]
+    Recording(#[from] calib_recording::Error),
+    /// Recordings do not hold what the profile asks of them.
+    #[error("{file}: {finding}\n  help: {remedy}")]
+    Data {
+        /// The file.
+        file: String,
+        /// What was found.
+        finding: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// The profile asks for something that does not go together.
+    #[error("{finding}\n  help: {remedy}")]
+    Usage {
+        /// What was found.
+        finding: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// The simulation cannot be made.
+    #[error("{0}")]
+    Simulation(#[from] calib_sim::SimError),
+    /// The solver refused the problem.
+    #[error("the estimation problem cannot be stated: {0}")]
+    Solve(#[from] calib_core::Error),
+    /// The patched robot description is not what was asked for.
+    #[error("{file}: the URDF cannot be patched: {text}")]
+    Patch {
+        /// The URDF.
+        file: String,
+        /// Why.
+        text: String,
+    },
+    /// The output could not be written; nothing was left half-written.
+    #[error("{path}: cannot be written: {source}")]
+    Write {
+        /// The file or folder.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Something that is there already would be overwritten.
+    #[error(
+        "{path} exists already and was not made by this program\n  help: choose another folder with --out"
+    )]
+    Exists {
+        /// The file.
+        path: String,
+    },
+    /// The report or scene could not be rendered.
+    #[error("the report cannot be written: {0}")]
+    Report(#[from] calib_report::ReportError),
+}
+
+impl PipelineError {
+    /// The exit code of this error.
+    #[must_use]
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Profile(_) | Self::Urdf(_) | Self::Usage { .. } | Self::Simulation(_) => {
+                ExitCode::Usage
+            }
+            Self::Read { .. } | Self::NotText { .. } | Self::Recording(_) | Self::Data { .. } => {
+                ExitCode::Data
+            }
+            Self::Solve(_) => ExitCode::NotConverged,
+            Self::Patch { .. } | Self::Write { .. } | Self::Exists { .. } | Self::Report(_) => {
+                ExitCode::NotWritten
+            }
+        }
+    }
+
+    pub(crate) fn write(path: &Path, source: std::io::Error) -> Self {
+        Self::Write {
+            path: path.display().to_string(),
+            source,
+        }
+    }
+
+    pub(crate) fn read(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
+        Self::Read {
+            path: path.into().display().to_string(),
+            source,
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Writes results: each file beside its place, then renamed, so that nothing is ever half-written.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use crate::error::PipelineError;
+
+/// A file to be written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OutputFile {
+    /// Name within the output folder.
+    pub name: String,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+}
+
+impl OutputFile {
+    /// A text file.
+    pub fn text(name: impl Into<String>, text: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            bytes: text.into().into_bytes(),
+        }
+    }
+}
+
+/// Name of the list that a folder of results carries: what this program wrote there and may replace.
+pub const MANIFEST: &str = "calib.manifest";
+
+/// Writes all files or none that is incomplete; returns their paths.
+///
+/// Files of an earlier run, listed in the folder's manifest, are replaced; anything else of the same name is kept
+/// and the call fails before a byte is written.
+///
+/// # Errors
+/// [`PipelineError::Exists`] or [`PipelineError::Write`].
+pub fn write_all(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>, PipelineError> {
+    let ours: Vec<String> = std::fs::read_to_string(folder.join(MANIFEST))
+        .map(|text| text.lines().map(str::to_owned).collect())
+        .unwrap_or_default();
+    for file in files {
+        let path = folder.join(&file.name);
+        if path.exists() && !ours.contains(&file.name) {
+            return Err(PipelineError::Exists {
+                path: path.display().to_string(),
+            });
+        }
+    }
+    std::fs::create_dir_all(folder).map_err(|e| PipelineError::write(folder, e))?;
+    let mut staged = Vec::new();
+    for file in files {
+        match stage(folder, file) {
+            Ok(temporary) => staged.push((temporary, folder.join(&file.name))),
+            Err(error) => {
+                for (temporary, _) in &staged {
+                    let _ = std::fs::remove_file(temporary);
+                }
+                return Err(error);
+            }
+        }
+    }
+    let mut names: Vec<&str> = files.iter().map(|f| f.name.as_str()).collect();
+    names.extend(
+        ours.iter()
+            .map(String::as_str)
+            .filter(|n| folder.join(n).exists()),
+    );
+    names.sort_unstable();
+    names.dedup();
+    let manifest = OutputFile::text(MANIFEST, names.join("\n") + "\n");
+    staged.push((stage(folder, &manifest)?, folder.join(MANIFEST)));
+    let mut written = Vec::new();
+    for (temporary, path) in staged {
+        std::fs::rename(&temporary, &path).map_err(|e| PipelineError::write(&path, e))?;
+        written.push(path);
+    }
+    Ok(written)
+}
+
+fn stage(folder: &Path, file: &OutputFile) -> Result<PathBuf, PipelineError> {
+    let temporary = folder.join(format!(".{}.part", file.name));
+    let mut out =
+        std::fs::File::create(&temporary).map_err(|e| PipelineError::write(&temporary, e))?;
+    let result = out.write_all(&file.bytes).and_then(|()| out.sync_all());
+    match result {
+        Ok(()) => Ok(temporary),
+        Err(error) => {
+            let _ = std::fs::remove_file(&temporary);
+            Err(PipelineError::write(&folder.join(&file.name), error))
+        }
+    }
+}
