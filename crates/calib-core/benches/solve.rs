@@ -1,1 +1,71 @@
-fn main() {}
+//! The figures that the project promises: a full solve of 12 000 rows, and the cost of one marker pose.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use calib_core::{MinimizeSettings, Model, Settings, minimize, solve};
+use common::{Chain, Free, rng, six_r};
+
+fn six_r_with_1000_poses(c: &mut Criterion) {
+    let mut r = rng(1);
+    let mut free = Free::frames_and_offsets(6);
+    // 6 world, 6 mount, 4 offsets and three origins as lines: 28 unknowns.
+    for (i, a) in [
+        (2, (0.0, 1.0, 0.0)),
+        (4, (0.0, 0.0, 1.0)),
+        (5, (0.0, 1.0, 0.0)),
+    ] {
+        free.origins[i - 1] = calib_core::Chart::axis_line(&common::axis(a.0, a.1, a.2));
+    }
+    let chain = Chain::nominal(six_r())
+        .posed(&mut r, 1000, 1.4)
+        .deviate(&mut r, &free, 0.01, 0.005);
+    let mut h = chain.problem(&free, 1e-4);
+    chain.observe(&mut r, &mut h, 1e-4, 0.0);
+    let model = Model::new(&h.problem).unwrap();
+    println!("{} rows, {} unknowns", model.rows(), model.free());
+    let weights = vec![1.0; model.observation_count()];
+    let theta = [1e-8];
+    let start = model.start();
+    let fit = minimize(
+        &model,
+        &start,
+        &weights,
+        &theta,
+        &MinimizeSettings::default(),
+    );
+    println!("{:?} after {} linearisations", fit.status, fit.iterations);
+    c.bench_function("full solve, 1000 poses x 4 markers", |b| {
+        b.iter(|| {
+            minimize(
+                &model,
+                &start,
+                &weights,
+                &theta,
+                &MinimizeSettings::default(),
+            )
+        });
+    });
+    let once = MinimizeSettings {
+        max_iterations: 1,
+        ..MinimizeSettings::default()
+    };
+    c.bench_function(
+        "one linearisation and one cost, 1000 poses x 4 markers",
+        |b| {
+            b.iter(|| minimize(&model, &start, &weights, &theta, &once));
+        },
+    );
+    c.bench_function("solve with covariance and observability", |b| {
+        b.iter(|| solve(&h.problem, &Settings::plain()).unwrap());
+    });
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(20);
+    targets = six_r_with_1000_poses
+}
+criterion_main!(benches);

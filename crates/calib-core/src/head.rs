@@ -3,7 +3,7 @@
 //! With `T = from_from_to(s; x)` along the path, residual = predicted ⊟ observed:
 //!
 //! ```text
-//! marker      p − Tᵀ-side of y:   e = p − Rᵀ(y − t)                    3, body axes, m      (1)
+//! marker      e = R p + t − y                                          3, from axes, m      (1)
 //! pose        e = [ Log(R_zᵀ R); R_zᵀ (t − t_z) ]                      6, body axes, rad, m (2)
 //! direction   e = E(d)ᵀ R a,  E(d) spans the plane across d            2, rad               (3)
 //! plane       e = nᵀ (R p + t) − h                                     1, m                 (4)
@@ -140,6 +140,10 @@ pub struct DirectionObservation {
 
 /// Noise of a measured pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one per head, not per observation; a box would cost Copy"
+)]
 pub enum PoseNoise {
     /// Isotropic in orientation and position.
     Split {

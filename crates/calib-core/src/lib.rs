@@ -113,27 +113,41 @@
 
 mod bounded;
 mod chart;
+mod closure;
+mod compare;
 mod dense;
 mod derived;
 mod edge;
 mod error;
+mod folds;
+mod goodness;
 mod head;
 mod ids;
 mod information;
 mod minimize;
 mod model;
+mod noise;
 mod normal;
+mod null_space;
+mod observability;
 mod parameter;
 mod path;
 mod pose;
 mod problem;
+mod relabel;
+mod robust;
 mod rows;
 mod solution;
+mod validate;
 
 pub use chart::Chart;
+pub use closure::{ClosureStatistics, Spread};
+pub use compare::{RankedVariant, compare};
 pub use derived::{Configuration, DerivedPoint, DerivedPose};
 pub use edge::{Axis, Candidate, Edge, EdgeKind, Feature, FeatureKind, Joint, Role, UnknownPose};
 pub use error::Error;
+pub use folds::{folds, k_fold};
+pub use goodness::{GoodnessOfFit, ScoreTest};
 pub use head::{
     DirectionObservation, Head, HeadKind, MarkerObservation, PoseNoise, PoseObservation,
 };
@@ -141,8 +155,13 @@ pub use ids::{EdgeId, FrameId, GroupId, ParameterId, PointId};
 pub use information::{Information, NULL_TOLERANCE};
 pub use minimize::{MinimizeSettings, Minimum, SolveStatus, minimize};
 pub use model::{MIN_JOINT_RANGE, Model, Values};
+pub use noise::sandwich;
+pub use observability::{Direction, Gauge, Observability, Term};
 pub use parameter::{
     DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA, Parameter, ParameterKind, Unit,
 };
 pub use problem::{NoiseGroup, NoiseKind, Point, Problem};
+pub use relabel::{Relabelled, relabel};
+pub use robust::{RejectReason, Rejection, RobustSettings};
 pub use solution::{NoiseEstimate, ParameterClass, ParameterEstimate, Settings, Solution, solve};
+pub use validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};

@@ -38,7 +38,8 @@ pub struct Model {
     /// Largest number of rows in one sample.
     pub(crate) max_rows: usize,
     unmoved: Vec<EdgeId>,
-    skipped: usize,
+    /// (head, sample, item) of observations whose path has no measurement at their sample.
+    lost: Vec<(usize, usize, usize)>,
 }
 
 /// One observation (vector-valued) of one head.
@@ -84,7 +85,7 @@ impl Model {
         }
 
         let mut observations = Vec::new();
-        let mut skipped = 0;
+        let mut lost_items = Vec::new();
         for (h, head) in problem.heads.iter().enumerate() {
             let rows = head.kind.rows();
             for (item, sample) in head.kind.samples().into_iter().enumerate() {
@@ -93,7 +94,7 @@ impl Model {
                         EdgeKind::Measured { poses, .. } if poses[sample].is_none())
                 });
                 if lost {
-                    skipped += 1;
+                    lost_items.push((h, sample, item));
                 } else {
                     observations.push(Observation {
                         sample,
@@ -104,7 +105,10 @@ impl Model {
                 }
             }
         }
-        if observations.is_empty() {
+        if observations
+            .iter()
+            .all(|o: &Observation| problem.held_out.contains(&o.sample))
+        {
             return Err(Error::NoObservations);
         }
         observations.sort_by_key(|o| (o.sample, o.head, o.item));
@@ -154,7 +158,7 @@ impl Model {
             rows,
             max_rows,
             unmoved,
-            skipped,
+            lost: lost_items,
         })
     }
 
@@ -170,10 +174,20 @@ impl Model {
         &self.unmoved
     }
 
-    /// Observations whose sample lacks a measured edge of their path.
+    /// (head, sample, index within the head) of observations whose path has a measured edge that was
+    /// lost at their sample.
     #[must_use]
-    pub fn skipped(&self) -> usize {
-        self.skipped
+    pub fn lost(&self) -> Vec<(String, usize, usize)> {
+        self.lost
+            .iter()
+            .map(|&(h, sample, item)| (self.problem.heads[h].name.clone(), sample, item))
+            .collect()
+    }
+
+    /// Whether a sample is kept for validation.
+    #[must_use]
+    pub fn is_held_out(&self, sample: usize) -> bool {
+        self.problem.held_out.contains(&sample)
     }
 
     /// Number of free parameters.
@@ -306,7 +320,7 @@ fn contract_unmoved(
 ) -> Vec<EdgeId> {
     let on_path: BTreeSet<usize> = walks.iter().flatten().map(|&(e, _)| e.index()).collect();
     let used: Vec<usize> = (0..problem.samples)
-        .filter(|&s| !of_sample[s].is_empty())
+        .filter(|&s| !of_sample[s].is_empty() && !problem.held_out.contains(&s))
         .collect();
     let range_of = |f: &dyn Fn(usize) -> f64| {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -348,10 +362,11 @@ fn contract_unmoved(
     for &e in &unmoved {
         let name = problem.edges[e.index()].name.clone();
         for edge in &problem.edges {
-            if let EdgeKind::Unknown(u) = &edge.kind {
-                if u.role == crate::edge::Role::JointOrigin && u.joint.as_deref() == Some(&name) {
-                    still_parameters.extend(u.parameters.iter().flatten().map(|p| p.index()));
-                }
+            if let EdgeKind::Unknown(u) = &edge.kind
+                && u.role == crate::edge::Role::JointOrigin
+                && u.joint.as_deref() == Some(&name)
+            {
+                still_parameters.extend(u.parameters.iter().flatten().map(|p| p.index()));
             }
         }
     }
@@ -367,7 +382,10 @@ fn random_slots(problem: &Problem, walks: &[Vec<(EdgeId, bool)>]) -> Vec<Slot> {
     let mut slots = Vec::new();
     for &edge in &on_path {
         let (count, group) = match &problem.edges[edge].kind {
-            EdgeKind::Joint(j) => (usize::from(j.noise.is_some()), j.noise.map(|g| g.index())),
+            EdgeKind::Joint(j) => (
+                usize::from(j.noise.is_some()),
+                j.noise.map(super::ids::GroupId::index),
+            ),
             EdgeKind::Random { directions, group } => (directions.len(), Some(group.index())),
             EdgeKind::Measured {
                 covariance: Some(_),
@@ -432,13 +450,13 @@ fn check(problem: &Problem) -> Result<(), Error> {
                         pose(&edge.name, s, x)?;
                     }
                 }
-                if let Some(c) = covariance {
-                    if covariance_directions(c).is_none() {
-                        return Err(Error::NotPositive {
-                            what: format!("{} covariance", edge.name),
-                            value: c.determinant(),
-                        });
-                    }
+                if let Some(c) = covariance
+                    && covariance_directions(c).is_none()
+                {
+                    return Err(Error::NotPositive {
+                        what: format!("{} covariance", edge.name),
+                        value: c.determinant(),
+                    });
                 }
             }
             EdgeKind::Joint(joint) => {
@@ -474,15 +492,15 @@ fn check(problem: &Problem) -> Result<(), Error> {
         if let Some(sigma) = p.prior_sigma {
             positive(&format!("{} prior", p.name), sigma)?;
         }
-        if let Some((lower, upper)) = p.bounds {
-            if !(lower <= p.start && p.start <= upper) {
-                return Err(Error::OutOfBounds {
-                    name: p.name.clone(),
-                    start: p.start,
-                    lower,
-                    upper,
-                });
-            }
+        if let Some((lower, upper)) = p.bounds
+            && !(lower <= p.start && p.start <= upper)
+        {
+            return Err(Error::OutOfBounds {
+                name: p.name.clone(),
+                start: p.start,
+                lower,
+                upper,
+            });
         }
     }
     for g in &problem.groups {
@@ -525,13 +543,13 @@ fn check(problem: &Problem) -> Result<(), Error> {
                             sample: o.sample,
                         });
                     }
-                    if let Some(shape) = o.shape {
-                        if nalgebra::Cholesky::new(shape).is_none() {
-                            return Err(Error::NotPositive {
-                                what: format!("{} covariance", head.name),
-                                value: shape.determinant(),
-                            });
-                        }
+                    if let Some(shape) = o.shape
+                        && nalgebra::Cholesky::new(shape).is_none()
+                    {
+                        return Err(Error::NotPositive {
+                            what: format!("{} covariance", head.name),
+                            value: shape.determinant(),
+                        });
                     }
                 }
             }
@@ -573,13 +591,13 @@ fn check(problem: &Problem) -> Result<(), Error> {
 }
 
 fn check_noise(head: &str, noise: &PoseNoise) -> Result<(), Error> {
-    if let PoseNoise::Full { shape, .. } = noise {
-        if nalgebra::Cholesky::new(*shape).is_none() {
-            return Err(Error::NotPositive {
-                what: format!("{head} covariance"),
-                value: shape.determinant(),
-            });
-        }
+    if let PoseNoise::Full { shape, .. } = noise
+        && nalgebra::Cholesky::new(*shape).is_none()
+    {
+        return Err(Error::NotPositive {
+            what: format!("{head} covariance"),
+            value: shape.determinant(),
+        });
     }
     Ok(())
 }

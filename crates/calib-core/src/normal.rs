@@ -40,6 +40,10 @@ impl NormalEquations {
 pub(crate) struct Workspace {
     pub cache: EdgeCache,
     pub rows: SampleRows,
+    /// Cholesky factors of every V_s at the last linearisation, where random effects make V_s depend
+    /// on the values: a step is judged by the same V_s that proposed it. (With V_s moving along, the
+    /// cost would reward values that only make the noise look larger.)
+    factors: Vec<f64>,
 }
 
 impl Workspace {
@@ -47,6 +51,7 @@ impl Workspace {
         Self {
             cache: EdgeCache::new(&model.problem),
             rows: SampleRows::new(model),
+            factors: Vec::new(),
         }
     }
 }
@@ -65,6 +70,8 @@ pub(crate) fn accumulate(
     out.g.fill(0.0);
     out.data = 0.0;
     work.cache.update(&model.problem, values);
+    let keep = !model.slots.is_empty();
+    work.factors.clear();
     let rows = &mut work.rows;
     for sample in 0..model.problem.samples {
         if model.of_sample[sample].is_empty() {
@@ -81,6 +88,9 @@ pub(crate) fn accumulate(
         rows.covariance(model, weights, theta);
         if rows.factor().is_none() {
             return false;
+        }
+        if keep {
+            work.factors.extend_from_slice(&rows.v[..rows.m * rows.m]);
         }
         rows.whiten(true);
         out.data += rows.squared_norm();
@@ -117,7 +127,8 @@ fn add_prior(model: &Model, values: &Values, out: &mut NormalEquations) {
     }
 }
 
-/// Equation (2), doubled; infinite where it cannot be computed.
+/// Equation (2), doubled, at trial values with the V_s of the last [`accumulate`]; infinite where it
+/// cannot be computed.
 pub(crate) fn cost(
     model: &Model,
     values: &Values,
@@ -125,26 +136,7 @@ pub(crate) fn cost(
     theta: &[f64],
     work: &mut Workspace,
 ) -> f64 {
-    work.cache.update(&model.problem, values);
-    let rows = &mut work.rows;
-    let wanted = if model.slots.is_empty() {
-        Derivatives::None
-    } else {
-        Derivatives::Random
-    };
-    let mut sum = 0.0;
-    for sample in 0..model.problem.samples {
-        if model.of_sample[sample].is_empty() {
-            continue;
-        }
-        rows.fill(model, &work.cache, values, weights, sample, wanted);
-        rows.covariance(model, weights, theta);
-        if rows.factor().is_none() {
-            return f64::INFINITY;
-        }
-        rows.whiten(false);
-        sum += rows.squared_norm();
-    }
+    let mut sum = evaluate_cost(model, values, weights, theta, work, !model.slots.is_empty());
     for &p in &model.columns {
         let parameter = &model.problem.parameters[p];
         if let Some(sigma) = parameter.prior_sigma {
@@ -153,4 +145,53 @@ pub(crate) fn cost(
         }
     }
     if sum.is_finite() { sum } else { f64::INFINITY }
+}
+
+/// eᵀV⁻¹e over all samples with V_s at these values; infinite where it cannot be computed.
+pub(crate) fn data_cost(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+) -> f64 {
+    evaluate_cost(model, values, weights, theta, work, false)
+}
+
+fn evaluate_cost(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+    stored: bool,
+) -> f64 {
+    work.cache.update(&model.problem, values);
+    let rows = &mut work.rows;
+    let wanted = if model.slots.is_empty() || stored {
+        Derivatives::None
+    } else {
+        Derivatives::Random
+    };
+    let mut sum = 0.0;
+    let mut at = 0;
+    for sample in 0..model.problem.samples {
+        if model.of_sample[sample].is_empty() {
+            continue;
+        }
+        rows.fill(model, &work.cache, values, weights, sample, wanted);
+        if stored {
+            let size = rows.m * rows.m;
+            rows.v[..size].copy_from_slice(&work.factors[at..at + size]);
+            at += size;
+        } else {
+            rows.covariance(model, weights, theta);
+            if rows.factor().is_none() {
+                return f64::INFINITY;
+            }
+        }
+        rows.whiten(false);
+        sum += rows.squared_norm();
+    }
+    sum
 }

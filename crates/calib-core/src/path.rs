@@ -146,7 +146,7 @@ impl CompiledPath {
                     let directions: Vec<Vector6<f64>> = covariance
                         .as_ref()
                         .and_then(covariance_directions)
-                        .map(|l| l.column_iter().map(|c| c.into_owned()).collect())
+                        .map(|l| l.column_iter().map(nalgebra::Matrix::into_owned).collect())
                         .unwrap_or_default();
                     Step::Measured {
                         edge: e,
@@ -263,43 +263,59 @@ impl CompiledPath {
         suffix
     }
 
-    /// Directions `∂ξ/∂φ`-like of a single joint effect at this path's end, for effects that are not
-    /// in the model: body twist per unit coefficient of a regressor of value 1.
-    pub(crate) fn effect(
+    /// For every joint on the path (once per occurrence): body twists of the path's end per unit of
+    /// motion along its axis and per unit of rotation about its two lateral axes, for effects that
+    /// are not in the model. Returns `T(s; x)`.
+    pub(crate) fn effects(
         &self,
         problem: &Problem,
         cache: &EdgeCache,
         values: &Values,
         sample: usize,
-        edge: usize,
-        lateral: Option<usize>,
-    ) -> Vector6<f64> {
-        let mut out = self.buffer();
-        let mut sum = Vector6::zeros();
-        for (k, step) in self.steps.iter().enumerate() {
-            let Step::Joint {
-                edge: e, inverse, ..
-            } = step
-            else {
-                continue;
+        out: &mut Vec<(usize, [Vector6<f64>; 3])>,
+    ) -> Pose {
+        out.clear();
+        let mut suffix = Pose::identity();
+        for step in self.steps.iter().rev() {
+            suffix = match step {
+                Step::Constant(x) => x.then(&suffix),
+                Step::Unknown { edge, inverse, .. } => {
+                    oriented(cache.pose[*edge], *inverse).then(&suffix)
+                }
+                Step::Joint { edge, inverse, .. } => {
+                    let EdgeKind::Joint(joint) = &problem.edges[*edge].kind else {
+                        continue;
+                    };
+                    out.push((
+                        *edge,
+                        [None, Some(0), Some(1)].map(|lateral| {
+                            joint_direction(joint, values, sample, *inverse, lateral, &suffix)
+                        }),
+                    ));
+                    joint_pose(joint, values, sample, *inverse).then(&suffix)
+                }
+                Step::Measured { edge, inverse, .. } => {
+                    let EdgeKind::Measured { poses, .. } = &problem.edges[*edge].kind else {
+                        continue;
+                    };
+                    let x = poses[sample].as_ref().map_or_else(Pose::identity, Pose::of);
+                    oriented(x, *inverse).then(&suffix)
+                }
+                Step::Random { .. } => suffix,
             };
-            if *e != edge {
-                continue;
-            }
-            let EdgeKind::Joint(joint) = &problem.edges[edge].kind else {
-                continue;
-            };
-            let behind = Self {
-                steps: self.steps[k + 1..].to_vec(),
-                columns: self.columns.clone(),
-                slots: self.slots.clone(),
-            };
-            let suffix =
-                behind.evaluate(problem, cache, values, sample, Derivatives::None, &mut out);
-            sum += joint_direction(joint, values, sample, *inverse, lateral, &suffix);
         }
-        sum
+        suffix
     }
+}
+
+/// The joint's transform at a sample, in the direction of walking.
+fn joint_pose(joint: &Joint, values: &Values, sample: usize, inverse: bool) -> Pose {
+    let (phi, theta) = motion(joint, values, sample);
+    let mut x = screw_motion(&joint.axis, phi);
+    if let Some(theta) = theta {
+        x.r *= so3::exp(&theta).to_rotation_matrix().matrix();
+    }
+    oriented(x, inverse)
 }
 
 fn oriented(x: Pose, inverse: bool) -> Pose {

@@ -65,6 +65,8 @@ pub struct Problem {
     pub(crate) heads: Vec<Head>,
     /// Time of each sample, s (optional; the goodness-of-fit test looks for drift along it).
     pub times: Option<Vec<f64>>,
+    /// Samples that are predicted but not fitted to.
+    pub held_out: std::collections::BTreeSet<usize>,
 }
 
 impl Problem {

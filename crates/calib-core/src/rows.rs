@@ -35,12 +35,15 @@ pub(crate) struct SampleRows {
     buffers: Vec<PathBuffer>,
 }
 
+/// Columns of a point's coordinates, and ∂e/∂p by rows.
+type PointRows = ([Option<usize>; 3], [[f64; 3]; 6]);
+
 /// Rows of one observation against the body twist, before the chain rule.
-struct HeadRows {
-    e: [f64; 6],
-    m: [[f64; 6]; 6],
+pub(crate) struct HeadRows {
+    pub e: [f64; 6],
+    pub m: [[f64; 6]; 6],
     /// ∂e/∂(point coordinates), rows × 3.
-    point: Option<([Option<usize>; 3], [[f64; 3]; 6])>,
+    point: Option<PointRows>,
 }
 
 impl SampleRows {
@@ -55,7 +58,11 @@ impl SampleRows {
             g: vec![0.0; m * k],
             v: vec![0.0; m * m],
             blocks: Vec::with_capacity(m),
-            buffers: model.paths.iter().map(|p| p.buffer()).collect(),
+            buffers: model
+                .paths
+                .iter()
+                .map(super::path::CompiledPath::buffer)
+                .collect(),
         }
     }
 
@@ -205,7 +212,7 @@ impl SampleRows {
 }
 
 #[inline]
-fn dot(row: &[f64; 6], twist: &Vector6<f64>) -> f64 {
+pub(crate) fn dot(row: &[f64; 6], twist: &Vector6<f64>) -> f64 {
     row[0] * twist[0]
         + row[1] * twist[1]
         + row[2] * twist[2]
@@ -275,7 +282,13 @@ pub(crate) fn tangent_basis(d: &Vector3<f64>) -> [Vector3<f64>; 2] {
 }
 
 /// Equations (1)–(7) of the heads at the path's pose.
-fn residual(model: &Model, values: &Values, head: usize, item: usize, pose: &Pose) -> HeadRows {
+pub(crate) fn residual(
+    model: &Model,
+    values: &Values,
+    head: usize,
+    item: usize,
+    pose: &Pose,
+) -> HeadRows {
     let mut out = HeadRows {
         e: [0.0; 6],
         m: [[0.0; 6]; 6],
@@ -285,17 +298,12 @@ fn residual(model: &Model, values: &Values, head: usize, item: usize, pose: &Pos
         HeadKind::Markers { observations, .. } => {
             let o = &observations[item];
             let p = model.point_position(o.point.index(), values).coords;
-            if o.shape.is_none() {
-                // u = Rᵀ(y − t), e = p − u; de = [−[u]ₓ, I] ξ + dp
-                let u = pose.r.tr_mul(&(o.position.coords - pose.t));
-                set_point_rows(&mut out, &Matrix3::identity(), &u, &(p - u));
-                out.point = point_columns(model, o.point.index(), &Matrix3::identity(), 3);
-            } else {
-                // Covariance is stated in `from`: keep the residual there. e = R p + t − y
-                let e = pose.r * p + pose.t - o.position.coords;
-                set_point_rows(&mut out, &pose.r, &p, &e);
-                out.point = point_columns(model, o.point.index(), &pose.r, 3);
-            }
+            // e = R p + t − y; de = R (−[p]ₓ ω + v + dp). Never −[Rᵀ(y − t)]ₓ, which is as good a
+            // derivative of e turned into the body, but lets the noise of y into the Jacobian: it
+            // would then see turns of the body that no marker can show.
+            let e = pose.r * p + pose.t - o.position.coords;
+            set_point_rows(&mut out, &pose.r, &p, &e);
+            out.point = point_columns(model, o.point.index(), &pose.r, 3);
         }
         HeadKind::Poses { observations, .. } => {
             pose_rows(&mut out, &Pose::of(&observations[item].pose), pose);
@@ -407,12 +415,7 @@ fn project(
 }
 
 /// Columns of a point's coordinates and the first `rows` rows of ∂e/∂p = A.
-fn point_columns(
-    model: &Model,
-    point: usize,
-    a: &Matrix3<f64>,
-    rows: usize,
-) -> Option<([Option<usize>; 3], [[f64; 3]; 6])> {
+fn point_columns(model: &Model, point: usize, a: &Matrix3<f64>, rows: usize) -> Option<PointRows> {
     let ids = model.problem.points[point].parameters?;
     let columns = ids.map(|id| model.column_of[id.index()]);
     let mut jacobian = [[0.0; 3]; 6];

@@ -1,13 +1,21 @@
 //! The whole estimate: values, their uncertainty, and what is not known.
+//!
+//! ```text
+//! start ─► minimise ─► Huber ─► GNC ─► gate ─► minimise ⇄ REML ─► gate again until it stays ─► analyse
+//! ```
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 use crate::information::{INDETERMINATE, Information};
-use crate::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize};
+use crate::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize_in};
 use crate::model::{Model, Values};
+use crate::noise::{Scoring, score};
+use crate::normal::{NormalEquations, Workspace};
+use crate::observability::{Observability, observe};
 use crate::parameter::{ParameterKind, Unit};
 use crate::problem::{NoiseKind, Problem};
+use crate::robust::{RejectReason, Rejection, RobustSettings, clean, explain, gate};
 
 /// How far a parameter is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,6 +57,18 @@ pub struct ParameterEstimate {
     pub at_bound: bool,
 }
 
+impl ParameterEstimate {
+    /// Is nominal a statement about this parameter (not just where its chart begins)? World frames and
+    /// mounts without prior have no nominal value to agree with.
+    pub(crate) fn prior_or_feature(&self) -> bool {
+        self.joint.is_some()
+            || !matches!(
+                self.kind,
+                ParameterKind::Rotation | ParameterKind::Translation | ParameterKind::Point
+            )
+    }
+}
+
 /// One noise level after the fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NoiseEstimate {
@@ -60,6 +80,8 @@ pub struct NoiseEstimate {
     pub stated: f64,
     /// σ that was used in the end.
     pub sigma: f64,
+    /// Standard error of `sigma` divided by `sigma`, where the residuals decided it.
+    pub relative_error: Option<f64>,
     /// Whether the residuals decided it.
     pub estimated: bool,
 }
@@ -75,8 +97,11 @@ pub struct Solution {
     pub status: SolveStatus,
     /// Linearisations over all rounds.
     pub iterations: usize,
-    /// eᵀV⁻¹e of the kept observations.
+    /// eᵀV⁻¹e of the kept observations, V with the noise levels as used.
     pub chi2: f64,
+    /// The same with the noise levels as stated: against `degrees_of_freedom` it shows missing physics
+    /// that estimated noise has swallowed.
+    pub chi2_stated: f64,
     /// Rows minus the parameters that the data determined.
     pub degrees_of_freedom: f64,
     /// Parameters, in the order of the problem.
@@ -85,18 +110,52 @@ pub struct Solution {
     pub noise: Vec<NoiseEstimate>,
     /// Spectrum and covariance.
     pub information: Information,
-    /// Robust weight per observation: 0 rejected, 1 kept.
+    /// Null space and weak directions, in words.
+    pub observability: Observability,
+    /// Robust weight per observation: 0 rejected or held out, 1 kept.
     pub weights: Vec<f64>,
+    /// Observations that were left out, with reasons.
+    pub rejected: Vec<Rejection>,
     /// σ² per noise group, as used.
     pub theta: Vec<f64>,
 }
 
 /// How to solve.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Limits of the minimisation.
     pub minimize: MinimizeSettings,
+    /// Treatment of outliers; on by default.
+    pub robust: RobustSettings,
+    /// Rounds of minimising and re-estimating noise levels; they settle to 0.1 % in 5 to 15.
+    pub noise_rounds: usize,
 }
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            minimize: MinimizeSettings::default(),
+            robust: RobustSettings::default(),
+            noise_rounds: 60,
+        }
+    }
+}
+
+impl Settings {
+    /// Every observation counts fully, noise levels as stated: the plain least-squares fit.
+    #[must_use]
+    pub fn plain() -> Self {
+        let mut settings = Self::default();
+        settings.robust.enabled = false;
+        settings.noise_rounds = 0;
+        settings
+    }
+}
+
+/// Noise levels have settled when log σ² changes by less than this: 0.05 % in σ.
+const NOISE_SETTLED: f64 = 1e-3;
+/// Gate and refit alternate; the set stays in two or three rounds unless it flickers at the border.
+const GATE_ROUNDS: usize = 6;
 
 /// Solves a problem.
 ///
@@ -105,23 +164,172 @@ pub struct Settings {
 /// is a [`Solution`] that says so.
 pub fn solve(problem: &Problem, settings: &Settings) -> Result<Solution, Error> {
     let model = Model::new(problem)?;
-    let theta: Vec<f64> = model
+    let stated: Vec<f64> = model
         .problem
         .groups
         .iter()
         .map(|g| g.sigma * g.sigma)
         .collect();
-    let weights = vec![1.0; model.observations.len()];
-    let minimum = minimize(&model, &model.start(), &weights, &theta, &settings.minimize);
-    finish(model, minimum, weights, theta)
+    let mask: Vec<f64> = model
+        .observations
+        .iter()
+        .map(|o| {
+            if model.is_held_out(o.sample) {
+                0.0
+            } else {
+                1.0
+            }
+        })
+        .collect();
+    if mask.iter().all(|w| *w == 0.0) {
+        return Err(Error::NoObservations);
+    }
+    let mut work = Workspace::new(&model);
+    let mut fit = Fit {
+        model: &model,
+        settings,
+        iterations: 0,
+        relative_sigma: vec![None; stated.len()],
+    };
+    let mut theta = stated.clone();
+    let mut weights = mask.clone();
+    let mut minimum = fit.minimize(&model.start(), &weights, &theta, &mut work);
+    if settings.robust.enabled
+        && minimum.status != SolveStatus::NotEvaluable
+        && let Some((values, kept, iterations)) =
+            clean(&model, &minimum, &mask, &theta, &settings.robust, &mut work)
+    {
+        fit.iterations += iterations;
+        minimum.values = values;
+        weights = kept;
+    }
+    for _ in 0..GATE_ROUNDS {
+        minimum = fit.with_noise(&minimum, &weights, &mut theta, &mut work);
+        if !settings.robust.enabled || minimum.status == SolveStatus::NotEvaluable {
+            break;
+        }
+        let Some(again) = gate(
+            &model,
+            &minimum.values,
+            &theta,
+            &mask,
+            &settings.robust,
+            &mut work,
+        ) else {
+            break;
+        };
+        if again == weights {
+            break;
+        }
+        weights = again;
+    }
+    let rejected = explain(&model, &minimum.values, &theta, &mask, &weights, &mut work);
+    let (iterations, relative_sigma) = (fit.iterations, fit.relative_sigma);
+    let chi2_stated =
+        crate::normal::data_cost(&model, &minimum.values, &weights, &stated, &mut work);
+    finish(
+        model,
+        minimum,
+        Outcome {
+            weights,
+            theta,
+            rejected,
+            iterations,
+            relative_sigma,
+            chi2_stated,
+        },
+    )
 }
 
-fn finish(
-    model: Model,
-    minimum: Minimum,
+/// What [`finish`] only passes on.
+struct Outcome {
     weights: Vec<f64>,
     theta: Vec<f64>,
-) -> Result<Solution, Error> {
+    rejected: Vec<Rejection>,
+    iterations: usize,
+    relative_sigma: Vec<Option<f64>>,
+    chi2_stated: f64,
+}
+
+struct Fit<'a> {
+    model: &'a Model,
+    settings: &'a Settings,
+    iterations: usize,
+    relative_sigma: Vec<Option<f64>>,
+}
+
+impl Fit<'_> {
+    fn minimize(
+        &mut self,
+        start: &Values,
+        weights: &[f64],
+        theta: &[f64],
+        work: &mut Workspace,
+    ) -> Minimum {
+        let minimum = minimize_in(
+            self.model,
+            start,
+            weights,
+            theta,
+            &self.settings.minimize,
+            work,
+        );
+        self.iterations += minimum.iterations;
+        minimum
+    }
+
+    /// Values and noise levels in turn until both stay.
+    fn with_noise(
+        &mut self,
+        start: &Minimum,
+        weights: &[f64],
+        theta: &mut Vec<f64>,
+        work: &mut Workspace,
+    ) -> Minimum {
+        let mut minimum = self.minimize(&start.values, weights, theta, work);
+        if !self.model.problem.groups.iter().any(|g| g.estimate) {
+            return minimum;
+        }
+        let mut system = NormalEquations::new(self.model.free());
+        for _ in 0..self.settings.noise_rounds {
+            if minimum.status == SolveStatus::NotEvaluable {
+                break;
+            }
+            let Some(Scoring {
+                theta: next,
+                change,
+                relative_sigma,
+            }) = score(
+                self.model,
+                &minimum.values,
+                weights,
+                theta,
+                work,
+                &mut system,
+            )
+            else {
+                break;
+            };
+            self.relative_sigma = relative_sigma;
+            *theta = next;
+            minimum = self.minimize(&minimum.values, weights, theta, work);
+            if change < NOISE_SETTLED {
+                break;
+            }
+        }
+        minimum
+    }
+}
+
+fn finish(model: Model, minimum: Minimum, outcome: Outcome) -> Result<Solution, Error> {
+    let Outcome {
+        weights,
+        theta,
+        mut rejected,
+        iterations,
+        relative_sigma,
+        chi2_stated,
+    } = outcome;
     let information =
         Information::at(&model, &minimum.values, &weights, &theta).ok_or(Error::NotEvaluable)?;
     let parameters = describe_parameters(&model, &minimum.values, &information);
@@ -129,13 +337,14 @@ fn finish(
         .problem
         .groups
         .iter()
-        .zip(&theta)
-        .map(|(g, t)| NoiseEstimate {
-            name: g.name.clone(),
-            kind: g.kind,
-            stated: g.sigma,
-            sigma: t.sqrt(),
-            estimated: g.estimate,
+        .enumerate()
+        .map(|(g, group)| NoiseEstimate {
+            name: group.name.clone(),
+            kind: group.kind,
+            stated: group.sigma,
+            sigma: theta[g].sqrt(),
+            relative_error: relative_sigma[g],
+            estimated: group.estimate,
         })
         .collect();
     let rows: usize = model
@@ -145,17 +354,30 @@ fn finish(
         .filter(|(_, w)| **w > 0.0)
         .map(|(o, _)| o.rows)
         .sum();
+    for (head, sample, item) in model.lost() {
+        rejected.push(Rejection {
+            sample,
+            head,
+            item,
+            reason: RejectReason::Occlusion,
+            distance: 0.0,
+        });
+    }
     let degrees_of_freedom = rows as f64 - effective_parameters(&information, &model);
+    let observability = observe(&model, &minimum.values, &information);
     Ok(Solution {
         values: minimum.values,
         status: minimum.status,
-        iterations: minimum.iterations,
+        iterations,
         chi2: minimum.data_cost,
+        chi2_stated,
         degrees_of_freedom,
         parameters,
         noise,
         information,
+        observability,
         weights,
+        rejected,
         theta,
         model,
     })
@@ -164,22 +386,15 @@ fn finish(
 /// tr(C JᵀV⁻¹J): how many parameters the data paid for.
 fn effective_parameters(information: &Information, model: &Model) -> f64 {
     let n = model.free();
-    let rs = &information.r;
-    let mut trace = 0.0;
-    // R is scaled by S: JᵀV⁻¹J = S⁻¹RᵀR S⁻¹, C carries S on both sides.
+    // R is scaled by S, C carries S on both sides.
     let mut unscaled = information.covariance.clone();
     for i in 0..n {
         for j in 0..n {
             unscaled[(i, j)] /= information.scale[i] * information.scale[j];
         }
     }
-    let rc = rs * unscaled;
-    for i in 0..n {
-        for j in 0..n {
-            trace += rc[(i, j)] * rs[(i, j)];
-        }
-    }
-    trace
+    let product = &information.r * unscaled;
+    product.dot(&information.r)
 }
 
 fn describe_parameters(

@@ -347,6 +347,30 @@ impl Chain {
             .markers("body", h.tracker, h.body, h.markers, seen);
     }
 
+    /// Marker observations where the joints move by more than their readings: `extra(sample)`.
+    pub fn observe_moved(
+        &self,
+        rng: &mut impl Rng,
+        h: &mut Handles,
+        sigma: f64,
+        extra: impl Fn(usize) -> Vec<f64>,
+    ) {
+        let mut seen = Vec::new();
+        for (s, q) in self.q.iter().enumerate() {
+            let x = self.tracker_from_body(q, &extra(s));
+            for (m, p) in self.markers.iter().enumerate() {
+                seen.push(MarkerObservation {
+                    sample: s,
+                    point: h.points[m],
+                    position: x * p + normal3(rng) * sigma,
+                    shape: None,
+                });
+            }
+        }
+        h.problem
+            .markers("body", h.tracker, h.body, h.markers, seen);
+    }
+
     /// Body poses with noise.
     pub fn observe_poses(
         &self,

@@ -1,0 +1,144 @@
+//! Which model to believe: variants of one problem, ranked by how well each predicts samples that it
+//! has not seen.
+//!
+//! ```text
+//! score(variant) = mean over samples of |e₋ₛ|²,   difference to the best ± its standard error (paired)  (1)
+//! ```
+//!
+//! The choice is the smallest variant (fewest free parameters) whose difference to the best is within
+//! one standard error.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::Error;
+use crate::problem::Problem;
+use crate::solution::{Settings, Solution, solve};
+use crate::validate::{CrossValidation, SamplePrediction};
+
+/// One variant after comparison.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RankedVariant {
+    /// Its name.
+    pub name: String,
+    /// Free parameters that the data determine.
+    pub parameters: usize,
+    /// Root of score (1): left-out position error per vector, m.
+    pub loo_rms: f64,
+    /// Score minus the best score, m².
+    pub worse_by: f64,
+    /// Standard error of `worse_by`, m².
+    pub standard_error: f64,
+    /// Sum over samples of the logarithm of the predictive density.
+    pub log_density: f64,
+    /// Parameters that differ from nominal by less than two of their σ: noise, as far as one can tell.
+    pub noise_parameters: Vec<String>,
+    /// The rule's choice.
+    pub chosen: bool,
+}
+
+/// Solves every variant and ranks them, best score first.
+///
+/// # Errors
+/// [`Error`] of the first variant that cannot be stated.
+pub fn compare(
+    variants: &[(String, Problem)],
+    settings: &Settings,
+) -> Result<Vec<RankedVariant>, Error> {
+    let mut solved = Vec::new();
+    for (name, problem) in variants {
+        let solution = solve(problem, settings)?;
+        let loo = solution.leave_one_out().ok_or(Error::NotEvaluable)?;
+        solved.push((name, solution, loo));
+    }
+    let common = common_vectors(&solved);
+    let scores: Vec<Vec<f64>> = solved
+        .iter()
+        .map(|(_, _, loo)| sample_scores(loo, &common))
+        .collect();
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
+    let best = (0..scores.len())
+        .min_by(|&a, &b| mean(&scores[a]).total_cmp(&mean(&scores[b])))
+        .unwrap_or(0);
+    let mut ranked: Vec<RankedVariant> = solved
+        .iter()
+        .zip(&scores)
+        .map(|((name, solution, loo), score)| {
+            let difference: Vec<f64> = score
+                .iter()
+                .zip(&scores[best])
+                .map(|(a, b)| a - b)
+                .collect();
+            let m = mean(&difference);
+            let n = difference.len().max(2) as f64;
+            let variance = difference.iter().map(|d| (d - m) * (d - m)).sum::<f64>() / (n - 1.0);
+            RankedVariant {
+                name: (*name).clone(),
+                parameters: solution.information.rank,
+                loo_rms: mean(score).sqrt(),
+                worse_by: m,
+                standard_error: (variance / n).sqrt(),
+                log_density: loo.samples.iter().map(|s| s.log_density).sum(),
+                noise_parameters: noise_parameters(solution),
+                chosen: false,
+            }
+        })
+        .collect();
+    let choice = (0..ranked.len())
+        .filter(|&i| ranked[i].worse_by <= ranked[i].standard_error)
+        .min_by(|&a, &b| {
+            (ranked[a].parameters, ranked[a].loo_rms)
+                .partial_cmp(&(ranked[b].parameters, ranked[b].loo_rms))
+                .unwrap_or(std::cmp::Ordering::Equal)
+        });
+    if let Some(i) = choice {
+        ranked[i].chosen = true;
+    }
+    ranked.sort_by(|a, b| a.loo_rms.total_cmp(&b.loo_rms));
+    Ok(ranked)
+}
+
+/// (sample, head, item) that every variant kept and could predict.
+fn common_vectors(
+    solved: &[(&String, Solution, CrossValidation)],
+) -> std::collections::BTreeSet<(usize, String, usize)> {
+    let mut sets = solved.iter().map(|(_, _, loo)| {
+        loo.samples
+            .iter()
+            .flat_map(|s| s.vectors.iter().map(|v| (s.sample, v.head.clone(), v.item)))
+            .collect::<std::collections::BTreeSet<_>>()
+    });
+    let first = sets.next().unwrap_or_default();
+    sets.fold(first, |a, b| a.intersection(&b).cloned().collect())
+}
+
+/// Mean squared position error (rotation where there is none) per sample.
+fn sample_scores(
+    loo: &CrossValidation,
+    common: &std::collections::BTreeSet<(usize, String, usize)>,
+) -> Vec<f64> {
+    let score = |s: &SamplePrediction| {
+        let squares: Vec<f64> = s
+            .vectors
+            .iter()
+            .filter(|v| common.contains(&(s.sample, v.head.clone(), v.item)))
+            .map(|v| v.position.or(v.rotation).unwrap_or(0.0).powi(2))
+            .collect();
+        (!squares.is_empty()).then(|| squares.iter().sum::<f64>() / squares.len() as f64)
+    };
+    loo.samples.iter().filter_map(score).collect()
+}
+
+fn noise_parameters(solution: &Solution) -> Vec<String> {
+    /// Two σ: one parameter in twenty looks like more by chance.
+    const NOISE: f64 = 2.0;
+    solution
+        .parameters
+        .iter()
+        .filter(|p| {
+            p.prior_or_feature()
+                && p.sigma
+                    .is_some_and(|s| (p.value - p.nominal).abs() < NOISE * s)
+        })
+        .map(|p| p.name.clone())
+        .collect()
+}
