@@ -74,6 +74,12 @@ struct Markup(String);
 impl Markup {
     /// Text whose backticks mark names and commands.
     fn from_text(text: &str) -> Self {
+        // A number and its unit stay on one line.
+        let text = &[" mm", " ms", " %", " ± "]
+            .iter()
+            .fold(text.to_owned(), |text, unit| {
+                text.replace(unit, &unit.replace(' ', "\u{a0}"))
+            });
         let parts: Vec<&str> = text.split('`').collect();
         // An odd number of backticks marks nothing.
         if parts.len().is_multiple_of(2) {

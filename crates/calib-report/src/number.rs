@@ -139,6 +139,13 @@ pub fn fixed_in(value: f64, unit: Unit, decimals: usize) -> String {
     fixed(value * shown(unit).0, decimals)
 }
 
+/// [`fixed_in`] with its unit: `377.910 mm`, `0.345°`.
+#[must_use]
+pub fn fixed_with_unit(value: f64, unit: Unit, decimals: usize) -> String {
+    let (factor, suffix) = shown(unit);
+    format!("{}{suffix}", fixed(value * factor, decimals))
+}
+
 /// `37 %` of a share in [0, 1]; `> 99 %` and `< 1 %` where rounding would claim all or nothing.
 #[must_use]
 pub fn percent(share: f64) -> String {

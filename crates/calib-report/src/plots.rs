@@ -59,6 +59,8 @@ pub enum PlotKind {
 pub struct PlotRow {
     /// Left of the row.
     pub label: String,
+    /// Colour and shape, 0 to 3: 0 is what was calibrated.
+    pub style: usize,
     /// Length of the bar from zero.
     pub bar: Option<f64>,
     /// A dot.
@@ -76,6 +78,8 @@ pub struct PlotRow {
 pub struct Series {
     /// In the legend.
     pub name: String,
+    /// Colour and shape, 0 to 3: 0 is what was calibrated.
+    pub style: usize,
     /// Whether the points are joined.
     pub line: bool,
     /// x, y.
@@ -135,15 +139,16 @@ fn held_out(plots: &mut Vec<Plot>, report: &Report) {
         return;
     };
     let models = [
-        ("nominal", held_out.nominal),
-        ("registration only", held_out.registration_only),
-        ("calibrated", held_out.calibrated),
+        ("nominal", 1, held_out.nominal),
+        ("registration only", 2, held_out.registration_only),
+        ("calibrated", 0, held_out.calibrated),
     ];
     let rows: Vec<PlotRow> = models
         .iter()
-        .filter_map(|(name, stats)| stats.map(|stats| (name, stats)))
-        .map(|(name, stats)| PlotRow {
+        .filter_map(|(name, style, stats)| stats.map(|stats| (name, *style, stats)))
+        .map(|(name, style, stats)| PlotRow {
             label: (*name).to_owned(),
+            style,
             bar: Some(mm(stats.rms_m)),
             whisker: Some([mm(stats.rms_m), mm(stats.p95_m)]),
             tick: Some(mm(stats.max_m)),
@@ -166,14 +171,19 @@ fn held_out(plots: &mut Vec<Plot>, report: &Report) {
             .collect()
     };
     let series: Vec<Series> = [
-        ("nominal", over(|pose| pose.nominal_m)),
-        ("registration only", over(|pose| pose.registration_only_m)),
-        ("calibrated", over(|pose| pose.calibrated_m)),
+        ("nominal", 1, over(|pose| pose.nominal_m)),
+        (
+            "registration only",
+            2,
+            over(|pose| pose.registration_only_m),
+        ),
+        ("calibrated", 0, over(|pose| pose.calibrated_m)),
     ]
     .into_iter()
-    .filter(|(_, points)| !points.is_empty())
-    .map(|(name, points)| Series {
+    .filter(|(_, _, points)| !points.is_empty())
+    .map(|(name, style, points)| Series {
         name: name.into(),
+        style,
         line: false,
         points,
     })
@@ -283,7 +293,7 @@ fn coverage(plots: &mut Vec<Plot>, report: &Report) {
             id: "plot-coverage".into(),
             section: "data",
             title: "Where the joints were".into(),
-            description: "Every joint over its range: the darker a cell, the more samples; an empty cell was never visited.".into(),
+            description: "Every joint over its range: the stronger a cell, the more samples; an empty cell was never visited.".into(),
             kind: PlotKind::Strips { rows },
         });
     }
@@ -351,6 +361,7 @@ fn over_bins(id: String, title: String, residuals: &JointResiduals) -> Plot {
     };
     let component = |name: &str, i: usize| Series {
         name: format!("mean {name}"),
+        style: i,
         line: true,
         points: residuals
             .bins
@@ -360,6 +371,7 @@ fn over_bins(id: String, title: String, residuals: &JointResiduals) -> Plot {
     };
     let rms = Series {
         name: "rms".into(),
+        style: 3,
         line: false,
         points: residuals
             .bins
@@ -397,7 +409,7 @@ fn workspace(plots: &mut Vec<Plot>, report: &Report) {
         section: "workspace",
         title: format!("Predicted σ of {} in {}", workspace.link, workspace.frame),
         description:
-            "From above and from the side; the darker a place, the less certain the tool is there."
+            "From above and from the side; the stronger the colour, the less certain the tool is there."
                 .into(),
         kind: PlotKind::Map {
             value: "σ [mm]".into(),

@@ -207,7 +207,8 @@ fn held_out(page: &mut Page, report: &Report) {
         "<joints",
     ]);
     for pose in poses.iter().take(POSES) {
-        let cell = |error: Option<f64>| error.map_or_else(|| number::UNKNOWN.to_owned(), mm);
+        // Empty, not a dash: a model that no pose has loses its column.
+        let cell = |error: Option<f64>| error.map_or_else(String::new, mm);
         let joints: Vec<String> = pose
             .joints
             .iter()
@@ -288,8 +289,7 @@ fn changes(page: &mut Page, report: &Report) {
         ">from the data",
     ]);
     for change in &report.changes {
-        let plain =
-            |x: f64| number::fixed_in(x, change.unit, 3) + " " + number::unit_name(change.unit);
+        let plain = |x: f64| number::fixed_with_unit(x, change.unit, 3);
         let old = change.old.map_or_else(|| "added".to_owned(), plain);
         let delta = change.delta.map_or_else(
             || number::UNKNOWN.to_owned(),
@@ -628,7 +628,7 @@ fn residuals(page: &mut Page, report: &Report) {
         return;
     }
     page.section("residuals", "Residuals of the fit");
-    page.text("Predicted − observed, mm; over joints and time: `report.html` and `residuals.csv`.");
+    page.text("Predicted − observed, mm; over joints and time as pictures in `report.html`, row by row in `residuals.csv`.");
     let mut table = Table::new(&["<of", ">samples", ">mean", ">rms", ">95 %", ">max"]);
     let directions = report
         .residuals

@@ -202,11 +202,14 @@ impl Scale {
     }
 }
 
-/// Labels keep to a column of this width, about 22 characters.
-const LABELS: f64 = 138.0;
+/// Labels keep to a column of this width.
+const LABELS: f64 = 140.0;
+
+/// Characters of a label in that column.
+const LABEL_CHARS: usize = 20;
 
 /// Numbers in words stand right of the rows.
-const TEXTS: f64 = 112.0;
+const TEXTS: f64 = 134.0;
 
 fn draw_rows(body: &mut Body, axis: &str, rows: &[PlotRow]) -> f64 {
     const ROW: f64 = 24.0;
@@ -243,11 +246,17 @@ fn draw_rows(body: &mut Body, axis: &str, rows: &[PlotRow]) -> f64 {
             "label end",
             LABELS - 8.0,
             y + 4.0,
-            &crate::table::clip(&row.label, 22),
+            &crate::table::clip(&row.label, LABEL_CHARS),
         );
         if let Some(bar) = row.bar {
             let at = scale.place(bar);
-            body.rect("bar s0", zero.min(at), y - 6.0, (at - zero).abs(), 12.0);
+            body.rect(
+                &format!("bar s{}", row.style),
+                zero.min(at),
+                y - 6.0,
+                (at - zero).abs(),
+                12.0,
+            );
         }
         if let Some([from, to]) = row.whisker {
             body.line("whisker", [scale.place(from), y], [scale.place(to), y]);
@@ -257,13 +266,13 @@ fn draw_rows(body: &mut Body, axis: &str, rows: &[PlotRow]) -> f64 {
             body.line("whisker", [at, y - 5.0], [at, y + 5.0]);
         }
         if let Some(mark) = row.mark {
-            body.mark(0, [scale.place(mark), y]);
+            body.mark(row.style, [scale.place(mark), y]);
         }
         body.text(
             "number",
             WIDTH - TEXTS + 6.0,
             y + 4.0,
-            &crate::table::clip(&row.text, 19),
+            &crate::table::clip(&row.text, 20),
         );
     }
     bottom + 36.0
@@ -294,17 +303,21 @@ fn draw_xy(body: &mut Body, x_label: &str, y_label: &str, log_y: bool, series: &
         x_label,
     );
     let mut legend = LEFT;
-    for (i, series) in series.iter().enumerate() {
+    for series in series {
         if series.line {
-            body.line(&format!("line s{i}"), [legend, 10.0], [legend + 14.0, 10.0]);
+            body.line(
+                &format!("line s{}", series.style),
+                [legend, 10.0],
+                [legend + 14.0, 10.0],
+            );
         } else {
-            body.mark(i, [legend + 7.0, 10.0]);
+            body.mark(series.style, [legend + 7.0, 10.0]);
         }
         body.text("tick", legend + 18.0, 14.0, &series.name);
         legend += 34.0 + 6.4 * series.name.chars().count() as f64;
     }
     body.text("tick end", WIDTH - 8.0, 14.0, y_label);
-    for (i, series) in series.iter().enumerate() {
+    for series in series {
         let places: Vec<[f64; 2]> = series
             .points
             .iter()
@@ -312,10 +325,10 @@ fn draw_xy(body: &mut Body, x_label: &str, y_label: &str, log_y: bool, series: &
             .map(|p| [x.place(p[0]), y.place(p[1])])
             .collect();
         if series.line && places.len() > 1 {
-            body.path(&format!("line s{i}"), &places);
+            body.path(&format!("line s{}", series.style), &places);
         } else {
             for place in places {
-                body.mark(i, place);
+                body.mark(series.style, place);
             }
         }
     }
@@ -331,7 +344,7 @@ fn draw_strips(body: &mut Body, rows: &[Strip]) -> f64 {
             "label end",
             LABELS - 8.0,
             y + 12.0,
-            &crate::table::clip(&row.label, 22),
+            &crate::table::clip(&row.label, LABEL_CHARS),
         );
         let cell = width / row.counts.len().max(1) as f64;
         let most = row.counts.iter().copied().max().unwrap_or(0).max(1);
@@ -401,11 +414,11 @@ fn draw_map(body: &mut Body, value: &str, panels: &[Panel]) -> f64 {
             -SIDE,
             false,
         );
-        for (at, label) in x.ticks(3.0) {
+        for (at, label) in x.ticks(4.0) {
             body.line("grid", [x.place(at), 8.0], [x.place(at), 8.0 + SIDE]);
             body.text("tick middle", x.place(at), SIDE + 23.0, &label);
         }
-        for (at, label) in y.ticks(3.0) {
+        for (at, label) in y.ticks(4.0) {
             body.line("grid", [left, y.place(at)], [left + SIDE, y.place(at)]);
             body.text("tick end", left - 5.0, y.place(at) + 4.0, &label);
         }
@@ -515,6 +528,7 @@ mod tests {
         };
         let xy = Series {
             name: "a".into(),
+            style: 0,
             line: true,
             points: vec![[f64::NAN, 1.0], [0.0, 0.0]],
         };

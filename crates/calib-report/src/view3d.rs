@@ -114,6 +114,14 @@ pub struct Axis {
     pub sigma_direction: Option<f64>,
 }
 
+impl Axis {
+    /// The end of the drawn axis on the side of `sign`.
+    fn end(&self, sign: f64) -> [f64; 3] {
+        (Point3::from(self.point) + Vector3::from(self.direction) * (sign * self.half_length))
+            .into()
+    }
+}
+
 /// Digits of a coordinate in the page: 10 µm in a metre, below what a pixel shows.
 const DIGITS: usize = 5;
 
@@ -201,16 +209,19 @@ impl View3d {
             let p = camera * Point3::from(*p);
             [p.x, -p.y]
         };
-        let everything = self
-            .poses
-            .first()
-            .into_iter()
-            .flat_map(|pose| pose.calibrated.iter().map(origin))
-            .chain(
-                self.clouds
-                    .iter()
-                    .flat_map(|cloud| cloud.points.iter().copied()),
-            );
+        let robot = self.poses.first().into_iter().flat_map(|pose| {
+            let seen = pose.markers.iter().filter_map(|marker| marker.observed);
+            pose.calibrated.iter().map(origin).chain(seen)
+        });
+        let swept = self
+            .clouds
+            .iter()
+            .flat_map(|cloud| cloud.points.iter().copied());
+        let axes = self
+            .axes
+            .iter()
+            .flat_map(|axis| [axis.end(-1.0), axis.end(1.0)]);
+        let everything = robot.chain(swept).chain(axes);
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for place in everything.map(|p| flat(&p)) {
             for k in 0..2 {
@@ -257,19 +268,12 @@ impl View3d {
             body.path("thin", &around.collect::<Vec<_>>());
         }
         for axis in &self.axes {
-            let end = |sign: f64| {
-                place(
-                    &(Point3::from(axis.point)
-                        + Vector3::from(axis.direction) * (sign * axis.half_length))
-                        .into(),
-                )
-            };
-            body.line("line s2", end(-1.0), end(1.0));
+            body.line("line s2", place(&axis.end(-1.0)), place(&axis.end(1.0)));
         }
         if let Some(pose) = self.poses.first() {
             for (class, rows) in [
-                ("line dashed s1", &pose.nominal),
                 ("line thick s0", &pose.calibrated),
+                ("line dashed s1", &pose.nominal),
             ] {
                 for (row, frame) in rows.iter().zip(&self.frames) {
                     if let Some(parent) = frame.parent.and_then(|parent| rows.get(parent)) {

@@ -156,8 +156,8 @@
     if (shown.joints) drawJoints();
     const now = view.poses[pose];
     if (!now) return;
-    if (shown.nominal && now.nominal.length) drawRobot(now.nominal, colours.s1, 2, [6, 5]);
     if (shown.calibrated) { drawRobot(now.calibrated, colours.s0, 4); drawAxes(now.calibrated); for (const row of now.calibrated) dot(row, colours.s0, 3.5); }
+    if (shown.nominal && now.nominal.length) drawRobot(now.nominal, colours.s1, 2, [6, 5]);
     for (const m of now.markers) {
       if (shown.markers) { if (m.observed) dot(m.observed, colours.s3, 4); dot(m.predicted, colours.s3, 5.5, true); }
       if (shown.residuals && m.observed) arrow(m.observed, add(m.observed, [0, 1, 2].map(function (i) { return m.predicted[i] - m.observed[i]; }), factor), colours.bad);

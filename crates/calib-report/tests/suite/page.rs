@@ -113,6 +113,44 @@ fn a_report_without_a_view_has_no_script() {
     assert!(!text.contains("<script"));
 }
 
+#[test]
+fn the_view_is_moved_by_keys_and_slider() {
+    let page = html(&examples::accepted(), Some(&examples::view())).expect("a page");
+    let script = "<script>
+        const canvas = document.getElementById('canvas'), slider = document.getElementById('pose');
+        const said = () => document.getElementById('view-status').textContent;
+        const press = key => canvas.dispatchEvent(new KeyboardEvent('keydown', { key, cancelable: true }));
+        const heard = [];
+        press('PageDown'); heard.push(said());
+        slider.value = 9; slider.dispatchEvent(new Event('input')); heard.push(said());
+        press('PageDown'); heard.push(said());
+        const before = canvas.toDataURL(); press('ArrowLeft'); heard.push(String(before !== canvas.toDataURL()));
+        const turned = canvas.toDataURL(); press('+'); heard.push(String(turned !== canvas.toDataURL()));
+        press('0'); heard.push(String(before === canvas.toDataURL()));
+        document.body.dataset.heard = heard.join(' | ');
+    </script></body>";
+    let Some((dom, log)) = in_browser("keys", &page.replace("</body>", script)) else {
+        println!("skipped: no Chromium is installed");
+        return;
+    };
+    assert!(!log.contains("CONSOLE"), "{log}");
+    let heard = dom
+        .split("data-heard=\"")
+        .nth(1)
+        .and_then(|rest| rest.split('"').next())
+        .expect("the script ran");
+    let told: Vec<&str> = heard.split(" | ").collect();
+    assert!(
+        told[0].starts_with("Pose 2 of 10: check 2, error "),
+        "{heard}"
+    );
+    assert!(
+        told[1].starts_with("Pose 10 of 10") && told[2] == told[1],
+        "{heard}"
+    );
+    assert_eq!(told[3..], ["true", "true", "true"], "{heard}");
+}
+
 /// The page as Chromium builds it, with what it said on the console; `None` when no browser is installed.
 fn in_browser(name: &str, text: &str) -> Option<(String, String)> {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("page-{name}"));
