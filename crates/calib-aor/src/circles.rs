@@ -1,0 +1,315 @@
+//! Circles of one or several markers around one axis: the cost all circle estimators share, and its minimum.
+//!
+//! ```text
+//! a = n·(x − c),  w = x − c − a n
+//! e_a = a − h_p,  e_r = |w| − r_p,       f = Σ e_a² + e_r²                (paper Eqs. 9–13, with I − n nᵀ)
+//! h_p = mean a,  r_p = mean |w|          best for given n, c
+//! ```
+//!
+//! The planar part does not depend on c and the radial part only on c across n. One marker with c free is the
+//! orthogonal-distance circle; several markers share n and c (one line), or n alone.
+
+use calib_geometry::{
+    levenberg::{Problem, Stop, minimise},
+    measured::Cloud,
+};
+use nalgebra::{Matrix2, Matrix4, Matrix6, Vector2, Vector3, Vector4};
+
+use crate::axis_frame::AxisFrame;
+
+const MAX_STEPS: usize = 200;
+
+/// An axis through a point; both relative to the cloud's origin.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Axis {
+    pub frame: AxisFrame,
+    pub point: Vector3<f64>,
+}
+
+/// Normal equations over (turn about e₁-direction a, b; shift g, d): n ← n + a e₁ + b e₂, c ← c + g e₁ + d e₂.
+#[derive(Debug, Clone)]
+pub(crate) struct Normal {
+    pub hessian: Matrix4<f64>,
+    pub gradient: Vector4<f64>,
+    pub cost: f64,
+}
+
+/// Linearises f for the samples of one marker.
+pub(crate) fn linearize_marker(points: &[Vector3<f64>], axis: &Axis) -> Normal {
+    let AxisFrame { e1, e2, n } = axis.frame;
+    let count = points.len() as f64;
+    let (mut sum_a, mut sum_r) = (Vector4::zeros(), Vector4::zeros());
+    let (mut mean_a, mut mean_r) = (0.0, 0.0);
+    let mut hessian = Matrix4::zeros();
+    let mut gradient = Vector4::zeros();
+    let mut cost = 0.0;
+    // Residuals relative to the first sample's: differences keep their digits.
+    let first = points[0] - axis.point;
+    let (a0, r0) = (first.dot(&n), (first - n * first.dot(&n)).norm());
+    for x in points {
+        let d = x - axis.point;
+        let a = d.dot(&n);
+        let w = d - n * a;
+        let length = w.norm();
+        let u = if length > 0.0 {
+            w / length
+        } else {
+            Vector3::zeros()
+        };
+        let (u1, u2) = (u.dot(&e1), u.dot(&e2));
+        // ∂a = d·(α e₁ + β e₂);  ∂|w| = −a û·(α e₁ + β e₂) − û·(γ e₁ + δ e₂)
+        let j_a = Vector4::new(d.dot(&e1), d.dot(&e2), 0.0, 0.0);
+        let j_r = Vector4::new(-a * u1, -a * u2, -u1, -u2);
+        let (e_a, e_r) = (a - a0, length - r0);
+        hessian += j_a * j_a.transpose() + j_r * j_r.transpose();
+        gradient += j_a * e_a + j_r * e_r;
+        cost += e_a * e_a + e_r * e_r;
+        sum_a += j_a;
+        sum_r += j_r;
+        mean_a += e_a;
+        mean_r += e_r;
+    }
+    // Heights and radii are means: center residuals and rows.
+    mean_a /= count;
+    mean_r /= count;
+    hessian -= (sum_a * sum_a.transpose() + sum_r * sum_r.transpose()) / count;
+    gradient -= sum_a * mean_a + sum_r * mean_r;
+    cost -= count * (mean_a * mean_a + mean_r * mean_r);
+    Normal {
+        hessian,
+        gradient,
+        cost: cost.max(0.0),
+    }
+}
+
+/// Linearises f for all markers around one line.
+pub(crate) fn linearize(cloud: &Cloud, axis: &Axis) -> Normal {
+    let mut total = Normal {
+        hessian: Matrix4::zeros(),
+        gradient: Vector4::zeros(),
+        cost: 0.0,
+    };
+    for p in 0..cloud.markers() {
+        let part = linearize_marker(cloud.marker(p), axis);
+        total.hessian += part.hessian;
+        total.gradient += part.gradient;
+        total.cost += part.cost;
+    }
+    total
+}
+
+/// Which unknowns move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Free {
+    /// Direction and place.
+    Line,
+    /// Direction only; the point is held.
+    Direction,
+}
+
+struct CommonLine<'a> {
+    cloud: &'a Cloud,
+    free: Free,
+    size: f64,
+}
+
+impl Problem for CommonLine<'_> {
+    type Point = Axis;
+    type Normal = Normal;
+    type Step = Vector4<f64>;
+
+    fn linearize(&self, x: &Axis) -> Normal {
+        linearize(self.cloud, x)
+    }
+
+    fn cost(&self, normal: &Normal) -> f64 {
+        normal.cost
+    }
+
+    fn solve(&self, normal: &Normal, damping: f64) -> Option<(Vector4<f64>, f64)> {
+        let mut h = normal.hessian;
+        for k in 0..4 {
+            h[(k, k)] *= 1.0 + damping;
+        }
+        let step = match self.free {
+            Free::Line => -h.cholesky()?.solve(&normal.gradient),
+            Free::Direction => {
+                let block: Matrix2<f64> = h.fixed_view::<2, 2>(0, 0).into();
+                let g: Vector2<f64> = normal.gradient.fixed_rows::<2>(0).into();
+                let s = -block.cholesky()?.solve(&g);
+                Vector4::new(s.x, s.y, 0.0, 0.0)
+            }
+        };
+        Some((
+            step,
+            -(step.dot(&normal.gradient) * 2.0 + step.dot(&(normal.hessian * step))),
+        ))
+    }
+
+    fn retract(&self, x: &Axis, step: &Vector4<f64>) -> Axis {
+        Axis {
+            frame: x.frame.turned(step[0], step[1]),
+            point: x.point + x.frame.e1 * step[2] + x.frame.e2 * step[3],
+        }
+    }
+
+    fn is_negligible(&self, _: &Axis, step: &Vector4<f64>) -> bool {
+        step[0].hypot(step[1]) <= 1e-15 && step[2].hypot(step[3]) <= 1e-15 * self.size
+    }
+}
+
+/// The line (or the direction through a held point) of least f from `start`; `None` where it runs away.
+pub(crate) fn minimise_line(
+    cloud: &Cloud,
+    start: Axis,
+    free: Free,
+    size: f64,
+) -> Option<(Axis, Normal)> {
+    let end = minimise(&CommonLine { cloud, free, size }, start, MAX_STEPS);
+    let far = (end.x.point - start.point).norm() > 1e4 * size;
+    (end.stop != Stop::Broken && end.normal.cost.is_finite() && !far).then_some((end.x, end.normal))
+}
+
+/// The direction that several markers share, each with its own center.
+pub(crate) struct OwnCenters<'a> {
+    pub cloud: &'a Cloud,
+    pub size: f64,
+}
+
+/// Direction and one center for each marker.
+#[derive(Debug, Clone)]
+pub(crate) struct Centers {
+    pub frame: AxisFrame,
+    pub points: Vec<Vector3<f64>>,
+}
+
+impl Problem for OwnCenters<'_> {
+    type Point = Centers;
+    type Normal = Vec<Normal>;
+    type Step = (Vector2<f64>, Vec<Vector2<f64>>);
+
+    fn linearize(&self, x: &Centers) -> Vec<Normal> {
+        (0..self.cloud.markers())
+            .map(|p| {
+                let axis = Axis {
+                    frame: x.frame,
+                    point: x.points[p],
+                };
+                linearize_marker(self.cloud.marker(p), &axis)
+            })
+            .collect()
+    }
+
+    fn cost(&self, normals: &Vec<Normal>) -> f64 {
+        normals.iter().map(|n| n.cost).sum()
+    }
+
+    fn solve(&self, normals: &Vec<Normal>, damping: f64) -> Option<(Self::Step, f64)> {
+        let (h, g, own) = self.reduced(normals, damping)?;
+        let turn = -h.cholesky()?.solve(&g);
+        let mut predicted = 0.0;
+        let shifts = own
+            .iter()
+            .zip(normals)
+            .map(|((inverse, coupling), normal)| {
+                let g_own: Vector2<f64> = normal.gradient.fixed_rows::<2>(2).into();
+                let g_turn: Vector2<f64> = normal.gradient.fixed_rows::<2>(0).into();
+                let shift = -(inverse * (g_own + coupling * turn));
+                predicted -= shift.dot(&g_own) + turn.dot(&g_turn);
+                shift
+            })
+            .collect();
+        Some(((turn, shifts), predicted))
+    }
+
+    fn retract(&self, x: &Centers, (turn, shifts): &Self::Step) -> Centers {
+        Centers {
+            frame: x.frame.turned(turn.x, turn.y),
+            points: x
+                .points
+                .iter()
+                .zip(shifts)
+                .map(|(c, s)| c + x.frame.e1 * s.x + x.frame.e2 * s.y)
+                .collect(),
+        }
+    }
+
+    fn is_negligible(&self, _: &Centers, (turn, shifts): &Self::Step) -> bool {
+        turn.norm() <= 1e-15 && shifts.iter().all(|s| s.norm() <= 1e-15 * self.size)
+    }
+}
+
+/// Normal equations of the direction with the own centers eliminated, and per marker (H_cc⁻¹, H_cn).
+type Eliminated = (
+    Matrix2<f64>,
+    Vector2<f64>,
+    Vec<(Matrix2<f64>, Matrix2<f64>)>,
+);
+
+impl OwnCenters<'_> {
+    pub fn reduced(&self, normals: &[Normal], damping: f64) -> Option<Eliminated> {
+        let (mut h, mut g) = (Matrix2::zeros(), Vector2::zeros());
+        let mut own = Vec::with_capacity(normals.len());
+        for normal in normals {
+            let mut damped = normal.hessian;
+            for k in 0..4 {
+                damped[(k, k)] *= 1.0 + damping;
+            }
+            let inverse = damped
+                .fixed_view::<2, 2>(2, 2)
+                .into_owned()
+                .cholesky()?
+                .inverse();
+            let coupling: Matrix2<f64> = normal.hessian.fixed_view::<2, 2>(2, 0).into();
+            let g_own: Vector2<f64> = normal.gradient.fixed_rows::<2>(2).into();
+            h += damped.fixed_view::<2, 2>(0, 0) - coupling.transpose() * inverse * coupling;
+            g += normal.gradient.fixed_rows::<2>(0) - coupling.transpose() * inverse * g_own;
+            own.push((inverse, coupling));
+        }
+        Some((h, g, own))
+    }
+
+    pub fn minimise(&self, start: Centers) -> Option<(Centers, Vec<Normal>)> {
+        let end = minimise(self, start, MAX_STEPS);
+        let cost = self.cost(&end.normal);
+        (end.stop != Stop::Broken && cost.is_finite()).then_some((end.x, end.normal))
+    }
+}
+
+/// Least-squares center (Taubin's weighting) of circles in the plane across n, common to all markers given.
+pub(crate) fn flat_center(
+    cloud: &Cloud,
+    frame: &AxisFrame,
+    markers: std::ops::Range<usize>,
+) -> Vector3<f64> {
+    // m across n from  Σ (q − q̄)(|q|² − mean)  =  2 Σ (q − q̄)(q − q̄)ᵀ m
+    let (mut a, mut b) = (Matrix2::zeros(), Vector2::zeros());
+    let flat = |x: &Vector3<f64>| Vector2::new(x.dot(&frame.e1), x.dot(&frame.e2));
+    let mut height = 0.0;
+    let mut total = 0.0;
+    for p in markers {
+        let points = cloud.marker(p);
+        let n = points.len() as f64;
+        let mean = points.iter().map(flat).sum::<Vector2<f64>>() / n;
+        let mean_w = points.iter().map(|x| flat(x).norm_squared()).sum::<f64>() / n;
+        for x in points {
+            let q = flat(x) - mean;
+            a += q * q.transpose();
+            b += q * (0.5 * (flat(x).norm_squared() - mean_w));
+            height += x.dot(&frame.n);
+        }
+        total += n;
+    }
+    let m = a.cholesky().map_or(Vector2::zeros(), |c| c.solve(&b));
+    frame.e1 * m.x + frame.e2 * m.y + frame.n * (height / total)
+}
+
+/// 6 × 6 over [direction; point] from a 4 × 4 over (turn, shift).
+pub(crate) fn spread_out(covariance: &Matrix4<f64>, frame: &AxisFrame) -> Matrix6<f64> {
+    let mut basis = nalgebra::SMatrix::<f64, 6, 4>::zeros();
+    basis.fixed_view_mut::<3, 1>(0, 0).copy_from(&frame.e1);
+    basis.fixed_view_mut::<3, 1>(0, 1).copy_from(&frame.e2);
+    basis.fixed_view_mut::<3, 1>(3, 2).copy_from(&frame.e1);
+    basis.fixed_view_mut::<3, 1>(3, 3).copy_from(&frame.e2);
+    basis * covariance * basis.transpose()
+}

@@ -1,0 +1,108 @@
+//! Halvorsen's line: the axis from displacements between pairs of samples.
+//!
+//! ```text
+//! d = x_j − x_i,  μ = (x_i + x_j)/2:     d·n = 0,    d·(c − μ) = 0       for every pair          (1)
+//! ```
+//!
+//! n is the direction of least displacement, c the least-squares point of the bisecting planes. With all pairs
+//! n is the plane's normal; with pairs a fixed number of rows apart the result depends on that choice.
+//! Halvorsen et al. 1999, J. Biomech. 32(11), 1221–1227.
+
+use calib_geometry::row_qr::RowQr;
+use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3};
+
+use crate::{
+    axis_frame::AxisFrame,
+    circles::{Axis, Free, linearize, minimise_line, spread_out},
+    input::{Input, cloud_of},
+    judge::{Candidate, inverse_or_zero, judge, prepare},
+    options::Options,
+    outcome::{AorError, Outcome},
+};
+
+/// Halvorsen's line with the pairs of [`Options::separation`].
+///
+/// # Errors
+/// [`AorError`] for data that are no numbers or of another kind.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+    options.check()?;
+    let cloud = cloud_of(input)?;
+    let factor = match prepare("halvorsen_line", &cloud) {
+        Ok(factor) => factor,
+        Err(answer) => return Ok(answer),
+    };
+    // Directions of the displacements, from their triangular factor; and Σ d (d·μ).
+    let (mut spread, mut right) = (RowQr::<3>::default(), Vector3::zeros());
+    let mut pairs = 0;
+    let mut add = |a: &Vector3<f64>, b: &Vector3<f64>| {
+        let d = b - a;
+        spread.push([d.x, d.y, d.z]);
+        right += d * (0.5 * (b.norm_squared() - a.norm_squared()));
+        pairs += 1;
+    };
+    for p in 0..cloud.markers() {
+        let range = cloud.starts[p]..cloud.starts[p + 1];
+        match options.separation {
+            None => {
+                for i in range.clone() {
+                    for j in i + 1..range.end {
+                        add(&cloud.points[i], &cloud.points[j]);
+                    }
+                }
+            }
+            Some(rows) => {
+                for i in range.clone() {
+                    let other = cloud.labels[i].1 + rows.max(1);
+                    if let Some(j) = (i + 1..range.end).find(|&j| cloud.labels[j].1 == other) {
+                        add(&cloud.points[i], &cloud.points[j]);
+                    }
+                }
+            }
+        }
+    }
+    let r: Matrix3<f64> = spread.factor();
+    let eigen = calib_geometry::decompose::svd_small(&r);
+    if pairs < 2 || eigen.s[1] <= 1e-9 * eigen.s[0] {
+        return Ok(Outcome::none(
+            "halvorsen_line",
+            calib_geometry::Verdict::TooFew,
+            format!("{pairs} pairs of samples, whose displacements span no plane"),
+            crate::outcome::Known::Nothing,
+        ));
+    }
+    let frame = AxisFrame::of(eigen.v.column(2).into_owned());
+    // In the plane across n: Σ d dᵀ c = Σ d (d·μ)
+    let gram = r.transpose() * r;
+    let flat = Matrix2::new(
+        frame.e1.dot(&(gram * frame.e1)),
+        frame.e1.dot(&(gram * frame.e2)),
+        frame.e2.dot(&(gram * frame.e1)),
+        frame.e2.dot(&(gram * frame.e2)),
+    );
+    let c = inverse_or_zero(&flat) * Vector2::new(frame.e1.dot(&right), frame.e2.dot(&right));
+    let point = frame.e1 * c.x + frame.e2 * c.y;
+    let axis = Axis { frame, point };
+    let normal = linearize(&cloud, &axis);
+    let (n, markers) = (cloud.points.len(), cloud.markers());
+    let mut unit = Matrix4::zeros();
+    let planar: Matrix2<f64> = normal.hessian.fixed_view::<2, 2>(0, 0).into();
+    let shift: Matrix2<f64> = normal.hessian.fixed_view::<2, 2>(2, 2).into();
+    unit.fixed_view_mut::<2, 2>(0, 0)
+        .copy_from(&inverse_or_zero(&planar));
+    unit.fixed_view_mut::<2, 2>(2, 2)
+        .copy_from(&inverse_or_zero(&shift));
+    // The pairs weigh samples unevenly: the noise level comes from the best line, not from this one.
+    let cost = minimise_line(&cloud, axis, Free::Line, factor.s[0])
+        .map_or(normal.cost, |(_, best)| best.cost);
+    let candidate = Candidate {
+        estimator: "halvorsen_line",
+        axis,
+        own_centers: Vec::new(),
+        cost,
+        dof: (2 * n).saturating_sub(4 + 2 * markers),
+        unit_covariance: spread_out(&unit, &frame),
+        residuals: 2 * n,
+        held: None,
+    };
+    Ok(judge(&cloud, &factor, candidate, options))
+}

@@ -1,0 +1,477 @@
+//! Hinge bundle: the axis, the markers' places around it and the joint angle of every frame, jointly.
+//!
+//! ```text
+//! v_ip = c + F Rz(θ_i) β_p,     F = [e₁ e₂ n]                                             (1)
+//! e = y + z,   y = Fᵀ(c − v_ip),  z = Rz(θ_i) β_p
+//! de = (γ, δ, 0) + [y]ₓ (turn) + Rz dβ_p + (ẑ × z) dθ_i                                   (2)
+//! ```
+//!
+//! All seen samples count, frames may miss markers. The angles are eliminated frame by frame; with encoder
+//! angles ([`Options::angles`]) they are data instead. It reaches the bound where a circle for each marker does not:
+//! the body is rigid, and the angle of a frame is one number for all its markers.
+
+use calib_geometry::{
+    Verdict,
+    levenberg::{Problem, Stop, minimise},
+    measured::Cloud,
+    so3,
+};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Rotation3, SMatrix, Vector3, Vector4};
+
+use crate::{
+    axis_frame::AxisFrame,
+    circles::{Axis, Free, minimise_line, spread_out},
+    input::{Input, InputKind, cloud_of},
+    judge::{Candidate, judge, prepare},
+    options::Options,
+    outcome::{AorError, Known, Outcome},
+    plane,
+};
+
+const MAX_STEPS: usize = 200;
+
+/// The bundle on markers of one rigid body.
+///
+/// # Errors
+/// [`AorError`] for data that are not finite, another kind of data, or angles of another length.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+    const ID: &str = "hinge_bundle";
+    options.check()?;
+    if !matches!(input, Input::Markers(_)) {
+        return Err(AorError::WrongInput {
+            expects: InputKind::Markers,
+            got: input.word(),
+        });
+    }
+    let cloud = cloud_of(input)?;
+    let factor = match prepare(ID, &cloud) {
+        Ok(factor) => factor,
+        Err(answer) => return Ok(answer),
+    };
+    let start = plane::start(&cloud, &factor, &Options::default());
+    // A common line is a better start than the plane's normal, where it exists.
+    let start =
+        minimise_line(&cloud, start, Free::Line, factor.s[0]).map_or(start, |(axis, _)| axis);
+    let problem = Bundle::of(&cloud, &options.angles, factor.s[0])?;
+    let Some(state) = problem.start(start) else {
+        return Ok(Outcome::none(
+            ID,
+            Verdict::TooFew,
+            "the frames do not share enough markers to chain their angles".into(),
+            Known::Nothing,
+        ));
+    };
+    let end = minimise(&problem, state, MAX_STEPS);
+    let inverse = problem
+        .reduced(&end.normal, 0.0)
+        .and_then(|(h, _)| h.cholesky())
+        .map(|c| c.inverse());
+    let far = (end.x.axis.point - start.point).norm() > 1e4 * factor.s[0];
+    let (Some(inverse), false, true) = (inverse, far, end.stop != Stop::Broken) else {
+        return Ok(Outcome::none(
+            ID,
+            Verdict::Diverged,
+            format!("no minimum after {} steps", end.iterations),
+            Known::Nothing,
+        ));
+    };
+    let unit: Matrix4<f64> = inverse.fixed_view::<4, 4>(0, 0).into();
+    let candidate = Candidate {
+        estimator: ID,
+        axis: end.x.axis,
+        own_centers: Vec::new(),
+        cost: end.normal.cost,
+        dof: problem.degrees_of_freedom(),
+        unit_covariance: spread_out(&unit, &end.x.axis.frame),
+        residuals: 3 * cloud.points.len(),
+        held: None,
+    };
+    Ok(judge(&cloud, &factor, candidate, options))
+}
+
+pub(crate) struct Bundle {
+    /// For each frame: (marker, position).
+    frames: Vec<Vec<(usize, Vector3<f64>)>>,
+    /// Encoder angle of each frame, or empty.
+    angles: Vec<f64>,
+    markers: usize,
+    /// The frame whose angle is zero.
+    reference: usize,
+    size: f64,
+}
+
+#[derive(Clone)]
+pub(crate) struct State {
+    pub axis: Axis,
+    pub angles: Vec<f64>,
+    /// Marker places in the frame of the axis, at angle zero.
+    pub places: Vec<Vector3<f64>>,
+}
+
+/// One frame's share: its own curvature, its pull, its coupling to the shared unknowns.
+struct FrameBlock {
+    own: f64,
+    gradient: f64,
+    to_axis: Vector4<f64>,
+    to_places: Vec<(usize, Vector3<f64>)>,
+}
+
+pub(crate) struct Normal {
+    shared: DMatrix<f64>,
+    gradient: DVector<f64>,
+    frames: Vec<FrameBlock>,
+    cost: f64,
+}
+
+impl Bundle {
+    fn of(cloud: &Cloud, angles: &[f64], size: f64) -> Result<Self, AorError> {
+        let rows = cloud.labels.iter().map(|l| l.1 + 1).max().unwrap_or(0);
+        if !angles.is_empty() && angles.len() < rows {
+            return Err(AorError::Data(
+                calib_geometry::measured::DataError::Lengths {
+                    what: "joint angles and frames",
+                    left: angles.len(),
+                    right: rows,
+                },
+            ));
+        }
+        let mut frames = vec![Vec::new(); rows];
+        for p in 0..cloud.markers() {
+            for k in cloud.starts[p]..cloud.starts[p + 1] {
+                frames[cloud.labels[k].1].push((p, cloud.points[k]));
+            }
+        }
+        let (mut kept, mut kept_angles) = (Vec::new(), Vec::new());
+        for (row, frame) in frames.into_iter().enumerate() {
+            if !frame.is_empty() {
+                kept.push(frame);
+                kept_angles.extend(angles.get(row));
+            }
+        }
+        Ok(Self::new(kept, kept_angles, cloud.markers(), size))
+    }
+
+    fn new(
+        frames: Vec<Vec<(usize, Vector3<f64>)>>,
+        angles: Vec<f64>,
+        markers: usize,
+        size: f64,
+    ) -> Self {
+        let reference = (0..frames.len()).fold(0, |best, i| {
+            if frames[i].len() > frames[best].len() {
+                i
+            } else {
+                best
+            }
+        });
+        Self {
+            frames,
+            angles,
+            markers,
+            reference,
+            size,
+        }
+    }
+
+    fn degrees_of_freedom(&self) -> usize {
+        let samples: usize = self.frames.iter().map(Vec::len).sum();
+        let turns = if self.angles.is_empty() {
+            self.frames.len() - 1
+        } else {
+            0
+        };
+        (3 * samples).saturating_sub(4 + 3 * self.markers + turns)
+    }
+
+    /// Angles and places around a first axis: chained from the reference frame over shared markers.
+    fn start(&self, axis: Axis) -> Option<State> {
+        let m = axis.frame.matrix();
+        let local = |v: &Vector3<f64>| m.tr_mul(&(v - axis.point));
+        if !self.angles.is_empty() {
+            // The encoder's sense: the axis follows it.
+            let turns = self.frames.iter().zip(&self.angles).flat_map(|(frame, q)| {
+                frame.iter().filter(|(p, _)| *p == 0).map(move |(_, v)| {
+                    let y = local(v);
+                    (y.y.atan2(y.x), *q)
+                })
+            });
+            let s =
+                crate::axis_frame::sign(&axis.frame.n, None, turns.collect::<Vec<_>>().into_iter());
+            if s < 0.0 {
+                let f = axis.frame;
+                let flipped = AxisFrame {
+                    e1: f.e1,
+                    e2: -f.e2,
+                    n: -f.n,
+                };
+                return self.known_angles(Axis {
+                    frame: flipped,
+                    point: axis.point,
+                });
+            }
+            return self.known_angles(axis);
+        }
+        let mut places: Vec<Option<Vector3<f64>>> = vec![None; self.markers];
+        for (p, v) in &self.frames[self.reference] {
+            places[*p] = Some(local(v));
+        }
+        let mut angles = vec![None; self.frames.len()];
+        angles[self.reference] = Some(0.0);
+        loop {
+            let mut placed = false;
+            for (frame, angle) in self.frames.iter().zip(&mut angles) {
+                if angle.is_some() {
+                    continue;
+                }
+                // Turn that carries the known places to where they are seen: Σ r² exp(i(φ − φ₀)).
+                let (mut sin, mut cos, mut known) = (0.0, 0.0, false);
+                for (p, v) in frame {
+                    if let Some(b) = places[*p] {
+                        let y = local(v);
+                        sin += b.x * y.y - b.y * y.x;
+                        cos += b.x * y.x + b.y * y.y;
+                        known = true;
+                    }
+                }
+                if !known {
+                    continue;
+                }
+                let turn: f64 = sin.atan2(cos);
+                *angle = Some(turn);
+                placed = true;
+                for (p, v) in frame {
+                    if places[*p].is_none() {
+                        places[*p] = Some(turned(-turn, &local(v)));
+                    }
+                }
+            }
+            if !placed {
+                break;
+            }
+        }
+        Some(State {
+            axis,
+            angles: angles.into_iter().collect::<Option<_>>()?,
+            places: places.into_iter().collect::<Option<_>>()?,
+        })
+    }
+
+    /// Places as means of the samples turned back by the encoder.
+    fn known_angles(&self, axis: Axis) -> Option<State> {
+        let m = axis.frame.matrix();
+        let mut sums = vec![(Vector3::zeros(), 0.0); self.markers];
+        for (frame, q) in self.frames.iter().zip(&self.angles) {
+            for (p, v) in frame {
+                sums[*p].0 += turned(-q, &m.tr_mul(&(v - axis.point)));
+                sums[*p].1 += 1.0;
+            }
+        }
+        let places = sums
+            .into_iter()
+            .map(|(s, n)| s / f64::max(n, 1.0))
+            .collect();
+        Some(State {
+            axis,
+            angles: self.angles.clone(),
+            places,
+        })
+    }
+
+    fn angle_is_free(&self, frame: usize) -> bool {
+        self.angles.is_empty() && frame != self.reference
+    }
+
+    /// Normal equations of axis and places with the angles eliminated.
+    fn reduced(&self, normal: &Normal, damping: f64) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let mut h = normal.shared.clone();
+        for k in 0..h.nrows() {
+            h[(k, k)] *= 1.0 + damping;
+        }
+        let mut g = normal.gradient.clone();
+        let mut row = DVector::zeros(h.nrows());
+        for (i, frame) in normal.frames.iter().enumerate() {
+            if !self.angle_is_free(i) || frame.own <= 0.0 {
+                continue;
+            }
+            row.fill(0.0);
+            row.fixed_rows_mut::<4>(0).copy_from(&frame.to_axis);
+            for (p, c) in &frame.to_places {
+                row.fixed_rows_mut::<3>(4 + 3 * p).copy_from(c);
+            }
+            let inverse = 1.0 / (frame.own * (1.0 + damping));
+            h.ger(-inverse, &row, &row, 1.0);
+            g.axpy(-inverse * frame.gradient, &row, 1.0);
+        }
+        h.iter().all(|x| x.is_finite()).then_some((h, g))
+    }
+}
+
+/// Rz(angle) v.
+fn turned(angle: f64, v: &Vector3<f64>) -> Vector3<f64> {
+    let (s, c) = angle.sin_cos();
+    Vector3::new(c * v.x - s * v.y, s * v.x + c * v.y, v.z)
+}
+
+impl Problem for Bundle {
+    type Point = State;
+    type Normal = Normal;
+    type Step = (DVector<f64>, Vec<f64>);
+
+    fn linearize(&self, x: &State) -> Normal {
+        let size = 4 + 3 * self.markers;
+        let mut normal = Normal {
+            shared: DMatrix::zeros(size, size),
+            gradient: DVector::zeros(size),
+            frames: Vec::with_capacity(self.frames.len()),
+            cost: 0.0,
+        };
+        let m = x.axis.frame.matrix();
+        for (frame, angle) in self.frames.iter().zip(&x.angles) {
+            let rz: Matrix3<f64> =
+                Rotation3::from_axis_angle(&Vector3::z_axis(), *angle).into_inner();
+            let mut block = FrameBlock {
+                own: 0.0,
+                gradient: 0.0,
+                to_axis: Vector4::zeros(),
+                to_places: Vec::with_capacity(frame.len()),
+            };
+            for (p, v) in frame {
+                let y = m.tr_mul(&(x.axis.point - v));
+                let z = rz * x.places[*p];
+                let e = y + z;
+                normal.cost += e.norm_squared();
+                // n ← n + a e₁ + b e₂ is the turn (−b, a, 0) in the frame
+                let cross = so3::skew(&y);
+                let mut j = SMatrix::<f64, 3, 4>::zeros();
+                j.set_column(0, &cross.column(1));
+                j.set_column(1, &(-cross.column(0)));
+                j[(0, 2)] = 1.0;
+                j[(1, 3)] = 1.0;
+                let spin = Vector3::new(-z.y, z.x, 0.0);
+                let at = 4 + 3 * p;
+                let mut corner = normal.shared.fixed_view_mut::<4, 4>(0, 0);
+                corner += j.transpose() * j;
+                let side = j.transpose() * rz;
+                let mut right = normal.shared.fixed_view_mut::<4, 3>(0, at);
+                right += side;
+                let mut below = normal.shared.fixed_view_mut::<3, 4>(at, 0);
+                below += side.transpose();
+                for k in 0..3 {
+                    normal.shared[(at + k, at + k)] += 1.0;
+                }
+                let mut g = normal.gradient.fixed_rows_mut::<4>(0);
+                g += j.transpose() * e;
+                let mut g = normal.gradient.fixed_rows_mut::<3>(at);
+                g += rz.transpose() * e;
+                block.own += spin.norm_squared();
+                block.gradient += spin.dot(&e);
+                block.to_axis += j.transpose() * spin;
+                block.to_places.push((*p, rz.transpose() * spin));
+            }
+            normal.frames.push(block);
+        }
+        normal
+    }
+
+    fn cost(&self, normal: &Normal) -> f64 {
+        normal.cost
+    }
+
+    fn solve(&self, normal: &Normal, damping: f64) -> Option<(Self::Step, f64)> {
+        let (h, g) = self.reduced(normal, damping)?;
+        let shared = -h.cholesky()?.solve(&g);
+        let mut predicted = -shared.dot(&normal.gradient);
+        let turns = normal
+            .frames
+            .iter()
+            .enumerate()
+            .map(|(i, frame)| {
+                if !self.angle_is_free(i) || frame.own <= 0.0 {
+                    return 0.0;
+                }
+                let mut pull = frame.gradient + frame.to_axis.dot(&shared.fixed_rows::<4>(0));
+                for (p, c) in &frame.to_places {
+                    pull += c.dot(&shared.fixed_rows::<3>(4 + 3 * p));
+                }
+                let turn = -pull / (frame.own * (1.0 + damping));
+                predicted -= turn * frame.gradient;
+                turn
+            })
+            .collect();
+        Some(((shared, turns), predicted))
+    }
+
+    fn retract(&self, x: &State, (shared, turns): &Self::Step) -> State {
+        let f = x.axis.frame;
+        // Exact rotation of the whole frame by the small turn (−b, a, 0): the gauge about n stays put.
+        let turn = so3::exp(&Vector3::new(-shared[1], shared[0], 0.0)).to_rotation_matrix();
+        let next = f.matrix() * turn.matrix();
+        State {
+            axis: Axis {
+                frame: AxisFrame {
+                    e1: next.column(0).into(),
+                    e2: next.column(1).into(),
+                    n: next.column(2).into(),
+                },
+                point: x.axis.point + f.e1 * shared[2] + f.e2 * shared[3],
+            },
+            angles: x.angles.iter().zip(turns).map(|(a, t)| a + t).collect(),
+            places: x
+                .places
+                .iter()
+                .enumerate()
+                .map(|(p, b)| b + shared.fixed_rows::<3>(4 + 3 * p))
+                .collect(),
+        }
+    }
+
+    fn is_negligible(&self, _: &State, (shared, turns): &Self::Step) -> bool {
+        shared[0].hypot(shared[1]) <= 1e-15
+            && shared.rows(2, shared.len() - 2).amax() <= 1e-15 * self.size
+            && turns.iter().all(|t| t.abs() <= 1e-15)
+    }
+}
+
+/// Unit-noise covariance of (turn, shift) at the truth; `places` in the frame of the axis.
+pub(crate) fn unit_bound(
+    axis: &Axis,
+    places: &[Vector3<f64>],
+    angles: &[f64],
+    angles_known: bool,
+) -> Option<Matrix4<f64>> {
+    let m = axis.frame.matrix();
+    let frames = angles
+        .iter()
+        .map(|a| {
+            places
+                .iter()
+                .enumerate()
+                .map(|(p, b)| (p, axis.point + m * turned(*a, b)))
+                .collect()
+        })
+        .collect();
+    let known = if angles_known {
+        angles.to_vec()
+    } else {
+        Vec::new()
+    };
+    let problem = Bundle::new(frames, known, places.len(), 1.0);
+    // The reference frame's angle is the zero of the others.
+    let zero = if angles_known {
+        0.0
+    } else {
+        angles[problem.reference]
+    };
+    let truth = State {
+        axis: *axis,
+        angles: angles.iter().map(|a| a - zero).collect(),
+        places: places.iter().map(|b| turned(zero, b)).collect(),
+    };
+    let (h, _) = problem.reduced(&problem.linearize(&truth), 0.0)?;
+    Some(
+        h.cholesky()?
+            .inverse()
+            .fixed_view::<4, 4>(0, 0)
+            .into_owned(),
+    )
+}

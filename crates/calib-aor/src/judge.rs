@@ -1,0 +1,257 @@
+//! Rank checks before a circle fit, and the judgement of a fitted axis.
+//!
+//! ```text
+//! κ = (s₂² / (n − P − 1)) / σ̂²  ~  F(n − P − 1, ν)      if the points stay on a line within noise    (1)
+//! C = σ² (JᵀJ)⁻¹,  the direction's weakest variance divided by 1 − 1/κ                              (2)
+//! ```
+//!
+//! A short arc looks like a chord: its normal is known only as well as its sagitta stands out of the noise.
+
+use calib_geometry::{
+    Line, Verdict, chance,
+    decompose::symmetric_eigen_small,
+    factor::{Factor, rank_verdict},
+    measured::Cloud,
+};
+use nalgebra::{Matrix2, Matrix3, Matrix6, Point3, Unit, Vector3};
+
+use crate::{
+    axis_frame::{arc_covered, sign},
+    circles::Axis,
+    options::Options,
+    outcome::{AorEstimate, Circle, Known, Outcome},
+};
+
+/// Samples, factor and rank; `Err` carries the answer where there is no plane.
+pub(crate) fn prepare(estimator: &'static str, cloud: &Cloud) -> Result<Factor, Outcome> {
+    let needed = cloud.markers().max(1) + 2;
+    if cloud.points.len() < needed {
+        return Err(Outcome::none(
+            estimator,
+            Verdict::TooFew,
+            format!(
+                "{} samples (of markers seen at least twice), at least {needed} are needed",
+                cloud.points.len()
+            ),
+            Known::Nothing,
+        ));
+    }
+    let factor = Factor::of(cloud, false);
+    match rank_verdict(cloud, &factor) {
+        Some(verdict @ (Verdict::Coincident | Verdict::Collinear)) => Err(no_plane(
+            estimator,
+            verdict,
+            format!(
+                "the points are {verdict}: singular values {:.3e}, {:.3e}, {:.3e}",
+                factor.s[0], factor.s[1], factor.s[2]
+            ),
+            cloud,
+            &factor,
+        )),
+        // Exact planar data are the best that a circle can have.
+        _ => Ok(factor),
+    }
+}
+
+fn no_plane(
+    estimator: &'static str,
+    verdict: Verdict,
+    reason: String,
+    cloud: &Cloud,
+    factor: &Factor,
+) -> Outcome {
+    let known = match verdict {
+        Verdict::Collinear => Known::Chord(Line {
+            point: Point3::from(cloud.origin),
+            direction: Unit::new_normalize(factor.v.column(0).into_owned()),
+        }),
+        _ => Known::Nothing,
+    };
+    Outcome::none(estimator, verdict, reason, known)
+}
+
+/// A fitted axis to be judged.
+pub(crate) struct Candidate {
+    pub estimator: &'static str,
+    /// Relative to the cloud's origin.
+    pub axis: Axis,
+    /// Center of each marker's circle where they have their own; empty: all on the line.
+    pub own_centers: Vec<Vector3<f64>>,
+    /// Σ of squared residuals.
+    pub cost: f64,
+    /// Residuals less unknowns.
+    pub dof: usize,
+    /// Covariance over [direction; point] for unit noise.
+    pub unit_covariance: Matrix6<f64>,
+    /// Number of residuals.
+    pub residuals: usize,
+    /// Center that was held, world.
+    pub held: Option<Point3<f64>>,
+}
+
+/// Noise, observability, sign and the circles of each marker.
+pub(crate) fn judge(
+    cloud: &Cloud,
+    factor: &Factor,
+    candidate: Candidate,
+    options: &Options,
+) -> Outcome {
+    let Candidate {
+        estimator,
+        axis,
+        own_centers,
+        cost,
+        dof,
+        unit_covariance,
+        residuals,
+        held,
+    } = candidate;
+    let estimated = if dof > 0 {
+        (cost / dof as f64).sqrt()
+    } else {
+        0.0
+    };
+    let sigma = options.sigma_t.unwrap_or(estimated);
+    let kappa = match leaves_its_line(estimator, cloud, factor, estimated, dof, options) {
+        Ok(kappa) => kappa,
+        Err(answer) => return answer,
+    };
+
+    // Take the share of noise off what the weakest direction seems to tell.
+    let mut covariance = unit_covariance * (sigma * sigma);
+    let of_direction: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
+    let eigen = symmetric_eigen_small(&of_direction);
+    let worst = eigen.vectors.column(2).into_owned();
+    let excess = if kappa.is_finite() {
+        1.0 / (kappa - 1.0)
+    } else {
+        0.0
+    };
+    // Along the worst turn w the joint change of (n, c) is C[:, w]/C_ww.
+    let mut along = nalgebra::Vector6::zeros();
+    along.fixed_rows_mut::<3>(0).copy_from(&worst);
+    let joint = covariance * along;
+    if eigen.values[2] > 0.0 {
+        covariance += joint * joint.transpose() * (excess / eigen.values[2]);
+    }
+    let sigma_direction = (eigen.values[2].max(0.0) * (1.0 + excess)).sqrt();
+
+    let n = axis.frame.n;
+    let center_of = |p: usize| own_centers.get(p).copied().unwrap_or(axis.point);
+    let angle_about = |p: usize, x: &Vector3<f64>| {
+        let d = x - center_of(p);
+        d.dot(&axis.frame.e2).atan2(d.dot(&axis.frame.e1))
+    };
+    let turns = (0..cloud.markers()).flat_map(|p| {
+        let angle_about = &angle_about;
+        (cloud.starts[p]..cloud.starts[p + 1]).filter_map(move |k| {
+            let q = options.angles.get(cloud.labels[k].1)?;
+            Some((angle_about(p, &cloud.points[k]), *q))
+        })
+    });
+    let s = sign(&n, options.towards, turns);
+
+    let mut circles = Vec::with_capacity(cloud.markers());
+    for p in 0..cloud.markers() {
+        let points = cloud.marker(p);
+        let count = points.len() as f64;
+        let c = center_of(p);
+        let height = points.iter().map(|x| (x - c).dot(&n)).sum::<f64>() / count;
+        let radius = points
+            .iter()
+            .map(|x| {
+                let d = x - c;
+                (d - n * d.dot(&n)).norm()
+            })
+            .sum::<f64>()
+            / count;
+        let mut angles: Vec<f64> = points.iter().map(|x| angle_about(p, x)).collect();
+        circles.push(Circle {
+            center: Point3::from(cloud.origin + c + n * height),
+            radius,
+            arc: arc_covered(&mut angles),
+        });
+    }
+    // τ = (v̄ − m)·n (paper Eq. 15, ‖n‖ = 1)
+    let from = held.map_or(axis.point + cloud.origin, |m| m.coords);
+    let tau = (cloud.origin - from).dot(&n) * s;
+    let (verdict, reason) = if sigma_direction > options.weak_angle {
+        let arc = circles.iter().map(|c| c.arc).fold(0.0, f64::max);
+        let text = format!(
+            "σ of the direction is {:.2}°, more than {:.1}°: arcs of at most {:.0}° with a noise of {sigma:.2e}",
+            sigma_direction.to_degrees(),
+            options.weak_angle.to_degrees(),
+            arc.to_degrees()
+        );
+        (Verdict::Weak, Some(text))
+    } else {
+        (Verdict::Ok, None)
+    };
+    Outcome::Estimate(Box::new(AorEstimate {
+        estimator,
+        line: Line {
+            point: held.unwrap_or_else(|| Point3::from(cloud.origin + axis.point)),
+            direction: Unit::new_normalize(n * s),
+        },
+        in_child: None,
+        covariance,
+        sigma_direction,
+        tau,
+        circles,
+        sigma,
+        rms: (cost / residuals.max(1) as f64).sqrt(),
+        used: cloud.points.len(),
+        rejected: Vec::new(),
+        verdict,
+        reason,
+    }))
+}
+
+/// H₀: every marker stays on a line within its noise, so that s₂² is noise alone. Returns κ.
+pub(crate) fn leaves_its_line(
+    estimator: &'static str,
+    cloud: &Cloud,
+    factor: &Factor,
+    sigma: f64,
+    dof: usize,
+    options: &Options,
+) -> Result<f64, Outcome> {
+    /// Residual degrees of freedom from which they say more about the noise than the tracker does.
+    const ENOUGH_DOF: usize = 10;
+    let (n, markers) = (cloud.points.len(), cloud.markers());
+    let (noise, noise_dof) = match options.sigma_t {
+        Some(stated) if dof < ENOUGH_DOF => (stated, None),
+        _ if dof == 0 => return Ok(f64::INFINITY),
+        _ => (sigma, Some(dof as f64)),
+    };
+    let test = |k: usize, test_dof: usize| {
+        let d = test_dof.max(1) as f64;
+        let kappa = factor.s[k] * factor.s[k] / d / (noise * noise);
+        let chance = match noise_dof {
+            Some(noise_dof) => chance::f_tail(kappa, d, noise_dof),
+            None => chance::chi2_tail(kappa * d, d),
+        };
+        (kappa, chance)
+    };
+    let (kappa, chance) = test(1, n - markers - 1);
+    if chance <= options.significance {
+        return Ok(kappa);
+    }
+    let verdict = if test(0, n - markers).1 <= options.significance {
+        Verdict::Collinear
+    } else {
+        Verdict::Coincident
+    };
+    let reason = format!(
+        "the points are {verdict} within their noise: their spread across the best line is {:.2} times the \
+         noise of {noise:.3e} (chance {chance:.1e}, accepted below {:.0e})",
+        kappa.sqrt(),
+        options.significance
+    );
+    Err(no_plane(estimator, verdict, reason, cloud, factor))
+}
+
+/// 2 × 2 inverse that is zero where singular.
+pub(crate) fn inverse_or_zero(m: &Matrix2<f64>) -> Matrix2<f64> {
+    m.try_inverse().unwrap_or_else(Matrix2::zeros)
+}

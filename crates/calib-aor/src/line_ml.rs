@@ -1,0 +1,141 @@
+//! Maximum likelihood circles: one common line, or one common direction with own centers.
+//!
+//! ```text
+//! line_ml     n, c common;      unknowns 4 + 2P,  residuals 2n
+//! dir_ml      n common, c_p;    unknowns 2 + 4P
+//! circle_ml   the same with one marker: the orthogonal-distance circle in space
+//! ```
+//!
+//! The common-line fit starts from the plane normal and one center for all markers; starting from each
+//! circle's own center diverges on short arcs.
+
+use calib_geometry::{Verdict, factor::Factor, measured::Cloud};
+use nalgebra::{Matrix4, Matrix6};
+
+use crate::{
+    circles::{Axis, Centers, Free, OwnCenters, flat_center, minimise_line, spread_out},
+    input::{Input, cloud_of},
+    judge::{Candidate, inverse_or_zero, judge, prepare},
+    options::Options,
+    outcome::{AorError, Known, Outcome},
+    plane,
+};
+
+/// A common line for all markers.
+///
+/// # Errors
+/// [`AorError`] for data that are no numbers or of another kind.
+pub fn line(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+    run("line_ml", input, options, common_line)
+}
+
+/// A common direction, an own center for each marker.
+///
+/// # Errors
+/// As [`line`].
+pub fn direction(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+    run("dir_ml", input, options, own_centers)
+}
+
+/// The orthogonal-distance circle of one marker (several: as [`direction`]).
+///
+/// # Errors
+/// As [`line`].
+pub fn circle(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+    run("circle_ml", input, options, |id, cloud, factor| {
+        if cloud.markers() == 1 {
+            common_line(id, cloud, factor)
+        } else {
+            own_centers(id, cloud, factor)
+        }
+    })
+}
+
+fn run(
+    estimator: &'static str,
+    input: &Input<'_>,
+    options: &Options,
+    solve: impl Fn(&'static str, &Cloud, &Factor) -> Option<Candidate>,
+) -> Result<Outcome, AorError> {
+    options.check()?;
+    let cloud = cloud_of(input)?;
+    let factor = match prepare(estimator, &cloud) {
+        Ok(factor) => factor,
+        Err(answer) => return Ok(answer),
+    };
+    match solve(estimator, &cloud, &factor) {
+        Some(candidate) => Ok(judge(&cloud, &factor, candidate, options)),
+        None => Ok(Outcome::none(
+            estimator,
+            Verdict::Diverged,
+            "the center of a circle ran away: its arc is straight within the noise".into(),
+            Known::Nothing,
+        )),
+    }
+}
+
+fn common_line(estimator: &'static str, cloud: &Cloud, factor: &Factor) -> Option<Candidate> {
+    let start = plane::start(cloud, factor, &Options::default());
+    let (axis, normal) = minimise_line(cloud, start, Free::Line, factor.s[0])?;
+    let unit = normal.hessian.try_inverse()?;
+    let (n, markers) = (cloud.points.len(), cloud.markers());
+    Some(Candidate {
+        estimator,
+        axis,
+        own_centers: Vec::new(),
+        cost: normal.cost,
+        dof: (2 * n).saturating_sub(4 + 2 * markers),
+        unit_covariance: spread_out(&unit, &axis.frame),
+        residuals: 2 * n,
+        held: None,
+    })
+}
+
+fn own_centers(estimator: &'static str, cloud: &Cloud, factor: &Factor) -> Option<Candidate> {
+    let start = plane::start(cloud, factor, &Options::default());
+    let points = (0..cloud.markers())
+        .map(|p| flat_center(cloud, &start.frame, p..p + 1))
+        .collect();
+    let problem = OwnCenters {
+        cloud,
+        size: factor.s[0],
+    };
+    let (end, normals) = problem.minimise(Centers {
+        frame: start.frame,
+        points,
+    })?;
+    let (h, _, own) = problem.reduced(&normals, 0.0)?;
+    let (n, markers) = (cloud.points.len(), cloud.markers());
+    // The reported point is the mean of the centers across n: its covariance from the markers' own blocks.
+    let mean = end.points.iter().sum::<nalgebra::Vector3<f64>>() / markers as f64;
+    let of_turn = inverse_or_zero(&h);
+    let mut unit = Matrix4::zeros();
+    unit.fixed_view_mut::<2, 2>(0, 0).copy_from(&of_turn);
+    let mut cross = nalgebra::Matrix2::zeros();
+    let mut alone = nalgebra::Matrix2::zeros();
+    for (inverse, coupling) in &own {
+        // c_p = −H_cc⁻¹ H_cn turn + own noise
+        cross -= inverse * coupling / markers as f64;
+        alone += inverse / (markers * markers) as f64;
+    }
+    unit.fixed_view_mut::<2, 2>(2, 2)
+        .copy_from(&(alone + cross * of_turn * cross.transpose()));
+    unit.fixed_view_mut::<2, 2>(2, 0)
+        .copy_from(&(cross * of_turn));
+    unit.fixed_view_mut::<2, 2>(0, 2)
+        .copy_from(&(cross * of_turn).transpose());
+    let unit_covariance: Matrix6<f64> = spread_out(&unit, &end.frame);
+    Some(Candidate {
+        estimator,
+        axis: Axis {
+            frame: end.frame,
+            point: mean,
+        },
+        own_centers: end.points,
+        cost: normals.iter().map(|n| n.cost).sum(),
+        dof: (2 * n).saturating_sub(2 + 4 * markers),
+        unit_covariance,
+        residuals: 2 * n,
+        held: None,
+    })
+}

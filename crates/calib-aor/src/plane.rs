@@ -1,0 +1,74 @@
+//! Plane fit: the two-step baseline. The axis is the normal of the best plane of each marker's samples.
+//!
+//! ```text
+//! n = direction of least spread of x − x̄_p;   point: the circle's center in that plane, or a given center
+//! ```
+//!
+//! Gamage & Lasenby 2002, Cerveri et al. 2005. For one clean circle it is as good as any (errors of second
+//! order apart); on short arcs of several markers a common line tells more.
+
+use calib_geometry::{factor::Factor, measured::Cloud};
+use nalgebra::{Matrix2, Matrix4};
+
+use crate::{
+    axis_frame::AxisFrame,
+    circles::{Axis, flat_center, linearize, spread_out},
+    input::{Input, cloud_of},
+    judge::{Candidate, inverse_or_zero, judge, prepare},
+    options::Options,
+    outcome::{AorError, Outcome},
+};
+
+/// The plane fit on all markers of `input`.
+///
+/// # Errors
+/// [`AorError`] for data that are no numbers or of another kind.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+    options.check()?;
+    let cloud = cloud_of(input)?;
+    let factor = match prepare("plane", &cloud) {
+        Ok(factor) => factor,
+        Err(answer) => return Ok(answer),
+    };
+    let axis = start(&cloud, &factor, options);
+    let normal = linearize(&cloud, &axis);
+    let (n, markers) = (cloud.points.len(), cloud.markers());
+    // Only the planar part of the cost speaks about n: Σ (d·e)² across the normal.
+    let spread: Matrix2<f64> = {
+        let f = axis.frame;
+        let mut m = Matrix2::zeros();
+        for k in 0..3 {
+            let v = factor.v.column(k);
+            let d = nalgebra::Vector2::new(v.dot(&f.e1), v.dot(&f.e2));
+            m += d * d.transpose() * (factor.s[k] * factor.s[k]);
+        }
+        m
+    };
+    let shift: Matrix2<f64> = normal.hessian.fixed_view::<2, 2>(2, 2).into();
+    let mut unit = Matrix4::zeros();
+    unit.fixed_view_mut::<2, 2>(0, 0)
+        .copy_from(&inverse_or_zero(&spread));
+    unit.fixed_view_mut::<2, 2>(2, 2)
+        .copy_from(&inverse_or_zero(&shift));
+    let candidate = Candidate {
+        estimator: "plane",
+        axis,
+        own_centers: Vec::new(),
+        cost: factor.s[2] * factor.s[2],
+        dof: n - markers - 2,
+        unit_covariance: spread_out(&unit, &axis.frame),
+        residuals: n,
+        held: options.center,
+    };
+    Ok(judge(&cloud, &factor, candidate, options))
+}
+
+/// Normal of the best plane, with a point: the held center, or the circles' common center in the plane.
+pub(crate) fn start(cloud: &Cloud, factor: &Factor, options: &Options) -> Axis {
+    let frame = AxisFrame::of(factor.v.column(2).into_owned());
+    let point = match options.center {
+        Some(center) => center.coords - cloud.origin,
+        None => flat_center(cloud, &frame, 0..cloud.markers()),
+    };
+    Axis { frame, point }
+}
