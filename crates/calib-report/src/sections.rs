@@ -572,7 +572,7 @@ fn data(page: &mut Page, report: &Report) {
         .into_iter()
         .find(|answer| answer.id == "clocks");
     page.text(format!(
-        "Clocks: {}",
+        "Did the clocks agree? {}",
         clocks.map_or_else(String::new, |answer| answer.lines.join("; "))
     ));
 

@@ -39,6 +39,17 @@ fn the_pictures_of_the_examples_as_data() {
 }
 
 #[test]
+fn the_view_of_the_example_as_data() {
+    let mut view = examples::view().thinned();
+    view.poses.truncate(1);
+    view.clouds
+        .iter_mut()
+        .for_each(|cloud| cloud.points.truncate(2));
+    let value = json::rounded(serde_json::to_value(&view).expect("JSON"));
+    assert_snapshot!("view", json::pretty(&value));
+}
+
+#[test]
 fn a_page_loads_nothing_and_is_small() {
     for (name, _, text) in pages() {
         assert!(text.len() < MAX_BYTES, "{name}: {} bytes", text.len());
