@@ -26,6 +26,7 @@ mod model;
 mod poses;
 pub mod readers;
 pub mod rigid_body;
+pub mod sync;
 mod table;
 mod text;
 mod units;

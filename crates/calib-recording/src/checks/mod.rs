@@ -13,6 +13,7 @@ mod rigidity;
 mod statistics;
 
 pub use held_out::held_out_in_training;
+pub(crate) use statistics::{median, robust_range_limit};
 
 use crate::finding::Finding;
 use crate::poses::Poses;

@@ -23,3 +23,9 @@ pub(crate) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
         Some((low, high)) => Some((low.min(value), high.max(value))),
     })
 }
+
+/// What the difference of two means of `n` samples each stays below, for noise σ per coordinate: eight σ of the
+/// difference's length.
+pub(crate) fn robust_range_limit(sigma: f64, n: usize) -> f64 {
+    8.0 * sigma * (2.0 * 3.0 / n.max(1) as f64).sqrt()
+}

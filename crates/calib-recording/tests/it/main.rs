@@ -7,6 +7,7 @@ mod fixtures;
 mod mutations;
 mod real_formats;
 mod real_tables;
+mod sync;
 mod tables;
 
 /// Property tests that are the same on every run.

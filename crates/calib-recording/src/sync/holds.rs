@@ -1,0 +1,271 @@
+//! Intervals in which nothing moves, and one pose for each of them.
+
+use crate::checks::robust_range_limit;
+use crate::finding::{Finding, Severity};
+use crate::poses::Poses;
+use calib_geometry::{mean::chordal_mean, se3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
+
+/// When something stands still.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HoldSettings {
+    /// Shortest hold, s. Default 0.5: arms ring for a few tenths of a second.
+    pub min_duration: f64,
+    /// Window in which everything must stay together, s. Default 0.2.
+    pub window: f64,
+    /// Range of a joint within the window, rad or m. Default 1e-3: 5 mrad/s.
+    pub joint_range: f64,
+    /// Range of a marker or body within the window, m. Default 1e-3: ten σ of a usual tracker.
+    pub point_range: f64,
+    /// Range of a body's angle within the window, rad. Default 0.01.
+    pub turn_range: f64,
+    /// Part of each hold that is dropped at its start. Default 0.2.
+    pub drop_start: f64,
+}
+
+impl Default for HoldSettings {
+    fn default() -> Self {
+        HoldSettings {
+            min_duration: 0.5,
+            window: 0.2,
+            joint_range: 1e-3,
+            point_range: 1e-3,
+            turn_range: 0.01,
+            drop_start: 0.2,
+        }
+    }
+}
+
+/// One hold.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hold {
+    /// Rows (from 0) that count, the start already dropped.
+    pub rows: std::ops::Range<usize>,
+    /// Time of the first and last of them, s.
+    pub span: (f64, f64),
+}
+
+/// Static poses made of holds.
+#[derive(Clone, Debug, Default)]
+pub struct StaticPoses {
+    /// One row per hold; `rows` are those of the holds' first samples.
+    pub poses: Poses,
+    /// Marker → covariance of one sample within each hold, m² (`None` below four samples). Divide by the number of
+    /// samples for the mean only where their noise is independent; trackers' noise often is not.
+    pub marker_covariance: BTreeMap<String, Vec<Option<Matrix3<f64>>>>,
+    /// Body → covariance of one sample in the body frame, `[ω; v]`.
+    pub body_covariance: BTreeMap<String, Vec<Option<Matrix6<f64>>>>,
+    /// Holds that drift although they passed the thresholds.
+    pub findings: Vec<Finding>,
+}
+
+/// The holds of a table with time; empty without time.
+pub fn holds(poses: &Poses, settings: &HoldSettings) -> Vec<Hold> {
+    let Some(t) = &poses.t else { return Vec::new() };
+    let channels = channels(poses, settings);
+    let mut quiet = vec![false; t.len()];
+    let (mut from, mut to) = (0, 0);
+    for i in 0..t.len() {
+        while t[i] - t[from] > settings.window / 2.0 {
+            from += 1;
+        }
+        while to + 1 < t.len() && t[to + 1] - t[i] <= settings.window / 2.0 {
+            to += 1;
+        }
+        quiet[i] = channels
+            .iter()
+            .all(|(values, limit)| range(&values[from..=to]).is_none_or(|range| range <= *limit));
+    }
+    let mut found = Vec::new();
+    let mut start = 0;
+    for end in 1..=t.len() {
+        if end < t.len() && quiet[end] == quiet[start] {
+            continue;
+        }
+        if quiet[start] && t[end - 1] - t[start] >= settings.min_duration {
+            let after = t[start] + settings.drop_start * (t[end - 1] - t[start]);
+            let first = (start..end).find(|&i| t[i] >= after).unwrap_or(start);
+            found.push(Hold {
+                rows: first..end,
+                span: (t[first], t[end - 1]),
+            });
+        }
+        start = end;
+    }
+    found
+}
+
+/// Every coordinate that must stand still, with its limit. A body's turn enters as rotation-vector components against
+/// its first orientation, which is exact enough within a window.
+fn channels(poses: &Poses, settings: &HoldSettings) -> Vec<(Vec<Option<f64>>, f64)> {
+    let mut channels: Vec<(Vec<Option<f64>>, f64)> = poses
+        .joints
+        .values()
+        .map(|q| (q.clone(), settings.joint_range))
+        .collect();
+    for track in poses.markers.values() {
+        for axis in 0..3 {
+            channels.push((
+                track.iter().map(|p| p.map(|p| p[axis])).collect(),
+                settings.point_range,
+            ));
+        }
+    }
+    for track in poses.bodies.values() {
+        for axis in 0..3 {
+            channels.push((
+                track
+                    .iter()
+                    .map(|p| p.map(|p| p.translation.vector[axis]))
+                    .collect(),
+                settings.point_range,
+            ));
+        }
+        // The nine entries of R change by at most the angle.
+        for (row, column) in (0..3).flat_map(|r| (0..3).map(move |c| (r, c))) {
+            let entry = |p: &Isometry3<f64>| p.rotation.to_rotation_matrix()[(row, column)];
+            channels.push((
+                track.iter().map(|p| p.as_ref().map(entry)).collect(),
+                settings.turn_range,
+            ));
+        }
+    }
+    channels
+}
+
+fn range(values: &[Option<f64>]) -> Option<f64> {
+    let range = values
+        .iter()
+        .flatten()
+        .fold(None, |range: Option<(f64, f64)>, &v| {
+            Some(range.map_or((v, v), |(low, high)| (low.min(v), high.max(v))))
+        });
+    range.map(|(low, high)| high - low)
+}
+
+/// One pose per hold: medians of joints and marker coordinates, chordal mean and median translation of bodies, with the
+/// empirical covariance of the samples. A hold whose halves differ by more than noise gets a finding.
+pub fn static_poses(poses: &Poses, holds: &[Hold]) -> StaticPoses {
+    let mut out = StaticPoses::default();
+    let first: Vec<usize> = holds.iter().map(|hold| hold.rows.start).collect();
+    out.poses.rows = first.iter().map(|&i| poses.rows[i]).collect();
+    out.poses.joint_units = poses.joint_units.clone();
+    out.poses.labels = poses
+        .labels
+        .iter()
+        .map(|(name, texts)| {
+            (
+                name.clone(),
+                first.iter().map(|&i| texts[i].clone()).collect(),
+            )
+        })
+        .collect();
+    let scalars = |all: &BTreeMap<String, Vec<Option<f64>>>| {
+        all.iter()
+            .map(|(name, values)| {
+                (
+                    name.clone(),
+                    holds
+                        .iter()
+                        .map(|hold| middle(values[hold.rows.clone()].iter().flatten().copied()))
+                        .collect(),
+                )
+            })
+            .collect()
+    };
+    out.poses.joints = scalars(&poses.joints);
+    out.poses.torques = scalars(&poses.torques);
+    for (name, track) in &poses.markers {
+        let (mut means, mut covariances) = (Vec::new(), Vec::new());
+        for hold in holds {
+            let points: Vec<Vector3<f64>> = track[hold.rows.clone()]
+                .iter()
+                .flatten()
+                .map(|p| p.coords)
+                .collect();
+            means.push(middle_point(&points).map(Point3::from));
+            covariances.push(covariance3(&points));
+            out.findings.extend(drift(name, poses, hold, &points));
+        }
+        out.poses.markers.insert(name.clone(), means);
+        out.marker_covariance.insert(name.clone(), covariances);
+    }
+    for (name, track) in &poses.bodies {
+        let (mut means, mut covariances) = (Vec::new(), Vec::new());
+        for hold in holds {
+            let seen: Vec<Isometry3<f64>> =
+                track[hold.rows.clone()].iter().flatten().copied().collect();
+            let points: Vec<Vector3<f64>> = seen.iter().map(|p| p.translation.vector).collect();
+            let rotations: Vec<UnitQuaternion<f64>> = seen.iter().map(|p| p.rotation).collect();
+            let mean = middle_point(&points)
+                .zip(chordal_mean(&rotations).ok())
+                .map(|(t, r)| Isometry3::from_parts(Translation3::from(t), r));
+            covariances.push(mean.and_then(|mean| covariance6(&mean, &seen)));
+            means.push(mean);
+            out.findings.extend(drift(name, poses, hold, &points));
+        }
+        out.poses.bodies.insert(name.clone(), means);
+        out.body_covariance.insert(name.clone(), covariances);
+    }
+    out
+}
+
+fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
+    crate::checks::median(values.collect())
+}
+
+fn middle_point(points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+    let axis = |k: usize| middle(points.iter().map(|p| p[k]));
+    Some(Vector3::new(axis(0)?, axis(1)?, axis(2)?))
+}
+
+fn covariance3(points: &[Vector3<f64>]) -> Option<Matrix3<f64>> {
+    let n = points.len() as f64;
+    let mean = points.iter().sum::<Vector3<f64>>() / n;
+    (points.len() >= 4).then(|| {
+        points
+            .iter()
+            .map(|p| (p - mean) * (p - mean).transpose())
+            .sum::<Matrix3<f64>>()
+            / (n - 1.0)
+    })
+}
+
+fn covariance6(mean: &Isometry3<f64>, poses: &[Isometry3<f64>]) -> Option<Matrix6<f64>> {
+    let xi = poses
+        .iter()
+        .map(|pose| se3::log(&(mean.inverse() * pose)).0);
+    (poses.len() >= 7).then(|| {
+        xi.map(|xi| xi * xi.transpose()).sum::<Matrix6<f64>>() / (poses.len() as f64 - 1.0)
+    })
+}
+
+/// The means of both halves differ by more than the scatter explains.
+fn drift(name: &str, poses: &Poses, hold: &Hold, points: &[Vector3<f64>]) -> Option<Finding> {
+    let covariance = covariance3(points)?;
+    let half = points.len() / 2;
+    let mean = |part: &[Vector3<f64>]| part.iter().sum::<Vector3<f64>>() / part.len() as f64;
+    let off = mean(&points[half..]) - mean(&points[..half]);
+    // Scatter within the halves, from successive differences, which a slow drift does not enter: E|Δ|² = 2·tr Σ.
+    let steps: f64 = points
+        .windows(2)
+        .map(|w| (w[1] - w[0]).norm_squared())
+        .sum::<f64>()
+        / (points.len() - 1) as f64;
+    let sigma = (steps / 2.0 / 3.0)
+        .sqrt()
+        .min((covariance.trace() / 3.0).sqrt());
+    let expected = robust_range_limit(sigma, half);
+    (half >= 5 && off.norm() > expected).then(|| {
+        let text = format!(
+            "drifts by {:.3} mm within the hold at {:.2} s, noise explains {:.3} mm",
+            off.norm() * 1e3,
+            hold.span.0,
+            expected * 1e3
+        );
+        let remedy = "wait longer before recording, or stiffen the robot's stand";
+        Finding::new("unsettled-rows", Severity::Warning, name, text, remedy)
+            .at_rows(hold.rows.clone().map(|i| poses.rows[i]))
+    })
+}
