@@ -1,9 +1,13 @@
 //! The 3-D view of `report.html`, as data: everything is in the tracker's (or world's) frame, m and rad.
 
+mod outline;
+
+pub use outline::Outline;
+
 use crate::ReportError;
 use crate::json::{rounded_to, to_value};
 use crate::svg::Body;
-use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::Serialize;
 
 /// What the 3-D view shows.
@@ -15,6 +19,8 @@ pub struct View3d {
     pub magnification: f64,
     /// Frames of the robot; the parents make the links.
     pub frames: Vec<ViewFrame>,
+    /// Outlines of the links; empty when only frames are drawn.
+    pub outlines: Vec<Outline>,
     /// Poses to step through, the validation poses first.
     pub poses: Vec<ViewPose>,
     /// Points of the sweeps.
@@ -128,8 +134,14 @@ const DIGITS: usize = 5;
 /// Points of all clouds together in the page: 20 bytes each, a third of a megabyte.
 const CLOUD_POINTS: usize = 15_000;
 
+/// Lines of all outlines together in the page: 40 bytes each, two thirds of a megabyte.
+const OUTLINE_LINES: usize = 15_000;
+
 /// Poses in the page.
 const POSES: usize = 200;
+
+/// Lines of one outline in the still picture.
+const STILL_LINES: usize = 300;
 
 /// The row of [`ViewPose::calibrated`] for a frame.
 #[must_use]
@@ -160,6 +172,22 @@ impl View3d {
         let frames = view.frames.len();
         for frame in &mut view.frames {
             frame.parent = frame.parent.filter(|parent| *parent < frames);
+        }
+        let total: usize = view
+            .outlines
+            .iter()
+            .map(|outline| outline.lines.len())
+            .sum();
+        let step = total.div_ceil(OUTLINE_LINES).max(1);
+        view.outlines.retain(|outline| outline.frame < frames);
+        for outline in &mut view.outlines {
+            outline.lines = outline
+                .lines
+                .iter()
+                .filter(|line| finite(line))
+                .step_by(step)
+                .copied()
+                .collect();
         }
         let fits = |rows: &Vec<[f64; 7]>| rows.len() == frames && rows.iter().all(finite);
         let step = view.poses.len().div_ceil(POSES).max(1);
@@ -271,6 +299,18 @@ impl View3d {
             body.line("line s2", place(&axis.end(-1.0)), place(&axis.end(1.0)));
         }
         if let Some(pose) = self.poses.first() {
+            for outline in &self.outlines {
+                let Some(row) = pose.calibrated.get(outline.frame) else {
+                    continue;
+                };
+                let world_from_frame = isometry(row);
+                let end = |x: f64, y: f64, z: f64| {
+                    place(&(world_from_frame * Point3::new(x, y, z)).into())
+                };
+                for [ax, ay, az, bx, by, bz] in outline.lines.iter().take(STILL_LINES) {
+                    body.line("thin", end(*ax, *ay, *az), end(*bx, *by, *bz));
+                }
+            }
             for (class, rows) in [
                 ("line thick s0", &pose.calibrated),
                 ("line dashed s1", &pose.nominal),
@@ -290,6 +330,12 @@ impl View3d {
             SIZE[0], SIZE[1], body.0
         )
     }
+}
+
+fn isometry(row: &[f64; 7]) -> Isometry3<f64> {
+    let rotation =
+        UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(row[6], row[3], row[4], row[5]));
+    Isometry3::from_parts(Translation3::new(row[0], row[1], row[2]), rotation)
 }
 
 fn origin(row: &[f64; 7]) -> [f64; 3] {

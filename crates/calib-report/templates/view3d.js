@@ -12,7 +12,7 @@
   const camera = {};
   let size = 1, floor = 0, pose = 0, colours = {}, factor = view.magnification;
   const layers = [
-    ["calibrated", "Calibrated", "s0", true], ["nominal", "Nominal", "s1", true], ["markers", "Markers", "s3", true],
+    ["calibrated", "Calibrated", "s0", true], ["outlines", "Outlines", "soft", true], ["nominal", "Nominal", "s1", true], ["markers", "Markers", "s3", true],
     ["residuals", "Errors", "bad", true], ["sweeps", "Sweeps", "soft", true], ["joints", "Spheres, circles, axes", "s2", true], ["names", "Names", "ink", false],
   ];
   const shown = {};
@@ -116,6 +116,12 @@
       if (frame.parent !== null) line(rows[frame.parent], rows[i], colour, width, dash);
     });
   }
+  function drawOutlines(rows) {
+    for (const outline of view.outlines) {
+      const row = rows[outline.frame], q = row.slice(3);
+      for (const l of outline.lines) line(add(row, rotate(q, l.slice(0, 3)), 1), add(row, rotate(q, l.slice(3)), 1), colours.soft, 0.7);
+    }
+  }
   function drawAxes(rows) {
     const long = size * 0.035, names = [colours.bad, colours.s2, colours.s0];
     rows.forEach(function (row) {
@@ -156,6 +162,7 @@
     if (shown.joints) drawJoints();
     const now = view.poses[pose];
     if (!now) return;
+    if (shown.outlines) drawOutlines(now.calibrated);
     if (shown.calibrated) { drawRobot(now.calibrated, colours.s0, 4); drawAxes(now.calibrated); for (const row of now.calibrated) dot(row, colours.s0, 3.5); }
     if (shown.nominal && now.nominal.length) drawRobot(now.nominal, colours.s1, 2, [6, 5]);
     for (const m of now.markers) {
@@ -189,6 +196,7 @@
   function zoom(by) { camera.zoom = Math.max(0.2, Math.min(60, camera.zoom * by)); draw(); }
 
   for (const [id, name, colour, on] of layers) {
+    if (id === "outlines" && !view.outlines.length) continue;
     shown[id] = on;
     const label = document.createElement("label"), box = document.createElement("input"), swatch = document.createElement("i");
     box.type = "checkbox"; box.checked = on; swatch.style.background = "var(--" + colour + ")"; swatch.setAttribute("aria-hidden", "true");

@@ -5,7 +5,7 @@
 
 use calib_report::scene::{Provenance, SceneBody, SceneMarker, SceneObject, SceneRobot, Shape};
 use calib_report::view3d::{
-    Axis, Circle, Cloud, Sphere, ViewFrame, ViewMarker, ViewPose, pose_row,
+    Axis, Circle, Cloud, Outline, Sphere, ViewFrame, ViewMarker, ViewPose, pose_row,
 };
 use calib_report::{
     AccuracyLimit, Change, Class, Clock, ErrorStats, EstimatorResult, Finding, FitSummary, HeldOut,
@@ -793,6 +793,15 @@ pub fn view() -> View3d {
                 parent: i.checked_sub(1),
             })
             .collect(),
+        outlines: vec![
+            Outline::cylinder(0, &Isometry3::translation(0.0, 0.0, 0.1), 0.09, 0.2),
+            Outline::cuboid(2, &Isometry3::translation(0.0, 0.0, 0.19), [0.08, 0.1, 0.4]),
+            Outline::cuboid(
+                3,
+                &Isometry3::translation(0.0, 0.0, 0.19),
+                [0.06, 0.08, 0.4],
+            ),
+        ],
         poses,
         clouds: vec![
             Cloud {

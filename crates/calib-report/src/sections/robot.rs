@@ -1,0 +1,257 @@
+//! What was found about the robot: changes, transforms, loops, other estimators, parameters.
+
+use super::{Page, code};
+use crate::table::Table;
+use crate::{LoopClosure, LoopGroup, Report, Stats, Unit, number};
+
+pub(super) fn changes(page: &mut Page, report: &Report) {
+    page.section("changes", "What changed");
+    if report.changes.is_empty() {
+        page.text("No number of the URDF changed.");
+    }
+    let mut table = Table::new(&[
+        "<joint",
+        "<what",
+        ">before",
+        ">after",
+        ">change ± σ",
+        ">from the data",
+    ]);
+    for change in &report.changes {
+        let plain = |x: f64| number::fixed_with_unit(x, change.unit, 3);
+        let old = change.old.map_or_else(|| "added".to_owned(), plain);
+        let delta = change.delta.map_or_else(
+            || number::UNKNOWN.to_owned(),
+            |delta| number::change(delta, change.sigma, change.unit),
+        );
+        table.row([
+            code(&change.joint),
+            change.what.clone(),
+            old,
+            plain(change.new),
+            delta,
+            change
+                .data_share
+                .map_or_else(|| number::UNKNOWN.to_owned(), number::percent),
+        ]);
+    }
+    page.table("", table);
+    if !report.urdf_diff.is_empty() {
+        page.code("diff", &report.urdf_diff);
+    }
+}
+
+pub(super) fn transforms(page: &mut Page, report: &Report) {
+    if report.transforms.is_empty() {
+        return;
+    }
+    page.section("transforms", "Transforms");
+    page.text("`parent ← child`; translation ± σ along the parent's axes; roll, pitch, yaw of the URDF; σ of the rotation about the child's axes.");
+    let mut table = Table::new(&[
+        "<name",
+        "<parent ← child",
+        "<status",
+        ">x",
+        ">y",
+        ">z",
+        ">rpy",
+        ">σ rotation",
+    ]);
+    for transform in &report.transforms {
+        let place = |i: usize| {
+            number::with_sigma(
+                transform.translation_m[i],
+                transform.sigma_translation_m.map(|sigma| sigma[i]),
+                Unit::Metre,
+            )
+        };
+        let rpy = transform
+            .rpy_rad
+            .map(|angle| number::fixed_in(angle, Unit::Radian, 3))
+            .join(", ")
+            + "°";
+        let sigma = transform.sigma_rotation_rad.map_or_else(
+            || number::UNKNOWN.to_owned(),
+            |sigma| {
+                sigma
+                    .map(|s| number::sigma(Some(s), Unit::Radian))
+                    .join(", ")
+            },
+        );
+        let status = if transform.observable {
+            transform.status.word().to_owned()
+        } else {
+            format!("{}, in part", transform.status.word())
+        };
+        table.row([
+            code(&transform.name),
+            format!("{} ← {}", transform.parent, transform.child),
+            status,
+            place(0),
+            place(1),
+            place(2),
+            rpy,
+            sigma,
+        ]);
+    }
+    page.table("", table);
+}
+
+pub(super) fn loops(page: &mut Page, report: &Report) {
+    if report.loops.is_empty() {
+        return;
+    }
+    page.section("loops", "Loop closures");
+    page.text("Measured against forward kinematics: e_t the translation, e_θ the rotation angle of `measured⁻¹ · kinematic`.");
+    for closure in &report.loops {
+        let title = format!(
+            "{}, {} poses, by {}:",
+            code(&closure.name),
+            closure.samples,
+            if closure.grouped_by.is_empty() {
+                "group"
+            } else {
+                &closure.grouped_by
+            }
+        );
+        if !closure.groups.is_empty() {
+            page.table(&title, by_group(closure));
+        }
+        let mut table = Table::new(&["<error", ">max", ">mean", ">std", ">rms"]);
+        let mut stats = |name: &str, stats: &Stats, unit: Unit| {
+            let cells =
+                [stats.max, stats.mean, stats.std, stats.rms].map(|x| number::plain(x, unit));
+            table.row([name.to_owned()].into_iter().chain(cells));
+        };
+        if let Some(norm) = &closure.norm_error_m {
+            stats("norm error, the paper's (a lower bound)", norm, Unit::Metre);
+        }
+        stats("vector error ‖e_t‖", &closure.translation_m, Unit::Metre);
+        if let Some(rotation) = &closure.rotation_rad {
+            stats("|e_θ|", rotation, Unit::Radian);
+        }
+        page.table(
+            &format!("{}, all {} poses:", code(&closure.name), closure.samples),
+            table,
+        );
+    }
+}
+
+/// The paper's Table 1: a row per number, a column per group.
+fn by_group(closure: &LoopClosure) -> Table {
+    let heads: Vec<String> = std::iter::once("<error".to_owned())
+        .chain(
+            closure
+                .groups
+                .iter()
+                .map(|group| format!(">{} (n = {})", group.name, group.samples)),
+        )
+        .collect();
+    let mut table = Table::new(&heads.iter().map(String::as_str).collect::<Vec<_>>());
+    let mut row = |name: &str, cell: &dyn Fn(&LoopGroup) -> String| {
+        table.row(std::iter::once(name.to_owned()).chain(closure.groups.iter().map(cell)))
+    };
+    row("max ‖e_t‖ (cm)", &|group| {
+        number::centimetres(group.translation_m.max)
+    });
+    row("mean ‖e_t‖ (cm)", &|group| {
+        number::centimetres(group.translation_m.mean)
+    });
+    row("std ‖e_t‖ (cm)", &|group| {
+        number::centimetres(group.translation_m.std)
+    });
+    if closure
+        .groups
+        .iter()
+        .any(|group| group.rotation_rad.is_some())
+    {
+        let angle = |group: &LoopGroup, of: fn(&Stats) -> f64| {
+            group.rotation_rad.as_ref().map_or_else(
+                || number::UNKNOWN.to_owned(),
+                |stats| number::degrees(of(stats)),
+            )
+        };
+        row("max |e_θ| (deg)", &|group| angle(group, |stats| stats.max));
+        row("mean |e_θ| (deg)", &|group| {
+            angle(group, |stats| stats.mean)
+        });
+        row("std |e_θ| (deg)", &|group| angle(group, |stats| stats.std));
+    }
+    table
+}
+
+pub(super) fn estimators(page: &mut Page, report: &Report) {
+    if report.estimators.is_empty() {
+        return;
+    }
+    page.section("estimators", "The same by other estimators");
+    let mut table = Table::new(&[
+        "<quantity",
+        "<estimator",
+        ">value ± σ",
+        ">distance",
+        "<agrees",
+        "<why",
+    ]);
+    for result in &report.estimators {
+        let sigma = |i: usize| {
+            result
+                .sigma
+                .as_ref()
+                .and_then(|sigma| sigma.get(i))
+                .copied()
+        };
+        let values = result.value.as_ref().map_or_else(
+            || "no answer".to_owned(),
+            |values| {
+                values
+                    .iter()
+                    .enumerate()
+                    .map(|(i, value)| number::with_sigma(*value, sigma(i), result.unit))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            },
+        );
+        let distance = number::plain_or_unknown(result.distance, result.unit);
+        let agrees = if result.agrees { "yes" } else { "no" };
+        table.row([
+            result.quantity.clone(),
+            code(&result.estimator),
+            values,
+            distance,
+            agrees.to_owned(),
+            result.text.clone(),
+        ]);
+    }
+    page.table("", table);
+}
+
+pub(super) fn parameters(page: &mut Page, report: &Report) {
+    if report.parameters.is_empty() {
+        return;
+    }
+    page.section("parameters", "Parameters");
+    let mut table = Table::new(&[
+        "<parameter",
+        "<kind",
+        ">nominal",
+        ">value ± σ",
+        ">from the data",
+        "<class",
+    ]);
+    for parameter in &report.parameters {
+        let share = parameter
+            .data_share
+            .map_or_else(|| number::UNKNOWN.to_owned(), number::percent);
+        let value = number::with_sigma(parameter.value, parameter.sigma, parameter.unit);
+        table.row([
+            code(&parameter.name),
+            parameter.kind.clone(),
+            number::plain(parameter.nominal, parameter.unit),
+            value,
+            share,
+            parameter.class.word().to_owned(),
+        ]);
+    }
+    page.table("", table);
+}
