@@ -32,15 +32,15 @@ pub fn line(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
 /// A common direction, an own center for each marker.
 ///
 /// # Errors
-/// As [`line`].
+/// As [`line()`].
 pub fn direction(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
     run("dir_ml", input, options, own_centers)
 }
 
-/// The orthogonal-distance circle of one marker (several: as [`direction`]).
+/// The orthogonal-distance circle of one marker (several: as [`direction()`]).
 ///
 /// # Errors
-/// As [`line`].
+/// As [`line()`].
 pub fn circle(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
     run("circle_ml", input, options, |id, cloud, factor| {
         if cloud.markers() == 1 {

@@ -48,7 +48,8 @@ pub fn robust(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError>
     dispatch("robust", input, options, true)
 }
 
-/// Consensus alone, inliers refitted: spheres for points and markers, hot spot for poses.
+/// Consensus alone, inliers refitted: spheres for points and markers, the linear hot spot for poses
+/// (what the field calls RANSAC pivot calibration).
 ///
 /// # Errors
 /// As [`robust`].
@@ -412,5 +413,9 @@ fn poses_fit(
         }
     }
     let out = rejected(&keep, &sigmas, 1, |k| (0, model.poses[k].0));
-    hotspot_ml::fit_poses(estimator, &kept, options, out)
+    if reweight {
+        hotspot_ml::fit_poses(estimator, &kept, options, out)
+    } else {
+        hotspot::linear(estimator, &kept, options, out, |sums, _| sums.body_point(0))
+    }
 }

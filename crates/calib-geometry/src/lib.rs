@@ -10,7 +10,7 @@
 //! ```
 //!
 //! * [`so3`], [`se3`]: exponential, logarithm, adjoint and right Jacobians, accurate at 0, 1e-8 and near π.
-//! * [`line`]: lines in space and screw axes of motions.
+//! * [`mod@line`]: lines in space and screw axes of motions.
 //! * [`mean`]: the chordal mean of rotations and the sign-free mean of axes.
 //! * [`decompose`]: the singular value and eigenvalue decompositions used for estimation.
 //! * [`registration`]: the rigid motion between two corresponding point sets.
