@@ -6,6 +6,7 @@ mod common;
 mod dtrack;
 mod motive;
 mod qualisys;
+mod ros;
 mod trc;
 mod vicon;
 
@@ -91,6 +92,8 @@ type ReadFn = fn(&mut dyn Input, &ReadOptions) -> Placed<Recording>;
 pub fn readers() -> &'static [Reader] {
     const READERS: &[Reader] = &[
         c3d::READER,
+        ros::MCAP,
+        ros::SQLITE,
         vicon::READER,
         motive::READER,
         qualisys::READER,

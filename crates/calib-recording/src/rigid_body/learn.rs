@@ -51,6 +51,16 @@ pub enum NotABody {
         /// Markers given.
         got: usize,
     },
+    /// A marker that the table does not have.
+    #[error("there is no marker `{name}`; the recording has {known}{}", nearest.as_ref().map(|n| format!("; did you mean `{n}`?")).unwrap_or_default())]
+    UnknownMarker {
+        /// The name asked for.
+        name: String,
+        /// The table's markers.
+        known: String,
+        /// The nearest of them.
+        nearest: Option<String>,
+    },
     /// The tracks have different lengths.
     #[error("marker `{name}` has {got} rows, the others {expected}")]
     Length {

@@ -21,4 +21,4 @@ mod learn;
 mod pose;
 
 pub use learn::{MarkerFit, NotABody, Template};
-pub use pose::{BodyPoses, RowPose, WithoutPose, body_poses};
+pub use pose::{BodyPoses, RowPose, WithoutPose, body_from_markers, body_poses};

@@ -1,6 +1,8 @@
 //! The pose of a body in every row, how certain it is, and how rigid the body was.
 
 use super::learn::{MarkerFit, NotABody, Template, register};
+use crate::error::nearest_word;
+use crate::poses::Poses;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3};
 use std::ops::AddAssign;
 
@@ -162,6 +164,31 @@ pub fn body_poses(
         sigma,
         fits,
     })
+}
+
+/// [`body_poses`] of markers of a table, by name; their order defines the body's frame.
+///
+/// # Errors
+/// As [`body_poses`], and [`NotABody::UnknownMarker`].
+pub fn body_from_markers(
+    poses: &Poses,
+    markers: &[String],
+    template: Option<Template>,
+    sigma: Option<f64>,
+) -> Result<BodyPoses, NotABody> {
+    let track = |name: &String| {
+        poses.markers.get(name).map(Vec::as_slice).ok_or_else(|| {
+            let known: Vec<&str> = poses.markers.keys().map(String::as_str).collect();
+            let nearest = nearest_word(name, known.iter().copied());
+            NotABody::UnknownMarker {
+                name: name.clone(),
+                known: known.join(", "),
+                nearest,
+            }
+        })
+    };
+    let tracks = markers.iter().map(track).collect::<Result<Vec<_>, _>>()?;
+    body_poses(markers, &tracks, template, sigma)
 }
 
 /// Σ J_kᵀ J_k with J_k = [ −[m_k]ₓ  I ].

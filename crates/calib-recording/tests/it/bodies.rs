@@ -1,7 +1,8 @@
 //! Rigid bodies from markers.
 
 use calib_geometry::se3;
-use calib_recording::rigid_body::{NotABody, Template, WithoutPose, body_poses};
+use calib_recording::Poses;
+use calib_recording::rigid_body::{NotABody, Template, WithoutPose, body_from_markers, body_poses};
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -279,4 +280,30 @@ fn three_markers_in_one_row_have_a_pose_without_covariance() {
     let body = body_poses(&names(3), &refs(&tracks), None, None).expect("a body");
     assert!(body.sigma.is_none());
     assert!(body.rows[0].as_ref().expect("seen").covariance.is_none());
+}
+
+#[test]
+fn a_body_of_a_table_is_found_by_its_markers_names() {
+    let (_, tracks) = tracks(&shape(), 10, 1e-4, 0.0, 13);
+    let poses = Poses {
+        rows: (0..10).collect(),
+        markers: names(5).into_iter().zip(tracks.iter().cloned()).collect(),
+        ..Poses::default()
+    };
+    let by_name = body_from_markers(&poses, &names(5), None, None).expect("a body");
+    assert_eq!(
+        by_name,
+        body_poses(&names(5), &refs(&tracks), None, None).expect("a body")
+    );
+    let wrong = body_from_markers(
+        &poses,
+        &["m1".into(), "m2".into(), "mm3".into()],
+        None,
+        None,
+    )
+    .expect_err("unknown");
+    assert_eq!(
+        wrong.to_string(),
+        "there is no marker `mm3`; the recording has m1, m2, m3, m4, m5; did you mean `m3`?"
+    );
 }

@@ -1,6 +1,7 @@
 //! Tests of calib-recording through its public interface.
 
 mod bad_tables;
+mod bags;
 mod bodies;
 mod checks;
 mod fixtures;

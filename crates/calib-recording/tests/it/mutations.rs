@@ -1,11 +1,14 @@
 //! Files that were cut, bent or glued: an error with a place or a recording without NaN, never a panic, and never
 //! more memory than the file can fill.
 
-use crate::fixtures;
+use crate::{bags, fixtures};
 use calib_recording::readers::readers;
 use calib_recording::{At, Filled, ReadOptions, Recording, read_bytes};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+/// Bent copies of each fixture.
+const ROUNDS: usize = 1500;
 
 /// Every reader's fixtures.
 fn corpus() -> Vec<(&'static str, Vec<u8>)> {
@@ -24,6 +27,10 @@ fn corpus() -> Vec<(&'static str, Vec<u8>)> {
         ("ndi", b"Frame#,ToolHandle,Face,q0,qx,qy,qz,tx,ty,tz\n1,02,0,0,1,0,0,10,20,30\n1,03,0,Missing,,,,,,\n".to_vec()),
     ];
     corpus.extend(fixtures::ENCODINGS.map(|encoding| ("c3d", fixtures::small_c3d(encoding))));
+    corpus.extend(
+        ["none", "", "lz4", "zstd"].map(|compression| ("ros2_mcap", bags::mcap(compression))),
+    );
+    corpus.push(("ros2_sqlite", bags::sqlite()));
     corpus
 }
 
@@ -111,7 +118,8 @@ fn every_reader_has_a_fixture_and_recognises_it() {
 #[test]
 fn empty_and_cut_files() {
     for (id, bytes) in corpus() {
-        for length in 0..bytes.len() {
+        // Every length of short files, every 37th of bags.
+        for length in (0..bytes.len()).step_by(if bytes.len() > 2500 { 37 } else { 1 }) {
             try_all(&bytes[..length], id);
         }
     }
@@ -119,9 +127,21 @@ fn empty_and_cut_files() {
 
 #[test]
 fn bent_files() {
-    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    bend(6, ROUNDS);
+}
+
+#[test]
+#[ignore = "minutes: the same with a hundred times more copies"]
+fn many_bent_files() {
+    for seed in 0..100 {
+        bend(1000 + seed, ROUNDS);
+    }
+}
+
+fn bend(seed: u64, rounds: usize) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
     for (id, bytes) in corpus() {
-        for _ in 0..600 {
+        for _ in 0..rounds {
             let mut bent = bytes.clone();
             for _ in 0..rng.random_range(1..=3) {
                 let at = rng.random_range(0..bent.len());

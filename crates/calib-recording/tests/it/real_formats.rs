@@ -312,3 +312,25 @@ fn dtrack_logs_are_read_as_the_vendors_own_listener_does() {
         .expect("all frames have a time");
     assert!(t.windows(2).all(|w| w[1] >= w[0]) && t.last().is_some_and(|&t| t > 86_400.0));
 }
+
+#[test]
+fn both_forms_of_one_ros_bag_say_the_same() {
+    let Some(mcap) = read("ros/rosbags-rs_0.3.4/test_bag_mcap/test_bag_mcap.mcap") else {
+        return;
+    };
+    let sqlite =
+        read("ros/rosbags-rs_0.3.4/test_bag_sqlite3/test_bag_sqlite3.db3").expect("present");
+    assert_eq!(
+        (mcap.meta.format.as_str(), sqlite.meta.format.as_str()),
+        ("ros2_mcap", "ros2_sqlite")
+    );
+    // Two messages each of JointState, PoseStamped, TransformStamped and TFMessage.
+    assert_eq!(mcap.timelines.len(), 4);
+    assert!(mcap.timelines.iter().all(|timeline| timeline.len() == 2));
+    assert_eq!(mcap.bodies.len(), 3);
+    assert!(!mcap.joints.is_empty());
+    assert_eq!(
+        (&mcap.joints, &mcap.bodies),
+        (&sqlite.joints, &sqlite.bodies)
+    );
+}

@@ -1,0 +1,117 @@
+//! Throughput of the readers, bytes of the file per second.
+
+use calib_recording::{Poses, ReadOptions, WriteOptions, read_bytes, write_poses};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use nalgebra::Point3;
+use std::hint::black_box;
+
+const MARKERS: usize = 60;
+const FRAMES: usize = 4000;
+
+/// A smooth, never repeating coordinate, mm.
+fn coordinate(frame: usize, k: usize) -> f64 {
+    1000.0 * ((frame as f64 * 0.01 + k as f64).sin() + 0.01 * ((frame * 31 + k * 7) as f64).cos())
+}
+
+/// Nexus CSV with six significant digits.
+fn nexus() -> Vec<u8> {
+    let mut text = String::from("Trajectories\r\n100\r\n,");
+    (0..MARKERS).for_each(|k| text.push_str(&format!(",Body:M{k},,")));
+    text.push_str("\r\nFrame,Sub Frame");
+    (0..MARKERS).for_each(|_| text.push_str(",X,Y,Z"));
+    text.push_str("\r\n,");
+    (0..3 * MARKERS).for_each(|_| text.push_str(",mm"));
+    text.push_str("\r\n");
+    for frame in 0..FRAMES {
+        text.push_str(&format!("{},0", frame + 1));
+        (0..3 * MARKERS).for_each(|k| text.push_str(&format!(",{:.3}", coordinate(frame, k))));
+        text.push_str("\r\n");
+    }
+    text.into_bytes()
+}
+
+/// Our own table with micrometres.
+fn canonical() -> Vec<u8> {
+    let mut poses = Poses {
+        rows: (0..FRAMES as u64).collect(),
+        ..Poses::default()
+    };
+    poses.t = Some((0..FRAMES).map(|i| i as f64 * 0.01).collect());
+    for k in 0..MARKERS {
+        let point = |frame| {
+            Point3::new(
+                coordinate(frame, 3 * k),
+                coordinate(frame, 3 * k + 1),
+                coordinate(frame, 3 * k + 2),
+            ) * 1e-3
+        };
+        poses.markers.insert(
+            format!("m{k}"),
+            (0..FRAMES).map(|frame| Some(point(frame))).collect(),
+        );
+    }
+    write_poses(&poses, &WriteOptions::micro())
+        .unwrap_or_default()
+        .into_bytes()
+}
+
+/// C3D, Intel, float or integer points, no analog data.
+fn c3d(float: bool) -> Vec<u8> {
+    let mut header = vec![0u8; 512];
+    header[0] = 2;
+    header[1] = 0x50;
+    for (word, value) in [(2, MARKERS as u16), (4, 1), (5, FRAMES as u16), (9, 3)] {
+        header[2 * word - 2..2 * word].copy_from_slice(&value.to_le_bytes());
+    }
+    header[12..16].copy_from_slice(&if float { -0.1f32 } else { 0.1 }.to_le_bytes());
+    header[20..24].copy_from_slice(&100f32.to_le_bytes());
+    let mut parameters = vec![1, 0x50, 1, 84];
+    parameters.resize(512, 0);
+    let mut data = Vec::new();
+    for frame in 0..FRAMES {
+        for k in 0..MARKERS {
+            for axis in 0..3 {
+                let value = coordinate(frame, 3 * k + axis);
+                if float {
+                    data.extend((value as f32).to_le_bytes())
+                } else {
+                    data.extend(((value * 10.0) as i16).to_le_bytes())
+                }
+            }
+            if float {
+                data.extend(1f32.to_le_bytes())
+            } else {
+                data.extend(1i16.to_le_bytes())
+            }
+        }
+    }
+    data.resize(data.len().div_ceil(512) * 512, 0);
+    [header, parameters, data].concat()
+}
+
+fn reading(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("reading");
+    group.sample_size(20);
+    for (name, bytes) in [
+        ("nexus_csv", nexus()),
+        ("canonical_csv", canonical()),
+        ("c3d_float", c3d(true)),
+        ("c3d_integer", c3d(false)),
+    ] {
+        group.throughput(Throughput::Bytes(bytes.len() as u64));
+        group.bench_with_input(
+            BenchmarkId::from_parameter(name),
+            &bytes,
+            |bencher, bytes| {
+                bencher.iter(|| {
+                    read_bytes(name, black_box(bytes), &ReadOptions::default())
+                        .map(|recording| recording.markers.len())
+                });
+            },
+        );
+    }
+    group.finish();
+}
+
+criterion_group!(benches, reading);
+criterion_main!(benches);
