@@ -159,7 +159,7 @@ impl Solution {
                 });
             }
         }
-        let mut cache = EdgeCache::new(&problem);
+        let mut cache = EdgeCache::new(&problem, std::sync::Arc::default());
         cache.update(&problem, &self.values);
         let mut buffer = path.buffer();
         let pose = path.evaluate(

@@ -51,11 +51,23 @@ impl Default for MinimizeSettings {
         Self {
             max_iterations: 100,
             decrement: 1e-12,
-            damping: 1e-6,
+            damping: 1e-9,
         }
     }
 }
 
+/// What became of a proposed step.
+enum Step {
+    /// Taken, and the minimum is reached with it.
+    Last,
+    Taken,
+    /// However short, it does not lower the cost.
+    None,
+}
+
+/// Least damping: keeps the factorisation positive along directions that nothing sees, and is far
+/// too small to slow down the others.
+const MIN_DAMPING: f64 = 1e-10;
 /// Damping beyond which a step is shorter than rounding.
 const MAX_DAMPING: f64 = 1e16;
 /// A rise of the cost by this fraction is rounding of its sum.
@@ -103,6 +115,7 @@ pub(crate) fn minimize_in(
     let n = model.free();
     let mut values = start.clone();
     let mut system = NormalEquations::new(n);
+    let mut next = NormalEquations::new(n);
     let mut factor = vec![0.0; n * n];
     let mut step = vec![0.0; n];
     let mut trial = values.clone();
@@ -112,47 +125,73 @@ pub(crate) fn minimize_in(
         .columns
         .iter()
         .any(|&p| model.problem.parameters[p].bounds.is_some());
-    let mut iterations = 0;
+    // Without random effects V is constant: the next linearisation delivers the cost to check.
+    let constant_noise = model.slots.is_empty();
+    let mut iterations = 1;
+    let mut evaluable = accumulate(model, &values, weights, theta, work, &mut system);
     let status = loop {
-        if !accumulate(model, &values, weights, theta, work, &mut system) {
+        if !evaluable {
             break SolveStatus::NotEvaluable;
         }
-        iterations += 1;
         let current = system.cost();
-        let accepted = loop {
+        let before = decrement;
+        let outcome = loop {
             let solved = damped_step(&system, damping, &mut factor, &mut step)
                 && (!bounded || bounded_step(model, &values, &system, damping, &mut step));
             if solved {
                 decrement = -dot(&system.g, &step);
                 retract(model, &values, &step, &mut trial);
-                if decrement <= settings.decrement {
-                    break true;
-                }
-                let cost = cost(model, &trial, weights, theta, work);
-                if cost <= current * (1.0 + COST_ROUNDING) {
-                    damping = (damping * 0.1).max(1e-12);
-                    break true;
+                // The decrement falls at least in proportion: is the next one already small enough?
+                let rate = if before.is_finite() {
+                    (decrement / before).min(1.0)
+                } else {
+                    1.0
+                };
+                let expected = decrement * rate;
+                if decrement <= settings.decrement
+                    || (constant_noise && expected <= settings.decrement * 1e-2)
+                {
+                    let fallen = decrement <= settings.decrement
+                        || cost(model, &trial, weights, theta, work)
+                            <= current * (1.0 + COST_ROUNDING);
+                    if fallen {
+                        break Step::Last;
+                    }
+                } else if constant_noise {
+                    iterations += 1;
+                    if accumulate(model, &trial, weights, theta, work, &mut next)
+                        && next.cost() <= current * (1.0 + COST_ROUNDING)
+                    {
+                        break Step::Taken;
+                    }
+                } else if cost(model, &trial, weights, theta, work)
+                    <= current * (1.0 + COST_ROUNDING)
+                {
+                    iterations += 1;
+                    evaluable = accumulate(model, &trial, weights, theta, work, &mut next);
+                    break Step::Taken;
                 }
             }
             damping = (damping * 10.0).max(1e-8);
             if damping > MAX_DAMPING {
-                break false;
+                break Step::None;
             }
         };
-        if !accepted {
+        match outcome {
+            Step::Last => {
+                std::mem::swap(&mut values, &mut trial);
+                break SolveStatus::Converged;
+            }
+            Step::Taken => {
+                damping = (damping * 0.1).max(MIN_DAMPING);
+                std::mem::swap(&mut values, &mut trial);
+                std::mem::swap(&mut system, &mut next);
+            }
             // At the minimum of a cost that is only rounding (exact data) nothing can fall further.
-            break if decrement <= 1e-6 + current * 1e-9 {
-                SolveStatus::Converged
-            } else {
-                SolveStatus::Stalled
-            };
+            Step::None if decrement <= 1e-6 + current * 1e-9 => break SolveStatus::Converged,
+            Step::None => break SolveStatus::Stalled,
         }
-        if decrement <= settings.decrement {
-            std::mem::swap(&mut values, &mut trial);
-            break SolveStatus::Converged;
-        }
-        std::mem::swap(&mut values, &mut trial);
-        if iterations >= settings.max_iterations {
+        if iterations > settings.max_iterations {
             break SolveStatus::MaxIterations;
         }
     };

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use crate::edge::{EdgeKind, FeatureKind};
+use crate::edge::{Axis, EdgeKind, FeatureKind};
 use crate::error::Error;
 use crate::head::{HeadKind, PoseNoise};
 use crate::ids::{EdgeId, FrameId};
@@ -31,6 +32,9 @@ pub struct Model {
     pub(crate) observations: Vec<Observation>,
     /// Observations of each sample.
     pub(crate) of_sample: Vec<Range<usize>>,
+    /// The same, by head: (sample, observations).
+    pub(crate) of_head: Vec<Vec<(usize, Range<usize>)>>,
+    pub(crate) trig: Trig,
     /// Random effects of a sample.
     pub(crate) slots: Vec<Slot>,
     /// Residual rows over all observations.
@@ -123,6 +127,14 @@ impl Model {
             start = end;
         }
 
+        let mut of_head: Vec<Vec<(usize, Range<usize>)>> = vec![Vec::new(); problem.heads.len()];
+        for (i, o) in observations.iter().enumerate() {
+            match of_head[o.head].last_mut() {
+                Some((sample, range)) if *sample == o.sample => range.end = i + 1,
+                _ => of_head[o.head].push((o.sample, i..i + 1)),
+            }
+        }
+
         let unmoved = contract_unmoved(&mut problem, &walks, &of_sample);
 
         // Only parameters that some observation can feel, or that are free by themselves, get columns.
@@ -148,17 +160,19 @@ impl Model {
             .max()
             .unwrap_or(0);
         Ok(Self {
-            problem,
             columns,
             column_of,
             paths,
             observations,
             of_sample,
+            of_head,
+            trig: tabulate(&problem),
             slots,
             rows,
             max_rows,
             unmoved,
             lost: lost_items,
+            problem,
         })
     }
 
@@ -613,19 +627,43 @@ fn positive(what: &str, value: f64) -> Result<(), Error> {
     }
 }
 
+/// Per edge: (sin q, cos q) of every sample of a revolute joint; empty for the other edges.
+pub(crate) type Trig = Arc<Vec<Vec<(f64, f64)>>>;
+
+fn tabulate(problem: &Problem) -> Trig {
+    Arc::new(
+        problem
+            .edges
+            .iter()
+            .map(|e| match &e.kind {
+                EdgeKind::Joint(j) if matches!(j.axis, Axis::Revolute(_)) => {
+                    j.q.iter().map(|q| q.sin_cos()).collect()
+                }
+                _ => Vec::new(),
+            })
+            .collect(),
+    )
+}
+
 /// Poses and right-twist columns of the unknown edges at the current values: constant over samples.
 #[derive(Debug, Clone)]
 pub(crate) struct EdgeCache {
     pub pose: Vec<Pose>,
+    /// sin, cos of what is added to the reading, for revolute joints where that is a constant.
+    pub offset: Vec<Option<(f64, f64)>>,
+    /// sin, cos of the readings; empty where they are not tabulated.
+    pub trig: Trig,
     /// Columns per coordinate, for the edge walked forward and backward.
     pub forward: Vec<[Vector6<f64>; 6]>,
     pub backward: Vec<[Vector6<f64>; 6]>,
 }
 
 impl EdgeCache {
-    pub(crate) fn new(problem: &Problem) -> Self {
+    pub(crate) fn new(problem: &Problem, trig: Trig) -> Self {
         let n = problem.edges.len();
         Self {
+            offset: vec![None; n],
+            trig,
             pose: vec![Pose::identity(); n],
             forward: vec![[Vector6::zeros(); 6]; n],
             backward: vec![[Vector6::zeros(); 6]; n],
@@ -645,6 +683,19 @@ impl EdgeCache {
                     self.backward[e][i] = -x.push_forward(&column);
                 }
                 self.pose[e] = x;
+            }
+            if let EdgeKind::Joint(j) = &edge.kind {
+                let constant = matches!(j.axis, Axis::Revolute(_))
+                    && j.features
+                        .iter()
+                        .all(|f| f.values.is_none() && f.kind.lateral().is_none());
+                self.offset[e] = constant.then(|| {
+                    j.features
+                        .iter()
+                        .map(|f| values.0[f.parameter.index()])
+                        .sum::<f64>()
+                        .sin_cos()
+                });
             }
         }
     }

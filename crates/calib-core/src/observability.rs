@@ -222,7 +222,7 @@ impl Axes {
             .collect();
         let stride = (used.len() / PROBES).max(1);
         let probes: Vec<usize> = used.iter().step_by(stride).copied().collect();
-        let mut cache = EdgeCache::new(&model.problem);
+        let mut cache = EdgeCache::new(&model.problem, model.trig.clone());
         cache.update(&model.problem, values);
         let mut joints: Vec<(usize, Vec<Vector3<f64>>)> = Vec::new();
         for path in &model.paths {

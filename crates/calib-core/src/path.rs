@@ -226,7 +226,8 @@ impl CompiledPath {
                         continue;
                     };
                     suffix = joint_step(
-                        joint, values, sample, *inverse, columns, *slot, wanted, suffix, out,
+                        joint, *edge, cache, values, sample, *inverse, columns, *slot, wanted,
+                        suffix, out,
                     );
                 }
                 Step::Measured {
@@ -286,13 +287,14 @@ impl CompiledPath {
                     let EdgeKind::Joint(joint) = &problem.edges[*edge].kind else {
                         continue;
                     };
+                    let motion = Motion::of(joint, *edge, cache, values, sample);
                     out.push((
                         *edge,
                         [None, Some(0), Some(1)].map(|lateral| {
-                            joint_direction(joint, values, sample, *inverse, lateral, &suffix)
+                            joint_direction(joint, &motion, *inverse, lateral, &suffix)
                         }),
                     ));
-                    joint_pose(joint, values, sample, *inverse).then(&suffix)
+                    joint_pose(joint, &motion, *inverse).then(&suffix)
                 }
                 Step::Measured { edge, inverse, .. } => {
                     let EdgeKind::Measured { poses, .. } = &problem.edges[*edge].kind else {
@@ -309,10 +311,9 @@ impl CompiledPath {
 }
 
 /// The joint's transform at a sample, in the direction of walking.
-fn joint_pose(joint: &Joint, values: &Values, sample: usize, inverse: bool) -> Pose {
-    let (phi, theta) = motion(joint, values, sample);
-    let mut x = screw_motion(&joint.axis, phi);
-    if let Some(theta) = theta {
+fn joint_pose(joint: &Joint, motion: &Motion, inverse: bool) -> Pose {
+    let mut x = motion.screw_motion(&joint.axis, false);
+    if let Some(theta) = motion.theta {
         x.r *= so3::exp(&theta).to_rotation_matrix().matrix();
     }
     oriented(x, inverse)
@@ -322,18 +323,83 @@ fn oriented(x: Pose, inverse: bool) -> Pose {
     if inverse { x.inverse() } else { x }
 }
 
-/// φ and the lateral rotation vector θ of a joint at a sample.
-fn motion(joint: &Joint, values: &Values, sample: usize) -> (f64, Option<Vector3<f64>>) {
-    let mut phi = joint.q[sample];
-    let mut theta: Option<Vector3<f64>> = None;
-    for f in &joint.features {
-        let amount = f.value(sample) * values.0[f.parameter.index()];
-        match f.kind.lateral() {
-            None => phi += amount,
-            Some(k) => *theta.get_or_insert_with(Vector3::zeros) += joint.axis.across()[k] * amount,
+/// A joint's motion at a sample: sine and cosine of φ (revolute) or φ itself (prismatic), and the
+/// lateral rotation vector θ.
+struct Motion {
+    phi: f64,
+    sin: f64,
+    cos: f64,
+    theta: Option<Vector3<f64>>,
+}
+
+impl Motion {
+    #[inline]
+    fn of(joint: &Joint, edge: usize, cache: &EdgeCache, values: &Values, sample: usize) -> Self {
+        // Only a constant is added to the reading: the addition theorem saves a sine and a cosine.
+        if let (Some((sin_c, cos_c)), Some(table)) = (cache.offset[edge], cache.trig.get(edge)) {
+            if let Some(&(sin_q, cos_q)) = table.get(sample) {
+                return Self {
+                    phi: 0.0,
+                    sin: sin_q * cos_c + cos_q * sin_c,
+                    cos: cos_q * cos_c - sin_q * sin_c,
+                    theta: None,
+                };
+            }
+        }
+        let mut phi = joint.q[sample];
+        let mut theta: Option<Vector3<f64>> = None;
+        for f in &joint.features {
+            let amount = f.value(sample) * values.0[f.parameter.index()];
+            match f.kind.lateral() {
+                None => phi += amount,
+                Some(k) => {
+                    *theta.get_or_insert_with(Vector3::zeros) += joint.axis.across()[k] * amount;
+                }
+            }
+        }
+        let (sin, cos) = match joint.axis {
+            Axis::Revolute(_) => phi.sin_cos(),
+            Axis::Prismatic(_) => (0.0, 1.0),
+        };
+        Self {
+            phi,
+            sin,
+            cos,
+            theta,
         }
     }
-    (phi, theta)
+
+    /// exp(S φ), or exp(−S φ).
+    #[inline]
+    fn screw_motion(&self, axis: &Axis, inverse: bool) -> Pose {
+        let sign = if inverse { -1.0 } else { 1.0 };
+        match axis {
+            Axis::Revolute(a) => {
+                // R = cos φ I + sin φ [a]ₓ + (1 − cos φ) a aᵀ
+                let (s, c) = (self.sin * sign, self.cos);
+                let k = 1.0 - c;
+                let (x, y, z) = (a.x, a.y, a.z);
+                Pose {
+                    r: Matrix3::new(
+                        c + k * x * x,
+                        k * x * y - s * z,
+                        k * x * z + s * y,
+                        k * x * y + s * z,
+                        c + k * y * y,
+                        k * y * z - s * x,
+                        k * x * z - s * y,
+                        k * y * z + s * x,
+                        c + k * z * z,
+                    ),
+                    t: Vector3::zeros(),
+                }
+            }
+            Axis::Prismatic(a) => Pose {
+                r: Matrix3::identity(),
+                t: a.into_inner() * (self.phi * sign),
+            },
+        }
+    }
 }
 
 fn screw(axis: &Axis) -> Vector6<f64> {
@@ -341,37 +407,6 @@ fn screw(axis: &Axis) -> Vector6<f64> {
     match axis {
         Axis::Revolute(_) => Vector6::new(a.x, a.y, a.z, 0.0, 0.0, 0.0),
         Axis::Prismatic(_) => Vector6::new(0.0, 0.0, 0.0, a.x, a.y, a.z),
-    }
-}
-
-/// exp(S φ)
-#[inline]
-fn screw_motion(axis: &Axis, phi: f64) -> Pose {
-    match axis {
-        Axis::Revolute(a) => {
-            // R = cos φ I + sin φ [a]ₓ + (1 − cos φ) a aᵀ
-            let (s, c) = phi.sin_cos();
-            let k = 1.0 - c;
-            let (x, y, z) = (a.x, a.y, a.z);
-            Pose {
-                r: Matrix3::new(
-                    c + k * x * x,
-                    k * x * y - s * z,
-                    k * x * z + s * y,
-                    k * x * y + s * z,
-                    c + k * y * y,
-                    k * y * z - s * x,
-                    k * x * z - s * y,
-                    k * y * z + s * x,
-                    c + k * z * z,
-                ),
-                t: Vector3::zeros(),
-            }
-        }
-        Axis::Prismatic(a) => Pose {
-            r: Matrix3::identity(),
-            t: a.into_inner() * phi,
-        },
     }
 }
 
@@ -383,6 +418,8 @@ fn screw_motion(axis: &Axis, phi: f64) -> Pose {
 #[inline]
 fn joint_step(
     joint: &Joint,
+    edge: usize,
+    cache: &EdgeCache,
     values: &Values,
     sample: usize,
     inverse: bool,
@@ -393,9 +430,9 @@ fn joint_step(
     out: &mut PathBuffer,
 ) -> Pose {
     let all = wanted == Derivatives::All;
-    let (phi, theta) = motion(joint, values, sample);
+    let motion = Motion::of(joint, edge, cache, values, sample);
     let s = screw(&joint.axis);
-    let swing = theta.map(|theta| {
+    let swing = motion.theta.map(|theta| {
         (
             Pose {
                 r: *so3::exp(&theta).to_rotation_matrix().matrix(),
@@ -435,7 +472,7 @@ fn joint_step(
     };
     if inverse {
         along(&suffix, out, -1.0);
-        let suffix = screw_motion(&joint.axis, -phi).then(&suffix);
+        let suffix = motion.screw_motion(&joint.axis, true).then(&suffix);
         match swing {
             None => suffix,
             Some((r, jr)) => {
@@ -453,21 +490,19 @@ fn joint_step(
             }
         };
         along(&suffix, out, 1.0);
-        screw_motion(&joint.axis, phi).then(&suffix)
+        motion.screw_motion(&joint.axis, false).then(&suffix)
     }
 }
 
 /// Body twist at the path's end per unit of φ (or of a lateral angle) of one joint.
 fn joint_direction(
     joint: &Joint,
-    values: &Values,
-    sample: usize,
+    motion: &Motion,
     inverse: bool,
     lateral: Option<usize>,
     suffix: &Pose,
 ) -> Vector6<f64> {
-    let (phi, theta) = motion(joint, values, sample);
-    let theta = theta.unwrap_or_else(Vector3::zeros);
+    let theta = motion.theta.unwrap_or_else(Vector3::zeros);
     let swing = Pose {
         r: *so3::exp(&theta).to_rotation_matrix().matrix(),
         t: Vector3::zeros(),
@@ -478,7 +513,8 @@ fn joint_direction(
         (false, None) => swing.then(suffix).pull_back(&screw(&joint.axis)),
         (true, None) => -suffix.pull_back(&screw(&joint.axis)),
         (false, Some(k)) => suffix.pull_back(&twist_of(jr * joint.axis.across()[k])),
-        (true, Some(k)) => -screw_motion(&joint.axis, -phi)
+        (true, Some(k)) => -motion
+            .screw_motion(&joint.axis, true)
             .then(suffix)
             .pull_back(&twist_of(swing.r * jr * joint.axis.across()[k])),
     }

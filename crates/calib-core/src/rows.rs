@@ -43,7 +43,7 @@ pub(crate) struct HeadRows {
     pub e: [f64; 6],
     pub m: [[f64; 6]; 6],
     /// ∂e/∂(point coordinates), rows × 3.
-    point: Option<PointRows>,
+    pub point: Option<PointRows>,
 }
 
 impl SampleRows {
