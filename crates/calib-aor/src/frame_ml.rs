@@ -350,8 +350,13 @@ impl Joint<'_> {
 
     /// H⁻¹, or `None` where the data leave a direction free.
     fn inverse(&self, normal: &Normal) -> Option<Matrix12> {
-        let s = Matrix12::from_diagonal(&self.scaling());
-        let scaled = s * self.hessian(normal) * s;
+        let h = self.hessian(normal);
+        // Each unknown in units of its own information: turns, shifts, exact and noisy residuals compare.
+        let unit = h
+            .diagonal()
+            .map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
+        let s = Matrix12::from_diagonal(&unit);
+        let scaled = s * h * s;
         let eigen = symmetric_eigen_small(&scaled);
         if eigen.values[0] <= UNSEEN * eigen.values[11] {
             return None;
