@@ -236,6 +236,69 @@ fn markers(
     true
 }
 
+/// eᵀV⁻¹e without derivatives; infinite where it cannot be computed.
+pub(crate) fn cost_compressed(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+) -> f64 {
+    let positions: Vec<Vector3<f64>> = (0..model.problem.points.len())
+        .map(|p| model.point_position(p, values).coords)
+        .collect();
+    let mut sum = 0.0;
+    for (head, path) in model.paths.iter().enumerate() {
+        let mut buffer = path.buffer();
+        for (sample, range) in &model.of_head[head] {
+            let pose = path.evaluate(
+                &model.problem,
+                &work.cache,
+                values,
+                *sample,
+                Derivatives::None,
+                &mut buffer,
+            );
+            for o in range.clone() {
+                if weights[o] <= 0.0 {
+                    continue;
+                }
+                let observation = model.observations[o];
+                if let HeadKind::Markers {
+                    noise,
+                    observations,
+                } = &model.problem.heads[head].kind
+                {
+                    let marker = &observations[observation.item];
+                    if marker.shape.is_none() {
+                        let p = positions[marker.point.index()];
+                        let e = pose.r * p + pose.t - marker.position.coords;
+                        sum += weights[o] / theta[noise.index()] * e.norm_squared();
+                        continue;
+                    }
+                }
+                let m = observation.rows;
+                let mut e = residual(model, values, head, observation.item, &pose).e;
+                let mut l = [[0.0; 6]; 6];
+                add_block(model, o, |i, j, group, shape| {
+                    l[i][j] += theta[group] * shape / weights[o];
+                });
+                if !cholesky6(&mut l, m) {
+                    return f64::INFINITY;
+                }
+                for i in 0..m {
+                    for b in 0..i {
+                        e[i] -= l[i][b] * e[b];
+                    }
+                    e[i] /= l[i][i];
+                    sum += e[i] * e[i];
+                }
+            }
+        }
+    }
+    sum
+}
+
 /// W of equation (1).
 fn compressed_weight(seen: &[(usize, f64)], positions: &[Vector3<f64>]) -> Matrix6<f64> {
     let mut weight = Matrix6::zeros();

@@ -5,7 +5,7 @@
 //! F = ½ Σ_s e_sᵀ V_s⁻¹ e_s + ½ (x − x₀)ᵀ Λ (x − x₀)                                          (2)
 //! ```
 
-use crate::compressed::accumulate_compressed;
+use crate::compressed::{accumulate_compressed, cost_compressed};
 use crate::model::{EdgeCache, Model, Values};
 use crate::path::Derivatives;
 use crate::rows::SampleRows;
@@ -185,8 +185,11 @@ fn evaluate_cost(
     stored: bool,
 ) -> f64 {
     work.cache.update(&model.problem, values);
+    if model.slots.is_empty() {
+        return cost_compressed(model, values, weights, theta, work);
+    }
     let rows = &mut work.rows;
-    let wanted = if model.slots.is_empty() || stored {
+    let wanted = if stored {
         Derivatives::None
     } else {
         Derivatives::Random
