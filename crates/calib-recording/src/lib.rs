@@ -39,6 +39,6 @@ pub use model::{
     Timeline, TorqueStream,
 };
 pub use poses::{NotOneTable, Poses};
-pub use readers::{ReadOptions, RotationForm, read_bytes, read_path};
-pub use table::{NotWritten, WriteOptions, write_poses};
+pub use readers::{ReadOptions, RotationForm, read_bytes, read_path, read_path_with};
+pub use table::{NotWritten, WriteOptions, write_poses, write_recording};
 pub use units::{AngleUnit, LengthUnit, TimeUnit};

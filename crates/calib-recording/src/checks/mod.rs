@@ -62,7 +62,7 @@ pub fn checks(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
 }
 
 /// Ids of all findings that this module can make, each a page of the book.
-pub const IDS: [&str; 27] = [
+pub const IDS: [&str; 28] = [
     "all-zero-triplet",
     "body-flip",
     "body-redefined",
@@ -84,6 +84,7 @@ pub const IDS: [&str; 27] = [
     "missing-marker",
     "not-rigid",
     "not-unit-rotation",
+    "quaternion-order",
     "time-gap",
     "too-few-poses",
     "unit-mismatch",

@@ -17,7 +17,8 @@
 use super::statistics::median;
 use crate::finding::{Finding, Severity};
 use crate::poses::Poses;
-use nalgebra::Isometry3;
+use crate::sync::OffsetOutcome;
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 
 /// Disagreement, rad (1°), below which the model is not blamed: nominal robots are that good.
 const GOOD_ENOUGH: f64 = 0.0175;
@@ -147,6 +148,93 @@ pub fn better_explanation(
         _ => "check the profile",
     };
     Some(Finding::new(best.id, Severity::Error, body, text, remedy))
+}
+
+/// Whether a body's quaternions were written scalar first and read scalar last: then the exchanged ones explain the
+/// robot's motion and these do not.
+pub fn quaternion_order(
+    body: &str,
+    tracker_from_body: &[Option<Isometry3<f64>>],
+    base_from_link: &[Isometry3<f64>],
+) -> Option<Finding> {
+    let as_read = disagreement(tracker_from_body, base_from_link)?;
+    let exchange = |pose: &Isometry3<f64>| {
+        // The file's w, x, y, z were taken for x, y, z, w.
+        let c = pose.rotation.coords;
+        let q = UnitQuaternion::from_quaternion(Quaternion::new(c.x, c.y, c.z, c.w));
+        Isometry3::from_parts(pose.translation, q)
+    };
+    let exchanged: Vec<_> = tracker_from_body
+        .iter()
+        .map(|pose| pose.as_ref().map(exchange))
+        .collect();
+    let other = disagreement(&exchanged, base_from_link)?;
+    (as_read > GOOD_ENOUGH && other * MUCH_BETTER < as_read).then(|| {
+        let text = format!(
+            "its motion disagrees with the robot's by {:.2}°, with the quaternions read scalar first only by {:.2}°",
+            as_read.to_degrees(), other.to_degrees()
+        );
+        let remedy = "the quaternions are written w, x, y, z: rename the columns, or use `quaternion_wxyz` in the column map";
+        Finding::new("quaternion-order", Severity::Error, body, text, remedy)
+    })
+}
+
+/// What an alignment of two clocks means for the recording; `None` when they agree to within `tolerance`, s.
+pub fn alignment(outcome: &OffsetOutcome, tolerance: f64) -> Option<Finding> {
+    let finding = |severity, text: String, remedy: &str| {
+        Some(Finding::new("clock-lag", severity, "clocks", text, remedy))
+    };
+    match *outcome {
+        OffsetOutcome::Found(map) => {
+            let agree = map.offset.abs() <= tolerance.max(4.0 * map.offset_sigma);
+            let text = format!(
+                "the tracker's clock is {:.4} s ± {:.1} ms ahead of the robot's and runs {:.0} ppm faster",
+                map.offset,
+                map.offset_sigma * 1e3,
+                map.drift * 1e6
+            );
+            if agree {
+                None
+            } else {
+                finding(
+                    Severity::Warning,
+                    text,
+                    "the offset is taken into account; a shared clock would be better",
+                )
+            }
+        }
+        OffsetOutcome::Ambiguous {
+            first,
+            second,
+            ratio,
+        } => finding(
+            Severity::Error,
+            format!(
+                "offsets of {first:.3} s and {second:.3} s explain the motion nearly equally well (ratio {ratio:.2})"
+            ),
+            "the motion is periodic: move irregularly once at the start, or record static poses",
+        ),
+        OffsetOutcome::NotExcited { deviation, needed } => finding(
+            Severity::Error,
+            format!(
+                "angular speed varies by {deviation:.4} rad/s, {needed} are needed to align the clocks"
+            ),
+            "move faster, or record static poses",
+        ),
+        OffsetOutcome::NoMatch {
+            correlation,
+            needed,
+        } => finding(
+            Severity::Error,
+            format!("the two motions correlate by {correlation:.2} at most, {needed} are needed"),
+            "check that both recordings are of the same motion, and the body's link",
+        ),
+        OffsetOutcome::TooShort => finding(
+            Severity::Error,
+            "too few samples in common".to_string(),
+            "record at least some seconds with both clocks running",
+        ),
+    }
 }
 
 /// Rows that disagree with all others while the others agree among themselves: not settled, or read while the clocks

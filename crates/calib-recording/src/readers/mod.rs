@@ -112,6 +112,18 @@ pub fn readers() -> &'static [Reader] {
 /// # Errors
 /// [`Error`] with the file as `path` is written, the place and the problem.
 pub fn read_path(path: &Path, options: &ReadOptions) -> Result<Recording, Error> {
+    read_path_with(path, options, &mut |_, _| ())
+}
+
+/// [`read_path`] that tells how far it is: `progress(bytes read, bytes in all)`, about every megabyte.
+///
+/// # Errors
+/// As [`read_path`].
+pub fn read_path_with(
+    path: &Path,
+    options: &ReadOptions,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<Recording, Error> {
     let name = path.display().to_string();
     let open = || -> Placed<(std::fs::File, u64)> {
         let io = |source| (At::File, Problem::Io(source));
@@ -119,7 +131,7 @@ pub fn read_path(path: &Path, options: &ReadOptions) -> Result<Recording, Error>
         let bytes = file.metadata().map_err(io)?.len();
         Ok((file, bytes))
     };
-    let (mut file, bytes) = in_file(&name, open())?;
+    let (file, bytes) = in_file(&name, open())?;
     if bytes > options.max_bytes {
         return in_file(
             &name,
@@ -132,7 +144,47 @@ pub fn read_path(path: &Path, options: &ReadOptions) -> Result<Recording, Error>
             )),
         );
     }
-    read_input(&name, &mut file, options)
+    read_input(
+        &name,
+        &mut Watched {
+            file,
+            read: 0,
+            told: 0,
+            bytes,
+            progress,
+        },
+        options,
+    )
+}
+
+/// A file that tells how far it has been read.
+struct Watched<'a> {
+    file: std::fs::File,
+    read: u64,
+    told: u64,
+    bytes: u64,
+    progress: &'a mut dyn FnMut(u64, u64),
+}
+
+impl Read for Watched<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let count = self.file.read(buffer)?;
+        self.read += count as u64;
+        if self.read >= self.told + (1 << 20) || count == 0 {
+            self.told = self.read;
+            (self.progress)(self.read.min(self.bytes), self.bytes);
+        }
+        Ok(count)
+    }
+}
+
+impl Seek for Watched<'_> {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        let place = self.file.seek(to)?;
+        self.read = place;
+        self.told = self.told.min(place);
+        Ok(place)
+    }
 }
 
 /// Reads bytes that are in memory; `name` stands in messages.

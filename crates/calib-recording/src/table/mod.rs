@@ -6,4 +6,4 @@ mod write;
 
 pub(crate) use header::is_canonical;
 pub(crate) use rows::{UNIT_TOLERANCE, read_table};
-pub use write::{NotWritten, WriteOptions, write_poses};
+pub use write::{NotWritten, WriteOptions, write_poses, write_recording};

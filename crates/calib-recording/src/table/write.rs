@@ -1,7 +1,9 @@
 //! The canonical table, always the same bytes for the same poses.
 
-use crate::model::JointUnit;
-use crate::poses::Poses;
+use super::header::Layout;
+use crate::model::{self, JointUnit, MarkerSample, Recording, Timeline};
+use crate::poses::{NotOneTable, Poses};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// How the table is written.
@@ -52,6 +54,15 @@ pub enum NotWritten {
         /// The text.
         text: String,
     },
+    /// A name that our own rules would read as something else, such as joints `a_x`, `a_y`, `a_z` (a marker).
+    #[error("`{name}` would be read back as something else; rename it")]
+    Misread {
+        /// The name.
+        name: String,
+    },
+    /// Two streams of one name.
+    #[error(transparent)]
+    NotOneTable(#[from] NotOneTable),
     /// A NaN or infinity.
     #[error("`{column}`, row {row}: {value} is not finite")]
     NotFinite {
@@ -74,6 +85,9 @@ pub enum NotWritten {
     },
 }
 
+/// Rows of a marker that are interpolated.
+type Filled = BTreeMap<String, Vec<bool>>;
+
 /// One output column.
 struct OutColumn<'a> {
     name: String,
@@ -86,6 +100,38 @@ struct OutColumn<'a> {
 /// # Errors
 /// [`NotWritten`] when the text would not read back as the same table.
 pub fn write_poses(poses: &Poses, options: &WriteOptions) -> Result<String, NotWritten> {
+    write(poses, &BTreeMap::new(), options)
+}
+
+/// One table per timeline: its clock and its text. Interpolated samples are marked in a column `<marker>.state`;
+/// qualities and covariances are not written.
+///
+/// # Errors
+/// [`NotWritten`] as [`write_poses`], and for two streams of one name.
+pub fn write_recording(
+    recording: &Recording,
+    options: &WriteOptions,
+) -> Result<Vec<(String, String)>, NotWritten> {
+    let table = |(index, timeline): (usize, &Timeline)| {
+        let poses = recording.poses_of(index, model::Filled::Include)?;
+        let is_filled = |sample: &MarkerSample| matches!(sample, MarkerSample::Filled(_));
+        let filled: Filled = recording
+            .markers
+            .iter()
+            .filter(|marker| marker.timeline == index && marker.samples.iter().any(is_filled))
+            .map(|marker| {
+                (
+                    marker.name.clone(),
+                    marker.samples.iter().map(is_filled).collect(),
+                )
+            })
+            .collect();
+        Ok((timeline.clock.clone(), write(&poses, &filled, options)?))
+    };
+    recording.timelines.iter().enumerate().map(table).collect()
+}
+
+fn write(poses: &Poses, filled: &Filled, options: &WriteOptions) -> Result<String, NotWritten> {
     check_lengths(poses)?;
     let columns = columns(poses, options);
     let mut out = String::new();
@@ -93,23 +139,36 @@ pub fn write_poses(poses: &Poses, options: &WriteOptions) -> Result<String, NotW
         let one_line = comment.replace(['\n', '\r'], " ");
         let _ = writeln!(out, "# {one_line}");
     }
-    let count = options.count && poses.t.is_none();
+    // A table of one column needs the counter: a row in which it is lost would be a blank line.
+    let one_column = columns.len() + poses.labels.len() < 2;
+    let count = (options.count || one_column) && poses.t.is_none();
     let mut header: Vec<&str> = Vec::new();
     if count {
         header.push("pose");
     }
     header.extend(poses.labels.keys().map(String::as_str));
     header.extend(columns.iter().map(|column| column.name.as_str()));
+    let states: Vec<String> = filled
+        .keys()
+        .map(|marker| format!("{marker}.state"))
+        .collect();
+    header.extend(states.iter().map(String::as_str));
     for text in header
         .iter()
         .copied()
         .chain(poses.labels.values().flatten().map(String::as_str))
     {
-        if text.contains([',', '"', '\n', '\r']) || text.starts_with('#') || text.trim() != text {
+        if text.contains([',', ';', '\t', '"', '\n', '\r'])
+            || text.starts_with('#')
+            || text.trim() != text
+        {
             return Err(NotWritten::Text {
                 text: text.to_string(),
             });
         }
+    }
+    if let Some(name) = misread(poses, &header) {
+        return Err(NotWritten::Misread { name });
     }
     let _ = writeln!(out, "{}", header.join(","));
     for row in 0..poses.len() {
@@ -139,6 +198,10 @@ pub fn write_poses(poses: &Poses, options: &WriteOptions) -> Result<String, NotW
                 }
                 push_number(&mut out, value, column.decimals);
             }
+        }
+        for rows in filled.values() {
+            separate(&mut out);
+            out.push_str(if rows[row] { "filled" } else { "" });
         }
         out.push('\n');
     }
@@ -216,6 +279,45 @@ fn columns<'a>(poses: &'a Poses, options: &WriteOptions) -> Vec<OutColumn<'a>> {
         }
     }
     columns
+}
+
+/// The first name that the header does not give back.
+fn misread(poses: &Poses, header: &[&str]) -> Option<String> {
+    let names = header.iter().copied().map(str::to_string).collect();
+    let layout = match Layout::new(1, names, None) {
+        Ok(layout) => layout,
+        Err((_, problem)) => return Some(problem.to_string()),
+    };
+    let all = [
+        (
+            poses.joints.keys().collect::<Vec<_>>(),
+            layout
+                .joints
+                .iter()
+                .map(|joint| &joint.0)
+                .collect::<BTreeSet<_>>(),
+        ),
+        (
+            poses.torques.keys().collect(),
+            layout.torques.iter().map(|torque| &torque.0).collect(),
+        ),
+        (
+            poses.bodies.keys().collect(),
+            layout.bodies.iter().map(|body| &body.name).collect(),
+        ),
+        (
+            poses.markers.keys().collect(),
+            layout.markers.iter().map(|marker| &marker.name).collect(),
+        ),
+        (
+            poses.labels.keys().collect(),
+            layout.labels.iter().collect(),
+        ),
+    ];
+    let lost = all
+        .iter()
+        .find_map(|(wanted, read)| wanted.iter().find(|name| !read.contains(**name)));
+    lost.map(|name| String::clone(name))
 }
 
 /// Shortest exact text, or fixed decimals without trailing zeros; never `-0`.

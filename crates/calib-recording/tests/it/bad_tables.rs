@@ -1,6 +1,8 @@
 //! What is wrong with a table is said with a place: the messages are what a person reads.
 
-use calib_recording::{BodyColumns, ColumnMap, Error, ReadOptions, read_bytes, read_path};
+use calib_recording::{
+    BodyColumns, ColumnMap, Error, ReadOptions, read_bytes, read_path, read_path_with,
+};
 
 fn error(text: impl AsRef<[u8]>) -> String {
     read_bytes("poses.csv", text.as_ref(), &ReadOptions::default())
@@ -201,4 +203,26 @@ fn a_reader_that_does_not_exist_is_named() {
         .expect_err("no such reader")
         .to_string();
     assert!(message.contains("did you mean `csv`?"), "{message}");
+}
+
+#[test]
+fn progress_is_told_to_the_end() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let path = dir.path().join("long.csv");
+    let text: String = std::iter::once("q_rad\n".to_string())
+        .chain((0..400_000).map(|i| format!("{}.5\n", i % 9)))
+        .collect();
+    std::fs::write(&path, &text).expect("writable");
+    let mut told = Vec::new();
+    let recording = read_path_with(&path, &ReadOptions::default(), &mut |done, all| {
+        told.push((done, all))
+    })
+    .expect("a table");
+    assert_eq!(recording.joints[0].q.len(), 400_000);
+    let bytes = text.len() as u64;
+    assert!(
+        told.len() >= 2 && told.iter().all(|&(done, all)| done <= all && all == bytes),
+        "{told:?}"
+    );
+    assert_eq!(told.last(), Some(&(bytes, bytes)));
 }

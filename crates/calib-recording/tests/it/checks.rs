@@ -1,6 +1,8 @@
 //! Every fault class injected into simulated recordings: found in (nearly) all, and clean ones stay silent.
 
-use calib_recording::checks::model::{Prediction, better_explanation, disagreement, spoiled_rows};
+use calib_recording::checks::model::{
+    Prediction, alignment, better_explanation, disagreement, quaternion_order, spoiled_rows,
+};
 use calib_recording::checks::{Expectations, IDS, checks, held_out_in_training};
 use calib_recording::rigid_body::Template;
 use calib_recording::{Finding, JointUnit, Poses, Severity};
@@ -663,4 +665,80 @@ fn nothing_known_and_nothing_recorded_is_no_panic() {
             && ids.contains(&"joint-never-moved"),
         "{ids:?}"
     );
+}
+
+#[test]
+fn quaternions_in_the_other_order_are_found() {
+    for seed in 0..SEEDS {
+        let recorded = record(seed, false);
+        let predicted: Vec<_> = recorded.q.iter().map(|&q| forward(q)).collect();
+        let right = &recorded.poses.bodies["tool"];
+        assert!(
+            quaternion_order("tool", right, &predicted).is_none(),
+            "seed {seed}"
+        );
+        let wrong: Vec<_> = right
+            .iter()
+            .map(|pose| {
+                pose.map(|pose| {
+                    let c = pose.rotation.coords;
+                    // w, x, y, z read as x, y, z, w.
+                    let q = nalgebra::Quaternion::new(c.z, c.w, c.x, c.y);
+                    Isometry3::from_parts(pose.translation, UnitQuaternion::from_quaternion(q))
+                })
+            })
+            .collect();
+        let finding =
+            quaternion_order("tool", &wrong, &predicted).unwrap_or_else(|| panic!("seed {seed}"));
+        assert_eq!(finding.id, "quaternion-order");
+    }
+}
+
+#[test]
+fn every_outcome_of_an_alignment_is_said() {
+    use calib_recording::sync::{ClockMap, OffsetOutcome};
+    let map = ClockMap {
+        offset: 3.9,
+        drift: 5e-5,
+        reference: 0.0,
+        offset_sigma: 2e-4,
+        drift_sigma: 1e-6,
+        correlation: 0.99,
+    };
+    let lag = alignment(&OffsetOutcome::Found(map), 1e-3).expect("3.9 s");
+    assert_eq!(
+        lag.text,
+        "the tracker's clock is 3.9000 s ± 0.2 ms ahead of the robot's and runs 50 ppm faster"
+    );
+    assert!(
+        alignment(
+            &OffsetOutcome::Found(ClockMap {
+                offset: 5e-4,
+                ..map
+            }),
+            1e-3
+        )
+        .is_none()
+    );
+    for outcome in [
+        OffsetOutcome::TooShort,
+        OffsetOutcome::NoMatch {
+            correlation: 0.2,
+            needed: 0.6,
+        },
+        OffsetOutcome::NotExcited {
+            deviation: 0.0,
+            needed: 0.02,
+        },
+        OffsetOutcome::Ambiguous {
+            first: 1.0,
+            second: 2.0,
+            ratio: 0.97,
+        },
+    ] {
+        assert_eq!(
+            alignment(&outcome, 1e-3).map(|f| f.severity),
+            Some(Severity::Error)
+        );
+    }
 }

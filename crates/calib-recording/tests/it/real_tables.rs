@@ -3,7 +3,9 @@
 use calib_recording::checks::model::{disagreement, spoiled_rows};
 use calib_recording::checks::{Expectations, checks};
 use calib_recording::rigid_body::body_poses;
-use calib_recording::{ColumnMap, Filled, Poses, ReadOptions, read_path};
+use calib_recording::{
+    BodyColumns, ColumnMap, Filled, LengthUnit, Poses, ReadOptions, read_bytes, read_path,
+};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -207,4 +209,77 @@ fn the_bad_tiago_table_is_called_bad() {
     let spoiled =
         spoiled_rows(&shifted, "gripper", &track(&shifted), &predict(&shifted)).expect("spoiled");
     assert_eq!(spoiled.rows, [6, 7]);
+}
+
+#[test]
+fn tables_of_other_makers_through_a_column_map() {
+    let text = |names: [&str; 3]| names.map(String::from);
+    let body = |c: &str| BodyColumns {
+        position: [format!("X{c}"), format!("Y{c}"), format!("Z{c}")],
+        quaternion_wxyz: Some([
+            format!("qo{c}"),
+            format!("qx{c}"),
+            format!("qy{c}"),
+            format!("qz{c}"),
+        ]),
+        ..BodyColumns::default()
+    };
+    let aurora = ColumnMap {
+        skip_lines: 4,
+        lengths: LengthUnit::Mm,
+        bodies: ["a", "b", "c", "d"]
+            .iter()
+            .map(|c| (c.to_string(), body(c)))
+            .collect(),
+        ..ColumnMap::default()
+    };
+    let Some(data) = real_data() else { return };
+    let text_of = std::fs::read_to_string(data.join("formats/ndi/andrewraz_NDIdata_aurora.csv"))
+        .expect("present");
+    let options = ReadOptions {
+        columns: Some(aurora),
+        ..ReadOptions::default()
+    };
+    // The file was cut in its last line; that is said, and without the line it is read.
+    let cut = read_bytes("aurora.csv", text_of.as_bytes(), &options)
+        .expect_err("cut")
+        .to_string();
+    assert_eq!(cut, "aurora.csv:164: 6 cells, the header has 33");
+    let whole = text_of.rsplit_once('\n').map_or("", |(whole, _)| whole);
+    let recording = read_bytes("aurora.csv", whole.as_bytes(), &options).expect("readable");
+    let aurora = recording.poses(Filled::Exclude).expect("one table");
+    assert_eq!(aurora.len(), 158);
+    let seen: Vec<usize> = aurora
+        .bodies
+        .values()
+        .map(|track| track.iter().flatten().count())
+        .collect();
+    // Lost tools are written as zeros; the counts are those of a spreadsheet.
+    assert_eq!(seen, [156, 154, 149, 157]);
+
+    let quaternion = |p: &str| Some(["qx", "qy", "qz", "qw"].map(|q| format!("{p}_{q}")));
+    let ur10 = ColumnMap {
+        bodies: [
+            ("flange", text(["flange_x", "flange_y", "flange_z"])),
+            ("meas", text(["meas_x", "meas_y", "meas_z"])),
+        ]
+        .into_iter()
+        .map(|(name, position)| {
+            (
+                name.to_string(),
+                BodyColumns {
+                    position,
+                    quaternion_xyzw: quaternion(name),
+                    ..BodyColumns::default()
+                },
+            )
+        })
+        .collect(),
+        ..ColumnMap::default()
+    };
+    let ur10 = table("ur10_handeye/ur10_axzb.csv", Some(ur10)).expect("present");
+    assert_eq!(
+        (ur10.len(), ur10.bodies["meas"].iter().flatten().count()),
+        (23, 23)
+    );
 }
