@@ -123,7 +123,7 @@ pub(crate) fn linear(
     if let Some(answer) = single_axis(estimator, &spot, &spread, options) {
         return Ok(answer);
     }
-    let (sigma_along, sigma_across) = spread.sigmas(spot.sums.n);
+    let (sigma_along, sigma_across) = noise_levels(&spot, &spread);
     let covariance = sandwich(&spot, &spread, sigma_along, sigma_across);
     let reach = spot.body_point.norm();
     let sigma_r2 = (sigma_across * sigma_across - sigma_along * sigma_along) / (reach * reach);
@@ -203,8 +203,18 @@ fn not_observable(
     })
 }
 
-/// (A'A)⁻¹ (Σ A_iᵀ Σ_i A_i) (A'A)⁻¹ over [o; p], Σ_i = R_i (σ_a² p̂p̂ᵀ + σ_x² (I − p̂p̂ᵀ)) R_iᵀ.
-fn sandwich(spot: &HotSpot, spread: &Spread, sigma_along: f64, sigma_across: f64) -> Matrix6<f64> {
+/// (σ along, σ across) with the degrees of freedom that each kind of residual loses to the six unknowns:
+/// `tr((A'A)⁻¹ Σ A_iᵀ R_i p̂p̂ᵀ R_iᵀ A_i)` for those along p, the rest across.
+fn noise_levels(spot: &HotSpot, spread: &Spread) -> (f64, f64) {
+    let n = spot.sums.n as f64;
+    let share = (inverse_normal(&spot.sums) * middle(spot, spread, 1.0, 0.0)).trace();
+    let along = spread.along / (n - share).max(0.5);
+    let across = spread.across / (2.0 * n - (6.0 - share)).max(0.5);
+    (along.sqrt(), across.sqrt())
+}
+
+/// Σ A_iᵀ Σ_i A_i over [o; p], Σ_i = R_i (σ_a² p̂p̂ᵀ + σ_x² (I − p̂p̂ᵀ)) R_iᵀ.
+fn middle(spot: &HotSpot, spread: &Spread, sigma_along: f64, sigma_across: f64) -> Matrix6<f64> {
     let n = spot.sums.n as f64;
     let unit = spot
         .body_point
@@ -223,8 +233,13 @@ fn sandwich(spot: &HotSpot, spread: &Spread, sigma_along: f64, sigma_across: f64
     middle
         .fixed_view_mut::<3, 3>(3, 0)
         .copy_from(&cross.transpose());
+    middle
+}
+
+/// (A'A)⁻¹ (Σ A_iᵀ Σ_i A_i) (A'A)⁻¹ over [o; p].
+fn sandwich(spot: &HotSpot, spread: &Spread, sigma_along: f64, sigma_across: f64) -> Matrix6<f64> {
     let bread = inverse_normal(&spot.sums);
-    bread * middle * bread
+    bread * middle(spot, spread, sigma_along, sigma_across) * bread
 }
 
 /// (A'A)⁻¹ over [o; p], by eliminating o: the block of p is M⁻¹.

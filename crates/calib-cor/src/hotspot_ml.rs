@@ -66,7 +66,7 @@ pub(crate) fn fit_poses(
     let (sigma_t, sigma_r, normal) = maximise(poses, &mut spot, &spread, options);
     let reach = spot.body_point.norm();
     let start_reach = body_point.norm() + spread.sigmas(spot.sums.n).1;
-    let covariance = normal.hessian.cholesky().map(|c| c.inverse());
+    let covariance = covariance(&normal, spot.sums.n, options);
     let (Some(covariance), true) = (covariance, reach.is_finite() && reach < 100.0 * start_reach)
     else {
         return Ok(Outcome::NotObservable(NotObservable {
@@ -141,6 +141,31 @@ fn maximise(
     (sigma_t, sigma_r, last)
 }
 
+/// H⁻¹; estimated noise levels are first raised by the degrees of freedom that each kind of residual loses to
+/// the unknowns (few poses spend most of the radial residuals on the center).
+fn covariance(normal: &Normal, n: usize, options: &Options) -> Option<Matrix6<f64>> {
+    let inverse = normal.hessian.cholesky()?.inverse();
+    let n = n as f64;
+    let share = (inverse * normal.of_radial).trace();
+    // As estimated: n − 2 and 2n − 4.
+    let radial = if options.sigma_t.is_none() {
+        (n - share).max(0.5) / (n - 2.0)
+    } else {
+        1.0
+    };
+    let across = if options.sigma_r.is_none() {
+        (2.0 * n - 6.0 + share).max(0.5) / (2.0 * n - 4.0)
+    } else {
+        1.0
+    };
+    let of_across = normal.hessian - normal.of_radial;
+    Some(
+        (normal.of_radial * radial + of_across * across)
+            .cholesky()?
+            .inverse(),
+    )
+}
+
 struct Likelihood<'a> {
     poses: &'a [Option<Pose>],
     /// Centers are relative to it.
@@ -153,6 +178,8 @@ struct Likelihood<'a> {
 
 struct Normal {
     hessian: Matrix6<f64>,
+    /// The part of the Hessian that the distances |q| contribute.
+    of_radial: Matrix6<f64>,
     gradient: Vector6<f64>,
     cost: f64,
     /// Σ (|q| − |p|)².
@@ -174,6 +201,8 @@ impl Problem for Likelihood<'_> {
         let unit_p = p / length_p;
         let across_p = Matrix3::identity() - unit_p * unit_p.transpose();
         let (mut h_oo, mut h_op, mut h_pp) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
+        let (mut turned2, mut turned) = (Matrix3::zeros(), Vector3::zeros());
+        let mut n = 0.0;
         let (mut g_o, mut g_p) = (Vector3::zeros(), Vector3::zeros());
         let (mut cost, mut radial, mut arc) = (0.0, 0.0, 0.0);
         for pose in self.poses.iter().flatten() {
@@ -204,6 +233,10 @@ impl Problem for Likelihood<'_> {
             let across_q = Matrix3::identity() - unit_q * unit_q.transpose();
             let h_qq = unit_q * unit_q.transpose() / t2 + across_q * (w / (length_q * length_q));
             let h_qp = -(unit_q * unit_p.transpose()) / t2 - across_q * across_p * (w / product);
+            let world_q = pose.rotation * unit_q;
+            turned2 += world_q * world_q.transpose();
+            turned += world_q;
+            n += 1.0;
             h_oo += pose.rotation * h_qq * pose.rotation.transpose();
             h_op += pose.rotation * h_qp;
             h_pp += unit_p * unit_p.transpose() / t2 + across_p * (w / (length_p * length_p));
@@ -215,8 +248,22 @@ impl Problem for Likelihood<'_> {
             .fixed_view_mut::<3, 3>(3, 0)
             .copy_from(&h_op.transpose());
         hessian.fixed_view_mut::<3, 3>(3, 3).copy_from(&h_pp);
+        // Σ (R q̂, −p̂)(R q̂, −p̂)ᵀ / σ_t²
+        let mut of_radial = Matrix6::zeros();
+        let side = -turned * unit_p.transpose() / t2;
+        of_radial
+            .fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&(turned2 / t2));
+        of_radial.fixed_view_mut::<3, 3>(0, 3).copy_from(&side);
+        of_radial
+            .fixed_view_mut::<3, 3>(3, 0)
+            .copy_from(&side.transpose());
+        of_radial
+            .fixed_view_mut::<3, 3>(3, 3)
+            .copy_from(&(unit_p * unit_p.transpose() * (n / t2)));
         Normal {
             hessian,
+            of_radial,
             gradient: stack(&g_o, &g_p),
             cost,
             radial,

@@ -3,8 +3,8 @@
 //!
 //! ```text
 //! consensus   draw subsets; MSAC  Σ min(d²/σ², T)  with a stated σ, else least median of squares
-//! Huber       w = min(1, k/d)                    d: residual in σ; k = 1.345 (1 dof), 2.8 (3 dof)
-//! GNC         w = (μT / (d² + μT))²,   μ = large … 1,   T = χ²_dof(0.999)
+//! Huber       w = min(1, k/d), 0 far off         d: residual in σ; k = 1.345 (1 dof), 2.8 (3 dof)
+//! GNC         w = (μT / (d² + μT))²,   μ = 8 … 1,   T = χ²_dof(0.999)
 //! gate        d² ≤ T,  σ re-estimated from the inliers, until the set stands still
 //! ```
 //!
@@ -37,8 +37,16 @@ const MEDIAN: [f64; 2] = [0.4549, 2.3660];
 const HUBER: [f64; 2] = [1.345, 2.8];
 /// Samples that score a subset; more would not rank subsets better.
 const SCORED: usize = 1000;
-/// Rounds of each reweighting stage.
+/// Rounds of Huber's weights, enough to forget which four samples the consensus drew.
+const HUBER_ROUNDS: usize = 8;
+/// Huber's weights end at this multiple of the gate (25: five times its distance).
+const FAR: f64 = 25.0;
+/// Graduation of Geman & McClure's weights; the last ones repeat until they stand still.
+const MU: [f64; 9] = [8.0, 5.0, 3.0, 2.0, 1.5, 1.0, 1.0, 1.0, 1.0];
+/// Rounds of the gate.
 const ROUNDS: usize = 30;
+/// Part of the largest squared residual that counts as rounding on exact data.
+const EXACT: f64 = 1e-24;
 
 /// Robust fit: spheres for points and markers, hot spot for poses.
 ///
@@ -123,33 +131,26 @@ fn inliers<M: Model>(
     let mut estimate = best?.1;
 
     if reweight {
-        // The consensus decides the noise; reweighting must not let outliers widen it again.
-        for stage in 0..2 {
-            let mut mu: f64 = 64.0;
-            for _ in 0..ROUNDS {
-                let d = squares(&estimate);
-                let variance = scale(&d).max(f64::MIN_POSITIVE);
-                let weights: Vec<f64> = d
-                    .iter()
-                    .map(|d| {
-                        let d2 = d / variance;
-                        if stage == 0 {
-                            (HUBER[M::DOF] / d2.sqrt()).min(1.0)
-                        } else {
-                            (mu * gate / (d2 + mu * gate)).powi(2)
-                        }
-                    })
-                    .collect();
-                let Some(next) = model.weighted(&estimate, &weights) else {
-                    break;
-                };
-                estimate = next;
-                if stage == 1 {
-                    if mu <= 1.0 {
-                        break;
-                    }
-                    mu = (mu / 1.6).max(1.0);
-                }
+        // The consensus decides the noise; reweighting may lower it, never let outliers widen it again.
+        let mut variance = f64::INFINITY;
+        for (round, mu) in std::iter::repeat_n(None, HUBER_ROUNDS)
+            .chain(MU.iter().copied().map(Some))
+            .enumerate()
+        {
+            let d = squares(&estimate);
+            let floor = EXACT * d.iter().copied().fold(0.0, f64::max);
+            variance = variance.min(scale(&d)).max(floor).max(f64::MIN_POSITIVE);
+            let weight = |d2: f64| match mu {
+                // A bounded pull is not enough for a sphere: far samples would drag it out of the basin.
+                None if d2 > FAR * gate => 0.0,
+                None => (HUBER[M::DOF] / d2.sqrt()).min(1.0),
+                Some(mu) => (mu * gate / (d2 + mu * gate)).powi(2),
+            };
+            let weights: Vec<f64> = d.iter().map(|d| weight(d / variance)).collect();
+            match model.weighted(&estimate, &weights) {
+                Some(next) => estimate = next,
+                None if round == 0 => return None,
+                None => break,
             }
         }
     }
