@@ -1,7 +1,7 @@
 //! The Levenberg–Marquardt step inside a box, as a quadratic program for Clarabel.
 //!
 //! ```text
-//! min ½ δᵀ(H + λ diag H)δ + gᵀδ   s.t.   lower ≤ x + δ ≤ upper                              (1)
+//! min ½ δᵀ(H + λ S⁻²)δ + gᵀδ      s.t.   lower ≤ x + δ ≤ upper                              (1)
 //! ```
 
 use clarabel::algebra::CscMatrix;
@@ -17,6 +17,7 @@ pub(crate) fn bounded_step(
     model: &Model,
     values: &Values,
     system: &NormalEquations,
+    natural: &[f64],
     damping: f64,
     step: &mut [f64],
 ) -> bool {
@@ -51,7 +52,7 @@ pub(crate) fn bounded_step(
         }
         // A direction that nothing sees is held at 0.
         quadratic[i][i] = if system.h[i * n + i] > 0.0 {
-            1.0 + damping.max(1e-10)
+            1.0 + 1e-10 + damping * natural[i] * scale[i] * scale[i]
         } else {
             1.0
         };

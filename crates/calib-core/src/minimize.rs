@@ -1,10 +1,22 @@
 //! Levenberg–Marquardt with scaled columns and a cost-checked step.
 //!
 //! ```text
-//! (H + λ diag H) δ = −g,   x ⊞ δ accepted when F falls;   stop when −gᵀδ (in σ²) vanishes       (1)
+//! (H + λ S⁻²) δ = −g,   x ⊞ δ accepted when F falls;   stop when −gᵀδ (in σ²) vanishes          (1)
 //! ```
 //!
+//! S holds the parameters' natural scales (prior σ, or 1°, 1 cm): what makes a linearisation wrong is the size
+//! of a step in degrees, not in units of the data's precision, so weakly seen directions are held back first.
+//!
 //! Directions that neither data nor prior see have zero gradient and stay where they start.
+//!
+//! Where residuals are large (missing physics) and a direction is held by a weak prior only, the curvature
+//! `Σ e·∂²e` that Gauss–Newton leaves out decides along it, and Gauss–Newton creeps or overshoots. Once
+//! progress is slow, K collects that curvature from the gradients met on the way (symmetric rank-one secant
+//! update) and the step solves `(H + K + λ S⁻²) δ = −g`:
+//!
+//! ```text
+//! v = (g₊ − g) − H₊ δ − K δ,   K ← K + v vᵀ/(vᵀδ)                                              (2)
+//! ```
 
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +54,7 @@ pub struct MinimizeSettings {
     pub max_iterations: usize,
     /// Stop when the decrement −gᵀδ falls below this (units of σ²).
     pub decrement: f64,
-    /// First damping, relative to diag H; small because closed forms give the start.
+    /// First damping λ: 1e-3 is a prior of 30 natural scales (30°, 30 cm) on the step.
     pub damping: f64,
 }
 
@@ -51,8 +63,72 @@ impl Default for MinimizeSettings {
         Self {
             max_iterations: 100,
             decrement: 1e-12,
-            damping: 1e-9,
+            damping: 1e-3,
         }
+    }
+}
+
+/// Gauss–Newton is slow when the decrement falls by less than this factor per step…
+const SLOW: f64 = 0.1;
+/// …once the fit is within this squared distance (in σ²) of the minimum: farther away the curvature changes
+/// from step to step and a secant of it misleads.
+const NEAR: f64 = 1.0;
+
+/// K of equation (2).
+struct Curvature {
+    n: usize,
+    s: Vec<f64>,
+    slow: bool,
+    known: bool,
+}
+
+impl Curvature {
+    fn new(n: usize) -> Self {
+        Self {
+            n,
+            s: vec![0.0; n * n],
+            slow: false,
+            known: false,
+        }
+    }
+
+    fn learn(&mut self, before: &NormalEquations, after: &NormalEquations, step: &[f64]) {
+        if !self.slow {
+            return;
+        }
+        let n = self.n;
+        let mut v = vec![0.0; n];
+        for i in 0..n {
+            let mut predicted = 0.0;
+            for j in 0..n {
+                predicted += (after.h[i.min(j) * n + i.max(j)] + self.s[i * n + j]) * step[j];
+            }
+            v[i] = after.g[i] - before.g[i] - predicted;
+        }
+        let along = dot(&v, step);
+        // In units of √H_ii, so that metres and radians count alike.
+        let size = |x: &[f64], power: i32| -> f64 {
+            (0..n)
+                .map(|i| {
+                    let d = after.h[i * n + i];
+                    if d > 0.0 {
+                        x[i] * x[i] * d.powi(power)
+                    } else {
+                        0.0
+                    }
+                })
+                .sum::<f64>()
+                .sqrt()
+        };
+        if along.abs() <= 1e-8 * size(&v, -1) * size(step, 1) {
+            return;
+        }
+        for i in 0..n {
+            for j in 0..n {
+                self.s[i * n + j] += v[i] * v[j] / along;
+            }
+        }
+        self.known = true;
     }
 }
 
@@ -65,9 +141,11 @@ enum Step {
     None,
 }
 
-/// Least damping: keeps the factorisation positive along directions that nothing sees, and is far
-/// too small to slow down the others.
-const MIN_DAMPING: f64 = 1e-10;
+/// Relative ridge: keeps the factorisation positive along directions that nothing sees, and is far too
+/// small to slow down the others.
+const RIDGE: f64 = 1e-10;
+/// Least damping.
+const MIN_DAMPING: f64 = 1e-12;
 /// Damping beyond which a step is shorter than rounding.
 const MAX_DAMPING: f64 = 1e16;
 /// A rise of the cost by this fraction is rounding of its sum.
@@ -125,6 +203,12 @@ pub(crate) fn minimize_in(
         .columns
         .iter()
         .any(|&p| model.problem.parameters[p].bounds.is_some());
+    let mut curvature = Curvature::new(n);
+    let natural: Vec<f64> = model
+        .columns
+        .iter()
+        .map(|&p| model.problem.parameters[p].scale().powi(-2))
+        .collect();
     // Without random effects V is constant: the next linearisation delivers the cost to check.
     let constant_noise = model.slots.is_empty();
     let mut iterations = 1;
@@ -136,8 +220,15 @@ pub(crate) fn minimize_in(
         let current = system.cost();
         let before = decrement;
         let outcome = loop {
-            let solved = damped_step(&system, damping, &mut factor, &mut step)
-                && (!bounded || bounded_step(model, &values, &system, damping, &mut step));
+            let solved = damped_step(
+                &system,
+                &mut curvature,
+                &natural,
+                damping,
+                &mut factor,
+                &mut step,
+            ) && (!bounded
+                || bounded_step(model, &values, &system, &natural, damping, &mut step));
             if solved {
                 decrement = -dot(&system.g, &step);
                 retract(model, &values, &step, &mut trial);
@@ -172,7 +263,8 @@ pub(crate) fn minimize_in(
                     break Step::Taken;
                 }
             }
-            damping = (damping * 10.0).max(1e-8);
+            curvature.slow |= decrement < NEAR;
+            damping = (damping * 10.0).max(1e-3);
             if damping > MAX_DAMPING {
                 break Step::None;
             }
@@ -184,6 +276,8 @@ pub(crate) fn minimize_in(
             }
             Step::Taken => {
                 damping = (damping * 0.1).max(MIN_DAMPING);
+                curvature.slow |= decrement < NEAR && decrement > SLOW * before;
+                curvature.learn(&system, &next, &step);
                 std::mem::swap(&mut values, &mut trial);
                 std::mem::swap(&mut system, &mut next);
             }
@@ -209,33 +303,57 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// Solves (1) by Cholesky of the column-scaled system; `false` when it is not positive definite.
-pub(crate) fn damped_step(
+/// Solves (1), with (2) where it is known, by Cholesky of the column-scaled system; `false` when it is not
+/// positive definite.
+fn damped_step(
     system: &NormalEquations,
+    curvature: &mut Curvature,
+    natural: &[f64],
     damping: f64,
     factor: &mut [f64],
     step: &mut [f64],
 ) -> bool {
     let n = system.n;
-    // S H S with unit diagonal, S = diag(1/√H_ii)
-    for i in 0..n {
-        let d = system.h[i * n + i];
-        step[i] = if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 };
-    }
-    for i in 0..n {
-        for j in 0..=i {
-            factor[i * n + j] = system.h[j * n + i] * step[i] * step[j];
+    // Scaled to unit diagonal, scales 1/√H_ii.
+    let scale: Vec<f64> = (0..n)
+        .map(|i| {
+            let d = system.h[i * n + i];
+            if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }
+        })
+        .collect();
+    let mut with = curvature.known;
+    loop {
+        for i in 0..n {
+            for j in 0..i {
+                factor[i * n + j] = system.h[j * n + i] * scale[i] * scale[j];
+            }
+            factor[i * n + i] = 1.0 + RIDGE + damping * natural[i] * scale[i] * scale[i];
+            if scale[i] == 0.0 {
+                factor[i * n + i] = 1.0;
+            }
+            if with {
+                for j in 0..=i {
+                    factor[i * n + j] += curvature.s[i * n + j] * scale[i] * scale[j];
+                }
+            }
         }
-        factor[i * n + i] = 1.0 + damping;
+        if cholesky_in_place(factor, n) {
+            break;
+        }
+        if !with {
+            return false;
+        }
+        // A saddle as far as (2) knows: forget it.
+        with = false;
+        curvature.known = false;
+        curvature.s.fill(0.0);
     }
-    if !cholesky_in_place(factor, n) {
-        return false;
-    }
-    // Two triangular solves on −S g; the scales sit in `step` until the end.
-    let mut y: Vec<f64> = (0..n).map(|i| -system.g[i] * step[i]).collect();
-    solve_in_place(factor, n, &mut y);
     for i in 0..n {
-        step[i] *= y[i];
+        step[i] = -system.g[i] * scale[i];
+    }
+    solve_in_place(factor, n, step);
+    for i in 0..n {
+        step[i] *= scale[i];
     }
     step.iter().all(|x| x.is_finite())
 }

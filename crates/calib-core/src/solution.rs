@@ -154,6 +154,8 @@ impl Settings {
 
 /// Noise levels have settled when log σ² changes by less than this: 0.05 % in σ.
 const NOISE_SETTLED: f64 = 1e-3;
+/// Values need not be better than 1e-3 σ while noise levels or outliers are still being decided.
+const BETWEEN_ROUNDS: f64 = 1e-6;
 /// Gate and refit alternate; the set stays in two or three rounds unless it flickers at the border.
 const GATE_ROUNDS: usize = 6;
 
@@ -193,7 +195,7 @@ pub fn solve(problem: &Problem, settings: &Settings) -> Result<Solution, Error> 
     };
     let mut theta = stated.clone();
     let mut weights = mask.clone();
-    let mut minimum = fit.minimize(&model.start(), &weights, &theta, &mut work);
+    let mut minimum = fit.minimize(&model.start(), &weights, &theta, &mut work, BETWEEN_ROUNDS);
     if settings.robust.enabled
         && minimum.status != SolveStatus::NotEvaluable
         && let Some((values, kept, iterations)) =
@@ -265,15 +267,13 @@ impl Fit<'_> {
         weights: &[f64],
         theta: &[f64],
         work: &mut Workspace,
+        decrement: f64,
     ) -> Minimum {
-        let minimum = minimize_in(
-            self.model,
-            start,
-            weights,
-            theta,
-            &self.settings.minimize,
-            work,
-        );
+        let settings = MinimizeSettings {
+            decrement,
+            ..self.settings.minimize
+        };
+        let minimum = minimize_in(self.model, start, weights, theta, &settings, work);
         self.iterations += minimum.iterations;
         minimum
     }
@@ -286,10 +286,17 @@ impl Fit<'_> {
         theta: &mut Vec<f64>,
         work: &mut Workspace,
     ) -> Minimum {
-        let mut minimum = self.minimize(&start.values, weights, theta, work);
-        if !self.model.problem.groups.iter().any(|g| g.estimate) {
-            return minimum;
+        if self.settings.noise_rounds == 0 || !self.model.problem.groups.iter().any(|g| g.estimate)
+        {
+            return self.minimize(
+                &start.values,
+                weights,
+                theta,
+                work,
+                self.settings.minimize.decrement,
+            );
         }
+        let mut minimum = self.minimize(&start.values, weights, theta, work, BETWEEN_ROUNDS);
         let mut system = NormalEquations::new(self.model.free());
         for _ in 0..self.settings.noise_rounds {
             if minimum.status == SolveStatus::NotEvaluable {
@@ -312,12 +319,18 @@ impl Fit<'_> {
             };
             self.relative_sigma = relative_sigma;
             *theta = next;
-            minimum = self.minimize(&minimum.values, weights, theta, work);
             if change < NOISE_SETTLED {
                 break;
             }
+            minimum = self.minimize(&minimum.values, weights, theta, work, BETWEEN_ROUNDS);
         }
-        minimum
+        self.minimize(
+            &minimum.values,
+            weights,
+            theta,
+            work,
+            self.settings.minimize.decrement,
+        )
     }
 }
 
