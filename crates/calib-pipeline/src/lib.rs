@@ -10,14 +10,26 @@
 //!
 //! Stages are functions of plain values. Only [`load`] reads files and only [`write`] writes them.
 
+pub mod assemble;
+pub mod checks;
+pub mod closure;
 pub mod error;
+pub mod export;
+pub mod fit;
+pub mod inspect;
 pub mod kinematics;
 pub mod load;
 pub mod loads;
 pub mod ml;
+pub mod paper;
+pub mod residuals;
+pub mod run;
 pub mod simulate;
 pub mod start;
+pub mod take_back;
 pub mod tracks;
+pub mod verify;
+pub mod view;
 pub mod write;
 
 pub use error::{ExitCode, PipelineError};

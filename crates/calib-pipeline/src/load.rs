@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use calib_profile::{Profile, RecordingSpec};
-use calib_recording::{Filled, Finding, JointUnit, Meta, Poses, ReadOptions, Severity};
+use calib_recording::{ColumnMap, Filled, Finding, JointUnit, Meta, Poses, ReadOptions, Severity};
 use calib_urdf::{RobotModel, sha256_hex};
 
 use crate::error::PipelineError;
@@ -120,7 +120,7 @@ pub fn load_recordings(robot: RobotProfile) -> Result<Inputs, PipelineError> {
             sha256: sha256_hex(&bytes),
         });
         let options = ReadOptions {
-            columns: spec.columns.clone(),
+            columns: column_map(spec),
             ..ReadOptions::default()
         };
         let shown = path.display().to_string();
@@ -142,6 +142,18 @@ pub fn load_recordings(robot: RobotProfile) -> Result<Inputs, PipelineError> {
         findings,
         digests,
     })
+}
+
+/// The profile's column map, with its group column among the texts to keep.
+fn column_map(spec: &RecordingSpec) -> Option<ColumnMap> {
+    let Some(group) = &spec.group else {
+        return spec.columns.clone();
+    };
+    let mut map = spec.columns.clone().unwrap_or_default();
+    if !map.labels.contains(group) {
+        map.labels.push(group.clone());
+    }
+    Some(map)
 }
 
 /// Checks the names of a table against robot and profile and makes its joint vectors.

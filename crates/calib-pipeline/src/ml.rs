@@ -331,19 +331,6 @@ fn add_features(
             Some(prior.gain.max(1.0)),
         );
     }
-    if !free.eccentricity && model.joint(joint).kind.turns() {
-        let readings: Vec<f64> = q.iter().map(|q| model.position(q, joint)).collect();
-        problem.candidate(
-            edge,
-            FeatureKind::EccentricityCos,
-            readings.iter().map(|q| q.cos() - 1.0).collect(),
-        );
-        problem.candidate(
-            edge,
-            FeatureKind::EccentricitySin,
-            readings.iter().map(|q| q.sin()).collect(),
-        );
-    }
     loaded
 }
 

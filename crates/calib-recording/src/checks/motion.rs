@@ -2,6 +2,7 @@
 
 use super::Expectations;
 use super::statistics::{median, range};
+use crate::JointUnit;
 use crate::finding::{Finding, Severity};
 use crate::poses::Poses;
 use nalgebra::{Point3, Vector3};
@@ -55,14 +56,16 @@ pub(super) fn flips(poses: &Poses) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (name, track) in &poses.bodies {
         let seen: Vec<usize> = (0..track.len()).filter(|&i| track[i].is_some()).collect();
-        let step = |w: &[usize]| Some((w[1], track[w[0]]?, track[w[1]]?));
+        let step = |w: &[usize]| Some((w[0], w[1], track[w[0]]?, track[w[1]]?));
         let steps: Vec<(usize, f64, f64)> = seen
             .windows(2)
             .filter_map(step)
-            .map(|(row, a, b)| {
+            .map(|(before, row, a, b)| {
+                // What the joints turned between the rows needs no flip (a sweep that starts its next line).
+                let turned = joints_turned(poses, before, row);
                 (
                     row,
-                    a.rotation.angle_to(&b.rotation),
+                    (a.rotation.angle_to(&b.rotation) - turned).max(0.0),
                     (a.translation.vector - b.translation.vector).norm(),
                 )
             })
@@ -93,6 +96,15 @@ pub(super) fn flips(poses: &Poses) -> Vec<Finding> {
         }
     }
     findings
+}
+
+/// Sum of what the recorded joints turned between two rows, rad: the most that a body on the robot can turn.
+fn joints_turned(poses: &Poses, before: usize, after: usize) -> f64 {
+    let turned = poses.joints.iter().filter_map(|(name, q)| {
+        let is_angle = poses.joint_units.get(name) != Some(&JointUnit::Length);
+        Some((q[after]? - q[before]?).abs()).filter(|_| is_angle)
+    });
+    turned.sum()
 }
 
 /// Steps in a track that should be smooth; only where rows have a time.

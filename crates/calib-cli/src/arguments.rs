@@ -1,0 +1,221 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Finds where a robot's joints are relative to the bodies that an optical tracker sees, and makes its kinematic
+/// model true.
+///
+/// Exit codes: 0 accepted · 1 finished, verdict not a pass · 2 usage or profile error · 3 data error · 4 a requested
+/// quantity is not observable · 5 did not converge · 6 plugin error · 7 output not written.
+#[derive(Debug, Parser)]
+#[command(name = "calib", version, about)]
+pub struct Arguments {
+    /// What to do
+    #[command(subcommand)]
+    pub command: Command,
+    /// Say nothing but results and errors
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// Say more on standard error
+    #[arg(short, long, global = true)]
+    pub verbose: bool,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Calibrate: from recordings to patched URDF, scene and report
+    Run(Run),
+    /// Check a profile and its recordings without solving
+    Check {
+        /// The robot's profile
+        profile: PathBuf,
+        /// Print findings as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Make recordings with known truth for a profile
+    Simulate {
+        /// The robot's profile
+        profile: PathBuf,
+        /// Seed of the random numbers; the profile's when not given
+        #[arg(long)]
+        seed: Option<u64>,
+        /// Folder to write to
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// One estimator on one table, no profile
+    Fit {
+        /// What to fit
+        #[command(subcommand)]
+        what: Fit,
+    },
+    /// What differs between two URDFs
+    Diff {
+        /// The one
+        a: PathBuf,
+        /// The other
+        b: PathBuf,
+        /// How to show it
+        #[arg(long, value_enum, default_value_t = DiffFormat::Table)]
+        format: DiffFormat,
+    },
+    /// Give the original bytes of a patched URDF back
+    Revert {
+        /// The patched URDF; its change record `<file>.changes.json` stands beside it
+        urdf: PathBuf,
+        /// Where to write the original
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Print a JSON Schema
+    Schema {
+        /// Of what
+        #[arg(value_enum, default_value_t = SchemaOf::Profile)]
+        of: SchemaOf,
+    },
+    /// Print completions for a shell
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+}
+
+/// `calib run`.
+#[derive(Debug, Args)]
+pub struct Run {
+    /// The robot's profile
+    pub profile: PathBuf,
+    /// Folder to write to; results/<profile name> when not given
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Instead of the profile's method
+    #[arg(long, value_enum)]
+    pub method: Option<MethodName>,
+    /// Go on although the data checks found errors
+    #[arg(long)]
+    pub force: bool,
+    /// Print the report as JSON instead of the summary
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Estimation methods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodName {
+    /// The closed forms of the paper, each origin alone
+    Paper,
+    /// Maximum likelihood over all loops at once
+    Ml,
+}
+
+/// Renderings of a difference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum DiffFormat {
+    /// A table for people
+    Table,
+    /// JSON
+    Json,
+    /// Unified text difference
+    Unified,
+}
+
+/// What has a schema.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SchemaOf {
+    /// The profile
+    Profile,
+    /// report.json
+    Report,
+    /// The scene
+    Scene,
+}
+
+/// `calib fit …`.
+#[derive(Debug, Subcommand)]
+pub enum Fit {
+    /// Center of rotation
+    Cor(FitTable),
+    /// Axis of rotation
+    Aor(FitTable),
+    /// Frame of a joint with two axes, from body poses and two joint columns
+    Frame(FitFrame),
+    /// Hand-eye: AX = ZB from two poses per row
+    Handeye(FitHandEye),
+}
+
+/// One table, one estimator.
+#[derive(Debug, Args)]
+pub struct FitTable {
+    /// The table: points (`<marker>.x_m`, …) or poses (`x_m`, …, `qw`)
+    #[arg(required_unless_present = "list")]
+    pub file: Option<PathBuf>,
+    /// Which estimator
+    #[arg(long)]
+    pub estimator: Option<String>,
+    /// All estimators that take these data, with their agreement
+    #[arg(long)]
+    pub all: bool,
+    /// The estimators there are
+    #[arg(long)]
+    pub list: bool,
+    /// Only these markers (points) or this body (poses)
+    #[arg(long, value_delimiter = ',')]
+    pub use_only: Vec<String>,
+    /// Markers (or the body) on one side of the joint, for estimators of two moving bodies
+    #[arg(long, value_delimiter = ',')]
+    pub parent: Vec<String>,
+    /// Markers (or the body) on the other side
+    #[arg(long, value_delimiter = ',')]
+    pub child: Vec<String>,
+    /// Stated noise of one coordinate, mm
+    #[arg(long)]
+    pub sigma_mm: Option<f64>,
+    /// Stated noise of the orientation about each axis, deg
+    #[arg(long)]
+    pub sigma_deg: Option<f64>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `calib fit frame`.
+#[derive(Debug, Args)]
+pub struct FitFrame {
+    /// The table: poses of one body and two joint columns
+    pub file: PathBuf,
+    /// The joint nearer to the base, as `axis=joint` (`z=pan`)
+    #[arg(long)]
+    pub proximal: String,
+    /// The joint nearer to the body, as `axis=joint` (`x=tilt`)
+    #[arg(long)]
+    pub distal: String,
+    /// The body, when the table has several
+    #[arg(long)]
+    pub body: Option<String>,
+    /// `algorithm1` or `frame_ml`
+    #[arg(long, default_value = "algorithm1")]
+    pub estimator: String,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `calib fit handeye`.
+#[derive(Debug, Args)]
+pub struct FitHandEye {
+    /// The table with two bodies per row
+    pub file: PathBuf,
+    /// Prefix of the columns of the first pose (robot flange), e.g. `flange`
+    #[arg(long, default_value = "flange")]
+    pub robot: String,
+    /// Prefix of the columns of the second pose (measurement), e.g. `meas`
+    #[arg(long, default_value = "meas")]
+    pub measured: String,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,164 @@
+//! What each command does: results on standard output, progress on standard error.
+
+use std::io::IsTerminal as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use calib_pipeline::run::{RunOptions, run as run_profile};
+use calib_pipeline::{ExitCode, PipelineError, fit, inspect, load, simulate, take_back, write};
+use clap::CommandFactory as _;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::arguments::{Arguments, Command, DiffFormat, Fit, MethodName, Run, SchemaOf};
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
+    match &arguments.command {
+        Command::Run(options) => calibrate(arguments, options),
+        Command::Check { profile, json } => {
+            let checked = inspect::check(profile)?;
+            print!(
+                "{}",
+                if *json {
+                    checked.json()?
+                } else {
+                    checked.text()
+                }
+            );
+            Ok(checked.exit_code())
+        }
+        Command::Simulate { profile, seed, out } => {
+            let robot = load::load_robot(profile)?;
+            for path in write::write_all(out, &simulate::simulate(&robot, *seed)?)? {
+                println!("{}", path.display());
+            }
+            Ok(ExitCode::Accepted)
+        }
+        Command::Fit { what } => {
+            let answer = match what {
+                Fit::Cor(table) => fit::cor(&fit_table(table))?,
+                Fit::Aor(table) => fit::aor(&fit_table(table))?,
+                Fit::Frame(f) => fit::frame(&fit::FrameRequest {
+                    file: f.file.clone(),
+                    proximal: f.proximal.clone(),
+                    distal: f.distal.clone(),
+                    body: f.body.clone(),
+                    estimator: f.estimator.clone(),
+                })?,
+                Fit::Handeye(f) => fit::handeye(&f.file, &f.robot, &f.measured)?,
+            };
+            let json = match what {
+                Fit::Cor(t) | Fit::Aor(t) => t.json,
+                Fit::Frame(f) => f.json,
+                Fit::Handeye(f) => f.json,
+            };
+            print!("{}", if json { &answer.json } else { &answer.text });
+            Ok(answer.exit)
+        }
+        Command::Diff { a, b, format } => {
+            let text = match format {
+                DiffFormat::Table => take_back::diff_table(a, b)?,
+                DiffFormat::Json => take_back::diff_json(a, b)?,
+                DiffFormat::Unified => take_back::diff_unified(a, b)?,
+            };
+            print!("{text}");
+            Ok(ExitCode::Accepted)
+        }
+        Command::Revert { urdf, out } => {
+            println!("{}", take_back::revert(urdf, out)?.display());
+            Ok(ExitCode::Accepted)
+        }
+        Command::Schema { of } => {
+            let text = match of {
+                SchemaOf::Profile => calib_profile::json_schema(),
+                SchemaOf::Report => inspect::report_schema(),
+                SchemaOf::Scene => inspect::scene_schema(),
+            };
+            print!("{text}");
+            Ok(ExitCode::Accepted)
+        }
+        Command::Completions { shell } => {
+            clap_complete::generate(
+                *shell,
+                &mut Arguments::command(),
+                "calib",
+                &mut std::io::stdout(),
+            );
+            Ok(ExitCode::Accepted)
+        }
+    }
+}
+
+fn fit_table(table: &crate::arguments::FitTable) -> fit::TableRequest {
+    fit::TableRequest {
+        file: table.file.clone(),
+        estimator: table.estimator.clone(),
+        all: table.all,
+        list: table.list,
+        only: table.use_only.clone(),
+        parent: table.parent.clone(),
+        child: table.child.clone(),
+        sigma_m: table.sigma_mm.map(|s| s * 1e-3),
+        sigma_rad: table.sigma_deg.map(f64::to_radians),
+    }
+}
+
+fn calibrate(arguments: &Arguments, options: &Run) -> Result<ExitCode, PipelineError> {
+    let out = options
+        .out
+        .clone()
+        .unwrap_or_else(|| default_folder(&options.profile));
+    let bar = progress_bar(arguments.quiet);
+    let mut progress = |stage: &str| {
+        bar.set_message(stage.to_owned());
+        if arguments.verbose {
+            eprintln!("calib: {stage}");
+        }
+    };
+    let run_options = RunOptions {
+        method: options.method.map(|m| match m {
+            MethodName::Paper => calib_profile::raw::RawMethod::Paper,
+            MethodName::Ml => calib_profile::raw::RawMethod::Ml,
+        }),
+        force: options.force,
+    };
+    let output = run_profile(&options.profile, &run_options, &mut progress)?;
+    progress("write results");
+    let written = write::write_all(&out, &output.files)?;
+    bar.finish_and_clear();
+    if options.json {
+        print!("{}", inspect::report_json(&output.report)?);
+    } else {
+        let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+        print!("{}", inspect::summary(&output.report, colour));
+        if !arguments.quiet {
+            for path in written
+                .iter()
+                .filter(|p| p.file_name().is_some_and(|n| n != write::MANIFEST))
+            {
+                println!("wrote {}", path.display());
+            }
+        }
+    }
+    Ok(output.exit)
+}
+
+fn default_folder(profile: &Path) -> PathBuf {
+    let name = profile
+        .file_stem()
+        .map_or_else(|| "profile".into(), |s| s.to_os_string());
+    PathBuf::from("results").join(name)
+}
+
+/// A spinner on a terminal, nothing elsewhere.
+fn progress_bar(quiet: bool) -> ProgressBar {
+    if quiet || !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} ({elapsed})") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(100));
+    bar
+}

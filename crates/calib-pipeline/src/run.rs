@@ -1,0 +1,497 @@
+//! `calib run`: everything, in order.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use calib_profile::{BodyKind, Method};
+use calib_recording::Finding;
+use calib_report::{Report, ResidualRow, Status, Unobservable, Verdict};
+use calib_urdf::JointId;
+use nalgebra::{Isometry3, Matrix6};
+
+use crate::assemble::{Evidence, assemble};
+use crate::checks;
+use crate::closure::close_loops;
+use crate::error::{ExitCode, PipelineError};
+use crate::export::{Found, calibration_yaml, patch_urdf, scene};
+use crate::kinematics::Calibration;
+use crate::load::{Inputs, load_recordings, load_robot};
+use crate::ml::{self, Freedom, MlFit};
+use crate::paper::{self, OriginEstimate};
+use crate::start::{Start, mean_pose, start};
+use crate::tracks::{BodyTrack, body_tracks};
+use crate::verify;
+use crate::view::view;
+use crate::write::OutputFile;
+
+/// How to run.
+#[derive(Debug, Clone, Default)]
+pub struct RunOptions {
+    /// Instead of the profile's method.
+    pub method: Option<Method>,
+    /// Go on although the data checks found errors.
+    pub force: bool,
+}
+
+/// What a run gives.
+#[derive(Debug, Clone)]
+pub struct RunOutput {
+    /// The report.
+    pub report: Report,
+    /// Every file to be written.
+    pub files: Vec<OutputFile>,
+    /// How the program should end.
+    pub exit: ExitCode,
+}
+
+/// Runs a profile; `progress` is told the name of each stage as it begins. Writes nothing.
+///
+/// # Errors
+/// [`PipelineError`] for everything that stops a run before a report exists.
+pub fn run(
+    profile: &Path,
+    options: &RunOptions,
+    progress: &mut dyn FnMut(&str),
+) -> Result<RunOutput, PipelineError> {
+    progress("read profile and robot");
+    let robot = load_robot(profile)?;
+    progress("read recordings");
+    let inputs = load_recordings(robot)?;
+    progress("check data");
+    let mut findings = inputs.findings.clone();
+    findings.extend(checks::check(&inputs));
+    if checks::stops(&findings) && !options.force {
+        return Err(stopped(&inputs, &findings));
+    }
+    let tracks = body_tracks(&inputs, &mut findings)?;
+    let start = start(&inputs, &tracks);
+    progress("estimate origins");
+    let origins = paper::origins(&inputs, &tracks, &start, &mut findings)?;
+    let method = options.method.unwrap_or(inputs.robot.profile.solve.method);
+    let nominal = nominal(&inputs, &start);
+    let robust = inputs.robot.profile.solve.robust;
+    let solved = match method {
+        Method::Paper => paper_result(&inputs, &tracks, &start, &origins, &nominal),
+        Method::Ml => {
+            progress("fit registration only");
+            let registered = ml::fit(
+                ml::state(&inputs, &tracks, &start, Freedom::RegistrationOnly),
+                &inputs,
+                robust,
+            )?;
+            progress("fit all loops");
+            let fit = ml::fit(
+                ml::state(&inputs, &tracks, &start, Freedom::Profile),
+                &inputs,
+                robust,
+            )?;
+            ml_result(&inputs, fit, registered.calibration)?
+        }
+    };
+    progress("verify");
+    let body_from_origin: BTreeMap<String, Isometry3<f64>> = inputs
+        .robot
+        .profile
+        .origins
+        .iter()
+        .filter_map(|(name, o)| {
+            let found = solved
+                .found
+                .iter()
+                .find(|f| f.name == format!("{}_from_{name}", o.body))?;
+            Some((name.clone(), found.pose))
+        })
+        .collect();
+    let loops = close_loops(&inputs, &tracks, &body_from_origin, &solved.fk);
+    let held_out = verify::held_out(
+        &inputs,
+        &tracks,
+        Some(&nominal),
+        solved.registered.as_ref(),
+        &solved.robot,
+    );
+    progress("patch the URDF");
+    let urdf = patch_urdf(&inputs, &solved.robot, &solved.origin_sigmas)?;
+    let scene = scene(
+        &inputs,
+        &tracks,
+        &solved.robot,
+        solved.root_covariance.as_ref(),
+        &solved.found,
+    );
+    progress("write the report");
+    let residuals =
+        crate::residuals::residual_rows(&inputs, &tracks, &solved.robot, solved.fit.as_ref());
+    let report = assemble(&Evidence {
+        inputs: &inputs,
+        tracks: &tracks,
+        method,
+        findings: &findings,
+        origins: &origins,
+        found: &solved.found,
+        fit: solved.fit.as_ref(),
+        robot: &solved.robot,
+        loops,
+        held_out,
+        urdf: &urdf,
+        residuals: &residuals,
+    });
+    let view = view(&inputs, &tracks, &nominal, &solved.robot, &origins);
+    let files = files(
+        &inputs,
+        &report,
+        &residuals,
+        &scene,
+        &urdf,
+        &solved.robot,
+        &view,
+    )?;
+    let exit = exit_code(&report, solved.fit.as_ref(), &origins);
+    Ok(RunOutput {
+        report,
+        files,
+        exit,
+    })
+}
+
+/// What either method hands on.
+struct Solved {
+    robot: Calibration,
+    /// The robot whose forward kinematics the loops are closed with.
+    fk: Calibration,
+    registered: Option<Calibration>,
+    found: Vec<Found>,
+    root_covariance: Option<Matrix6<f64>>,
+    origin_sigmas: BTreeMap<String, f64>,
+    fit: Option<MlFit>,
+}
+
+fn stopped(inputs: &Inputs, findings: &[Finding]) -> PipelineError {
+    let errors: Vec<String> = findings
+        .iter()
+        .filter(|f| f.severity == calib_recording::Severity::Error)
+        .map(|f| {
+            let rows: Vec<String> = f.rows.iter().take(5).map(u64::to_string).collect();
+            let at = if rows.is_empty() {
+                String::new()
+            } else {
+                format!(" (rows {})", rows.join(", "))
+            };
+            format!(
+                "{} [{}]{at}: {}\n  help: {}",
+                f.subject, f.id, f.text, f.remedy
+            )
+        })
+        .collect();
+    PipelineError::Data {
+        file: inputs.robot.file.clone(),
+        finding: format!(
+            "the data checks found {} error(s)\n{}",
+            errors.len(),
+            errors.join("\n")
+        ),
+        remedy: "correct the data, or go on at your own risk with --force".to_owned(),
+    }
+}
+
+/// The robot as described, with the bodies placed by closed forms.
+fn nominal(inputs: &Inputs, start: &Start) -> Calibration {
+    let mut robot = Calibration::nominal(&inputs.robot.model, start.tracker_from_root);
+    robot.mounts = start.mounts.clone();
+    robot.points = start.points.clone();
+    robot
+}
+
+/// The paper's result as a robot: mounts from the origins, everything else nominal.
+fn paper_result(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    start: &Start,
+    origins: &BTreeMap<String, OriginEstimate>,
+    nominal: &Calibration,
+) -> Solved {
+    let profile = &inputs.robot.profile;
+    let model = &inputs.robot.model;
+    let zero = model.forward_kinematics(&model.zero_positions());
+    let mut robot = nominal.clone();
+    let mut found = Vec::new();
+    let mut places = Vec::new();
+    for (name, estimate) in origins {
+        let origin = &profile.origins[name];
+        let Some(pose) = estimate.pose else { continue };
+        let body = &profile.bodies[&origin.body];
+        // link_from_body = link_from_origin · (body_from_origin)⁻¹
+        let link_from_origin = zero[body.link.index()].inverse() * zero[origin.link.index()];
+        robot
+            .mounts
+            .insert(origin.body.clone(), link_from_origin * pose.inverse());
+        let sweep = &inputs.recordings[&origin.sweep];
+        for (q, seen) in sweep
+            .q
+            .iter()
+            .zip(tracks[&origin.body].in_recording(&origin.sweep))
+        {
+            if let (Some(q), Some(seen)) = (q, seen) {
+                places.push(seen * pose * model.root_from_link(q, origin.link).inverse());
+            }
+        }
+        found.push(Found {
+            name: format!("{}_from_{name}", origin.body),
+            parent: origin.body.clone(),
+            child: name.clone(),
+            pose,
+            covariance: estimate.covariance,
+            unobservable: estimate.unobservable.clone(),
+            status: estimate.status,
+        });
+    }
+    let known_place = profile.bodies.values().any(|b| b.mount.is_some());
+    if let (false, Some(place)) = (known_place, mean_pose(&places)) {
+        robot.tracker_from_root = place;
+    }
+    for (name, t) in &profile.transforms {
+        if let Some((joint, found_transform)) =
+            paper_transform(inputs, tracks, start, origins, name, t)
+        {
+            if let Some(joint) = joint {
+                let (id, origin) = joint;
+                robot.model = robot.model.with_origin(id, origin);
+            }
+            found.push(found_transform);
+        }
+    }
+    Solved {
+        fk: Calibration {
+            mounts: robot.mounts.clone(),
+            ..nominal.clone()
+        },
+        robot,
+        registered: None,
+        found,
+        root_covariance: None,
+        origin_sigmas: BTreeMap::new(),
+        fit: None,
+    }
+}
+
+type CorrectedJoint = Option<(JointId, Isometry3<f64>)>;
+
+/// A transform between links by the paper's method: from the sweep of the origin whose link is its child.
+fn paper_transform(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    start: &Start,
+    origins: &BTreeMap<String, OriginEstimate>,
+    name: &str,
+    t: &calib_profile::LinkTransform,
+) -> Option<(CorrectedJoint, Found)> {
+    let profile = &inputs.robot.profile;
+    let model = &inputs.robot.model;
+    let (origin_name, origin) = profile.origins.iter().find(|(_, o)| o.link == t.child)?;
+    let estimate = origins.get(origin_name)?;
+    let pose = estimate.pose?;
+    let zero = model.forward_kinematics(&model.zero_positions());
+    let sweep = &inputs.recordings[&origin.sweep];
+    let mut samples = Vec::new();
+    for (q, seen) in sweep
+        .q
+        .iter()
+        .zip(tracks[&origin.body].in_recording(&origin.sweep))
+    {
+        let (Some(q), Some(seen)) = (q, seen) else {
+            continue;
+        };
+        let root_from_link = model.forward_kinematics(q);
+        // The child as it would stand at zero: undo the swept joints in the robot's own frame.
+        let child_from_child_at_zero =
+            root_from_link[t.child.index()].inverse() * zero[t.child.index()];
+        let parent = start.tracker_from_root * root_from_link[t.parent.index()];
+        samples.push(parent.inverse() * seen * pose * child_from_child_at_zero);
+    }
+    let parent_from_child = mean_pose(&samples)?;
+    let corrected = t.correct.map(|joint| {
+        let j = model.joint(joint);
+        let parent_from_joint_parent = zero[t.parent.index()].inverse() * zero[j.parent.index()];
+        let joint_child_from_child = zero[j.child.index()].inverse() * zero[t.child.index()];
+        (
+            joint,
+            parent_from_joint_parent.inverse()
+                * parent_from_child
+                * joint_child_from_child.inverse(),
+        )
+    });
+    let found = Found {
+        name: name.to_owned(),
+        parent: model.link(t.parent).name.clone(),
+        child: model.link(t.child).name.clone(),
+        pose: parent_from_child,
+        covariance: estimate.covariance,
+        unobservable: estimate.unobservable.clone(),
+        status: estimate.status,
+    };
+    Some((corrected, found))
+}
+
+fn ml_result(
+    inputs: &Inputs,
+    fit: MlFit,
+    registered: Calibration,
+) -> Result<Solved, PipelineError> {
+    let profile = &inputs.robot.profile;
+    let model = &inputs.robot.model;
+    let at_zero = calib_core::Configuration::zero();
+    let mut found = Vec::new();
+    let mut push =
+        |name: String, parent: &str, child: &str, from, to| -> Result<(), PipelineError> {
+            let derived = fit.solution.relative_pose(from, to, &at_zero)?;
+            found.push(Found {
+                name,
+                parent: parent.to_owned(),
+                child: child.to_owned(),
+                pose: derived.pose,
+                covariance: derived.covariance,
+                unobservable: derived.unobservable.iter().map(in_words).collect(),
+                status: Status::Calibrated,
+            });
+            Ok(())
+        };
+    for (name, origin) in &profile.origins {
+        if let (Some(body), Some(link)) = (
+            fit.stated.bodies.get(&origin.body),
+            fit.stated.links[origin.link.index()],
+        ) {
+            push(
+                format!("{}_from_{name}", origin.body),
+                &origin.body,
+                name,
+                *body,
+                link,
+            )?;
+        }
+    }
+    for (name, t) in &profile.transforms {
+        if let (Some(parent), Some(child)) = (
+            fit.stated.links[t.parent.index()],
+            fit.stated.links[t.child.index()],
+        ) {
+            push(
+                name.clone(),
+                &model.link(t.parent).name,
+                &model.link(t.child).name,
+                parent,
+                child,
+            )?;
+        }
+    }
+    let root = fit.stated.links[model.root().index()];
+    let root_covariance = match root {
+        Some(root) => {
+            fit.solution
+                .relative_pose(fit.stated.tracker, root, &at_zero)?
+                .covariance
+        }
+        None => None,
+    };
+    let origin_sigmas = crate::assemble::origin_sigmas(inputs, &fit);
+    Ok(Solved {
+        robot: fit.calibration.clone(),
+        fk: fit.calibration.clone(),
+        registered: Some(registered),
+        found,
+        root_covariance,
+        origin_sigmas,
+        fit: Some(fit),
+    })
+}
+
+/// A twist of the child that the data do not see, as a sentence.
+fn in_words(twist: &calib_geometry::Twist) -> Unobservable {
+    let (w, v) = (twist.angular(), twist.linear());
+    let direction = [w.x, w.y, w.z, v.x, v.y, v.z];
+    let axis = |a: &nalgebra::Vector3<f64>| {
+        let n = a / a.norm();
+        format!("[{:.2}, {:.2}, {:.2}]", n.x, n.y, n.z)
+    };
+    let text = match (w.norm() > 1e-6, v.norm() > 1e-6) {
+        (true, false) => format!(
+            "a turn about {} of the child: its size is shared out by the priors",
+            axis(&w)
+        ),
+        (false, true) => format!(
+            "a shift along {} of the child: its size is shared out by the priors",
+            axis(&v)
+        ),
+        _ => format!(
+            "a turn about {} with a shift along {} of the child: its size is shared out by the priors",
+            axis(&w),
+            axis(&v)
+        ),
+    };
+    Unobservable {
+        direction,
+        text,
+        remedy: "see \"what is not known\": it is a convention between this frame and its neighbours, unless a mark defines one of them".to_owned(),
+    }
+}
+
+fn files(
+    inputs: &Inputs,
+    report: &Report,
+    residuals: &[ResidualRow],
+    scene: &calib_report::Scene,
+    urdf: &crate::export::PatchedUrdf,
+    robot: &Calibration,
+    view: &calib_report::view3d::View3d,
+) -> Result<Vec<OutputFile>, PipelineError> {
+    let outputs = &inputs.robot.profile.outputs;
+    let mut record = calib_report::json::exact_json(&urdf.record)?;
+    record.push('\n');
+    let stem = outputs.scene.trim_end_matches(".json");
+    let mut files = vec![
+        OutputFile::text("report.md", calib_report::markdown::markdown(report)),
+        OutputFile::text("report.json", calib_report::json::report_json(report)?),
+        OutputFile::text("report.html", calib_report::html::html(report, Some(view))?),
+        OutputFile::text(
+            "residuals.csv",
+            calib_report::csv::residuals_csv(residuals)?,
+        ),
+        OutputFile::text(outputs.urdf.clone(), urdf.text.clone()),
+        OutputFile::text(format!("{}.changes.json", outputs.urdf), record),
+        OutputFile::text(outputs.scene.clone(), scene.json()?),
+        OutputFile::text(format!("{stem}.launch.py"), scene.ros_launch()?),
+        OutputFile::text(format!("{stem}.sdf"), scene.sdf()?),
+    ];
+    if let Some(yaml) = calibration_yaml(inputs, robot) {
+        let stem = outputs.urdf.trim_end_matches(".urdf");
+        files.push(OutputFile::text(format!("{stem}.calibration.yaml"), yaml));
+    }
+    Ok(files)
+}
+
+fn exit_code(
+    report: &Report,
+    fit: Option<&MlFit>,
+    origins: &BTreeMap<String, OriginEstimate>,
+) -> ExitCode {
+    if fit.is_some_and(|f| !f.solution.status.is_converged()) {
+        return ExitCode::NotConverged;
+    }
+    if fit.is_none() && origins.values().any(|o| o.pose.is_none()) {
+        return ExitCode::NotObservable;
+    }
+    match report.verdict {
+        Verdict::Accepted => ExitCode::Accepted,
+        Verdict::Rejected | Verdict::NotEvaluated => ExitCode::VerdictFail,
+    }
+}
+
+/// Whether any body of the profile is made of markers.
+#[must_use]
+pub fn has_markers(inputs: &Inputs) -> bool {
+    inputs
+        .robot
+        .profile
+        .bodies
+        .values()
+        .any(|b| matches!(b.kind, BodyKind::Markers { .. }))
+}

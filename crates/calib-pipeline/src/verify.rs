@@ -1,0 +1,166 @@
+//! Position errors on poses that were not fitted: nominal, registration only, calibrated.
+
+use std::collections::BTreeMap;
+
+use calib_profile::{BodyKind, Usage};
+use calib_report::{HeldOut, JointValue, PoseError, Unit};
+use nalgebra::{Isometry3, Vector3};
+
+use crate::kinematics::Calibration;
+use crate::load::Inputs;
+use crate::tracks::BodyTrack;
+
+/// Predicted minus measured position of one body or marker in one row, tracker frame, m.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Deviation {
+    /// Recording.
+    pub recording: String,
+    /// Row in its table, from 0.
+    pub row: usize,
+    /// Body or marker.
+    pub subject: String,
+    /// Predicted − measured, m.
+    pub vector: Vector3<f64>,
+}
+
+/// Deviations of a robot from what the tracker saw of every body that a joint moves, in recordings of one use.
+///
+/// A body with a frame counts once, by its origin; a body without one counts once per marker.
+#[must_use]
+pub fn deviations(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    robot: &Calibration,
+    usage: impl Fn(Usage) -> bool,
+) -> Vec<Deviation> {
+    let model = &inputs.robot.model;
+    let mut out = Vec::new();
+    for (name, loaded) in inputs
+        .recordings
+        .iter()
+        .filter(|(_, r)| usage(r.spec.usage))
+    {
+        for (row, q) in loaded.q.iter().enumerate() {
+            let Some(q) = q else { continue };
+            let root_from_link = robot.root_from_link(q);
+            for (body_name, body) in &inputs.robot.profile.bodies {
+                if model
+                    .chain(model.root(), body.link)
+                    .iter()
+                    .all(|s| model.joint(s.joint).kind.axis().is_none())
+                {
+                    continue;
+                }
+                let tracker_from_link = robot.tracker_from_root * root_from_link[body.link.index()];
+                let mut push = |subject: &str, predicted: Vector3<f64>, measured: Vector3<f64>| {
+                    out.push(Deviation {
+                        recording: name.clone(),
+                        row,
+                        subject: subject.to_owned(),
+                        vector: predicted - measured,
+                    });
+                };
+                let track = &tracks[body_name];
+                let seen: Option<Isometry3<f64>> =
+                    track.in_recording(name).get(row).copied().flatten();
+                if let (Some(mount), Some(seen)) = (robot.mounts.get(body_name), seen) {
+                    push(
+                        body_name,
+                        (tracker_from_link * mount).translation.vector,
+                        seen.translation.vector,
+                    );
+                } else if let (BodyKind::Markers { names, .. }, None) =
+                    (&body.kind, &track.template)
+                {
+                    for marker in names {
+                        let on_link = robot.points.get(body_name).and_then(|p| p.get(marker));
+                        let seen = loaded.poses.markers.get(marker).and_then(|t| t[row]);
+                        if let (Some(on_link), Some(seen)) = (on_link, seen) {
+                            push(marker, (tracker_from_link * on_link).coords, seen.coords);
+                        }
+                    }
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Held-out errors of up to three robots side by side; `None` without validation rows.
+#[must_use]
+pub fn held_out(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    nominal: Option<&Calibration>,
+    registration_only: Option<&Calibration>,
+    calibrated: &Calibration,
+) -> Option<HeldOut> {
+    let validation = |usage| usage == Usage::Validation;
+    let lengths = |robot: Option<&Calibration>| -> Vec<f64> {
+        robot.map_or_else(Vec::new, |r| {
+            deviations(inputs, tracks, r, validation)
+                .iter()
+                .map(|d| d.vector.norm())
+                .collect()
+        })
+    };
+    let (nominal, registered) = (lengths(nominal), lengths(registration_only));
+    let best = deviations(inputs, tracks, calibrated, validation);
+    if best.is_empty() {
+        return None;
+    }
+    let poses = best
+        .iter()
+        .enumerate()
+        .map(|(i, d)| {
+            let loaded = &inputs.recordings[&d.recording];
+            let group = loaded
+                .spec
+                .group
+                .as_ref()
+                .and_then(|g| loaded.poses.labels.get(g));
+            PoseError {
+                pose: format!("{}:{} {}", d.recording, loaded.poses.rows[d.row], d.subject),
+                group: group.map_or_else(String::new, |g| g[d.row].clone()),
+                joints: joint_values(inputs, &d.recording, d.row),
+                nominal_m: nominal.get(i).copied(),
+                registration_only_m: registered.get(i).copied(),
+                calibrated_m: Some(d.vector.norm()),
+                vector_m: Some(d.vector.into()),
+            }
+        })
+        .collect();
+    Some(HeldOut::from_poses(
+        "position of the tracked bodies against their prediction",
+        poses,
+    ))
+}
+
+/// Recorded joint positions of a row.
+#[must_use]
+pub fn joint_values(inputs: &Inputs, recording: &str, row: usize) -> Vec<JointValue> {
+    let model = &inputs.robot.model;
+    let Some(loaded) = inputs.recordings.get(recording) else {
+        return Vec::new();
+    };
+    let Some(q) = loaded.q.get(row).and_then(Option::as_ref) else {
+        return Vec::new();
+    };
+    model
+        .independent_joints()
+        .filter(|id| loaded.poses.joints.contains_key(&model.joint(*id).name))
+        .map(|id| {
+            let joint = model.joint(id);
+            let unit = if joint.kind.turns() {
+                Unit::Radian
+            } else {
+                Unit::Metre
+            };
+            JointValue {
+                joint: joint.name.clone(),
+                value: q[id.index()],
+                unit,
+            }
+        })
+        .collect()
+}
