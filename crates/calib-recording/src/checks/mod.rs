@@ -62,7 +62,7 @@ pub fn checks(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
 }
 
 /// Ids of all findings that this module can make, each a page of the book.
-pub const IDS: [&str; 28] = [
+pub const IDS: [&str; 29] = [
     "all-zero-triplet",
     "body-flip",
     "body-redefined",
@@ -89,6 +89,7 @@ pub const IDS: [&str; 28] = [
     "too-few-poses",
     "unit-mismatch",
     "unsettled-rows",
+    "up-axis",
     "virtual-points",
     "wrong-mount",
 ];

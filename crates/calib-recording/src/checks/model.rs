@@ -18,7 +18,7 @@ use super::statistics::median;
 use crate::finding::{Finding, Severity};
 use crate::poses::Poses;
 use crate::sync::OffsetOutcome;
-use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 /// Disagreement, rad (1°), below which the model is not blamed: nominal robots are that good.
 const GOOD_ENOUGH: f64 = 0.0175;
@@ -177,6 +177,42 @@ pub fn quaternion_order(
         let remedy = "the quaternions are written w, x, y, z: rename the columns, or use `quaternion_wxyz` in the column map";
         Finding::new("quaternion-order", Severity::Error, body, text, remedy)
     })
+}
+
+/// Whether the tracker's up axis can be the one declared (`+Z`, `-Y`, …): the robot's base stands upright to within
+/// `tilt`, rad, so its z axis must be there. `None` also when the text names no axis.
+pub fn up_axis(declared: &str, tracker_from_base: &Isometry3<f64>, tilt: f64) -> Option<Finding> {
+    let base_up = tracker_from_base.rotation * Vector3::z();
+    let axes = [
+        ("+X", Vector3::x()),
+        ("+Y", Vector3::y()),
+        ("+Z", Vector3::z()),
+        ("-X", -Vector3::x()),
+        ("-Y", -Vector3::y()),
+        ("-Z", -Vector3::z()),
+    ];
+    let (_, up) = axes
+        .iter()
+        .find(|(name, _)| name.eq_ignore_ascii_case(declared.trim()))?;
+    let off = base_up.angle(up);
+    if off <= tilt {
+        return None;
+    }
+    let (nearest, _) = axes
+        .iter()
+        .max_by(|a, b| base_up.dot(&a.1).total_cmp(&base_up.dot(&b.1)))?;
+    let text = format!(
+        "the recording says {declared} is up, the robot's base points {:.0}° away from it, nearest to {nearest}",
+        off.to_degrees()
+    );
+    let remedy = "set the tracker's up axis in the profile, or say how the robot is mounted";
+    Some(Finding::new(
+        "up-axis",
+        Severity::Warning,
+        "tracker",
+        text,
+        remedy,
+    ))
 }
 
 /// What an alignment of two clocks means for the recording; `None` when they agree to within `tolerance`, s.

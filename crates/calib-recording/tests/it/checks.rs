@@ -2,6 +2,7 @@
 
 use calib_recording::checks::model::{
     Prediction, alignment, better_explanation, disagreement, quaternion_order, spoiled_rows,
+    up_axis,
 };
 use calib_recording::checks::{Expectations, IDS, checks, held_out_in_training};
 use calib_recording::rigid_body::Template;
@@ -741,4 +742,17 @@ fn every_outcome_of_an_alignment_is_said() {
             Some(Severity::Error)
         );
     }
+}
+
+#[test]
+fn the_up_axis_is_compared_with_the_robots_base() {
+    let y_up = Isometry3::rotation(Vector3::x() * -std::f64::consts::FRAC_PI_2)
+        * Isometry3::rotation(Vector3::z() * 0.7);
+    assert!(up_axis("+Y", &y_up, 0.2).is_none() && up_axis("elsewhere", &y_up, 0.2).is_none());
+    let wrong = up_axis("+Z", &y_up, 0.2).expect("a quarter turn");
+    assert!(
+        wrong.text.contains("90° away") && wrong.text.contains("nearest to +Y"),
+        "{}",
+        wrong.text
+    );
 }
