@@ -1,6 +1,7 @@
 //! The canonical table, always the same bytes for the same poses.
 
 use super::header::Layout;
+use crate::column_map::ColumnMap;
 use crate::model::{self, JointUnit, MarkerSample, Recording, Timeline};
 use crate::poses::{NotOneTable, Poses};
 use std::collections::{BTreeMap, BTreeSet};
@@ -95,7 +96,9 @@ struct OutColumn<'a> {
     value: Box<dyn Fn(usize) -> Option<f64> + 'a>,
 }
 
-/// The table as text: counter or `t_s`, labels, joints, torques, bodies, markers, each in alphabetical order.
+/// The table as text: counter or `t_s`, labels, joints, torques, bodies, markers, each in alphabetical order. A label
+/// column of another name than the usual ones (`trial`, `group`, …) must be named when the table is read, in
+/// [`ColumnMap::labels`].
 ///
 /// # Errors
 /// [`NotWritten`] when the text would not read back as the same table.
@@ -284,7 +287,12 @@ fn columns<'a>(poses: &'a Poses, options: &WriteOptions) -> Vec<OutColumn<'a>> {
 /// The first name that the header does not give back.
 fn misread(poses: &Poses, header: &[&str]) -> Option<String> {
     let names = header.iter().copied().map(str::to_string).collect();
-    let layout = match Layout::new(1, names, None) {
+    // A label of any name is read where the profile or a column map names it.
+    let map = ColumnMap {
+        labels: poses.labels.keys().cloned().collect(),
+        ..ColumnMap::default()
+    };
+    let layout = match Layout::new(1, names, Some(&map)) {
         Ok(layout) => layout,
         Err((_, problem)) => return Some(problem.to_string()),
     };

@@ -438,3 +438,20 @@ fn a_recording_is_written_with_its_states_and_one_table_per_clock() {
         [4, 2]
     );
 }
+
+#[test]
+fn a_label_of_any_name_is_written_and_read_when_named() {
+    let mut table = poses("trial,q_rad\n1: up,1\n");
+    let texts = table.labels.remove("trial").expect("read");
+    table.labels.insert("torso".to_string(), texts);
+    let text = write_poses(&table, &WriteOptions::default()).expect("writable");
+    let options = map(ColumnMap {
+        labels: vec!["torso".into()],
+        ..ColumnMap::default()
+    });
+    let back = read_bytes("x.csv", text.as_bytes(), &options)
+        .expect("named")
+        .poses(Filled::Exclude)
+        .expect("one table");
+    assert_eq!(back.labels["torso"], ["1: up"]);
+}
