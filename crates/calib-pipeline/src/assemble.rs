@@ -134,7 +134,10 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             .collect(),
         outputs: outputs(e),
         reproduce: vec![format!("calib run {file}")],
-        undo: vec![format!("calib revert {}", profile.outputs.urdf)],
+        undo: vec![format!(
+            "calib revert {} --out original.urdf",
+            profile.outputs.urdf
+        )],
         seed: 0,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         ..Report::default()

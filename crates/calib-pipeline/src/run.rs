@@ -71,7 +71,10 @@ pub fn run(
     let nominal = nominal(&inputs, &start);
     let robust = inputs.robot.profile.solve.robust;
     let solved = match method {
-        Method::Paper => paper_result(&inputs, &tracks, &start, &origins, &nominal),
+        Method::Paper => {
+            findings.push(paper_assumptions());
+            paper_result(&inputs, &tracks, &start, &origins, &nominal)
+        }
         Method::Ml => {
             progress("fit registration only");
             let registered = ml::fit(
@@ -192,6 +195,18 @@ fn stopped(inputs: &Inputs, findings: &[Finding]) -> PipelineError {
         ),
         remedy: "correct the data, or go on at your own risk with --force".to_owned(),
     }
+}
+
+/// What the paper's method takes for granted; its regions hold only as far as this is true.
+fn paper_assumptions() -> Finding {
+    Finding::new(
+        "paper-assumptions",
+        calib_recording::Severity::Info,
+        "method: paper",
+        "the closed forms take the swept axes to meet in one point at a right angle, the encoders to have no zero \
+         offset, and the rest of the robot to be as described; the reported uncertainty covers the tracker's noise only",
+        "solve with `method: ml`, which estimates axes, offsets and mounts together",
+    )
 }
 
 /// The robot as described, with the bodies placed by closed forms.
