@@ -50,14 +50,20 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
         .copy_from(&inverse_or_zero(&spread));
     unit.fixed_view_mut::<2, 2>(2, 2)
         .copy_from(&inverse_or_zero(&shift));
+    // One circle: its radial residuals speak about the noise too. Several may not share a center.
+    let (cost, dof, residuals) = if markers == 1 && options.center.is_none() && n > 3 {
+        (normal.cost, 2 * n - 6, 2 * n)
+    } else {
+        (factor.s[2] * factor.s[2], n - markers - 2, n)
+    };
     let candidate = Candidate {
         estimator: "plane",
         axis,
         own_centers: Vec::new(),
-        cost: factor.s[2] * factor.s[2],
-        dof: n - markers - 2,
+        cost,
+        dof,
         unit_covariance: spread_out(&unit, &axis.frame),
-        residuals: n,
+        residuals,
         held: options.center,
     };
     Ok(judge(&cloud, &factor, candidate, options))
