@@ -2,11 +2,13 @@
 //! has not seen.
 //!
 //! ```text
-//! score(variant) = mean over samples of |e₋ₛ|²,   difference to the best ± its standard error (paired)  (1)
+//! loss_s(variant) = −log p(y_s | y₋ₛ)        (density; noise levels count, the sharper test)      (1)
+//!              or = mean over vectors of |e₋ₛ|²   (position error, m²)                           (2)
+//! worse by = mean_s loss_s − best,  ± its standard error over samples (paired)
 //! ```
 //!
-//! The choice is the smallest variant (fewest free parameters) whose difference to the best is within
-//! one standard error.
+//! The choice is the smallest variant (fewest parameters that the data determine) whose difference to the best
+//! is within one standard error. Only vectors that every variant kept and could predict are compared.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,6 +17,17 @@ use crate::problem::Problem;
 use crate::solution::{Settings, Solution, solve};
 use crate::validate::{CrossValidation, SamplePrediction};
 
+/// By what variants are ranked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Criterion {
+    /// Equation (1).
+    #[default]
+    LogDensity,
+    /// Equation (2).
+    PositionError,
+}
+
 /// One variant after comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RankedVariant {
@@ -22,27 +35,28 @@ pub struct RankedVariant {
     pub name: String,
     /// Free parameters that the data determine.
     pub parameters: usize,
-    /// Root of score (1): left-out position error per vector, m.
+    /// Root of the mean of (2): left-out position error per vector, m.
     pub loo_rms: f64,
-    /// Score minus the best score, m².
-    pub worse_by: f64,
-    /// Standard error of `worse_by`, m².
-    pub standard_error: f64,
     /// Sum over samples of the logarithm of the predictive density.
     pub log_density: f64,
+    /// Mean loss minus that of the best variant (nats per sample, or m²).
+    pub worse_by: f64,
+    /// Standard error of `worse_by`.
+    pub standard_error: f64,
     /// Parameters that differ from nominal by less than two of their σ: noise, as far as one can tell.
     pub noise_parameters: Vec<String>,
     /// The rule's choice.
     pub chosen: bool,
 }
 
-/// Solves every variant and ranks them, best score first.
+/// Solves every variant and ranks them, least loss first.
 ///
 /// # Errors
 /// [`Error`] of the first variant that cannot be stated.
 pub fn compare(
     variants: &[(String, Problem)],
     settings: &Settings,
+    criterion: Criterion,
 ) -> Result<Vec<RankedVariant>, Error> {
     let mut solved = Vec::new();
     for (name, problem) in variants {
@@ -51,18 +65,34 @@ pub fn compare(
         solved.push((name, solution, loo));
     }
     let common = common_vectors(&solved);
-    let scores: Vec<Vec<f64>> = solved
+    let samples: std::collections::BTreeSet<usize> = common.iter().map(|(s, _, _)| *s).collect();
+    let squares: Vec<Vec<f64>> = solved
         .iter()
         .map(|(_, _, loo)| sample_scores(loo, &common))
         .collect();
+    let densities: Vec<Vec<f64>> = solved
+        .iter()
+        .map(|(_, _, loo)| {
+            loo.samples
+                .iter()
+                .filter(|s| samples.contains(&s.sample))
+                .map(|s| -s.log_density)
+                .collect()
+        })
+        .collect();
+    let scores = match criterion {
+        Criterion::LogDensity => &densities,
+        Criterion::PositionError => &squares,
+    };
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
     let best = (0..scores.len())
         .min_by(|&a, &b| mean(&scores[a]).total_cmp(&mean(&scores[b])))
         .unwrap_or(0);
     let mut ranked: Vec<RankedVariant> = solved
         .iter()
-        .zip(&scores)
-        .map(|((name, solution, loo), score)| {
+        .enumerate()
+        .map(|(i, (name, solution, _))| {
+            let score = &scores[i];
             let difference: Vec<f64> = score
                 .iter()
                 .zip(&scores[best])
@@ -74,10 +104,10 @@ pub fn compare(
             RankedVariant {
                 name: (*name).clone(),
                 parameters: solution.information.rank,
-                loo_rms: mean(score).sqrt(),
+                loo_rms: mean(&squares[i]).sqrt(),
                 worse_by: m,
                 standard_error: (variance / n).sqrt(),
-                log_density: loo.samples.iter().map(|s| s.log_density).sum(),
+                log_density: -densities[i].iter().sum::<f64>(),
                 noise_parameters: noise_parameters(solution),
                 chosen: false,
             }
@@ -93,7 +123,7 @@ pub fn compare(
     if let Some(i) = choice {
         ranked[i].chosen = true;
     }
-    ranked.sort_by(|a, b| a.loo_rms.total_cmp(&b.loo_rms));
+    ranked.sort_by(|a, b| a.worse_by.total_cmp(&b.worse_by));
     Ok(ranked)
 }
 

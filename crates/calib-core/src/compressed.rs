@@ -448,10 +448,10 @@ fn general(
                     let d = point[i][axis];
                     out.g[c] += d * e[i];
                     for (other, c2) in columns.iter().enumerate() {
-                        if let Some(c2) = *c2 {
-                            if c2 >= c {
-                                out.h[c * n + c2] += d * point[i][other];
-                            }
+                        if let Some(c2) = *c2
+                            && c2 >= c
+                        {
+                            out.h[c * n + c2] += d * point[i][other];
                         }
                     }
                     for a in 0..k {

@@ -43,8 +43,15 @@ pub fn folds(problem: &Problem, k: usize) -> Vec<Vec<usize>> {
 /// [`Error`] when the problem cannot be stated.
 pub fn k_fold(problem: &Problem, settings: &Settings, k: usize) -> Result<CrossValidation, Error> {
     let mut out = CrossValidation::default();
+    // Every fold starts where the fit of all samples ended: a start value is no information, the minimum
+    // is the fold's own, and it is near.
+    let whole = solve(problem, settings)?;
+    let mut near = problem.clone();
+    for (parameter, value) in near.parameters.iter_mut().zip(&whole.values.0) {
+        parameter.start = *value;
+    }
     for fold in folds(problem, k) {
-        let mut part = problem.clone();
+        let mut part = near.clone();
         let before = part.held_out.clone();
         part.held_out.extend(fold.iter().copied());
         let solution = solve(&part, settings)?;

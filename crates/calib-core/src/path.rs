@@ -336,15 +336,15 @@ impl Motion {
     #[inline]
     fn of(joint: &Joint, edge: usize, cache: &EdgeCache, values: &Values, sample: usize) -> Self {
         // Only a constant is added to the reading: the addition theorem saves a sine and a cosine.
-        if let (Some((sin_c, cos_c)), Some(table)) = (cache.offset[edge], cache.trig.get(edge)) {
-            if let Some(&(sin_q, cos_q)) = table.get(sample) {
-                return Self {
-                    phi: 0.0,
-                    sin: sin_q * cos_c + cos_q * sin_c,
-                    cos: cos_q * cos_c - sin_q * sin_c,
-                    theta: None,
-                };
-            }
+        if let (Some((sin_c, cos_c)), Some(table)) = (cache.offset[edge], cache.trig.get(edge))
+            && let Some(&(sin_q, cos_q)) = table.get(sample)
+        {
+            return Self {
+                phi: 0.0,
+                sin: sin_q * cos_c + cos_q * sin_c,
+                cos: cos_q * cos_c - sin_q * sin_c,
+                theta: None,
+            };
         }
         let mut phi = joint.q[sample];
         let mut theta: Option<Vector3<f64>> = None;

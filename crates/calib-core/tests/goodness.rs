@@ -2,7 +2,7 @@
 
 mod common;
 
-use calib_core::{FeatureKind, NoiseKind, Settings, Solution, compare, k_fold, solve};
+use calib_core::{Criterion, FeatureKind, NoiseKind, Settings, Solution, compare, k_fold, solve};
 use common::{Chain, Free, Handles, rng, six_r};
 use rand::RngExt;
 
@@ -222,15 +222,17 @@ fn the_comparison_chooses_the_smallest_model_that_predicts_as_well() {
         everything.free_feature(*edge, FeatureKind::EccentricitySin, None);
         everything.free_feature(*edge, FeatureKind::EccentricityCos, None);
     }
-    let ranked = compare(
-        &[
-            ("offsets".into(), offsets_only),
-            ("+ compliance".into(), compliance),
-            ("+ everything".into(), everything),
-        ],
-        &Settings::default(),
-    )
-    .unwrap();
+    let variants = [
+        ("offsets".to_owned(), offsets_only),
+        ("+ compliance".to_owned(), compliance),
+        ("+ everything".to_owned(), everything),
+    ];
+    let by_density = compare(&variants, &Settings::default(), Criterion::LogDensity).unwrap();
+    let ranked = compare(&variants, &Settings::default(), Criterion::PositionError).unwrap();
+    for list in [&by_density, &ranked] {
+        assert_eq!(list.iter().find(|v| v.chosen).unwrap().name, "+ compliance");
+        assert_eq!(list.last().unwrap().name, "offsets");
+    }
     let chosen = ranked.iter().find(|v| v.chosen).unwrap();
     assert_eq!(chosen.name, "+ compliance");
     let rich = ranked.iter().find(|v| v.name == "+ everything").unwrap();
