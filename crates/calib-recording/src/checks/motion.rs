@@ -184,7 +184,10 @@ pub(super) fn gaps(poses: &Poses) -> Vec<Finding> {
     let lost_of = |name: &String, seen: usize, findings: &mut Vec<Finding>| {
         let lost = poses.len() - seen.min(poses.len());
         if lost as f64 > MANY_LOST * poses.len() as f64 {
-            let text = format!("lost in {lost} of {} rows", poses.len());
+            let text = format!(
+                "lost (or only interpolated) in {lost} of {} rows",
+                poses.len()
+            );
             let remedy = "move the cameras or the marker, or leave it out";
             findings.push(Finding::new(
                 "many-lost",

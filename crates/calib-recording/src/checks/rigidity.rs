@@ -19,6 +19,9 @@ const ROWS: usize = 5;
 /// Markers up to which all permutations are tried; beyond, exchanges of two.
 const ALL_PERMUTATIONS: usize = 5;
 
+/// Part of the rows from which bad rows are the body's nature, not mistakes of the tracker.
+const BENDING: f64 = 0.15;
+
 /// One body's markers over all rows.
 struct Body<'a> {
     name: &'a str,
@@ -251,6 +254,10 @@ impl<'a> Body<'a> {
             let finding = Finding::new("marker-swap", Severity::Error, self.name, text, remedy);
             findings.push(finding.at_rows(swapped.iter().map(|(row, _)| *row)));
         }
+        if outliers.len() as f64 > BENDING * poses.len() as f64 {
+            findings.extend(self.bending(outliers.iter().map(|(row, _, _)| *row).collect()));
+            return findings;
+        }
         if let Some((_, marker, off)) = outliers.iter().max_by(|a, b| a.2.total_cmp(&b.2)) {
             let text = format!(
                 "a marker is out of place in {} rows, most {marker} by {:.2} mm",
@@ -264,6 +271,28 @@ impl<'a> Body<'a> {
             findings.push(finding.at_rows(outliers.iter().map(|(row, _, _)| *row)));
         }
         findings
+    }
+
+    /// Many rows, none of them a rare mistake: the body bends.
+    fn bending(&self, rows: Vec<u64>) -> Option<Finding> {
+        let spread = |pair: &Pair| {
+            let all = distances(self.tracks[pair.i], self.tracks[pair.j]);
+            super::statistics::range(all.map(|(_, distance)| distance))
+                .map_or(0.0, |(low, high)| high - low)
+        };
+        let (pair, spread) = self
+            .pairs
+            .iter()
+            .map(|pair| (pair, spread(pair)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (a, b) = (self.markers[pair.j], self.markers[pair.i]);
+        let text = format!(
+            "bends: the distance {a}–{b} varies by {:.2} mm, {} rows are off",
+            spread * 1e3,
+            rows.len()
+        );
+        let remedy = "stiffen the body, or make bodies of the markers that keep their distances";
+        Some(Finding::new("not-rigid", Severity::Error, self.name, text, remedy).at_rows(rows))
     }
 
     /// Largest departure of a distance from its median.

@@ -285,6 +285,21 @@ fn faults() -> Vec<(&'static str, &'static str, bool, Fault)> {
             },
         ),
         (
+            "not-rigid",
+            "a part of the body bends by up to 10 mm",
+            false,
+            |r, _| {
+                for i in 0..36 {
+                    let bend = 0.01 * (r.q[i][1] / 0.8).max(0.0);
+                    let outward = r.poses.bodies["tool"][i].expect("tracked").rotation
+                        * Vector3::new(-0.4, 0.9, 0.2);
+                    for name in ["hand_2", "hand_3"] {
+                        *marker(r, name)[i].as_mut().expect("seen") += outward * bend;
+                    }
+                }
+            },
+        ),
+        (
             "body-redefined",
             "a marker knocked by 4 mm half way",
             false,
