@@ -1,7 +1,7 @@
 //! Single markers: lost ones coded as zero, columns written twice, frozen and computed points, the unit of length.
 
 use super::Expectations;
-use super::statistics::{range, robust_sigma};
+use super::statistics::{median, range, robust_sigma};
 use crate::finding::{Finding, Severity};
 use crate::poses::Poses;
 use nalgebra::Point3;
@@ -9,6 +9,10 @@ use std::collections::BTreeMap;
 
 /// Rows of exactly equal values that make a frozen marker: two may happen by rounding.
 const FROZEN_ROWS: usize = 3;
+/// A step of this many times the written resolution does not vanish by rounding.
+const SHOWN: f64 = 10.0;
+/// Steps among which the smallest is the resolution.
+const MANY_STEPS: usize = 200;
 /// Movement of anything else, m, in which a marker cannot stand exactly still.
 const MOVED: f64 = 1e-3;
 /// Distances between measured markers scatter by at least this, m (the best trackers: 10 µm). Less is computed.
@@ -147,7 +151,8 @@ pub(super) fn frozen(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
             })
             .map(|(_, track)| track.as_slice())
             .collect();
-        if siblings.is_empty() && travel(track, 0, track.len()) < MOVED {
+        let moves = travel(track, 0, track.len()) >= MOVED;
+        if (siblings.is_empty() && !moves) || !steps_show(track) {
             continue;
         }
         let mut rows = Vec::new();
@@ -225,6 +230,41 @@ fn frozen_bodies(poses: &Poses) -> Vec<Finding> {
         }
     }
     findings
+}
+
+/// Whether the marker's usual step from row to row is well above the resolution it is written with: a pin that creeps by
+/// a micrometre a row repeats its value without being frozen.
+fn steps_show(track: &Track) -> bool {
+    let steps: Vec<f64> = track
+        .windows(2)
+        .filter_map(|w| Some((w[1]? - w[0]?).amax()))
+        .collect();
+    let resolution = decimal_grid(track).unwrap_or_else(|| {
+        // Not decimal (integers times a scale): with many steps the smallest is the grid's.
+        let smallest = steps
+            .iter()
+            .copied()
+            .filter(|&step| step > 0.0)
+            .fold(f64::INFINITY, f64::min);
+        if steps.len() >= MANY_STEPS {
+            smallest
+        } else {
+            0.0
+        }
+    });
+    median(steps).is_some_and(|usual| usual > SHOWN * resolution)
+}
+
+/// The coarsest 10⁻ᵏ m, k ≤ 7, of which all coordinates are multiples.
+fn decimal_grid(track: &Track) -> Option<f64> {
+    (2..=7).map(|k| 10f64.powi(k)).find_map(|per_metre| {
+        let on_grid = |x: &f64| ((x * per_metre).round() - x * per_metre).abs() < 1e-4;
+        track
+            .iter()
+            .flatten()
+            .all(|point| point.iter().all(on_grid))
+            .then_some(1.0 / per_metre)
+    })
 }
 
 /// Maximal runs `start..end` of equal points.

@@ -286,12 +286,30 @@ fn tables_of_other_makers_through_a_column_map() {
 
 #[test]
 fn the_lower_half_of_the_hinge_is_found_to_bend() {
-    let Some(hinge) = table("hinge/hinge_markers.csv", None) else { return };
+    let Some(hinge) = table("hinge/hinge_markers.csv", None) else {
+        return;
+    };
     let names = |body: &str| (1..=5).map(|k| format!("{body}{k}")).collect();
-    let bodies = [("up".to_string(), names("up")), ("dw".to_string(), names("dw"))];
-    let findings = checks(&hinge, &Expectations { bodies: bodies.into(), ..Expectations::default() });
+    let bodies = [
+        ("up".to_string(), names("up")),
+        ("dw".to_string(), names("dw")),
+    ];
+    let findings = checks(
+        &hinge,
+        &Expectations {
+            bodies: bodies.into(),
+            ..Expectations::default()
+        },
+    );
     // dw1–dw2 and dw3–dw4 keep their distances to 0.01 mm, dw2–dw3 changes by 13.88 mm (counted by hand).
-    let found: Vec<_> = findings.iter().map(|f| (f.id, f.subject.as_str())).collect();
+    let found: Vec<_> = findings
+        .iter()
+        .map(|f| (f.id, f.subject.as_str()))
+        .collect();
     assert_eq!(found, [("not-rigid", "dw")], "{findings:#?}");
-    assert!(findings[0].text.contains("dw2–dw3 varies by 13.88 mm"), "{}", findings[0].text);
+    assert!(
+        findings[0].text.contains("dw2–dw3 varies by 13.88 mm"),
+        "{}",
+        findings[0].text
+    );
 }
