@@ -1,7 +1,8 @@
 //! Sparse combinations that span the null space: what a person can read.
 //!
-//! With N (n × d, orthonormal) the null space in units of the parameters' scales, a null vector that
-//! lives on the parameters B alone exists exactly where the rows N_B have a singular value 1. Single
+//! With N (n × d, orthonormal) the null space in units of the parameters' scales and P = N Nᵀ, a null vector
+//! that lives on the parameters B alone exists exactly where P_BB has the eigenvalue 1 (and is its
+//! eigenvector); `(1 − ε) I − P_BB` positive definite rules it out for the price of a Cholesky factor. Single
 //! blocks (one edge, one joint's effects, one body's markers) are tried first, then pairs, then
 //! triples; what is left is reduced by complete pivoting.
 
@@ -9,8 +10,8 @@ use nalgebra::{DMatrix, DVector};
 
 use calib_geometry::decompose;
 
-/// N_B has a singular value within this of 1: less than 1e-4 of the vector lies outside B.
-const SUPPORTED: f64 = 5e-9;
+/// P_BB has an eigenvalue within this of 1: less than 1e-4 of the vector lies outside B.
+const SUPPORTED: f64 = 1e-8;
 /// Entries below this share of the largest are rounding of the null space, not terms.
 pub(crate) const TERM: f64 = 1e-4;
 /// With more blocks than this, triples are only tried among neighbours.
@@ -22,6 +23,7 @@ pub(crate) fn sparse_basis(null: &DMatrix<f64>, blocks: &[Vec<usize>]) -> Vec<DV
     let d = null.ncols();
     let mut found = Found {
         null,
+        projector: null * null.transpose(),
         accepted: DMatrix::zeros(d, 0),
         vectors: Vec::new(),
     };
@@ -57,6 +59,8 @@ pub(crate) fn sparse_basis(null: &DMatrix<f64>, blocks: &[Vec<usize>]) -> Vec<DV
 
 struct Found<'a> {
     null: &'a DMatrix<f64>,
+    /// P
+    projector: DMatrix<f64>,
     /// Orthonormal coordinates (in the columns of `null`) of what is already explained.
     accepted: DMatrix<f64>,
     vectors: Vec<DVector<f64>>,
@@ -70,23 +74,34 @@ impl Found<'_> {
             return;
         }
         let rows: Vec<usize> = blocks.iter().flat_map(|b| b.iter().copied()).collect();
-        let part = DMatrix::from_fn(rows.len(), d, |i, j| self.null[(rows[i], j)]);
-        let svd = decompose::svd(&part);
-        let count = svd.s.iter().take_while(|&&s| s > 1.0 - SUPPORTED).count();
+        let part = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
+            self.projector[(rows[i], rows[j])]
+        });
+        let margin =
+            DMatrix::from_diagonal_element(rows.len(), rows.len(), 1.0 - SUPPORTED) - &part;
+        if nalgebra::Cholesky::new(margin).is_some() {
+            return;
+        }
+        let eigen = decompose::symmetric_eigen(&part);
+        let count = eigen
+            .values
+            .iter()
+            .filter(|&&v| v > 1.0 - SUPPORTED)
+            .count();
         if count == 0 {
             return;
         }
-        let coordinates = svd.v.columns(0, count).into_owned();
+        let mut vectors = DMatrix::zeros(self.null.nrows(), count);
+        for (i, &r) in rows.iter().enumerate() {
+            for k in 0..count {
+                vectors[(r, k)] = eigen.vectors[(i, rows.len() - count + k)];
+            }
+        }
+        let coordinates = self.null.tr_mul(&vectors);
         // Nothing new? Then no need to tidy it.
         let left = &coordinates - &self.accepted * self.accepted.tr_mul(&coordinates);
         if left.norm() < 1e-3 {
             return;
-        }
-        let mut vectors = self.null * coordinates;
-        for r in 0..vectors.nrows() {
-            if !rows.contains(&r) {
-                vectors.row_mut(r).fill(0.0);
-            }
         }
         self.offer(reduced(vectors));
     }

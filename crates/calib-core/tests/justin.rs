@@ -167,6 +167,7 @@ enum Level {
 fn problem(postures: &[Posture], level: Level) -> Problem {
     let rows = nominal();
     let torques = gravity_torques(&rows, postures);
+
     let mut p = Problem::new(postures.len());
     let tracker = p.frame("tracker");
     let base = p.frame("base");
@@ -269,34 +270,58 @@ fn settings() -> Settings {
 }
 
 #[test]
-fn agile_justin_by_levels() {
+fn missing_compliance_is_named_and_disappears_when_it_is_freed() {
     let Some(postures) = postures() else { return };
+    let geometry = solve(&problem(&postures, Level::Geometry), &settings()).unwrap();
+    assert!(geometry.status.is_converged());
+    let g = geometry.goodness_of_fit().unwrap();
+    // Torso joints 1–3 are parallel and carry everything: which of them gives is not decidable by one
+    // step, that it is compliance is.
+    assert!(g.missing[0].contains("compliance"), "{:?}", g.missing);
+    assert!(g.tests[0].explains > 0.4);
+    let compliance = solve(&problem(&postures, Level::Compliance), &settings()).unwrap();
+    assert!(compliance.status.is_converged());
+    assert!(compliance.noise[0].sigma < 0.5 * geometry.noise[0].sigma);
+    let g = compliance.goodness_of_fit().unwrap();
+    assert!(
+        g.missing.iter().all(|m| !m.contains("under gravity")),
+        "{:?}",
+        g.missing
+    );
+    // What is left is named too: the published next step is lateral compliance.
+    assert!(g.missing[0].contains("lateral compliance"));
+    // In-sample mean, norm of the 3-D error: published 5.64 mm on 500 postures, of which these are 350.
+    let errors = ErrorSummary::positions(&compliance.leave_one_out().unwrap().samples);
+    assert!(errors.mean < 5.7e-3, "{}", errors.mean);
+}
+
+#[test]
+#[ignore = "study: 10-fold cross-validation of five models, a minute"]
+fn study_agile_justin_by_levels() {
+    let Some(postures) = postures() else { return };
+    // Published on 500 postures: 21.33, 18.18, 10.5, 5.64, 3.12 mm.
     let levels = [
-        ("frames", Level::Frames, 25.0),
-        ("offsets", Level::Offsets, 22.0),
-        ("geometry", Level::Geometry, 10.6),
-        ("compliance", Level::Compliance, 5.7),
-        ("lateral", Level::Lateral, 5.0),
+        ("frames", Level::Frames, 21.33),
+        ("+ offsets", Level::Offsets, 18.18),
+        ("+ geometry", Level::Geometry, 10.6),
+        ("+ compliance", Level::Compliance, 5.7),
+        ("+ lateral compliance", Level::Lateral, 4.0),
     ];
     for (name, level, limit) in levels {
         let p = problem(&postures, level);
-        let start = std::time::Instant::now();
         let s = solve(&p, &settings()).unwrap();
-        let seconds = start.elapsed().as_secs_f64();
-        let cv = k_fold(&p, &settings(), 10).unwrap();
-        let held = ErrorSummary::positions(&cv.samples);
+        let held = ErrorSummary::positions(&k_fold(&p, &settings(), 10).unwrap().samples);
         println!(
-            "{name}: {:?} {} it, {seconds:.2} s; rank {}; sigma {:.2} mm; held out mean {:.2} max {:.2} mm",
+            "{name}: {:?}, rank {} of {}, sigma {:.2} mm, 10-fold mean {:.2} rms {:.2} max {:.2} mm",
             s.status,
-            s.iterations,
             s.information.rank,
+            s.model.free(),
             s.noise[0].sigma * 1e3,
             held.mean * 1e3,
+            held.rms * 1e3,
             held.max * 1e3
         );
-        for m in s.goodness_of_fit().unwrap().missing.iter().take(4) {
-            println!("    {m}");
-        }
-        println!("{limit}");
+        assert!(s.status.is_converged());
+        assert!(held.mean * 1e3 < limit, "{name}: {}", held.mean);
     }
 }
