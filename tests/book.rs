@@ -210,7 +210,6 @@ fn copy(from: &Path, to: &Path) {
 /// names (`console,exit=4`), 0 if none. Commands of cargo and git stand in the blocks for the reader and are not run, except
 /// `cargo run --release --`, which is `calib`.
 #[test]
-#[ignore = "until `calib run` has landed"]
 fn every_command_of_the_book_runs() {
     let mut wrong = Vec::new();
     let mut ran = 0;
@@ -247,6 +246,36 @@ fn every_command_of_the_book_runs() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     assert!(ran > 0, "the book has no commands");
+}
+
+#[test]
+fn the_command_line_page_has_every_command() {
+    let help = Command::new(env!("CARGO_BIN_EXE_calib"))
+        .arg("--help")
+        .output()
+        .expect("calib starts");
+    let help = String::from_utf8_lossy(&help.stdout).into_owned();
+    let commands: BTreeSet<&str> = help
+        .lines()
+        .skip_while(|line| !line.starts_with("Commands:"))
+        .skip(1)
+        .take_while(|line| !line.is_empty())
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|command| *command != "help")
+        .collect();
+    let pages = pages();
+    let page = blocks_and_prose(&pages["book/src/command-line.md"]).0;
+    let listed: BTreeSet<&str> = page
+        .iter()
+        .flat_map(|block| &block.lines)
+        .filter_map(|line| line.strip_prefix("calib ")?.split_whitespace().next())
+        .collect();
+    assert!(commands.len() > 3, "{help}");
+    assert_eq!(
+        listed, commands,
+        "book/src/command-line.md against `calib --help`"
+    );
 }
 
 /// One line of a description; a table's cell cannot hold more.
@@ -399,10 +428,60 @@ fn the_profile_reference_is_the_schema() {
     }
 }
 
-/// Text of all sources below `crates/<name>/src`.
-fn sources(name: &str) -> String {
+/// The block of a summary that begins with this word, up to the next empty line.
+fn section(summary: &str, word: &str) -> String {
+    summary
+        .lines()
+        .skip_while(|line| !line.starts_with(word))
+        .take_while(|line| !line.is_empty())
+        .map(|line| format!("{}\n", line.trim_end()))
+        .collect()
+}
+
+/// What the shipped robots reach: both methods on both recordings.
+fn results_page() -> String {
+    let mut page = String::from(
+        "# Results of the shipped robots\n\n\
+         Printed by the commands shown, on the simulated recordings in `robots/`; a test compares this page with the program, and \
+         `UPDATE_BOOK=1 cargo test -p calib-cli --test book` makes it anew. Errors are positions of tracked bodies or markers on poses \
+         that were not fitted.\n",
+    );
+    let shelf = Shelf::new();
+    for robot in ["ripley", "justin"] {
+        page.push_str(&format!("\n## {robot}\n"));
+        for method in ["ml", "paper"] {
+            let command =
+                format!("calib run robots/{robot}.yaml --method {method} --out {robot}-{method}");
+            let (code, output) = shelf.run(&command);
+            let code = code.map_or("a signal".to_owned(), |code| code.to_string());
+            page.push_str(&format!(
+                "\n```text\n$ {command}\n{}```\n\nExit code {code}.\n",
+                section(&output, "Held-out error"),
+            ));
+        }
+    }
+    page
+}
+
+#[test]
+fn the_results_page_is_what_the_program_prints() {
+    let page = results_page();
+    let file = root().join("book/src/reference/results.md");
+    if std::env::var_os("UPDATE_BOOK").is_some() {
+        fs::write(&file, &page).expect("the page can be written");
+    }
+    let written = fs::read_to_string(&file).unwrap_or_default();
+    assert!(
+        written == page,
+        "book/src/reference/results.md is old: UPDATE_BOOK=1 cargo test -p calib-cli --test book\n{page}"
+    );
+    assert_eq!(page.matches("calibrated").count(), 4, "{page}");
+}
+
+/// Text of all sources below `crates/<folder>`.
+fn sources(folder: &str) -> String {
     let mut text = String::new();
-    let mut folders = vec![root().join("crates").join(name).join("src")];
+    let mut folders = vec![root().join("crates").join(folder)];
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(&folder).expect("a source folder is readable") {
             let path = entry.expect("a source is readable").path();
@@ -416,14 +495,27 @@ fn sources(name: &str) -> String {
     text
 }
 
-/// Ids behind `Finding::new(` where the first argument is a text.
+/// Ids that stand as a text in `Finding::new("…"`, in `Finding { id: "…"` and in the lists `IDS`.
 fn finding_ids(source: &str) -> BTreeSet<String> {
-    source
-        .split("Finding::new(")
+    let text = |rest: &str| {
+        Some(
+            rest.trim_start()
+                .strip_prefix('"')?
+                .split('"')
+                .next()?
+                .to_owned(),
+        )
+    };
+    let called = source.split("Finding::new(").skip(1).filter_map(text);
+    let built = source
+        .split("Finding {")
         .skip(1)
-        .filter_map(|rest| rest.trim_start().strip_prefix('"')?.split('"').next())
-        .map(str::to_owned)
-        .collect()
+        .filter_map(|rest| text(rest.trim_start().strip_prefix("id:")?));
+    let lists = source.split("const IDS:").skip(1);
+    let listed = lists
+        .filter_map(|rest| rest.split_once("= [")?.1.split_once(']'))
+        .flat_map(|(list, _)| list.split(',').filter_map(text));
+    called.chain(built).chain(listed).collect()
 }
 
 #[test]
@@ -434,9 +526,13 @@ fn every_finding_has_its_section() {
         .filter_map(|line| line.strip_prefix("## "))
         .map(|heading| heading.trim_matches('`').to_owned())
         .collect();
-    let source: String = ["calib-recording", "calib-pipeline", "calib-core"]
-        .map(sources)
-        .concat();
+    let source: String = [
+        "calib-recording/src",
+        "calib-pipeline/src",
+        "calib-core/src",
+    ]
+    .map(sources)
+    .concat();
     let ids = finding_ids(&source);
     assert!(ids.len() > 20, "only {} findings found", ids.len());
     let missing: Vec<_> = ids.difference(&headings).collect();
@@ -460,6 +556,26 @@ fn every_finding_has_its_section() {
 }
 
 #[test]
+fn every_reader_is_on_the_page_of_formats() {
+    let page = &pages()["book/src/file-formats.md"];
+    let source = sources("calib-recording/src/readers");
+    let ids: BTreeSet<&str> = source
+        .split("id: \"")
+        .skip(1)
+        .filter_map(|rest| rest.split('"').next())
+        .collect();
+    assert!(ids.len() > 8, "only {ids:?}");
+    let missing: Vec<_> = ids
+        .iter()
+        .filter(|id| !page.contains(&format!("`{id}`")))
+        .collect();
+    assert!(
+        missing.is_empty(),
+        "book/src/file-formats.md lacks {missing:?}"
+    );
+}
+
+#[test]
 fn the_checks_see_what_they_are_for() {
     let text = "# One `two`, Three\n[a](b.md#c) `[no](x)`\n```console,exit=4\n$ calib x\n```\n";
     assert!(anchors(text).contains("one-two-three"));
@@ -469,6 +585,8 @@ fn the_checks_see_what_they_are_for() {
     assert_eq!(links(prose[1].1), ["b.md#c"]);
     assert_eq!(tidy(Path::new("a/b/../c.md")), Path::new("a/c.md"));
     assert_eq!(title("RawJointSolve"), "joint solve");
-    let ids = finding_ids("Finding::new(\n  \"a-b\", x); Finding::new(id, y)");
-    assert_eq!(ids.into_iter().collect::<Vec<_>>(), ["a-b"]);
+    let ids = finding_ids(
+        "Finding::new(\n  \"a-b\", x); Finding::new(id, y); Finding { id: \"c\".into() }; const IDS: [&str; 2] = [\"d\", \"e\"];",
+    );
+    assert_eq!(ids.into_iter().collect::<Vec<_>>(), ["a-b", "c", "d", "e"]);
 }
