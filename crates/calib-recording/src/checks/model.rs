@@ -26,6 +26,10 @@ const GOOD_ENOUGH: f64 = 0.0175;
 const MUCH_BETTER: f64 = 4.0;
 /// A row that disagrees with the others by this many times their usual disagreement does not belong to them.
 const SPOILED_RATIO: f64 = 6.0;
+/// Rows within this part of the worst leave together with it.
+const NEARLY_WORST: f64 = 0.7;
+/// Disagreement, rad (34°), that no motion between two readings explains.
+const FLIPPED: f64 = 0.6;
 /// Turn that counts, rad: pairs of rows that turned less say nothing.
 const TURNED: f64 = 0.05;
 
@@ -273,60 +277,77 @@ pub fn alignment(outcome: &OffsetOutcome, tolerance: f64) -> Option<Finding> {
     }
 }
 
-/// Rows that disagree with all others while the others agree among themselves: not settled, or read while the clocks
-/// were apart.
+/// Rows that disagree with all others while the others agree among themselves: the body flipped (`body-flip`), or the
+/// robot had not settled, or the two were read at different times (`unsettled-rows`).
 pub fn spoiled_rows(
     poses: &Poses,
     body: &str,
     tracker_from_body: &[Option<Isometry3<f64>>],
     base_from_link: &[Isometry3<f64>],
-) -> Option<Finding> {
+) -> Vec<Finding> {
     let n = tracker_from_body
         .len()
         .min(base_from_link.len())
         .min(poses.len());
-    let mut spoiled = vec![false; n];
-    let mut reported = (0.0, 0.0);
-    // The worst row leaves first: it weighs on all others.
+    // Disagreement of the rows taken out, rad.
+    let mut spoiled: Vec<Option<f64>> = vec![None; n];
+    let mut usual = 0.0;
+    // The worst rows leave first: they weigh on all others.
     for _ in 0..n {
         let mut off: Vec<Vec<f64>> = vec![Vec::new(); n];
-        for (i, j, angle) in pairs(&tracker_from_body[..n], &base_from_link[..n])
-            .filter(|(i, j, _)| !spoiled[*i] && !spoiled[*j])
-        {
-            off[i].push(angle);
-            off[j].push(angle);
+        for (i, j, angle) in pairs(&tracker_from_body[..n], &base_from_link[..n]) {
+            if spoiled[i].is_none() && spoiled[j].is_none() {
+                off[i].push(angle);
+                off[j].push(angle);
+            }
         }
         let medians: Vec<(usize, f64)> = off
             .into_iter()
             .enumerate()
             .filter_map(|(i, all)| Some((i, median(all)?)))
             .collect();
-        if medians.len() < 5 {
-            break;
-        }
-        let usual = median(medians.iter().map(|m| m.1).collect())?;
-        let Some(&(row, worst)) = medians.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else {
+        let worst = medians.iter().map(|m| m.1).fold(0.0, f64::max);
+        let Some(middle) =
+            median(medians.iter().map(|m| m.1).collect()).filter(|_| medians.len() >= 5)
+        else {
             break;
         };
-        if worst < (SPOILED_RATIO * usual).max(GOOD_ENOUGH) {
+        usual = middle;
+        let limit = (SPOILED_RATIO * usual).max(GOOD_ENOUGH);
+        if worst < limit {
             break;
         }
-        spoiled[row] = true;
-        reported = (worst.max(reported.0), usual);
+        for (row, angle) in medians
+            .into_iter()
+            .filter(|(_, angle)| *angle >= limit.max(NEARLY_WORST * worst))
+        {
+            spoiled[row] = Some(angle);
+        }
     }
-    let rows: Vec<u64> = (0..n)
-        .filter(|&i| spoiled[i])
-        .map(|i| poses.rows[i])
-        .collect();
-    if rows.is_empty() {
-        return None;
-    }
-    let text = format!(
-        "{} rows disagree with the robot's model by up to {:.2}°, {:.2}° is usual",
-        rows.len(),
-        reported.0.to_degrees(),
-        reported.1.to_degrees()
-    );
-    let remedy = "the robot had not settled, or tracker and robot were read at different times: drop these rows or synchronise the clocks";
-    Some(Finding::new("unsettled-rows", Severity::Warning, body, text, remedy).at_rows(rows))
+    let finding = |id, severity, flipped: bool, remedy: &str| {
+        let rows: Vec<usize> = (0..n)
+            .filter(|&i| spoiled[i].is_some_and(|angle| (angle > FLIPPED) == flipped))
+            .collect();
+        let worst = rows.iter().filter_map(|&i| spoiled[i]).fold(0.0, f64::max);
+        let text = format!(
+            "{} rows disagree with the robot's model by up to {:.2}°, {:.2}° is usual",
+            rows.len(),
+            worst.to_degrees(),
+            usual.to_degrees()
+        );
+        let finding = Finding::new(id, severity, body, text, remedy);
+        (!rows.is_empty()).then(|| finding.at_rows(rows.into_iter().map(|i| poses.rows[i])))
+    };
+    let flip = "its marker pattern is nearly symmetric: move a marker; drop the flipped rows";
+    let unsettled = "the robot had not settled, or tracker and robot were read at different times: drop these rows or synchronise the clocks";
+    let flips = finding("body-flip", Severity::Error, true, flip);
+    flips
+        .into_iter()
+        .chain(finding(
+            "unsettled-rows",
+            Severity::Warning,
+            false,
+            unsettled,
+        ))
+        .collect()
 }

@@ -625,11 +625,23 @@ fn spoiled_rows_are_exactly_those() {
         }
         let predicted: Vec<_> = q.iter().map(|&q| forward(q)).collect();
         let track = &recorded.poses.bodies["tool"];
-        let finding = spoiled_rows(&recorded.poses, "tool", track, &predicted).expect("spoiled");
+        let findings = spoiled_rows(&recorded.poses, "tool", track, &predicted);
+        let [finding] = findings.as_slice() else {
+            panic!("{findings:?}")
+        };
+        assert_eq!(finding.id, "unsettled-rows");
         let expected: Vec<u64> = spoiled.iter().map(|&i| i as u64 + 2).collect();
         assert_eq!(finding.rows, expected, "seed {seed}");
         let clean: Vec<_> = recorded.q.iter().map(|&q| forward(q)).collect();
-        assert!(spoiled_rows(&recorded.poses, "tool", track, &clean).is_none());
+        assert!(spoiled_rows(&recorded.poses, "tool", track, &clean).is_empty());
+        let mut flipped = track.clone();
+        for i in [2, 17, 18] {
+            flipped[i].as_mut().expect("tracked").rotation *=
+                UnitQuaternion::from_scaled_axis(Vector3::y() * std::f64::consts::PI);
+        }
+        let findings = spoiled_rows(&recorded.poses, "tool", &flipped, &clean);
+        let found: Vec<_> = findings.iter().map(|f| (f.id, f.rows.clone())).collect();
+        assert_eq!(found, [("body-flip", vec![4, 19, 20])], "seed {seed}");
         assert!(disagreement(track, &clean).expect("turned") < 0.005);
     }
 }
