@@ -146,6 +146,24 @@ fn every_link_resolves() {
 }
 
 #[test]
+fn every_file_that_is_named_exists() {
+    let mut missing = Vec::new();
+    for (name, text) in pages() {
+        for (number, line) in blocks_and_prose(&text).1 {
+            for path in line.split('`').skip(1).step_by(2) {
+                let of_ours = ["crates/", "book/", "tests/", "plugins/", ".ci/"];
+                let exact = of_ours.iter().any(|folder| path.starts_with(folder))
+                    && !path.contains(['<', '*', ' ', '…']);
+                if exact && !root().join(path).exists() {
+                    missing.push(format!("{name}:{number}: there is no {path}"));
+                }
+            }
+        }
+    }
+    assert!(missing.is_empty(), "{}", missing.join("\n"));
+}
+
+#[test]
 fn the_summary_lists_every_page_once() {
     let pages = pages();
     let listed: Vec<String> = pages["book/src/SUMMARY.md"]
