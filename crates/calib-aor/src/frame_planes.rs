@@ -125,10 +125,11 @@ pub fn algorithm1(
         Ok(grid) => grid,
         Err(answer) => return Ok(answer),
     };
-    let fitted = match fit_once(samples, &grid, &center, options) {
-        Ok(fitted) => fitted,
+    let base = match Base::fit(samples, &grid, &center, options) {
+        Ok(base) => base,
         Err(answer) => return Ok(FrameOutcome::NotObservable(answer)),
     };
+    let fitted = &base.fitted;
     let (rms_t, rms_r) = residuals(
         samples,
         options.axes,
@@ -140,7 +141,7 @@ pub fn algorithm1(
     let dof = (3.0 * n - 6.0).max(1.0);
     let sigma_t = options.sigma_t.unwrap_or(rms_t * (n / dof).sqrt());
     let sigma_r = options.sigma_r.unwrap_or(rms_r * (n / dof).sqrt());
-    let covariance = propagate(samples, &grid, &center, options, &fitted, sigma_t, sigma_r);
+    let covariance = propagate(samples, &grid, &center, options, &base, (sigma_t, sigma_r));
     let (proximal_in_body, distal_in_body) = axes_in_body(options.axes, &fitted.body_from_joint);
     let reach = fitted.body_from_joint.translation.vector.norm();
     let (verdict, reason) = judge(
@@ -268,6 +269,36 @@ struct Grid {
 }
 
 impl Grid {
+    fn circles(&self) -> usize {
+        self.around_proximal.len() + self.around_distal.len()
+    }
+
+    /// Rows of circle c, those around the proximal axis first.
+    fn rows(&self, c: usize) -> &[usize] {
+        let proximal = self.around_proximal.len();
+        if c < proximal {
+            &self.around_proximal[c]
+        } else {
+            &self.around_distal[c - proximal]
+        }
+    }
+
+    /// Axis of circle c, its sense given by the swept joint angle.
+    fn normal_of(
+        &self,
+        c: usize,
+        samples: &[FrameSample],
+        m: &Point3<f64>,
+        options: &FrameOptions,
+    ) -> Result<Unit<Vector3<f64>>, NotObservable> {
+        let swept = if c < self.around_proximal.len() {
+            |s: &FrameSample| s.proximal
+        } else {
+            |s: &FrameSample| s.distal
+        };
+        circle_axis(samples, self.rows(c), swept, m, options)
+    }
+
     fn of(samples: &[FrameSample], options: &FrameOptions) -> Result<Self, FrameOutcome> {
         let around_proximal = planes(samples, options.same_angle, |s| (s.distal, s.proximal));
         let around_distal = planes(samples, options.same_angle, |s| (s.proximal, s.distal));
@@ -333,27 +364,83 @@ fn planes(
     groups
 }
 
+/// The result with the intermediate steps that the covariance starts from.
+struct Base {
+    center: Point3<f64>,
+    normals: Vec<Unit<Vector3<f64>>>,
+    fitted: Fitted,
+}
+
+impl Base {
+    /// The algorithm itself, without uncertainty.
+    fn fit(
+        samples: &[FrameSample],
+        grid: &Grid,
+        center: &Center<'_>,
+        options: &FrameOptions,
+    ) -> Result<Self, NotObservable> {
+        let center = center_of(samples, grid, center)?;
+        let normals = normals_of(samples, grid, &center, options)?;
+        let fitted = assemble(samples, grid, &center, &normals, options)?;
+        Ok(Self {
+            center,
+            normals,
+            fitted,
+        })
+    }
+
+    /// ∂n/∂m of every circle.
+    fn slopes(
+        &self,
+        samples: &[FrameSample],
+        grid: &Grid,
+        options: &FrameOptions,
+        step: f64,
+    ) -> Vec<Matrix3<f64>> {
+        let mut slopes = vec![Matrix3::zeros(); grid.circles()];
+        // A plane's normal does not know the center; neither does exact data need its noise.
+        if options.fit == PlaneFit::Plane || step <= 0.0 {
+            return slopes;
+        }
+        for axis in 0..3 {
+            let beside = self.center + Vector3::ith(axis, step);
+            let Ok(normals) = normals_of(samples, grid, &beside, options) else {
+                continue;
+            };
+            for (c, n) in normals.iter().enumerate() {
+                slopes[c].set_column(
+                    axis,
+                    &((n.into_inner() - self.normals[c].into_inner()) / step),
+                );
+            }
+        }
+        slopes
+    }
+}
+
 struct Fitted {
     world_from_joint: Isometry3<f64>,
     body_from_joint: Isometry3<f64>,
     orthogonality_defect: f64,
 }
 
-/// The algorithm itself, without uncertainty.
-fn fit_once(
-    samples: &[FrameSample],
-    grid: &Grid,
-    center: &Center<'_>,
-    options: &FrameOptions,
-) -> Result<Fitted, NotObservable> {
-    let none = |verdict, reason: String| NotObservable {
+fn none(verdict: Verdict, reason: String) -> NotObservable {
+    NotObservable {
         estimator: ID,
         verdict,
         reason,
         known: Known::Nothing,
-    };
-    let m = match center {
-        Center::Given { point, .. } => *point,
+    }
+}
+
+/// Step 1: the center of rotation.
+fn center_of(
+    samples: &[FrameSample],
+    grid: &Grid,
+    center: &Center<'_>,
+) -> Result<Point3<f64>, NotObservable> {
+    match center {
+        Center::Given { point, .. } => Ok(*point),
         Center::From(estimator) => {
             let poses: Vec<Option<Pose>> = samples.iter().map(|s| s.world_from_body).collect();
             estimator(&poses).ok_or_else(|| {
@@ -361,32 +448,49 @@ fn fit_once(
                     Verdict::Diverged,
                     "the center of rotation has no estimate".into(),
                 )
-            })?
+            })
         }
         Center::NearestToAxes => nearest_to_axes(samples, grid).ok_or_else(|| {
             none(
                 Verdict::Parallel,
                 "the circles' axes have no nearest point".into(),
             )
-        })?,
-    };
-
-    let mut normals = Vec::with_capacity(grid.around_proximal.len());
-    for rows in &grid.around_proximal {
-        let swept = |s: &FrameSample| s.proximal;
-        normals.push(circle_axis(samples, rows, swept, &m, options)?);
+        }),
     }
-    let proximal = mean_axis(&normals).map_err(|why| none(Verdict::NotUnique, why))?;
+}
 
-    // n turns with the proximal joint: bring it back to α = 0.
-    let mut normals = Vec::with_capacity(grid.around_distal.len());
-    for rows in &grid.around_distal {
-        let swept = |s: &FrameSample| s.distal;
-        let n = circle_axis(samples, rows, swept, &m, options)?;
-        let held = rows.iter().map(|&k| samples[k].proximal).sum::<f64>() / rows.len() as f64;
-        normals.push(UnitQuaternion::from_axis_angle(&proximal, -held) * n);
-    }
-    let distal = mean_axis(&normals).map_err(|why| none(Verdict::NotUnique, why))?;
+/// Step 2: the axis of every circle in the tracker's frame, those around the proximal axis first.
+fn normals_of(
+    samples: &[FrameSample],
+    grid: &Grid,
+    m: &Point3<f64>,
+    options: &FrameOptions,
+) -> Result<Vec<Unit<Vector3<f64>>>, NotObservable> {
+    (0..grid.circles())
+        .map(|c| grid.normal_of(c, samples, m, options))
+        .collect()
+}
+
+/// Step 3: means, cross product, projection, and the frame in the body.
+fn assemble(
+    samples: &[FrameSample],
+    grid: &Grid,
+    m: &Point3<f64>,
+    normals: &[Unit<Vector3<f64>>],
+    options: &FrameOptions,
+) -> Result<Fitted, NotObservable> {
+    let (around_proximal, around_distal) = normals.split_at(grid.around_proximal.len());
+    let proximal = mean_axis(around_proximal).map_err(|why| none(Verdict::NotUnique, why))?;
+    // The distal axis turns with the proximal joint: bring it back to α = 0.
+    let turned_back: Vec<_> = around_distal
+        .iter()
+        .zip(&grid.around_distal)
+        .map(|(n, rows)| {
+            let held = rows.iter().map(|&k| samples[k].proximal).sum::<f64>() / rows.len() as f64;
+            UnitQuaternion::from_axis_angle(&proximal, -held) * n
+        })
+        .collect();
+    let distal = mean_axis(&turned_back).map_err(|why| none(Verdict::NotUnique, why))?;
 
     let FrameAxes {
         proximal: p,
@@ -521,25 +625,44 @@ fn nearest_to_axes(samples: &[FrameSample], grid: &Grid) -> Option<Point3<f64>> 
 }
 
 /// First-order covariance of `body_from_joint`: each measured pose moved by a thousandth of its noise.
+///
+/// A moved sample changes its two circles and, through the center, all others a little; the latter by
+/// the derivative of every normal in the center, so that only two circles are fitted again.
 fn propagate(
     samples: &[FrameSample],
     grid: &Grid,
     center: &Center<'_>,
     options: &FrameOptions,
-    fitted: &Fitted,
-    sigma_t: f64,
-    sigma_r: f64,
+    base: &Base,
+    (sigma_t, sigma_r): (f64, f64),
 ) -> Matrix6<f64> {
     /// Part of a standard deviation: small against curvature, large against rounding.
     const STEP: f64 = 1e-3;
-    let zero_from = fitted.body_from_joint.inverse();
-    let response = |moved: &[FrameSample], center: &Center<'_>| -> Vector6<f64> {
-        match fit_once(moved, grid, center, options) {
-            Ok(f) => se3::log(&(zero_from * f.body_from_joint)).0 / STEP,
-            Err(_) => Vector6::zeros(),
-        }
+    let zero_from = base.fitted.body_from_joint.inverse();
+    let slopes = base.slopes(samples, grid, options, STEP * sigma_t);
+    let respond = |moved: &[FrameSample], m: &Point3<f64>, touched: Option<usize>| {
+        let shift = m - base.center;
+        let normals: Option<Vec<_>> = (0..grid.circles())
+            .map(|c| {
+                let n = match touched {
+                    Some(row) if grid.rows(c).contains(&row) => {
+                        grid.normal_of(c, moved, &base.center, options).ok()?
+                    }
+                    _ => base.normals[c],
+                };
+                Some(Unit::new_normalize(n.into_inner() + slopes[c] * shift))
+            })
+            .collect();
+        let fitted = assemble(moved, grid, m, &normals?, options).ok()?;
+        Some(se3::log(&(zero_from * fitted.body_from_joint)).0 / STEP)
     };
     let mut covariance = Matrix6::zeros();
+    // A response that does not exist cannot happen a thousandth of σ from one that does.
+    let mut add = |d: Option<Vector6<f64>>| {
+        if let Some(d) = d {
+            covariance += d * d.transpose();
+        }
+    };
     let mut moved = samples.to_vec();
     for k in 0..samples.len() {
         let Some(pose) = samples[k].world_from_body else {
@@ -549,16 +672,17 @@ fn propagate(
             let mut shifted = pose;
             shifted.translation[axis] += STEP * sigma_t;
             moved[k].world_from_body = Some(shifted);
-            let d = response(&moved, center);
-            covariance += d * d.transpose();
+            if let Ok(m) = center_of(&moved, grid, center) {
+                add(respond(&moved, &m, Some(k)));
+            }
             let turn = so3::exp(&(Vector3::ith(axis, 1.0) * (STEP * sigma_r)));
-            let turned = Pose {
+            moved[k].world_from_body = Some(Pose {
                 rotation: pose.rotation * turn.to_rotation_matrix().matrix(),
                 translation: pose.translation,
-            };
-            moved[k].world_from_body = Some(turned);
-            let d = response(&moved, center);
-            covariance += d * d.transpose();
+            });
+            if let Ok(m) = center_of(&moved, grid, center) {
+                add(respond(&moved, &m, None));
+            }
         }
         moved[k] = samples[k];
     }
@@ -570,12 +694,8 @@ fn propagate(
         let eigen = calib_geometry::decompose::symmetric_eigen_small(of_center);
         for k in 0..3 {
             let sigma = eigen.values[k].max(0.0).sqrt();
-            let shifted = Center::Given {
-                point: point + eigen.vectors.column(k) * (STEP * sigma),
-                covariance: *of_center,
-            };
-            let d = response(samples, &shifted);
-            covariance += d * d.transpose();
+            let m = point + eigen.vectors.column(k) * (STEP * sigma);
+            add(respond(samples, &m, None));
         }
     }
     covariance

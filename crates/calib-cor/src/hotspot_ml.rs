@@ -30,6 +30,8 @@ use crate::{
 const MAX_STEPS: usize = 200;
 /// Rounds of re-estimating σ_t and σ_r.
 const NOISE_ROUNDS: usize = 200;
+/// Distance between body and center, in σ_t, below which the angle at the center means nothing.
+const AT_THE_CENTER: f64 = 5.0;
 /// σ_t as a part of the geometry's size below which data count as exact.
 const EXACT: f64 = 1e-12;
 
@@ -62,6 +64,14 @@ pub(crate) fn fit_poses(
     let spread = Spread::of(poses, &spot.body_point, &spot.center);
     if let Some(answer) = single_axis(estimator, &spot, &spread, options) {
         return Ok(answer);
+    }
+    if spot.body_point.norm()
+        <= AT_THE_CENTER * options.sigma_t.unwrap_or(spread.sigmas(spot.sums.n).0)
+    {
+        // The direction to the center is noise: orientations carry no lever, and least squares is the likelihood.
+        return crate::hotspot::linear(estimator, poses, options, rejected, |sums, _| {
+            sums.body_point(0)
+        });
     }
     let (sigma_t, sigma_r, normal) = maximise(poses, &mut spot, &spread, options);
     let reach = spot.body_point.norm();
@@ -105,6 +115,8 @@ fn maximise(
     let mut x = stack(&(spot.center - spot.sums.mean_t), &spot.body_point);
     let mut last;
     let mut round = 0;
+    let fixed = options.sigma_t.is_some() && options.sigma_r.is_some();
+    let mut change = f64::INFINITY;
     loop {
         let problem = Likelihood {
             poses,
@@ -113,7 +125,9 @@ fn maximise(
             sigma_r,
             scale,
         };
-        let end = minimise(&problem, x, MAX_STEPS);
+        // While the noise levels still move, a few steps for each round are enough.
+        let steps = if fixed || change < 1e-7 { MAX_STEPS } else { 2 };
+        let end = minimise(&problem, x, steps);
         if end.stop == Stop::Broken {
             x.fill(f64::NAN);
         } else {
@@ -130,9 +144,15 @@ fn maximise(
             let reach = x.fixed_rows::<3>(3).norm().max(floor);
             sigma_r = (across2 - sigma_t * sigma_t).max(0.0).sqrt() / reach;
         }
-        let settled = (sigma_t / old_t - 1.0).abs() < 1e-11
-            && (sigma_r - old_r).abs() <= 1e-11 * (sigma_r + sigma_t / scale);
-        if settled || round >= NOISE_ROUNDS || !x.iter().all(|v| v.is_finite()) {
+        let last_change = change;
+        change = (sigma_t / old_t - 1.0)
+            .abs()
+            .max((sigma_r - old_r).abs() / (sigma_r + sigma_t / scale));
+        if fixed
+            || (change < 1e-11 && last_change < 1e-7)
+            || round >= NOISE_ROUNDS
+            || !x.iter().all(|v| v.is_finite())
+        {
             break;
         }
     }
@@ -200,47 +220,52 @@ impl Problem for Likelihood<'_> {
         let length_p = p.norm();
         let unit_p = p / length_p;
         let across_p = Matrix3::identity() - unit_p * unit_p.transpose();
-        let (mut h_oo, mut h_op, mut h_pp) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
-        let (mut turned2, mut turned) = (Matrix3::zeros(), Vector3::zeros());
-        let mut n = 0.0;
-        let (mut g_o, mut g_p) = (Vector3::zeros(), Vector3::zeros());
-        let (mut cost, mut radial, mut arc) = (0.0, 0.0, 0.0);
+        let (mut turned, mut turned2) = (Vector3::zeros(), Matrix3::zeros());
+        let (mut sum_b, mut sum_bww) = (0.0, Matrix3::zeros());
+        let (mut sum_cr, mut sum_w) = (Matrix3::zeros(), 0.0);
+        let (mut g_o, mut g_q, mut along_p) = (Vector3::zeros(), Vector3::zeros(), 0.0);
+        let (mut n, mut cost, mut radial, mut arc, mut sum_e) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for pose in self.poses.iter().flatten() {
-            let q = pose
-                .rotation
-                .tr_mul(&(o - (pose.translation - self.origin)));
-            let length_q = q.norm();
-            let unit_q = q / length_q;
+            // In the world: ŵ = R q̂ needs no rotation.
+            let d = o - (pose.translation - self.origin);
+            let length_q = d.norm();
+            let unit_w = d / length_q;
+            let unit_q = pose.rotation.tr_mul(&unit_w);
             let e = length_q - length_p;
             // ∠ from sine and cosine: accurate at both ends
-            let cross = unit_q.cross(&unit_p);
-            let (sine, cosine) = (cross.norm(), unit_q.dot(&unit_p));
+            let (sine, cosine) = (unit_q.cross(&unit_p).norm(), unit_q.dot(&unit_p));
             let phi = sine.atan2(cosine);
             let ratio = if sine > 1e-9 { phi / sine } else { 1.0 };
             let product = length_q * length_p;
             let w = 1.0 / (r2 + t2 / product);
+            n += 1.0;
             cost += e * e / t2 + phi * phi * w;
             radial += e * e;
             arc += phi * phi * product;
             // ∇_q ∠²/2 = φ/sin φ (cos φ q̂ − p̂)/|q|, and likewise for p; ∂w/∂|q| = w² σ_t²/(|q|²|p|)
             let pull = 0.5 * phi * phi * w * w * t2 / product;
-            let g_q = unit_q * (e / t2 + pull / length_q)
-                + (unit_q * cosine - unit_p) * (ratio * w / length_q);
-            g_p += unit_p * (pull / length_p - e / t2)
-                + (unit_p * cosine - unit_q) * (ratio * w / length_p);
-            g_o += pose.rotation * g_q;
+            let swing = ratio * w;
+            g_o += unit_w * (e / t2 + (pull + swing * cosine) / length_q)
+                - pose.rotation * unit_p * (swing / length_q);
+            g_q += unit_q * swing;
+            along_p += pull + swing * cosine;
             // Gauss–Newton blocks: radial q̂, p̂; tangential (I − q̂q̂ᵀ)/|q|, (I − p̂p̂ᵀ)/|p|
-            let across_q = Matrix3::identity() - unit_q * unit_q.transpose();
-            let h_qq = unit_q * unit_q.transpose() / t2 + across_q * (w / (length_q * length_q));
-            let h_qp = -(unit_q * unit_p.transpose()) / t2 - across_q * across_p * (w / product);
-            let world_q = pose.rotation * unit_q;
-            turned2 += world_q * world_q.transpose();
-            turned += world_q;
-            n += 1.0;
-            h_oo += pose.rotation * h_qq * pose.rotation.transpose();
-            h_op += pose.rotation * h_qp;
-            h_pp += unit_p * unit_p.transpose() / t2 + across_p * (w / (length_p * length_p));
+            let b = w / (length_q * length_q);
+            let c = w / product;
+            let ww = unit_w * unit_w.transpose();
+            turned += unit_w;
+            turned2 += ww;
+            sum_b += b;
+            sum_bww += ww * b;
+            sum_cr += (pose.rotation - unit_w * unit_q.transpose()) * c;
+            sum_w += w;
+            sum_e += e;
         }
+        let g_p = unit_p * (along_p / length_p - sum_e / t2) - g_q / length_p;
+        let h_oo = turned2 / t2 + Matrix3::identity() * sum_b - sum_bww;
+        let h_op = -(turned * unit_p.transpose()) / t2 - sum_cr * across_p;
+        let h_pp =
+            unit_p * unit_p.transpose() * (n / t2) + across_p * (sum_w / (length_p * length_p));
         let mut hessian = Matrix6::zeros();
         hessian.fixed_view_mut::<3, 3>(0, 0).copy_from(&h_oo);
         hessian.fixed_view_mut::<3, 3>(0, 3).copy_from(&h_op);

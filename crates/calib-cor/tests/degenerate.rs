@@ -306,3 +306,21 @@ fn lost_samples_are_skipped() {
         assert_eq!(b.estimate().expect(id).used, 36, "{id}");
     }
 }
+
+/// A body mounted right at the center: no lever, but a center all the same.
+#[test]
+fn a_body_at_the_center() {
+    let turns = grid([-45.0, 135.0], 6, [-45.0, 80.0], 6);
+    for (arm, sigma) in [(0.0, 1e-3), (2e-3, 1e-3), (0.0, 0.0)] {
+        let arm = Vector3::new(arm, 0.0, 0.0);
+        let data = poses(&turns, &CENTER, &arm, sigma, 5e-3, &mut Noise::new(8));
+        for id in ["hse", "hsa", "hotspot_ml", "robust", "consensus"] {
+            let outcome = fit(id, &Input::Poses(&data), &Options::default()).expect(id);
+            let e = outcome
+                .estimate()
+                .unwrap_or_else(|| panic!("{id}: {:?}", outcome.reason()));
+            let off = (e.center.coords - CENTER).norm();
+            assert!(off < 1e-9 + sigma, "{id}: {off:e}");
+        }
+    }
+}
