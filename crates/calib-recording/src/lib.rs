@@ -15,6 +15,16 @@
 //! min over m, {R_i, t_i}   Σ_i Σ_{k seen at i} ‖ R_i m_k + t_i − p_ik ‖²                  (1)
 //! ```
 //!
+//! ```
+//! use calib_recording::{Filled, ReadOptions, read_bytes};
+//!
+//! let text = "elbow_deg,tip.x_mm,tip.y_mm,tip.z_mm\n90,100,200,300\n45,,,\n";
+//! let poses = read_bytes("poses.csv", text.as_bytes(), &ReadOptions::default())?.poses(Filled::Exclude)?;
+//! assert_eq!(poses.joints["elbow"][0], Some(std::f64::consts::FRAC_PI_2));
+//! assert_eq!(poses.markers["tip"][1], None);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Readers ([`readers`]) convert to SI and write down what they converted; errors name file, line and column.
 //! What no reader can know: whether a marker's name is on the right marker, or two clocks on the same second.
 

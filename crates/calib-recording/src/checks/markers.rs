@@ -1,7 +1,7 @@
 //! Single markers: lost ones coded as zero, columns written twice, frozen and computed points, the unit of length.
 
 use super::Expectations;
-use super::statistics::{median, range, robust_sigma};
+use super::statistics::{median, range};
 use crate::finding::{Finding, Severity};
 use crate::poses::Poses;
 use nalgebra::Point3;
@@ -19,6 +19,8 @@ const MOVED: f64 = 1e-3;
 const TOO_CONSTANT: f64 = 1.5e-6;
 /// Rows from which the scatter of a distance is known well enough.
 const ROWS_FOR_SCATTER: usize = 5;
+/// Rows that are looked at, evenly spread, where all would take long and tell no more.
+const ENOUGH_ROWS: usize = 1000;
 /// A tracked volume is smaller than this, m; more is millimetres taken for metres.
 const LARGEST_VOLUME: f64 = 60.0;
 
@@ -104,20 +106,25 @@ pub(super) fn duplicates(poses: &Poses) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (i, (a, track_a)) in tracks.iter().enumerate() {
         for (b, track_b) in &tracks[..i] {
-            let (mut count, mut equal) = (0, 0);
-            let mut rows = Vec::new();
-            for (row, (p, q)) in track_a
-                .iter()
-                .zip(track_b.iter())
-                .enumerate()
-                .filter_map(|(row, (a, b))| Some((row, (a.as_ref()?, b.as_ref()?))))
+            let stride = poses.len() / ENOUGH_ROWS + 1;
+            let both = |row: usize| Some((track_a[row]?, track_b[row]?));
+            if stride > 1
+                && !(0..poses.len())
+                    .step_by(stride)
+                    .filter_map(both)
+                    .any(|(p, q)| p == q)
             {
+                continue;
+            }
+            let seen = (0..poses.len()).filter_map(|row| both(row).map(|(p, q)| (row, p == q)));
+            let (mut count, mut rows) = (0, Vec::new());
+            for (row, same) in seen {
                 count += 1;
-                if p == q {
-                    equal += 1;
+                if same {
                     rows.push(poses.rows[row]);
                 }
             }
+            let equal = rows.len();
             if equal >= 2 && 2 * equal >= count {
                 let text = format!("equals marker `{b}` in {equal} of {count} rows");
                 let remedy = "one column was written twice: check the marker's label in the tracker's software, or leave it out";
@@ -296,24 +303,20 @@ pub(super) fn virtual_points(poses: &Poses) -> Vec<Finding> {
         .iter()
         .filter(|(_, track)| travel(track, 0, track.len()) > 10.0 * MOVED)
         .collect();
+    let stride = poses.len() / ENOUGH_ROWS + 1;
     // Markers joined by a distance that does not scatter.
     let mut group: Vec<usize> = (0..tracks.len()).collect();
     let mut worst: BTreeMap<usize, f64> = BTreeMap::new();
     for i in 0..tracks.len() {
         for j in 0..i {
-            let distances: Vec<f64> = tracks[i]
-                .1
-                .iter()
-                .zip(tracks[j].1)
-                .filter_map(|(a, b)| Some((a.as_ref()? - b.as_ref()?).norm()))
-                .collect();
+            let both = |row: usize| Some((tracks[i].1[row]? - tracks[j].1[row]?).norm());
+            let distances: Vec<f64> = (0..poses.len()).step_by(stride).filter_map(both).collect();
             if distances.len() < ROWS_FOR_SCATTER || distances.iter().all(|&d| d == 0.0) {
                 continue;
             }
             let mean = distances.iter().sum::<f64>() / distances.len() as f64;
-            let Some(sigma) = robust_sigma(distances.into_iter(), mean) else {
-                continue;
-            };
+            let squares: f64 = distances.iter().map(|d| (d - mean).powi(2)).sum();
+            let sigma = (squares / (distances.len() - 1) as f64).sqrt();
             if sigma < TOO_CONSTANT {
                 let (from, to) = (group[i], group[j]);
                 group
