@@ -120,12 +120,7 @@ impl Solution {
     ) -> Result<DerivedPoint, Error> {
         let (pose, path, buffer) = self.evaluate(from, to, at)?;
         let f = self.expand(&path, &buffer);
-        // ∂(R p + t) = R (−[p]ₓ ω + v)
-        let mut a = DMatrix::zeros(3, 6);
-        a.view_mut((0, 0), (3, 3))
-            .copy_from(&(-(pose.r * so3::skew(&point.coords))));
-        a.view_mut((0, 3), (3, 3)).copy_from(&pose.r);
-        let f = a * f;
+        let f = point_rows(&pose, point) * f;
         Ok(DerivedPoint {
             position: Point3::from(pose.r * point.coords + pose.t),
             covariance: self
@@ -133,6 +128,65 @@ impl Solution {
                 .map(|c| Matrix3::from_iterator(c.iter().copied())),
             estimable: self.unseen(&f).ncols() == 0,
         })
+    }
+
+    /// Pose of `to` in `from` at a recorded sample, with that sample's readings, regressors and measured
+    /// edges (a measured edge that was lost counts as identity).
+    ///
+    /// # Errors
+    /// [`Error::NoPath`].
+    pub fn pose_at_sample(
+        &self,
+        from: FrameId,
+        to: FrameId,
+        sample: usize,
+    ) -> Result<Isometry3<f64>, Error> {
+        if sample >= self.model.problem.samples {
+            return Err(Error::NoSuchSample {
+                what: "pose at sample".to_owned(),
+                sample,
+                samples: self.model.problem.samples,
+            });
+        }
+        let path = self.model.compile_between(from, to, &self.values)?;
+        let mut cache = EdgeCache::new(&self.model.problem, self.model.trig.clone());
+        cache.update(&self.model.problem, &self.values);
+        let mut buffer = path.buffer();
+        Ok(path
+            .evaluate(
+                &self.model.problem,
+                &cache,
+                &self.values,
+                sample,
+                Derivatives::None,
+                &mut buffer,
+            )
+            .isometry())
+    }
+
+    /// What each weak direction ([`Observability::weak`](crate::Observability::weak), same order) costs at
+    /// a point of `to`: σ of its position in `from`, m, if that direction alone were uncertain.
+    ///
+    /// # Errors
+    /// As [`Solution::relative_pose`].
+    pub fn weak_at_point(
+        &self,
+        from: FrameId,
+        to: FrameId,
+        point: &Point3<f64>,
+        at: &Configuration,
+    ) -> Result<Vec<f64>, Error> {
+        let (pose, path, buffer) = self.evaluate(from, to, at)?;
+        let f = self.scaled(&(point_rows(&pose, point) * self.expand(&path, &buffer)));
+        let first = self.information.rank - self.observability.weak.len();
+        Ok((first..self.information.rank)
+            .map(|i| {
+                let moved = &f * self.information.directions.column(i);
+                let prior = &self.information;
+                // Posterior σ along the direction in units of its scale: data and prior together.
+                moved.norm() * prior.posterior_along(i)
+            })
+            .collect())
     }
 
     /// The compiled path and its derivatives at a configuration.
@@ -209,6 +263,15 @@ impl Solution {
         }
         f
     }
+}
+
+/// ∂(R p + t) = R (−[p]ₓ ω + v), 3 × 6
+fn point_rows(pose: &crate::pose::Pose, point: &Point3<f64>) -> DMatrix<f64> {
+    let mut a = DMatrix::zeros(3, 6);
+    a.view_mut((0, 0), (3, 3))
+        .copy_from(&(-(pose.r * so3::skew(&point.coords))));
+    a.view_mut((0, 3), (3, 3)).copy_from(&pose.r);
+    a
 }
 
 /// The edge with its per-sample arrays cut to the one configuration.

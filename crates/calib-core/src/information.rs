@@ -232,6 +232,13 @@ impl Information {
         (leak < INDETERMINATE).then(|| self.covariance[(column, column)].max(0.0).sqrt())
     }
 
+    /// Posterior σ along singular direction i, in units of `scale`: `√(w_iᵀ S⁻¹ C S⁻¹ w_i)`.
+    #[must_use]
+    pub fn posterior_along(&self, i: usize) -> f64 {
+        let w = self.directions.column(i).component_div(&self.scale);
+        (&self.covariance * &w).dot(&w).max(0.0).sqrt()
+    }
+
     /// Largest share of a unit null direction in this column: 0 when the data alone determine it.
     #[must_use]
     pub fn null_share(&self, column: usize) -> f64 {

@@ -30,7 +30,21 @@
 //!    Priors are per parameter: [`Problem::set_prior`], [`Problem::parameter_mut`].
 //! 2. [`solve`] it. Bad input is an [`Error`]; what the data cannot answer is in the [`Solution`].
 //! 3. Read [`Solution::parameters`], [`Solution::relative_pose`], [`Solution::predict_point`] and the
-//!    analyses below.
+//!    analyses:
+//!
+//! | question | answer |
+//! |---|---|
+//! | did it converge, and how good is it | [`Solution::status`], `chi2`, `chi2_stated`, `degrees_of_freedom` |
+//! | how noisy are markers, bodies, joints | [`Solution::noise`] (REML where [`NoiseGroup::estimate`] is set) |
+//! | which rows were left out, and why | [`Solution::rejected`]; exchanged labels: [`relabel`] before solving |
+//! | what cannot be known, in words | [`Solution::observability`], [`ParameterEstimate::class`] and `data_share` |
+//! | how well does it predict | [`Solution::leave_one_out`], [`Solution::held_out`] with [`Problem::held_out`], [`k_fold`] |
+//! | against what | [`Problem::baseline`]: nominal, registration only |
+//! | which physics is missing | [`Solution::goodness_of_fit`], with [`Problem::candidate`] effects |
+//! | which model | [`compare`] |
+//! | can I trust the intervals if the noise model is wrong | [`sandwich`] |
+//! | how well does a loop close | [`ClosureStatistics`], [`Solution::pose_at_sample`] |
+//! | hand–eye with a proof of optimality | [`handeye`] |
 //!
 //! # Example: two joints, seen by a tracker
 //!
@@ -111,8 +125,10 @@
 //! # Ok::<(), Error>(())
 //! ```
 
+mod baseline;
 mod bounded;
 mod chart;
+mod check;
 mod closure;
 mod compare;
 mod compressed;
@@ -142,6 +158,7 @@ mod rows;
 mod solution;
 mod validate;
 
+pub use baseline::Baseline;
 pub use chart::Chart;
 pub use closure::{ClosureStatistics, Spread};
 pub use compare::{Criterion, RankedVariant, compare};

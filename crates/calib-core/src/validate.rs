@@ -127,6 +127,36 @@ impl Solution {
         self.each_prediction(&held, false)
     }
 
+    /// Residuals `predicted ⊟ observed` of every observation at the solution, used, rejected and held out
+    /// alike, as (sample, vector); `z` counts measurement noise only. `None` when the model cannot be
+    /// evaluated.
+    #[must_use]
+    pub fn residuals(&self) -> Option<Vec<(usize, VectorError)>> {
+        let model = &self.model;
+        let mut work = Workspace::new(model);
+        work.cache.update(&model.problem, &self.values);
+        let everything = vec![1.0; model.observations.len()];
+        let mut out = Vec::new();
+        for sample in 0..model.problem.samples {
+            let Some(s) = whitened(
+                model,
+                &self.values,
+                &everything,
+                &self.theta,
+                sample,
+                &mut work,
+            ) else {
+                continue;
+            };
+            let e = &s.l * &s.w;
+            let v = &s.l * s.l.transpose();
+            for &(o, first, rows) in &s.blocks {
+                out.push((sample, vector_error(model, o, first, rows, &e, &v)));
+            }
+        }
+        Some(out)
+    }
+
     fn each_prediction(&self, include: &[f64], left_out: bool) -> Option<CrossValidation> {
         let model = &self.model;
         let mut work = Workspace::new(model);

@@ -284,7 +284,6 @@ fn tiago_frozen() {
                 geometry: true,
                 compliance: true,
                 play: true,
-                ..base
             },
         ),
     ];
