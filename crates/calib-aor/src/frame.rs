@@ -13,7 +13,7 @@ use calib_geometry::{Line, Verdict, measured::Pose, so3};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::outcome::NotObservable;
+use crate::outcome::{Known, NotObservable};
 
 /// Angle between two axes below which no frame can be built from them whatever their noise.
 const PARALLEL: f64 = 1e-6;
@@ -132,6 +132,33 @@ pub enum FrameOutcome {
 }
 
 impl FrameOutcome {
+    /// An estimate, unless a number in it is not finite: then that is said instead.
+    pub(crate) fn estimated(e: FrameEstimate) -> Self {
+        let isometry = |x: &Isometry3<f64>| x.to_homogeneous().iter().all(|v| v.is_finite());
+        let finite = isometry(&e.body_from_joint)
+            && isometry(&e.world_from_joint)
+            && e.covariance.iter().all(|v| v.is_finite())
+            && [
+                e.sigma_t,
+                e.sigma_r,
+                e.rms_t,
+                e.rms_r,
+                e.orthogonality_defect,
+            ]
+            .iter()
+            .all(|v| v.is_finite());
+        if finite {
+            Self::Estimate(Box::new(e))
+        } else {
+            Self::NotObservable(NotObservable {
+                estimator: e.estimator,
+                verdict: Verdict::Diverged,
+                reason: "the result is beyond the range of numbers".into(),
+                known: Known::Nothing,
+            })
+        }
+    }
+
     /// The verdict of either branch.
     #[must_use]
     pub fn verdict(&self) -> Verdict {

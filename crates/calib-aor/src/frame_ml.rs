@@ -199,7 +199,7 @@ pub fn fit(
         options,
     );
     let (proximal_in_body, distal_in_body) = axes_in_body(options.axes, &body_from_joint);
-    Ok(FrameOutcome::Estimate(Box::new(FrameEstimate {
+    Ok(FrameOutcome::estimated(FrameEstimate {
         estimator: ID,
         body_from_joint,
         covariance,
@@ -216,7 +216,7 @@ pub fn fit(
         used: n,
         verdict,
         reason,
-    })))
+    }))
 }
 
 fn range(samples: &[FrameSample], angle: impl Fn(&FrameSample) -> f64) -> f64 {

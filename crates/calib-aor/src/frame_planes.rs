@@ -30,6 +30,7 @@ use crate::{
         residuals,
     },
     input::Input,
+    line_ml,
     options::Options,
     outcome::{AorError, Known, NotObservable, Outcome},
     planar_radial, plane,
@@ -61,6 +62,9 @@ pub enum PlaneFit {
     PlanarRadial,
     /// The plane's normal.
     Plane,
+    /// One line for all circles around the proximal axis, which does not move; orthogonal-distance circles around
+    /// the distal one.
+    CommonLine,
 }
 
 /// Settings of Algorithm 1.
@@ -151,7 +155,7 @@ pub fn algorithm1(
         (sigma_t, sigma_r),
         options,
     );
-    Ok(FrameOutcome::Estimate(Box::new(FrameEstimate {
+    Ok(FrameOutcome::estimated(FrameEstimate {
         estimator: ID,
         body_from_joint: fitted.body_from_joint,
         covariance,
@@ -168,7 +172,7 @@ pub fn algorithm1(
         used: seen,
         verdict,
         reason,
-    })))
+    }))
 }
 
 /// # Errors
@@ -291,12 +295,23 @@ impl Grid {
         m: &Point3<f64>,
         options: &FrameOptions,
     ) -> Result<Unit<Vector3<f64>>, NotObservable> {
-        let swept = if c < self.around_proximal.len() {
-            |s: &FrameSample| s.proximal
+        if c < self.around_proximal.len() {
+            let circles = match options.fit {
+                PlaneFit::CommonLine => &self.around_proximal[..],
+                _ => &self.around_proximal[c..=c],
+            };
+            circle_axis(samples, circles, |s| s.proximal, m, options)
         } else {
-            |s: &FrameSample| s.distal
-        };
-        circle_axis(samples, self.rows(c), swept, m, options)
+            let circle = std::slice::from_ref(&self.around_distal[c - self.around_proximal.len()]);
+            circle_axis(samples, circle, |s| s.distal, m, options)
+        }
+    }
+
+    /// True when a change of `row` changes the axis of circle c.
+    fn depends(&self, c: usize, row: usize, options: &FrameOptions) -> bool {
+        let common = options.fit == PlaneFit::CommonLine && c < self.around_proximal.len();
+        self.rows(c).contains(&row)
+            || (common && self.around_proximal.iter().any(|rows| rows.contains(&row)))
     }
 
     fn of(samples: &[FrameSample], options: &FrameOptions) -> Result<Self, FrameOutcome> {
@@ -398,8 +413,8 @@ impl Base {
         step: f64,
     ) -> Vec<Matrix3<f64>> {
         let mut slopes = vec![Matrix3::zeros(); grid.circles()];
-        // A plane's normal does not know the center; neither does exact data need its noise.
-        if options.fit == PlaneFit::Plane || step <= 0.0 {
+        // Only the paper's cost holds the center; and exact data have no noise to spread.
+        if options.fit != PlaneFit::PlanarRadial || step <= 0.0 {
             return slopes;
         }
         for axis in 0..3 {
@@ -533,27 +548,28 @@ fn assemble(
     })
 }
 
-/// The axis of one circle, its sense given by the swept joint angles.
+/// The axis of one circle, or of several around one line, its sense given by the swept joint angles.
 fn circle_axis(
     samples: &[FrameSample],
-    rows: &[usize],
+    circles: &[Vec<usize>],
     swept: impl Fn(&FrameSample) -> f64,
     m: &Point3<f64>,
     options: &FrameOptions,
 ) -> Result<Unit<Vector3<f64>>, NotObservable> {
-    let track = rows
-        .iter()
-        .map(|&k| {
-            samples[k]
-                .world_from_body
-                .as_ref()
-                .map(|p| Point3::from(p.translation))
-        })
-        .collect::<Vec<_>>();
-    let tracks = [track];
+    // Every circle in its own rows of one table, so that the angles pair up.
+    let rows: usize = circles.iter().map(Vec::len).sum();
+    let mut tracks = vec![vec![None; rows]; circles.len()];
+    let mut angles = Vec::with_capacity(rows);
+    for (track, circle) in tracks.iter_mut().zip(circles) {
+        for &k in circle {
+            let pose = samples[k].world_from_body.as_ref();
+            track[angles.len()] = pose.map(|p| Point3::from(p.translation));
+            angles.push(swept(&samples[k]));
+        }
+    }
     let fit_options = Options {
-        center: Some(*m),
-        angles: rows.iter().map(|&k| swept(&samples[k])).collect(),
+        center: (options.fit != PlaneFit::CommonLine).then_some(*m),
+        angles,
         // The mean over all planes is judged, not each plane.
         significance: 1.0,
         weak_angle: f64::MAX,
@@ -563,20 +579,19 @@ fn circle_axis(
     let outcome = match options.fit {
         PlaneFit::PlanarRadial => planar_radial::gauss_newton(&input, &fit_options),
         PlaneFit::Plane => plane::fit(&input, &fit_options),
+        PlaneFit::CommonLine => line_ml::line(&input, &fit_options),
     };
     match outcome {
         Ok(Outcome::Estimate(estimate)) => Ok(estimate.line.direction),
         Ok(Outcome::NotObservable(mut why)) => {
             why.estimator = ID;
-            why.reason = format!("a circle of {} samples: {}", rows.len(), why.reason);
+            why.reason = format!("circles of {rows} samples: {}", why.reason);
             Err(why)
         }
-        Err(error) => Err(NotObservable {
-            estimator: ID,
-            verdict: error.verdict().unwrap_or(Verdict::Diverged),
-            reason: error.to_string(),
-            known: Known::Nothing,
-        }),
+        Err(error) => Err(none(
+            error.verdict().unwrap_or(Verdict::Diverged),
+            error.to_string(),
+        )),
     }
 }
 
@@ -645,7 +660,7 @@ fn propagate(
         let normals: Option<Vec<_>> = (0..grid.circles())
             .map(|c| {
                 let n = match touched {
-                    Some(row) if grid.rows(c).contains(&row) => {
+                    Some(row) if grid.depends(c, row, options) => {
                         grid.normal_of(c, moved, &base.center, options).ok()?
                     }
                     _ => base.normals[c],

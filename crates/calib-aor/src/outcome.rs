@@ -91,6 +91,26 @@ pub struct AorEstimate {
     pub reason: Option<String>,
 }
 
+impl AorEstimate {
+    fn is_finite(&self) -> bool {
+        let line = |l: &Line| {
+            l.point
+                .iter()
+                .chain(l.direction.iter())
+                .all(|x| x.is_finite())
+        };
+        line(&self.line)
+            && self.in_child.iter().all(line)
+            && self.covariance.iter().all(|x| x.is_finite())
+            && self.circles.iter().all(|c| {
+                c.center.iter().all(|x| x.is_finite()) && c.radius.is_finite() && c.arc.is_finite()
+            })
+            && [self.sigma_direction, self.tau, self.sigma, self.rms]
+                .iter()
+                .all(|x| x.is_finite())
+    }
+}
+
 /// What is known although the axis is not.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum Known {
@@ -155,6 +175,19 @@ impl Outcome {
         match self {
             Self::Estimate(e) => e.reason.as_deref(),
             Self::NotObservable(n) => Some(&n.reason),
+        }
+    }
+
+    /// The outcome itself, unless a number in it is not finite: then it says so.
+    pub(crate) fn checked(self) -> Self {
+        match self {
+            Self::Estimate(e) if !e.is_finite() => Self::none(
+                e.estimator,
+                Verdict::Diverged,
+                "the result is beyond the range of numbers".into(),
+                Known::Nothing,
+            ),
+            outcome => outcome,
         }
     }
 

@@ -148,7 +148,7 @@ pub fn fit(id: &str, input: &Input<'_>, options: &Options) -> Result<Outcome, Ao
             got: input.word(),
         });
     }
-    (info.fit)(input, options)
+    Ok((info.fit)(input, options)?.checked())
 }
 
 /// Ids of the frame estimators, for lists that show all.

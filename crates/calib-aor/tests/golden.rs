@@ -323,6 +323,7 @@ fn frames() {
         for (name, plane_fit) in [
             ("fixed_m_derot", PlaneFit::PlanarRadial),
             ("plane_derot", PlaneFit::Plane),
+            ("line_derot", PlaneFit::CommonLine),
         ] {
             let want = &case["expect"][name];
             let options = FrameOptions {

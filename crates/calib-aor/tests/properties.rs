@@ -9,7 +9,7 @@ use calib_aor::{
     frame_planes,
 };
 use common::{Hinge, Joint, Noise, Track, steps};
-use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 /// The simplex compares costs, which agree near the minimum to half of the digits.
@@ -197,6 +197,74 @@ proptest! {
             let (a, b) = (alone.estimate().expect(id), both.estimate().expect(id));
             let (angle, distance) = off(b, &a.line.direction, &a.line.point);
             prop_assert!(angle < 1e-10 && distance < 1e-10, "{id}: {angle:e} {distance:e}");
+        }
+    }
+}
+
+/// Numbers that sit at the edges of arithmetic.
+fn an_edge() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        Just(0.0),
+        Just(-0.0),
+        Just(1.0),
+        Just(-1.0),
+        Just(1e-300),
+        Just(1e300),
+        Just(-1e160),
+        Just(1e-160),
+        Just(f64::EPSILON),
+        Just(1.0 + f64::EPSILON),
+        -1.0..1.0
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, ..config() })]
+
+    /// Whatever the numbers, the answer is a verdict, an error, or finite.
+    #[test]
+    fn garbage_neither_panics_nor_returns_nan(
+        points in prop::collection::vec(prop::collection::vec(prop::option::weighted(0.9, prop::array::uniform3(an_edge())), 0..9), 0..4),
+        poses in prop::collection::vec(prop::option::weighted(0.9, (prop::array::uniform3(an_edge()), prop::array::uniform3(an_edge()))), 0..9),
+        sigma in prop::option::of(prop_oneof![Just(1e-300), Just(1.0), Just(1e300)]),
+    ) {
+        let rows = points.iter().map(Vec::len).max().unwrap_or(0);
+        let tracks: Vec<Track> = points.iter().map(|t| {
+            let mut t: Track = t.iter().map(|p| p.map(Point3::from)).collect();
+            t.resize(rows, None);
+            t
+        }).collect();
+        let poses: Vec<Option<Pose>> = poses.iter().map(|p| p.map(|(w, t)| Pose {
+            rotation: UnitQuaternion::from_scaled_axis(Vector3::from(w).map(|x| x.clamp(-10.0, 10.0))).to_rotation_matrix().into_inner(),
+            translation: Vector3::from(t),
+        })).collect();
+        let options = Options { sigma_t: sigma, ..Options::default() };
+        for info in estimators() {
+            let inputs = [Input::Markers(&tracks), Input::Poses(&poses), Input::TwoBodies { parent: &poses, child: &poses }];
+            for input in inputs.iter().filter(|i| i.serves(info.input)) {
+                if let Ok(outcome) = fit(info.id, input, &options)
+                    && let Some(e) = outcome.estimate()
+                {
+                    prop_assert!(e.line.point.iter().all(|x| x.is_finite()), "{}: {e:?}", info.id);
+                    prop_assert!(e.covariance.iter().all(|x| x.is_finite()), "{}: {e:?}", info.id);
+                }
+            }
+        }
+        let samples: Vec<FrameSample> = poses.iter().enumerate().map(|(k, p)| FrameSample {
+            world_from_body: *p, proximal: (k % 3) as f64, distal: (k / 3) as f64,
+        }).collect();
+        let options = FrameOptions { sigma_t: sigma, ..FrameOptions::default() };
+        for outcome in [
+            frame_planes::algorithm1(&samples, Center::NearestToAxes, &options),
+            frame_ml::fit(&samples, Residuals::Poses, &options),
+            frame_ml::fit(&samples, Residuals::Points, &options),
+        ] {
+            if let Ok(outcome) = outcome
+                && let Some(e) = outcome.estimate()
+            {
+                prop_assert!(e.covariance.iter().all(|x| x.is_finite()), "{e:?}");
+                prop_assert!(e.body_from_joint.to_homogeneous().iter().all(|x| x.is_finite()), "{e:?}");
+            }
         }
     }
 }

@@ -142,6 +142,43 @@ pub struct CorEstimate {
     pub reason: Option<String>,
 }
 
+impl CorEstimate {
+    fn is_finite(&self) -> bool {
+        let shape = match &self.shape {
+            Shape::Radii { radii, bias } => radii.iter().chain(bias).all(|x| x.is_finite()),
+            Shape::BodyPoint {
+                body_point,
+                covariance,
+            } => body_point
+                .iter()
+                .chain(covariance.iter())
+                .all(|x| x.is_finite()),
+            Shape::BodyPoints {
+                in_first,
+                in_second,
+                covariance,
+                mean_gap,
+            } => {
+                mean_gap.is_finite()
+                    && in_first
+                        .iter()
+                        .chain(in_second.iter())
+                        .chain(covariance.iter())
+                        .all(|x| x.is_finite())
+            }
+        };
+        shape
+            && self.rms.is_finite()
+            && self.noise.sigma_t.is_finite()
+            && self.noise.sigma_r.is_none_or(f64::is_finite)
+            && self
+                .center
+                .iter()
+                .chain(self.covariance.iter())
+                .all(|x| x.is_finite())
+    }
+}
+
 /// What is known although the center is not.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Known {
@@ -211,6 +248,19 @@ impl Outcome {
         match self {
             Self::Estimate(e) => e.reason.as_deref(),
             Self::NotObservable(n) => Some(&n.reason),
+        }
+    }
+
+    /// The outcome itself, unless a number in it is not finite: then it says so.
+    pub(crate) fn checked(self) -> Self {
+        match self {
+            Self::Estimate(e) if !e.is_finite() => Self::NotObservable(NotObservable {
+                estimator: e.estimator,
+                verdict: Verdict::Diverged,
+                reason: "the result is beyond the range of numbers".into(),
+                known: Known::Nothing,
+            }),
+            outcome => outcome,
         }
     }
 

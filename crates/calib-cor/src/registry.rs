@@ -187,5 +187,5 @@ pub fn fit(id: &str, input: &Input<'_>, options: &Options) -> Result<Outcome, Co
             got: input.kind(),
         });
     }
-    (info.fit)(input, options)
+    Ok((info.fit)(input, options)?.checked())
 }

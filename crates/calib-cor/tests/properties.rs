@@ -238,7 +238,59 @@ proptest! {
     }
 }
 
-/// Four times the samples halve the error.
+/// Numbers that sit at the edges of arithmetic.
+fn an_edge() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        Just(0.0),
+        Just(-0.0),
+        Just(1.0),
+        Just(-1.0),
+        Just(1e-300),
+        Just(1e300),
+        Just(-1e160),
+        Just(1e-160),
+        Just(f64::EPSILON),
+        Just(1.0 + f64::EPSILON),
+        -1.0..1.0
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, ..config() })]
+
+    /// Whatever the numbers, the answer is a verdict, an error, or finite.
+    #[test]
+    fn garbage_neither_panics_nor_returns_nan(
+        points in prop::collection::vec(prop::collection::vec(prop::option::weighted(0.9, prop::array::uniform3(an_edge())), 0..9), 0..4),
+        poses in prop::collection::vec(prop::option::weighted(0.9, (prop::array::uniform3(an_edge()), prop::array::uniform3(an_edge()))), 0..9),
+        sigma in prop::option::of(prop_oneof![Just(1e-300), Just(1.0), Just(1e300)]),
+    ) {
+        let rows = points.iter().map(Vec::len).max().unwrap_or(0);
+        let tracks: Vec<Track> = points.iter().map(|t| {
+            let mut t: Track = t.iter().map(|p| p.map(Point3::from)).collect();
+            t.resize(rows, None);
+            t
+        }).collect();
+        let poses: Vec<Option<Pose>> = poses.iter().map(|p| p.map(|(w, t)| Pose {
+            rotation: UnitQuaternion::from_scaled_axis(Vector3::from(w).map(|x| x.clamp(-10.0, 10.0))).to_rotation_matrix().into_inner(),
+            translation: Vector3::from(t),
+        })).collect();
+        let options = Options { sigma_t: sigma, subsets: 20, ..Options::default() };
+        for info in estimators() {
+            let inputs = [Input::Markers(&tracks), Input::Poses(&poses), Input::TwoBodies { first: &poses, second: &poses }];
+            for input in inputs.iter().filter(|i| i.serves(info.input)) {
+                if let Ok(outcome) = fit(info.id, input, &options)
+                    && let Some(e) = outcome.estimate()
+                {
+                    prop_assert!(e.center.iter().all(|x| x.is_finite()), "{}: {e:?}", info.id);
+                    prop_assert!(e.covariance.iter().all(|x| x.is_finite()), "{}: {e:?}", info.id);
+                }
+            }
+        }
+    }
+}
+
+/// Sixteen times the samples quarter the error.
 #[test]
 fn the_error_falls_like_one_over_root_n() {
     let arm = Vector3::new(0.02, -0.15, 0.04);
