@@ -240,7 +240,7 @@ pub(crate) fn minimize_in(
                 };
                 let expected = decrement * rate;
                 if decrement <= settings.decrement
-                    || (constant_noise && expected <= settings.decrement * 1e-2)
+                    || (constant_noise && expected <= settings.decrement)
                 {
                     let fallen = decrement <= settings.decrement
                         || cost(model, &trial, weights, theta, work)

@@ -211,7 +211,12 @@ impl CompiledPath {
                             &cache.forward[*edge]
                         };
                         for &(i, c) in columns {
-                            out.columns[c] += suffix.pull_back(&twists[i]);
+                            // Coordinates 3 to 5 are translations, walked either way.
+                            out.columns[c] += if i < 3 {
+                                suffix.pull_back(&twists[i])
+                            } else {
+                                suffix.pull_back_translation(&twists[i])
+                            };
                         }
                     }
                     suffix = oriented(cache.pose[*edge], *inverse).then(&suffix);

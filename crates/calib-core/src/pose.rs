@@ -57,6 +57,13 @@ impl Pose {
         Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
     }
 
+    /// [`Pose::pull_back`] of a twist with ω = 0: [0; Rᵀv]
+    #[inline]
+    pub(crate) fn pull_back_translation(&self, xi: &Vector6<f64>) -> Vector6<f64> {
+        let b = self.r.tr_mul(&Vector3::new(xi[3], xi[4], xi[5]));
+        Vector6::new(0.0, 0.0, 0.0, b.x, b.y, b.z)
+    }
+
     /// Ad(self) [ω; v] = [Rω; t × Rω + Rv]
     pub(crate) fn push_forward(&self, xi: &Vector6<f64>) -> Vector6<f64> {
         let omega = self.r * Vector3::new(xi[0], xi[1], xi[2]);
