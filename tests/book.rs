@@ -146,6 +146,21 @@ fn every_link_resolves() {
 }
 
 #[test]
+fn every_page_with_rust_is_a_doctest() {
+    let included = fs::read_to_string(root().join("book/doctests.rs")).expect("it is text");
+    for (name, text) in pages() {
+        let blocks = blocks_and_prose(&text).0;
+        if blocks.iter().any(|block| block.info.starts_with("rust")) {
+            let path = name.trim_start_matches("book/");
+            assert!(
+                included.contains(&format!("include_str!(\"{path}\")")),
+                "{name} has Rust blocks: include it in book/doctests.rs"
+            );
+        }
+    }
+}
+
+#[test]
 fn every_file_that_is_named_exists() {
     let mut missing = Vec::new();
     for (name, text) in pages() {
