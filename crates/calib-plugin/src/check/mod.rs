@@ -1,0 +1,361 @@
+//! Conformance of a plugin: does it keep the contract on data that it has never seen?
+//!
+//! ```text
+//! loads · describes fast · loads again · golden cases · degenerate data · same answer twice · eight threads ·
+//! stops when cancelled · huge input · memory
+//! ```
+//!
+//! Times are measured only to compare them with a limit; they stand in no result. A call that does not return is left
+//! behind in its thread. Libraries are never unloaded, so *loads again* means: opened and described again in the same
+//! process, as other parts of a program would do.
+
+mod cases;
+mod memory;
+mod motions;
+mod subject;
+mod watch;
+
+use std::{fmt, sync::Arc, time::Duration};
+
+use crate::{
+    answer::Failure,
+    host::{Cancel, Control, Host, LoadedPlugin, PluginError},
+};
+use cases::Cases;
+use subject::{Reply, Subject};
+
+/// Threads of the concurrent test, and calls of each.
+const THREADS: (usize, usize) = (8, 20);
+/// Times that a plugin is opened again.
+const REPEATS: usize = 20;
+
+/// What counts as too slow, and what as huge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// For `describe`. 100 ms: it does no work, and `calib plugins` calls it for every plugin.
+    pub describe: Duration,
+    /// For one call, the huge one included.
+    pub call: Duration,
+    /// From the wish to stop to the return. Plugins ask every 50 ms; the rest is for a busy machine.
+    pub cancel: Duration,
+    /// Samples of a huge motion; readers and writers get sixteen times as many bytes.
+    pub huge: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            describe: Duration::from_millis(100),
+            call: Duration::from_secs(60),
+            cancel: Duration::from_secs(2),
+            huge: 200_000,
+        }
+    }
+}
+
+/// How a test ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// As the contract says.
+    Passed,
+    /// Otherwise.
+    Failed,
+    /// It could not be made; the detail says why.
+    Skipped,
+}
+
+impl Outcome {
+    /// `ok`, `FAILED` or `skipped`.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Passed => "ok",
+            Self::Failed => "FAILED",
+            Self::Skipped => "skipped",
+        }
+    }
+}
+
+/// One test.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Row {
+    /// The plugin, or one of its offers.
+    pub subject: String,
+    /// What was tested.
+    pub test: &'static str,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Why, when it did not pass.
+    pub detail: String,
+}
+
+/// All tests of one plugin.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Conformance {
+    /// Its name, or what was asked for when it did not load.
+    pub plugin: String,
+    /// In the order they were made.
+    pub rows: Vec<Row>,
+}
+
+impl Conformance {
+    /// True when nothing failed.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        self.rows.iter().all(|row| row.outcome != Outcome::Failed)
+    }
+
+    /// The program's exit code: 0, or 6 when something failed.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        if self.passed() { 0 } else { 6 }
+    }
+
+    fn note(&mut self, subject: &str, test: &'static str, result: Result<(), String>) {
+        let (outcome, detail) = match result {
+            Ok(()) => (Outcome::Passed, String::new()),
+            Err(detail) => (Outcome::Failed, detail),
+        };
+        self.rows.push(Row {
+            subject: subject.to_string(),
+            test,
+            outcome,
+            detail,
+        });
+    }
+
+    fn skip(&mut self, subject: &str, test: &'static str, why: &str) {
+        self.rows.push(Row {
+            subject: subject.to_string(),
+            test,
+            outcome: Outcome::Skipped,
+            detail: why.to_string(),
+        });
+    }
+}
+
+impl fmt::Display for Conformance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = |of: fn(&Row) -> usize, head: usize| {
+            self.rows.iter().map(of).max().unwrap_or(0).max(head)
+        };
+        let subject = width(|row| row.subject.chars().count(), "offer".len());
+        let test = width(|row| row.test.chars().count(), "test".len());
+        writeln!(f, "plugin {}", self.plugin)?;
+        writeln!(f, "{:subject$}  {:test$}  result", "offer", "test")?;
+        for row in &self.rows {
+            write!(
+                f,
+                "{:subject$}  {:test$}  {}",
+                row.subject,
+                row.test,
+                row.outcome.word()
+            )?;
+            match row.detail.as_str() {
+                "" => writeln!(f)?,
+                detail => writeln!(f, ": {detail}")?,
+            }
+        }
+        let count = |outcome| {
+            self.rows
+                .iter()
+                .filter(|row| row.outcome == outcome)
+                .count()
+        };
+        let (failed, skipped) = (count(Outcome::Failed), count(Outcome::Skipped));
+        write!(
+            f,
+            "{} passed, {failed} failed, {skipped} skipped",
+            count(Outcome::Passed)
+        )
+    }
+}
+
+/// Tests a plugin.
+#[must_use]
+pub fn check(host: &Host, name_or_path: &str, limits: &Limits) -> Conformance {
+    let mut table = Conformance {
+        plugin: name_or_path.to_string(),
+        rows: Vec::new(),
+    };
+    let plugin = match host.load(name_or_path, None) {
+        Ok(plugin) => plugin,
+        Err(error) => {
+            table.note("plugin", "loads", Err(error.to_string()));
+            return table;
+        }
+    };
+    table.note("plugin", "loads", Ok(()));
+    let again = || host.load(name_or_path, None);
+    check_loaded(table, &plugin, again, limits)
+}
+
+/// Tests a plugin that is linked into the program.
+#[must_use]
+pub fn check_adopted(entry: &'static crate::abi::Entry, limits: &Limits) -> Conformance {
+    let mut table = Conformance {
+        plugin: "in the program".to_string(),
+        rows: Vec::new(),
+    };
+    match Host::adopt(entry) {
+        Ok(plugin) => check_loaded(table, &plugin, || Host::adopt(entry), limits),
+        Err(error) => {
+            table.note("plugin", "loads", Err(error.to_string()));
+            table
+        }
+    }
+}
+
+fn check_loaded(
+    mut table: Conformance,
+    plugin: &LoadedPlugin,
+    again: impl Fn() -> Result<LoadedPlugin, PluginError>,
+    limits: &Limits,
+) -> Conformance {
+    table.plugin = format!("{} {}", plugin.description.name, plugin.description.version);
+    for skipped in &plugin.description.skipped {
+        table.skip("plugin", "understood", skipped);
+    }
+    let described = plugin.described_in <= limits.describe;
+    table.note(
+        "plugin",
+        "describes fast",
+        described
+            .then_some(())
+            .ok_or_else(|| format!("{:?}, at most {:?}", plugin.described_in, limits.describe)),
+    );
+    let same = |_| match again() {
+        Ok(other) if other.description == plugin.description => Ok(()),
+        Ok(_) => Err("described itself differently".to_string()),
+        Err(error) => Err(error.to_string()),
+    };
+    table.note("plugin", "loads again", (0..REPEATS).try_for_each(same));
+
+    for subject in Subject::all(plugin) {
+        check_offer(&mut table, &Arc::new(subject), limits);
+    }
+    table
+}
+
+fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits) {
+    let title = subject.title.clone();
+    let cases = Cases::of(subject, limits.huge);
+
+    let mut hangs = false;
+    for (test, list) in [
+        ("golden cases", &cases.golden),
+        ("degenerate data", &cases.degenerate),
+    ] {
+        if list.is_empty() {
+            table.skip(&title, test, "a reader without an example");
+            continue;
+        }
+        let result = list.iter().try_for_each(|case| {
+            let said = watch::call(subject, &case.input, &Cancel::new(), limits.call)
+                .map_err(|late| late.to_string());
+            hangs |= said.is_err();
+            said.and_then(|reply| (case.judge)(&reply?))
+                .map_err(|problem| format!("{}: {problem}", case.name))
+        });
+        table.note(&title, test, result);
+    }
+    if hangs {
+        table.skip(&title, "the rest", "a call did not return");
+        return;
+    }
+    let Some(usual) = cases
+        .golden
+        .first()
+        .or(cases.degenerate.first())
+        .map(|c| c.input.clone())
+    else {
+        return;
+    };
+
+    // Text of the answer with all digits: the same means the same bits.
+    let answer = |subject: &Subject| format!("{:?}", subject.call(&usual, &Control::default()));
+    let first = answer(subject);
+    let same = |second: String| {
+        if second == first {
+            Ok(())
+        } else {
+            Err(format!("first {first}, then {second}"))
+        }
+    };
+    table.note(
+        &title,
+        "same answer twice",
+        (0..3).try_for_each(|_| same(answer(subject))),
+    );
+
+    let (threads, calls) = THREADS;
+    let answers: Vec<String> = std::thread::scope(|scope| {
+        let one = || (0..calls).map(|_| answer(subject)).collect::<Vec<_>>();
+        let running: Vec<_> = (0..threads).map(|_| scope.spawn(one)).collect();
+        running
+            .into_iter()
+            .flat_map(|thread| {
+                thread
+                    .join()
+                    .unwrap_or_else(|_| vec!["a panic".to_string()])
+            })
+            .collect()
+    });
+    table.note(
+        &title,
+        "eight threads",
+        answers.into_iter().try_for_each(same),
+    );
+
+    let cancelled = Cancel::new();
+    cancelled.cancel();
+    let in_time = watch::call(subject, &cases.huge, &cancelled, limits.cancel)
+        .and_then(|_| {
+            // Cancelled while it works.
+            let cancel = Cancel::new();
+            let later = cancel.clone();
+            std::thread::spawn(move || {
+                std::thread::sleep(Duration::from_millis(20));
+                later.cancel();
+            });
+            watch::call(
+                subject,
+                &cases.huge,
+                &cancel,
+                limits.cancel + Duration::from_millis(20),
+            )
+        })
+        .map_err(|late| late.to_string())
+        .and_then(|reply| match reply {
+            Err(broken) => Err(broken),
+            Ok(_) => Ok(()),
+        });
+    let hangs = in_time.is_err();
+    table.note(&title, "stops when cancelled", in_time);
+    if hangs {
+        table.skip(&title, "huge input", "a call did not stop");
+        table.skip(&title, "memory", "a call did not stop");
+        return;
+    }
+    let huge = watch::call(subject, &cases.huge, &Cancel::new(), limits.call)
+        .map_err(|late| late.to_string())
+        .and_then(|reply| reply.map(drop));
+    table.note(&title, "huge input", huge);
+
+    match memory::growth(|| drop(answer(subject))) {
+        Ok(result) => table.note(&title, "memory", result),
+        Err(why) => table.skip(&title, "memory", why),
+    }
+}
+
+/// A reply, or the fault of a plugin; a refusal with a reason is a reply.
+fn judged(reply: Result<Reply, PluginError>) -> Result<Reply, String> {
+    match reply {
+        Err(PluginError::Call {
+            failure: failure @ (Failure::Contract(_) | Failure::Panicked(_)),
+            ..
+        }) => Err(failure.to_string()),
+        Err(error) => Ok(Reply::Refused(error.to_string())),
+        Ok(reply) => Ok(reply),
+    }
+}

@@ -1,0 +1,192 @@
+//! A complete plugin project: build, test, README. It needs nothing that is not in it but a compiler.
+
+use std::path::{Path, PathBuf};
+
+/// The language of a new plugin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Language {
+    /// Cargo project with the author's side of the contract inside.
+    Rust,
+    /// One C file, a Makefile, and the header.
+    C,
+}
+
+impl Language {
+    /// The language with this name.
+    ///
+    /// # Errors
+    /// [`NewProjectError::Language`].
+    pub fn from_name(name: &str) -> Result<Self, NewProjectError> {
+        match name {
+            "rust" => Ok(Self::Rust),
+            "c" => Ok(Self::C),
+            other => Err(NewProjectError::Language {
+                got: other.to_string(),
+            }),
+        }
+    }
+}
+
+/// Why no project was made.
+#[derive(Debug, thiserror::Error)]
+pub enum NewProjectError {
+    /// Not a language there is a template for.
+    #[error("unknown language `{got}`, expected one of `rust`, `c`")]
+    Language {
+        /// What was asked for.
+        got: String,
+    },
+    /// Not a name for a library, a crate and a plugin at once.
+    #[error(
+        "`{got}` is not a plugin name: lower-case letters, digits and `-`, a letter first, at most 64"
+    )]
+    Name {
+        /// What was asked for.
+        got: String,
+    },
+    /// Something is there already.
+    #[error("{path} exists already")]
+    Exists {
+        /// The folder.
+        path: String,
+    },
+    /// The files cannot be written.
+    #[error("{path}: cannot be written: {source}")]
+    Write {
+        /// The file or folder.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+/// `calib-plugin/src` of a Rust project: this crate's own files.
+const AUTHOR_SIDE: &[(&str, &str)] = &[
+    ("abi.rs", include_str!("abi.rs")),
+    ("answer.rs", include_str!("answer.rs")),
+    ("author/aor.rs", include_str!("author/aor.rs")),
+    ("author/border.rs", include_str!("author/border.rs")),
+    ("author/cor.rs", include_str!("author/cor.rs")),
+    ("author/exported.rs", include_str!("author/exported.rs")),
+    ("author/mod.rs", include_str!("author/mod.rs")),
+    ("author/motion.rs", include_str!("author/motion.rs")),
+    ("author/reader.rs", include_str!("author/reader.rs")),
+    ("author/report.rs", include_str!("author/report.rs")),
+    ("call.rs", include_str!("call.rs")),
+    ("kinds.rs", include_str!("kinds.rs")),
+    (
+        "lib.rs",
+        include_str!("../templates/rust/calib-plugin.rs.in"),
+    ),
+    ("motion.rs", include_str!("motion.rs")),
+    ("offer.rs", include_str!("offer.rs")),
+    ("streams.rs", include_str!("streams.rs")),
+];
+
+/// Makes the folder `folder/name` with a complete project, and returns its path.
+///
+/// # Errors
+/// [`NewProjectError`]; then nothing is left behind.
+pub fn new_project(
+    name: &str,
+    language: Language,
+    folder: &Path,
+) -> Result<PathBuf, NewProjectError> {
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    let good = name.starts_with(|c: char| c.is_ascii_lowercase()) && name.chars().all(plain);
+    // The two crates of a Rust project must differ.
+    if !good || name.len() > 64 || name == "calib-plugin" {
+        return Err(NewProjectError::Name {
+            got: name.to_string(),
+        });
+    }
+    let project = folder.join(name);
+    if project.exists() {
+        return Err(NewProjectError::Exists {
+            path: project.display().to_string(),
+        });
+    }
+    // Written beside and renamed: no half a project.
+    let beside = folder.join(format!(".{name}.new"));
+    let made = write_all(&beside, &files(name, language)).and_then(|()| {
+        std::fs::rename(&beside, &project).map_err(|source| failed(&project, source))
+    });
+    if made.is_err() {
+        // The error that counts is the first.
+        let _ = std::fs::remove_dir_all(&beside);
+    }
+    made.map(|()| project)
+}
+
+fn failed(path: &Path, source: std::io::Error) -> NewProjectError {
+    NewProjectError::Write {
+        path: path.display().to_string(),
+        source,
+    }
+}
+
+fn write_all(folder: &Path, files: &[(String, String)]) -> Result<(), NewProjectError> {
+    for (name, text) in files {
+        let path = folder.join(name);
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).map_err(|source| failed(parent, source))?;
+        }
+        std::fs::write(&path, text).map_err(|source| failed(&path, source))?;
+    }
+    Ok(())
+}
+
+fn files(name: &str, language: Language) -> Vec<(String, String)> {
+    let offer = name.replace('-', "_");
+    let library = format!(
+        "{}{}{}",
+        std::env::consts::DLL_PREFIX,
+        name.replace('-', "_"),
+        std::env::consts::DLL_SUFFIX
+    );
+    let filled = |path: &str, template: &str| {
+        let text = template
+            .replace("@NAME@", name)
+            .replace("@OFFER@", &offer)
+            .replace("@LIBRARY@", &library)
+            .replace("@VERSION@", env!("CARGO_PKG_VERSION"));
+        (path.to_string(), text)
+    };
+    match language {
+        Language::Rust => {
+            let mut files = vec![
+                filled(
+                    "Cargo.toml",
+                    include_str!("../templates/rust/Cargo.toml.in"),
+                ),
+                filled("README.md", include_str!("../templates/rust/README.md.in")),
+                filled("src/lib.rs", include_str!("../templates/rust/lib.rs.in")),
+                (".gitignore".to_string(), "target/\n".to_string()),
+                filled(
+                    "calib-plugin/Cargo.toml",
+                    include_str!("../templates/rust/calib-plugin.toml.in"),
+                ),
+            ];
+            files.extend(
+                AUTHOR_SIDE
+                    .iter()
+                    .map(|(path, text)| (format!("calib-plugin/src/{path}"), (*text).to_string())),
+            );
+            files
+        }
+        Language::C => vec![
+            filled("plugin.c", include_str!("../templates/c/plugin.c.in")),
+            filled("test.c", include_str!("../templates/c/test.c.in")),
+            filled("Makefile", include_str!("../templates/c/Makefile.in")),
+            filled("README.md", include_str!("../templates/c/README.md.in")),
+            (
+                ".gitignore".to_string(),
+                "*.so\n*.dylib\ntest-plugin\n".to_string(),
+            ),
+            (
+                "include/calib_plugin.h".to_string(),
+                crate::HEADER.to_string(),
+            ),
+        ],
+    }
+}
