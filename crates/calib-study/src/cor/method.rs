@@ -1,0 +1,79 @@
+//! An estimator of the table, and how a study uses it.
+
+use calib_cor::{EstimatorInfo, Input, Options, estimators};
+use nalgebra::Vector3;
+
+use crate::{
+    cell::Quantity,
+    tally::{Row, Tally},
+};
+
+/// The data a method is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Gets {
+    Points,
+    Poses,
+}
+
+/// One way of using one estimator.
+pub(crate) struct Method {
+    pub name: &'static str,
+    pub info: &'static EstimatorInfo,
+    pub gets: Gets,
+    /// The tracker states its noise.
+    pub known: bool,
+    /// Runs in every so-manieth trial: the slow ones.
+    pub every: u64,
+}
+
+/// The method `name` by estimator `id`; `None` where the table has no such estimator.
+pub(crate) fn method(
+    name: &'static str,
+    id: &str,
+    gets: Gets,
+    known: bool,
+    every: u64,
+) -> Option<Method> {
+    let info = estimators().iter().find(|e| e.id == id)?;
+    Some(Method {
+        name,
+        info,
+        gets,
+        known,
+        every,
+    })
+}
+
+impl Method {
+    pub fn row(&self, bound: Option<f64>) -> Row {
+        Row {
+            method: self.name.to_owned(),
+            estimator: self.info.id,
+            quantity: Quantity::Center,
+            bound,
+        }
+    }
+}
+
+/// Runs an estimator and records the error of its center.
+pub(crate) fn record(
+    info: &EstimatorInfo,
+    input: &Input<'_>,
+    options: &Options,
+    truth: &Vector3<f64>,
+    linear: Option<Vector3<f64>>,
+    tally: &mut Tally,
+) {
+    match (info.fit)(input, options) {
+        Ok(outcome) => match outcome.estimate() {
+            Some(e) => tally.error(
+                outcome.is_observable(),
+                e.center.coords - truth,
+                e.covariance.trace(),
+                linear,
+            ),
+            None => tally.verdict(false, false),
+        },
+        Err(_) => tally.verdict(false, false),
+    }
+}

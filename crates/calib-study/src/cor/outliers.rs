@@ -1,0 +1,229 @@
+//! Three tenths of the poses are somewhere else.
+//!
+//! Each trial draws a clean recording, moves exactly 30 % of its poses by up to the reach in every coordinate, and asks: the robust
+//! estimators with all samples, the plain estimator with the clean recording (the yardstick), and the plain estimator
+//! with the moved ones (what happens without protection). With seven tenths left, 1/√0.7 = 1.20 is what perfect
+//! knowledge of them gives on average; with few poses, which ones are lost matters.
+
+use calib_cor::{EstimatorInfo, Input, Options, Pose, estimators};
+use nalgebra::{Point3, Vector3};
+
+use super::{
+    method::{Gets, record},
+    poses::{Ball, CENTER},
+};
+use crate::{
+    cell::{Quantity, Scene},
+    experiment::Experiment,
+    motion::Range,
+    noise::Noise,
+    tally::{Row, Tally},
+};
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Sees {
+    Clean,
+    /// Only the poses that were not moved: perfect knowledge.
+    Left,
+    Moved,
+}
+
+struct Use {
+    info: &'static EstimatorInfo,
+    gets: Gets,
+    sees: Sees,
+    known: bool,
+}
+
+pub(crate) struct OutlierScene {
+    scene: Scene,
+    ball: Ball,
+    reach: f64,
+    uses: Vec<Use>,
+    rows: Vec<Row>,
+}
+
+impl OutlierScene {
+    pub fn new(scene: Scene, reach: f64) -> Self {
+        let ball = Ball::new(Range::Hand.turns(scene.samples), &scene);
+        let table = [
+            (
+                "ml_sphere, clean",
+                "ml_sphere",
+                Gets::Points,
+                Sees::Clean,
+                false,
+            ),
+            (
+                "ml_sphere, inliers",
+                "ml_sphere",
+                Gets::Points,
+                Sees::Left,
+                false,
+            ),
+            ("ml_sphere", "ml_sphere", Gets::Points, Sees::Moved, false),
+            ("robust, points", "robust", Gets::Points, Sees::Moved, false),
+            (
+                "robust, points, σ known",
+                "robust",
+                Gets::Points,
+                Sees::Moved,
+                true,
+            ),
+            (
+                "consensus, points",
+                "consensus",
+                Gets::Points,
+                Sees::Moved,
+                false,
+            ),
+            (
+                "consensus, points, σ known",
+                "consensus",
+                Gets::Points,
+                Sees::Moved,
+                true,
+            ),
+            (
+                "hotspot_ml, clean",
+                "hotspot_ml",
+                Gets::Poses,
+                Sees::Clean,
+                false,
+            ),
+            (
+                "hotspot_ml, inliers",
+                "hotspot_ml",
+                Gets::Poses,
+                Sees::Left,
+                false,
+            ),
+            ("hotspot_ml", "hotspot_ml", Gets::Poses, Sees::Moved, false),
+            ("robust, poses", "robust", Gets::Poses, Sees::Moved, false),
+            (
+                "robust, poses, σ known",
+                "robust",
+                Gets::Poses,
+                Sees::Moved,
+                true,
+            ),
+            (
+                "consensus, poses",
+                "consensus",
+                Gets::Poses,
+                Sees::Moved,
+                false,
+            ),
+            (
+                "consensus, poses, σ known",
+                "consensus",
+                Gets::Poses,
+                Sees::Moved,
+                true,
+            ),
+        ];
+        let (mut uses, mut rows) = (Vec::new(), Vec::new());
+        for (name, id, gets, sees, known) in table {
+            if let Some(info) = estimators().iter().find(|e| e.id == id) {
+                rows.push(Row {
+                    method: name.to_owned(),
+                    estimator: info.id,
+                    quantity: Quantity::Center,
+                    // The bound of the clean recording; with outliers nobody reaches it.
+                    bound: ball.bound(gets),
+                });
+                uses.push(Use {
+                    info,
+                    gets,
+                    sees,
+                    known,
+                });
+            }
+        }
+        Self {
+            scene: Scene {
+                condition: format!("30 % outliers, ±{} mm", reach * 1e3),
+                ..scene
+            },
+            ball,
+            reach,
+            uses,
+            rows,
+        }
+    }
+}
+
+impl Experiment for OutlierScene {
+    fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// Consensus is a hundred times slower than a plain fit.
+    fn trials(&self, base: u64) -> u64 {
+        base.div_ceil(2)
+    }
+
+    fn trial(&self, _: u64, noise: &mut Noise, tallies: &mut [Tally]) {
+        let draw = self.ball.draw(noise);
+        let n = draw.poses.len();
+        let mut moved = draw.poses.clone();
+        let mut left = draw.poses.clone();
+        let mut to_move = 3 * n / 10;
+        while to_move > 0 {
+            let k = noise.below(n);
+            if left[k].take().is_some()
+                && let Some(pose) = moved[k].as_mut()
+            {
+                pose.translation += Vector3::from_fn(|_, _| self.reach * noise.between(-1.0, 1.0));
+                to_move -= 1;
+            }
+        }
+        for (one, tally) in self.uses.iter().zip(tallies) {
+            let poses = match one.sees {
+                Sees::Clean => &draw.poses,
+                Sees::Left => &left,
+                Sees::Moved => &moved,
+            };
+            let options = match (one.known, one.gets) {
+                (false, _) => Options::default(),
+                (true, Gets::Poses) => self.ball.options(true),
+                (true, Gets::Points) => Options {
+                    sigma_r: None,
+                    ..self.ball.options(true)
+                },
+            };
+            match one.gets {
+                Gets::Poses => record(
+                    one.info,
+                    &Input::Poses(poses),
+                    &options,
+                    &CENTER,
+                    None,
+                    tally,
+                ),
+                Gets::Points => {
+                    let tracks = [origins(poses)];
+                    record(
+                        one.info,
+                        &Input::Points(&tracks),
+                        &options,
+                        &CENTER,
+                        None,
+                        tally,
+                    );
+                }
+            }
+        }
+    }
+}
+
+fn origins(poses: &[Option<Pose>]) -> Vec<Option<Point3<f64>>> {
+    poses
+        .iter()
+        .map(|p| p.map(|p| Point3::from(p.translation)))
+        .collect()
+}

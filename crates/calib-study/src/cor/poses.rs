@@ -1,0 +1,366 @@
+//! One body on a ball joint: the paper's grid, short arcs, and noise along the line of sight.
+//!
+//! ```text
+//! t_i = o − R_i p + ε_i,  R̃_i = R_i exp(φ_i)          ε ~ N(0, σ_t² I),  φ ~ N(0, σ_r² I)         (1)
+//! points:  e* = C Σ w_i (u_i − ū)(u_i·ε_i)             u_i from the center to the body               (2)
+//! poses:   e* = C Σ A_iᵀ Σ_i⁻¹ (R_i (φ_i × p) + ε_i)   A_i = [I  −R_i]                               (3)
+//! ```
+
+use calib_cor::{EstimatorInfo, Input, Options, Pose, bounds, estimators};
+use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
+
+use super::method::{Gets, Method, method, record};
+use crate::{
+    cell::{Part, Scene},
+    experiment::Experiment,
+    motion::Range,
+    noise::Noise,
+    tally::{Row, Tally},
+};
+
+/// The center in the tracker's frame, m: a tripod's distance away, no coordinate special.
+pub(crate) const CENTER: Vector3<f64> = Vector3::new(1.2, -0.8, 0.9);
+
+/// Orientation noise that stands for "none" where an estimator wants a positive number, rad.
+const NO_TURN: f64 = 1e-6;
+
+/// The center in the body's frame: across both axes of the grid.
+pub(crate) fn body_point(radius: f64) -> Vector3<f64> {
+    Vector3::new(0.0, -radius, 0.0)
+}
+
+/// Marker positions and poses of one trial.
+pub(crate) struct Draw {
+    pub tracks: Vec<Vec<Option<Point3<f64>>>>,
+    pub poses: Vec<Option<Pose>>,
+    /// (2) and (3), where their matrices are known.
+    pub of_points: Vector3<f64>,
+    pub of_poses: Vector3<f64>,
+}
+
+/// A ball joint with a body and noise (1).
+pub(crate) struct Ball {
+    turns: Vec<UnitQuaternion<f64>>,
+    point: Vector3<f64>,
+    sigma_t: f64,
+    sigma_r: f64,
+    /// Trace of the bound from positions alone, and from poses.
+    pub bound_points: Option<f64>,
+    pub bound_poses: Option<f64>,
+    /// Factors of ε_i in (2), of the residual in (3).
+    by_points: Vec<Matrix3<f64>>,
+    by_poses: Vec<Matrix3<f64>>,
+}
+
+impl Ball {
+    pub fn new(turns: Vec<UnitQuaternion<f64>>, scene: &Scene) -> Self {
+        let point = body_point(scene.radius_m);
+        let (sigma_t, sigma_r) = (scene.sigma_t_m, scene.sigma_r_rad);
+        let arms: Vec<Vector3<f64>> = turns.iter().map(|r| -(r * point)).collect();
+        let n = arms.len() as f64;
+        let directions: Vec<Vector3<f64>> = arms.iter().map(Vector3::normalize).collect();
+        let mean = directions.iter().sum::<Vector3<f64>>() / n;
+        let points = bounds::sphere_center(&[arms], sigma_t);
+        let by_points = points.map_or_else(Vec::new, |c| {
+            let c = c / (sigma_t * sigma_t);
+            let factor = |u: &Vector3<f64>| c * (u - mean) * u.transpose();
+            directions.iter().map(factor).collect()
+        });
+        let truth: Vec<Pose> = turns
+            .iter()
+            .map(|r| Pose {
+                rotation: r.to_rotation_matrix().into_inner(),
+                translation: CENTER - r * point,
+            })
+            .collect();
+        let poses = bounds::hot_spot(&truth, &point, sigma_t, sigma_r);
+        let by_poses = poses.map_or_else(Vec::new, |c| {
+            let unit = point.normalize();
+            let along = unit * unit.transpose();
+            let across = sigma_t.powi(2) + sigma_r.powi(2) * point.norm_squared();
+            let weight = along / sigma_t.powi(2) + (Matrix3::identity() - along) / across;
+            let top_left: Matrix3<f64> = c.fixed_view::<3, 3>(0, 0).into();
+            let top_right: Matrix3<f64> = c.fixed_view::<3, 3>(0, 3).into();
+            let factor = |pose: &Pose| {
+                let r = pose.rotation;
+                (top_left - top_right * r.transpose()) * (r * weight * r.transpose())
+            };
+            truth.iter().map(factor).collect()
+        });
+        Self {
+            turns,
+            point,
+            sigma_t,
+            sigma_r,
+            bound_points: points.map(|c| c.trace()),
+            bound_poses: poses.map(|c| c.fixed_view::<3, 3>(0, 0).trace()),
+            by_points,
+            by_poses,
+        }
+    }
+
+    pub fn draw(&self, noise: &mut Noise) -> Draw {
+        let mut draw = Draw {
+            tracks: vec![Vec::with_capacity(self.turns.len())],
+            poses: Vec::with_capacity(self.turns.len()),
+            of_points: Vector3::zeros(),
+            of_poses: Vector3::zeros(),
+        };
+        for (k, turn) in self.turns.iter().enumerate() {
+            let epsilon = noise.vector(self.sigma_t);
+            let phi = noise.vector(self.sigma_r);
+            let translation = CENTER - turn * self.point + epsilon;
+            let measured = turn * UnitQuaternion::from_scaled_axis(phi);
+            draw.tracks[0].push(Some(Point3::from(translation)));
+            draw.poses.push(Some(Pose {
+                rotation: measured.to_rotation_matrix().into_inner(),
+                translation,
+            }));
+            if let Some(factor) = self.by_points.get(k) {
+                draw.of_points += factor * epsilon;
+            }
+            if let Some(factor) = self.by_poses.get(k) {
+                draw.of_poses += factor * (turn * phi.cross(&self.point) + epsilon);
+            }
+        }
+        draw
+    }
+
+    pub fn options(&self, known: bool) -> Options {
+        Options {
+            sigma_t: known.then_some(self.sigma_t),
+            sigma_r: known.then_some(self.sigma_r.max(NO_TURN)),
+            ..Options::default()
+        }
+    }
+
+    pub fn bound(&self, gets: Gets) -> Option<f64> {
+        match gets {
+            Gets::Points => self.bound_points,
+            Gets::Poses => self.bound_poses,
+        }
+    }
+}
+
+/// Methods on one ball.
+pub(crate) struct PoseScene {
+    scene: Scene,
+    ball: Ball,
+    methods: Vec<Method>,
+    rows: Vec<Row>,
+    stated: Options,
+    unstated: Options,
+}
+
+impl PoseScene {
+    /// The paper's grid. Positions do not depend on orientation noise: the point estimators that are not the paper's run
+    /// where it is zero; the robust ones for poses at 1°.
+    pub fn paper(range: Range, scene: Scene) -> Self {
+        let scene = Scene {
+            motion: range.word().to_owned(),
+            ..scene
+        };
+        let turns = range.turns(scene.samples);
+        let mut methods = vec![
+            method("hse", "hse", Gets::Poses, false, 1),
+            method("hsa", "hsa", Gets::Poses, false, 1),
+            method("sfe", "sfe", Gets::Points, false, 1),
+            method("hotspot_ml", "hotspot_ml", Gets::Poses, false, 1),
+            method("hotspot_ml, σ known", "hotspot_ml", Gets::Poses, true, 1),
+        ];
+        let turn_deg = scene.sigma_r_rad.to_degrees();
+        let head = range == Range::Head;
+        if turn_deg < 0.01 || head {
+            methods.extend([
+                method("sfa", "sfa", Gets::Points, false, 20),
+                method("kasa", "kasa", Gets::Points, false, 1),
+                method("taubin", "taubin", Gets::Points, false, 1),
+                method("hyper", "hyper", Gets::Points, false, 1),
+                method("gamage_lasenby", "gamage_lasenby", Gets::Points, false, 1),
+                method("halvorsen", "halvorsen", Gets::Points, false, 1),
+                method("ml_sphere", "ml_sphere", Gets::Points, false, 1),
+                method("ml_sphere, σ known", "ml_sphere", Gets::Points, true, 1),
+                method("robust, points", "robust", Gets::Points, false, 10),
+                method("consensus, points", "consensus", Gets::Points, false, 10),
+            ]);
+        }
+        if (0.99..1.01).contains(&turn_deg) {
+            methods.extend([
+                method("robust, poses", "robust", Gets::Poses, false, 10),
+                method("consensus, poses", "consensus", Gets::Poses, false, 10),
+            ]);
+        }
+        Self::with(scene, turns, methods)
+    }
+
+    /// A range of motion in the study of bias.
+    pub fn arc(motion: String, turns: Vec<UnitQuaternion<f64>>, scene: Scene) -> Self {
+        let methods = vec![
+            method("kasa", "kasa", Gets::Points, false, 1),
+            method("sfe", "sfe", Gets::Points, false, 1),
+            method("taubin", "taubin", Gets::Points, false, 1),
+            method("hyper", "hyper", Gets::Points, false, 1),
+            method("ml_sphere", "ml_sphere", Gets::Points, false, 1),
+            method("hse", "hse", Gets::Poses, false, 1),
+            method("hotspot_ml, σ known", "hotspot_ml", Gets::Poses, true, 1),
+        ];
+        Self::with(Scene { motion, ..scene }, turns, methods)
+    }
+
+    fn with(scene: Scene, turns: Vec<UnitQuaternion<f64>>, methods: Vec<Option<Method>>) -> Self {
+        let ball = Ball::new(turns, &scene);
+        let methods: Vec<Method> = methods.into_iter().flatten().collect();
+        let rows = methods.iter().map(|m| m.row(ball.bound(m.gets))).collect();
+        Self {
+            stated: ball.options(true),
+            unstated: ball.options(false),
+            scene,
+            ball,
+            methods,
+            rows,
+        }
+    }
+}
+
+impl Experiment for PoseScene {
+    fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    fn trial(&self, number: u64, noise: &mut Noise, tallies: &mut [Tally]) {
+        let draw = self.ball.draw(noise);
+        for (method, tally) in self.methods.iter().zip(tallies) {
+            if !number.is_multiple_of(method.every) {
+                continue;
+            }
+            let (input, linear) = match method.gets {
+                Gets::Points => (Input::Points(&draw.tracks), draw.of_points),
+                Gets::Poses => (Input::Poses(&draw.poses), draw.of_poses),
+            };
+            let options = if method.known {
+                &self.stated
+            } else {
+                &self.unstated
+            };
+            record(method.info, &input, options, &CENTER, Some(linear), tally);
+        }
+    }
+}
+
+/// Noise that is `ratio` times larger along the line of sight than σ across it.
+///
+/// ```text
+/// Σ = σ² (I + (ratio² − 1) s sᵀ),   information of a sample along its radius: w_i = 1 / u_iᵀ Σ u_i
+/// C = ( Σ w_i (u_i − ū)(u_i − ū)ᵀ )⁻¹,   ū weighted: the common radius is eliminated
+/// ```
+pub(crate) struct DepthScene {
+    scene: Scene,
+    arms: Vec<Vector3<f64>>,
+    /// Root of Σ over σ.
+    root: Matrix3<f64>,
+    factors: Vec<Matrix3<f64>>,
+    methods: Vec<(&'static EstimatorInfo, Options)>,
+    rows: Vec<Row>,
+}
+
+impl DepthScene {
+    pub fn new(scene: Scene, ratio: f64) -> Self {
+        let sigma = scene.sigma_t_m;
+        let sight = Vector3::new(0.55, 0.8, -0.25).normalize();
+        let root = Matrix3::identity() + sight * sight.transpose() * (ratio - 1.0);
+        let covariance = root * root * (sigma * sigma);
+        let point = body_point(scene.radius_m);
+        let arms: Vec<Vector3<f64>> = Range::Hand
+            .turns(scene.samples)
+            .iter()
+            .map(|r| -(r * point))
+            .collect();
+        let directions: Vec<Vector3<f64>> = arms.iter().map(Vector3::normalize).collect();
+        let weights: Vec<f64> = directions
+            .iter()
+            .map(|u| 1.0 / u.dot(&(covariance * u)))
+            .collect();
+        let weighted = || directions.iter().zip(&weights);
+        let mean =
+            weighted().map(|(u, w)| u * *w).sum::<Vector3<f64>>() / weights.iter().sum::<f64>();
+        let information: Matrix3<f64> = weighted()
+            .map(|(u, w)| (u - mean) * (u - mean).transpose() * *w)
+            .sum();
+        let bound = information.cholesky().map(|c| c.inverse());
+        let factors = bound.map_or_else(Vec::new, |c| {
+            weighted()
+                .map(|(u, w)| c * (u - mean) * u.transpose() * *w)
+                .collect()
+        });
+        let weighted_options = Options {
+            covariances: vec![vec![covariance; arms.len()]],
+            ..Options::default()
+        };
+        let uses = [
+            ("sfe", "sfe", Options::default()),
+            ("ml_sphere", "ml_sphere", Options::default()),
+            ("ml_sphere, covariances", "ml_sphere", weighted_options),
+        ];
+        let (mut methods, mut rows) = (Vec::new(), Vec::new());
+        for (name, id, options) in uses {
+            if let Some(info) = estimators().iter().find(|e| e.id == id) {
+                rows.push(Row {
+                    method: name.to_owned(),
+                    estimator: info.id,
+                    quantity: crate::cell::Quantity::Center,
+                    bound: bound.map(|c| c.trace()),
+                });
+                methods.push((info, options));
+            }
+        }
+        Self {
+            scene: Scene {
+                condition: format!("depth × {ratio}"),
+                part: Part::Depth,
+                ..scene
+            },
+            arms,
+            root,
+            factors,
+            methods,
+            rows,
+        }
+    }
+}
+
+impl Experiment for DepthScene {
+    fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    fn trial(&self, _: u64, noise: &mut Noise, tallies: &mut [Tally]) {
+        let mut linear = Vector3::zeros();
+        let mut track = Vec::with_capacity(self.arms.len());
+        for (k, arm) in self.arms.iter().enumerate() {
+            let epsilon = self.root * noise.vector(self.scene.sigma_t_m);
+            track.push(Some(Point3::from(CENTER + arm + epsilon)));
+            if let Some(factor) = self.factors.get(k) {
+                linear += factor * epsilon;
+            }
+        }
+        let tracks = [track];
+        for ((info, options), tally) in self.methods.iter().zip(tallies) {
+            record(
+                info,
+                &Input::Points(&tracks),
+                options,
+                &CENTER,
+                Some(linear),
+                tally,
+            );
+        }
+    }
+}

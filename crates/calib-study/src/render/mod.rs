@@ -1,0 +1,53 @@
+//! A finished study as tables and pictures. Renderers compute nothing.
+
+mod csv;
+mod markdown;
+mod svg;
+pub(crate) mod text;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use crate::{
+    run::{StudyError, StudyResult},
+    state::{failed, write_whole},
+};
+
+pub use csv::csv;
+pub use markdown::markdown;
+pub use svg::{Figure, svg};
+
+/// All of the result, every bit kept.
+#[must_use]
+pub fn json(result: &StudyResult) -> String {
+    // Numbers, words and options: nothing that serde_json could refuse.
+    let mut text = serde_json::to_string_pretty(result).unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+/// Writes `<study>.csv`, `.json`, `.md` and `<study>-<figure>.svg` into `folder`; returns the paths.
+///
+/// # Errors
+/// [`StudyError::File`] where the folder or a file cannot be written.
+pub fn write(result: &StudyResult, folder: &Path) -> Result<Vec<PathBuf>, StudyError> {
+    fs::create_dir_all(folder).map_err(failed(folder, "create the folder"))?;
+    let word = result.study.word();
+    let mut files = vec![
+        (format!("{word}.csv"), csv(result)),
+        (format!("{word}.json"), json(result)),
+        (format!("{word}.md"), markdown(result)),
+    ];
+    for figure in svg(result) {
+        files.push((format!("{}.svg", figure.name), figure.svg));
+    }
+    let mut written = Vec::new();
+    for (name, text) in files {
+        let path = folder.join(name);
+        write_whole(&path, &text)?;
+        written.push(path);
+    }
+    Ok(written)
+}

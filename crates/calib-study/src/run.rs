@@ -1,0 +1,252 @@
+//! Runs a study: scenes and blocks of trials in parallel, the same result for any number of threads.
+
+use std::{
+    path::PathBuf,
+    sync::{
+        Mutex,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    aor,
+    cell::{Cell, Quantity},
+    claims::{self, Claim},
+    cor,
+    experiment::Experiment,
+    held::{self, Standard},
+    noise::Noise,
+    state::State,
+    tally::Tally,
+};
+
+/// Trials that one thread does at a stretch: sums are joined block by block, whoever ran them.
+const BLOCK: u64 = 50;
+
+/// Which study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Study {
+    /// Centers of rotation: paper §3.3.
+    Cor,
+    /// Axes of rotation and frames: paper §4 and §5.2.
+    Aor,
+}
+
+impl Study {
+    /// `cor` or `aor`: the word on the command line, and the stem of the files.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Cor => "cor",
+            Self::Aor => "aor",
+        }
+    }
+
+    pub(crate) fn plan(self) -> Vec<Box<dyn Experiment>> {
+        match self {
+            Self::Cor => cor::plan(),
+            Self::Aor => aor::plan(),
+        }
+    }
+}
+
+/// Settings of a study.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StudyOptions {
+    /// Trials of an ordinary cell; slow methods take a stated part of them, error rates a multiple. 1500: efficiencies
+    /// to about 0.005, one million fits for the study of centers.
+    pub trials: u64,
+    /// Seed of all draws.
+    pub seed: u64,
+    /// Threads; `None`: as many as there are processors.
+    pub threads: Option<usize>,
+    /// Folder of the state file `<study>.state.jsonl`, where finished scenes are kept; `None`: nothing is written.
+    pub out: Option<PathBuf>,
+    /// Keep the finished scenes of an earlier run with the same settings; otherwise start anew.
+    pub resume: bool,
+}
+
+impl Default for StudyOptions {
+    fn default() -> Self {
+        Self {
+            trials: 1500,
+            seed: 1,
+            threads: None,
+            out: None,
+            resume: false,
+        }
+    }
+}
+
+/// A study that cannot be run.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// No trials.
+    #[error("a study needs at least 1 trial, got {got}")]
+    NoTrials {
+        /// Trials asked for.
+        got: u64,
+    },
+    /// Threads cannot be started.
+    #[error("cannot start {threads} threads")]
+    Threads {
+        /// Threads asked for (0: one for each processor).
+        threads: usize,
+        /// Why.
+        source: rayon::ThreadPoolBuildError,
+    },
+    /// A file cannot be read or written.
+    #[error("{}: cannot {action}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The state file belongs to another study or other settings.
+    #[error("{}: holds {found}, this run is {expected}: finish that one, or start anew without resuming", path.display())]
+    OtherState {
+        /// The file.
+        path: PathBuf,
+        /// Settings in the file.
+        found: String,
+        /// Settings of this run.
+        expected: String,
+    },
+}
+
+/// A finished study, as data.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StudyResult {
+    /// Version of this layout.
+    pub calib_study: u32,
+    /// Which study.
+    pub study: Study,
+    /// Trials of an ordinary cell.
+    pub trials: u64,
+    /// Seed of all draws.
+    pub seed: u64,
+    /// Estimates made in all trials of all cells.
+    pub fits: u64,
+    /// What the estimators are required to reach, and whether they do.
+    pub standards: Vec<Standard>,
+    /// What the paper says, beside what was measured.
+    pub claims: Vec<Claim>,
+    /// Every cell, in the order of the plan.
+    pub cells: Vec<Cell>,
+}
+
+/// Runs a study. `progress(done, total)` counts trials and is called from any thread.
+///
+/// # Errors
+/// [`StudyError`] for no trials, threads that cannot be started, and a state file that cannot be used.
+pub fn run(
+    study: Study,
+    options: &StudyOptions,
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<StudyResult, StudyError> {
+    if options.trials == 0 {
+        return Err(StudyError::NoTrials { got: 0 });
+    }
+    let plan = study.plan();
+    let state = State::open(study, options)?;
+    let threads = options.threads.unwrap_or(0);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|source| StudyError::Threads { threads, source })?;
+
+    let total = plan.iter().map(|e| e.trials(options.trials)).sum();
+    let done = AtomicU64::new(0);
+    let advance = |trials: u64| {
+        progress(done.fetch_add(trials, Ordering::Relaxed) + trials, total);
+    };
+    let state = Mutex::new(state);
+    let cells: Vec<Vec<Cell>> = pool.install(|| {
+        plan.par_iter()
+            .with_max_len(1)
+            .map(|experiment| {
+                let id = experiment.scene().id();
+                let known = lock(&state).finished(&id);
+                if let Some(cells) = known {
+                    advance(experiment.trials(options.trials));
+                    return Ok(cells);
+                }
+                let cells = cells_of(experiment.as_ref(), &id, options, &advance);
+                lock(&state).append(&id, &cells)?;
+                Ok(cells)
+            })
+            .collect::<Result<_, StudyError>>()
+    })?;
+    let order: Vec<String> = plan.iter().map(|e| e.scene().id()).collect();
+    lock(&state).close(&order, &cells)?;
+
+    let cells: Vec<Cell> = cells.into_iter().flatten().collect();
+    Ok(StudyResult {
+        calib_study: 1,
+        study,
+        trials: options.trials,
+        seed: options.seed,
+        fits: fits(&cells),
+        standards: held::standards(study, &cells),
+        claims: claims::claims(study, &cells),
+        cells,
+    })
+}
+
+/// All trials of one scene.
+fn cells_of(
+    experiment: &dyn Experiment,
+    id: &str,
+    options: &StudyOptions,
+    advance: &(dyn Fn(u64) + Sync),
+) -> Vec<Cell> {
+    let trials = experiment.trials(options.trials);
+    let rows = experiment.rows();
+    let blocks: Vec<Vec<Tally>> = (0..trials.div_ceil(BLOCK))
+        .into_par_iter()
+        .map(|block| {
+            let mut tallies = vec![Tally::default(); rows.len()];
+            let range = block * BLOCK..trials.min((block + 1) * BLOCK);
+            let length = range.end - range.start;
+            for number in range {
+                let mut noise = Noise::of_trial(options.seed, id, number);
+                experiment.trial(number, &mut noise, &mut tallies);
+            }
+            advance(length);
+            tallies
+        })
+        .collect();
+    let mut sums = vec![Tally::default(); rows.len()];
+    for block in &blocks {
+        for (sum, tally) in sums.iter_mut().zip(block) {
+            sum.join(tally);
+        }
+    }
+    rows.iter()
+        .zip(&sums)
+        .map(|(row, sum)| sum.cell(experiment.scene(), row))
+        .collect()
+}
+
+/// An axis has two quantities, a frame too: one fit.
+fn fits(cells: &[Cell]) -> u64 {
+    cells
+        .iter()
+        .filter(|c| !matches!(c.quantity, Quantity::Offset | Quantity::Shift))
+        .map(|c| c.trials)
+        .sum()
+}
+
+/// A thread that panicked while writing has already ended the study: what it left is not used again.
+fn lock(state: &Mutex<State>) -> std::sync::MutexGuard<'_, State> {
+    state
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner)
+}
