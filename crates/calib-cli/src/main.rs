@@ -3,6 +3,7 @@
 mod arguments;
 mod commands;
 
+use std::error::Error;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -12,8 +13,22 @@ fn main() -> ExitCode {
     match commands::run(&arguments) {
         Ok(code) => ExitCode::from(code as u8),
         Err(error) => {
-            eprintln!("error: {error}");
+            eprintln!("error: {}", with_causes(&error));
             ExitCode::from(error.exit_code() as u8)
         }
     }
+}
+
+/// The error and what caused it, each thing said once.
+fn with_causes(error: &dyn Error) -> String {
+    let mut said = error.to_string();
+    let mut cause = error.source();
+    while let Some(inner) = cause {
+        let text = inner.to_string();
+        if !said.contains(&text) {
+            said = format!("{said}\n  cause: {text}");
+        }
+        cause = inner.source();
+    }
+    said
 }

@@ -27,7 +27,7 @@ pub enum ExitCode {
 /// Why a stage stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum PipelineError {
-    /// A file that must be read cannot be.
+    /// A profile or robot description cannot be read.
     #[error("{path}: cannot be read: {source}")]
     Read {
         /// The file.
@@ -35,7 +35,7 @@ pub enum PipelineError {
         /// Why.
         source: std::io::Error,
     },
-    /// A file that must be text is not.
+    /// A profile or robot description is not text.
     #[error("{path}: is not UTF-8 text (byte {offset}); save it as UTF-8")]
     NotText {
         /// The file.
@@ -110,12 +110,13 @@ impl PipelineError {
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Profile(_) | Self::Urdf(_) | Self::Usage { .. } | Self::Simulation(_) => {
-                ExitCode::Usage
-            }
-            Self::Read { .. } | Self::NotText { .. } | Self::Recording(_) | Self::Data { .. } => {
-                ExitCode::Data
-            }
+            Self::Read { .. }
+            | Self::NotText { .. }
+            | Self::Profile(_)
+            | Self::Urdf(_)
+            | Self::Usage { .. }
+            | Self::Simulation(_) => ExitCode::Usage,
+            Self::Recording(_) | Self::Data { .. } => ExitCode::Data,
             Self::Solve(_) => ExitCode::NotConverged,
             Self::Patch { .. } | Self::Write { .. } | Self::Exists { .. } | Self::Report(_) => {
                 ExitCode::NotWritten

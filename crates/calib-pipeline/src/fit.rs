@@ -107,16 +107,10 @@ impl Table {
         let wanted = |name: &String| request.only.is_empty() || request.only.contains(name);
         for name in &request.only {
             if !poses.markers.contains_key(name) && !poses.bodies.contains_key(name) {
-                let known: Vec<&str> = poses
-                    .markers
-                    .keys()
-                    .chain(poses.bodies.keys())
-                    .map(String::as_str)
-                    .collect();
                 return Err(data(
                     file,
                     format!("has no marker or body `{name}`"),
-                    format!("it has {}", known.join(", ")),
+                    it_has(poses.markers.keys().chain(poses.bodies.keys())),
                 ));
             }
         }
@@ -166,6 +160,16 @@ impl Table {
     }
 }
 
+/// What a table has instead of what was asked for.
+fn it_has<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    let names: Vec<String> = names.map(|n| format!("`{n}`")).collect();
+    if names.is_empty() {
+        "it has none".to_owned()
+    } else {
+        format!("it has {}", names.join(", "))
+    }
+}
+
 fn read_poses(file: &Path, options: &ReadOptions) -> Result<Poses, PipelineError> {
     let recording = read_path(file, options)?;
     recording
@@ -200,11 +204,10 @@ fn side(file: &Path, poses: &Poses, names: &[String]) -> Result<Vec<Option<Pose>
     let mut markers = Vec::new();
     for name in names {
         let track = poses.markers.get(name).ok_or_else(|| {
-            let known: Vec<&str> = poses.markers.keys().map(String::as_str).collect();
             data(
                 file,
                 format!("has no marker `{name}`"),
-                format!("it has {}", known.join(", ")),
+                it_has(poses.markers.keys()),
             )
         })?;
         markers.push((name.clone(), track.clone()));
@@ -498,7 +501,7 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, PipelineError> {
             data(
                 file,
                 format!("has no joint `{joint}`"),
-                format!("it has {}", poses.joint_names().join(", ")),
+                it_has(poses.joints.keys()),
             )
         })
     };
@@ -644,13 +647,17 @@ pub fn handeye(file: &Path, robot: &str, measured: &str) -> Result<Answer, Pipel
         .filter(|p| p.bodies.contains_key(robot) && p.bodies.contains_key(measured));
     let poses = match own {
         Some(poses) => poses,
-        None => read_poses(
-            file,
-            &ReadOptions {
+        None => {
+            let options = ReadOptions {
                 columns: Some(map),
                 ..ReadOptions::default()
-            },
-        )?,
+            };
+            read_poses(file, &options).map_err(|error| PipelineError::Data {
+                file: file.display().to_string(),
+                finding: format!("does not hold two poses per row, `{robot}` and `{measured}`: {error}"),
+                remedy: "name the columns <prefix>_x, _y, _z, _qx, _qy, _qz, _qw and give the prefixes with --robot and --measured".to_owned(),
+            })?
+        }
     };
     let pairs: Vec<(Isometry3<f64>, Isometry3<f64>)> = poses.bodies[robot]
         .iter()

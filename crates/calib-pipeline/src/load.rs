@@ -81,6 +81,7 @@ pub fn load_robot(profile_path: &Path) -> Result<RobotProfile, PipelineError> {
     let urdf_text = read_text(&urdf_path)?;
     let model = RobotModel::from_urdf_text(&urdf_text, &urdf_path.display().to_string())?;
     let profile = calib_profile::check(&raw, &text, &shown, &model)?;
+    known_estimators(&profile, &text, &shown)?;
     let file = profile_path
         .file_name()
         .map_or_else(String::new, |f| f.to_string_lossy().into_owned());
@@ -104,6 +105,30 @@ pub fn load_robot(profile_path: &Path) -> Result<RobotProfile, PipelineError> {
     })
 }
 
+/// A profile does not know the estimators; their names are checked here, at their place in the profile.
+fn known_estimators(profile: &Profile, text: &str, shown: &str) -> Result<(), PipelineError> {
+    let ids: Vec<&str> = calib_cor::estimators().iter().map(|e| e.id).collect();
+    for (name, origin) in &profile.origins {
+        let wanted = origin.center.as_str();
+        if ids.contains(&wanted) {
+            continue;
+        }
+        let place = text
+            .lines()
+            .position(|line| line.contains("center:") && line.contains(wanted))
+            .map_or_else(String::new, |line| format!(":{}", line + 1));
+        let nearest = calib_urdf::nearest::nearest(wanted, ids.iter().copied())
+            .map_or_else(String::new, |near| format!("did you mean `{near}`? "));
+        return Err(PipelineError::Usage {
+            finding: format!(
+                "{shown}{place}: origin `{name}`: no center estimator is called `{wanted}`"
+            ),
+            remedy: format!("{nearest}known: {}", ids.join(", ")),
+        });
+    }
+    Ok(())
+}
+
 /// Reads all recordings of a profile.
 ///
 /// # Errors
@@ -114,7 +139,11 @@ pub fn load_recordings(robot: RobotProfile) -> Result<Inputs, PipelineError> {
     let mut digests = robot.digests.clone();
     for (name, spec) in &robot.profile.recordings {
         let path = robot.folder.join(&spec.file);
-        let bytes = std::fs::read(&path).map_err(|e| PipelineError::read(&path, e))?;
+        let bytes = std::fs::read(&path).map_err(|e| PipelineError::Data {
+            file: path.display().to_string(),
+            finding: format!("recording `{name}` cannot be read: {e}"),
+            remedy: "correct `file`; it is relative to the profile".to_owned(),
+        })?;
         digests.push(Digest {
             path: spec.file.clone(),
             sha256: sha256_hex(&bytes),
@@ -161,13 +190,13 @@ fn prepare(
     robot: &RobotProfile,
     name: &str,
     spec: &RecordingSpec,
-    poses: Poses,
+    mut poses: Poses,
     meta: Meta,
     findings: &mut Vec<Finding>,
 ) -> Result<Loaded, PipelineError> {
     let model = &robot.model;
     let error = |finding: String, remedy: String| PipelineError::Data {
-        file: spec.file.clone(),
+        file: robot.folder.join(&spec.file).display().to_string(),
         finding,
         remedy,
     };
@@ -183,7 +212,8 @@ fn prepare(
             .cloned()
             .map(|f| in_file(f, &spec.file)),
     );
-    for (joint, column) in &poses.joints {
+    ignore_unmapped(robot, name, spec, &mut poses, findings);
+    for joint in poses.joints.keys() {
         let id = model.joint_id(joint).map_err(|unknown| {
             error(
                 format!("column `{joint}` is no joint: {unknown}"),
@@ -212,32 +242,6 @@ fn prepare(
                 "remove it from `hold`".to_owned(),
             ));
         }
-        if let (Some((lower, upper)), true) = (robot_joint.limits.range(), turns) {
-            // Encoders and limits are rounded differently: half a degree.
-            let slack = 0.5_f64.to_radians();
-            let outside: Vec<u64> =
-                rows_where(&poses, column, |q| q < lower - slack || q > upper + slack);
-            if !outside.is_empty()
-                && !matches!(robot_joint.kind, calib_urdf::JointKind::Continuous { .. })
-            {
-                findings.push(
-                    Finding::new(
-                        "joint-outside-limits",
-                        Severity::Warning,
-                        format!("{name}: {joint}"),
-                        format!(
-                            "{} of {} poses lie outside the URDF's limits {:.1} … {:.1} deg",
-                            outside.len(),
-                            poses.len(),
-                            lower.to_degrees(),
-                            upper.to_degrees()
-                        ),
-                        "check the unit and sign of the column, or the limits in the URDF",
-                    )
-                    .at_rows(outside),
-                );
-            }
-        }
     }
     check_bodies(robot, name, &poses, findings);
     let q = joint_vectors(model, spec, &poses);
@@ -250,6 +254,42 @@ fn prepare(
     })
 }
 
+/// In a table with a column map, a column that only looks like a joint is ignored, and said so.
+fn ignore_unmapped(
+    robot: &RobotProfile,
+    name: &str,
+    spec: &RecordingSpec,
+    poses: &mut Poses,
+    findings: &mut Vec<Finding>,
+) {
+    if spec.columns.is_none() {
+        return;
+    }
+    let strangers: Vec<String> = poses
+        .joints
+        .keys()
+        .filter(|j| robot.model.joint_id(j).is_err())
+        .cloned()
+        .collect();
+    if strangers.is_empty() {
+        return;
+    }
+    for joint in &strangers {
+        poses.joints.remove(joint);
+        poses.joint_units.remove(joint);
+    }
+    findings.push(Finding::new(
+        "column-ignored",
+        Severity::Info,
+        name,
+        format!(
+            "the column map does not mention {}, and the robot has no such joint: ignored",
+            strangers.join(", ")
+        ),
+        "map the column if it matters",
+    ));
+}
+
 fn in_file(mut finding: Finding, file: &str) -> Finding {
     if !finding.subject.contains(file) {
         finding.subject = if finding.subject.is_empty() {
@@ -259,15 +299,6 @@ fn in_file(mut finding: Finding, file: &str) -> Finding {
         };
     }
     finding
-}
-
-fn rows_where(poses: &Poses, column: &[Option<f64>], is: impl Fn(f64) -> bool) -> Vec<u64> {
-    column
-        .iter()
-        .zip(&poses.rows)
-        .filter(|(q, _)| q.is_some_and(&is))
-        .map(|(_, row)| *row)
-        .collect()
 }
 
 /// Says which declared bodies and markers a recording does not have; none of one body is "not in view".

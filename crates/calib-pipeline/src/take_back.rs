@@ -54,8 +54,11 @@ fn model_diff(a: &Path, b: &Path) -> Result<calib_urdf::ModelDiff, PipelineError
 /// [`PipelineError`] when the change record is missing, or the patched file was edited since.
 pub fn revert(patched: &Path, out: &Path) -> Result<PathBuf, PipelineError> {
     let record_path = PathBuf::from(format!("{}.changes.json", patched.display()));
-    let record_text =
-        std::fs::read_to_string(&record_path).map_err(|e| PipelineError::read(&record_path, e))?;
+    let record_text = std::fs::read_to_string(&record_path).map_err(|e| PipelineError::Data {
+        file: record_path.display().to_string(),
+        finding: format!("the change record cannot be read: {e}"),
+        remedy: "give the URDF that `calib run` wrote, with its .changes.json beside it".to_owned(),
+    })?;
     let record: ChangeRecord =
         serde_json::from_str(&record_text).map_err(|e| PipelineError::Data {
             file: record_path.display().to_string(),
@@ -63,12 +66,17 @@ pub fn revert(patched: &Path, out: &Path) -> Result<PathBuf, PipelineError> {
             remedy: "give the URDF that `calib run` wrote, with its .changes.json beside it"
                 .to_owned(),
         })?;
-    let original =
-        calib_urdf::revert(&text(patched)?, &record).map_err(|e| PipelineError::Data {
+    let original = calib_urdf::revert(&text(patched)?, &record).map_err(|e| {
+        let said = e.to_string();
+        let (finding, remedy) = said
+            .split_once("\nhelp: ")
+            .unwrap_or((&said, "revert the file as `calib run` wrote it"));
+        PipelineError::Data {
             file: patched.display().to_string(),
-            finding: e.to_string(),
-            remedy: "revert the file as `calib run` wrote it".to_owned(),
-        })?;
+            finding: finding.to_owned(),
+            remedy: remedy.to_owned(),
+        }
+    })?;
     if out.exists() {
         return Err(PipelineError::Exists {
             path: out.display().to_string(),

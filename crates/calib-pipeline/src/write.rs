@@ -33,12 +33,18 @@ pub const MANIFEST: &str = "calib.manifest";
 /// and the call fails before a byte is written.
 ///
 /// # Errors
-/// [`PipelineError::Exists`] or [`PipelineError::Write`].
+/// [`PipelineError::Exists`] or [`PipelineError::Write`]; [`PipelineError::Usage`] for two files of one name.
 pub fn write_all(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>, PipelineError> {
     let ours: Vec<String> = std::fs::read_to_string(folder.join(MANIFEST))
         .map(|text| text.lines().map(str::to_owned).collect())
         .unwrap_or_default();
-    for file in files {
+    for (i, file) in files.iter().enumerate() {
+        if files[..i].iter().any(|earlier| earlier.name == file.name) {
+            return Err(PipelineError::Usage {
+                finding: format!("two results would be written to `{}`", file.name),
+                remedy: "give each output of the profile a name of its own".to_owned(),
+            });
+        }
         let path = folder.join(&file.name);
         if path.exists() && !ours.contains(&file.name) {
             return Err(PipelineError::Exists {
