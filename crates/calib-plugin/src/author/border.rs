@@ -120,13 +120,17 @@ pub(super) unsafe fn guarded(
             (status, Some(failure.to_string()))
         }
         Err(payload) => {
-            let text = payload
-                .downcast_ref::<&str>()
-                .map(ToString::to_string)
-                .or_else(|| payload.downcast_ref::<String>().cloned())
-                .unwrap_or_else(|| "without a text".to_string());
-            // A payload whose drop panics would cross the border.
-            std::mem::forget(payload);
+            let text = match payload.downcast::<&str>() {
+                Ok(text) => text.to_string(),
+                Err(payload) => match payload.downcast::<String>() {
+                    Ok(text) => *text,
+                    Err(unknown) => {
+                        // The drop of a foreign payload could panic again, across the border.
+                        std::mem::forget(unknown);
+                        "without a text".to_string()
+                    }
+                },
+            };
             (abi::PANICKED, Some(text))
         }
     };

@@ -4,6 +4,7 @@
 
 mod bad;
 mod bed;
+mod book;
 mod border;
 mod check;
 mod compatible;
