@@ -1,6 +1,6 @@
 //! What each command does: results on standard output, progress on standard error.
 
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -11,26 +11,28 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::arguments::{Arguments, Command, DiffFormat, Fit, MethodName, Run, SchemaOf};
 
+/// Writes results to standard output; a reader that went away (`| head`) is no error.
+fn emit(text: &str) {
+    let _ = std::io::stdout().lock().write_all(text.as_bytes());
+}
+
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
     match &arguments.command {
         Command::Run(options) => calibrate(arguments, options),
         Command::Check { profile, json } => {
             let checked = inspect::check(profile)?;
-            print!(
-                "{}",
-                if *json {
-                    checked.json()?
-                } else {
-                    checked.text()
-                }
-            );
+            emit(&if *json {
+                checked.json()?
+            } else {
+                checked.text()
+            });
             Ok(checked.exit_code())
         }
         Command::Simulate { profile, seed, out } => {
             let robot = load::load_robot(profile)?;
             for path in write::write_all(out, &simulate::simulate(&robot, *seed)?)? {
-                println!("{}", path.display());
+                emit(&format!("{}\n", path.display()));
             }
             Ok(ExitCode::Accepted)
         }
@@ -52,7 +54,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
                 Fit::Frame(f) => f.json,
                 Fit::Handeye(f) => f.json,
             };
-            print!("{}", if json { &answer.json } else { &answer.text });
+            emit(if json { &answer.json } else { &answer.text });
             Ok(answer.exit)
         }
         Command::Diff { a, b, format } => {
@@ -61,11 +63,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
                 DiffFormat::Json => take_back::diff_json(a, b)?,
                 DiffFormat::Unified => take_back::diff_unified(a, b)?,
             };
-            print!("{text}");
+            emit(&text);
             Ok(ExitCode::Accepted)
         }
         Command::Revert { urdf, out } => {
-            println!("{}", take_back::revert(urdf, out)?.display());
+            emit(&format!("{}\n", take_back::revert(urdf, out)?.display()));
             Ok(ExitCode::Accepted)
         }
         Command::Schema { of } => {
@@ -74,7 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
                 SchemaOf::Report => inspect::report_schema(),
                 SchemaOf::Scene => inspect::scene_schema(),
             };
-            print!("{text}");
+            emit(&text);
             Ok(ExitCode::Accepted)
         }
         Command::Completions { shell } => {
@@ -127,16 +129,16 @@ fn calibrate(arguments: &Arguments, options: &Run) -> Result<ExitCode, PipelineE
     let written = write::write_all(&out, &output.files)?;
     bar.finish_and_clear();
     if options.json {
-        print!("{}", inspect::report_json(&output.report)?);
+        emit(&inspect::report_json(&output.report)?);
     } else {
         let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-        print!("{}", inspect::summary(&output.report, colour));
+        emit(&inspect::summary(&output.report, colour));
         if !arguments.quiet {
             for path in written
                 .iter()
                 .filter(|p| p.file_name().is_some_and(|n| n != write::MANIFEST))
             {
-                println!("wrote {}", path.display());
+                emit(&format!("wrote {}\n", path.display()));
             }
         }
     }

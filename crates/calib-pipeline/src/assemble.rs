@@ -12,8 +12,7 @@ use calib_report::{
     WorkspacePoint, judge,
 };
 use calib_urdf::LinkId;
-use calib_urdf::rpy::rpy_from_rotation;
-use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
+use nalgebra::{Isometry3, Matrix6};
 
 use crate::export::{Found, PatchedUrdf};
 use crate::kinematics::{Calibration, Loads};
@@ -387,6 +386,18 @@ fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
 }
 
 fn clocks(inputs: &Inputs) -> Vec<Clock> {
+    let untimed = inputs.recordings.values().all(|r| r.poses.t.is_none());
+    if untimed {
+        return vec![Clock {
+            recording: "all".to_owned(),
+            clock: "tracker".to_owned(),
+            against: "joints".to_owned(),
+            agrees: Some(true),
+            text: "static poses, joints and tracker in one row: the clocks do not matter"
+                .to_owned(),
+            ..Clock::default()
+        }];
+    }
     inputs
         .recordings
         .values()
@@ -394,15 +405,14 @@ fn clocks(inputs: &Inputs) -> Vec<Clock> {
             recording: r.name.clone(),
             clock: "tracker".to_owned(),
             against: "joints".to_owned(),
-            offset_s: None,
-            sigma_s: None,
             agrees: r.poses.t.is_none().then_some(true),
             text: if r.poses.t.is_none() {
-                "static poses, joints and tracker in one row: the clocks do not matter".to_owned()
+                "static poses: the clocks do not matter".to_owned()
             } else {
                 "joints and tracker share the rows of one table; their offset was not tested"
                     .to_owned()
             },
+            ..Clock::default()
         })
         .collect()
 }
@@ -795,7 +805,7 @@ fn joint_lever(inputs: &Inputs) -> f64 {
     (squares / rows.len().max(1) as f64).sqrt()
 }
 
-/// σ of every number of every calibrated origin, by `<joint>.<x|y|z|roll|pitch|yaw>` (m, rad).
+/// σ of every number of every calibrated origin, by `<joint>.<x|y|z|turn about x|y|z>` (m, rad).
 #[must_use]
 pub fn origin_sigmas(inputs: &Inputs, fit: &MlFit) -> BTreeMap<String, f64> {
     let model = &inputs.robot.model;
@@ -826,32 +836,17 @@ pub fn origin_sigmas(inputs: &Inputs, fit: &MlFit) -> BTreeMap<String, f64> {
 fn number_sigmas(pose: &Isometry3<f64>, covariance: &Matrix6<f64>) -> Vec<(&'static str, f64)> {
     let r = pose.rotation.to_rotation_matrix();
     let position = r.matrix() * covariance.fixed_view::<3, 3>(3, 3) * r.matrix().transpose();
-    // ∂rpy/∂ω by central differences: ω turns the child.
-    const STEP: f64 = 1e-6;
-    let mut jacobian = Matrix3::zeros();
-    for k in 0..3 {
-        let delta = Vector3::ith(k, STEP);
-        let plus = rpy_from_rotation(&(pose.rotation * calib_geometry::so3::exp(&delta)));
-        let minus = rpy_from_rotation(&(pose.rotation * calib_geometry::so3::exp(&-delta)));
-        for i in 0..3 {
-            jacobian[(i, k)] = (plus[i] - minus[i]) / (2.0 * STEP);
-        }
-    }
-    let angles = jacobian * covariance.fixed_view::<3, 3>(0, 0) * jacobian.transpose();
     let sigma = |v: f64| v.max(0.0).sqrt();
     let mut out = vec![
         ("x", sigma(position[(0, 0)])),
         ("y", sigma(position[(1, 1)])),
         ("z", sigma(position[(2, 2)])),
     ];
-    /// Near pitch ±90° roll and yaw trade against each other: a σ beyond this means nothing.
-    const SINGULAR: f64 = 1e3;
-    if jacobian.amax() < SINGULAR {
-        out.extend([
-            ("roll", sigma(angles[(0, 0)])),
-            ("pitch", sigma(angles[(1, 1)])),
-            ("yaw", sigma(angles[(2, 2)])),
-        ]);
+    for (k, what) in ["turn about x", "turn about y", "turn about z"]
+        .into_iter()
+        .enumerate()
+    {
+        out.push((what, sigma(covariance[(k, k)])));
     }
     out
 }

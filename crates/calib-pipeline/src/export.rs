@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use calib_geometry::so3;
 use calib_report::scene::{Provenance, SceneBody, SceneFrame, SceneMarker, SceneRobot};
 use calib_report::{Change, Input, Scene, Status, Unit};
 use calib_urdf::{ChangeRecord, RobotModel, UrdfEdit, patch, rpy::rpy_from_rotation};
@@ -117,26 +118,37 @@ fn number_changes(
                 let Ok(id) = nominal.joint_id(joint) else {
                     continue;
                 };
-                let old = numbers(&nominal.joint(id).parent_link_from_joint);
-                let new = numbers(&target.joint(id).parent_link_from_joint);
-                for (k, what) in ["x", "y", "z", "roll", "pitch", "yaw"].iter().enumerate() {
-                    let delta = if k < 3 {
-                        new[k] - old[k]
-                    } else {
-                        wrap(new[k] - old[k])
-                    };
-                    if delta.abs() > UNCHANGED {
+                let old = nominal.joint(id).parent_link_from_joint;
+                let new = target.joint(id).parent_link_from_joint;
+                let mut push = |what: &str, unit: Unit, old: f64, new: f64| {
+                    if (new - old).abs() > UNCHANGED {
                         changes.push(Change {
                             joint: joint.clone(),
-                            what: format!("origin {what}"),
-                            unit: if k < 3 { Unit::Metre } else { Unit::Radian },
-                            old: Some(old[k]),
-                            new: new[k],
-                            delta: Some(delta),
+                            what: what.to_owned(),
+                            unit,
+                            old: Some(old),
+                            new,
+                            delta: Some(new - old),
                             sigma: sigmas.get(&format!("{joint}.{what}")).copied(),
                             data_share: None,
                         });
                     }
+                };
+                for (k, what) in ["x", "y", "z"].into_iter().enumerate() {
+                    push(
+                        what,
+                        Unit::Metre,
+                        old.translation.vector[k],
+                        new.translation.vector[k],
+                    );
+                }
+                // Roll, pitch and yaw jump near pitch ±90°: the turn itself is what changed.
+                let turn = so3::log(&(old.rotation.inverse() * new.rotation));
+                for (k, what) in ["turn about x", "turn about y", "turn about z"]
+                    .into_iter()
+                    .enumerate()
+                {
+                    push(what, Unit::Radian, 0.0, turn[k]);
                 }
             }
             UrdfEdit::AddFixedFrame {
@@ -169,11 +181,6 @@ fn numbers(pose: &Isometry3<f64>) -> [f64; 6] {
     let t = pose.translation.vector;
     let rpy = rpy_from_rotation(&pose.rotation);
     [t.x, t.y, t.z, rpy[0], rpy[1], rpy[2]]
-}
-
-fn wrap(angle: f64) -> f64 {
-    let turn = std::f64::consts::TAU;
-    angle - turn * (angle / turn).round()
 }
 
 /// The effects that a URDF cannot hold, as YAML; `None` when there are none.

@@ -343,12 +343,9 @@ fn add_bodies(
     let profile = &inputs.robot.profile;
     let known = profile.solve.noise.known;
     let tracker = &profile.tracker;
-    let uses = |pose: bool| {
-        profile
-            .bodies
-            .values()
-            .any(|b| (b.kind == BodyKind::Pose) == pose)
-    };
+    let as_pose =
+        |name: &String| profile.bodies[name].kind == BodyKind::Pose || tracks[name].is_computed();
+    let uses = |pose: bool| profile.bodies.keys().any(|name| as_pose(name) == pose);
     let problem = &mut stated.problem;
     let marker_noise = uses(false).then(|| {
         problem.noise_group(
@@ -402,7 +399,7 @@ fn add_bodies(
             link
         };
         match (&body.kind, marker_noise, body_noise) {
-            (BodyKind::Pose, _, Some(noise)) => {
+            (_, _, Some(noise)) if as_pose(name) => {
                 let seen =
                     stated
                         .samples

@@ -424,28 +424,27 @@ fn in_words(twist: &calib_geometry::Twist) -> Unobservable {
     let (w, v) = (twist.angular(), twist.linear());
     let direction = [w.x, w.y, w.z, v.x, v.y, v.z];
     let axis = |a: &nalgebra::Vector3<f64>| {
+        /// A direction this near to a coordinate axis (cosine, 0.6°) is called by its letter.
+        const ON_AXIS: f64 = 0.999_95;
         let n = a / a.norm();
-        format!("[{:.2}, {:.2}, {:.2}]", n.x, n.y, n.z)
+        match n.iter().position(|c| c.abs() > ON_AXIS) {
+            Some(k) => ["x", "y", "z"][k].to_owned(),
+            None => format!("[{:.2}, {:.2}, {:.2}]", n.x, n.y, n.z),
+        }
     };
     let text = match (w.norm() > 1e-6, v.norm() > 1e-6) {
-        (true, false) => format!(
-            "a turn about {} of the child: its size is shared out by the priors",
-            axis(&w)
-        ),
-        (false, true) => format!(
-            "a shift along {} of the child: its size is shared out by the priors",
-            axis(&v)
-        ),
+        (true, false) => format!("a turn about {} of the child", axis(&w)),
+        (false, true) => format!("a shift along {} of the child", axis(&v)),
         _ => format!(
-            "a turn about {} with a shift along {} of the child: its size is shared out by the priors",
+            "a turn about {} with a shift along {} of the child",
             axis(&w),
             axis(&v)
         ),
-    };
+    } + ": the data leave it open, its size is what the priors share out";
     Unobservable {
         direction,
         text,
-        remedy: "see \"what is not known\": it is a convention between this frame and its neighbours, unless a mark defines one of them".to_owned(),
+        remedy: "a convention between this frame and its neighbours (see the combinations below); a mark or a second axis would define it".to_owned(),
     }
 }
 

@@ -25,7 +25,16 @@ pub struct BodyTrack {
     pub poses: BTreeMap<String, Vec<Option<Isometry3<f64>>>>,
 }
 
+/// Markers that keep their distances to better than this were computed from a fitted body, not measured, m.
+const COMPUTED: f64 = 2e-6;
+
 impl BodyTrack {
+    /// Whether the markers are points of one fitted body: then they are one 6-DoF measurement, not several.
+    #[must_use]
+    pub fn is_computed(&self) -> bool {
+        self.template.is_some() && self.marker_sigma.is_some_and(|s| s < COMPUTED)
+    }
+
     /// Poses in one recording; empty where the body is not in it.
     #[must_use]
     pub fn in_recording(&self, recording: &str) -> &[Option<Isometry3<f64>>] {
