@@ -267,10 +267,9 @@ pub fn cor(request: &TableRequest) -> Result<Answer, PipelineError> {
     }
     let default = if table.pair.is_some() {
         "score"
-    } else if tracks.is_empty() {
-        "hse"
     } else if table.body.is_some() {
-        "ball_bundle"
+        // A rigid body: pivot calibration as everybody else does it. `--all` shows the likelihood estimates beside it.
+        "hse"
     } else {
         "sfe"
     };
@@ -456,10 +455,12 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
         .iter()
         .filter_map(|r| table.rows.get(*r).copied())
         .collect();
+    let frame = axis_frame(request);
     let value = json!({
         "estimator": id,
         "observable": true,
         "reason": e.reason,
+        "frame": frame,
         "point_m": e.line.point.coords.as_slice(),
         "direction": e.line.direction.as_slice(),
         "covariance": matrix(e.covariance.row_iter().map(|r| r.iter().copied().collect()).collect()),
@@ -468,7 +469,7 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
         "rejected": rejected,
     });
     let mut text = format!(
-        "{id}: direction {}\n",
+        "{id}: direction {} in the frame of {frame}\n",
         coordinates(e.line.direction.as_slice())
     );
     let _ = writeln!(text, "  sigma {:.4} deg", e.sigma_direction.to_degrees());
@@ -485,6 +486,18 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
         rejected.len()
     );
     Ok(answer(text, &value, true))
+}
+
+/// The frame that an axis is given in: the tracker's, or the parent's when two bodies move.
+fn axis_frame(request: &TableRequest) -> String {
+    match request.parent.as_slice() {
+        [] => "the tracker".to_owned(),
+        [body] => format!("`{body}`"),
+        // As calib_recording::rigid_body (1).
+        [first, second, ..] => {
+            format!("the parent body (origin {first}, x towards {second})")
+        }
+    }
 }
 
 /// `calib fit frame`.
