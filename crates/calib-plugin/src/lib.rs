@@ -64,6 +64,8 @@ pub mod check;
 #[cfg(feature = "host")]
 mod host;
 #[cfg(feature = "host")]
+mod listing;
+#[cfg(feature = "host")]
 mod new_project;
 #[cfg(feature = "host")]
 mod parameters;

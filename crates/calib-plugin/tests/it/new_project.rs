@@ -1,9 +1,9 @@
 //! A new project builds, passes its own test, loads, and passes the conformance check.
 
-use std::{path::Path, process::Command, time::Duration};
+use std::{collections::BTreeMap, path::Path, process::Command, time::Duration};
 
 use calib_plugin::{
-    Host, Language, SearchPath,
+    Control, Host, Language, MotionData, SearchPath,
     check::{Limits, check},
     new_project,
 };
@@ -39,6 +39,19 @@ fn passes(library: &Path) {
     assert!(table.passed(), "{table}");
 }
 
+fn cargo(command: &str, project: &Path, target: &Path) {
+    let output = Command::new(env!("CARGO"))
+        .args([command, "--offline", "--manifest-path"])
+        .arg(project.join("Cargo.toml"))
+        .arg("--target-dir")
+        .arg(target)
+        .env("RUSTFLAGS", "-Dwarnings")
+        .output()
+        .unwrap();
+    let messages = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "cargo {command}\n{messages}");
+}
+
 #[test]
 fn a_rust_project_is_complete() {
     let folder = tempfile::tempdir().unwrap();
@@ -46,24 +59,44 @@ fn a_rust_project_is_complete() {
     insta::assert_snapshot!(tree(&project).join("\n"));
     // Offline and with no registry: it depends on nothing outside of its folder.
     let target = folder.path().join("target");
-    for command in ["test", "build"] {
-        let output = Command::new(env!("CARGO"))
-            .args([command, "--offline", "--manifest-path"])
-            .arg(project.join("Cargo.toml"))
-            .arg("--target-dir")
-            .arg(&target)
-            .env("RUSTFLAGS", "-Dwarnings")
-            .output()
-            .unwrap();
-        let messages = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "cargo {command}\n{messages}");
-    }
+    cargo("test", &project, &target);
+    cargo("build", &project, &target);
     let file = format!(
         "{}my_sphere{}",
         std::env::consts::DLL_PREFIX,
         std::env::consts::DLL_SUFFIX
     );
-    passes(&target.join("debug").join(file));
+    let library = target.join("debug").join(file);
+    passes(&library);
+
+    // A panic in a real shared library, with its own copy of the standard library, stops at its border.
+    let source = project.join("src/lib.rs");
+    let text = std::fs::read_to_string(&source).unwrap();
+    let panics = text.replace(
+        "let scale =",
+        "assert!(used != 7, \"seven samples\");\n        let scale =",
+    );
+    assert_ne!(panics, text);
+    std::fs::write(&source, panics).unwrap();
+    cargo("build", &project, &target);
+    let copy = folder
+        .path()
+        .join(format!("panics{}", std::env::consts::DLL_SUFFIX));
+    std::fs::copy(&library, &copy).unwrap();
+    let plugin = Host::new(SearchPath::default(), true)
+        .load(copy.to_str().unwrap(), None)
+        .unwrap();
+    let bound = plugin
+        .cor("my_sphere")
+        .unwrap()
+        .with(&BTreeMap::new())
+        .unwrap();
+    let seven = MotionData::points(&[(0..7).map(|i| Some([f64::from(i), 0.0, 0.0])).collect()]);
+    let error = bound.fit(&seven.view(), &Control::default()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "plugin `my-sphere`, center estimator `my_sphere`: panicked: seven samples"
+    );
 }
 
 #[test]

@@ -77,6 +77,29 @@ fn a_built_in_and_a_plugin_are_called_alike() {
 }
 
 #[test]
+fn the_listing_shows_both_and_their_parameters() {
+    let bed = Bed::new();
+    if bed
+        .build(
+            "../../plugins/column-reader-c/column_reader.c",
+            "column_reader",
+            &[],
+        )
+        .is_none()
+    {
+        return;
+    }
+    let mut tables = Tables::default();
+    tables
+        .cor
+        .register(Entry::built_in_cor(mean(Kind::Cor)))
+        .unwrap();
+    tables.add(&bed.load("column_reader").unwrap()).unwrap();
+    insta::assert_snapshot!(tables);
+    insta::assert_json_snapshot!(tables.json());
+}
+
+#[test]
 fn unknown_names_and_wrong_kinds_say_what_there_is() {
     let mut tables = Tables::default();
     tables
