@@ -277,3 +277,25 @@ fn data_that_break_the_contract_never_reach_a_plugin() {
         "plugin `bad`, center estimator `mean` takes points, got poses"
     );
 }
+
+#[test]
+fn an_exception_that_is_caught_in_cpp_is_an_error_with_the_plugin_s_name() {
+    let bed = Bed::new();
+    if bed.build("tests/c/throws.cc", "cpp", &[]).is_none() {
+        return;
+    }
+    assert!(matches!(fit(&bed, "cpp").unwrap(), Answer::Found(_)));
+    let plugin = bed.load("cpp").unwrap();
+    let bound = plugin.cor("mean").unwrap().with(&no_parameters()).unwrap();
+    let error = bound
+        .fit(
+            &MotionData::points(&[vec![None; 3]]).view(),
+            &Control::default(),
+        )
+        .unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "plugin `cpp`, center estimator `mean`: panicked: std::out_of_range"
+    );
+    assert_eq!(error.exit_code(), 6);
+}

@@ -77,11 +77,16 @@ impl Bed {
         Host::new(search, true).load(name, None)
     }
 
-    /// A message without this folder's path.
+    /// A message without this folder's path, the platform's ending of libraries, and the loader's own words.
     pub fn tidy(&self, message: &impl ToString) -> String {
-        message
+        let text = message
             .to_string()
             .replace(&self.path().display().to_string(), "[bed]")
+            .replace(std::env::consts::DLL_SUFFIX, ".so");
+        match text.find("dlsym failed") {
+            Some(at) => format!("{}[the loader's words]", &text[..at]),
+            None => text,
+        }
     }
 }
 
