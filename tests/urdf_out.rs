@@ -1,0 +1,289 @@
+//! The URDF that a run writes: only what was calibrated differs, it says what the report says, and it can be taken back.
+
+mod scratch;
+
+use calib_urdf::RobotModel;
+use scratch::{Scratch, finished};
+use serde_json::Value;
+
+const ROBOTS: [&str; 2] = ["ripley", "justin"];
+
+fn robot_text(robot: &str) -> (String, String) {
+    let dir = &finished(robot, "ml").dir;
+    let original = dir.files(&format!("robots/{robot}"));
+    let (_, urdf) = original
+        .iter()
+        .find(|(name, _)| name.ends_with(".urdf"))
+        .expect("a URDF");
+    let patched = dir.read(&format!("out/{robot}.calibrated.urdf"));
+    (String::from_utf8(urdf.clone()).expect("text"), patched)
+}
+
+/// Without the values of `xyz` and `rpy`, the only attributes that a calibration writes.
+fn without_poses(text: &str) -> String {
+    let mut rest = text;
+    let mut kept = String::new();
+    while let Some(at) = ["xyz=\"", "rpy=\""]
+        .iter()
+        .filter_map(|key| Some(rest.find(key)? + key.len()))
+        .min()
+    {
+        kept += &rest[..at];
+        rest = &rest[at..];
+        rest = &rest[rest.find('"').expect("a closing quote")..];
+    }
+    kept + rest
+}
+
+/// Removes the fixed joints and links that the profile asks for; what is left must be the original.
+fn without_added_bodies(patched: &str, bodies: &[&str]) -> String {
+    let mut lines: Vec<&str> = patched.split_inclusive('\n').collect();
+    for body in bodies {
+        let joint = format!("<joint name=\"{body}_mount\"");
+        let link = format!("<link name=\"{body}\"/>");
+        let first = lines
+            .iter()
+            .position(|l| l.contains(&joint))
+            .unwrap_or_else(|| panic!("no {joint}"));
+        let last = first
+            + lines[first..]
+                .iter()
+                .position(|l| l.contains("</joint>"))
+                .expect("its end");
+        lines.drain(first..=last);
+        let at = lines
+            .iter()
+            .position(|l| l.contains(&link))
+            .unwrap_or_else(|| panic!("no {link}"));
+        lines.remove(at);
+        let comment = format!("<!-- tracking body {body} -->");
+        lines.retain(|l| l.trim() != comment);
+    }
+    lines.concat()
+}
+
+#[test]
+fn only_numbers_of_poses_differ_besides_the_added_bodies() {
+    for (robot, bodies) in [("ripley", ["linkM", "gripM"]), ("justin", ["heT", "haT"])] {
+        let (original, patched) = robot_text(robot);
+        let rest = without_added_bodies(&patched, &bodies);
+        assert_eq!(without_poses(&rest), without_poses(&original), "{robot}");
+        assert_ne!(rest, original, "{robot}: nothing was calibrated");
+    }
+}
+
+/// Without added bodies the file has the same lines, and each changed line is an `<origin>`.
+#[test]
+fn without_added_bodies_only_origins_change() {
+    let dir = Scratch::new().robot("ripley").edit(
+        "robots/ripley.yaml",
+        "  add_bodies: [linkM, gripM]\n",
+        "",
+    );
+    dir.calib(["run", "robots/ripley.yaml", "--out", "out"])
+        .expect(0);
+    let (original, patched) = (
+        dir.read("robots/ripley/r17.urdf"),
+        dir.read("out/ripley.calibrated.urdf"),
+    );
+    assert_eq!(original.lines().count(), patched.lines().count());
+    for (before, after) in original
+        .lines()
+        .zip(patched.lines())
+        .filter(|(a, b)| a != b)
+    {
+        assert!(before.contains("<origin "), "{before}\n{after}");
+    }
+    assert_eq!(without_poses(&patched), without_poses(&original));
+}
+
+/// Line endings, byte order mark, quotes and foreign elements are the owner's.
+#[test]
+fn other_people_s_bytes_are_kept() {
+    let odd = |text: &str| {
+        let text = text
+            .replace(
+                "xyz=\"0.375 0 0\" rpy=\"0 0 0\"",
+                "rpy = '0 0 0'  xyz='0.375 0 0' ",
+            )
+            .replace(
+                "</robot>",
+                "  <gazebo reference=\"hand\"><mu1>0.2</mu1></gazebo>\n</robot>",
+            );
+        format!("\u{feff}{}", text.replace('\n', "\r\n"))
+    };
+    let dir = Scratch::new().robot("ripley");
+    let text = odd(&dir.read("robots/ripley/r17.urdf"));
+    let dir = dir.file("robots/ripley/r17.urdf", &text);
+    dir.calib(["run", "robots/ripley.yaml", "--out", "out"])
+        .expect(0);
+    let patched = dir.read("out/ripley.calibrated.urdf");
+    assert!(patched.starts_with('\u{feff}'));
+    assert_eq!(
+        patched.matches('\n').count(),
+        patched.matches("\r\n").count()
+    );
+    assert!(patched.contains("<gazebo reference=\"hand\"><mu1>0.2</mu1></gazebo>\r\n"));
+    assert!(patched.contains("rpy = '"), "{patched}");
+    dir.calib(["revert", "out/ripley.calibrated.urdf", "--out", "back.urdf"])
+        .expect(0);
+    assert!(dir.read("back.urdf") == text);
+}
+
+/// Every changed number of the file is the report's "after", and every other joint is as it was.
+#[test]
+fn the_file_says_what_the_report_says() {
+    for robot in ROBOTS {
+        let (original, patched) = robot_text(robot);
+        let before = RobotModel::from_urdf_text(&original, "original").expect("a robot");
+        let after = RobotModel::from_urdf_text(&patched, "patched").expect("a robot");
+        let changes = finished(robot, "ml").report["changes"]
+            .as_array()
+            .expect("changes")
+            .clone();
+        for joint in before.joints() {
+            let now = after.joint(after.joint_id(&joint.name).expect("the joint is kept"));
+            let moved = (joint.parent_link_from_joint.inverse() * now.parent_link_from_joint)
+                .to_homogeneous();
+            let changed = (moved - nalgebra::Matrix4::identity()).norm() > 1e-12;
+            let told = changes
+                .iter()
+                .any(|c| c.to_string().contains(&format!("\"{}\"", joint.name)));
+            assert_eq!(changed, told, "{robot}: {}", joint.name);
+        }
+    }
+}
+
+/// The mounts in the file put the origins where the report says they are.
+#[test]
+fn the_re_read_file_has_the_reported_transforms() {
+    for (robot, links) in [
+        (
+            "ripley",
+            [
+                ("linkM_from_base", "linkM", "upper_arm"),
+                ("gripM_from_endJ", "gripM", "gripper"),
+            ],
+        ),
+        (
+            "justin",
+            [
+                ("heT_from_head", "heT", "head"),
+                ("haT_from_hand", "haT", "tcp"),
+            ],
+        ),
+    ] {
+        let (_, patched) = robot_text(robot);
+        let model = RobotModel::from_urdf_text(&patched, "patched").expect("a robot");
+        let at_zero = model.forward_kinematics(&model.zero_positions());
+        let place = |link: &str| at_zero[model.link_id(link).expect("a link").index()];
+        for (name, body, origin) in links {
+            let body_from_origin = place(body).inverse() * place(origin);
+            let report = &finished(robot, "ml").report["transforms"];
+            let reported = report
+                .as_array()
+                .expect("transforms")
+                .iter()
+                .find(|t| t["name"] == name)
+                .expect("the transform");
+            let written = body_from_origin.translation.vector;
+            for (k, value) in reported["translation_m"]
+                .as_array()
+                .expect("three")
+                .iter()
+                .enumerate()
+            {
+                // The report has twelve significant digits.
+                let gap = (written[k] - value.as_f64().expect("a number")).abs();
+                assert!(gap < 2e-12, "{robot} {name}[{k}]: {gap:.1e} m");
+            }
+            let q = body_from_origin.rotation.coords;
+            let reported: Vec<f64> = reported["rotation_xyzw"]
+                .as_array()
+                .expect("four")
+                .iter()
+                .filter_map(Value::as_f64)
+                .collect();
+            let cosine: f64 = (0..4).map(|k| q[k] * reported[k]).sum();
+            assert!(1.0 - cosine.abs() < 1e-12, "{robot} {name}: {cosine}");
+        }
+    }
+}
+
+#[test]
+fn reverting_gives_the_original_bytes() {
+    for robot in ROBOTS {
+        let dir = &finished(robot, "ml").dir;
+        let out = format!("reverted-{robot}.urdf");
+        dir.calib([
+            "revert",
+            &format!("out/{robot}.calibrated.urdf"),
+            "--out",
+            &out,
+        ])
+        .expect(0);
+        assert!(dir.read(&out) == robot_text(robot).0, "{robot}");
+    }
+}
+
+#[test]
+fn an_edited_file_is_not_reverted() {
+    let run = &finished("ripley", "ml").dir;
+    let dir = Scratch::new()
+        .file("r.urdf", run.read("out/ripley.calibrated.urdf"))
+        .file(
+            "r.urdf.changes.json",
+            run.read("out/ripley.calibrated.urdf.changes.json"),
+        )
+        .edit("r.urdf", "velocity=\"2.6\"", "velocity=\"2.7\"");
+    let ran = dir
+        .calib(["revert", "r.urdf", "--out", "back.urdf"])
+        .expect(3);
+    insta::with_settings!({filters => [("[0-9a-f]{64}", "[sha256]")]}, {
+        insta::assert_snapshot!(ran.stderr);
+    });
+    assert!(!dir.path("back.urdf").exists());
+}
+
+#[test]
+fn reverting_overwrites_nothing() {
+    let run = &finished("ripley", "ml").dir;
+    let dir = Scratch::new()
+        .file("r.urdf", run.read("out/ripley.calibrated.urdf"))
+        .file(
+            "r.urdf.changes.json",
+            run.read("out/ripley.calibrated.urdf.changes.json"),
+        )
+        .file("mine.urdf", "mine");
+    let ran = dir
+        .calib(["revert", "r.urdf", "--out", "mine.urdf"])
+        .expect(7);
+    assert!(
+        ran.stderr.contains("mine.urdf exists already"),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(dir.read("mine.urdf"), "mine");
+}
+
+#[test]
+fn the_difference_is_shown() {
+    let dir = Scratch::new().robot("ripley").file(
+        "a.urdf",
+        Scratch::new()
+            .robot("ripley")
+            .read("robots/ripley/r17.urdf"),
+    );
+    let moved = dir
+        .read("a.urdf")
+        .replace("xyz=\"0.375 0 0\"", "xyz=\"0.3751 0 -0.0002\"");
+    let dir = dir.file("b.urdf", moved);
+    for format in ["table", "json", "unified"] {
+        let ran = dir
+            .calib(["diff", "a.urdf", "b.urdf", "--format", format])
+            .expect(0);
+        insta::assert_snapshot!(format!("diff_{format}"), ran.stdout);
+    }
+    let same = dir.calib(["diff", "a.urdf", "a.urdf"]).expect(0);
+    insta::assert_snapshot!("diff_of_the_same", same.stdout);
+}
