@@ -29,6 +29,7 @@ mod claims;
 mod cor;
 mod experiment;
 mod held;
+mod linear;
 mod motion;
 mod noise;
 mod render;

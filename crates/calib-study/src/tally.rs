@@ -7,7 +7,8 @@
 //! ```
 //!
 //! Where a scene knows (2), it serves as a control variate: the same noise gives e and e*, so most of the Monte-Carlo
-//! error of (1) cancels in (3), and likewise in the mean error.
+//! error of (1) cancels in (3), and likewise in the mean error. It need not be efficient for the method at hand: any
+//! linear function of the noise with a known mean square will do, the closer the better.
 
 use nalgebra::Vector3;
 
@@ -127,13 +128,13 @@ impl Tally {
         let every_trial = self.answered == self.trials
             && self.controlled == self.trials
             && self.trials >= ENOUGH_FOR_CONTROL;
-        if let (true, Some(bound)) = (every_trial, row.bound) {
+        if let (true, Some(control)) = (every_trial, row.control) {
             let l2 = self.l2 / n;
             let spread = self.l4 / n - l2 * l2;
             if spread > 0.0 {
                 let together = self.e2l2 / n - plain * l2;
                 let beta = together / spread;
-                let corrected = plain - beta * (l2 - bound);
+                let corrected = plain - beta * (l2 - control);
                 if corrected > 0.0 {
                     mse = corrected;
                     mse_variance = (mse_variance - beta * together / n).max(0.0);
@@ -176,6 +177,8 @@ pub(crate) struct Row {
     pub quantity: Quantity,
     /// Trace of the Cramér–Rao bound, squared unit.
     pub bound: Option<f64>,
+    /// Mean square of the control variate, where there is one: the bound of the data that it uses.
+    pub control: Option<f64>,
 }
 
 #[cfg(test)]
@@ -201,6 +204,7 @@ mod tests {
             estimator: "m",
             quantity: Quantity::Center,
             bound: Some(bound),
+            control: Some(bound),
         }
     }
 

@@ -5,6 +5,8 @@
 //! center free:  δn* = −(1/ρ) S⁻¹ Σ (u_i − ū)(n·ε_i)         C = σ²/ρ² · S⁻¹                        (2)
 //! center held:  C = σ²/(ρ² + h²) · S⁻¹       the radii tilt with the axis as the heights do          (3)
 //! ```
+//!
+//! (2) is the control variate of both.
 
 use calib_aor::{Input, Options, bounds};
 use nalgebra::{Matrix2, Matrix6, Point3, Vector2, Vector3};
@@ -65,21 +67,30 @@ impl CircleScene {
         });
         let positions: Vec<Point3<f64>> = arms.iter().map(|a| Point3::from(POINT + a)).collect();
         let free = bounds::common_line(&[positions], &truth(), scene.sigma_t_m);
+        let control = inverse.map(|s| variance * s.trace() / scene.radius_m.powi(2));
         let center_held = Options {
             center: Some(Point3::from(POINT)),
             ..Options::default()
         };
         let plain = Options::default;
         let (methods, rows): (Vec<Method>, Vec<[Row; 2]>) = [
-            method("plane", "plane", plain(), 1, free),
-            method("planar_radial", "planar_radial", plain(), 10, free),
-            method("planar_radial_gn", "planar_radial_gn", plain(), 1, free),
+            method("plane", "plane", plain(), 1, free, control),
+            method("planar_radial", "planar_radial", plain(), 10, free, control),
+            method(
+                "planar_radial_gn",
+                "planar_radial_gn",
+                plain(),
+                1,
+                free,
+                control,
+            ),
             method(
                 "planar_radial, center held",
                 "planar_radial",
                 center_held.clone(),
                 10,
                 held,
+                control,
             ),
             method(
                 "planar_radial_gn, center held",
@@ -87,11 +98,19 @@ impl CircleScene {
                 center_held,
                 1,
                 held,
+                control,
             ),
-            method("circle_ml", "circle_ml", plain(), 1, free),
-            method("dir_ml", "dir_ml", plain(), 1, free),
-            method("line_ml", "line_ml", plain(), 1, free),
-            method("halvorsen_line", "halvorsen_line", plain(), 1, free),
+            method("circle_ml", "circle_ml", plain(), 1, free, control),
+            method("dir_ml", "dir_ml", plain(), 1, free, control),
+            method("line_ml", "line_ml", plain(), 1, free, control),
+            method(
+                "halvorsen_line",
+                "halvorsen_line",
+                plain(),
+                1,
+                free,
+                control,
+            ),
         ]
         .into_iter()
         .flatten()
@@ -129,9 +148,7 @@ impl Experiment for CircleScene {
         let tracks = [track];
         for (method, pair) in self.methods.iter().zip(tallies.chunks_mut(2)) {
             if number.is_multiple_of(method.every) {
-                // (2) is the bound of the free center only.
-                let control = method.options.center.is_none().then_some(linear);
-                method.record(&Input::Points(&tracks), control, pair);
+                method.record(&Input::Points(&tracks), Some(linear), pair);
             }
         }
     }

@@ -60,6 +60,7 @@ impl FrameScene {
             estimator: id,
             quantity,
             bound: bound.map(|b: Matrix6<f64>| b.fixed_view::<3, 3>(first, first).trace()),
+            control: None,
         };
         let rows = METHODS
             .into_iter()

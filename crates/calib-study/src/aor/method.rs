@@ -44,13 +44,14 @@ pub(crate) struct Method {
     pub every: u64,
 }
 
-/// The method and its two rows; `bound` over `[direction; point]` at the true point.
+/// The method and its two rows; `bound` over `[direction; point]` at the true point, `control` for the direction.
 pub(crate) fn method(
     name: &str,
     id: &str,
     options: Options,
     every: u64,
     bound: Option<Matrix6<f64>>,
+    control: Option<f64>,
 ) -> Option<(Method, [Row; 2])> {
     let info = estimators().iter().find(|e| e.id == id)?;
     let row = |quantity, first: usize| Row {
@@ -60,6 +61,7 @@ pub(crate) fn method(
         bound: bound
             .map(|b| b.fixed_view::<3, 3>(first, first).trace())
             .filter(|b| *b > 0.0),
+        control: control.filter(|_| quantity == Quantity::Direction),
     };
     let rows = [row(Quantity::Direction, 0), row(Quantity::Offset, 3)];
     Some((

@@ -34,13 +34,14 @@ impl PoseScene {
             .collect();
         let bound = hinge_poses(&truth, &axis(), &POINT, scene.sigma_t_m, scene.sigma_r_rad);
         let (methods, rows): (Vec<Method>, Vec<[Row; 2]>) = [
-            method("sara", "sara", Options::default(), 1, bound),
+            method("sara", "sara", Options::default(), 1, bound, None),
             method(
                 "rotation_axis",
                 "rotation_axis",
                 Options::default(),
                 1,
                 bound,
+                None,
             ),
         ]
         .into_iter()

@@ -66,6 +66,7 @@ impl BodiesScene {
                 estimator: info.id,
                 quantity: Quantity::Center,
                 bound: bound.map(|c| c.fixed_view::<3, 3>(3, 3).trace()),
+                control: None,
             })
             .into_iter()
             .collect();

@@ -1,14 +1,19 @@
 //! Raw markers of a rigid body on a ball joint: the bundle against spheres of the same markers.
 
 use calib_cor::{Input, Options, bounds};
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Matrix3, Point3, UnitQuaternion, Vector3};
 
 use super::{
     method::{Gets, Method, method, record},
     poses::{CENTER, body_point},
 };
 use crate::{
-    cell::Scene, experiment::Experiment, motion::Range, noise::Noise, tally::Row, tally::Tally,
+    cell::Scene,
+    experiment::Experiment,
+    linear::{Linear, linear},
+    motion::Range,
+    noise::Noise,
+    tally::{Row, Tally},
 };
 
 /// Four markers around the body's origin, m: a cluster of 60–90 mm.
@@ -24,6 +29,8 @@ pub(crate) struct MarkerScene {
     turns: Vec<UnitQuaternion<f64>>,
     /// Markers relative to the center, in the body's axes.
     layout: Vec<Vector3<f64>>,
+    /// The efficient linear estimator of the bundle, of noise in the body's axes.
+    gains: Vec<DMatrix<f64>>,
     methods: Vec<Method>,
     rows: Vec<Row>,
 }
@@ -39,6 +46,8 @@ impl MarkerScene {
             .map(|b| turns.iter().map(|r| r * b).collect())
             .collect();
         let spheres = bounds::sphere_center(&arms, scene.sigma_t_m).map(|c| c.trace());
+        let rigid = rigid(&turns, &layout);
+        let control = rigid.as_ref().map(|l| l.trace * scene.sigma_t_m.powi(2));
         let methods: Vec<Method> = [
             method("ball_bundle", "ball_bundle", Gets::Points, false, 5),
             method("ml_sphere", "ml_sphere", Gets::Points, false, 5),
@@ -51,11 +60,11 @@ impl MarkerScene {
         let rows = methods
             .iter()
             .map(|m| {
-                m.row(if m.info.id == "ball_bundle" {
-                    bundle
-                } else {
-                    spheres
-                })
+                let own = m.info.id == "ball_bundle";
+                Row {
+                    control,
+                    ..m.row(if own { bundle } else { spheres })
+                }
             })
             .collect();
         Self {
@@ -65,10 +74,39 @@ impl MarkerScene {
             },
             turns,
             layout,
+            gains: rigid.map_or_else(Vec::new, |l| l.gains),
             methods,
             rows,
         }
     }
+}
+
+/// Unknowns `[center; layout]`; each frame's own is the body's turn. In the body's axes:
+///
+/// ```text
+/// R_iᵀ dv_ip = R_iᵀ do + db_p − [b_p]ₓ ω_i
+/// ```
+fn rigid(turns: &[UnitQuaternion<f64>], layout: &[Vector3<f64>]) -> Option<Linear> {
+    let rows = 3 * layout.len();
+    let mut own = DMatrix::zeros(rows, 3);
+    for (p, b) in layout.iter().enumerate() {
+        own.fixed_view_mut::<3, 3>(3 * p, 0)
+            .copy_from(&(-b.cross_matrix()));
+    }
+    let jacobians: Vec<DMatrix<f64>> = turns
+        .iter()
+        .map(|r| {
+            let back = r.inverse().to_rotation_matrix().into_inner();
+            let mut j = DMatrix::zeros(rows, 3 + rows);
+            for p in 0..layout.len() {
+                j.fixed_view_mut::<3, 3>(3 * p, 0).copy_from(&back);
+                j.fixed_view_mut::<3, 3>(3 * p, 3 + 3 * p)
+                    .copy_from(&Matrix3::identity());
+            }
+            j
+        })
+        .collect();
+    linear(&jacobians, Some(&own), true, 3)
 }
 
 impl Experiment for MarkerScene {
@@ -85,18 +123,36 @@ impl Experiment for MarkerScene {
             return;
         }
         let sigma = self.scene.sigma_t_m;
-        let tracks: Vec<Vec<Option<Point3<f64>>>> = self
-            .layout
-            .iter()
-            .map(|b| {
-                let mut seen = |r: &UnitQuaternion<f64>| CENTER + r * b + noise.vector(sigma);
-                self.turns.iter().map(|r| Some(seen(r).into())).collect()
-            })
-            .collect();
+        let mut tracks: Vec<Vec<Option<Point3<f64>>>> = vec![Vec::new(); self.layout.len()];
+        let mut linear = Vector3::zeros();
+        for (i, turn) in self.turns.iter().enumerate() {
+            for (p, (b, track)) in self.layout.iter().zip(&mut tracks).enumerate() {
+                let epsilon = noise.vector(sigma);
+                track.push(Some(Point3::from(CENTER + turn * b + epsilon)));
+                if let Some(gain) = self.gains.get(i) {
+                    linear += gain.fixed_view::<3, 3>(0, 3 * p) * (turn.inverse() * epsilon);
+                }
+            }
+        }
         let options = Options::default();
         for (method, tally) in self.methods.iter().zip(tallies) {
             let input = Input::Markers(&tracks);
-            record(method.info, &input, &options, &CENTER, None, tally);
+            record(method.info, &input, &options, &CENTER, Some(linear), tally);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two derivations of one bound.
+    #[test]
+    fn the_linear_estimator_has_the_bound() {
+        let turns = Range::Hand.turns(16);
+        let layout: Vec<Vector3<f64>> = CLUSTER.iter().map(|b| b - body_point(0.1)).collect();
+        let ours = rigid(&turns, &layout).expect("determined").trace;
+        let theirs = bounds::ball(&layout, &turns, 1.0).expect("a bound").trace();
+        assert!((ours / theirs - 1.0).abs() < 1e-8, "{ours} {theirs}");
     }
 }

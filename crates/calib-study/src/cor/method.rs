@@ -51,6 +51,7 @@ impl Method {
             estimator: self.info.id,
             quantity: Quantity::Center,
             bound,
+            control: bound,
         }
     }
 }

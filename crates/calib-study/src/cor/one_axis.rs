@@ -78,10 +78,10 @@ impl OneAxis {
                 false,
                 10,
             ),
-            ("robust, points", "robust", Given::Marker, false, 50),
-            ("robust, poses", "robust", Given::Poses, false, 50),
-            ("consensus, points", "consensus", Given::Marker, false, 50),
-            ("consensus, poses", "consensus", Given::Poses, false, 50),
+            ("robust, points", "robust", Given::Marker, false, 10),
+            ("robust, poses", "robust", Given::Poses, false, 10),
+            ("consensus, points", "consensus", Given::Marker, false, 10),
+            ("consensus, poses", "consensus", Given::Poses, false, 10),
         ];
         let (mut uses, mut rows) = (Vec::new(), Vec::new());
         for (name, id, gets, known, every) in table {
@@ -91,6 +91,7 @@ impl OneAxis {
                     estimator: info.id,
                     quantity: Quantity::Center,
                     bound: None,
+                    control: None,
                 });
                 uses.push(Use {
                     info,

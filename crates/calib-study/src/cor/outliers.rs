@@ -131,6 +131,7 @@ impl OutlierScene {
                     quantity: Quantity::Center,
                     // The bound of the clean recording; with outliers nobody reaches it.
                     bound: ball.bound(gets),
+                    control: None,
                 });
                 uses.push(Use {
                     info,

@@ -313,6 +313,7 @@ impl DepthScene {
                     estimator: info.id,
                     quantity: crate::cell::Quantity::Center,
                     bound: bound.map(|c| c.trace()),
+                    control: bound.map(|c| c.trace()),
                 });
                 methods.push((info, options));
             }
