@@ -1,7 +1,7 @@
 //! What a call costs when the estimator does nothing: built in, and across the border.
 //!
-//! `cargo bench -p calib-plugin`; the limit is 1 µs for a call with a few samples. Beyond that the host reads every
-//! sample once, to promise finite numbers.
+//! `cargo bench -p calib-plugin`; the limit is 1 µs between the two. For both, every sample is read once before the
+//! call, to promise finite numbers.
 
 use std::{collections::BTreeMap, hint::black_box};
 

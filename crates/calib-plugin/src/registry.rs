@@ -242,7 +242,7 @@ impl Bound<dyn Cor> {
     /// Finds the center.
     ///
     /// # Errors
-    /// [`PluginError`]: data that it does not take, failures, and results that break the contract.
+    /// [`PluginError`]: data that it does not take or that break the contract, failures, and results that break it.
     pub fn fit(
         &self,
         motion: &Motion<'_>,
@@ -250,6 +250,8 @@ impl Bound<dyn Cor> {
     ) -> Result<Answer<CorFit>, PluginError> {
         self.takes(motion)?;
         self.call(control, |it, call| {
+            // Built-ins too: what one refuses the other must not answer.
+            verify::motion(motion).map_err(Failure::BadInput)?;
             let answer = it.fit(motion, call)?;
             if let Answer::Found(fit) = &answer {
                 verify::cor(fit, motion).map_err(Failure::Contract)?;
@@ -263,7 +265,7 @@ impl Bound<dyn Aor> {
     /// Finds the axis.
     ///
     /// # Errors
-    /// [`PluginError`]: data that it does not take, failures, and results that break the contract.
+    /// [`PluginError`]: data that it does not take or that break the contract, failures, and results that break it.
     pub fn fit(
         &self,
         motion: &Motion<'_>,
@@ -271,6 +273,7 @@ impl Bound<dyn Aor> {
     ) -> Result<Answer<AorFit>, PluginError> {
         self.takes(motion)?;
         self.call(control, |it, call| {
+            verify::motion(motion).map_err(Failure::BadInput)?;
             let answer = it.fit(motion, call)?;
             if let Answer::Found(fit) = &answer {
                 verify::aor(fit, motion).map_err(Failure::Contract)?;

@@ -31,7 +31,6 @@ impl Aor for LoadedAor {
     }
 
     fn fit(&self, motion: &Motion<'_>, call: &Call<'_>) -> Result<Answer<AorFit>, Failure> {
-        crate::verify::motion(motion).map_err(Failure::BadInput)?;
         let mut target: Target<AorFit> = Target {
             got: Got::Nothing,
             tracks: motion.tracks,
@@ -44,7 +43,7 @@ impl Aor for LoadedAor {
             result: Some(take),
         };
         let raw = raw(motion);
-        // SAFETY: all arguments are alive until the function returns, with the sizes that were verified above.
+        // SAFETY: all arguments are alive until the function returns. Sizes were verified by `Bound`, the only way here.
         let ended = across(call, |call| unsafe {
             (self.fit)(call, &raw const raw, &raw const sink)
         });

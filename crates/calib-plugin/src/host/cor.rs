@@ -37,7 +37,6 @@ impl Cor for LoadedCor {
     }
 
     fn fit(&self, motion: &Motion<'_>, call: &Call<'_>) -> Result<Answer<CorFit>, Failure> {
-        crate::verify::motion(motion).map_err(Failure::BadInput)?;
         let mut target: Target<CorFit> = Target {
             got: Got::Nothing,
             tracks: motion.tracks,
@@ -50,7 +49,7 @@ impl Cor for LoadedCor {
             result: Some(take),
         };
         let raw = raw(motion);
-        // SAFETY: all arguments are alive until the function returns, with the sizes that were verified above.
+        // SAFETY: all arguments are alive until the function returns. Sizes were verified by `Bound`, the only way here.
         let ended = across(call, |call| unsafe {
             (self.fit)(call, &raw const raw, &raw const sink)
         });
