@@ -71,6 +71,24 @@ pub enum Command {
         #[arg(long)]
         out: PathBuf,
     },
+    /// Simulation studies of the estimators, with the statistical bound in every cell
+    Study(StudyRun),
+    /// Any recording as canonical CSV
+    Convert {
+        /// The recording
+        input: PathBuf,
+        /// The CSV to write; it must not exist
+        output: PathBuf,
+        /// Reader to use instead of the one found from the content
+        #[arg(long)]
+        format: Option<String>,
+    },
+    /// Estimators, readers and plugins there are; checks and makes plugins
+    Plugins {
+        /// What to do; lists when not given
+        #[command(subcommand)]
+        what: Option<Plugins>,
+    },
     /// Print a JSON Schema
     Schema {
         /// Of what
@@ -98,6 +116,12 @@ pub struct Run {
     /// Go on although the data checks found errors
     #[arg(long)]
     pub force: bool,
+    /// Rank models by how well they predict each fitted pose from the others; writes nothing
+    #[arg(long)]
+    pub compare_models: bool,
+    /// Load no plugin
+    #[arg(long)]
+    pub no_plugins: bool,
     /// Print the report as JSON instead of the summary
     #[arg(long)]
     pub json: bool,
@@ -218,4 +242,62 @@ pub struct FitHandEye {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// `calib study`.
+#[derive(Debug, Args)]
+pub struct StudyRun {
+    /// Which study
+    #[arg(value_enum)]
+    pub study: StudyName,
+    /// Trials of an ordinary cell
+    #[arg(long)]
+    pub trials: Option<u64>,
+    /// Seed
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Threads; all processors when not given
+    #[arg(long)]
+    pub threads: Option<usize>,
+    /// Folder for the tables and pictures; an interrupted study continues there
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Begin anew instead of continuing
+    #[arg(long)]
+    pub restart: bool,
+    /// Print JSON instead of Markdown
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Simulation studies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum StudyName {
+    /// Centers of rotation, paper §3.3
+    Cor,
+    /// Axes of rotation and frames, paper §4 and §5.2
+    Aor,
+}
+
+/// `calib plugins …`.
+#[derive(Debug, Subcommand)]
+pub enum Plugins {
+    /// Conformance of one plugin: a table, exit code 6 when something fails
+    Check {
+        /// Its path, or its name on the search path
+        plugin: String,
+    },
+    /// Make a complete plugin project
+    New {
+        /// Its name: small letters, digits, hyphens
+        name: String,
+        /// rust or c
+        #[arg(long, default_value = "rust")]
+        lang: String,
+        /// Folder to make it in
+        #[arg(long, default_value = ".")]
+        out: PathBuf,
+    },
+    /// Print the contract, calib_plugin.h
+    Header,
 }

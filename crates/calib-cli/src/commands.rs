@@ -5,11 +5,17 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use calib_pipeline::run::{RunOptions, run as run_profile};
-use calib_pipeline::{ExitCode, PipelineError, fit, inspect, load, simulate, take_back, write};
+use calib_pipeline::{
+    ExitCode, PipelineError, convert, fit, inspect, load, models, simulate, take_back, write,
+};
+use calib_study::{Study, StudyOptions};
 use clap::CommandFactory as _;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::arguments::{Arguments, Command, DiffFormat, Fit, MethodName, Run, SchemaOf};
+use crate::arguments::{
+    Arguments, Command, DiffFormat, Fit, MethodName, Run, SchemaOf, StudyName, StudyRun,
+};
+use crate::plugins;
 
 /// Writes results to standard output; a reader that went away (`| head`) is no error.
 fn emit(text: &str) {
@@ -70,6 +76,22 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
             emit(&format!("{}\n", take_back::revert(urdf, out)?.display()));
             Ok(ExitCode::Accepted)
         }
+        Command::Study(study) => run_study(arguments, study),
+        Command::Convert {
+            input,
+            output,
+            format,
+        } => {
+            let converted = convert::convert(input, output, format.as_deref())?;
+            for note in &converted.notes {
+                eprintln!("calib: {note}");
+            }
+            for path in write::write_new(&converted.folder, &converted.files)? {
+                emit(&format!("{}\n", path.display()));
+            }
+            Ok(ExitCode::Accepted)
+        }
+        Command::Plugins { what } => plugins::run(what.as_ref()),
         Command::Schema { of } => {
             let text = match of {
                 SchemaOf::Profile => calib_profile::json_schema(),
@@ -105,6 +127,50 @@ fn fit_table(table: &crate::arguments::FitTable) -> fit::TableRequest {
     }
 }
 
+fn run_study(arguments: &Arguments, study: &StudyRun) -> Result<ExitCode, PipelineError> {
+    let default = StudyOptions::default();
+    let options = StudyOptions {
+        trials: study.trials.unwrap_or(default.trials),
+        seed: study.seed.unwrap_or(default.seed),
+        threads: study.threads,
+        out: study.out.clone(),
+        resume: !study.restart,
+    };
+    let bar = if arguments.quiet || !std::io::stderr().is_terminal() {
+        ProgressBar::hidden()
+    } else {
+        ProgressBar::new(0)
+    };
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} scenes, {eta} left") {
+        bar.set_style(style);
+    }
+    let progress = |done: u64, total: u64| {
+        bar.set_length(total);
+        bar.set_position(done);
+    };
+    let which = match study.study {
+        StudyName::Cor => Study::Cor,
+        StudyName::Aor => Study::Aor,
+    };
+    let failed = |e: calib_study::StudyError| PipelineError::Usage {
+        finding: e.to_string(),
+        remedy: "choose another folder with --out, or begin anew with --restart".to_owned(),
+    };
+    let result = calib_study::run(which, &options, &progress).map_err(failed)?;
+    bar.finish_and_clear();
+    emit(&if study.json {
+        calib_study::json(&result)
+    } else {
+        calib_study::markdown(&result)
+    });
+    if let Some(out) = &study.out {
+        for path in calib_study::write(&result, out).map_err(failed)? {
+            eprintln!("wrote {}", path.display());
+        }
+    }
+    Ok(ExitCode::Accepted)
+}
+
 fn calibrate(arguments: &Arguments, options: &Run) -> Result<ExitCode, PipelineError> {
     let out = options
         .out
@@ -117,12 +183,23 @@ fn calibrate(arguments: &Arguments, options: &Run) -> Result<ExitCode, PipelineE
             eprintln!("calib: {stage}");
         }
     };
+    if options.compare_models {
+        let ranked = models::compare_models(&options.profile, options.force, &mut progress)?;
+        bar.finish_and_clear();
+        emit(&if options.json {
+            models::json(&ranked)
+        } else {
+            models::table(&ranked)
+        });
+        return Ok(ExitCode::Accepted);
+    }
     let run_options = RunOptions {
         method: options.method.map(|m| match m {
             MethodName::Paper => calib_profile::raw::RawMethod::Paper,
             MethodName::Ml => calib_profile::raw::RawMethod::Ml,
         }),
         force: options.force,
+        no_plugins: options.no_plugins,
     };
     let output = run_profile(&options.profile, &run_options, &mut progress)?;
     progress("write results");
@@ -148,7 +225,7 @@ fn calibrate(arguments: &Arguments, options: &Run) -> Result<ExitCode, PipelineE
 fn default_folder(profile: &Path) -> PathBuf {
     let name = profile
         .file_stem()
-        .map_or_else(|| "profile".into(), |s| s.to_os_string());
+        .map_or_else(|| "profile".into(), std::ffi::OsStr::to_os_string);
     PathBuf::from("results").join(name)
 }
 

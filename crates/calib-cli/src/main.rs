@@ -2,6 +2,7 @@
 
 mod arguments;
 mod commands;
+mod plugins;
 
 use std::error::Error;
 use std::process::ExitCode;

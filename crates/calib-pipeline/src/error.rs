@@ -100,6 +100,12 @@ pub enum PipelineError {
         /// The file.
         path: String,
     },
+    /// A plugin or an estimator failed, or is not what the profile needs.
+    #[error("{text}")]
+    Plugin {
+        /// What was found and what was needed.
+        text: String,
+    },
     /// The report or scene could not be rendered.
     #[error("the report cannot be written: {0}")]
     Report(#[from] calib_report::ReportError),
@@ -118,6 +124,7 @@ impl PipelineError {
             | Self::Simulation(_) => ExitCode::Usage,
             Self::Recording(_) | Self::Data { .. } => ExitCode::Data,
             Self::Solve(_) => ExitCode::NotConverged,
+            Self::Plugin { .. } => ExitCode::Plugin,
             Self::Patch { .. } | Self::Write { .. } | Self::Exists { .. } | Self::Report(_) => {
                 ExitCode::NotWritten
             }

@@ -92,7 +92,7 @@ struct Table {
     rows: Vec<u64>,
     markers: Vec<(String, Vec<Option<Point3<f64>>>)>,
     body: Option<Vec<Option<Pose>>>,
-    pair: Option<(Vec<Option<Pose>>, Vec<Option<Pose>>)>,
+    pair: Option<[Vec<Option<Pose>>; 2]>,
 }
 
 impl Table {
@@ -127,10 +127,10 @@ impl Table {
             _ => None,
         };
         let pair = match (request.parent.is_empty(), request.child.is_empty()) {
-            (false, false) => Some((
+            (false, false) => Some([
                 side(file, &poses, &request.parent)?,
                 side(file, &poses, &request.child)?,
-            )),
+            ]),
             (true, true) => None,
             _ => {
                 return Err(usage(
@@ -236,7 +236,7 @@ pub fn cor(request: &TableRequest) -> Result<Answer, PipelineError> {
     let run = |id: &str| -> Result<calib_cor::Outcome, calib_cor::CorError> {
         let info = calib_cor::estimator(id)?;
         match (info.input, &table.body, &table.pair) {
-            (InputKind::TwoBodies, _, Some((first, second))) => {
+            (InputKind::TwoBodies, _, Some([first, second])) => {
                 calib_cor::fit(id, &calib_cor::Input::TwoBodies { first, second }, &options)
             }
             (InputKind::Poses, Some(poses), _) => {
@@ -395,7 +395,7 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
     let run = |id: &str| -> Result<calib_aor::Outcome, calib_aor::AorError> {
         let info = calib_aor::estimator(id)?;
         match (info.input, &table.body, &table.pair) {
-            (calib_aor::InputKind::Poses, _, Some((parent, child))) => {
+            (calib_aor::InputKind::Poses, _, Some([parent, child])) => {
                 calib_aor::fit(id, &calib_aor::Input::TwoBodies { parent, child }, &options)
             }
             (calib_aor::InputKind::Poses, Some(poses), _) => {

@@ -13,7 +13,9 @@
 pub mod assemble;
 pub mod checks;
 pub mod closure;
+pub mod convert;
 pub mod error;
+pub mod estimators;
 pub mod export;
 pub mod fit;
 pub mod inspect;
@@ -21,6 +23,7 @@ pub mod kinematics;
 pub mod load;
 pub mod loads;
 pub mod ml;
+pub mod models;
 pub mod paper;
 pub mod residuals;
 pub mod run;

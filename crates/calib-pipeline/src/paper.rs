@@ -13,8 +13,9 @@ use std::collections::BTreeMap;
 use calib_aor::{
     Center, FrameAxes, FrameOptions, FrameOutcome, FrameSample, Letter, frame_planes::algorithm1,
 };
-use calib_cor::{CorEstimate, InputKind, Pose};
+use calib_geometry::measured::Pose;
 use calib_geometry::{Line, Twist, se3};
+use calib_plugin::{BodyPose, MotionData, Shape};
 use calib_profile::{BodyKind, Orientation, Origin, PointChoice};
 use calib_recording::{Finding, Severity};
 use calib_report::{EstimatorResult, Status, Unit, Unobservable};
@@ -23,6 +24,7 @@ use nalgebra::{
 };
 
 use crate::error::PipelineError;
+use crate::estimators::{CenterFit, Estimators};
 use crate::load::{Inputs, Loaded};
 use crate::start::{Start, mean_pose};
 use crate::tracks::BodyTrack;
@@ -60,6 +62,7 @@ pub fn origins(
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
     start: &Start,
+    estimators: &Estimators,
     findings: &mut Vec<Finding>,
 ) -> Result<BTreeMap<String, OriginEstimate>, PipelineError> {
     let mut found: BTreeMap<String, OriginEstimate> = BTreeMap::new();
@@ -70,6 +73,7 @@ pub fn origins(
     order.sort_by_key(|(_, o)| depends(o));
     for (name, origin) in order {
         let task = Task {
+            estimators,
             inputs,
             name,
             origin,
@@ -82,7 +86,35 @@ pub fn origins(
     Ok(found)
 }
 
+/// A center, or why the data do not determine one.
+type CenterOutcome = Result<CenterFit, String>;
+
+/// The chosen estimator's center and what others say.
+struct Centers {
+    chosen: CenterOutcome,
+    others: Vec<(&'static str, CenterOutcome)>,
+}
+
+fn body_pose(pose: &Isometry3<f64>) -> BodyPose {
+    let r = pose.rotation.to_rotation_matrix();
+    BodyPose {
+        rotation: std::array::from_fn(|i| std::array::from_fn(|j| r[(i, j)])),
+        translation_m: pose.translation.vector.into(),
+    }
+}
+
+fn plugin_value(value: &calib_profile::ParameterValue) -> calib_plugin::Value {
+    use calib_profile::ParameterValue as Profile;
+    match value {
+        Profile::Bool(b) => calib_plugin::Value::Bool(*b),
+        Profile::Integer(i) => calib_plugin::Value::Integer(*i),
+        Profile::Number(x) => calib_plugin::Value::Number(*x),
+        Profile::Text(t) => calib_plugin::Value::Text(t.clone()),
+    }
+}
+
 struct Task<'a> {
+    estimators: &'a Estimators,
     inputs: &'a Inputs,
     name: &'a str,
     origin: &'a Origin,
@@ -143,74 +175,68 @@ impl Task<'_> {
     }
 
     /// The center by the profile's estimator, and by the others that take the same data.
-    fn center(
-        &self,
-    ) -> Result<(calib_cor::Outcome, Vec<(&'static str, calib_cor::Outcome)>), PipelineError> {
-        let usage = |e: calib_cor::CorError| PipelineError::Usage {
-            finding: format!(
-                "origin `{}`: center estimator `{}`: {e}",
-                self.name, self.origin.center
-            ),
-            remedy: "name one of `calib fit cor --list`, or correct the data".to_owned(),
-        };
-        calib_cor::estimator(&self.origin.center).map_err(usage)?;
-        let chosen = self.fit_center(&self.origin.center).map_err(usage)?;
+    fn center(&self) -> Result<Centers, PipelineError> {
+        let id = &self.origin.center;
+        let parameters = self
+            .origin
+            .center_parameters
+            .iter()
+            .map(|(k, v)| (k.clone(), plugin_value(v)))
+            .collect();
+        let chosen = self.fit_center(id, &parameters)?;
         let mut others = Vec::new();
         for other in ["sfe", "hse", "hotspot_ml", "ml_sphere", "ball_bundle"] {
-            if other != self.origin.center
-                && let Ok(outcome) = self.fit_center(other)
-                && let Ok(info) = calib_cor::estimator(other)
+            if other != id
+                && let Ok(outcome) = self.fit_center(other, &BTreeMap::new())
             {
-                others.push((info.id, outcome));
+                others.push((other, outcome));
             }
         }
-        Ok((chosen, others))
+        Ok(Centers { chosen, others })
     }
 
-    fn fit_center(&self, id: &str) -> Result<calib_cor::Outcome, calib_cor::CorError> {
+    /// Runs one estimator: on the markers where it takes them, else on the poses of the body.
+    fn fit_center(
+        &self,
+        id: &str,
+        parameters: &BTreeMap<String, calib_plugin::Value>,
+    ) -> Result<CenterOutcome, PipelineError> {
         let tracker = &self.inputs.robot.profile.tracker;
-        let sweep = self.sweep();
-        let poses: Vec<Option<Pose>> = self
-            .track
-            .in_recording(&self.origin.sweep)
-            .iter()
-            .map(|p| p.map(Pose::from))
-            .collect();
-        let info = calib_cor::estimator(id)?;
-        let body = &self.inputs.robot.profile.bodies[&self.origin.body];
-        let mut options = calib_cor::Options {
-            sigma_r: tracker.body_sigma_rad,
-            ..calib_cor::Options::default()
+        let takes = &self.estimators.tables.cor.get(id)?.offer().shapes;
+        let sweep = &self.sweep().poses;
+        let markers = match &self.inputs.robot.profile.bodies[&self.origin.body].kind {
+            BodyKind::Markers { names, .. } if takes.contains(&Shape::Markers) => Some(names),
+            _ => None,
         };
-        match &body.kind {
-            BodyKind::Markers { names, .. } if info.input != InputKind::Poses => {
-                options.sigma_t = tracker.marker_sigma;
-                options.sigma_r = None;
-                let tracks: Vec<Vec<Option<Point3<f64>>>> = names
+        let motion = match markers {
+            Some(names) => {
+                let track = |m: &String| match sweep.markers.get(m) {
+                    Some(track) => track.iter().map(|p| p.map(|p| p.coords.into())).collect(),
+                    None => vec![None; sweep.len()],
+                };
+                let tracks: Vec<Vec<Option<[f64; 3]>>> = names.iter().map(track).collect();
+                let mut motion = MotionData::markers(&tracks);
+                motion.sigma_t_m = tracker.marker_sigma;
+                motion
+            }
+            None => {
+                let poses: Vec<Option<BodyPose>> = self
+                    .track
+                    .in_recording(&self.origin.sweep)
                     .iter()
-                    .map(|m| {
-                        sweep
-                            .poses
-                            .markers
-                            .get(m)
-                            .cloned()
-                            .unwrap_or_else(|| vec![None; sweep.poses.len()])
-                    })
+                    .map(|p| p.map(|p| body_pose(&p)))
                     .collect();
-                calib_cor::fit(id, &calib_cor::Input::Markers(&tracks), &options)
+                let mut motion = MotionData::poses(&poses);
+                motion.sigma_t_m = tracker.body_sigma;
+                motion.sigma_r_rad = tracker.body_sigma_rad;
+                motion
             }
-            BodyKind::Markers { .. } => {
-                calib_cor::fit(id, &calib_cor::Input::Poses(&poses), &options)
-            }
-            BodyKind::Pose => {
-                options.sigma_t = tracker.body_sigma;
-                calib_cor::fit(id, &calib_cor::Input::Poses(&poses), &options)
-            }
-        }
+        };
+        self.estimators.center(id, parameters, &motion)
     }
 
     /// The center in the body, averaged over the sweep, with its covariance.
-    fn center_in_body(&self, estimate: &CorEstimate) -> (Point3<f64>, Matrix3<f64>) {
+    fn center_in_body(&self, estimate: &CenterFit) -> (Point3<f64>, Matrix3<f64>) {
         let rows = self.rows();
         let n = rows.len().max(1) as f64;
         let in_body: Vec<Vector3<f64>> = rows
@@ -241,15 +267,23 @@ impl Task<'_> {
             / ((n - 1.0).max(1.0) * n);
         (
             Point3::from(mean),
-            turned * estimate.covariance * turned.transpose() + scatter,
+            turned * self.covariance_of(estimate) * turned.transpose() + scatter,
         )
+    }
+
+    /// Covariance of a center; an estimator that states none is trusted no better than the prior.
+    fn covariance_of(&self, estimate: &CenterFit) -> Matrix3<f64> {
+        let prior = self.inputs.robot.profile.solve.prior.position;
+        estimate
+            .covariance
+            .unwrap_or_else(|| Matrix3::from_diagonal_element(prior * prior))
     }
 
     fn agreement(
         &self,
         reference: &Point3<f64>,
         covariance: &Matrix3<f64>,
-        others: &[(&'static str, calib_cor::Outcome)],
+        others: &[(&'static str, CenterOutcome)],
     ) -> Vec<EstimatorResult> {
         /// Squared Mahalanobis distance that two estimates of one point stay under in 99.9 % (χ² with 3 degrees).
         const AGREES: f64 = 16.27;
@@ -257,17 +291,20 @@ impl Task<'_> {
             .iter()
             .map(|(id, outcome)| {
                 let quantity = format!("center of {} in {}", self.name, self.origin.body);
-                let Some(estimate) = outcome.estimate() else {
-                    return EstimatorResult {
-                        quantity,
-                        estimator: (*id).to_owned(),
-                        value: None,
-                        sigma: None,
-                        agrees: false,
-                        unit: Unit::Metre,
-                        distance: None,
-                        text: outcome.reason().unwrap_or("").to_owned(),
-                    };
+                let estimate = match outcome {
+                    Ok(estimate) => estimate,
+                    Err(reason) => {
+                        return EstimatorResult {
+                            quantity,
+                            estimator: (*id).to_owned(),
+                            value: None,
+                            sigma: None,
+                            agrees: false,
+                            unit: Unit::Metre,
+                            distance: None,
+                            text: reason.clone(),
+                        };
+                    }
                 };
                 let (point, own) = self.center_in_body(estimate);
                 let difference = point - reference;
@@ -282,7 +319,7 @@ impl Task<'_> {
                     agrees: z2 <= AGREES,
                     unit: Unit::Metre,
                     distance: Some(difference.norm()),
-                    text: outcome.reason().unwrap_or("").to_owned(),
+                    text: String::new(),
                 }
             })
             .collect()
@@ -290,13 +327,10 @@ impl Task<'_> {
 
     /// Two swept axes: Algorithm 1.
     fn frame(&self, findings: &mut Vec<Finding>) -> Result<OriginEstimate, PipelineError> {
-        let (chosen, others) = self.center()?;
-        let Some(estimate) = chosen.estimate() else {
-            return Ok(self.refused(
-                findings,
-                chosen.verdict().as_str(),
-                chosen.reason().unwrap_or(""),
-            ));
+        let Centers { chosen, others } = self.center()?;
+        let estimate = match chosen {
+            Ok(estimate) => estimate,
+            Err(reason) => return Ok(self.refused(findings, "center", &reason)),
         };
         let [proximal, distal] = [self.origin.axes[0], self.origin.axes[1]];
         let rows = self.rows();
@@ -320,7 +354,7 @@ impl Task<'_> {
         };
         let center = Center::Given {
             point: estimate.center,
-            covariance: estimate.covariance,
+            covariance: self.covariance_of(&estimate),
         };
         let outcome = algorithm1(&samples, center, &options).map_err(|e| PipelineError::Usage {
             finding: format!("origin `{}`: {e}", self.name),
@@ -335,7 +369,7 @@ impl Task<'_> {
         let canonical_from_origin =
             self.child_from_canonical().inverse() * self.child_from_origin();
         let pose = frame.body_from_joint * canonical_from_origin;
-        let (point, covariance) = self.center_in_body(estimate);
+        let (point, covariance) = self.center_in_body(&estimate);
         Ok(OriginEstimate {
             pose: Some(pose),
             covariance: Some(transported(&frame.covariance, &canonical_from_origin)),
@@ -349,15 +383,12 @@ impl Task<'_> {
 
     /// A center without axes: the orientation is the description's, relative to a body.
     fn center_only(&self, findings: &mut Vec<Finding>) -> Result<OriginEstimate, PipelineError> {
-        let (chosen, others) = self.center()?;
-        let Some(estimate) = chosen.estimate() else {
-            return Ok(self.refused(
-                findings,
-                chosen.verdict().as_str(),
-                chosen.reason().unwrap_or(""),
-            ));
+        let Centers { chosen, others } = self.center()?;
+        let estimate = match chosen {
+            Ok(estimate) => estimate,
+            Err(reason) => return Ok(self.refused(findings, "center", &reason)),
         };
-        let (point, covariance) = self.center_in_body(estimate);
+        let (point, covariance) = self.center_in_body(&estimate);
         let Some(rotation) = self.assumed_rotation() else {
             return Ok(self.refused(
                 findings,

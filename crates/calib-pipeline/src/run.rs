@@ -13,6 +13,7 @@ use crate::assemble::{Evidence, assemble};
 use crate::checks;
 use crate::closure::close_loops;
 use crate::error::{ExitCode, PipelineError};
+use crate::estimators::Estimators;
 use crate::export::{Found, calibration_yaml, patch_urdf, scene};
 use crate::kinematics::Calibration;
 use crate::load::{Inputs, load_recordings, load_robot};
@@ -31,6 +32,8 @@ pub struct RunOptions {
     pub method: Option<Method>,
     /// Go on although the data checks found errors.
     pub force: bool,
+    /// Load no plugin; a profile that names one fails.
+    pub no_plugins: bool,
 }
 
 /// What a run gives.
@@ -65,8 +68,13 @@ pub fn run(
     }
     let tracks = body_tracks(&inputs, &mut findings)?;
     let start = start(&inputs, &tracks);
+    let estimators = Estimators::of_profile(
+        &inputs.robot.profile,
+        &inputs.robot.folder,
+        !options.no_plugins,
+    )?;
     progress("estimate origins");
-    let origins = paper::origins(&inputs, &tracks, &start, &mut findings)?;
+    let origins = paper::origins(&inputs, &tracks, &start, &estimators, &mut findings)?;
     let method = options.method.unwrap_or(inputs.robot.profile.solve.method);
     let nominal = nominal(&inputs, &start);
     let robust = inputs.robot.profile.solve.robust;
@@ -169,7 +177,7 @@ struct Solved {
     fit: Option<MlFit>,
 }
 
-fn stopped(inputs: &Inputs, findings: &[Finding]) -> PipelineError {
+pub(crate) fn stopped(inputs: &Inputs, findings: &[Finding]) -> PipelineError {
     let errors: Vec<String> = findings
         .iter()
         .filter(|f| f.severity == calib_recording::Severity::Error)

@@ -96,3 +96,27 @@ fn stage(folder: &Path, file: &OutputFile) -> Result<PathBuf, PipelineError> {
         }
     }
 }
+
+/// Writes files that must not exist yet, outside a folder of results: no manifest is kept.
+///
+/// # Errors
+/// [`PipelineError::Exists`] or [`PipelineError::Write`].
+pub fn write_new(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>, PipelineError> {
+    for file in files {
+        let path = folder.join(&file.name);
+        if path.exists() {
+            return Err(PipelineError::Exists {
+                path: path.display().to_string(),
+            });
+        }
+    }
+    std::fs::create_dir_all(folder).map_err(|e| PipelineError::write(folder, e))?;
+    let mut written = Vec::new();
+    for file in files {
+        let temporary = stage(folder, file)?;
+        let path = folder.join(&file.name);
+        std::fs::rename(&temporary, &path).map_err(|e| PipelineError::write(&path, e))?;
+        written.push(path);
+    }
+    Ok(written)
+}

@@ -135,6 +135,7 @@ impl<'a> Checker<'a> {
                 .iter()
                 .map(|(name, r)| (name.clone(), self.recording(name, r)))
                 .collect(),
+            plugins: raw.plugins.clone(),
             origins: raw
                 .origins
                 .iter()
@@ -341,6 +342,7 @@ impl<'a> Checker<'a> {
                 .center
                 .clone()
                 .unwrap_or_else(|| DEFAULT_CENTER.to_owned()),
+            center_parameters: raw.center_parameters.clone(),
             axis: raw.axis.clone().unwrap_or_else(|| DEFAULT_AXIS.to_owned()),
             axes,
             orientation,

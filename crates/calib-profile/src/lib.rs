@@ -24,9 +24,9 @@ pub use error::{Problem, ProfileError};
 pub use locate::Place;
 pub use profile::{
     Body, BodyKind, Error3, Free, JointException, JointFree, JointFreedom, Limits, LinkTransform,
-    Loop, Method, Noise, Orientation, Origin, OriginFreedom, Outputs, PointChoice, Prior, Profile,
-    Protocol, RecordingSpec, SimErrors, SimMount, SimNoise, Simulation, Solve, Steps, SweptAxis,
-    Tracker, Usage,
+    Loop, Method, Noise, Orientation, Origin, OriginFreedom, Outputs, ParameterValue, Plugin,
+    PointChoice, Prior, Profile, Protocol, RecordingSpec, SimErrors, SimMount, SimNoise,
+    Simulation, Solve, Steps, SweptAxis, Tracker, Usage,
 };
 pub use schema::json_schema;
 

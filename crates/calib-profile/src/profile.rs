@@ -9,6 +9,7 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 pub use crate::raw::{
     RawFree as Free, RawJointFree as JointFree, RawMethod as Method, RawUse as Usage,
 };
+pub use crate::raw::{RawPlugin as Plugin, RawValue as ParameterValue};
 
 /// A checked profile. Lengths m, angles rad, torques N m.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +24,8 @@ pub struct Profile {
     pub bodies: BTreeMap<String, Body>,
     /// Recordings by name.
     pub recordings: BTreeMap<String, RecordingSpec>,
+    /// Plugins to load, by name.
+    pub plugins: BTreeMap<String, Plugin>,
     /// Unknown transforms by name.
     pub origins: BTreeMap<String, Origin>,
     /// Transforms between links to report, by name.
@@ -105,6 +108,8 @@ pub struct Origin {
     pub sweep: String,
     /// Center estimator, by id.
     pub center: String,
+    /// Parameters of the center estimator.
+    pub center_parameters: BTreeMap<String, ParameterValue>,
     /// Axis estimator, by id.
     pub axis: String,
     /// The swept joints, proximal first.

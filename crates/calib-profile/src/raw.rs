@@ -22,6 +22,9 @@ pub struct RawProfile {
     pub bodies: BTreeMap<String, RawBody>,
     /// The recordings, by name.
     pub recordings: BTreeMap<String, RawRecording>,
+    /// Plugins to load, by name; found beside the profile in `plugins/` or on the search path.
+    #[serde(default)]
+    pub plugins: BTreeMap<String, RawPlugin>,
     /// The unknown transforms: joint origins relative to tracking bodies, by name.
     #[serde(default)]
     pub origins: BTreeMap<String, RawOrigin>,
@@ -153,6 +156,9 @@ pub struct RawOrigin {
     /// Center-of-rotation estimator (see `calib plugins`).
     #[serde(default)]
     pub center: Option<String>,
+    /// Parameters of the center estimator, by name.
+    #[serde(default)]
+    pub center_parameters: BTreeMap<String, RawValue>,
     /// Axis-of-rotation estimator (see `calib plugins`).
     #[serde(default)]
     pub axis: Option<String>,
@@ -197,6 +203,30 @@ pub struct RawTransform {
     /// With `method: paper`, the fixed joint between them whose origin in the URDF takes up the difference.
     #[serde(default)]
     pub correct: Option<String>,
+}
+
+/// A plugin to load.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawPlugin {
+    /// The library, relative to the profile; found by its name when absent.
+    pub path: Option<String>,
+    /// SHA-256 of the library: another file is refused.
+    pub sha256: Option<String>,
+}
+
+/// A value of an estimator's parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum RawValue {
+    /// Yes or no.
+    Bool(bool),
+    /// A whole number.
+    Integer(i64),
+    /// A number.
+    Number(f64),
+    /// A text.
+    Text(String),
 }
 
 /// A loop closure between two origins.

@@ -1,0 +1,254 @@
+//! Estimators by name: built-in ones and those of plugins in one table.
+
+use std::collections::BTreeMap;
+
+use calib_cor::{InputKind, Pose, Shape as CorShape};
+use calib_plugin::{
+    Answer, AorFit, AxisLine, ByFn, Call, Control, CorFit, Entry, Failure, Host, Kind, Motion,
+    MotionData, Offer, PluginError, SearchPath, Shape, Tables, Value,
+};
+use calib_profile::Profile;
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::error::PipelineError;
+
+/// A center that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CenterFit {
+    /// In the tracker's frame, m.
+    pub center: Point3<f64>,
+    /// Its covariance, m²; `None` when the estimator gives none.
+    pub covariance: Option<Matrix3<f64>>,
+}
+
+/// All estimators that a profile can name.
+pub struct Estimators {
+    /// The tables, built-in first.
+    pub tables: Tables,
+}
+
+impl std::fmt::Debug for Estimators {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Estimators").finish_non_exhaustive()
+    }
+}
+
+impl Estimators {
+    /// The built-in ones only.
+    ///
+    /// # Errors
+    /// [`PipelineError::Plugin`] when two have one name.
+    pub fn built_in() -> Result<Self, PipelineError> {
+        let mut tables = Tables::default();
+        for info in calib_cor::estimators() {
+            tables.cor.register(built_in_cor(info))?;
+        }
+        for info in calib_aor::estimators() {
+            tables.aor.register(built_in_aor(info))?;
+        }
+        Ok(Self { tables })
+    }
+
+    /// With the plugins that a profile names, found beside it and on the search path.
+    ///
+    /// # Errors
+    /// [`PipelineError::Plugin`] when one cannot be loaded, has another hash, or offers a name that is taken.
+    pub fn of_profile(
+        profile: &Profile,
+        folder: &std::path::Path,
+        plugins: bool,
+    ) -> Result<Self, PipelineError> {
+        let mut estimators = Self::built_in()?;
+        let host = Host::new(SearchPath::from_environment(Some(folder)), plugins);
+        for (name, spec) in &profile.plugins {
+            let place = spec
+                .path
+                .as_ref()
+                .map_or_else(|| name.clone(), |p| folder.join(p).display().to_string());
+            let loaded = host.load(&place, spec.sha256.as_deref())?;
+            estimators.tables.add(&loaded)?;
+        }
+        Ok(estimators)
+    }
+
+    /// Finds a center; `Ok(Err(reason))` when the data do not determine one.
+    ///
+    /// # Errors
+    /// [`PipelineError::Plugin`] for an unknown name, data that the estimator does not take, and failures.
+    pub fn center(
+        &self,
+        id: &str,
+        parameters: &BTreeMap<String, Value>,
+        motion: &MotionData,
+    ) -> Result<Result<CenterFit, String>, PipelineError> {
+        let bound = self.tables.cor.get(id)?.with(parameters)?;
+        Ok(match bound.fit(&motion.view(), &Control::default())? {
+            Answer::NotObservable(reason) => Err(reason),
+            Answer::Found(CorFit {
+                weak: Some(reason), ..
+            }) => Err(reason),
+            Answer::Found(fit) => Ok(CenterFit {
+                center: Point3::from(fit.center_m),
+                covariance: fit.covariance_m2.map(|c| Matrix3::from_fn(|i, j| c[i][j])),
+            }),
+        })
+    }
+}
+
+impl From<PluginError> for PipelineError {
+    fn from(error: PluginError) -> Self {
+        let mut text = error.to_string();
+        let mut source = std::error::Error::source(&error);
+        while let Some(cause) = source {
+            text.push_str(&format!(": {cause}"));
+            source = cause.source();
+        }
+        Self::Plugin { text }
+    }
+}
+
+fn shapes(input: InputKind) -> &'static [Shape] {
+    match input {
+        InputKind::Points | InputKind::PointsOrPoses => {
+            &[Shape::Points, Shape::Markers, Shape::Poses]
+        }
+        InputKind::Markers => &[Shape::Markers],
+        InputKind::Poses => &[Shape::Poses],
+        InputKind::TwoBodies => &[Shape::TwoBodies],
+    }
+}
+
+fn tracks(motion: &Motion<'_>) -> Vec<Vec<Option<Point3<f64>>>> {
+    (0..motion.tracks)
+        .map(|k| motion.points(k).map(|p| p.map(Point3::from)).collect())
+        .collect()
+}
+
+fn poses(motion: &Motion<'_>, track: usize) -> Vec<Option<Pose>> {
+    let pose = |p: calib_plugin::BodyPose| Pose {
+        rotation: Matrix3::from_fn(|i, j| p.rotation[i][j]),
+        translation: Vector3::from(p.translation_m),
+    };
+    motion.poses(track).map(|p| p.map(pose)).collect()
+}
+
+fn built_in_cor(info: &'static calib_cor::EstimatorInfo) -> Entry<dyn calib_plugin::Cor> {
+    let offer = Offer::new(Kind::Cor, info.id, info.summary)
+        .from_source(info.source)
+        .takes(shapes(info.input));
+    Entry::built_in_cor(ByFn::new(
+        offer,
+        move |motion: &Motion<'_>, _: &Call<'_>| {
+            let options = calib_cor::Options {
+                sigma_t: motion.sigma_t_m,
+                sigma_r: motion.sigma_r_rad,
+                significance: motion.significance,
+                seed: motion.seed,
+                ..calib_cor::Options::default()
+            };
+            let (tracks, first, second) = (tracks(motion), poses(motion, 0), poses(motion, 1));
+            let input = match motion.shape {
+                Shape::Points => calib_cor::Input::Points(&tracks),
+                Shape::Markers => calib_cor::Input::Markers(&tracks),
+                Shape::Poses => calib_cor::Input::Poses(&first),
+                Shape::TwoBodies => calib_cor::Input::TwoBodies {
+                    first: &first,
+                    second: &second,
+                },
+            };
+            let outcome =
+                (info.fit)(&input, &options).map_err(|e| Failure::BadInput(e.to_string()))?;
+            let Some(e) = outcome.estimate() else {
+                return Ok(Answer::NotObservable(format!(
+                    "{}: {}",
+                    outcome.verdict().as_str(),
+                    outcome.reason().unwrap_or("")
+                )));
+            };
+            let (radii_m, body_points_m) = match &e.shape {
+                CorShape::Radii { radii, .. } => (radii.clone(), Vec::new()),
+                CorShape::BodyPoint { body_point, .. } => {
+                    (Vec::new(), vec![body_point.coords.into()])
+                }
+                CorShape::BodyPoints {
+                    in_first,
+                    in_second,
+                    ..
+                } => (
+                    Vec::new(),
+                    vec![in_first.coords.into(), in_second.coords.into()],
+                ),
+            };
+            Ok(Answer::Found(CorFit {
+                center_m: e.center.coords.into(),
+                covariance_m2: Some(std::array::from_fn(|i| {
+                    std::array::from_fn(|j| e.covariance[(i, j)])
+                })),
+                body_points_m,
+                radii_m,
+                rms_m: e.rms,
+                used: e.used,
+                rejected: e.rejected.iter().map(|r| [r.marker, r.row]).collect(),
+                weak: (!outcome.is_observable()).then(|| e.reason.clone().unwrap_or_default()),
+            }))
+        },
+    ))
+}
+
+fn built_in_aor(info: &'static calib_aor::EstimatorInfo) -> Entry<dyn calib_plugin::Aor> {
+    let takes: &[Shape] = match info.input {
+        calib_aor::InputKind::Points => &[Shape::Points, Shape::Markers, Shape::Poses],
+        calib_aor::InputKind::Markers => &[Shape::Markers],
+        calib_aor::InputKind::Poses => &[Shape::Poses, Shape::TwoBodies],
+    };
+    let offer = Offer::new(Kind::Aor, info.id, info.summary)
+        .from_source(info.source)
+        .takes(takes);
+    Entry::built_in_aor(ByFn::new(
+        offer,
+        move |motion: &Motion<'_>, _: &Call<'_>| {
+            let options = calib_aor::Options {
+                sigma_t: motion.sigma_t_m,
+                sigma_r: motion.sigma_r_rad,
+                center: motion.center_m.map(Point3::from),
+                angles: motion.angles_rad.map_or_else(Vec::new, <[f64]>::to_vec),
+                significance: motion.significance,
+                ..calib_aor::Options::default()
+            };
+            let (tracks, parent, child) = (tracks(motion), poses(motion, 0), poses(motion, 1));
+            let input = match motion.shape {
+                Shape::Points => calib_aor::Input::Points(&tracks),
+                Shape::Markers => calib_aor::Input::Markers(&tracks),
+                Shape::Poses => calib_aor::Input::Poses(&parent),
+                Shape::TwoBodies => calib_aor::Input::TwoBodies {
+                    parent: &parent,
+                    child: &child,
+                },
+            };
+            let outcome =
+                (info.fit)(&input, &options).map_err(|e| Failure::BadInput(e.to_string()))?;
+            let Some(e) = outcome.estimate() else {
+                return Ok(Answer::NotObservable(format!(
+                    "{}: {}",
+                    outcome.verdict().as_str(),
+                    outcome.reason().unwrap_or("")
+                )));
+            };
+            let line = |l: &calib_geometry::Line| AxisLine {
+                point_m: l.point.coords.into(),
+                direction: l.direction.into_inner().into(),
+            };
+            Ok(Answer::Found(AorFit {
+                line: line(&e.line),
+                covariance: Some(std::array::from_fn(|i| {
+                    std::array::from_fn(|j| e.covariance[(i, j)])
+                })),
+                in_child: e.in_child.as_ref().map(line),
+                rms_m: e.rms,
+                used: e.used,
+                rejected: e.rejected.iter().map(|row| [0, *row]).collect(),
+                weak: (!outcome.is_observable()).then(|| e.reason.clone().unwrap_or_default()),
+            }))
+        },
+    ))
+}

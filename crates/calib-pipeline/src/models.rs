@@ -1,0 +1,135 @@
+//! `calib run --compare-models`: which physics the recordings support, by leave-one-pose-out.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use calib_core::{RankedVariant, Settings, compare};
+use calib_profile::Free;
+use serde_json::json;
+
+use crate::checks;
+use crate::error::PipelineError;
+use crate::kinematics::Loads;
+use crate::load::{Inputs, load_recordings, load_robot};
+use crate::ml::{Freedom, state};
+use crate::start::start;
+use crate::tracks::body_tracks;
+
+/// Models in order of growth; each adds to the one before.
+const STEPS: [(&str, &[Free]); 7] = [
+    ("registration only", &[]),
+    ("+ joint offsets", &[Free::JointOffsets]),
+    ("+ joint axes", &[Free::JointAxes]),
+    ("+ compliance", &[Free::Compliance]),
+    ("+ lateral compliance", &[Free::LateralCompliance]),
+    ("+ eccentricity", &[Free::Eccentricity]),
+    ("+ gains", &[Free::JointGains]),
+];
+
+/// Ranks the models on the fitted recordings alone; validation recordings are not looked at.
+///
+/// # Errors
+/// [`PipelineError`] as for a run; data errors stop unless `force`.
+pub fn compare_models(
+    profile: &Path,
+    force: bool,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Vec<RankedVariant>, PipelineError> {
+    let mut inputs = load_recordings(load_robot(profile)?)?;
+    let mut findings = inputs.findings.clone();
+    findings.extend(checks::check(&inputs));
+    if checks::stops(&findings) && !force {
+        return Err(crate::run::stopped(&inputs, &findings));
+    }
+    inputs
+        .recordings
+        .retain(|_, r| r.spec.usage != calib_profile::Usage::Validation);
+    let tracks = body_tracks(&inputs, &mut findings)?;
+    let start = start(&inputs, &tracks);
+    let loaded = is_loaded(&inputs);
+    let mut free: BTreeSet<Free> = [Free::Bodies, Free::Tracker].into();
+    let mut variants = Vec::new();
+    for (name, added) in STEPS {
+        let needs_load = added
+            .iter()
+            .any(|f| matches!(f, Free::Compliance | Free::LateralCompliance));
+        if needs_load && !loaded {
+            continue;
+        }
+        free.extend(added.iter().copied());
+        inputs.robot.profile.solve.free.clone_from(&free);
+        let freedom = if added.is_empty() {
+            Freedom::RegistrationOnly
+        } else {
+            Freedom::Profile
+        };
+        progress(&format!("state model: {name}"));
+        variants.push((
+            name.to_owned(),
+            state(&inputs, &tracks, &start, freedom).problem,
+        ));
+    }
+    progress("fit and predict each pose from the others");
+    Ok(compare(
+        &variants,
+        &Settings::default(),
+        calib_core::Criterion::LogDensity,
+    )?)
+}
+
+/// Whether gravity loads any joint in any fitted pose.
+fn is_loaded(inputs: &Inputs) -> bool {
+    let poses = inputs
+        .recordings
+        .values()
+        .flat_map(|r| r.q.iter().flatten());
+    poses.take(1).any(|q| {
+        Loads::at(&inputs.robot.model, q)
+            .about_axis
+            .iter()
+            .any(|t| *t != 0.0)
+    })
+}
+
+/// The ranking for people.
+#[must_use]
+pub fn table(ranked: &[RankedVariant]) -> String {
+    let mut text = String::from(
+        "model                   known  left-out rms   worse by ± s.e. [nats per pose]\n",
+    );
+    for r in ranked {
+        let _ = writeln!(
+            text,
+            "{} {:<21} {:>5}  {:>9.3} mm   {:>7.3} ± {:.3}",
+            if r.chosen { "*" } else { " " },
+            r.name,
+            r.parameters,
+            r.loo_rms * 1e3,
+            r.worse_by,
+            r.standard_error
+        );
+    }
+    if let Some(chosen) = ranked.iter().find(|r| r.chosen) {
+        let _ = writeln!(
+            text,
+            "\n* the smallest model within one standard error of the best: {}",
+            chosen.name
+        );
+        if !chosen.noise_parameters.is_empty() {
+            let _ = writeln!(
+                text,
+                "  not told from zero (under two sigma): {}",
+                chosen.noise_parameters.join(", ")
+            );
+        }
+    }
+    text
+}
+
+/// The ranking for machines.
+#[must_use]
+pub fn json(ranked: &[RankedVariant]) -> String {
+    let value = json!({ "models": ranked });
+    calib_report::json::pretty(&calib_report::json::rounded(value)) + "\n"
+}
