@@ -448,3 +448,74 @@ fn missing_compliance_is_noticed_and_gone_when_it_is_freed() {
     let freed = missing(&finished("justin", "ml").report);
     assert!(freed.is_empty(), "{freed:?}");
 }
+
+#[test]
+fn a_limit_that_was_not_set_is_not_a_pass() {
+    let dir = Scratch::new().robot("ripley").edit(
+        "robots/ripley.yaml",
+        "  limits: {held_out_rms_mm: 1.5, held_out_max_mm: 4}\n",
+        "",
+    );
+    dir.calib(["run", "robots/ripley.yaml", "--out", "out"])
+        .expect(1);
+    assert_eq!(dir.json("out/report.json")["verdict"], "not_evaluated");
+}
+
+#[test]
+fn the_report_is_printed_as_it_is_written() {
+    let dir = Scratch::new().robot("ripley");
+    let ran = dir
+        .calib(["run", "robots/ripley.yaml", "--json", "--out", "out"])
+        .expect(0);
+    assert!(ran.stdout == dir.read("out/report.json"));
+}
+
+#[test]
+fn bad_data_stop_a_run_unless_it_is_forced() {
+    let outside = |row: usize, name: &str, cell: &str| {
+        if row == 9 && name == "waist_deg" {
+            "200".to_owned()
+        } else {
+            cell.to_owned()
+        }
+    };
+    let dir = Scratch::new()
+        .robot("ripley")
+        .cells("robots/ripley/base_sweep.csv", outside);
+    let profile = "robots/ripley.yaml";
+    dir.calib(["run", profile, "--out", "out"]).expect(3);
+    assert!(dir.files("out").is_empty());
+    let ran = dir.calib(["run", profile, "--force", "--out", "out"]);
+    assert!(ran.code < 2, "{} {}", ran.code, ran.stderr);
+    let findings = dir.json("out/report.json")["findings"].to_string();
+    assert!(findings.contains("joint-outside-limits"), "{findings}");
+}
+
+/// The closed forms cannot answer from the sweep; the likelihood can from the other recordings.
+#[test]
+fn a_body_that_its_sweep_never_saw() {
+    let unseen = |_: usize, name: &str, cell: &str| {
+        if name.starts_with("linkM") {
+            String::new()
+        } else {
+            cell.to_owned()
+        }
+    };
+    let dir = Scratch::new()
+        .robot("ripley")
+        .cells("robots/ripley/base_sweep.csv", unseen);
+    let profile = "robots/ripley.yaml";
+    let severities = |folder: &str| -> Vec<String> {
+        let report = dir.json(&format!("{folder}/report.json"));
+        let findings = report["findings"].as_array().expect("findings").clone();
+        let about = findings
+            .iter()
+            .filter(|f| f["id"] == "origin-not-observable" && f["subject"] == "base");
+        about.map(|f| f["severity"].to_string()).collect()
+    };
+    dir.calib(["run", profile, "--method", "paper", "--out", "paper"])
+        .expect(4);
+    assert_eq!(severities("paper"), ["\"error\""]);
+    dir.calib(["run", profile, "--out", "ml"]).expect(0);
+    assert_eq!(severities("ml"), ["\"warning\""]);
+}

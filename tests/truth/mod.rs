@@ -81,7 +81,7 @@ pub fn errors(report: &Value, truth: &Truth) -> Vec<TransformError> {
             let rows = t["covariance"]
                 .as_array()
                 .unwrap_or_else(|| panic!("{name} has no covariance"));
-            let covariance = Matrix6::from_row_iterator(rows.iter().flat_map(|r| numbers(r)));
+            let covariance = Matrix6::from_row_iterator(rows.iter().flat_map(numbers));
             let weighed = covariance
                 .cholesky()
                 .unwrap_or_else(|| panic!("{name}: the covariance is not positive definite"))
