@@ -385,7 +385,7 @@ fn default_words(key: &str, schema: &Value, of: &Value) -> String {
 /// One table of keys, or one list of words.
 fn table(page: &mut String, schema: &Value) {
     use std::fmt::Write as _;
-    if let Some(words) = schema["oneOf"].as_array() {
+    if let Some(words) = schema["oneOf"].as_array().or(schema["anyOf"].as_array()) {
         page.push_str("| one of | meaning |\n|---|---|\n");
         for word in words {
             let meaning = one_line(word["description"].as_str().unwrap_or_default());
