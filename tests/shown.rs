@@ -184,25 +184,27 @@ fn checks() {
 #[test]
 fn help() {
     let dir = Scratch::new();
-    let top = dir.calib(["--help"]).expect(0).stdout;
-    let mut text = format!("$ calib --help\n{top}");
-    let commands = top
+    insta::assert_snapshot!(help_pages(&dir, &[]));
+}
+
+/// The page of a command and the pages of all commands below it.
+fn help_pages(dir: &Scratch, command: &[&str]) -> String {
+    let asked = [command, &["--help"]].concat();
+    let page = dir.calib_with(&asked).expect(0).stdout;
+    let mut text = format!("$ calib {}\n{page}\n", asked.join(" "));
+    let below = page
         .lines()
-        .skip_while(|l| *l != "Commands:")
+        .skip_while(|line| *line != "Commands:")
         .skip(1)
-        .take_while(|l| !l.is_empty());
-    for command in commands
-        .filter_map(|l| l.split_whitespace().next())
-        .filter(|c| *c != "help")
-    {
-        let page = dir.calib([command, "--help"]).expect(0).stdout;
-        text += &format!("\n$ calib {command} --help\n{page}");
+        .take_while(|line| !line.is_empty())
+        // A description that goes on stands deeper.
+        .filter(|line| !line.starts_with("    "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help");
+    for name in below {
+        text += &help_pages(dir, &[command, &[name]].concat());
     }
-    for what in ["cor", "aor", "frame", "handeye"] {
-        let page = dir.calib(["fit", what, "--help"]).expect(0).stdout;
-        text += &format!("\n$ calib fit {what} --help\n{page}");
-    }
-    insta::assert_snapshot!(text);
+    text
 }
 
 #[test]

@@ -112,6 +112,10 @@ impl Scratch {
 
     /// Runs the program in this folder.
     pub fn calib<const N: usize>(&self, arguments: [&str; N]) -> Ran {
+        self.calib_with(&arguments)
+    }
+
+    pub fn calib_with(&self, arguments: &[&str]) -> Ran {
         let output = Command::new(env!("CARGO_BIN_EXE_calib"))
             .args(arguments)
             .current_dir(self.0.path())
