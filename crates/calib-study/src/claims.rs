@@ -275,9 +275,9 @@ fn aor(cells: &[Cell]) -> Vec<Claim> {
         "Algorithm 1 averages the distal axes as they stand in the tracker's frame",
         "deg",
         [
-            "algorithm1, as printed",
-            "algorithm1, turned back",
-            "frame_ml",
+            "algorithm1, as printed, in the tracker",
+            "algorithm1, turned back, in the tracker",
+            "frame_ml, in the tracker",
         ]
         .into_iter()
         .flat_map(frame)

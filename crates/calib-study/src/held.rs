@@ -309,7 +309,7 @@ fn aor(cells: &[Cell]) -> Vec<Standard> {
         cells
             .iter()
             .filter(|c| {
-                c.method == "frame_ml"
+                c.method == "frame_ml, in the tracker"
                     && c.quantity == quantity
                     && (c.scene.sigma_t_m - sigma).abs() < 1e-9
                     && (c.scene.sigma_r_rad - sigma_r.to_radians()).abs() < 1e-9
@@ -363,13 +363,13 @@ fn aor(cells: &[Cell]) -> Vec<Standard> {
             of(Part::Frame, Quantity::Shift, "frame_ml"),
         ),
         judge(
-            "frame ML on 6 × 6, 1 mm, 0.5°: rms of the turn, degrees (rounded bound 0.16)",
+            "frame ML on 6 × 6, 1 mm, 0.5°, in the tracker: rms of the turn, degrees",
             0.165,
             false,
             frame(Quantity::Turn, 180.0 / std::f64::consts::PI, 1e-3, 0.5),
         ),
         judge(
-            "frame ML on 6 × 6, 1 mm, 0.5°: rms of the shift, mm (rounded bound 0.37)",
+            "frame ML on 6 × 6, 1 mm, 0.5°, in the tracker: rms of the shift, mm",
             0.375,
             false,
             frame(Quantity::Shift, 1e3, 1e-3, 0.5),

@@ -1,4 +1,6 @@
-//! The Cramér–Rao bound of an axis from the poses of one body, joint angles unknown.
+//! Cramér–Rao bounds that the estimators' crate does not have: an axis from poses, a frame in the tracker.
+//!
+//! The axis from the poses of one body, joint angles unknown:
 //!
 //! ```text
 //! T_i = W Rz(θ_i) Y,  T̃_i = T_i exp(ξ_i),  ξ ~ N(0, diag(σ_r² I, σ_t² I))
@@ -67,6 +69,39 @@ pub(crate) fn hinge_poses(
     Some(out * of_axis * out.transpose())
 }
 
+/// The frame of a joint from poses `W A_i Y` with known turns A_i, over `[ω; v]` of W = world_from_joint and of
+/// Y = joint_from_body, both perturbed on the right.
+///
+/// ```text
+/// dξ_i = Ad((A_i Y)⁻¹) dW + dY
+/// ```
+pub(crate) fn frame(
+    turns: &[UnitQuaternion<f64>],
+    joint_from_body: &Isometry3<f64>,
+    sigma_t: f64,
+    sigma_r: f64,
+) -> Option<SMatrix<f64, 12, 12>> {
+    if !(sigma_t > 0.0 && sigma_r > 0.0) {
+        return None;
+    }
+    // Scaled unknowns: angles by σ_r, lengths by σ_t.
+    let scale = |k: usize| if k % 6 < 3 { sigma_r } else { sigma_t };
+    let mut information = SMatrix::<f64, 12, 12>::zeros();
+    for turn in turns {
+        let of_w = se3::adjoint(&(turn * joint_from_body).inverse());
+        let mut j = SMatrix::<f64, 6, 12>::zeros();
+        for row in 0..6 {
+            for column in 0..6 {
+                j[(row, column)] = of_w[(row, column)] * scale(column) / scale(row);
+            }
+            j[(row, 6 + row)] = 1.0;
+        }
+        information += j.transpose() * j;
+    }
+    let c = information.cholesky()?.inverse();
+    Some(SMatrix::from_fn(|i, k| c[(i, k)] * scale(i) * scale(k)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -114,5 +149,28 @@ mod tests {
             let expected = circle.fixed_view::<3, 3>(first, first).trace();
             assert!((got / expected - 1.0).abs() < 1e-3, "{got} {expected}");
         }
+    }
+
+    /// The body's part is the bound of the estimators' crate.
+    #[test]
+    fn the_frame_in_the_body_is_known() {
+        let axes = calib_aor::FrameAxes::default();
+        let body_from_joint =
+            Isometry3::new(Vector3::new(0.0, -0.1, 0.0), Vector3::new(-0.9, 0.3, 0.5));
+        let mut angles = Vec::new();
+        for p in steps(-45.0, 135.0, 6) {
+            for d in steps(-45.0, 80.0, 6) {
+                angles.push((p, d));
+            }
+        }
+        let turns: Vec<_> = angles.iter().map(|(p, d)| axes.turned(*p, *d)).collect();
+        let y = body_from_joint.inverse();
+        let ours = frame(&turns, &y, 1e-3, 0.01).expect("a bound");
+        let ad = se3::adjoint(&y);
+        let of_y: Matrix6<f64> = ours.fixed_view::<6, 6>(6, 6).into();
+        let in_body = ad * of_y * ad.transpose();
+        let theirs = calib_aor::bounds::frame(axes, &angles, &body_from_joint, 1e-3, 0.01);
+        let difference = (in_body - theirs.expect("a bound")).norm() / in_body.norm();
+        assert!(difference < 1e-9, "{difference}");
     }
 }

@@ -15,13 +15,13 @@ use calib_aor::{FrameAxes, FrameSample, Input, Options};
 use calib_geometry::{mean::axis_mean, so3};
 use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
 
-/// body_from_joint by (1); `None` where a plane or the mean has no answer. `truth`: gives the axes their signs.
+/// (body_from_joint, world_from_joint) by (1); `None` where a plane or the mean has no answer. `truth`: gives the axes their signs.
 pub(crate) fn algorithm1_as_printed(
     samples: &[FrameSample],
     center: &Point3<f64>,
     axes: FrameAxes,
     truth: &Isometry3<f64>,
-) -> Option<Isometry3<f64>> {
+) -> Option<(Isometry3<f64>, Isometry3<f64>)> {
     let options = Options {
         center: Some(*center),
         ..Options::default()
@@ -50,7 +50,8 @@ pub(crate) fn algorithm1_as_printed(
     let world_from_body =
         Isometry3::from_parts(pose.translation.into(), so3::quaternion_of(&measured));
     let turn = axes.turned(nearest.proximal, nearest.distal);
-    Some(world_from_body.inverse() * world_from_joint * turn)
+    let body_from_joint = world_from_body.inverse() * world_from_joint * turn;
+    Some((body_from_joint, world_from_joint))
 }
 
 fn size(sample: &FrameSample) -> f64 {

@@ -149,7 +149,10 @@ fn table(out: &mut String, cells: &[Cell], t: &Table<'_>) {
     if scenes.is_empty() {
         return;
     }
-    let _ = writeln!(out, "## {}\n\n{}\n", t.title, t.note);
+    let _ = writeln!(out, "## {}\n", t.title);
+    if !t.note.is_empty() {
+        let _ = writeln!(out, "{}\n", t.note);
+    }
     let _ = writeln!(
         out,
         "| motion | n | r mm | σ mm | σ ° | {} |",
