@@ -70,10 +70,18 @@ fn list() -> Result<String, PipelineError> {
         .iter()
         .map(|e| (e.offer().name.clone(), e.offer().summary.clone()));
     section(Kind::Aor, aor.collect());
-    let readers = calib_recording::readers::readers()
+    let readers = estimators
+        .tables
+        .reader
         .iter()
-        .map(|r| (r.id.to_owned(), r.name.to_owned()));
+        .map(|e| (e.offer().name.clone(), e.offer().summary.clone()));
     section(Kind::Reader, readers.collect());
+    let reports = estimators
+        .tables
+        .report
+        .iter()
+        .map(|e| (e.offer().name.clone(), e.offer().summary.clone()));
+    section(Kind::Report, reports.collect());
     let found = Host::new(SearchPath::from_environment(None), true).discover();
     let _ = writeln!(
         text,

@@ -18,6 +18,10 @@ use crate::{
     outcome::{CorError, CorEstimate, Known, Noise, NotObservable, Outcome, Rejected, Shape},
 };
 
+/// A gradient this much smaller than at the start is rounding of the sums it is made of.
+const ROUNDING: f64 = 1e-14;
+/// Conjugate gradients may rise on the way; from here on a rise is rounding.
+const SMALL: f64 = 1e-8;
 /// Conjugate gradients end after as many steps as there are unknowns; twice for rounding.
 const CG_STEPS: usize = 24;
 
@@ -333,7 +337,7 @@ fn conjugate_gradients(sums: &PoseSums, poses: &[Option<Pose>]) -> Vector3<f64> 
     let start = s.norm();
     for _ in 0..CG_STEPS {
         let gamma = s.norm_squared();
-        if gamma.sqrt() <= 1e-16 * start {
+        if gamma.sqrt() <= ROUNDING * start {
             break;
         }
         let mut curvature = 0.0;
@@ -341,8 +345,14 @@ fn conjugate_gradients(sums: &PoseSums, poses: &[Option<Pose>]) -> Vector3<f64> 
         if curvature <= 0.0 {
             break;
         }
-        x += direction * (gamma / curvature);
-        s = gradient(&x);
+        let next = x + direction * (gamma / curvature);
+        let gradient = gradient(&next);
+        // A small gradient that no longer falls is rounding: another step would amplify it.
+        if gradient.norm_squared() >= gamma && gamma.sqrt() <= SMALL * start {
+            break;
+        }
+        x = next;
+        s = gradient;
         direction = s + direction * (s.norm_squared() / gamma);
     }
     x

@@ -105,6 +105,8 @@ pub enum PipelineError {
     Plugin {
         /// What was found and what was needed.
         text: String,
+        /// Usage, data or plugin: whose fault it is.
+        code: ExitCode,
     },
     /// The report or scene could not be rendered.
     #[error("the report cannot be written: {0}")]
@@ -124,7 +126,7 @@ impl PipelineError {
             | Self::Simulation(_) => ExitCode::Usage,
             Self::Recording(_) | Self::Data { .. } => ExitCode::Data,
             Self::Solve(_) => ExitCode::NotConverged,
-            Self::Plugin { .. } => ExitCode::Plugin,
+            Self::Plugin { code, .. } => *code,
             Self::Patch { .. } | Self::Write { .. } | Self::Exists { .. } | Self::Report(_) => {
                 ExitCode::NotWritten
             }

@@ -11,6 +11,7 @@ use calib_profile::Profile;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::error::PipelineError;
+use crate::readers;
 
 /// A center that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +47,12 @@ impl Estimators {
         for info in calib_aor::estimators() {
             tables.aor.register(built_in_aor(info))?;
         }
+        for reader in calib_recording::readers::readers() {
+            tables.reader.register(readers::built_in_reader(reader))?;
+        }
+        for writer in readers::built_in_reports() {
+            tables.report.register(writer)?;
+        }
         Ok(Self { tables })
     }
 
@@ -61,10 +68,8 @@ impl Estimators {
         let mut estimators = Self::built_in()?;
         let host = Host::new(SearchPath::from_environment(Some(folder)), plugins);
         for (name, spec) in &profile.plugins {
-            let place = spec
-                .path
-                .as_ref()
-                .map_or_else(|| name.clone(), |p| folder.join(p).display().to_string());
+            // Relative paths start from the profile: the search path knows its folder.
+            let place = spec.path.clone().unwrap_or_else(|| name.clone());
             let loaded = host.load(&place, spec.sha256.as_deref())?;
             estimators.tables.add(&loaded)?;
         }
@@ -95,6 +100,22 @@ impl Estimators {
     }
 }
 
+/// Values of a profile as values of the contract.
+#[must_use]
+pub fn values(given: &BTreeMap<String, calib_profile::ParameterValue>) -> BTreeMap<String, Value> {
+    use calib_profile::ParameterValue as Given;
+    let value = |v: &Given| match v {
+        Given::Bool(b) => Value::Bool(*b),
+        Given::Integer(i) => Value::Integer(*i),
+        Given::Number(x) => Value::Number(*x),
+        Given::Text(t) => Value::Text(t.clone()),
+    };
+    given
+        .iter()
+        .map(|(name, v)| (name.clone(), value(v)))
+        .collect()
+}
+
 impl From<PluginError> for PipelineError {
     fn from(error: PluginError) -> Self {
         let mut text = error.to_string();
@@ -103,7 +124,12 @@ impl From<PluginError> for PipelineError {
             text.push_str(&format!(": {cause}"));
             source = cause.source();
         }
-        Self::Plugin { text }
+        let code = match error.exit_code() {
+            2 => crate::ExitCode::Usage,
+            3 => crate::ExitCode::Data,
+            _ => crate::ExitCode::Plugin,
+        };
+        Self::Plugin { text, code }
     }
 }
 

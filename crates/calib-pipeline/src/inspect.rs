@@ -27,7 +27,7 @@ pub struct Checked {
 /// # Errors
 /// [`PipelineError`] for what cannot be read at all.
 pub fn check(profile: &Path) -> Result<Checked, PipelineError> {
-    let inputs = load_recordings(load_robot(profile)?)?;
+    let inputs = load_recordings(load_robot(profile)?, true)?;
     let mut findings = inputs.findings.clone();
     findings.extend(checks::check(&inputs));
     if !checks::stops(&findings) {

@@ -25,6 +25,7 @@ pub mod loads;
 pub mod ml;
 pub mod models;
 pub mod paper;
+pub mod readers;
 pub mod residuals;
 pub mod run;
 pub mod simulate;

@@ -2,12 +2,18 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use calib_plugin::{Control, Source};
 use calib_profile::{Profile, RecordingSpec};
-use calib_recording::{ColumnMap, Filled, Finding, JointUnit, Meta, Poses, ReadOptions, Severity};
+use calib_recording::{
+    ColumnMap, Filled, Finding, JointUnit, Meta, Poses, ReadOptions, Recording, Severity,
+};
 use calib_urdf::{RobotModel, sha256_hex};
 
 use crate::error::PipelineError;
+use crate::estimators::{Estimators, values};
+use crate::readers;
 
 /// A profile with its robot, before any recording is read.
 #[derive(Debug, Clone)]
@@ -61,6 +67,8 @@ pub struct Inputs {
     pub findings: Vec<Finding>,
     /// Digests of all files read, profile first.
     pub digests: Vec<Digest>,
+    /// Estimators, readers and writers that the profile can name.
+    pub estimators: Arc<Estimators>,
 }
 
 /// Largest profile or robot description that is read, bytes.
@@ -137,7 +145,8 @@ fn known_estimators(profile: &Profile, text: &str, shown: &str) -> Result<(), Pi
 ///
 /// # Errors
 /// [`PipelineError`] with file, place and remedy.
-pub fn load_recordings(robot: RobotProfile) -> Result<Inputs, PipelineError> {
+pub fn load_recordings(robot: RobotProfile, plugins: bool) -> Result<Inputs, PipelineError> {
+    let estimators = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
     let mut recordings = BTreeMap::new();
     let mut findings = Vec::new();
     let mut digests = robot.digests.clone();
@@ -152,12 +161,8 @@ pub fn load_recordings(robot: RobotProfile) -> Result<Inputs, PipelineError> {
             path: spec.file.clone(),
             sha256: sha256_hex(&bytes),
         });
-        let options = ReadOptions {
-            columns: column_map(spec),
-            ..ReadOptions::default()
-        };
         let shown = path.display().to_string();
-        let recording = calib_recording::read_bytes(&shown, &bytes, &options)?;
+        let recording = read(spec, &shown, &bytes, &estimators)?;
         let poses = recording
             .poses(Filled::Exclude)
             .map_err(|e| PipelineError::Data {
@@ -174,7 +179,45 @@ pub fn load_recordings(robot: RobotProfile) -> Result<Inputs, PipelineError> {
         recordings,
         findings,
         digests,
+        estimators: Arc::new(estimators),
     })
+}
+
+/// Reads one file with the profile's reader: a built-in one directly, a plugin's across the border.
+fn read(
+    spec: &RecordingSpec,
+    shown: &str,
+    bytes: &[u8],
+    estimators: &Estimators,
+) -> Result<Recording, PipelineError> {
+    let built_in = |id: &String| {
+        calib_recording::readers::readers()
+            .iter()
+            .any(|r| r.id == id)
+    };
+    match &spec.reader {
+        Some(id) if !built_in(id) || !spec.reader_parameters.is_empty() => {
+            let reader = estimators
+                .tables
+                .reader
+                .get(id)?
+                .with(&values(&spec.reader_parameters))?;
+            let source = Source { name: shown, bytes };
+            Ok(readers::recording(
+                reader.read(&source, &Control::default())?,
+                shown,
+                id,
+            ))
+        }
+        format => {
+            let options = ReadOptions {
+                format: format.clone(),
+                columns: column_map(spec),
+                ..ReadOptions::default()
+            };
+            Ok(calib_recording::read_bytes(shown, bytes, &options)?)
+        }
+    }
 }
 
 /// The profile's column map, with its group column among the texts to keep.

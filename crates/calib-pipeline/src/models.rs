@@ -36,7 +36,7 @@ pub fn compare_models(
     force: bool,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Vec<RankedVariant>, PipelineError> {
-    let mut inputs = load_recordings(load_robot(profile)?)?;
+    let mut inputs = load_recordings(load_robot(profile)?, true)?;
     let mut findings = inputs.findings.clone();
     findings.extend(checks::check(&inputs));
     if checks::stops(&findings) && !force {

@@ -103,16 +103,6 @@ fn body_pose(pose: &Isometry3<f64>) -> BodyPose {
     }
 }
 
-fn plugin_value(value: &calib_profile::ParameterValue) -> calib_plugin::Value {
-    use calib_profile::ParameterValue as Profile;
-    match value {
-        Profile::Bool(b) => calib_plugin::Value::Bool(*b),
-        Profile::Integer(i) => calib_plugin::Value::Integer(*i),
-        Profile::Number(x) => calib_plugin::Value::Number(*x),
-        Profile::Text(t) => calib_plugin::Value::Text(t.clone()),
-    }
-}
-
 struct Task<'a> {
     estimators: &'a Estimators,
     inputs: &'a Inputs,
@@ -177,12 +167,7 @@ impl Task<'_> {
     /// The center by the profile's estimator, and by the others that take the same data.
     fn center(&self) -> Result<Centers, PipelineError> {
         let id = &self.origin.center;
-        let parameters = self
-            .origin
-            .center_parameters
-            .iter()
-            .map(|(k, v)| (k.clone(), plugin_value(v)))
-            .collect();
+        let parameters = crate::estimators::values(&self.origin.center_parameters);
         let chosen = self.fit_center(id, &parameters)?;
         let mut others = Vec::new();
         for other in ["sfe", "hse", "hotspot_ml", "ml_sphere", "ball_bundle"] {

@@ -13,7 +13,7 @@ use crate::assemble::{Evidence, assemble};
 use crate::checks;
 use crate::closure::close_loops;
 use crate::error::{ExitCode, PipelineError};
-use crate::estimators::Estimators;
+use crate::estimators::values;
 use crate::export::{Found, calibration_yaml, patch_urdf, scene};
 use crate::kinematics::Calibration;
 use crate::load::{Inputs, load_recordings, load_robot};
@@ -59,7 +59,7 @@ pub fn run(
     progress("read profile and robot");
     let robot = load_robot(profile)?;
     progress("read recordings");
-    let inputs = load_recordings(robot)?;
+    let inputs = load_recordings(robot, !options.no_plugins)?;
     progress("check data");
     let mut findings = inputs.findings.clone();
     findings.extend(checks::check(&inputs));
@@ -68,13 +68,8 @@ pub fn run(
     }
     let tracks = body_tracks(&inputs, &mut findings)?;
     let start = start(&inputs, &tracks);
-    let estimators = Estimators::of_profile(
-        &inputs.robot.profile,
-        &inputs.robot.folder,
-        !options.no_plugins,
-    )?;
     progress("estimate origins");
-    let origins = paper::origins(&inputs, &tracks, &start, &estimators, &mut findings)?;
+    let origins = paper::origins(&inputs, &tracks, &start, &inputs.estimators, &mut findings)?;
     let method = options.method.unwrap_or(inputs.robot.profile.solve.method);
     let nominal = nominal(&inputs, &start);
     let robust = inputs.robot.profile.solve.robust;
@@ -497,6 +492,27 @@ fn files(
     if let Some(yaml) = calibration_yaml(inputs, robot) {
         let stem = outputs.urdf.trim_end_matches(".urdf");
         files.push(OutputFile::text(format!("{stem}.calibration.yaml"), yaml));
+    }
+    let report_json = files[1].bytes.clone();
+    let scene_json = scene.json()?.into_bytes();
+    for (name, parameters) in &outputs.reports {
+        let writer = inputs
+            .estimators
+            .tables
+            .report
+            .get(name)?
+            .with(&values(parameters))?;
+        let input = calib_plugin::ReportInput {
+            report_json: &report_json,
+            scene_json: Some(&scene_json),
+        };
+        for file in writer.write(&input, &calib_plugin::Control::default())? {
+            let own = format!("{name}.{}", file.path.replace(['/', '\\'], "."));
+            files.push(OutputFile {
+                name: own,
+                bytes: file.bytes,
+            });
+        }
     }
     Ok(files)
 }

@@ -263,6 +263,8 @@ impl<'a> Checker<'a> {
             ranges,
             hold,
             group: raw.group.clone(),
+            reader: raw.reader.clone(),
+            reader_parameters: raw.reader_parameters.clone(),
             columns: raw.columns.clone(),
         }
     }
@@ -657,6 +659,7 @@ impl<'a> Checker<'a> {
             urdf: named(&raw.urdf, ".calibrated.urdf"),
             scene: named(&raw.scene, ".scene.json"),
             add_bodies: raw.add_bodies.clone(),
+            reports: raw.reports.clone(),
         };
         for (key, file) in [("urdf", &outputs.urdf), ("scene", &outputs.scene)] {
             if file.contains(['/', '\\']) {

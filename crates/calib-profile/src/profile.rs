@@ -91,6 +91,10 @@ pub struct RecordingSpec {
     pub hold: BTreeMap<JointId, f64>,
     /// Text column that groups the poses.
     pub group: Option<String>,
+    /// Reader by id; found from the content when `None`.
+    pub reader: Option<String>,
+    /// Parameters of the reader.
+    pub reader_parameters: BTreeMap<String, ParameterValue>,
     /// Meaning of columns that do not follow our own names.
     pub columns: Option<ColumnMap>,
 }
@@ -338,7 +342,7 @@ pub struct Limits {
 }
 
 /// What is written.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Outputs {
     /// Patched URDF.
     pub urdf: String,
@@ -346,6 +350,8 @@ pub struct Outputs {
     pub scene: String,
     /// Bodies added to the patched URDF.
     pub add_bodies: Vec<String>,
+    /// Report writers to run too, with their parameters.
+    pub reports: BTreeMap<String, BTreeMap<String, ParameterValue>>,
 }
 
 /// How to simulate recordings with known truth.

@@ -135,6 +135,12 @@ pub struct RawRecording {
     /// Text column whose values group the poses in the report (e.g. the torso position).
     #[serde(default)]
     pub group: Option<String>,
+    /// Reader to use, built-in or of a plugin; found from the content when absent (see `calib plugins`).
+    #[serde(default)]
+    pub reader: Option<String>,
+    /// Parameters of the reader, by name.
+    #[serde(default)]
+    pub reader_parameters: BTreeMap<String, RawValue>,
     /// How to read columns that do not name their unit.
     #[serde(default)]
     pub columns: Option<calib_recording::ColumnMap>,
@@ -432,6 +438,8 @@ pub struct RawOutputs {
     pub scene: Option<String>,
     /// Tracking bodies to add to the patched URDF as fixed joints and links.
     pub add_bodies: Vec<String>,
+    /// Report writers to run too, built-in or of a plugin, each with its parameters.
+    pub reports: BTreeMap<String, BTreeMap<String, RawValue>>,
 }
 
 /// How `calib simulate` makes recordings.
