@@ -107,7 +107,7 @@ pub enum Command {
 pub struct Run {
     /// The robot's profile
     pub profile: PathBuf,
-    /// Folder to write to; results/<profile name> when not given
+    /// Folder to write to; `results/<profile name>` when not given
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Instead of the profile's method

@@ -211,8 +211,10 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
             ("lateral_1_rad_per_nm", e.lateral[0]),
             ("lateral_2_rad_per_nm", e.lateral[1]),
         ] {
-            if value != 0.0 {
-                let _ = writeln!(text, "    {key}: {value}");
+            /// Below this an effect moves no tool by a nanometre (rad, rad per N m, 1).
+            const NOTHING: f64 = 1e-15;
+            if value.abs() > NOTHING {
+                let _ = writeln!(text, "    {key}: {value:e}");
             }
         }
         if !e.coupling.is_empty() {

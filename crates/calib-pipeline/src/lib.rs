@@ -8,7 +8,7 @@
 //! Calibration ─ export ─► patched URDF, scene        everything ─ assemble ─► Report
 //! ```
 //!
-//! Stages are functions of plain values. Only [`load`] reads files and only [`write`] writes them.
+//! Stages are functions of plain values. Only [`load`] reads files and only [`mod@write`] writes them.
 
 pub mod assemble;
 pub mod checks;

@@ -139,7 +139,8 @@ fn body_frame(profile: &Profile, name: &str) -> Result<Isometry3<f64>, SimError>
         None => {
             let tracks: Vec<[Option<Point3<f64>>; 1]> =
                 in_plan.iter().map(|p| [Some(*p)]).collect();
-            let tracks: Vec<&[Option<Point3<f64>>]> = tracks.iter().map(<[_; 1]>::as_slice).collect();
+            let tracks: Vec<&[Option<Point3<f64>>]> =
+                tracks.iter().map(<[_; 1]>::as_slice).collect();
             let learned = Template::learn(names, &tracks);
             learned
                 .map_err(|source| SimError::Body {

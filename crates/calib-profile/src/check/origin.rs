@@ -1,0 +1,236 @@
+//! Origins: the joint, the body that moves with it, the swept axes, and what is assumed.
+
+use super::*;
+
+impl Checker<'_> {
+    pub(super) fn origin(&mut self, name: &str, raw: &RawOrigin) -> Origin {
+        let joint = self.joint(&["origins", name, "joint"], &raw.joint);
+        let child = self.robot.joint(joint).child;
+        let link = match &raw.link {
+            Some(link) => self.link(&["origins", name, "link"], link),
+            None => child,
+        };
+        if !self.rigidly_joined(child, link) {
+            let child_name = self.robot.link(child).name.clone();
+            self.problem(
+                &["origins", name, "link"],
+                format!(
+                    "link `{}` moves against `{child_name}`, the child link of `{}`",
+                    self.robot.link(link).name,
+                    raw.joint
+                ),
+                "name a link that is fixed to it",
+            );
+        }
+        self.known(
+            &["origins", name, "body"],
+            &raw.body,
+            self.raw.bodies.keys(),
+        );
+        if let Some(body) = self.raw.bodies.get(&raw.body) {
+            if let Ok(body_link) = self.robot.link_id(&body.link)
+                && !self.rigidly_joined(child, body_link)
+            {
+                self.problem(
+                    &["origins", name, "body"],
+                    format!(
+                        "body `{}` sits on `{}`, which moves against the child link of `{}`",
+                        raw.body, body.link, raw.joint
+                    ),
+                    "mount the body on the joint's child link, or name the joint that carries it",
+                );
+            }
+            if !body.pose && body.markers.len() < 3 {
+                self.problem(
+                    &["origins", name, "body"],
+                    format!(
+                        "body `{}` has {} markers: they give points, not a frame",
+                        raw.body,
+                        body.markers.len()
+                    ),
+                    "an origin is expressed in a body frame: it needs 3 markers or a 6-DoF body",
+                );
+            }
+        }
+        self.known(
+            &["origins", name, "sweep"],
+            &raw.sweep,
+            self.raw.recordings.keys(),
+        );
+        if let Some(recording) = self.raw.recordings.get(&raw.sweep)
+            && recording.usage == RawUse::Validation
+        {
+            self.problem(
+                &["origins", name, "sweep"],
+                format!("`{}` is held out for validation", raw.sweep),
+                "sweep another recording, or change its `use`",
+            );
+        }
+        let axes = self.axes(name, raw, joint);
+        let orientation = self.orientation(name, raw, axes.len());
+        let point = self.point(name, raw, axes.len());
+        Origin {
+            joint,
+            link,
+            body: raw.body.clone(),
+            sweep: raw.sweep.clone(),
+            center: raw
+                .center
+                .clone()
+                .unwrap_or_else(|| DEFAULT_CENTER.to_owned()),
+            center_parameters: raw.center_parameters.clone(),
+            axis: raw.axis.clone().unwrap_or_else(|| DEFAULT_AXIS.to_owned()),
+            axes,
+            orientation,
+            point,
+        }
+    }
+
+    /// The swept joints, proximal first, each checked to turn about the stated axis of the joint frame at zero.
+    pub(super) fn axes(
+        &mut self,
+        name: &str,
+        raw: &RawOrigin,
+        origin_joint: JointId,
+    ) -> Vec<SweptAxis> {
+        let child = self.robot.joint(origin_joint).child;
+        let zero = self.robot.forward_kinematics(&self.robot.zero_positions());
+        let mut axes = Vec::new();
+        for (label, joint_name) in &raw.axes {
+            let path = ["origins", name, "axes", label];
+            let Some(stated) = axis_label(label) else {
+                self.key_problem(
+                    &path,
+                    format!("`{label}` is no axis"),
+                    "axes are x, y, z, -x, -y or -z of the joint frame",
+                );
+                continue;
+            };
+            let joint = self.joint(&path, joint_name);
+            let Some(axis) = self
+                .robot
+                .joint(joint)
+                .kind
+                .axis()
+                .filter(|_| self.robot.joint(joint).kind.turns())
+            else {
+                self.problem(
+                    &path,
+                    format!("joint `{joint_name}` does not turn"),
+                    "name a revolute joint",
+                );
+                continue;
+            };
+            if !self.robot.carries(joint, child) {
+                self.problem(
+                    &path,
+                    format!(
+                        "joint `{joint_name}` does not move `{}`",
+                        self.robot.link(child).name
+                    ),
+                    "name joints between the root and the origin's joint",
+                );
+                continue;
+            }
+            // child_from_joint · axis, at the zero position
+            let at = self.robot.joint(joint).child;
+            let in_child =
+                zero[child.index()].rotation.inverse() * zero[at.index()].rotation * axis;
+            if in_child.dot(&stated) < SAME_DIRECTION {
+                let found = format!("[{:.3}, {:.3}, {:.3}]", in_child.x, in_child.y, in_child.z);
+                self.problem(&path, format!("`{joint_name}` turns about {found} of the frame of `{}` at zero, not about `{label}`", raw.joint), "correct the label, or the URDF");
+            }
+            axes.push(SweptAxis {
+                joint,
+                direction: Unit::new_normalize(in_child.into_inner()),
+            });
+        }
+        if axes.len() > 2 {
+            self.problem(
+                &["origins", name, "axes"],
+                format!("{} axes were given", axes.len()),
+                "an origin takes one or two swept axes",
+            );
+        }
+        axes.sort_by_key(|a| {
+            self.robot
+                .chain_to_root(self.robot.joint(a.joint).child)
+                .len()
+        });
+        if let [a, b] = axes.as_slice()
+            && a.direction.dot(&b.direction).abs() > SAME_DIRECTION
+        {
+            self.problem(
+                &["origins", name, "axes"],
+                "the two axes are parallel",
+                "two axes that are not parallel give an orientation",
+            );
+        }
+        axes
+    }
+
+    pub(super) fn orientation(&mut self, name: &str, raw: &RawOrigin, axes: usize) -> Orientation {
+        match &raw.orientation {
+            Some(RawOrientation::From(body)) => {
+                self.known(
+                    &["origins", name, "orientation", "from"],
+                    body,
+                    self.raw.bodies.keys(),
+                );
+                Orientation::FromBody(body.clone())
+            }
+            None => {
+                if axes < 2 {
+                    self.key_problem(&["origins", name], format!("origin `{name}` has {axes} swept axes: its orientation is open"), "give two `axes`, or `orientation: {from: <body>}` to take it from the URDF");
+                }
+                Orientation::Axes
+            }
+        }
+    }
+
+    pub(super) fn point(
+        &mut self,
+        name: &str,
+        raw: &RawOrigin,
+        axes: usize,
+    ) -> Option<PointChoice> {
+        match &raw.point {
+            Some(RawPoint::NominalDistanceFrom(origin)) => {
+                self.known(
+                    &["origins", name, "point", "nominal_distance_from"],
+                    origin,
+                    self.raw.origins.keys(),
+                );
+                if origin == name {
+                    self.problem(
+                        &["origins", name, "point"],
+                        "an origin cannot be its own reference",
+                        "name another origin",
+                    );
+                }
+                Some(PointChoice::NominalDistanceFrom(origin.clone()))
+            }
+            Some(RawPoint::FromBodyMm(distance)) => Some(PointChoice::FromBody(distance * MM)),
+            None => {
+                if axes == 1 {
+                    self.key_problem(&["origins", name], format!("origin `{name}` sweeps one axis: only a line can be observed, not a point on it"), "choose the point with `point: {from_body_mm: 0}` or `point: {nominal_distance_from: <origin>}`");
+                }
+                None
+            }
+        }
+    }
+}
+
+fn axis_label(label: &str) -> Option<Vector3<f64>> {
+    let (sign, name) = match label.strip_prefix('-') {
+        Some(rest) => (-1.0, rest),
+        None => (1.0, label),
+    };
+    let axis = match name {
+        "x" => Vector3::x(),
+        "y" => Vector3::y(),
+        "z" => Vector3::z(),
+        _ => return None,
+    };
+    Some(axis * sign)
+}

@@ -1,0 +1,199 @@
+//! The `simulate` section.
+
+use super::*;
+
+impl Checker<'_> {
+    pub(super) fn simulation(&mut self, raw: &RawSimulate) -> Simulation {
+        let mut mounts = BTreeMap::new();
+        for (name, mount) in &raw.mounts {
+            self.known(&["simulate", "mounts", name], name, self.raw.bodies.keys());
+            if let Some(body) = self.raw.bodies.get(name) {
+                for marker in &body.markers {
+                    if !mount.markers_mm.contains_key(marker) {
+                        self.problem(
+                            &["simulate", "mounts", name],
+                            format!("marker `{marker}` has no place"),
+                            "give it under `markers_mm`",
+                        );
+                    }
+                }
+            }
+            let rigid = pose(&crate::raw::RawPose {
+                xyz_mm: mount.xyz_mm,
+                rpy_deg: mount.rpy_deg,
+            });
+            let markers = mount
+                .markers_mm
+                .iter()
+                .map(|(m, p)| (m.clone(), Point3::from(Vector3::from(*p) * MM)))
+                .collect();
+            mounts.insert(
+                name.clone(),
+                SimMount {
+                    link_from_body: rigid,
+                    markers,
+                },
+            );
+        }
+        for name in self
+            .raw
+            .bodies
+            .keys()
+            .filter(|name| !raw.mounts.contains_key(*name))
+        {
+            self.problem(
+                &["simulate", "mounts"],
+                format!("body `{name}` has no simulated mount"),
+                format!("add `{name}: {{xyz_mm: […], rpy_deg: […]}}`"),
+            );
+        }
+        let mut fixed: BTreeMap<JointId, Isometry3<f64>> = BTreeMap::new();
+        for (joint, change) in &raw.errors.fixed {
+            if let Some(id) = self.joint_at(&["simulate", "errors", "fixed", joint], joint) {
+                fixed.insert(id, pose(change));
+            }
+        }
+        let mut compliance = BTreeMap::new();
+        for (joint, value) in &raw.errors.compliance_deg_per_nm {
+            if let Some(id) = self.joint_at(
+                &["simulate", "errors", "compliance_deg_per_nm", joint],
+                joint,
+            ) {
+                compliance.insert(id, value * DEG);
+            }
+        }
+        if !(0.0..1.0).contains(&raw.noise.occluded) {
+            self.problem(
+                &["simulate", "noise", "occluded"],
+                format!("{} is no share of lost samples", raw.noise.occluded),
+                "give a number from 0 to below 1",
+            );
+        }
+        let mut recordings = BTreeMap::new();
+        for (name, protocol) in &raw.recordings {
+            self.known(
+                &["simulate", "recordings", name],
+                name,
+                self.raw.recordings.keys(),
+            );
+            recordings.insert(name.clone(), self.protocol(name, protocol));
+        }
+        Simulation {
+            seed: raw.seed,
+            tracker_from_root: pose(&raw.tracker_from_root),
+            mounts,
+            errors: SimErrors {
+                joint_offset: raw.errors.joint_offset_deg * DEG,
+                axis: Error3 {
+                    position: raw.errors.axis_mm * MM,
+                    angle: raw.errors.axis_deg * DEG,
+                },
+                mount: Error3 {
+                    position: raw.errors.mount_mm * MM,
+                    angle: raw.errors.mount_deg * DEG,
+                },
+                fixed,
+                compliance,
+            },
+            noise: SimNoise {
+                marker: raw.noise.marker_mm * MM,
+                body: Error3 {
+                    position: raw.noise.body_mm * MM,
+                    angle: raw.noise.body_deg * DEG,
+                },
+                joint: raw.noise.joint_deg * DEG,
+                occluded: raw.noise.occluded,
+            },
+            recordings,
+        }
+    }
+
+    pub(super) fn protocol(&mut self, name: &str, raw: &RawProtocol) -> Protocol {
+        let at = |key: &'static str| ["simulate", "recordings", name, key];
+        let mut grid = Vec::new();
+        for (i, steps) in raw.grid.iter().enumerate() {
+            let path = [
+                "simulate",
+                "recordings",
+                name,
+                "grid",
+                &i.to_string(),
+                "joint",
+            ];
+            if let Some((joint, factor)) = self.joint_key(&path, &steps.joint) {
+                self.within_limits(
+                    &path,
+                    joint,
+                    steps.from.min(steps.to) * factor,
+                    steps.from.max(steps.to) * factor,
+                );
+                grid.push((
+                    joint,
+                    Steps {
+                        from: steps.from * factor,
+                        to: steps.to * factor,
+                        poses: steps.poses,
+                    },
+                ));
+            }
+            if steps.poses == 0 {
+                self.problem(&path, "a grid of no poses", "give `poses: 1` or more");
+            }
+        }
+        let mut random = BTreeMap::new();
+        for (key, range) in &raw.random {
+            let path = ["simulate", "recordings", name, "random", key];
+            if let Some((joint, factor)) = self.joint_key(&path, key) {
+                let (low, high) = (
+                    range[0].min(range[1]) * factor,
+                    range[0].max(range[1]) * factor,
+                );
+                self.within_limits(&path, joint, low, high);
+                random.insert(joint, (low, high));
+            }
+        }
+        if random.is_empty() != (raw.poses == 0) {
+            self.problem(
+                &at("poses"),
+                "`random` and `poses` belong together",
+                "give both or neither",
+            );
+        }
+        if grid.is_empty() == random.is_empty() {
+            self.problem(
+                &["simulate", "recordings", name],
+                "a protocol is either a grid or random poses",
+                "give `grid` or `random`, not both",
+            );
+        }
+        let mut repeat_at = None;
+        for (key, values) in &raw.repeat_at {
+            if let Some((joint, factor)) =
+                self.joint_key(&["simulate", "recordings", name, "repeat_at", key], key)
+            {
+                repeat_at = Some((joint, values.iter().map(|v| v * factor).collect()));
+            }
+        }
+        if raw.repeat_at.len() > 1 {
+            self.problem(
+                &at("repeat_at"),
+                "poses repeat at the values of one joint",
+                "name one joint",
+            );
+        }
+        for body in raw.bodies.iter().flatten() {
+            self.known(&at("bodies"), body, self.raw.bodies.keys());
+        }
+        Protocol {
+            grid,
+            random,
+            poses: raw.poses,
+            repeat_at,
+            hold: self.joint_values(&at("hold"), &raw.hold),
+            bodies: raw
+                .bodies
+                .clone()
+                .unwrap_or_else(|| self.raw.bodies.keys().cloned().collect()),
+        }
+    }
+}
