@@ -4,7 +4,7 @@
 //! robots/x.yaml ── parse ──► RawProfile ── check (against the robot's links and joints) ──► Profile
 //! ```
 //!
-//! [`RawProfile`](raw::RawProfile) is what was written: units in key names, unknown keys refused.
+//! [`raw::RawProfile`] is what was written: units in key names, unknown keys refused.
 //! [`Profile`] is what the program needs: m, rad, ids of the robot model, every cross reference resolved.
 //! Neither stage opens another file. Every problem is reported with file, line and caret, what was found and
 //! what was expected; the check collects all of them rather than stopping at the first.
