@@ -79,7 +79,10 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             format!("the solver did not converge: {:?}", fit.solution.status),
         );
     }
-    let findings = findings(e);
+    let goodness = e.fit.and_then(|fit| fit.solution.goodness_of_fit());
+    let missing = goodness.map(|g| g.missing).unwrap_or_default();
+    let workspace = e.fit.and_then(|fit| workspace(e.inputs, fit));
+    let findings = findings(e, &missing);
     Report {
         profile: file.clone(),
         robot: profile.robot.clone(),
@@ -91,7 +94,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         reasons,
         scope: scope(e),
         limits,
-        next_steps: next_steps(e, verdict),
+        next_steps: next_steps(e, verdict, &missing),
         transforms: e.found.iter().map(transform).collect(),
         parameters: e.fit.map_or_else(Vec::new, parameters),
         changes: e.urdf.changes.clone(),
@@ -119,8 +122,10 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         recordings: recordings(e),
         coverage: coverage(e.inputs),
         rejected: e.fit.map_or_else(Vec::new, |fit| rejected(e.inputs, fit)),
-        workspace: e.fit.and_then(|fit| workspace(e.inputs, fit)),
-        accuracy_limits: e.fit.map_or_else(Vec::new, |fit| accuracy_limits(e, fit)),
+        accuracy_limits: e
+            .fit
+            .map_or_else(Vec::new, |fit| accuracy_limits(e, fit, workspace.as_ref())),
+        workspace,
         findings,
         inputs: e
             .inputs
@@ -219,7 +224,7 @@ fn scope(e: &Evidence<'_>) -> Vec<String> {
     scope
 }
 
-fn next_steps(e: &Evidence<'_>, verdict: Verdict) -> Vec<String> {
+fn next_steps(e: &Evidence<'_>, verdict: Verdict, missing: &[String]) -> Vec<String> {
     let mut steps = Vec::new();
     match verdict {
         Verdict::Accepted => steps.push(format!(
@@ -233,11 +238,6 @@ fn next_steps(e: &Evidence<'_>, verdict: Verdict) -> Vec<String> {
             steps.push("record validation poses and name limits, then run again".to_owned())
         }
     }
-    let missing = e
-        .fit
-        .and_then(|f| f.solution.goodness_of_fit())
-        .map(|g| g.missing)
-        .unwrap_or_default();
     if let Some(first) = missing.first() {
         steps.push(format!("free the missing effect in the profile: {first}"));
     }
@@ -506,7 +506,7 @@ fn rejected(inputs: &Inputs, fit: &MlFit) -> Vec<Rejected> {
         .collect()
 }
 
-fn findings(e: &Evidence<'_>) -> Vec<calib_report::Finding> {
+fn findings(e: &Evidence<'_>, missing: &[String]) -> Vec<calib_report::Finding> {
     let mut findings: Vec<calib_report::Finding> = e
         .findings
         .iter()
@@ -523,19 +523,15 @@ fn findings(e: &Evidence<'_>) -> Vec<calib_report::Finding> {
             remedy: f.remedy.clone(),
         })
         .collect();
-    if let Some(fit) = e.fit
-        && let Some(goodness) = fit.solution.goodness_of_fit()
-    {
-        for missing in goodness.missing {
-            findings.push(calib_report::Finding {
+    for missing in missing {
+        findings.push(calib_report::Finding {
                 id: "missing-physics".to_owned(),
                 severity: calib_report::Severity::Warning,
                 subject: "fit".to_owned(),
                 rows: Vec::new(),
-                text: missing,
+                text: missing.clone(),
                 remedy: "free the effect under `solve.free` or `solve.joints`, and compare the held-out errors".to_owned(),
             });
-        }
     }
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     findings
@@ -716,7 +712,11 @@ fn workspace(inputs: &Inputs, fit: &MlFit) -> Option<Workspace> {
 }
 
 /// What a tool error on a new pose is made of: rms over the held-out poses, in metres.
-fn accuracy_limits(e: &Evidence<'_>, fit: &MlFit) -> Vec<AccuracyLimit> {
+fn accuracy_limits(
+    e: &Evidence<'_>,
+    fit: &MlFit,
+    workspace: Option<&Workspace>,
+) -> Vec<AccuracyLimit> {
     let Some(measured) = e.held_out.as_ref().and_then(|h| h.calibrated) else {
         return Vec::new();
     };
@@ -727,9 +727,7 @@ fn accuracy_limits(e: &Evidence<'_>, fit: &MlFit) -> Vec<AccuracyLimit> {
             .find(|n| n.name == name)
             .map(|n| n.sigma)
     };
-    let parameters = workspace(e.inputs, fit)
-        .map(|w| w.rms_sigma_m)
-        .unwrap_or(0.0);
+    let parameters = workspace.map_or(0.0, |w| w.rms_sigma_m);
     let tracker = sigma_of("marker")
         .or_else(|| sigma_of("body position"))
         .unwrap_or(0.0)

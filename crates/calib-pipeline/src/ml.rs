@@ -139,10 +139,8 @@ pub fn state(
 ///
 /// # Errors
 /// [`PipelineError::Solve`] when the problem cannot be stated so.
-pub fn fit(stated: Stated, inputs: &Inputs, robust: bool) -> Result<MlFit, PipelineError> {
-    let mut settings = Settings::default();
-    settings.robust.enabled = robust;
-    let solution = calib_core::solve(&stated.problem, &settings)?;
+pub fn fit(stated: Stated, inputs: &Inputs, settings: &Settings) -> Result<MlFit, PipelineError> {
+    let solution = calib_core::solve(&stated.problem, settings)?;
     let calibration = calibration(&stated, &solution, inputs);
     Ok(MlFit {
         stated,

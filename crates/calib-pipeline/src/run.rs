@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use calib_core::Settings;
 use calib_profile::{BodyKind, Method};
 use calib_recording::Finding;
 use calib_report::{Report, ResidualRow, Status, Unobservable, Verdict};
@@ -72,7 +73,6 @@ pub fn run(
     let origins = paper::origins(&inputs, &tracks, &start, &inputs.estimators, &mut findings)?;
     let method = options.method.unwrap_or(inputs.robot.profile.solve.method);
     let nominal = nominal(&inputs, &start);
-    let robust = inputs.robot.profile.solve.robust;
     let solved = match method {
         Method::Paper => {
             findings.push(paper_assumptions());
@@ -81,16 +81,16 @@ pub fn run(
         Method::Ml => {
             only_a_cross_check(&mut findings);
             progress("fit registration only");
-            let registered = ml::fit(
-                ml::state(&inputs, &tracks, &start, Freedom::RegistrationOnly),
-                &inputs,
-                robust,
-            )?;
+            // The baseline is plain least squares: what is left then is the geometry's fault, not noise to be estimated.
+            let baseline = ml::state(&inputs, &tracks, &start, Freedom::RegistrationOnly);
+            let registered = ml::fit(baseline, &inputs, &Settings::plain())?;
             progress("fit all loops");
+            let mut settings = Settings::default();
+            settings.robust.enabled = inputs.robot.profile.solve.robust;
             let fit = ml::fit(
                 ml::state(&inputs, &tracks, &start, Freedom::Profile),
                 &inputs,
-                robust,
+                &settings,
             )?;
             ml_result(&inputs, fit, registered.calibration)?
         }

@@ -117,6 +117,19 @@ pub(crate) fn from_yaml(error: &serde_saphyr::Error, text: &str, file: &str) -> 
         column: at.column() as usize,
     });
     let (finding, remedy) = match error {
+        _ if text.trim().is_empty() => (
+            "the profile is empty".to_owned(),
+            "start from one of the profiles in `robots/`".to_owned(),
+        ),
+        Yaml::DuplicateMappingKey { key, .. } => {
+            let name = key
+                .as_deref()
+                .map_or_else(|| "a key".to_owned(), |k| format!("the key `{k}`"));
+            (
+                format!("{name} stands twice"),
+                "remove one of them".to_owned(),
+            )
+        }
         Yaml::SerdeUnknownField {
             field,
             expected: known,
@@ -139,12 +152,15 @@ pub(crate) fn from_yaml(error: &serde_saphyr::Error, text: &str, file: &str) -> 
         ),
         other => {
             let full = other.to_string();
+            let finding = full
+                .lines()
+                .next()
+                .unwrap_or("not readable as YAML")
+                .to_owned();
             (
-                full.lines()
-                    .next()
-                    .unwrap_or("not readable as YAML")
+                finding,
+                "a profile is YAML: keys, colons, indentation; see the profiles in `robots/`"
                     .to_owned(),
-                String::new(),
             )
         }
     };

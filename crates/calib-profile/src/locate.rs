@@ -57,6 +57,18 @@ impl Places {
     }
 }
 
+impl Places {
+    /// Places of numbers that are NaN or infinite.
+    #[must_use]
+    pub fn not_finite(&self) -> Vec<Place> {
+        let mut found = Vec::new();
+        if let Some(tree) = &self.0 {
+            tree.collect_not_finite(&mut found);
+        }
+        found
+    }
+}
+
 struct Tree {
     place: Place,
     kind: Kind,
@@ -64,14 +76,26 @@ struct Tree {
 
 enum Kind {
     Leaf,
+    NotFinite,
     List(Vec<Tree>),
     Map(Vec<(Spanned<String>, Tree)>),
 }
 
 impl Tree {
+    fn collect_not_finite(&self, found: &mut Vec<Place>) {
+        match &self.kind {
+            Kind::Leaf => {}
+            Kind::NotFinite => found.push(self.place),
+            Kind::List(items) => items.iter().for_each(|t| t.collect_not_finite(found)),
+            Kind::Map(entries) => entries
+                .iter()
+                .for_each(|(_, t)| t.collect_not_finite(found)),
+        }
+    }
+
     fn child(&self, step: &str) -> Option<&Self> {
         match &self.kind {
-            Kind::Leaf => None,
+            Kind::Leaf | Kind::NotFinite => None,
             Kind::List(items) => items.get(step.parse::<usize>().ok()?),
             Kind::Map(entries) => entries.iter().find(|e| e.0.value == step).map(|e| &e.1),
         }
@@ -139,8 +163,12 @@ impl<'de> Visitor<'de> for KindVisitor {
         Ok(Kind::Leaf)
     }
 
-    fn visit_f64<E>(self, _: f64) -> Result<Kind, E> {
-        Ok(Kind::Leaf)
+    fn visit_f64<E>(self, value: f64) -> Result<Kind, E> {
+        Ok(if value.is_finite() {
+            Kind::Leaf
+        } else {
+            Kind::NotFinite
+        })
     }
 
     fn visit_str<E>(self, _: &str) -> Result<Kind, E> {

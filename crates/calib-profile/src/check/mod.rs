@@ -101,6 +101,11 @@ impl<'a> Checker<'a> {
                 format!("this program reads version {VERSION}"),
             );
         }
+        for place in self.places.not_finite() {
+            let finding = "a number that is not finite";
+            self.problems
+                .push(Problem::new(Some(place), finding, "give a number"));
+        }
         if raw.bodies.is_empty() {
             self.problem(
                 &["bodies"],
