@@ -53,6 +53,8 @@ impl JointEffects {
 pub struct Calibration {
     /// Geometry: origins without zero offsets.
     pub model: RobotModel,
+    /// The robot as described: loads are computed from it, as in the fit.
+    pub described: RobotModel,
     /// Effects by joint index.
     pub effects: Vec<JointEffects>,
     /// `tracker_from_root`.
@@ -69,6 +71,7 @@ impl Calibration {
     pub fn nominal(model: &RobotModel, tracker_from_root: Isometry3<f64>) -> Self {
         Self {
             model: model.clone(),
+            described: model.clone(),
             effects: vec![JointEffects::default(); model.joints().len()],
             tracker_from_root,
             mounts: BTreeMap::new(),
@@ -79,7 +82,7 @@ impl Calibration {
     /// `root_from_link` of all links at indicated joint positions (by joint index, rad or m).
     #[must_use]
     pub fn root_from_link(&self, q: &[f64]) -> Vec<Isometry3<f64>> {
-        let loads = Loads::at(&self.model, q);
+        let loads = Loads::at(&self.described, q);
         let mut poses = vec![Isometry3::identity(); self.model.links().len()];
         // Links in an order in which every parent comes before its children.
         let mut order: Vec<LinkId> = vec![self.model.root()];

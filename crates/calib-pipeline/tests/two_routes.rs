@@ -1,0 +1,101 @@
+//! Two routes to one number: the robot that the pipeline predicts with, and the solver's own frame graph.
+
+use std::path::Path;
+
+use calib_core::{Configuration, FeatureKind, Settings};
+use calib_pipeline::kinematics::Loads;
+use calib_pipeline::load::{load_recordings, load_robot};
+use calib_pipeline::ml::{Freedom, fit, state};
+use calib_pipeline::start::start;
+use calib_pipeline::tracks::body_tracks;
+use calib_profile::Free;
+
+/// Rounding of a chain of a dozen rotations.
+const SAME: f64 = 1e-12;
+
+#[test]
+fn the_calibrated_robot_is_the_solution() {
+    for robot in ["ripley", "justin"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../robots/{robot}.yaml"));
+        let mut profile = load_robot(&path).expect("shipped");
+        // Every effect that exists, so that every term of the prediction is exercised.
+        profile.profile.solve.free.extend([
+            Free::JointGains,
+            Free::Eccentricity,
+            Free::LateralCompliance,
+        ]);
+        let inputs = load_recordings(profile, false).expect("shipped");
+        let mut findings = Vec::new();
+        let tracks = body_tracks(&inputs, &mut findings).expect("bodies");
+        let start = start(&inputs, &tracks);
+        let stated = state(&inputs, &tracks, &start, Freedom::Profile);
+        let fit = fit(stated, &inputs, &Settings::plain()).expect("a problem");
+        let model = &inputs.robot.model;
+        let effects = fit
+            .calibration
+            .effects
+            .iter()
+            .filter(|e| e.gain != 0.0)
+            .count();
+        assert!(effects >= 4, "{robot}: {effects} joints with a gain");
+        for loaded in inputs.recordings.values() {
+            let q = loaded.q[loaded.q.len() / 2].as_ref().expect("recorded");
+            let loads = Loads::at(model, q);
+            let mut at = Configuration::zero();
+            for joint in model.joint_ids() {
+                let Some(edge) = fit.stated.joints[joint.index()] else {
+                    continue;
+                };
+                at = at.with(edge, model.position(q, joint));
+                let i = joint.index();
+                at.regressors
+                    .insert((edge, FeatureKind::TorqueCompliance), loads.about_axis[i]);
+                at.regressors
+                    .insert((edge, FeatureKind::Lateral1), loads.across[i][0]);
+                at.regressors
+                    .insert((edge, FeatureKind::Lateral2), loads.across[i][1]);
+            }
+            let root_from_link = fit.calibration.root_from_link(q);
+            for (name, frame) in &fit.stated.bodies {
+                let body = &inputs.robot.profile.bodies[name];
+                let predicted = fit.calibration.tracker_from_root
+                    * root_from_link[body.link.index()]
+                    * fit.calibration.mounts[name];
+                let solved = fit
+                    .solution
+                    .relative_pose(fit.stated.tracker, *frame, &at)
+                    .expect("a path")
+                    .pose;
+                let difference =
+                    (predicted.inverse() * solved).to_homogeneous() - nalgebra::Matrix4::identity();
+                assert!(
+                    difference.amax() < SAME,
+                    "{robot} {name} in {}: {difference}",
+                    loaded.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_load_about_an_axis_is_the_description_s_gravity_torque() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/justin.yaml");
+    let robot = load_robot(&path).expect("shipped");
+    let mut q = robot.model.zero_positions();
+    for (i, q) in q.iter_mut().enumerate() {
+        *q = (i as f64 * 0.37).sin();
+    }
+    let loads = Loads::at(&robot.model, &q);
+    let torques = robot
+        .model
+        .gravity_torques(&q, &calib_pipeline::loads::GRAVITY);
+    for joint in robot.model.independent_joints() {
+        let (a, b) = (loads.about_axis[joint.index()], torques[joint.index()]);
+        assert!(
+            (a - b).abs() < 1e-9 * (1.0 + b.abs()),
+            "{}: {a} against {b}",
+            robot.model.joint(joint).name
+        );
+    }
+}
