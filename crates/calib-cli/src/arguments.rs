@@ -94,6 +94,9 @@ pub enum Command {
         /// Of what
         #[arg(value_enum, default_value_t = SchemaOf::Profile)]
         of: SchemaOf,
+        /// With the plugins that this profile names (only for `parameters`)
+        #[arg(long)]
+        profile: Option<PathBuf>,
     },
     /// Print completions for a shell
     Completions {
@@ -156,6 +159,8 @@ pub enum SchemaOf {
     Report,
     /// The scene
     Scene,
+    /// Parameters of estimators, readers and report writers, by kind and name
+    Parameters,
 }
 
 /// `calib fit …`.

@@ -92,11 +92,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
             Ok(ExitCode::Accepted)
         }
         Command::Plugins { what } => plugins::run(what.as_ref()),
-        Command::Schema { of } => {
+        Command::Schema { of, profile } => {
             let text = match of {
                 SchemaOf::Profile => calib_profile::json_schema(),
                 SchemaOf::Report => inspect::report_schema(),
                 SchemaOf::Scene => inspect::scene_schema(),
+                SchemaOf::Parameters => inspect::parameter_schemas(profile.as_deref())?,
             };
             emit(&text);
             Ok(ExitCode::Accepted)

@@ -22,6 +22,17 @@ pub struct CenterFit {
     pub covariance: Option<Matrix3<f64>>,
 }
 
+/// An axis that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisFit {
+    /// In the tracker's frame.
+    pub line: calib_geometry::Line,
+    /// Largest variance of the direction, rad²; `None` when the estimator gives none.
+    pub direction_variance: Option<f64>,
+    /// Mean variance of the point across the axis, m².
+    pub point_variance: Option<f64>,
+}
+
 /// All estimators that a profile can name.
 pub struct Estimators {
     /// The tables, built-in first.
@@ -96,6 +107,65 @@ impl Estimators {
                 center: Point3::from(fit.center_m),
                 covariance: fit.covariance_m2.map(|c| Matrix3::from_fn(|i, j| c[i][j])),
             }),
+        })
+    }
+}
+
+impl Estimators {
+    /// Finds an axis; `Ok(Err(reason))` when the data do not determine one.
+    ///
+    /// # Errors
+    /// As [`Estimators::center`].
+    pub fn axis(
+        &self,
+        id: &str,
+        parameters: &BTreeMap<String, Value>,
+        motion: &MotionData,
+    ) -> Result<Result<AxisFit, String>, PipelineError> {
+        let bound = self.tables.aor.get(id)?.with(parameters)?;
+        let fit = match bound.fit(&motion.view(), &Control::default())? {
+            Answer::NotObservable(reason) => return Ok(Err(reason)),
+            Answer::Found(AorFit {
+                weak: Some(reason), ..
+            }) => return Ok(Err(reason)),
+            Answer::Found(fit) => fit,
+        };
+        let line = calib_geometry::Line::new(
+            Point3::from(fit.line.point_m),
+            Vector3::from(fit.line.direction),
+        );
+        let Some(line) = line else {
+            return Ok(Err("the direction vanishes".to_owned()));
+        };
+        let block = |c: &[[f64; 6]; 6], at: usize| Matrix3::from_fn(|i, j| c[at + i][at + j]);
+        Ok(Ok(AxisFit {
+            line,
+            direction_variance: fit.covariance.map(|c| {
+                let eigen = calib_geometry::decompose::symmetric_eigen_small(&block(&c, 0));
+                eigen.values[2].max(0.0)
+            }),
+            // Two directions across the axis share the trace; the third has none.
+            point_variance: fit.covariance.map(|c| block(&c, 3).trace().max(0.0) / 2.0),
+        }))
+    }
+
+    /// JSON Schema of the parameters of everything that a profile can name, by kind and name.
+    #[must_use]
+    pub fn parameter_schemas(&self) -> serde_json::Value {
+        fn of<T: ?Sized>(registry: &calib_plugin::Registry<T>) -> serde_json::Value {
+            let entry = |e: &Entry<T>| {
+                (
+                    e.offer().name.clone(),
+                    calib_plugin::schema(&e.offer().parameters),
+                )
+            };
+            serde_json::Value::Object(registry.iter().map(entry).collect())
+        }
+        serde_json::json!({
+            Kind::Cor.id(): of(&self.tables.cor),
+            Kind::Aor.id(): of(&self.tables.aor),
+            Kind::Reader.id(): of(&self.tables.reader),
+            Kind::Report.id(): of(&self.tables.report),
         })
     }
 }

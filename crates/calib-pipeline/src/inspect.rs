@@ -8,6 +8,7 @@ use calib_report::Report;
 
 use crate::checks;
 use crate::error::{ExitCode, PipelineError};
+use crate::estimators::Estimators;
 use crate::load::{Inputs, load_recordings, load_robot};
 use crate::tracks::body_tracks;
 
@@ -138,4 +139,19 @@ pub fn report_schema() -> String {
 #[must_use]
 pub fn scene_schema() -> String {
     calib_report::json::pretty(&calib_report::scene_schema()) + "\n"
+}
+
+/// JSON Schemas of all parameters, by kind and name; with a profile, its plugins too.
+///
+/// # Errors
+/// [`PipelineError`] when the profile cannot be read or a plugin cannot be loaded.
+pub fn parameter_schemas(profile: Option<&Path>) -> Result<String, PipelineError> {
+    let estimators = match profile {
+        Some(path) => {
+            let robot = load_robot(path)?;
+            Estimators::of_profile(&robot.profile, &robot.folder, true)?
+        }
+        None => Estimators::built_in()?,
+    };
+    Ok(calib_report::json::pretty(&estimators.parameter_schemas()) + "\n")
 }

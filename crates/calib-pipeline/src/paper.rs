@@ -13,7 +13,6 @@ use std::collections::BTreeMap;
 use calib_aor::{
     Center, FrameAxes, FrameOptions, FrameOutcome, FrameSample, Letter, frame_planes::algorithm1,
 };
-use calib_geometry::measured::Pose;
 use calib_geometry::{Line, Twist, se3};
 use calib_plugin::{BodyPose, MotionData, Shape};
 use calib_profile::{BodyKind, Orientation, Origin, PointChoice};
@@ -135,7 +134,7 @@ impl Task<'_> {
         findings: &mut Vec<Finding>,
     ) -> Result<OriginEstimate, PipelineError> {
         match (self.origin.axes.len(), &self.origin.orientation) {
-            (1, _) => Ok(self.single_axis(found, findings)),
+            (1, _) => self.single_axis(found, findings),
             (2, Orientation::Axes) => self.frame(findings),
             _ => self.center_only(findings),
         }
@@ -402,47 +401,36 @@ impl Task<'_> {
         &self,
         found: &BTreeMap<String, OriginEstimate>,
         findings: &mut Vec<Finding>,
-    ) -> OriginEstimate {
+    ) -> Result<OriginEstimate, PipelineError> {
         let rows = self.rows();
         let swept = self.origin.axes[0];
         let tracker = &self.inputs.robot.profile.tracker;
-        let poses: Vec<Option<Pose>> = rows
+        let poses: Vec<Option<BodyPose>> = rows
             .iter()
-            .map(|r| Some(r.tracker_from_body.into()))
+            .map(|r| Some(body_pose(&r.tracker_from_body)))
             .collect();
-        let angles: Vec<f64> = rows
+        let mut motion = MotionData::poses(&poses);
+        motion.sigma_t_m = tracker.body_sigma;
+        motion.sigma_r_rad = tracker.body_sigma_rad;
+        motion.angles_rad = rows
             .iter()
             .map(|r| self.inputs.robot.model.position(r.q, swept.joint))
             .collect();
-        let options = calib_aor::Options {
-            sigma_t: tracker.body_sigma,
-            sigma_r: tracker.body_sigma_rad,
-            angles,
-            ..calib_aor::Options::default()
-        };
-        let outcome = calib_aor::fit(
-            &self.origin.axis,
-            &calib_aor::Input::Poses(&poses),
-            &options,
-        );
-        let outcome = match outcome {
-            Ok(outcome) => outcome,
-            Err(error) => return self.refused(findings, "not usable", &error.to_string()),
-        };
-        let Some(axis) = outcome.estimate() else {
-            return self.refused(
-                findings,
-                outcome.verdict().as_str(),
-                outcome.reason().unwrap_or(""),
-            );
+        let parameters = crate::estimators::values(&self.origin.axis_parameters);
+        let axis = match self
+            .estimators
+            .axis(&self.origin.axis, &parameters, &motion)?
+        {
+            Ok(axis) => axis,
+            Err(reason) => return Ok(self.refused(findings, "axis", &reason)),
         };
         let Some((rotation, slide)) = self.assumed_rotation().zip(self.slide(&axis.line, found))
         else {
-            return self.refused(
+            return Ok(self.refused(
                 findings,
                 "no_rotation",
                 "the assumed orientation or the reference point is not known",
-            );
+            ));
         };
         // The measured axis in the body, averaged over the sweep.
         let directions: Vec<_> = rows
@@ -451,11 +439,11 @@ impl Task<'_> {
             .collect();
         let expected = rotation * swept.direction;
         let Ok(direction) = calib_geometry::mean::axis_mean(&directions, Some(expected)) else {
-            return self.refused(
+            return Ok(self.refused(
                 findings,
                 "not_unique",
                 "the axis has no mean direction in the body",
-            );
+            ));
         };
         let align = UnitQuaternion::rotation_between_axis(&expected, &direction)
             .unwrap_or_else(UnitQuaternion::identity);
@@ -478,9 +466,13 @@ impl Task<'_> {
         let prior = &self.inputs.robot.profile.solve.prior;
         let along = direction.into_inner() * direction.transpose();
         let across = Matrix3::identity() - along;
-        let sigma_point = axis.covariance.fixed_view::<3, 3>(3, 3).trace().max(0.0) / 2.0;
+        let sigma_point = axis
+            .point_variance
+            .unwrap_or_else(|| self.inputs.robot.profile.solve.prior.position.powi(2));
         let position = scatter + across * sigma_point + along * prior.position.powi(2);
-        let turn = axis.sigma_direction.powi(2);
+        let turn = axis
+            .direction_variance
+            .unwrap_or_else(|| prior.angle.powi(2));
         let r = rotation.to_rotation_matrix();
         let mut covariance = Matrix6::zeros();
         let orientation = across * turn + along * prior.angle.powi(2);
@@ -493,7 +485,7 @@ impl Task<'_> {
         let child_from_origin = self.child_from_origin();
         let d = swept.direction;
         let joint = &self.inputs.robot.model.joint(swept.joint).name;
-        OriginEstimate {
+        Ok(OriginEstimate {
             pose: Some(child * child_from_origin),
             covariance: Some(transported(&covariance, &child_from_origin)),
             unobservable: vec![
@@ -512,7 +504,7 @@ impl Task<'_> {
             center: None,
             axis: Some(axis.line),
             estimators: Vec::new(),
-        }
+        })
     }
 
     /// Distance along the axis from its reported point to the origin, m.

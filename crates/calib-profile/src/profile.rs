@@ -116,6 +116,8 @@ pub struct Origin {
     pub center_parameters: BTreeMap<String, ParameterValue>,
     /// Axis estimator, by id.
     pub axis: String,
+    /// Parameters of the axis estimator.
+    pub axis_parameters: BTreeMap<String, ParameterValue>,
     /// The swept joints, proximal first.
     pub axes: Vec<SweptAxis>,
     /// Where the orientation comes from.

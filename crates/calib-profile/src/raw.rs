@@ -168,6 +168,9 @@ pub struct RawOrigin {
     /// Axis-of-rotation estimator (see `calib plugins`).
     #[serde(default)]
     pub axis: Option<String>,
+    /// Parameters of the axis estimator, by name.
+    #[serde(default)]
+    pub axis_parameters: BTreeMap<String, RawValue>,
     /// The swept joints and the axis of the joint frame each turns about at the zero position: `{z: pan, y: tilt}`;
     /// a minus turns it about (`-z: pan`).
     #[serde(default)]

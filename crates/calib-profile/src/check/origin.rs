@@ -80,6 +80,7 @@ impl Checker<'_> {
                 .unwrap_or_else(|| DEFAULT_CENTER.to_owned()),
             center_parameters: raw.center_parameters.clone(),
             axis: raw.axis.clone().unwrap_or_else(|| DEFAULT_AXIS.to_owned()),
+            axis_parameters: raw.axis_parameters.clone(),
             axes,
             orientation,
             point,
