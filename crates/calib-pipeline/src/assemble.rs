@@ -137,7 +137,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             })
             .collect(),
         outputs: outputs(e),
-        reproduce: vec![format!("calib run {file}")],
+        reproduce: vec![reproduce(e)],
         undo: vec![format!(
             "calib revert {} --out original.urdf",
             profile.outputs.urdf
@@ -145,6 +145,16 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         seed: 0,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         ..Report::default()
+    }
+}
+
+/// The command that gives this report again, with the method where it is not the profile's.
+fn reproduce(e: &Evidence<'_>) -> String {
+    let file = &e.inputs.robot.file;
+    match e.method {
+        method if method == e.inputs.robot.profile.solve.method => format!("calib run {file}"),
+        Method::Paper => format!("calib run {file} --method paper"),
+        Method::Ml => format!("calib run {file} --method ml"),
     }
 }
 
