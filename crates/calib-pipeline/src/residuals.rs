@@ -50,6 +50,14 @@ pub fn residual_rows(
     fit: Option<&MlFit>,
 ) -> Vec<ResidualRow> {
     let left_out = fit.map(left_out).unwrap_or_default();
+    // Points computed from one body are one measurement: it is left out under the body's name.
+    let body_of = |subject: &str| {
+        let holds = |body: &&String| match &inputs.robot.profile.bodies[*body].kind {
+            BodyKind::Markers { names, .. } => names.iter().any(|m| m == subject),
+            BodyKind::Pose => false,
+        };
+        inputs.robot.profile.bodies.keys().find(holds).cloned()
+    };
     let mut rows = Vec::new();
     for (name, loaded) in inputs
         .recordings
@@ -60,6 +68,11 @@ pub fn residual_rows(
             let Some(q) = q else { continue };
             let root_from_link = robot.root_from_link(q);
             let joints = joint_values(inputs, name, row);
+            let is_out = |row: usize, subject: &str| {
+                let key = |subject: &str| (name.clone(), row, subject.to_owned());
+                left_out.contains(&key(subject))
+                    || body_of(subject).is_some_and(|body| left_out.contains(&key(&body)))
+            };
             let mut push =
                 |subject: &str, residual: nalgebra::Vector3<f64>, rotation_rad: Option<f64>| {
                     rows.push(ResidualRow {
@@ -70,7 +83,7 @@ pub fn residual_rows(
                         residual_m: residual.into(),
                         rotation_rad,
                         normalised: None,
-                        used: !left_out.contains(&(name.clone(), row, subject.to_owned())),
+                        used: !is_out(row, subject),
                         joints: joints.clone(),
                     });
                 };
