@@ -28,7 +28,7 @@ pub fn run(what: Option<&Plugins>) -> Result<ExitCode, PipelineError> {
         Some(Plugins::Check { plugin }) => {
             let host = Host::new(SearchPath::from_environment(None), true);
             let conformance = check(&host, plugin, &Limits::default());
-            emit(&format!("{conformance}"));
+            emit(&format!("{}\n", conformance.to_string().trim_end()));
             Ok(if conformance.passed() {
                 ExitCode::Accepted
             } else {
