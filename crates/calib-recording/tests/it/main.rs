@@ -5,6 +5,7 @@ mod bags;
 mod bodies;
 mod checks;
 mod fixtures;
+mod fuzz_seeds;
 mod mutations;
 mod real_formats;
 mod real_tables;

@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 const ROUNDS: usize = 1500;
 
 /// Every reader's fixtures.
-fn corpus() -> Vec<(&'static str, Vec<u8>)> {
+pub fn corpus() -> Vec<(&'static str, Vec<u8>)> {
     let mut corpus = vec![
         ("csv", b"# note\npose,trial,elbow_deg,m1.x_mm,m1.y_mm,m1.z_mm,h.x_m,h.y_m,h.z_m,h.qx,h.qy,h.qz,h.qw\n0,a,180,1000,2000,3000,0.1,0.2,0.3,0,0,0,1\n1,b,-90,,,,,,,,,,\n".to_vec()),
         ("csv", b"frame,marker,x_mm,y_mm,z_mm\n5,b,1,2,3\n5,a,4,5,6\n7,a,7,8,9\n".to_vec()),

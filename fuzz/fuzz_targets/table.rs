@@ -1,0 +1,4 @@
+//! Our own tables, wide and long.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| calib_fuzz::read_as("csv", bytes));
