@@ -15,6 +15,7 @@ const LAYERS: &[(&str, u8)] = &[
     ("calib-aor", 1),
     ("calib-recording", 1),
     ("calib-urdf", 1),
+    ("calib-capture", 2),
     ("calib-profile", 2),
     ("calib-plugin", 2),
     ("calib-report", 2),

@@ -2,6 +2,7 @@
 //!
 //! Memory is watched by the fuzzer itself (`-malloc_limit_mb`, `-rss_limit_mb`), time by `-timeout`.
 
+use calib_capture::{Order, dtrack, parse_joints, vrpn};
 use calib_recording::{
     At, ColumnMap, Filled, ReadOptions, Recording, WriteOptions, read_bytes, write_recording,
 };
@@ -95,4 +96,71 @@ fn holds_together(recording: &Recording, bytes: usize) {
         let _ = recording.poses_of(timeline, Filled::Include);
     }
     let _ = write_recording(recording, &WriteOptions::micro());
+}
+
+/// A datagram on the tracker's port, and on the robot's.
+pub fn datagram(bytes: &[u8]) {
+    if let Ok(joints) = parse_joints(bytes) {
+        assert!(joints.values().all(|q| q.is_finite()));
+    }
+    let _ = dtrack::is_ours(bytes);
+    let Ok(frames) = dtrack::datagram(bytes) else {
+        return;
+    };
+    assert!(frames.len() <= bytes.len());
+    let mut order = Order::default();
+    for frame in &frames {
+        frame.bodies.values().for_each(finite);
+        order.arrives(frame);
+    }
+}
+
+/// A stream in pieces gives what it gives as a whole.
+pub fn stream(bytes: &[u8]) {
+    let Some((&size, bytes)) = bytes.split_first() else {
+        return;
+    };
+    let mut whole = vrpn::Decoder::default();
+    let mut all = Vec::new();
+    let mut ended = whole.push(bytes).map(|messages| all.extend(messages));
+    if ended.is_ok() {
+        ended = whole.push(&[]).map(|messages| all.extend(messages));
+    }
+    let mut decoder = vrpn::Decoder::default();
+    let mut grouper = vrpn::Grouper::default();
+    let mut pieces = Vec::new();
+    let mut broken = None;
+    for piece in bytes.chunks(usize::from(size).max(1)) {
+        match decoder.push(piece) {
+            Ok(messages) => pieces.extend(messages),
+            Err(error) => {
+                broken = Some(error);
+                break;
+            }
+        }
+    }
+    if broken.is_none() {
+        broken = decoder.push(&[]).err();
+    }
+    assert_eq!(ended.err(), broken);
+    assert_eq!(all, pieces);
+    for message in pieces {
+        if let vrpn::Message::Pose {
+            device,
+            stamp,
+            pose,
+            ..
+        } = message
+        {
+            finite(&pose);
+            if let Some(frame) = grouper.report(device, stamp, pose) {
+                assert!(frame.device.is_some_and(f64::is_finite));
+            }
+        }
+    }
+}
+
+fn finite(pose: &nalgebra::Isometry3<f64>) {
+    assert!(pose.translation.vector.iter().all(|x| x.is_finite()));
+    assert!(pose.rotation.coords.iter().all(|x| x.is_finite()));
 }

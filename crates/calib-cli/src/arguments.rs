@@ -73,6 +73,8 @@ pub enum Command {
     },
     /// Simulation studies of the estimators, with the statistical bound in every cell
     Study(StudyRun),
+    /// Record a sweep from a live tracker, guided from pose to pose
+    Record(Record),
     /// Any recording as canonical CSV
     Convert {
         /// The recording
@@ -128,6 +130,49 @@ pub struct Run {
     /// Print the report as JSON instead of the summary
     #[arg(long)]
     pub json: bool,
+}
+
+/// `calib record`.
+#[derive(Debug, Args)]
+pub struct Record {
+    /// The robot's profile
+    pub profile: PathBuf,
+    /// `dtrack:PORT` (DTrack sends to this port), `vrpn:HOST[:PORT]` or `vrpn:DEVICE@HOST[:PORT]`
+    #[arg(long)]
+    pub source: String,
+    /// Which recording of the profile; needed when it has several
+    #[arg(long)]
+    pub recording: Option<String>,
+    /// The CSV to write; the recording's file when not given. It must not exist
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Go on with a file that was begun
+    #[arg(long)]
+    pub append: bool,
+    /// Where joint values come from: `targets` (the poses asked for) or `udp:PORT` (the robot sends `name_deg=value`)
+    #[arg(long, default_value = "targets")]
+    pub joints: String,
+    /// A joint that stands still, as `waist_deg=20`
+    #[arg(long, value_delimiter = ',')]
+    pub at: Vec<String>,
+    /// Body or marker of the profile and the tracker's name for it, as `gripM=body_0`
+    #[arg(long, value_delimiter = ',')]
+    pub map: Vec<String>,
+    /// Values of each swept joint; 11 for one joint, 6 for several when not given
+    #[arg(long)]
+    pub poses: Option<usize>,
+    /// How long each pose is recorded, s
+    #[arg(long, default_value_t = 1.0)]
+    pub hold: f64,
+    /// Write rows also while the robot moves
+    #[arg(long)]
+    pub all: bool,
+    /// Give up when nothing comes from the tracker for this long, s
+    #[arg(long, default_value_t = 30.0)]
+    pub patience: f64,
+    /// End after this long, s
+    #[arg(long)]
+    pub seconds: Option<f64>,
 }
 
 /// Estimation methods.

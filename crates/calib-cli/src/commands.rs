@@ -15,7 +15,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::arguments::{
     Arguments, Command, DiffFormat, Fit, MethodName, Run, SchemaOf, StudyName, StudyRun,
 };
-use crate::plugins;
+use crate::{plugins, record};
 
 /// Writes results to standard output; a reader that went away (`| head`) is no error.
 fn emit(text: &str) {
@@ -77,6 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
             Ok(ExitCode::Accepted)
         }
         Command::Study(study) => run_study(arguments, study),
+        Command::Record(options) => record::run(arguments.quiet, options),
         Command::Convert {
             input,
             output,

@@ -3,6 +3,7 @@
 mod arguments;
 mod commands;
 mod plugins;
+mod record;
 
 use std::error::Error;
 use std::process::ExitCode;

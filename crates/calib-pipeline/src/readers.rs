@@ -172,6 +172,7 @@ pub fn recording(streams: Streams, source: &str, reader: &str) -> Recording {
                 rows: t.rows,
                 t: t.t_s,
                 labels: t.labels.into_iter().collect(),
+                ..calib_recording::Timeline::default()
             })
             .collect(),
         joints: streams

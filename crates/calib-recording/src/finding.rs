@@ -14,6 +14,16 @@ pub enum Severity {
     Error,
 }
 
+/// `1 row`, `2 rows`.
+pub(crate) fn counted(count: usize, one: &str) -> String {
+    format!("{count} {one}{}", if count == 1 { "" } else { "s" })
+}
+
+/// The verb after [`counted`].
+pub(crate) fn are(count: usize) -> &'static str {
+    if count == 1 { "is" } else { "are" }
+}
+
 /// One finding about a recording. Its id is stable: the book has a page of that name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {

@@ -51,6 +51,9 @@ pub struct Timeline {
     pub rows: Vec<u64>,
     /// Times, s, never decreasing. `None` for a table of static poses, which has no useful time.
     pub t: Option<Vec<f64>>,
+    /// When each sample arrived at the computer that recorded it, by that computer's own clock, s since 1970; `None`
+    /// where nobody wrote it down. A second clock beside `t`: it is late by what the tracker and the network need.
+    pub received: Option<Vec<f64>>,
     /// Text columns that name a sample: `trial`, `group`, … ; one text per sample.
     pub labels: BTreeMap<String, Vec<String>>,
 }

@@ -14,6 +14,8 @@ pub struct Poses {
     pub rows: Vec<u64>,
     /// Time, s, when the rows have one.
     pub t: Option<Vec<f64>>,
+    /// When each row arrived at the recording computer, s by its clock; see [`Timeline::received`].
+    pub received: Option<Vec<f64>>,
     /// Joint positions, rad or m as [`joint_units`](Self::joint_units) says.
     pub joints: BTreeMap<String, Vec<Option<f64>>>,
     /// Angle or length, for every joint.
@@ -77,6 +79,7 @@ impl Poses {
         Poses {
             rows: pick(&self.rows, &kept),
             t: self.t.as_ref().map(|t| pick(t, &kept)),
+            received: self.received.as_ref().map(|t| pick(t, &kept)),
             joints: pick_each(&self.joints, &kept),
             joint_units: self.joint_units.clone(),
             torques: pick_each(&self.torques, &kept),
@@ -114,6 +117,7 @@ impl Poses {
         let Poses {
             rows,
             t,
+            received,
             joints,
             joint_units,
             torques,
@@ -128,6 +132,7 @@ impl Poses {
                 clock: clock.to_string(),
                 rows,
                 t,
+                received,
                 labels,
             }],
             joints: joints
@@ -206,6 +211,7 @@ impl Recording {
         let mut poses = Poses {
             rows: instants.rows.clone(),
             t: instants.t.clone(),
+            received: instants.received.clone(),
             labels: instants.labels.clone(),
             ..Poses::default()
         };

@@ -29,6 +29,11 @@ impl<R: BufRead> Lines<R> {
 
     /// The next line, or `None` at the end.
     pub(crate) fn next(&mut self) -> Placed<Option<&str>> {
+        Ok(self.next_whole()?.map(|(line, _)| line))
+    }
+
+    /// The next line and whether it ended with a line break, or `None` at the end.
+    pub(crate) fn next_whole(&mut self) -> Placed<Option<(&str, bool)>> {
         self.buffer.clear();
         let at = At::Line(self.number + 1);
         let read = (&mut self.input)
@@ -43,13 +48,14 @@ impl<R: BufRead> Lines<R> {
         }
         self.number += 1;
         let mut line: &[u8] = &self.buffer;
+        let whole = line.ends_with(b"\n");
         line = line.strip_suffix(b"\n").unwrap_or(line);
         line = line.strip_suffix(b"\r").unwrap_or(line);
         if self.number == 1 {
             line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
         }
         match std::str::from_utf8(line) {
-            Ok(text) => Ok(Some(text)),
+            Ok(text) => Ok(Some((text, whole))),
             Err(error) => Err((
                 at,
                 Problem::NotUtf8 {

@@ -2,7 +2,7 @@
 
 use super::Expectations;
 use super::statistics::range;
-use crate::finding::{Finding, Severity};
+use crate::finding::{Finding, Severity, counted};
 use crate::model::JointUnit;
 use crate::poses::Poses;
 use std::f64::consts::TAU;
@@ -27,7 +27,8 @@ pub(super) fn too_few(poses: &Poses, expected: &Expectations) -> Option<Finding>
     let usable = if has_tracker { usable } else { poses.len() };
     (usable < expected.min_poses).then(|| {
         let text = format!(
-            "{usable} rows with a tracked body or marker; the fit needs {}",
+            "{} with a tracked body or marker; the fit needs {}",
+            counted(usable, "row"),
             expected.min_poses
         );
         Finding::new(
@@ -108,8 +109,8 @@ pub(super) fn limits(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
             .max_by(|a, b| (a - low).max(high - a).total_cmp(&(b - low).max(high - b)));
         let unit = unit(poses, joint);
         let text = format!(
-            "{} rows outside its limits {low:.4}..{high:.4} {unit}, e.g. {:.4} {unit}",
-            rows.len(),
+            "{} outside its limits {low:.4}..{high:.4} {unit}, e.g. {:.4} {unit}",
+            counted(rows.len(), "row"),
             worst.unwrap_or_default()
         );
         let remedy =

@@ -2,7 +2,7 @@
 
 use super::Expectations;
 use super::statistics::{median, range};
-use crate::finding::{Finding, Severity};
+use crate::finding::{Finding, Severity, are, counted};
 use crate::poses::Poses;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
@@ -34,7 +34,11 @@ pub(super) fn zeros(poses: &Poses) -> Vec<Finding> {
             .map(|i| poses.rows[i])
             .collect();
         if !rows.is_empty() {
-            let text = format!("{} samples are exactly (0, 0, 0)", rows.len());
+            let text = format!(
+                "{} {} exactly (0, 0, 0)",
+                counted(rows.len(), "sample"),
+                are(rows.len())
+            );
             let remedy = "a lost sample is an empty cell";
             findings.push(
                 Finding::new("all-zero-triplet", Severity::Warning, name, text, remedy)
@@ -174,8 +178,8 @@ pub(super) fn frozen(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
         }
         if !rows.is_empty() {
             let text = format!(
-                "stands exactly still in {} rows while other markers move",
-                rows.len()
+                "stands exactly still in {} while other markers move",
+                counted(rows.len(), "row")
             );
             let remedy =
                 "the tracker repeated its last value: set it to export lost samples as empty";
@@ -227,8 +231,8 @@ fn frozen_bodies(poses: &Poses) -> Vec<Finding> {
         }
         if !rows.is_empty() {
             let text = format!(
-                "stands exactly still in {} rows while joints or other bodies move",
-                rows.len()
+                "stands exactly still in {} while joints or other bodies move",
+                counted(rows.len(), "row")
             );
             let remedy =
                 "the tracker repeated its last pose: set it to export lost samples as empty";

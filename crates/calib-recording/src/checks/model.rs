@@ -15,7 +15,7 @@
 //! links between which no joint moved.
 
 use super::statistics::median;
-use crate::finding::{Finding, Severity};
+use crate::finding::{Finding, Severity, are, counted};
 use crate::poses::Poses;
 use crate::sync::OffsetOutcome;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
@@ -330,8 +330,8 @@ pub fn spoiled_rows(
             .collect();
         let worst = rows.iter().filter_map(|&i| spoiled[i]).fold(0.0, f64::max);
         let text = format!(
-            "{} rows disagree with the robot's model by up to {:.2}°, {:.2}° is usual",
-            rows.len(),
+            "{} off the robot's model by up to {:.2}°, {:.2}° is usual",
+            format_args!("{} {}", counted(rows.len(), "row"), are(rows.len())),
             worst.to_degrees(),
             usual.to_degrees()
         );

@@ -4,7 +4,7 @@
 
 use super::Expectations;
 use super::statistics::{median, robust_sigma};
-use crate::finding::{Finding, Severity};
+use crate::finding::{Finding, Severity, are, counted};
 use crate::poses::Poses;
 use crate::rigid_body::Template;
 use calib_geometry::registration::rigid_registration;
@@ -247,8 +247,8 @@ impl<'a> Body<'a> {
         let mut findings = Vec::new();
         if let Some((_, which)) = swapped.first() {
             let text = format!(
-                "markers {which} are exchanged, {} rows in all",
-                swapped.len()
+                "markers {which} are exchanged, {} in all",
+                counted(swapped.len(), "row")
             );
             let remedy = "correct the labels in the tracker's software, or drop these rows";
             let finding = Finding::new("marker-swap", Severity::Error, self.name, text, remedy);
@@ -260,8 +260,8 @@ impl<'a> Body<'a> {
         }
         if let Some((_, marker, off)) = outliers.iter().max_by(|a, b| a.2.total_cmp(&b.2)) {
             let text = format!(
-                "a marker is out of place in {} rows, most {marker} by {:.2} mm",
-                outliers.len(),
+                "a marker is out of place in {}, most {marker} by {:.2} mm",
+                counted(outliers.len(), "row"),
                 off * 1e3
             );
             let remedy =
@@ -287,9 +287,10 @@ impl<'a> Body<'a> {
             .max_by(|a, b| a.1.total_cmp(&b.1))?;
         let (a, b) = (self.markers[pair.j], self.markers[pair.i]);
         let text = format!(
-            "bends: the distance {a}–{b} varies by {:.2} mm, {} rows are off",
+            "bends: the distance {a}–{b} varies by {:.2} mm, {} {} off",
             spread * 1e3,
-            rows.len()
+            counted(rows.len(), "row"),
+            are(rows.len())
         );
         let remedy = "stiffen the body, or make bodies of the markers that keep their distances";
         Some(Finding::new("not-rigid", Severity::Error, self.name, text, remedy).at_rows(rows))

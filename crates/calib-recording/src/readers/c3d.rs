@@ -12,7 +12,7 @@
 use super::common::unique_names;
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem, excerpt};
-use crate::finding::{Finding, Severity};
+use crate::finding::{Finding, Severity, are, counted};
 use crate::model::{MarkerSample, MarkerStream, Recording, Timeline};
 use crate::units::LengthUnit;
 use nalgebra::Point3;
@@ -478,7 +478,7 @@ fn read_points(
     let mut samples: Vec<Vec<MarkerSample>> = vec![Vec::with_capacity(count); shape.points];
     let mut frame = vec![0u8; frame_bytes];
     let mut reader = BufReader::with_capacity(1 << 18, input);
-    let (mut any_residual, mut not_finite) = (false, 0u64);
+    let (mut any_residual, mut not_finite) = (false, 0usize);
     let p = shape.processor;
     for _ in 0..count {
         reader.read_exact(&mut frame).map_err(io)?;
@@ -534,7 +534,11 @@ fn read_points(
         }
     }
     if not_finite > 0 {
-        let text = format!("{not_finite} points are not finite; taken as lost");
+        let text = format!(
+            "{} {} not finite; taken as lost",
+            counted(not_finite, "point"),
+            are(not_finite)
+        );
         meta.findings.push(Finding::new(
             "not-a-number",
             Severity::Warning,

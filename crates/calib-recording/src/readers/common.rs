@@ -1,7 +1,7 @@
 //! What the readers of tracker files share: rows of numbers, three coordinates to a sample, unique names.
 
 use crate::error::{At, Placed, Problem};
-use crate::finding::{Finding, Severity};
+use crate::finding::{Finding, Severity, are, counted};
 use crate::model::{BodyStream, MarkerSample, MarkerStream};
 use crate::table::UNIT_TOLERANCE;
 use crate::text::{Number, Separator, cells, not_a_number, number};
@@ -149,8 +149,9 @@ impl MarkerTrack {
 /// The finding about samples at exactly zero; `None` without such.
 pub(super) fn all_zero(subject: &str, rows: Vec<u64>) -> Option<Finding> {
     let text = format!(
-        "{} samples are exactly (0, 0, 0); taken as lost",
-        rows.len()
+        "{} {} exactly (0, 0, 0); taken as lost",
+        counted(rows.len(), "sample"),
+        are(rows.len())
     );
     let remedy = "let the tracker export lost samples as empty";
     (!rows.is_empty()).then(|| {

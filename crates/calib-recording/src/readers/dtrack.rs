@@ -15,7 +15,7 @@
 use super::common::{body_stream, head_text, pose, rotation, unexpected};
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
-use crate::finding::{Finding, Severity};
+use crate::finding::{Finding, Severity, counted};
 use crate::model::{BodyStream, MarkerSample, MarkerStream, Recording, Timeline};
 use crate::text::{Lines, Number, number};
 use crate::units::LengthUnit;
@@ -417,8 +417,8 @@ impl Log {
             .push("lengths from mm; rotations from the matrices, angles ignored".to_string());
         if self.days > 0.0 {
             meta.conversions.push(format!(
-                "time runs on over midnight ({} times)",
-                self.days / DAY
+                "time runs on over midnight ({})",
+                counted((self.days / DAY) as usize, "time")
             ));
         }
         if !self.skipped.is_empty() {
@@ -431,7 +431,15 @@ impl Log {
                 .push(format!("lines not read: {}", kinds.join(", ")));
         }
         if !self.backwards.is_empty() {
-            let text = format!("{} frame numbers do not rise", self.backwards.len());
+            let text = format!(
+                "{} {} not rise",
+                counted(self.backwards.len(), "frame number"),
+                if self.backwards.len() == 1 {
+                    "does"
+                } else {
+                    "do"
+                }
+            );
             let remedy =
                 "the log may hold several recordings, or datagrams out of order: cut it there";
             meta.findings.push(
@@ -443,7 +451,8 @@ impl Log {
         let t: Option<Vec<f64>> = self.times.into_iter().collect();
         if t.is_none() && without < n {
             let text = format!(
-                "{without} of {n} frames have no time stamp; the recording is read without time"
+                "no time stamp in {without} of {}; the recording is read without time",
+                counted(n, "frame")
             );
             let remedy = "switch on `ts` or `ts2` in DTrack's output";
             meta.findings.push(Finding::new(

@@ -61,6 +61,9 @@ pub struct StaticPoses {
 }
 
 /// The holds of a table with time; empty without time.
+///
+/// A hold ends where rows are missing for longer than the window (nobody saw whether it moved), and where the table
+/// says so itself: in a column `hold`, as recorded live, each text is a hold of its own.
 pub fn holds(poses: &Poses, settings: &HoldSettings) -> Vec<Hold> {
     let Some(t) = &poses.t else { return Vec::new() };
     let channels = channels(poses, settings);
@@ -77,10 +80,15 @@ pub fn holds(poses: &Poses, settings: &HoldSettings) -> Vec<Hold> {
             .iter()
             .all(|(values, limit)| range(&values[from..=to]).is_none_or(|range| range <= *limit));
     }
+    let names = poses.labels.get("hold");
+    let apart = |end: usize| {
+        t[end] - t[end - 1] > settings.window
+            || names.is_some_and(|names| names[end] != names[end - 1])
+    };
     let mut found = Vec::new();
     let mut start = 0;
     for end in 1..=t.len() {
-        if end < t.len() && quiet[end] == quiet[start] {
+        if end < t.len() && quiet[end] == quiet[start] && !apart(end) {
             continue;
         }
         if quiet[start] && t[end - 1] - t[start] >= settings.min_duration {

@@ -1,7 +1,7 @@
 //! What the columns of a table mean: by our own naming rules, and by a column map for the columns it names.
 //!
 //! The rules, in this order:
-//! 1. `t_s`, `t_ms`, `t_us`: time. `frame`, `pose`, `row`, `sample`, `index`, `config`: a counter.
+//! 1. `t_s`, `t_ms`, `t_us`: time. `host_s`: the recording computer's clock. `frame`, `pose`, `row`, `sample`, `index`, `config`: a counter.
 //!    `trial`, `group`, `label`, `phase`, `set`, `hold`, `segment`, `note`: text.
 //! 2. `marker` or `body` as a column name: a long table; the row's `x_m,y_m,z_m[,qx,qy,qz,qw]` belong to the
 //!    marker or body named there.
@@ -84,6 +84,8 @@ pub(super) struct Layout {
     pub columns: Vec<Column>,
     pub slots: Vec<Slot>,
     pub time: Option<usize>,
+    /// The clock of the computer that recorded, s.
+    pub received: Option<usize>,
     pub counter: Option<usize>,
     pub joints: Vec<(String, JointUnit, usize)>,
     pub torques: Vec<(String, usize)>,
@@ -137,6 +139,7 @@ fn length_suffix(unit: &str) -> Option<LengthUnit> {
 /// How a column name reads by the rules of this module.
 enum Meaning<'a> {
     Time(TimeUnit),
+    Received,
     Counter,
     Label,
     Entity,
@@ -161,6 +164,7 @@ fn meaning(name: &str) -> Meaning<'_> {
         "t_s" => return Meaning::Time(TimeUnit::S),
         "t_ms" => return Meaning::Time(TimeUnit::Ms),
         "t_us" => return Meaning::Time(TimeUnit::Us),
+        "host_s" => return Meaning::Received,
         "marker" | "body" => return Meaning::Entity,
         _ if COUNTERS.contains(&name) => return Meaning::Counter,
         _ if LABELS.contains(&name) => return Meaning::Label,
@@ -500,6 +504,9 @@ impl Layout {
                 Meaning::Time(unit) if self.time.is_none() => {
                     self.time = Some(self.slot(i, SlotKind::Time, unit.per_second()))
                 }
+                Meaning::Received if self.received.is_none() => {
+                    self.received = Some(self.slot(i, SlotKind::Time, 1.0))
+                }
                 Meaning::Counter if self.counter.is_none() => {
                     self.counter = Some(self.slot(i, SlotKind::Counter, 1.0))
                 }
@@ -535,7 +542,11 @@ impl Layout {
                     let slot = self.slot(i, SlotKind::Robot, 1.0);
                     self.torques.push((name.to_string(), slot));
                 }
-                Meaning::Time(_) | Meaning::Counter | Meaning::Entity | Meaning::Unknown => {
+                Meaning::Time(_)
+                | Meaning::Received
+                | Meaning::Counter
+                | Meaning::Entity
+                | Meaning::Unknown => {
                     if !lenient && !name.is_empty() {
                         return Err(Problem::UnknownColumn {
                             name: name.clone(),
@@ -701,7 +712,7 @@ fn nearest_rule(name: &str) -> Option<String> {
         .iter()
         .chain(&LABELS)
         .copied()
-        .chain(["t_s", "t_ms", "marker", "body", "x_m", "x_mm"]);
+        .chain(["t_s", "t_ms", "host_s", "marker", "body", "x_m", "x_mm"]);
     nearest_word(name, fixed).or_else(|| Some(format!("{name}_rad")))
 }
 

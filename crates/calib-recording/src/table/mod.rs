@@ -5,5 +5,6 @@ mod rows;
 mod write;
 
 pub(crate) use header::is_canonical;
+pub use rows::WRITTEN_LIVE;
 pub(crate) use rows::{UNIT_TOLERANCE, read_table};
 pub use write::{NotWritten, WriteOptions, write_poses, write_recording};

@@ -3,7 +3,7 @@
 use super::header::{BodyPlan, Column, Layout, Rotation, SlotKind};
 use crate::column_map::{ColumnMap, Delimiter};
 use crate::error::{At, Placed, Problem, excerpt};
-use crate::finding::{Finding, Severity};
+use crate::finding::{Finding, Severity, are, counted};
 use crate::model::{
     BodyStream, JointStream, MarkerSample, MarkerStream, Meta, Recording, Timeline, TorqueStream,
 };
@@ -22,6 +22,10 @@ const MAX_SPARSITY: usize = 100;
 /// Cells that any long table may have when written wide.
 const ALWAYS_ALLOWED: usize = 1 << 20;
 
+/// The comment that a table carries which is written while it is recorded: such a table may end in the middle of a
+/// row, and a row is whole when its line break is there.
+pub const WRITTEN_LIVE: &str = "written live: a last line without line break was cut off";
+
 /// Reads a wide or long table. `map` must be resolved (no preset left).
 pub(crate) fn read_table(input: impl BufRead, map: Option<&ColumnMap>) -> Placed<Recording> {
     let mut lines = Lines::new(input);
@@ -32,9 +36,17 @@ pub(crate) fn read_table(input: impl BufRead, map: Option<&ColumnMap>) -> Placed
         None => return Err((At::Line(lines.number()), Problem::NoRows)),
     };
     let mut rows = Rows::new(layout, separator, map);
+    let live = comments.iter().any(|comment| comment == WRITTEN_LIVE);
+    let mut cut = None;
     loop {
         let number = lines.number() + 1;
-        let Some(line) = lines.next()? else { break };
+        let Some((line, whole)) = lines.next_whole()? else {
+            break;
+        };
+        if live && !whole {
+            cut = Some(number);
+            break;
+        }
         if let Some(comment) = line.strip_prefix('#') {
             comments.push(comment.trim().to_string());
         } else if !line.bytes().all(|b| b.is_ascii_whitespace()) {
@@ -45,6 +57,11 @@ pub(crate) fn read_table(input: impl BufRead, map: Option<&ColumnMap>) -> Placed
         return Err((At::Line(lines.number()), Problem::NoRows));
     }
     let mut recording = rows.finish()?;
+    recording.meta.findings.extend(cut.map(|line| {
+        let text = "the last row was cut off while it was written, and is left out";
+        let remedy = "nothing to do; `calib record --append` goes on from here";
+        Finding::new("row-cut-off", Severity::Info, "last row", text, remedy).at_rows([line])
+    }));
     recording.meta.comments = comments;
     Ok(recording)
 }
@@ -115,6 +132,7 @@ struct Rows<'a> {
     texts: Vec<String>,
     timeline: Timeline,
     times: Vec<f64>,
+    received: Vec<f64>,
     joints: Vec<Vec<Option<f64>>>,
     torques: Vec<Vec<Option<f64>>>,
     markers: Vec<Vec<MarkerSample>>,
@@ -148,6 +166,7 @@ impl<'a> Rows<'a> {
             texts: vec![String::new(); layout.labels.len()],
             timeline: Timeline::default(),
             times: Vec::new(),
+            received: Vec::new(),
             joints: vec![Vec::new(); layout.joints.len()],
             torques: vec![Vec::new(); layout.torques.len()],
             markers: vec![Vec::new(); streams(layout.markers.len())],
@@ -278,17 +297,19 @@ impl<'a> Rows<'a> {
 
     /// Time, counter and labels of the row; whether it starts a new sample.
     fn instant(&mut self, line: u64) -> Placed<bool> {
-        let time = match self.layout.time {
+        let clock = |slot: Option<usize>| match slot {
             Some(slot) if self.values[slot].is_nan() => {
                 let problem = Problem::Unexpected {
                     found: String::new(),
                     expected: "a time in every row".to_string(),
                 };
-                return Err((self.at(line, self.layout.slots[slot].column), problem));
+                Err((self.at(line, self.layout.slots[slot].column), problem))
             }
-            Some(slot) => Some(self.values[slot]),
-            None => None,
+            Some(slot) => Ok(Some(self.values[slot])),
+            None => Ok(None),
         };
+        let time = clock(self.layout.time)?;
+        let received = clock(self.layout.received)?;
         if let (Some(found), Some(&previous)) = (time, self.times.last())
             && found < previous
         {
@@ -317,6 +338,7 @@ impl<'a> Rows<'a> {
         }
         self.timeline.rows.push(line);
         self.times.extend(time);
+        self.received.extend(received);
         for (texts, text) in self.labels.iter_mut().zip(&self.texts) {
             texts.push(text.clone());
         }
@@ -531,6 +553,7 @@ impl<'a> Rows<'a> {
         let timed = self.layout.time.is_some();
         self.timeline.clock = if timed { "t_s" } else { "static poses" }.to_string();
         self.timeline.t = timed.then_some(self.times);
+        self.timeline.received = self.layout.received.map(|_| self.received);
         self.timeline.labels = self
             .layout
             .labels
@@ -614,8 +637,9 @@ impl<'a> Rows<'a> {
             .into_iter()
             .map(|(name, rows)| {
                 let text = format!(
-                    "{} samples are exactly (0, 0, 0); taken as lost",
-                    rows.len()
+                    "{} {} exactly (0, 0, 0); taken as lost",
+                    counted(rows.len(), "sample"),
+                    are(rows.len())
                 );
                 let remedy = "leave the cells empty where nothing was measured";
                 Finding::new("all-zero-triplet", Severity::Warning, name, text, remedy)
@@ -624,7 +648,11 @@ impl<'a> Rows<'a> {
         let nans = std::mem::take(&mut self.nans)
             .into_iter()
             .map(|(column, rows)| {
-                let text = format!("{} cells are not a number; taken as lost", rows.len());
+                let text = format!(
+                    "{} {} not a number; taken as lost",
+                    counted(rows.len(), "cell"),
+                    are(rows.len())
+                );
                 let remedy = "leave the cells empty where nothing was measured";
                 Finding::new("not-a-number", Severity::Warning, column, text, remedy).at_rows(rows)
             });

@@ -96,7 +96,7 @@ struct OutColumn<'a> {
     value: Box<dyn Fn(usize) -> Option<f64> + 'a>,
 }
 
-/// The table as text: counter or `t_s`, labels, joints, torques, bodies, markers, each in alphabetical order. A label
+/// The table as text: counter, labels, `t_s`, `host_s`, joints, torques, bodies, markers, each in alphabetical order. A label
 /// column of another name than the usual ones (`trial`, `group`, …) must be named when the table is read, in
 /// [`ColumnMap::labels`].
 ///
@@ -219,6 +219,13 @@ fn columns<'a>(poses: &'a Poses, options: &WriteOptions) -> Vec<OutColumn<'a>> {
             name: "t_s".to_string(),
             decimals,
             value: Box::new(|row| Some(t[row])),
+        });
+    }
+    if let Some(received) = &poses.received {
+        columns.push(OutColumn {
+            name: "host_s".to_string(),
+            decimals,
+            value: Box::new(|row| Some(received[row])),
         });
     }
     for (name, q) in &poses.joints {
@@ -370,12 +377,14 @@ fn check_lengths(poses: &Poses) -> Result<(), NotWritten> {
             });
         }
     }
-    match &poses.t {
-        Some(t) if t.len() != n => Err(NotWritten::Length {
-            column: "t_s".to_string(),
-            found: t.len(),
-            expected: n,
-        }),
-        _ => Ok(()),
+    for (column, clock) in [("t_s", &poses.t), ("host_s", &poses.received)] {
+        if let Some(found) = clock.as_ref().map(Vec::len).filter(|&found| found != n) {
+            return Err(NotWritten::Length {
+                column: column.to_string(),
+                found,
+                expected: n,
+            });
+        }
     }
+    Ok(())
 }

@@ -9,6 +9,7 @@ mod fuzz_seeds;
 mod mutations;
 mod real_formats;
 mod real_tables;
+mod recall;
 mod sync;
 mod tables;
 

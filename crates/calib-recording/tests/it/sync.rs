@@ -204,6 +204,37 @@ fn holds_are_found_and_averaged() {
     assert!(holds(&Poses::default(), &HoldSettings::default()).is_empty());
 }
 
+/// As recorded live: only rows that stand still, so that nothing but the gap in time, or the column `hold`, tells one
+/// hold from the next.
+#[test]
+fn holds_end_where_rows_are_missing_or_the_table_says_so() {
+    let poses = stop_and_go(0.0);
+    let settings = HoldSettings::default();
+    let all = holds(&poses, &settings);
+    let still: Vec<usize> = all.iter().flat_map(|hold| hold.rows.clone()).collect();
+    let mut cut = poses.select(&still);
+    let found = holds(&cut, &settings);
+    assert_eq!(found.len(), all.len(), "{found:?}");
+    let average = static_poses(&cut, &found);
+    for (a, b) in average.poses.joints["q"].iter().zip(0..) {
+        assert!((a.expect("recorded") - 0.2 * f64::from(b)).abs() < 1e-9);
+    }
+    // Without a gap in the clock, but named.
+    let n = cut.len();
+    cut.t = Some((0..n).map(|i| i as f64 * 0.01).collect());
+    for track in cut.bodies.values_mut() {
+        track.fill(track[0]);
+    }
+    for track in cut.markers.values_mut() {
+        track.fill(track[0]);
+    }
+    cut.joints.values_mut().for_each(|q| q.fill(Some(0.1)));
+    assert_eq!(holds(&cut, &settings).len(), 1);
+    let names = (0..n).map(|i| (2 * i / n).to_string()).collect();
+    cut.labels.insert("hold".to_string(), names);
+    assert_eq!(holds(&cut, &settings).len(), 2);
+}
+
 #[test]
 fn a_hold_that_drifts_is_reported() {
     let poses = stop_and_go(5e-4);

@@ -285,6 +285,7 @@ prop_compose! {
         Poses {
             rows: (0..n as u64).collect(),
             t: timed.then(|| (0..n).map(|i| i as f64 * 0.01).collect()),
+            received: timed.then(|| (0..n).map(|i| 1.7e9 + i as f64 * 0.0101).collect()),
             joints: BTreeMap::from([("q".to_string(), rows.iter().map(|r| r.0).collect())]),
             joint_units: BTreeMap::from([("q".to_string(), JointUnit::Angle)]),
             torques: BTreeMap::from([("q".to_string(), rows.iter().map(|r| r.3).collect())]),
@@ -306,6 +307,7 @@ proptest! {
         prop_assert_eq!(&back.markers, &poses.markers);
         prop_assert_eq!(&back.labels, &poses.labels);
         prop_assert_eq!(&back.t, &poses.t);
+        prop_assert_eq!(&back.received, &poses.received);
         for (a, b) in back.bodies["hand"].iter().zip(&poses.bodies["hand"]) {
             prop_assert_eq!(a.is_some(), b.is_some());
             if let (Some(a), Some(b)) = (a, b) {

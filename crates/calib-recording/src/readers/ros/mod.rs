@@ -13,7 +13,7 @@ mod sqlite;
 use super::common::unique_names;
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
-use crate::finding::{Finding, Severity};
+use crate::finding::{Finding, Severity, counted};
 use crate::model::{
     JointStream, JointUnit, MarkerSample, MarkerStream, Recording, Timeline, TorqueStream,
 };
@@ -304,8 +304,8 @@ impl Group {
             .collect();
         if !moved.is_empty() {
             let text = format!(
-                "{} messages came out of order; sorted by their time",
-                moved.len()
+                "{} came out of order; sorted by their time",
+                counted(moved.len(), "message")
             );
             let remedy = "nothing, unless several nodes publish this topic";
             out.meta.findings.push(

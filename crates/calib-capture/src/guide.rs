@@ -1,0 +1,93 @@
+//! The poses that a sweep asks for, one after the other.
+
+use crate::{JointColumn, Unit};
+
+/// One pose of the sweep.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// Value of each guided joint, rad or m.
+    pub targets: Vec<f64>,
+}
+
+/// A sweep: its joints, their ranges, its poses.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Guide {
+    /// Index of each guided joint among the columns.
+    pub joints: Vec<usize>,
+    /// Range asked of each, rad or m.
+    pub ranges: Vec<(f64, f64)>,
+    /// The poses; none for a recording whose poses the person chooses.
+    pub steps: Vec<Step>,
+}
+
+impl Guide {
+    /// `waist 40.0°, shoulder -80.0°`.
+    pub fn shown(&self, step: &Step, columns: &[JointColumn]) -> String {
+        let texts: Vec<String> = self
+            .joints
+            .iter()
+            .zip(&step.targets)
+            .filter_map(|(&joint, &target)| {
+                let column = columns.get(joint)?;
+                Some(format!("{} {}", column.name, column.unit.shown(target)))
+            })
+            .collect();
+        texts.join(", ")
+    }
+
+    /// `waist -70.0..180.0°`.
+    pub fn shown_ranges(&self, columns: &[JointColumn]) -> String {
+        let texts: Vec<String> = self
+            .joints
+            .iter()
+            .zip(&self.ranges)
+            .filter_map(|(&joint, &(low, high))| {
+                let column = columns.get(joint)?;
+                Some(format!(
+                    "{} {}",
+                    column.name,
+                    shown_range(column.unit, low, high)
+                ))
+            })
+            .collect();
+        texts.join(", ")
+    }
+}
+
+/// `-70.0..180.0°`.
+pub(crate) fn shown_range(unit: Unit, low: f64, high: f64) -> String {
+    match unit {
+        Unit::Angle => format!("{:.1}..{:.1}°", low.to_degrees(), high.to_degrees()),
+        Unit::Length => format!("{:.1}..{:.1} mm", low * 1e3, high * 1e3),
+    }
+}
+
+/// All combinations of equal steps through the ranges, ends included, the last joint fastest and back and forth, so
+/// that neighbours in the list are neighbours in the room.
+///
+/// `poses` is the number of values of each joint; 1 asks for the middle of the range.
+pub fn grid(ranges: &[(f64, f64)], poses: usize) -> Vec<Step> {
+    let poses = poses.max(1);
+    let value = |(low, high): (f64, f64), i: usize| match poses {
+        1 => (low + high) / 2.0,
+        _ => low + (high - low) * i as f64 / (poses - 1) as f64,
+    };
+    let mut steps = vec![Step {
+        targets: Vec::new(),
+    }];
+    for &range in ranges {
+        steps = steps
+            .iter()
+            .enumerate()
+            .flat_map(|(row, step)| {
+                (0..poses).map(move |i| {
+                    let i = if row % 2 == 0 { i } else { poses - 1 - i };
+                    let mut targets = step.targets.clone();
+                    targets.push(value(range, i));
+                    Step { targets }
+                })
+            })
+            .collect();
+    }
+    if ranges.is_empty() { Vec::new() } else { steps }
+}

@@ -1,0 +1,50 @@
+//! Live capture: from what a tracker sends over the network to the canonical recording, row by row.
+//!
+//! ```text
+//! socket ── Source ──► Frame ── Order ──► Session ──► Table      a row per frame while a pose is held
+//!                                          ▲    │
+//!                     joint values ────────┘    └──► Screen      the next pose, who is lost, how far
+//! ```
+//!
+//! A frame has two times: the device's own, and the instant at which it arrived here. Both are written (`t_s`,
+//! `host_s`). What arrives late or twice is dropped and counted, never sorted in: rows go to the disk every second
+//! and stay as they are, so that a kill costs at most the last second.
+//!
+//! The pose that a row belongs to is decided by stillness: within a window the tracked bodies must stay together
+//! ([`Stillness`]). Nothing in here estimates anything.
+//!
+//! ```
+//! use calib_capture::dtrack;
+//!
+//! let frames = dtrack::datagram(b"fr 7\r\n6d 1 [0 1.000][1 2 3 0 0 0][1 0 0 0 1 0 0 0 1]\r\n\0")?;
+//! assert_eq!(frames[0].number, Some(7));
+//! assert_eq!(frames[0].bodies["body_0"].translation.x, 0.001);
+//! # Ok::<(), calib_recording::Error>(())
+//! ```
+//!
+//! What this crate cannot know: whether the person stands where the joint values say, and whether a tracker's name
+//! is on the right body.
+
+pub mod dtrack;
+mod frame;
+mod guide;
+mod joints;
+mod order;
+mod screen;
+mod session;
+mod source;
+mod still;
+mod survey;
+mod table;
+pub mod vrpn;
+
+pub use frame::Frame;
+pub use guide::{Guide, Step, grid};
+pub use joints::{JointColumn, JointListener, JointSource, Unit, parse_joints};
+pub use order::{Arrival, Order};
+pub use screen::{Lines, Screen, Terminal, WIDTH};
+pub use session::{CaptureError, Ended, Key, Plan, Session, Summary, Watched, WatchedKind};
+pub use source::{Address, BadAddress, Input, Source, SourceError};
+pub use still::{StillSettings, Stillness};
+pub use survey::{Survey, map_names, survey};
+pub use table::{Table, TableError};

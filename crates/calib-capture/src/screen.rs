@@ -1,0 +1,124 @@
+//! What the person reads while recording: lines that stay, and one that changes.
+
+use std::io::Write;
+
+/// No line is longer.
+pub const WIDTH: usize = 80;
+
+/// Shows lines and a status.
+pub trait Screen {
+    /// A line that stays.
+    fn line(&mut self, text: &str);
+    /// What is going on at this time, s; replaces the status before.
+    fn status(&mut self, text: &str, now: f64);
+}
+
+/// A terminal: the status stands in the last line and is written over.
+#[derive(Debug)]
+pub struct Terminal<W: Write> {
+    out: W,
+    shown: bool,
+    last: Option<f64>,
+}
+
+impl<W: Write> Terminal<W> {
+    /// Writes to `out`.
+    pub fn new(out: W) -> Self {
+        Terminal {
+            out,
+            shown: false,
+            last: None,
+        }
+    }
+}
+
+impl<W: Write> Screen for Terminal<W> {
+    fn line(&mut self, text: &str) {
+        if std::mem::take(&mut self.shown) {
+            let _ = write!(self.out, "\r\x1b[K");
+        }
+        for line in folded(text) {
+            let _ = writeln!(self.out, "{line}");
+        }
+        self.last = None;
+    }
+
+    fn status(&mut self, text: &str, now: f64) {
+        // Ten times a second is as fast as anyone reads.
+        if self
+            .last
+            .is_some_and(|last| (0.0..0.1).contains(&(now - last)))
+        {
+            return;
+        }
+        self.last = Some(now);
+        self.shown = true;
+        let short: String = text.chars().take(WIDTH - 1).collect();
+        let _ = write!(self.out, "\r\x1b[K{short}");
+        let _ = self.out.flush();
+    }
+}
+
+/// Anything else: plain lines, the status every few seconds and only when it says something new.
+#[derive(Debug)]
+pub struct Lines<W: Write> {
+    out: W,
+    last: Option<(f64, String)>,
+}
+
+impl<W: Write> Lines<W> {
+    /// Writes to `out`.
+    pub fn new(out: W) -> Self {
+        Lines { out, last: None }
+    }
+}
+
+/// Time between two status lines in a file, s.
+const SELDOM: f64 = 5.0;
+
+impl<W: Write> Screen for Lines<W> {
+    fn line(&mut self, text: &str) {
+        for line in folded(text) {
+            let _ = writeln!(self.out, "{line}");
+        }
+        let _ = self.out.flush();
+    }
+
+    fn status(&mut self, text: &str, now: f64) {
+        match &self.last {
+            Some((at, said)) if now - at < SELDOM || said == text => {}
+            None => self.last = Some((now, String::new())),
+            Some(_) => {
+                self.line(text);
+                self.last = Some((now, text.to_string()));
+            }
+        }
+    }
+}
+
+/// The text in lines of at most [`WIDTH`] characters, broken at blanks, continued with two blanks.
+fn folded(text: &str) -> Vec<String> {
+    let mut lines = Vec::new();
+    for part in text.lines() {
+        let indent = part
+            .chars()
+            .take_while(|c| *c == ' ')
+            .count()
+            .min(WIDTH / 2);
+        let mut line = " ".repeat(indent);
+        let mut empty = true;
+        for word in part.split_whitespace() {
+            if !empty && line.chars().count() + 1 + word.chars().count() > WIDTH {
+                lines.push(std::mem::replace(&mut line, " ".repeat(indent + 2)));
+                empty = true;
+            }
+            if !empty {
+                line.push(' ');
+            }
+            line.push_str(word);
+            empty = false;
+        }
+        lines.push(line);
+    }
+    lines
+}

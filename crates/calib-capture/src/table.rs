@@ -1,0 +1,214 @@
+//! The file that grows while it is recorded: whole rows, on the disk every second.
+
+use calib_recording::{ReadOptions, WRITTEN_LIVE, read_bytes};
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Seek, SeekFrom, Write};
+use std::path::Path;
+
+/// Rows wait at most this long for the disk, s.
+const EVERY: f64 = 1.0;
+
+/// Why a recording cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// There is a file already.
+    #[error("{path} exists already; go on with --append, or choose another with --out")]
+    Exists {
+        /// The file.
+        path: String,
+    },
+    /// There is a file, but it is another recording.
+    #[error("{path}: cannot go on here: {problem}; choose another file with --out")]
+    Other {
+        /// The file.
+        path: String,
+        /// What differs.
+        problem: String,
+    },
+    /// The operating system refused.
+    #[error("{path}: cannot be written: {source}")]
+    Io {
+        /// The file.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+/// A table being written.
+#[derive(Debug)]
+pub struct Table {
+    file: File,
+    path: String,
+    pending: String,
+    /// Time of the oldest row that waits, s.
+    waiting_since: Option<f64>,
+    /// Rows taken, on the disk or not.
+    pub rows: u64,
+    /// Device time of the last row of the file that is gone on with, s.
+    pub last_time: Option<f64>,
+    /// Holds that the file has already.
+    pub held: Vec<String>,
+}
+
+impl Table {
+    /// Begins a file that must not exist.
+    ///
+    /// # Errors
+    /// [`TableError`].
+    pub fn create(path: &Path, comments: &[String], header: &str) -> Result<Table, TableError> {
+        let shown = path.display().to_string();
+        let io = |source| TableError::Io {
+            path: shown.clone(),
+            source,
+        };
+        if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder).map_err(io)?;
+        }
+        let opened = OpenOptions::new().write(true).create_new(true).open(path);
+        let mut file = opened.map_err(|source| match source.kind() {
+            ErrorKind::AlreadyExists => TableError::Exists {
+                path: shown.clone(),
+            },
+            _ => io(source),
+        })?;
+        let mut text = String::new();
+        for comment in comments.iter().map(String::as_str).chain([WRITTEN_LIVE]) {
+            text.push_str("# ");
+            text.push_str(&comment.replace(['\n', '\r'], " "));
+            text.push('\n');
+        }
+        text.push_str(header);
+        text.push('\n');
+        file.write_all(text.as_bytes()).map_err(io)?;
+        file.sync_data().map_err(io)?;
+        Ok(Table {
+            file,
+            path: shown,
+            pending: String::new(),
+            waiting_since: None,
+            rows: 0,
+            last_time: None,
+            held: Vec::new(),
+        })
+    }
+
+    /// Goes on with a file of the same header; a row that a kill cut off is taken away first.
+    ///
+    /// # Errors
+    /// [`TableError`].
+    pub fn append(path: &Path, header: &str) -> Result<Table, TableError> {
+        let shown = path.display().to_string();
+        let io = |source| TableError::Io {
+            path: shown.clone(),
+            source,
+        };
+        let other = |problem: String| TableError::Other {
+            path: shown.clone(),
+            problem,
+        };
+        let bytes = std::fs::read(path).map_err(io)?;
+        let whole = bytes.iter().rposition(|&b| b == b'\n').map_or(0, |i| i + 1);
+        let text = std::str::from_utf8(&bytes[..whole]).map_err(|e| other(e.to_string()))?;
+        let mut lines = text
+            .lines()
+            .filter(|line| !line.starts_with('#') && !line.trim().is_empty());
+        let found = lines.next().unwrap_or("");
+        if found != header {
+            return Err(other(format!(
+                "its columns are `{}`, this recording has `{}`",
+                short(found),
+                short(header)
+            )));
+        }
+        if !text
+            .lines()
+            .any(|line| line.strip_prefix("# ") == Some(WRITTEN_LIVE))
+        {
+            return Err(other("it was not made by `calib record`".to_string()));
+        }
+        let (mut rows, mut last_time, mut held) = (0, None, Vec::new());
+        if lines.next().is_some() {
+            let recording = read_bytes(&shown, text.as_bytes(), &ReadOptions::default())
+                .map_err(|e| other(e.to_string()))?;
+            if let Some(timeline) = recording.timelines.first() {
+                rows = timeline.len() as u64;
+                last_time = timeline.t.as_ref().and_then(|t| t.last().copied());
+                held = timeline.labels.get("hold").cloned().unwrap_or_default();
+                held.retain(|name| !name.is_empty());
+                held.dedup();
+            }
+        }
+        let mut file = OpenOptions::new().write(true).open(path).map_err(io)?;
+        file.set_len(whole as u64).map_err(io)?;
+        file.seek(SeekFrom::End(0)).map_err(io)?;
+        Ok(Table {
+            file,
+            path: shown,
+            pending: String::new(),
+            waiting_since: None,
+            rows,
+            last_time,
+            held,
+        })
+    }
+
+    /// Takes a row (without line break) at this time, s; older rows go to the disk when a second has passed.
+    ///
+    /// # Errors
+    /// [`TableError::Io`].
+    pub fn row(&mut self, row: &str, now: f64) -> Result<(), TableError> {
+        self.pending.push_str(row);
+        self.pending.push('\n');
+        self.rows += 1;
+        self.waiting_since.get_or_insert(now);
+        self.tick(now)
+    }
+
+    /// Writes what has waited for a second.
+    ///
+    /// # Errors
+    /// [`TableError::Io`].
+    pub fn tick(&mut self, now: f64) -> Result<(), TableError> {
+        // A clock that went back must not keep rows from the disk.
+        let due = |since: f64| now - since >= EVERY || now < since;
+        if self.waiting_since.is_some_and(due) {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    /// Writes everything now.
+    ///
+    /// # Errors
+    /// [`TableError::Io`].
+    pub fn flush(&mut self) -> Result<(), TableError> {
+        if self.pending.is_empty() {
+            return Ok(());
+        }
+        self.file
+            .write_all(self.pending.as_bytes())
+            .and_then(|()| self.file.sync_data())
+            .map_err(|source| TableError::Io {
+                path: self.path.clone(),
+                source,
+            })?;
+        self.pending.clear();
+        self.waiting_since = None;
+        Ok(())
+    }
+}
+
+impl Drop for Table {
+    /// What still waits goes to the disk, as far as it can.
+    fn drop(&mut self) {
+        let _ = self.flush();
+    }
+}
+
+fn short(text: &str) -> String {
+    if text.chars().count() <= 60 {
+        return text.to_string();
+    }
+    text.chars().take(59).chain("…".chars()).collect()
+}

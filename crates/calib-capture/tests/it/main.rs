@@ -1,0 +1,10 @@
+//! Tests of calib-capture through its public interface: with senders of our own on this computer's own network.
+
+mod fuzz_seeds;
+mod loopback;
+mod order;
+mod plain;
+mod senders;
+mod session;
+mod table;
+mod vrpn;

@@ -1,0 +1,271 @@
+//! A guided sweep without a network: frames and keys in, rows and lines out.
+
+use calib_capture::{
+    Frame, Guide, JointColumn, JointListener, JointSource, Key, Lines, Plan, Session, Table, Unit,
+    Watched, WatchedKind, grid,
+};
+use calib_recording::{Filled, ReadOptions, Recording, read_path};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use std::path::Path;
+
+fn plan(joints: JointSource, poses: usize) -> Plan {
+    let ranges = vec![(-0.5, 0.5)];
+    let column = |name: &str, fixed| JointColumn {
+        name: name.into(),
+        unit: Unit::Angle,
+        fixed,
+    };
+    Plan {
+        columns: vec![column("waist", None), column("elbow", Some(0.2))],
+        joints,
+        guide: Guide {
+            joints: vec![0],
+            steps: grid(&ranges, poses),
+            ranges,
+        },
+        watched: vec![
+            Watched {
+                name: "hand".into(),
+                from: "body_0".into(),
+                kind: WatchedKind::Body,
+            },
+            Watched {
+                name: "tip".into(),
+                from: "body_3".into(),
+                kind: WatchedKind::Marker,
+            },
+        ],
+        hold: 0.5,
+        near: (0.02, 0.002),
+        all: false,
+        patience: 5.0,
+        longest: None,
+    }
+}
+
+fn at(waist: f64) -> Isometry3<f64> {
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), waist);
+    Isometry3::from_parts(
+        Translation3::from(rotation * Vector3::new(0.8, 0.1, 1.0)),
+        rotation,
+    )
+}
+
+/// A robot under a tracker of 100 Hz.
+struct Scene {
+    session: Session,
+    screen: Lines<Vec<u8>>,
+    listener: Option<JointListener>,
+    number: u64,
+    waist: f64,
+}
+
+impl Scene {
+    fn new(path: &Path, plan: Plan) -> Scene {
+        let table = Table::create(path, &["test".to_string()], &plan.header()).expect("made");
+        let listener = matches!(plan.joints, JointSource::Udp(_))
+            .then(|| JointListener::open(0).expect("a free port"));
+        Scene {
+            session: Session::new(plan, table),
+            screen: Lines::new(Vec::new()),
+            listener,
+            number: 0,
+            waist: -0.5,
+        }
+    }
+
+    fn now(&self) -> f64 {
+        1000.0 + self.number as f64 * 0.01
+    }
+
+    fn frame(&mut self, with_tip: bool) {
+        let now = self.now();
+        if let Some(listener) = &mut self.listener {
+            listener.datagram(format!("waist_rad={}", self.waist).as_bytes(), now);
+        }
+        let mut frame = Frame {
+            number: Some(self.number),
+            device: Some(self.number as f64 * 0.01),
+            ..Frame::default()
+        };
+        frame.bodies.insert("body_0".into(), at(self.waist));
+        if with_tip {
+            frame.bodies.insert("body_3".into(), at(self.waist + 0.1));
+        }
+        self.number += 1;
+        self.session
+            .frame(&frame, now, self.listener.as_ref(), &mut self.screen)
+            .expect("written");
+    }
+
+    fn go(&mut self, to: f64) {
+        while (to - self.waist).abs() > 1e-9 {
+            self.waist += (to - self.waist).clamp(-0.01, 0.01);
+            self.frame(true);
+        }
+    }
+
+    fn stay(&mut self, frames: usize) {
+        (0..frames).for_each(|i| self.frame(i % 4 != 0));
+    }
+}
+
+fn read(path: &Path) -> Recording {
+    read_path(path, &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn a_guided_sweep_with_commanded_joints() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("sweep.csv");
+    let mut scene = Scene::new(&path, plan(JointSource::Targets, 3));
+    let mut out = Lines::new(Vec::new());
+    scene.session.announce(&mut out);
+    scene.stay(100);
+    // Nobody said that the robot is there: nothing is written.
+    assert_eq!(scene.session.summary().rows, 0);
+    scene.session.key(Key::There, &mut scene.screen);
+    scene.stay(80);
+    scene.go(0.0);
+    scene.session.key(Key::Skip, &mut scene.screen);
+    scene.go(0.5);
+    scene.session.key(Key::There, &mut scene.screen);
+    // It moves once more while it is held.
+    scene.stay(45);
+    scene.go(0.52);
+    scene.go(0.5);
+    scene.stay(120);
+    assert!(scene.session.is_finished());
+    scene.session.report(&mut scene.screen);
+    drop(scene.session);
+    let recording = read(&path);
+    let timeline = &recording.timelines[0];
+    let holds = &timeline.labels["hold"];
+    assert!(holds.iter().all(|h| h == "1" || h == "3"), "{holds:?}");
+    let t = timeline.t.as_ref().expect("device times");
+    let host = timeline.received.as_ref().expect("host times");
+    assert!(
+        t.iter()
+            .zip(host)
+            .all(|(t, host)| (host - t - 1000.0).abs() < 1e-6)
+    );
+    let poses = recording.poses(Filled::Exclude).expect("a table");
+    for (row, hold) in holds.iter().enumerate() {
+        let target = if hold == "1" { -0.5 } else { 0.5 };
+        assert!((poses.joints["waist"][row].expect("held") - target).abs() < 1e-6);
+        assert!((poses.joints["elbow"][row].expect("fixed") - 0.2).abs() < 1e-6);
+        let hand = poses.bodies["hand"][row].expect("seen");
+        assert!((hand.translation.vector - at(target).translation.vector).norm() < 2e-3);
+    }
+    assert!(poses.markers["tip"].iter().any(Option::is_none));
+}
+
+#[test]
+fn the_lines_of_a_sweep() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut scene = Scene::new(&folder.path().join("a.csv"), plan(JointSource::Targets, 2));
+    let lines = {
+        let mut buffer = Vec::new();
+        let mut screen = Lines::new(&mut buffer);
+        let session = &mut scene.session;
+        session.announce(&mut screen);
+        session.foreign(
+            "4 bytes that begin `ping`, expected `fr <number>`",
+            &mut screen,
+        );
+        session.foreign("again", &mut screen);
+        session.key(Key::There, &mut screen);
+        let mut number = 0;
+        let mut run =
+            |session: &mut Session, screen: &mut Lines<&mut Vec<u8>>, n: u64, waist: f64| {
+                for _ in 0..n {
+                    number += 1;
+                    let mut frame = Frame {
+                        number: Some(2 * number),
+                        device: Some(number as f64 * 0.01),
+                        unlabelled: 1,
+                        ..Frame::default()
+                    };
+                    frame.bodies.insert("body_0".into(), at(waist));
+                    session
+                        .frame(&frame, 50.0 + number as f64 * 0.01, None, screen)
+                        .expect("written");
+                }
+            };
+        run(session, &mut screen, 80, -0.5);
+        use calib_capture::Screen as _;
+        screen.line(&session.status(50.9));
+        session.key(Key::There, &mut screen);
+        run(session, &mut screen, 90, 0.5);
+        screen.line(&session.status(51.8));
+        session.report(&mut screen);
+        String::from_utf8(buffer).expect("text")
+    };
+    assert!(lines.lines().all(|line| line.chars().count() <= 80));
+    insta::assert_snapshot!(lines);
+}
+
+#[test]
+fn measured_joints_say_when_the_robot_is_there() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("sweep.csv");
+    let mut scene = Scene::new(&path, plan(JointSource::Udp(0), 3));
+    for target in [-0.5, 0.0, 0.5] {
+        scene.go(target);
+        scene.stay(110);
+    }
+    assert!(scene.session.is_finished());
+    assert_eq!(scene.session.summary().poses, 3);
+    let (low, high) = scene.session.summary().covered["waist"];
+    assert!((low + 0.5).abs() < 0.03 && (high - 0.5).abs() < 0.03);
+}
+
+#[test]
+fn a_pose_away_from_the_target_is_not_taken() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut scene = Scene::new(&folder.path().join("a.csv"), plan(JointSource::Udp(0), 3));
+    scene.go(-0.3);
+    scene.stay(300);
+    assert_eq!(scene.session.summary().rows, 0);
+}
+
+#[test]
+fn poses_of_ones_own_choice() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut free = plan(JointSource::Udp(0), 3);
+    free.guide = Guide::default();
+    let mut scene = Scene::new(&folder.path().join("a.csv"), free);
+    scene.stay(300);
+    // One pose, however long it is held.
+    assert_eq!(scene.session.summary().poses, 1);
+    scene.go(0.3);
+    scene.stay(100);
+    assert_eq!(scene.session.summary().poses, 2);
+    assert!(!scene.session.is_finished());
+}
+
+#[test]
+fn everything_is_written_when_asked() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut all = plan(JointSource::Udp(0), 3);
+    all.all = true;
+    let mut scene = Scene::new(&folder.path().join("a.csv"), all);
+    scene.go(0.0);
+    scene.stay(50);
+    assert_eq!(scene.session.summary().rows, scene.number);
+}
+
+#[test]
+fn what_was_held_before_is_left_out() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("a.csv");
+    let mut scene = Scene::new(&path, plan(JointSource::Udp(0), 3));
+    scene.stay(100);
+    assert_eq!(scene.session.summary().poses, 1);
+    drop(scene);
+    let plan = plan(JointSource::Udp(0), 3);
+    let table = Table::append(&path, &plan.header()).unwrap_or_else(|e| panic!("{e}"));
+    assert!(table.rows > 40, "{}", table.rows);
+    let session = Session::new(plan, table);
+    assert_eq!(session.step().map(|s| s.targets[0]), Some(0.0));
+}
