@@ -98,6 +98,13 @@ fn reading(criterion: &mut Criterion) {
         ("c3d_float", c3d(true)),
         ("c3d_integer", c3d(false)),
     ] {
+        // For other programs to read the same files.
+        if let Some(folder) = std::env::var_os("CALIB_BENCH_FILES") {
+            let path = std::path::Path::new(&folder).join(name);
+            if let Err(error) = std::fs::write(&path, &bytes) {
+                eprintln!("{}: {error}", path.display());
+            }
+        }
         group.throughput(Throughput::Bytes(bytes.len() as u64));
         group.bench_with_input(
             BenchmarkId::from_parameter(name),

@@ -32,6 +32,7 @@ pub mod checks;
 mod column_map;
 mod error;
 mod finding;
+mod growth;
 mod model;
 mod poses;
 pub mod readers;

@@ -475,7 +475,9 @@ fn read_points(
     let frame_bytes = (4 * shape.points + shape.analog) * value_bytes;
     let count = usize::try_from(shape.frames).unwrap_or(usize::MAX);
     // The file is at least this long (checked), so this is no more than three times its size.
-    let mut samples: Vec<Vec<MarkerSample>> = vec![Vec::with_capacity(count); shape.points];
+    let mut samples: Vec<Vec<MarkerSample>> = (0..shape.points)
+        .map(|_| Vec::with_capacity(count))
+        .collect();
     let mut frame = vec![0u8; frame_bytes];
     let mut reader = BufReader::with_capacity(1 << 18, input);
     let (mut any_residual, mut not_finite) = (false, 0usize);

@@ -2,6 +2,7 @@
 
 use crate::error::{At, Placed, Problem};
 use crate::finding::{Finding, Severity, are, counted};
+use crate::growth::push;
 use crate::model::{BodyStream, MarkerSample, MarkerStream};
 use crate::table::UNIT_TOLERANCE;
 use crate::text::{Number, Separator, cells, not_a_number, number};
@@ -126,7 +127,8 @@ impl MarkerTrack {
         let coordinates = self
             .columns
             .map(|column| values.get(column).copied().unwrap_or(f64::NAN));
-        self.stream.samples.push(
+        push(
+            &mut self.stream.samples,
             match triplet(line, &self.stream.name, coordinates, units_per_metre)? {
                 Triplet::Point(point) if self.filled => MarkerSample::Filled(point),
                 Triplet::Point(point) => MarkerSample::Measured(point),

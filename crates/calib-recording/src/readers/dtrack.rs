@@ -16,6 +16,7 @@ use super::common::{body_stream, head_text, pose, rotation, unexpected};
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
 use crate::finding::{Finding, Severity, counted};
+use crate::growth::push;
 use crate::model::{BodyStream, MarkerSample, MarkerStream, Recording, Timeline};
 use crate::text::{Lines, Number, number};
 use crate::units::LengthUnit;
@@ -137,8 +138,8 @@ impl Log {
             if self.frames.last().is_some_and(|&last| frame <= last) {
                 self.backwards.push(frame);
             }
-            self.frames.push(frame);
-            self.times.push(None);
+            push(&mut self.frames, frame);
+            push(&mut self.times, None);
             return Ok(());
         }
         if self.frames.is_empty() {
@@ -330,9 +331,9 @@ impl Log {
             return Ok(());
         };
         stream.tracker_from_body.resize(sample, None);
-        stream.tracker_from_body.push(track);
+        push(&mut stream.tracker_from_body, track);
         stream.quality.resize(sample, None);
-        stream.quality.push(Some(quality));
+        push(&mut stream.quality, Some(quality));
         Ok(())
     }
 
@@ -369,11 +370,8 @@ impl Log {
         }
         stream.samples.resize(sample, MarkerSample::Lost);
         let per_metre = LengthUnit::Mm.per_metre();
-        stream.samples.push(MarkerSample::Measured(Point3::new(
-            x / per_metre,
-            y / per_metre,
-            z / per_metre,
-        )));
+        let point = Point3::new(x / per_metre, y / per_metre, z / per_metre);
+        push(&mut stream.samples, MarkerSample::Measured(point));
         self.samples += 1;
         self.dense += sample + 1 - length;
         sparse(

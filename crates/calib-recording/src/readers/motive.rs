@@ -20,6 +20,7 @@ use super::common::{
 };
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
+use crate::growth::push;
 use crate::model::{BodyStream, Recording, Timeline};
 use crate::text::{Lines, Separator, cells};
 use crate::units::LengthUnit;
@@ -145,8 +146,8 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
                 },
             ));
         }
-        frames.push(frame as u64);
-        times.push(time);
+        push(&mut frames, frame as u64);
+        push(&mut times, time);
         for marker in &mut markers {
             marker.read(number, frame as u64, &values, per_metre)?;
         }
@@ -333,10 +334,10 @@ fn read_body(body: &mut Body, line: u64, values: &[f64], per_metre: f64) -> Plac
         )),
         None => None,
     };
-    body.stream.tracker_from_body.push(track);
+    push(&mut body.stream.tracker_from_body, track);
     if let Some(column) = body.error {
         let error = values[column];
-        body.stream.quality.push((!error.is_nan()).then_some(error));
+        push(&mut body.stream.quality, (!error.is_nan()).then_some(error));
     }
     Ok(())
 }

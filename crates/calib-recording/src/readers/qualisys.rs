@@ -11,6 +11,7 @@ use super::common::{
 };
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
+use crate::growth::push;
 use crate::model::{BodyStream, Recording, Timeline};
 use crate::text::{Lines, Number, Separator, cells, number};
 use crate::units::LengthUnit;
@@ -190,9 +191,9 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
                     },
                 ));
             }
-            times.push(time);
+            push(&mut times, time);
         }
-        frames.push(frame as u64);
+        push(&mut frames, frame as u64);
         for marker in &mut markers {
             marker.read(line_number, frame as u64, &values, per_metre)?;
         }
@@ -325,9 +326,10 @@ fn read_body(body: &mut Body, line: u64, row: u64, values: &[f64], per_metre: f6
             ));
         }
     };
-    body.stream
-        .quality
-        .push((!part[6].is_nan()).then_some(part[6]));
+    push(
+        &mut body.stream.quality,
+        (!part[6].is_nan()).then_some(part[6]),
+    );
     let track = match point {
         // Written by columns, as nalgebra stores it.
         Some(point) => Some(pose(
@@ -340,6 +342,6 @@ fn read_body(body: &mut Body, line: u64, row: u64, values: &[f64], per_metre: f6
         )),
         None => None,
     };
-    body.stream.tracker_from_body.push(track);
+    push(&mut body.stream.tracker_from_body, track);
     Ok(())
 }

@@ -14,6 +14,7 @@ use super::common::{MarkerTrack, first_cell, numbers, unexpected, unique_names};
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
 use crate::finding::{Finding, Severity};
+use crate::growth::push;
 use crate::model::{Recording, Timeline};
 use crate::text::{Lines, Separator, cells};
 use crate::units::LengthUnit;
@@ -113,8 +114,8 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
                 },
             ));
         }
-        frames.push(frame as u64);
-        times.push(time);
+        push(&mut frames, frame as u64);
+        push(&mut times, time);
         for marker in &mut markers {
             marker.read(number, frame as u64, &values, unit.per_metre())?;
         }

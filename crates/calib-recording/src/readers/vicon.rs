@@ -21,6 +21,7 @@ use super::common::{
 use super::{Input, ReadOptions, Reader, RotationForm};
 use crate::error::{At, Placed, Problem};
 use crate::finding::Finding;
+use crate::growth::push;
 use crate::model::{BodyStream, Meta, Recording, Timeline};
 use crate::text::{Lines, Separator, cells};
 use crate::units::{AngleUnit, LengthUnit};
@@ -236,8 +237,8 @@ fn read_section<R: BufRead>(
             ));
         }
         let row = frame as u64;
-        rows.push(row);
-        times.push((frame - 1.0) / rate);
+        push(&mut rows, row);
+        push(&mut times, (frame - 1.0) / rate);
         for marker in &mut markers {
             MarkerTrack::read(marker, number, row, &values, length)?;
         }
@@ -443,12 +444,12 @@ fn read_body(body: &mut Body, line: u64, row: u64, values: &[f64]) -> Placed<()>
     let given = parts.iter().filter(|value| !value.is_nan()).count();
     let point = match position {
         Triplet::Lost if given == 0 => {
-            body.stream.tracker_from_body.push(None);
+            push(&mut body.stream.tracker_from_body, None);
             return Ok(());
         }
         Triplet::Zero if given == 0 || parts.iter().all(|&value| value == 0.0) => {
             body.zeros.push(row);
-            body.stream.tracker_from_body.push(None);
+            push(&mut body.stream.tracker_from_body, None);
             return Ok(());
         }
         Triplet::Zero => nalgebra::Point3::origin(),
@@ -492,8 +493,9 @@ fn read_body(body: &mut Body, line: u64, row: u64, values: &[f64]) -> Placed<()>
         ([a, b, c], _) => UnitQuaternion::from_scaled_axis(Vector3::new(*a, *b, *c)),
         _ => return unexpected(line, "", "three or four rotation columns"),
     };
-    body.stream
-        .tracker_from_body
-        .push(Some(pose(point, rotation)));
+    push(
+        &mut body.stream.tracker_from_body,
+        Some(pose(point, rotation)),
+    );
     Ok(())
 }

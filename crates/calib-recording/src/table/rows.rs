@@ -4,6 +4,7 @@ use super::header::{BodyPlan, Column, Layout, Rotation, SlotKind};
 use crate::column_map::{ColumnMap, Delimiter};
 use crate::error::{At, Placed, Problem, excerpt};
 use crate::finding::{Finding, Severity, are, counted};
+use crate::growth::push;
 use crate::model::{
     BodyStream, JointStream, MarkerSample, MarkerStream, Meta, Recording, Timeline, TorqueStream,
 };
@@ -336,11 +337,12 @@ impl<'a> Rows<'a> {
                 _ => self.frame = Some(frame),
             }
         }
-        self.timeline.rows.push(line);
-        self.times.extend(time);
-        self.received.extend(received);
+        push(&mut self.timeline.rows, line);
+        time.into_iter().for_each(|t| push(&mut self.times, t));
+        let received = received.into_iter();
+        received.for_each(|t| push(&mut self.received, t));
         for (texts, text) in self.labels.iter_mut().zip(&self.texts) {
-            texts.push(text.clone());
+            push(texts, text.clone());
         }
         Ok(true)
     }
@@ -348,18 +350,18 @@ impl<'a> Rows<'a> {
     fn wide_row(&mut self, line: u64) -> Placed<()> {
         let given = |value: f64| if value.is_nan() { None } else { Some(value) };
         for ((_, _, slot), stream) in self.layout.joints.iter().zip(&mut self.joints) {
-            stream.push(given(self.values[*slot]));
+            push(stream, given(self.values[*slot]));
         }
         for ((_, slot), stream) in self.layout.torques.iter().zip(&mut self.torques) {
-            stream.push(given(self.values[*slot]));
+            push(stream, given(self.values[*slot]));
         }
         for i in 0..self.markers.len() {
             let sample = self.marker(line, i)?;
-            self.markers[i].push(sample);
+            push(&mut self.markers[i], sample);
         }
         for i in 0..self.bodies.len() {
             let pose = self.body(line, i)?;
-            self.bodies[i].push(pose);
+            push(&mut self.bodies[i], pose);
         }
         Ok(())
     }
@@ -408,11 +410,11 @@ impl<'a> Rows<'a> {
         if is_body {
             let pose = self.body(line, 0)?;
             self.bodies[stream].resize(sample, None);
-            self.bodies[stream].push(pose);
+            push(&mut self.bodies[stream], pose);
         } else {
             let point = self.marker(line, 0)?;
             self.markers[stream].resize(sample, MarkerSample::Lost);
-            self.markers[stream].push(point);
+            push(&mut self.markers[stream], point);
         }
         Ok(())
     }

@@ -223,10 +223,12 @@ fn holds_end_where_rows_are_missing_or_the_table_says_so() {
     let n = cut.len();
     cut.t = Some((0..n).map(|i| i as f64 * 0.01).collect());
     for track in cut.bodies.values_mut() {
-        track.fill(track[0]);
+        let first = track[0];
+        track.fill(first);
     }
     for track in cut.markers.values_mut() {
-        track.fill(track[0]);
+        let first = track[0];
+        track.fill(first);
     }
     cut.joints.values_mut().for_each(|q| q.fill(Some(0.1)));
     assert_eq!(holds(&cut, &settings).len(), 1);

@@ -14,6 +14,7 @@ use super::common::unique_names;
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
 use crate::finding::{Finding, Severity, counted};
+use crate::growth::push;
 use crate::model::{
     JointStream, JointUnit, MarkerSample, MarkerStream, Recording, Timeline, TorqueStream,
 };
@@ -111,9 +112,9 @@ impl Bag {
                 topic: topic.to_string(),
                 ..Group::default()
             });
-            group.stamps.push(stamp);
-            group.recorded.push(recorded);
-            group.rows.push(row);
+            push(&mut group.stamps, stamp);
+            push(&mut group.recorded, recorded);
+            push(&mut group.rows, row);
             let n = group.rows.len();
             let given = joints.len() + torques.len() + bodies.len() + markers.len();
             let mut padded = given;
@@ -250,7 +251,7 @@ fn put<T: Clone>(
     let stream = streams.entry(name).or_default();
     let padded = (n - 1).saturating_sub(stream.len());
     stream.resize(n - 1, None);
-    stream.push(value);
+    push(stream, value);
     padded
 }
 
@@ -287,13 +288,13 @@ impl Group {
     fn into_streams(self, out: &mut Recording) {
         let stamped = self.stamps.iter().all(|&stamp| stamp > 0.0);
         let (times, clock) = if stamped {
-            (&self.stamps, format!("header stamps of {}", self.topic))
+            (self.stamps, format!("header stamps of {}", self.topic))
         } else {
             out.meta.conversions.push(format!(
                 "{}: no header stamps, time of recording taken",
                 self.topic
             ));
-            (&self.recorded, "bag recorder".to_string())
+            (self.recorded, "bag recorder".to_string())
         };
         // Messages arrive in another order than they were stamped, now and then.
         let mut order: Vec<usize> = (0..times.len()).collect();
@@ -319,7 +320,11 @@ impl Group {
                 .at_rows(moved),
             );
         }
-        fn sorted<T: Clone>(values: &[T], order: &[usize]) -> Vec<T> {
+        /// What is in order already is not copied.
+        fn sorted<T: Clone>(values: Vec<T>, order: &[usize]) -> Vec<T> {
+            if order.iter().enumerate().all(|(i, &from)| i == from) {
+                return values;
+            }
             order
                 .iter()
                 .filter_map(|&i| values.get(i).cloned())
@@ -328,7 +333,7 @@ impl Group {
         let timeline = out.timelines.len();
         out.timelines.push(Timeline {
             clock,
-            rows: sorted(&self.rows, &order),
+            rows: sorted(self.rows, &order),
             t: Some(sorted(times, &order)),
             ..Timeline::default()
         });
@@ -337,24 +342,24 @@ impl Group {
                 name,
                 timeline,
                 unit: JointUnit::Angle,
-                q: sorted(&q, &order),
+                q: sorted(q, &order),
             });
         }
         for (name, torque) in self.torques {
             out.torques.push(TorqueStream {
                 name,
                 timeline,
-                torque: sorted(&torque, &order),
+                torque: sorted(torque, &order),
             });
         }
         for (name, track) in self.bodies {
             let mut stream = super::common::body_stream(&name);
             stream.timeline = timeline;
-            stream.tracker_from_body = sorted(&track, &order);
+            stream.tracker_from_body = sorted(track, &order);
             out.bodies.push(stream);
         }
         for (name, points) in self.markers {
-            let samples = sorted(&points, &order)
+            let samples = sorted(points, &order)
                 .into_iter()
                 .map(|p| p.map_or(MarkerSample::Lost, MarkerSample::Measured));
             out.markers.push(MarkerStream {
