@@ -9,6 +9,8 @@ use clarabel::solver::{
     DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus,
 };
 
+use nalgebra::{Cholesky, DMatrix, DVector};
+
 use crate::model::{Model, Values};
 use crate::normal::NormalEquations;
 
@@ -17,6 +19,7 @@ pub(crate) fn bounded_step(
     model: &Model,
     values: &Values,
     system: &NormalEquations,
+    curvature: Option<&[f64]>,
     natural: &[f64],
     damping: f64,
     step: &mut [f64],
@@ -46,13 +49,14 @@ pub(crate) fn bounded_step(
     let mut quadratic = vec![vec![0.0; n]; n];
     for i in 0..n {
         for j in 0..=i {
-            let h = system.h[j * n + i] * scale[i] * scale[j];
+            let more = curvature.map_or(0.0, |s| s[i * n + j]);
+            let h = (system.h[j * n + i] + more) * scale[i] * scale[j];
             quadratic[i][j] = h;
             quadratic[j][i] = h;
         }
         // A direction that nothing sees is held at 0.
         quadratic[i][i] = if system.h[i * n + i] > 0.0 {
-            1.0 + 1e-10 + damping * natural[i] * scale[i] * scale[i]
+            quadratic[i][i] + 1e-10 + damping * natural[i] * scale[i] * scale[i]
         } else {
             1.0
         };
@@ -60,6 +64,7 @@ pub(crate) fn bounded_step(
     let linear: Vec<f64> = (0..n).map(|i| system.g[i] * scale[i]).collect();
     let mut a = Vec::new();
     let mut b = Vec::new();
+    let mut walls = Vec::new();
     for (c, limits) in room.iter().enumerate() {
         if let Some((lower, upper)) = limits {
             let mut row = vec![0.0; n];
@@ -67,15 +72,17 @@ pub(crate) fn bounded_step(
                 row[c] = 1.0;
                 a.push(row.clone());
                 b.push(upper / scale[c]);
+                walls.push((c, *upper));
             }
             if lower.is_finite() {
                 row[c] = -1.0;
                 a.push(row);
                 b.push(-lower / scale[c]);
+                walls.push((c, *lower));
             }
         }
     }
-    let p = CscMatrix::from(&quadratic).to_triu();
+    let triangle = CscMatrix::from(&quadratic).to_triu();
     let a = CscMatrix::from(&a);
     let cones = [NonnegativeConeT(b.len())];
     let Ok(settings) = DefaultSettingsBuilder::default()
@@ -87,7 +94,7 @@ pub(crate) fn bounded_step(
     else {
         return false;
     };
-    let Ok(mut solver) = DefaultSolver::new(&p, &linear, &a, &b, &cones, settings) else {
+    let Ok(mut solver) = DefaultSolver::new(&triangle, &linear, &a, &b, &cones, settings) else {
         return false;
     };
     solver.solve();
@@ -99,8 +106,49 @@ pub(crate) fn bounded_step(
     }
     for c in 0..n {
         let d = solver.solution.x[c] * scale[c];
-        // The interior point stops a hair inside or outside: exactly on the wall is meant.
         step[c] = room[c].map_or(d, |(lower, upper)| d.clamp(lower, upper));
     }
+    // The interior point stops a hair off the walls. Which of them press is all that is taken from it where the rest
+    // can be solved exactly: otherwise a strong gradient against a wall would hide that the minimum is reached.
+    let mut pressed = vec![None; n];
+    for (k, &(c, wall)) in walls.iter().enumerate() {
+        if solver.solution.z[k] > solver.solution.s[k] {
+            pressed[c] = Some(wall);
+        }
+    }
+    if let Some(exact) = exact_step(&quadratic, &linear, &scale, &pressed)
+        && (0..n).all(|c| inside(c, exact[c]))
+    {
+        step.copy_from_slice(&exact);
+    }
     step.iter().all(|x| x.is_finite())
+}
+
+/// The minimiser of (1) with the pressed coordinates on their walls and the others free.
+fn exact_step(
+    quadratic: &[Vec<f64>],
+    linear: &[f64],
+    scale: &[f64],
+    pressed: &[Option<f64>],
+) -> Option<Vec<f64>> {
+    let n = linear.len();
+    let free: Vec<usize> = (0..n).filter(|&c| pressed[c].is_none()).collect();
+    let held: Vec<f64> = (0..n)
+        .map(|c| pressed[c].map_or(0.0, |wall| wall / scale[c]))
+        .collect();
+    let h = DMatrix::from_fn(free.len(), free.len(), |i, j| quadratic[free[i]][free[j]]);
+    let g = DVector::from_fn(free.len(), |i, _| {
+        let row = &quadratic[free[i]];
+        linear[free[i]] + row.iter().zip(&held).map(|(q, z)| q * z).sum::<f64>()
+    });
+    let z = Cholesky::new(h)?.solve(&-g);
+    let mut step: Vec<f64> = (0..n).map(|c| held[c] * scale[c]).collect();
+    for (i, &c) in free.iter().enumerate() {
+        step[c] = z[i] * scale[c];
+    }
+    // Exactly on the wall, not a rounding beside it.
+    for (c, wall) in pressed.iter().enumerate() {
+        step[c] = wall.unwrap_or(step[c]);
+    }
+    Some(step)
 }

@@ -21,12 +21,12 @@ use crate::rows::{add_block, residual};
 /// Rows gathered before one matrix product: 64 to 96 rows fill the cache lines of the product's kernel.
 const PANEL: usize = 96;
 
-/// H and g of one head over its local columns, and its share of the cost.
-struct Local {
+/// H and g over some columns, and their share of the cost.
+pub(crate) struct Local {
     k: usize,
     /// k × k.
-    h: DMatrix<f64>,
-    g: Vec<f64>,
+    pub h: DMatrix<f64>,
+    pub g: Vec<f64>,
     /// k × PANEL: whitened rows of J waiting to be multiplied, one per column.
     panel: DMatrix<f64>,
     transposed: DMatrix<f64>,
@@ -35,21 +35,23 @@ struct Local {
 }
 
 impl Local {
-    fn new(k: usize) -> Self {
+    /// Space for k columns; never more than `most` rows are asked for at once.
+    pub(crate) fn new(k: usize, most: usize) -> Self {
+        let panel = PANEL.max(most);
         Self {
             k,
             h: DMatrix::zeros(k, k),
             g: vec![0.0; k],
-            panel: DMatrix::zeros(k, PANEL),
-            transposed: DMatrix::zeros(PANEL, k),
+            panel: DMatrix::zeros(k, panel),
+            transposed: DMatrix::zeros(panel, k),
             filled: 0,
             cost: 0.0,
         }
     }
 
     /// Space for `m` further rows, each k long, one after the other.
-    fn rows(&mut self, m: usize) -> &mut [f64] {
-        if self.filled + m > PANEL {
+    pub(crate) fn rows(&mut self, m: usize) -> &mut [f64] {
+        if self.filled + m > self.panel.ncols() {
             self.multiply();
         }
         let start = self.filled * self.k;
@@ -58,7 +60,7 @@ impl Local {
     }
 
     /// H += Σ rowᵀ row
-    fn multiply(&mut self) {
+    pub(crate) fn multiply(&mut self) {
         if self.filled == 0 || self.k == 0 {
             self.filled = 0;
             return;
@@ -92,7 +94,7 @@ pub(crate) fn accumulate_compressed(
 ) -> bool {
     for head in 0..model.problem.heads.len() {
         let k = model.paths[head].columns.len();
-        let mut local = Local::new(k);
+        let mut local = Local::new(k, 6);
         let isotropic = match &model.problem.heads[head].kind {
             HeadKind::Markers { observations, .. } => {
                 observations.iter().all(|o| o.shape.is_none())

@@ -156,6 +156,7 @@ mod relabel;
 mod robust;
 mod rows;
 mod solution;
+mod structured;
 mod validate;
 
 pub use baseline::Baseline;

@@ -228,7 +228,15 @@ pub(crate) fn minimize_in(
                 &mut factor,
                 &mut step,
             ) && (!bounded
-                || bounded_step(model, &values, &system, &natural, damping, &mut step));
+                || bounded_step(
+                    model,
+                    &values,
+                    &system,
+                    curvature.known.then_some(curvature.s.as_slice()),
+                    &natural,
+                    damping,
+                    &mut step,
+                ));
             if solved {
                 decrement = -dot(&system.g, &step);
                 retract(model, &values, &step, &mut trial);

@@ -1,16 +1,21 @@
 //! Noise levels from the residuals: restricted maximum likelihood (REML) over the groups.
 //!
 //! ```text
-//! V_s = Σ_g θ_g V_gs,   A = L⁻¹J,   w = L⁻¹e,   B_g = L⁻¹V_gL⁻ᵀ,   Q = A C Aᵀ   (V = LLᵀ)      (1)
-//! score_g  = ½ Σ_s [ wᵀB_g w − tr(B_g (I − Q)) ]                                          (2)
-//! fisher_gh = ½ Σ_s tr(B_g (I − Q) B_h (I − Q))                                           (3)
+//! V_s = Σ_g θ_g V_gs,   P_s = V_s⁻¹ − V_s⁻¹ J_s C J_sᵀ V_s⁻¹,   C = H⁻¹                         (1)
+//! score_g  = ½ Σ_s [ eᵀV⁻¹V_gV⁻¹e − tr(V_g P) ]
+//!          = ½ Σ_s [ eᵀV⁻¹V_gV⁻¹e − tr(V_g V⁻¹) ] + ½ tr(C Σ_s JᵀV⁻¹V_gV⁻¹J)                   (2)
+//! fisher_gh = ½ Σ_s tr(V_g V⁻¹ V_h V⁻¹) · √(ρ_g ρ_h),   ρ_g = Σ_s tr(V_g P) / Σ_s tr(V_g V⁻¹)    (3)
 //! ```
 //!
-//! `tr(B_g(I − Q))` instead of `tr(B_g)` is what REML adds to ML: the parameters that were fitted
-//! have used up their share of the residuals. Scoring runs on log θ, so a variance stays positive.
+//! `tr(V_g P)` instead of `tr(V_g V⁻¹)` is what REML adds to ML: the parameters that were fitted
+//! have used up their share ρ of the residuals. Equation (2) is exact; (3) only sets the length of a
+//! step and the standard error of σ, and is exact for one group. The second form of (2) needs one sum
+//! over the samples like the normal equations, no product over pairs of rows. Scoring runs on log θ, so a
+//! variance stays positive.
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::compressed::Local;
 use crate::minimize::{cholesky_in_place, solve_in_place};
 use crate::model::{Model, Values};
 use crate::normal::{NormalEquations, Workspace, accumulate};
@@ -76,13 +81,12 @@ pub(crate) fn covariance_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
     Some(c)
 }
 
-/// One sample in whitened form: A (m × n), w (m), L⁻¹ (m × m) and G (m × k).
+/// One sample in whitened form, V = LLᵀ: A = L⁻¹J (m × n), w (m), L⁻¹ (m × m).
 pub(crate) struct Whitened {
     pub a: DMatrix<f64>,
     pub w: DVector<f64>,
     pub l: DMatrix<f64>,
     pub l_inverse: DMatrix<f64>,
-    pub g: DMatrix<f64>,
     pub log_det: f64,
     /// (observation, first row, rows)
     pub blocks: Vec<(usize, usize, usize)>,
@@ -109,8 +113,7 @@ pub(crate) fn whitened(
     if rows.m == 0 {
         return None;
     }
-    let (m, n, k) = (rows.m, rows.n, rows.k);
-    let g = DMatrix::from_row_slice(m, k, &rows.g[..m * k]);
+    let (m, n) = (rows.m, rows.n);
     rows.covariance(model, weights, theta);
     let log_det = rows.factor()?;
     rows.whiten(true);
@@ -135,43 +138,158 @@ pub(crate) fn whitened(
         w: DVector::from_row_slice(&rows.r[..m]),
         l,
         l_inverse,
-        g,
         log_det,
         blocks: rows.blocks.clone(),
     })
 }
 
-/// B_g of equation (1) for the groups that are to be estimated.
-fn components(model: &Model, weights: &[f64], groups: &[usize], s: &Whitened) -> Vec<DMatrix<f64>> {
-    let m = s.w.len();
-    groups
+/// Group of every row of a sample, in the order of its rows.
+fn row_groups(model: &Model, blocks: &[(usize, usize, usize)], out: &mut Vec<usize>) {
+    out.clear();
+    for &(o, first, count) in blocks {
+        out.resize(first + count, 0);
+        add_block(model, o, |i, j, group, _| {
+            if i == j {
+                out[first + i] = group;
+            }
+        });
+    }
+}
+
+/// Sums of (2) and (3) over the samples, for the groups that are to be estimated.
+struct Sums {
+    /// eᵀV⁻¹V_gV⁻¹e
+    squares: DVector<f64>,
+    /// tr(V_g V⁻¹)
+    traces: DVector<f64>,
+    /// tr(V_g V⁻¹ V_h V⁻¹)
+    products: DMatrix<f64>,
+    /// JᵀV⁻¹V_gV⁻¹J
+    moments: Vec<Local>,
+}
+
+/// One pass over the samples; `None` when the model cannot be evaluated.
+///
+/// In block-whitened rows (D = L_D L_Dᵀ) a group of measurement noise is V_g = E_g/θ_g with E_g the unit matrix on its
+/// rows, a group of random effects V_u = u uᵀ/θ_u summed over its columns u, and V⁻¹ the weighing of
+/// [`structured`](crate::structured), equation (3).
+fn sums(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    groups: &[usize],
+    work: &mut Workspace,
+) -> Option<Sums> {
+    let n = model.free();
+    let count = groups.len();
+    let most = model.max_rows.max(model.slots.len());
+    let mut sums = Sums {
+        squares: DVector::zeros(count),
+        traces: DVector::zeros(count),
+        products: DMatrix::zeros(count, count),
+        moments: (0..count).map(|_| Local::new(n, most)).collect(),
+    };
+    let slots_of: Vec<Vec<usize>> = groups
         .iter()
         .map(|&g| {
-            let mut v = DMatrix::zeros(m, m);
-            let mut any = false;
-            for &(o, first, _) in &s.blocks {
-                add_block(model, o, |i, j, group, shape| {
-                    if group == g {
-                        v[(first + i, first + j)] = shape / weights[o];
-                        v[(first + j, first + i)] = shape / weights[o];
-                        any = true;
+            let own = model.slots.iter().enumerate();
+            own.filter(|(_, s)| s.group == Some(g))
+                .map(|(k, _)| k)
+                .collect()
+        })
+        .collect();
+    let place: Vec<Option<usize>> = (0..theta.len())
+        .map(|g| groups.iter().position(|h| *h == g))
+        .collect();
+    let mut group_of = Vec::new();
+    work.cache.update(&model.problem, values);
+    let Workspace {
+        cache,
+        rows,
+        random,
+        ..
+    } = work;
+    for sample in 0..model.problem.samples {
+        rows.fill(model, cache, values, weights, sample, Derivatives::All);
+        let (m, k) = (rows.m, rows.k);
+        if m == 0 {
+            continue;
+        }
+        rows.whiten_blocks(model, weights, theta, true)?;
+        rows.random_part(random)?;
+        row_groups(model, &rows.blocks, &mut group_of);
+        // V⁻¹ in block-whitened rows, and what it makes of e, J and U.
+        let mut p0 = vec![0.0; m * m];
+        for i in 0..m {
+            p0[i * m + i] = 1.0;
+        }
+        random.weigh(&mut p0, m);
+        let u = rows.g[..m * k].to_vec();
+        let mut pu = u.clone();
+        random.weigh(&mut pu, k);
+        random.weigh(&mut rows.r[..m], 1);
+        random.weigh(&mut rows.j[..m * n], n);
+        // Uᵀ V⁻¹ U, per pair of columns
+        let mut upu = vec![0.0; k * k];
+        for i in 0..m {
+            for a in 0..k {
+                let ua = u[i * k + a];
+                if ua != 0.0 {
+                    for b in 0..k {
+                        upu[a * k + b] += ua * pu[i * k + b];
                     }
-                });
-            }
-            let mut b = if any {
-                &s.l_inverse * v * s.l_inverse.transpose()
-            } else {
-                v
-            };
-            for (k, slot) in model.slots.iter().enumerate() {
-                if slot.group == Some(g) {
-                    let u = &s.l_inverse * s.g.column(k);
-                    b.ger(1.0, &u, &u, 1.0);
                 }
             }
-            b
-        })
-        .collect()
+        }
+        for i in 0..m {
+            let Some(g) = place[group_of[i]] else {
+                continue;
+            };
+            sums.squares[g] += rows.r[i] * rows.r[i];
+            sums.traces[g] += p0[i * m + i];
+            sums.moments[g]
+                .rows(1)
+                .copy_from_slice(&rows.j[i * n..(i + 1) * n]);
+            for j in 0..m {
+                if let Some(h) = place[group_of[j]] {
+                    sums.products[(g, h)] += p0[i * m + j] * p0[i * m + j];
+                }
+            }
+        }
+        for (g, slots) in slots_of.iter().enumerate() {
+            for &a in slots {
+                let mut along = 0.0;
+                let row = sums.moments[g].rows(1);
+                row.fill(0.0);
+                for i in 0..m {
+                    let ua = u[i * k + a];
+                    if ua != 0.0 {
+                        along += ua * rows.r[i];
+                        row.iter_mut()
+                            .zip(&rows.j[i * n..(i + 1) * n])
+                            .for_each(|(x, j)| *x += ua * j);
+                    }
+                }
+                sums.squares[g] += along * along;
+                sums.traces[g] += upu[a * k + a];
+                for (h, others) in slots_of.iter().enumerate() {
+                    for &b in others {
+                        sums.products[(g, h)] += upu[a * k + b] * upu[a * k + b];
+                    }
+                }
+                for i in 0..m {
+                    if let Some(h) = place[group_of[i]] {
+                        let x = pu[i * k + a] * pu[i * k + a];
+                        sums.products[(g, h)] += x;
+                        sums.products[(h, g)] += x;
+                    }
+                }
+            }
+        }
+    }
+    sums.moments.iter_mut().for_each(Local::multiply);
+    Some(sums)
 }
 
 /// One step of (2) and (3) at fixed values; `None` when the model cannot be evaluated.
@@ -199,33 +317,19 @@ pub(crate) fn score(
     }
     let c = covariance_of(system)?;
     let count = groups.len();
+    let sums = sums(model, values, weights, theta, &groups, work)?;
+    // Everything above is 1/θ too large in every factor: exactly the chain rule to log θ.
+    let taken = DVector::from_iterator(count, sums.moments.iter().map(|m| m.h.dot(&c)));
+    let share = |g: usize| {
+        let left = 1.0 - taken[g] / sums.traces[g];
+        if left.is_finite() { left.max(0.0) } else { 0.0 }
+    };
     let mut gradient = DVector::zeros(count);
     let mut fisher = DMatrix::zeros(count, count);
-    for sample in 0..model.problem.samples {
-        let Some(s) = whitened(model, values, weights, theta, sample, work) else {
-            continue;
-        };
-        let m = s.w.len();
-        let mut left = DMatrix::identity(m, m);
-        left -= &s.a * &c * s.a.transpose();
-        let b = components(model, weights, &groups, &s);
-        let reduced: Vec<DMatrix<f64>> = b.iter().map(|b| b * &left).collect();
-        for g in 0..count {
-            gradient[g] += 0.5 * (s.w.dot(&(&b[g] * &s.w)) - reduced[g].trace());
-            for h in 0..=g {
-                let t = 0.5 * reduced[g].dot(&reduced[h].transpose());
-                fisher[(g, h)] += t;
-                if h != g {
-                    fisher[(h, g)] += t;
-                }
-            }
-        }
-    }
-    // In log θ: chain rule by θ on both sides.
     for g in 0..count {
-        gradient[g] *= theta[groups[g]];
+        gradient[g] = 0.5 * (sums.squares[g] - sums.traces[g] + taken[g]);
         for h in 0..count {
-            fisher[(g, h)] *= theta[groups[g]] * theta[groups[h]];
+            fisher[(g, h)] = 0.5 * sums.products[(g, h)] * (share(g) * share(h)).sqrt();
         }
     }
     let floor = |g: usize| (model.problem.groups[g].sigma * FLOOR).powi(2);
@@ -316,4 +420,173 @@ pub fn sandwich(
         meat.ger(1.0, &score, &score, 1.0);
     }
     Some(&c * meat * &c)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::*;
+    use nalgebra::{Isometry3, Point3, Vector3};
+
+    /// Markers and a body pose behind two noisy joints; everything that can be wrong in a sum is different here.
+    fn problem() -> Problem {
+        let n = 14;
+        let q = |a: f64| (0..n).map(|i| (f64::from(i) * a).sin()).collect::<Vec<_>>();
+        let mut p = Problem::new(n as usize);
+        let base = p.frame("base");
+        let a = p.frame("a");
+        let b = p.frame("b");
+        let c = p.frame("c");
+        let d = p.frame("d");
+        let x = Isometry3::new(Vector3::new(0.3, 0.1, 0.2), Vector3::new(0.2, -0.4, 0.5));
+        p.unknown("first", base, a, x, Chart::full());
+        let turn = p.joint("turn", a, b, Axis::Revolute(Vector3::z_axis()), q(0.9));
+        p.known("elbow", b, c, x);
+        let tilt = p.joint("tilt", c, d, Axis::Revolute(Vector3::x_axis()), q(0.53));
+        p.free_feature(turn, FeatureKind::ZeroOffset, Some(0.1));
+        let joint = p.noise_group("joint", NoiseKind::Joint, 4e-3, true);
+        p.joint_noise(turn, joint);
+        p.joint_noise(tilt, joint);
+        let marker = p.noise_group("marker", NoiseKind::Position, 2e-3, true);
+        let orientation = p.noise_group("orientation", NoiseKind::Orientation, 3e-3, true);
+        let position = p.noise_group("position", NoiseKind::Position, 1e-3, false);
+        let points = [
+            p.known_point("k", d, Point3::new(0.3, 0.1, 0.0)),
+            p.unknown_point("u", d, Point3::new(0.1, -0.2, 0.3), None),
+        ];
+        let seen = (0..2 * n as usize)
+            .map(|i| MarkerObservation {
+                sample: i / 2,
+                point: points[i % 2],
+                position: Point3::new((i as f64).sin(), (i as f64 * 1.7).cos(), 0.1),
+                shape: None,
+            })
+            .collect();
+        p.markers("hand", base, d, marker, seen);
+        let noise = PoseNoise::Split {
+            orientation,
+            position,
+        };
+        let poses = (0..n as usize)
+            .map(|sample| PoseObservation { sample, pose: x })
+            .collect();
+        p.poses("arm", base, b, noise, poses);
+        p
+    }
+
+    /// −½ [ Σ log det V + log det H + Σ eᵀV⁻¹e ] by dense factors: what (2) is the gradient of at fixed values.
+    fn likelihood(model: &Model, weights: &[f64], theta: &[f64]) -> f64 {
+        let values = model.start();
+        let mut work = Workspace::new(model);
+        work.cache.update(&model.problem, &values);
+        let n = model.free();
+        let mut h = DMatrix::zeros(n, n);
+        let mut sum = 0.0;
+        for sample in 0..model.problem.samples {
+            let s = whitened(model, &values, weights, theta, sample, &mut work).unwrap();
+            h += s.a.tr_mul(&s.a);
+            sum += s.log_det + s.w.norm_squared();
+        }
+        for (i, &p) in model.columns.iter().enumerate() {
+            if let Some(sigma) = model.problem.parameters[p].prior_sigma {
+                h[(i, i)] += 1.0 / (sigma * sigma);
+            }
+        }
+        let cholesky = nalgebra::Cholesky::new(h).unwrap();
+        -0.5 * (sum + 2.0 * cholesky.l().diagonal().map(f64::ln).sum())
+    }
+
+    #[test]
+    fn the_score_is_the_gradient_of_the_restricted_likelihood() {
+        let model = Model::new(&problem()).unwrap();
+        let mut work = Workspace::new(&model);
+        let weights: Vec<f64> = (0..model.observation_count())
+            .map(|o| [1.0, 0.3, 2.0][o % 3])
+            .collect();
+        let theta: Vec<f64> = model
+            .problem
+            .groups
+            .iter()
+            .map(|g| g.sigma.powi(2))
+            .collect();
+        let groups = [0, 1, 2];
+        let values = model.start();
+        let mut system = NormalEquations::new(model.free());
+        assert!(accumulate(
+            &model,
+            &values,
+            &weights,
+            &theta,
+            &mut work,
+            &mut system
+        ));
+        let c = covariance_of(&system).unwrap();
+        let sums = sums(&model, &values, &weights, &theta, &groups, &mut work).unwrap();
+        for (i, &g) in groups.iter().enumerate() {
+            let taken = sums.moments[i].h.dot(&c);
+            let score = 0.5 * (sums.squares[i] - sums.traces[i] + taken);
+            const STEP: f64 = 1e-4;
+            let at = |factor: f64| {
+                let mut theta = theta.clone();
+                theta[g] *= factor.exp();
+                likelihood(&model, &weights, &theta)
+            };
+            let slope = (at(STEP) - at(-STEP)) / (2.0 * STEP);
+            assert!(
+                (score - slope).abs() < 1e-5 * slope.abs().max(1.0),
+                "{g}: {score} {slope}"
+            );
+        }
+        // Uncorrected for the parameters, (3) is −E of the second derivative of the likelihood of the data alone.
+        assert!(sums.products.iter().all(|x| *x >= 0.0));
+        assert!((&sums.products - sums.products.transpose()).amax() < 1e-9 * sums.products.amax());
+    }
+
+    #[test]
+    fn dense_and_structured_whitening_give_the_same_normal_equations() {
+        let model = Model::new(&problem()).unwrap();
+        let mut work = Workspace::new(&model);
+        let weights = vec![0.7; model.observation_count()];
+        let theta: Vec<f64> = model
+            .problem
+            .groups
+            .iter()
+            .map(|g| g.sigma.powi(2))
+            .collect();
+        let values = model.start();
+        let n = model.free();
+        let mut system = NormalEquations::new(n);
+        assert!(accumulate(
+            &model,
+            &values,
+            &weights,
+            &theta,
+            &mut work,
+            &mut system
+        ));
+        let (mut h, mut g, mut cost) = (DMatrix::zeros(n, n), DVector::zeros(n), 0.0);
+        for sample in 0..model.problem.samples {
+            let s = whitened(&model, &values, &weights, &theta, sample, &mut work).unwrap();
+            h += s.a.tr_mul(&s.a);
+            g += s.a.tr_mul(&s.w);
+            cost += s.w.norm_squared();
+        }
+        let scale = h.amax();
+        for a in 0..n {
+            for b in a..n {
+                let prior = if a == b {
+                    let sigma = model.problem.parameters[model.columns[a]].prior_sigma;
+                    sigma.map_or(0.0, |s| 1.0 / (s * s))
+                } else {
+                    0.0
+                };
+                assert!((system.h[a * n + b] - prior - h[(a, b)]).abs() < 1e-11 * scale);
+            }
+            assert!((system.g[a] - g[a]).abs() < 1e-10 * g.amax());
+        }
+        assert!((system.data - cost).abs() < 1e-11 * cost);
+        // A step is judged by the V that proposed it.
+        let again = crate::normal::cost(&model, &values, &weights, &theta, &mut work);
+        assert!((again - system.cost()).abs() < 1e-11 * cost);
+    }
 }

@@ -5,10 +5,11 @@
 //! F = ½ Σ_s e_sᵀ V_s⁻¹ e_s + ½ (x − x₀)ᵀ Λ (x − x₀)                                          (2)
 //! ```
 
-use crate::compressed::{accumulate_compressed, cost_compressed};
+use crate::compressed::{Local, accumulate_compressed, cost_compressed};
 use crate::model::{EdgeCache, Model, Values};
 use crate::path::Derivatives;
 use crate::rows::SampleRows;
+use crate::structured::RandomPart;
 
 /// H (upper triangle, row-major n × n), g, and twice F split into data and prior.
 #[derive(Debug, Clone)]
@@ -41,7 +42,8 @@ impl NormalEquations {
 pub(crate) struct Workspace {
     pub cache: EdgeCache,
     pub rows: SampleRows,
-    /// Cholesky factors of every V_s at the last linearisation, where random effects make V_s depend
+    pub random: RandomPart,
+    /// The random part of every V_s at the last linearisation, where random effects make V_s depend
     /// on the values: a step is judged by the same V_s that proposed it. (With V_s moving along, the
     /// cost would reward values that only make the noise look larger.)
     factors: Vec<f64>,
@@ -52,6 +54,7 @@ impl Workspace {
         Self {
             cache: EdgeCache::new(&model.problem, model.trig.clone()),
             rows: SampleRows::new(model),
+            random: RandomPart::default(),
             factors: Vec::new(),
         }
     }
@@ -90,41 +93,39 @@ pub(crate) fn accumulate_rows(
     out: &mut NormalEquations,
 ) -> bool {
     let n = out.n;
-    let keep = !model.slots.is_empty();
-    let rows = &mut work.rows;
+    let mut sum = Local::new(n, model.max_rows);
+    let Workspace {
+        cache,
+        rows,
+        random,
+        factors,
+    } = work;
     for sample in 0..model.problem.samples {
         if model.of_sample[sample].is_empty() {
             continue;
         }
-        rows.fill(
-            model,
-            &work.cache,
-            values,
-            weights,
-            sample,
-            Derivatives::All,
-        );
-        rows.covariance(model, weights, theta);
-        if rows.factor().is_none() {
+        rows.fill(model, cache, values, weights, sample, Derivatives::All);
+        if rows
+            .whiten_blocks(model, weights, theta, true)
+            .and_then(|()| rows.random_part(random))
+            .is_none()
+        {
             return false;
         }
-        if keep {
-            work.factors.extend_from_slice(&rows.v[..rows.m * rows.m]);
-        }
-        rows.whiten(true);
+        random.store(factors);
+        let m = rows.m;
+        random.whiten(&mut rows.r[..m], 1);
+        random.whiten(&mut rows.j[..m * n], n);
         out.data += rows.squared_norm();
-        for i in 0..rows.m {
-            let row = &rows.j[i * n..(i + 1) * n];
-            let r = rows.r[i];
-            for a in 0..n {
-                let ja = row[a];
-                if ja != 0.0 {
-                    out.g[a] += ja * r;
-                    for (h, &jb) in out.h[a * n + a..(a + 1) * n].iter_mut().zip(&row[a..]) {
-                        *h += ja * jb;
-                    }
-                }
-            }
+        for (row, r) in rows.j[..m * n].chunks_exact(n.max(1)).zip(&rows.r) {
+            out.g.iter_mut().zip(row).for_each(|(g, j)| *g += j * r);
+        }
+        sum.rows(m).copy_from_slice(&rows.j[..m * n]);
+    }
+    sum.multiply();
+    for a in 0..n {
+        for b in a..n {
+            out.h[a * n + b] += sum.h[(a, b)];
         }
     }
     true
@@ -188,7 +189,12 @@ fn evaluate_cost(
     if model.slots.is_empty() {
         return cost_compressed(model, values, weights, theta, work);
     }
-    let rows = &mut work.rows;
+    let Workspace {
+        cache,
+        rows,
+        random,
+        factors,
+    } = work;
     let wanted = if stored {
         Derivatives::None
     } else {
@@ -200,18 +206,17 @@ fn evaluate_cost(
         if model.of_sample[sample].is_empty() {
             continue;
         }
-        rows.fill(model, &work.cache, values, weights, sample, wanted);
-        if stored {
-            let size = rows.m * rows.m;
-            rows.v[..size].copy_from_slice(&work.factors[at..at + size]);
-            at += size;
-        } else {
-            rows.covariance(model, weights, theta);
-            if rows.factor().is_none() {
-                return f64::INFINITY;
-            }
+        rows.fill(model, cache, values, weights, sample, wanted);
+        if rows.whiten_blocks(model, weights, theta, false).is_none() {
+            return f64::INFINITY;
         }
-        rows.whiten(false);
+        let m = rows.m;
+        if stored {
+            at += random.load(&factors[at..], m, rows.k);
+        } else if rows.random_part(random).is_none() {
+            return f64::INFINITY;
+        }
+        random.whiten(&mut rows.r[..m], 1);
         sum += rows.squared_norm();
     }
     sum
