@@ -374,6 +374,7 @@ pub(crate) fn score(
 /// Covariance of the parameters that does not trust the noise model: clusters are samples (CR2).
 ///
 /// ```text
+/// A = L⁻¹J,   w = L⁻¹e,   Q = A C Aᵀ   (V = LLᵀ)
 /// C (Σ_s Aᵀ(I − Q)^(-½) w wᵀ (I − Q)^(-½) A + Λ) C                                         (4)
 /// ```
 ///

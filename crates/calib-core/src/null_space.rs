@@ -4,7 +4,7 @@
 //! that lives on the parameters B alone exists exactly where P_BB has the eigenvalue 1 (and is its
 //! eigenvector); `(1 − ε) I − P_BB` positive definite rules it out for the price of a Cholesky factor. Single
 //! blocks (one edge, one joint's effects, one body's markers) are tried first, then pairs, then
-//! triples; what is left is reduced by complete pivoting.
+//! triples; what is left is brought to reduced echelon form.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -137,44 +137,42 @@ impl Found<'_> {
     }
 }
 
-/// Reduced echelon form by complete pivoting: each vector gets a parameter of its own.
+/// Reduced echelon form: each vector gets a parameter of its own, vectors in the order of these parameters.
+///
+/// The own parameters are the columns that QR with column pivoting picks. Its norms do not change when the basis of the
+/// null space is turned, so the result does not depend on the rounding that chose this basis.
 fn reduced(vectors: DMatrix<f64>) -> Vec<DVector<f64>> {
-    let mut rows = vectors.transpose();
-    let (d, n) = rows.shape();
-    let mut done = vec![false; d];
-    for _ in 0..d {
-        let mut pivot = (0.0, 0, 0);
-        for i in (0..d).filter(|&i| !done[i]) {
-            for j in 0..n {
-                // Ties go to the first column: results do not depend on rounding of equal entries.
-                if rows[(i, j)].abs() > pivot.0 * (1.0 + 1e-9) {
-                    pivot = (rows[(i, j)].abs(), i, j);
-                }
-            }
-        }
-        let (size, i, j) = pivot;
-        if size < 1e-8 {
+    /// Ties within this share of the largest go to the first column.
+    const TIE: f64 = 1e-4;
+    /// Squared norm of a column that is only rounding.
+    const NOTHING: f64 = 1e-16;
+    let rows = vectors.transpose();
+    let mut left = rows.clone();
+    let mut pivots = Vec::new();
+    for _ in 0..rows.nrows() {
+        let norms: Vec<f64> = left.column_iter().map(|c| c.norm_squared()).collect();
+        let largest = norms.iter().copied().fold(0.0, f64::max);
+        let Some(own) = norms.iter().position(|x| *x >= largest * (1.0 - TIE)) else {
+            break;
+        };
+        if largest < NOTHING {
             break;
         }
-        done[i] = true;
-        let p = rows[(i, j)];
-        for c in 0..n {
-            rows[(i, c)] /= p;
-        }
-        for other in (0..d).filter(|&o| o != i) {
-            let f = rows[(other, j)];
-            if f != 0.0 {
-                for c in 0..n {
-                    let x = rows[(i, c)];
-                    rows[(other, c)] -= f * x;
-                }
-            }
-        }
+        pivots.push(own);
+        let direction = left.column(own).normalize();
+        left -= &direction * direction.tr_mul(&left);
     }
-    (0..d)
-        .filter(|&i| done[i])
-        .map(|i| {
-            let mut v = rows.row(i).transpose();
+    pivots.sort_unstable();
+    // rows = B · reduced with B the pivot columns, invertible by their choice.
+    let own = rows.select_columns(&pivots);
+    let Some(inverse) = own.tr_mul(&own).try_inverse() else {
+        return Vec::new();
+    };
+    let reduced = inverse * own.tr_mul(&rows);
+    reduced
+        .row_iter()
+        .map(|row| {
+            let mut v = row.transpose();
             let largest = v.amax();
             for x in v.iter_mut() {
                 if x.abs() < TERM * largest {

@@ -7,6 +7,7 @@ use calib_recording::checks::{Expectations, checks, held_out_in_training};
 use calib_recording::rigid_body::Template;
 use calib_recording::{Finding, Severity};
 
+use crate::conditions::missing_torques;
 use crate::load::{Inputs, Loaded};
 
 /// Fewest rows of a recording that a fit can use: a sphere has four unknowns, and one row must check it.
@@ -31,6 +32,7 @@ pub fn check(inputs: &Inputs) -> Vec<Finding> {
             }
         }
     }
+    findings.extend(missing_torques(inputs));
     findings
 }
 

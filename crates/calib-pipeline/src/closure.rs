@@ -13,6 +13,7 @@ use calib_profile::Usage;
 use calib_report::{LoopClosure, LoopGroup, Stats};
 use nalgebra::Isometry3;
 
+use crate::conditions::conditions;
 use crate::kinematics::Calibration;
 use crate::load::Inputs;
 use crate::tracks::BodyTrack;
@@ -54,6 +55,7 @@ pub fn close_loops(
             }
             let seen_from = tracks[&from.body].in_recording(recording);
             let seen_to = tracks[&to.body].in_recording(recording);
+            let under = conditions(loaded, &inputs.robot.model, inputs.robot.profile.solve.load);
             for (row, q) in loaded.q.iter().enumerate() {
                 let (Some(q), Some(Some(t_a)), Some(Some(t_b))) =
                     (q, seen_from.get(row), seen_to.get(row))
@@ -61,7 +63,7 @@ pub fn close_loops(
                     continue;
                 };
                 let measured = (t_a * a).inverse() * (t_b * b);
-                let root_from_link = robot.root_from_link(q);
+                let root_from_link = robot.root_from_link_under(q, &under[row]);
                 let fk =
                     root_from_link[from.link.index()].inverse() * root_from_link[to.link.index()];
                 errors.push(&measured, &fk);

@@ -196,8 +196,9 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
     }
     let mut text = String::from(
         "# Joint effects that a URDF cannot hold. Zero offsets are in the URDF's origins already.\n\
-         # phi = q + gain*q + cos*(cos q - 1) + sin*sin q + compliance*torque + sum(coupling*q_other)\n\
+         # phi = q + gain*q + cos*(cos q - 1) + sin*sin q + compliance*torque + backlash*approach + sum(coupling*q_other)\n\
          # torque: what the joint holds against gravity about its axis, N m; lateral: about the two axes across.\n\
+         # approach: +1 where the joint came from below, -1 from above; backlash is half of the play.\n\
          calib_effects: 1\njoints:\n",
     );
     for joint in beyond {
@@ -210,6 +211,14 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
             ("compliance_rad_per_nm", e.compliance),
             ("lateral_1_rad_per_nm", e.lateral[0]),
             ("lateral_2_rad_per_nm", e.lateral[1]),
+            (
+                if model.joint(joint).kind.turns() {
+                    "backlash_rad"
+                } else {
+                    "backlash_m"
+                },
+                e.backlash,
+            ),
         ] {
             /// Below this an effect moves no tool by a nanometre (rad, rad per N m, 1).
             const NOTHING: f64 = 1e-15;

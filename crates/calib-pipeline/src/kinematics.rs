@@ -7,12 +7,13 @@ use calib_urdf::{JointId, JointKind, LinkId, RobotModel};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::conditions::Conditions;
 use crate::loads::{gravity_moments, has_masses};
 
 /// What the reading of one joint leaves out.
 ///
 /// ```text
-/// φ = q + offset + gain·q + c·(cos q − 1) + s·sin q + compliance·τ + Σ_k coupling_k·q_k          (1)
+/// φ = q + offset + gain·q + c·(cos q − 1) + s·sin q + compliance·τ + backlash·a + Σ_k coupling_k·q_k   (1)
 /// joint_from_child = exp(axis φ) · Exp(lateral₁ τ₁ e₁ + lateral₂ τ₂ e₂)                            (2)
 /// ```
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -29,6 +30,8 @@ pub struct JointEffects {
     pub compliance: f64,
     /// Turn per holding torque about the two axes across, rad per N m.
     pub lateral: [f64; 2],
+    /// Half of the play, rad or m; a of equation (1) is the direction of approach, ±1.
+    pub backlash: f64,
     /// Share of other joints' readings.
     pub coupling: BTreeMap<JointIndex, f64>,
 }
@@ -63,6 +66,10 @@ pub struct Calibration {
     pub mounts: BTreeMap<String, Isometry3<f64>>,
     /// Markers on their link, m, by body then marker, where they are known.
     pub points: BTreeMap<String, BTreeMap<String, Point3<f64>>>,
+    /// Touching points in their links' frames, m, by name.
+    pub tips: BTreeMap<String, Point3<f64>>,
+    /// Frames of touched things (z along normal or direction) in what they are fixed to, by contact.
+    pub places: BTreeMap<String, Isometry3<f64>>,
 }
 
 impl Calibration {
@@ -76,13 +83,22 @@ impl Calibration {
             tracker_from_root,
             mounts: BTreeMap::new(),
             points: BTreeMap::new(),
+            tips: BTreeMap::new(),
+            places: BTreeMap::new(),
         }
     }
 
-    /// `root_from_link` of all links at indicated joint positions (by joint index, rad or m).
+    /// `root_from_link` of all links at indicated joint positions (by joint index, rad or m), nothing else being
+    /// known: in the middle of all play, loaded by gravity.
     #[must_use]
     pub fn root_from_link(&self, q: &[f64]) -> Vec<Isometry3<f64>> {
-        let loads = Loads::at(&self.described, q);
+        self.root_from_link_under(q, &Conditions::default())
+    }
+
+    /// The same under known circumstances.
+    #[must_use]
+    pub fn root_from_link_under(&self, q: &[f64], under: &Conditions) -> Vec<Isometry3<f64>> {
+        let loads = Loads::under(&self.described, q, under);
         let mut poses = vec![Isometry3::identity(); self.model.links().len()];
         // Links in an order in which every parent comes before its children.
         let mut order: Vec<LinkId> = vec![self.model.root()];
@@ -92,8 +108,9 @@ impl Calibration {
             next += 1;
             for &joint in &self.model.link(link).child_joints {
                 let j = self.model.joint(joint);
-                poses[j.child.index()] =
-                    poses[link.index()] * j.parent_link_from_joint * self.motion(joint, q, &loads);
+                poses[j.child.index()] = poses[link.index()]
+                    * j.parent_link_from_joint
+                    * self.motion(joint, q, &loads, under);
                 order.push(j.child);
             }
         }
@@ -101,7 +118,13 @@ impl Calibration {
     }
 
     /// Eq. (2) of [`JointEffects`] for one joint.
-    fn motion(&self, joint: JointId, q: &[f64], loads: &Loads) -> Isometry3<f64> {
+    fn motion(
+        &self,
+        joint: JointId,
+        q: &[f64],
+        loads: &Loads,
+        under: &Conditions,
+    ) -> Isometry3<f64> {
         let j = self.model.joint(joint);
         let Some(axis) = j.kind.axis() else {
             return Isometry3::identity();
@@ -115,6 +138,7 @@ impl Calibration {
             + e.eccentricity_cos * (reading.cos() - 1.0)
             + e.eccentricity_sin * reading.sin()
             + e.compliance * loads.about_axis[joint.index()]
+            + e.backlash * under.approach_of(joint.index())
             + coupled;
         if matches!(j.kind, JointKind::Prismatic { .. }) {
             return Isometry3::from_parts(
@@ -168,6 +192,16 @@ pub struct Loads {
 }
 
 impl Loads {
+    /// The measured torques about the axes where there are, gravity otherwise and across the axes.
+    #[must_use]
+    pub fn under(model: &RobotModel, q: &[f64], under: &Conditions) -> Self {
+        let mut loads = Self::at(model, q);
+        if let Some(torque) = &under.torque {
+            loads.about_axis.clone_from(torque);
+        }
+        loads
+    }
+
     /// From the masses of the description; zero where there are none.
     #[must_use]
     pub fn at(model: &RobotModel, q: &[f64]) -> Self {

@@ -13,6 +13,8 @@
 pub mod assemble;
 pub mod checks;
 pub mod closure;
+pub mod conditions;
+pub mod contacts;
 pub mod convert;
 pub mod error;
 pub mod estimators;

@@ -6,10 +6,12 @@ use calib_core::{
     Axis, Chart, EdgeId, FeatureKind, FrameId, GroupId, MarkerObservation, NoiseKind, PointId,
     PoseNoise, PoseObservation, Problem, Role, Settings, Solution,
 };
-use calib_profile::{BodyKind, Free, JointFreedom, OriginFreedom, Profile, Usage};
+use calib_profile::{BodyKind, ContactBase, Free, JointFreedom, OriginFreedom, Profile, Usage};
 use calib_urdf::{JointId, JointKind, RobotModel};
 use nalgebra::{Isometry3, Point3};
 
+use crate::conditions::{Conditions, conditions};
+use crate::contacts::add_contacts;
 use crate::error::PipelineError;
 use crate::kinematics::{Calibration, JointEffects, Loads};
 use crate::load::Inputs;
@@ -59,6 +61,10 @@ pub struct Stated {
     pub mounts: BTreeMap<String, EdgeId>,
     /// Points by body and marker.
     pub points: BTreeMap<String, BTreeMap<String, PointId>>,
+    /// Touching points by name.
+    pub tips: BTreeMap<String, PointId>,
+    /// Places of what is touched, by contact.
+    pub contacts: BTreeMap<String, EdgeId>,
     /// Regressors are needed at predictions (compliance or coupling is free).
     pub loaded: bool,
 }
@@ -85,9 +91,22 @@ pub fn state(
     let profile = &inputs.robot.profile;
     let model = &inputs.robot.model;
     let samples = samples(inputs);
-    let q: Vec<&Vec<f64>> = samples
+    let conditions_of: BTreeMap<&str, Vec<Conditions>> = inputs
+        .recordings
         .iter()
-        .filter_map(|(r, row)| inputs.recordings[r].q[*row].as_ref())
+        .map(|(name, r)| (name.as_str(), conditions(r, model, profile.solve.load)))
+        .collect();
+    let rows: Vec<Row<'_>> = samples
+        .iter()
+        .filter_map(|(r, row)| {
+            let q = inputs.recordings[r].q[*row].as_ref()?;
+            let under = &conditions_of[r.as_str()][*row];
+            Some(Row {
+                q,
+                under,
+                loads: Loads::under(model, q, under),
+            })
+        })
         .collect();
     let mut problem = Problem::new(samples.len());
     for (i, (recording, _)) in samples.iter().enumerate() {
@@ -97,8 +116,8 @@ pub fn state(
     }
     let tracker = problem.frame(&profile.tracker.frame);
     let root_frame = problem.frame(&model.link(model.root()).name);
-    let tracker_free =
-        profile.solve.free.contains(&Free::Tracker) || freedom == Freedom::RegistrationOnly;
+    let tracker_free = !profile.bodies.is_empty()
+        && (profile.solve.free.contains(&Free::Tracker) || freedom == Freedom::RegistrationOnly);
     let chart = if tracker_free {
         Chart::full()
     } else {
@@ -122,17 +141,26 @@ pub fn state(
         root,
         mounts: BTreeMap::new(),
         points: BTreeMap::new(),
+        tips: BTreeMap::new(),
+        contacts: BTreeMap::new(),
         loaded: false,
         samples,
     };
     stated.links[model.root().index()] = Some(root_frame);
     let joint_noise = joint_noise_group(&mut stated.problem, profile);
-    let loads: Vec<Loads> = q.iter().map(|q| Loads::at(model, q)).collect();
     for joint in used_joints(inputs, model) {
-        add_joint(&mut stated, inputs, joint, &q, &loads, joint_noise, freedom);
+        add_joint(&mut stated, inputs, joint, &rows, joint_noise, freedom);
     }
     add_bodies(&mut stated, inputs, tracks, start);
+    add_contacts(&mut stated, inputs);
     stated
+}
+
+/// One sample: indicated positions, and what else is known of it.
+struct Row<'a> {
+    q: &'a [f64],
+    under: &'a Conditions,
+    loads: Loads,
 }
 
 /// Solves a stated problem.
@@ -176,6 +204,11 @@ fn used_joints(inputs: &Inputs, model: &RobotModel) -> Vec<JointId> {
             .values()
             .flat_map(|t| [t.parent, t.child]),
     );
+    links.extend(profile.points.values().map(|p| p.link));
+    links.extend(profile.contacts.values().filter_map(|c| match c.on {
+        ContactBase::Link(link) => Some(link),
+        ContactBase::Tracker => None,
+    }));
     let mut joints: Vec<JointId> = Vec::new();
     for link in links {
         for step in model.chain(model.root(), link) {
@@ -206,8 +239,7 @@ fn add_joint(
     stated: &mut Stated,
     inputs: &Inputs,
     joint: JointId,
-    q: &[&Vec<f64>],
-    loads: &[Loads],
+    rows: &[Row<'_>],
     noise: Option<GroupId>,
     freedom: Freedom,
 ) {
@@ -217,7 +249,7 @@ fn add_joint(
     let Some(parent) = stated.links[j.parent.index()] else {
         return;
     };
-    let readings: Vec<f64> = q.iter().map(|q| model.position(q, joint)).collect();
+    let readings: Vec<f64> = rows.iter().map(|r| model.position(r.q, joint)).collect();
     let fitted = readings
         .iter()
         .enumerate()
@@ -251,6 +283,14 @@ fn add_joint(
     if free.origin != OriginFreedom::Held {
         problem.set_prior(origin, Some(free.angle_sigma), Some(free.position_sigma));
     }
+    for (coordinate, parameter) in problem.edge_parameters(origin) {
+        let within = if coordinate < 3 {
+            free.angle_within
+        } else {
+            free.position_within
+        };
+        problem.parameter_mut(parameter).bounds = within.map(|w| (-w, w));
+    }
     stated.origins[joint.index()] = Some(origin);
     stated.links[j.child.index()] = Some(child);
     let Some(axis) = j.kind.axis() else { return };
@@ -261,7 +301,7 @@ fn add_joint(
     };
     let edge = problem.joint(&j.name, origin_child, child, motion, readings);
     stated.joints[joint.index()] = Some(edge);
-    stated.loaded |= add_features(problem, profile, model, joint, edge, &free, q, loads);
+    stated.loaded |= add_features(problem, profile, model, joint, edge, &free, rows);
     if let Some(group) = noise
         && moved
         && !slides
@@ -271,7 +311,6 @@ fn add_joint(
 }
 
 /// Frees the effects of a joint; returns whether a prediction needs its load or another joint's reading.
-#[allow(clippy::too_many_arguments)] // one call site: the pieces of one joint
 fn add_features(
     problem: &mut Problem,
     profile: &Profile,
@@ -279,14 +318,19 @@ fn add_features(
     joint: JointId,
     edge: EdgeId,
     free: &JointFreedom,
-    q: &[&Vec<f64>],
-    loads: &[Loads],
+    rows: &[Row<'_>],
 ) -> bool {
     let prior = &profile.solve.prior;
     let index = joint.index();
     let mut loaded = false;
     if free.offset {
-        problem.free_feature(edge, FeatureKind::ZeroOffset, Some(free.offset_sigma));
+        let offset = problem.free_feature(edge, FeatureKind::ZeroOffset, Some(free.offset_sigma));
+        let within = if model.joint(joint).kind.turns() {
+            free.angle_within
+        } else {
+            free.position_within
+        };
+        problem.parameter_mut(offset).bounds = within.map(|w| (-w, w));
     }
     if free.gain {
         problem.free_feature(edge, FeatureKind::Gain, Some(prior.gain));
@@ -295,7 +339,7 @@ fn add_features(
         problem.free_feature(edge, FeatureKind::EccentricityCos, Some(prior.eccentricity));
         problem.free_feature(edge, FeatureKind::EccentricitySin, Some(prior.eccentricity));
     }
-    let about: Vec<f64> = loads.iter().map(|l| l.about_axis[index]).collect();
+    let about: Vec<f64> = rows.iter().map(|r| r.loads.about_axis[index]).collect();
     if about.iter().any(|t| t.abs() > 0.0) {
         if free.compliance {
             loaded = true;
@@ -314,14 +358,21 @@ fn add_features(
                 .into_iter()
                 .enumerate()
             {
-                let across = loads.iter().map(|l| l.across[index][k]).collect();
+                let across = rows.iter().map(|r| r.loads.across[index][k]).collect();
                 problem.free_feature_with(edge, kind, across, Some(prior.compliance));
             }
         }
     }
+    let approach: Vec<f64> = rows.iter().map(|r| r.under.approach_of(index)).collect();
+    if free.backlash {
+        let sigma = Some(free.backlash_sigma);
+        problem.free_feature_with(edge, FeatureKind::Backlash, approach, sigma);
+    } else if approach.contains(&1.0) && approach.contains(&-1.0) {
+        problem.candidate(edge, FeatureKind::Backlash, approach);
+    }
     for other in &free.coupled_to {
         loaded = true;
-        let values = q.iter().map(|q| model.position(q, *other)).collect();
+        let values = rows.iter().map(|r| model.position(r.q, *other)).collect();
         problem.free_feature_with(
             edge,
             FeatureKind::Coupling,
@@ -530,6 +581,15 @@ fn calibration(stated: &Stated, solution: &Solution, inputs: &Inputs) -> Calibra
         });
         robot.points.insert(body.clone(), on_link.collect());
     }
+    for (name, point) in &stated.tips {
+        let at = solution
+            .model
+            .point_position(point.index(), &solution.values);
+        robot.tips.insert(name.clone(), at);
+    }
+    for (name, place) in &stated.contacts {
+        robot.places.insert(name.clone(), pose(*place));
+    }
     robot
 }
 
@@ -567,7 +627,8 @@ fn effects(
                     effects.coupling.insert(other.index(), c);
                 }
             }
-            FeatureKind::Backlash | FeatureKind::ClockOffset | FeatureKind::Other => {}
+            FeatureKind::Backlash => effects.backlash = c,
+            FeatureKind::ClockOffset | FeatureKind::Other => {}
         }
     }
     effects

@@ -17,12 +17,13 @@ use crate::start::start;
 use crate::tracks::body_tracks;
 
 /// Models in order of growth; each adds to the one before.
-const STEPS: [(&str, &[Free]); 7] = [
+const STEPS: [(&str, &[Free]); 8] = [
     ("registration only", &[]),
     ("+ joint offsets", &[Free::JointOffsets]),
     ("+ joint axes", &[Free::JointAxes]),
     ("+ compliance", &[Free::Compliance]),
     ("+ lateral compliance", &[Free::LateralCompliance]),
+    ("+ backlash", &[Free::Backlash]),
     ("+ eccentricity", &[Free::Eccentricity]),
     ("+ gains", &[Free::JointGains]),
 ];

@@ -6,6 +6,8 @@ use calib_geometry::so3;
 use calib_profile::{BodyKind, Usage};
 use calib_report::ResidualRow;
 
+use crate::conditions::conditions;
+use crate::contacts::miss;
 use crate::kinematics::Calibration;
 use crate::load::Inputs;
 use crate::ml::MlFit;
@@ -64,9 +66,11 @@ pub fn residual_rows(
         .iter()
         .filter(|(_, r)| r.spec.usage != Usage::Validation)
     {
+        let solve = &inputs.robot.profile.solve;
+        let under = conditions(loaded, &inputs.robot.model, solve.load);
         for (row, q) in loaded.q.iter().enumerate() {
             let Some(q) = q else { continue };
-            let root_from_link = robot.root_from_link(q);
+            let root_from_link = robot.root_from_link_under(q, &under[row]);
             let joints = joint_values(inputs, name, row);
             let is_out = |row: usize, subject: &str| {
                 let key = |subject: &str| (name.clone(), row, subject.to_owned());
@@ -87,6 +91,13 @@ pub fn residual_rows(
                         joints: joints.clone(),
                     });
                 };
+            for (contact_name, contact) in &inputs.robot.profile.contacts {
+                if contact.recordings.contains(name)
+                    && let Some(off) = miss(inputs, contact_name, robot, &root_from_link)
+                {
+                    push(contact_name, off, None);
+                }
+            }
             for (body_name, body) in &inputs.robot.profile.bodies {
                 let tracker_from_link = robot.tracker_from_root * root_from_link[body.link.index()];
                 match &body.kind {

@@ -92,6 +92,7 @@ pub fn run(
                 &inputs,
                 &settings,
             )?;
+            findings.extend(on_their_limit(&fit));
             ml_result(&inputs, fit, registered.calibration)?
         }
     };
@@ -213,6 +214,32 @@ fn paper_assumptions() -> Finding {
     )
 }
 
+/// Numbers that a physical limit of the profile stopped.
+fn on_their_limit(fit: &MlFit) -> Vec<Finding> {
+    let stated = fit.stated.problem.parameters();
+    let stopped = fit.solution.parameters.iter().zip(stated);
+    stopped
+        .filter(|(found, _)| found.at_bound)
+        .filter_map(|(found, stated)| {
+            let (_, limit) = stated.bounds?;
+            let (unit, factor) = match found.unit {
+                calib_core::Unit::Metre => ("mm", 1e3),
+                _ => ("deg", 1f64.to_degrees()),
+            };
+            Some(Finding::new(
+                "on-its-limit",
+                calib_recording::Severity::Warning,
+                &found.name,
+                format!(
+                    "the data want it beyond its limit of ±{:.3} {unit}; it stays there and the rest is fitted around it",
+                    limit * factor
+                ),
+                "widen `within_mm` or `within_deg` if the limit is not physical; otherwise look for an effect that is not freed",
+            ))
+        })
+        .collect()
+}
+
 /// The closed forms are start values here: where one has no answer, the likelihood may still have it.
 fn only_a_cross_check(findings: &mut [Finding]) {
     for finding in findings
@@ -228,6 +255,13 @@ fn nominal(inputs: &Inputs, start: &Start) -> Calibration {
     let mut robot = Calibration::nominal(&inputs.robot.model, start.tracker_from_root);
     robot.mounts = start.mounts.clone();
     robot.points = start.points.clone();
+    let profile = &inputs.robot.profile;
+    let tips = profile.points.iter();
+    robot.tips = tips.map(|(name, tip)| (name.clone(), tip.at)).collect();
+    let contacts = profile.contacts.iter();
+    robot.places = contacts
+        .map(|(name, contact)| (name.clone(), contact.base_from_place))
+        .collect();
     robot
 }
 

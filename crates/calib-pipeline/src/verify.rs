@@ -6,6 +6,8 @@ use calib_profile::{BodyKind, Usage};
 use calib_report::{HeldOut, JointValue, PoseError, Unit};
 use nalgebra::{Isometry3, Vector3};
 
+use crate::conditions::conditions;
+use crate::contacts::miss;
 use crate::kinematics::Calibration;
 use crate::load::Inputs;
 use crate::tracks::BodyTrack;
@@ -17,7 +19,7 @@ pub struct Deviation {
     pub recording: String,
     /// Row in its table, from 0.
     pub row: usize,
-    /// Body or marker.
+    /// Body, marker or contact.
     pub subject: String,
     /// Predicted − measured, m.
     pub vector: Vector3<f64>,
@@ -40,9 +42,22 @@ pub fn deviations(
         .iter()
         .filter(|(_, r)| usage(r.spec.usage))
     {
+        let under = conditions(loaded, model, inputs.robot.profile.solve.load);
         for (row, q) in loaded.q.iter().enumerate() {
             let Some(q) = q else { continue };
-            let root_from_link = robot.root_from_link(q);
+            let root_from_link = robot.root_from_link_under(q, &under[row]);
+            for (contact_name, contact) in &inputs.robot.profile.contacts {
+                if contact.recordings.contains(name)
+                    && let Some(off) = miss(inputs, contact_name, robot, &root_from_link)
+                {
+                    out.push(Deviation {
+                        recording: name.clone(),
+                        row,
+                        subject: contact_name.clone(),
+                        vector: off,
+                    });
+                }
+            }
             for (body_name, body) in &inputs.robot.profile.bodies {
                 if model
                     .chain(model.root(), body.link)
@@ -130,8 +145,17 @@ pub fn held_out(
             }
         })
         .collect();
+    let touched = |contact: &calib_profile::Contact| {
+        let mut used = contact.recordings.iter();
+        used.any(|r| validation(inputs.recordings[r].spec.usage))
+    };
+    let touches = inputs.robot.profile.contacts.values().any(touched);
     Some(HeldOut::from_poses(
-        "position of the tracked bodies against their prediction",
+        if touches {
+            "position of the tracked bodies against their prediction, and how far touches miss"
+        } else {
+            "position of the tracked bodies against their prediction"
+        },
         poses,
     ))
 }

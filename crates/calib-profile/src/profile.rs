@@ -7,7 +7,8 @@ use calib_urdf::{JointId, LinkId};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 pub use crate::raw::{
-    RawFree as Free, RawJointFree as JointFree, RawMethod as Method, RawUse as Usage,
+    RawFree as Free, RawJointFree as JointFree, RawLoad as Load, RawMethod as Method,
+    RawUse as Usage,
 };
 pub use crate::raw::{RawPlugin as Plugin, RawValue as ParameterValue};
 
@@ -32,6 +33,10 @@ pub struct Profile {
     pub transforms: BTreeMap<String, LinkTransform>,
     /// Loop closures by name.
     pub loops: BTreeMap<String, Loop>,
+    /// Touching points by name.
+    pub points: BTreeMap<String, Tip>,
+    /// Touches by name.
+    pub contacts: BTreeMap<String, Contact>,
     /// How to solve.
     pub solve: Solve,
     /// What is written.
@@ -175,6 +180,60 @@ pub struct Loop {
     pub recording: Option<String>,
 }
 
+/// A point of a link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tip {
+    /// Link that carries it.
+    pub link: LinkId,
+    /// Where it is in that link's frame, m.
+    pub at: Point3<f64>,
+    /// Prior σ of its coordinates where they are estimated, m.
+    pub sigma: Option<f64>,
+}
+
+/// Poses in which a point of one link touches something that is fixed to another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contact {
+    /// Recordings whose every row is a touch.
+    pub recordings: Vec<String>,
+    /// The touching point.
+    pub point: String,
+    /// What carries the thing that is touched.
+    pub on: ContactBase,
+    /// What is touched; at `base_from_place` its own frame stands, with z along normal or direction.
+    pub touched: Touched,
+    /// Pose of the touched thing's frame in its base.
+    pub base_from_place: Isometry3<f64>,
+    /// Prior σ of its position where it is estimated, m.
+    pub place_sigma: Option<f64>,
+    /// Prior σ of its orientation where it is estimated, rad.
+    pub place_sigma_rad: Option<f64>,
+    /// σ of one touch, m.
+    pub sigma: f64,
+}
+
+/// What a touched thing is fixed to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ContactBase {
+    /// The tracker's frame.
+    Tracker,
+    /// A link.
+    Link(LinkId),
+}
+
+/// What is touched, in its own frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Touched {
+    /// The plane z = 0.
+    Plane,
+    /// The line along z.
+    Line,
+    /// The origin.
+    Point,
+    /// The sphere of this radius about the origin, m.
+    Distance(f64),
+}
+
 /// How to solve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solve {
@@ -188,6 +247,8 @@ pub struct Solve {
     pub prior: Prior,
     /// Noise levels.
     pub noise: Noise,
+    /// Where the torques of compliance come from.
+    pub load: Load,
     /// Detect and remove outliers and swapped markers.
     pub robust: bool,
     /// Limits of the verdict.
@@ -203,6 +264,10 @@ pub struct JointException {
     pub sigma_m: Option<f64>,
     /// Prior of its angle numbers, rad.
     pub sigma_rad: Option<f64>,
+    /// Limit of its position numbers about the description, m.
+    pub within_m: Option<f64>,
+    /// Limit of its angle numbers about the description, rad.
+    pub within_rad: Option<f64>,
     /// Joints whose motion it follows by an unknown share.
     pub coupled_to: Vec<JointId>,
 }
@@ -233,6 +298,8 @@ pub struct JointFreedom {
     pub compliance: bool,
     /// Compliance across the axis.
     pub lateral_compliance: bool,
+    /// Play by the direction of approach.
+    pub backlash: bool,
     /// Joints whose motion it follows.
     pub coupled_to: Vec<JointId>,
     /// Prior of position numbers, m.
@@ -241,6 +308,12 @@ pub struct JointFreedom {
     pub angle_sigma: f64,
     /// Prior of the zero offset, rad (or m for a prismatic joint).
     pub offset_sigma: f64,
+    /// Prior of half the play, rad (or m for a prismatic joint).
+    pub backlash_sigma: f64,
+    /// Limit of the position numbers, m.
+    pub position_within: Option<f64>,
+    /// Limit of the angle numbers, rad.
+    pub angle_within: Option<f64>,
 }
 
 impl JointFreedom {
@@ -254,6 +327,7 @@ impl JointFreedom {
             eccentricity: false,
             compliance: false,
             lateral_compliance: false,
+            backlash: false,
             coupled_to: Vec::new(),
             ..self
         }
@@ -289,6 +363,7 @@ impl Solve {
             eccentricity: has(JointFree::Eccentricity, Free::Eccentricity),
             compliance: has(JointFree::Compliance, Free::Compliance),
             lateral_compliance: has(JointFree::LateralCompliance, Free::LateralCompliance),
+            backlash: has(JointFree::Backlash, Free::Backlash),
             coupled_to: exception.coupled_to,
             position_sigma: exception.sigma_m.unwrap_or(self.prior.position),
             angle_sigma: exception.sigma_rad.unwrap_or(self.prior.angle),
@@ -298,6 +373,13 @@ impl Solve {
                 exception.sigma_rad
             }
             .unwrap_or(offset_prior),
+            backlash_sigma: if slides {
+                self.prior.backlash_m
+            } else {
+                self.prior.backlash_rad
+            },
+            position_within: exception.within_m,
+            angle_within: exception.within_rad,
         }
     }
 }
@@ -319,6 +401,10 @@ pub struct Prior {
     pub eccentricity: f64,
     /// Compliance, rad per N m.
     pub compliance: f64,
+    /// Half the play of a revolute joint, rad.
+    pub backlash_rad: f64,
+    /// Half the play of a prismatic joint, m.
+    pub backlash_m: f64,
 }
 
 /// Noise levels.

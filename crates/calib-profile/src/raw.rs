@@ -34,6 +34,12 @@ pub struct RawProfile {
     /// Loop closures: two origins measured by the tracker against forward kinematics, by name.
     #[serde(default)]
     pub loops: BTreeMap<String, RawLoop>,
+    /// Points of links that touch things, by name.
+    #[serde(default)]
+    pub points: BTreeMap<String, RawTip>,
+    /// Touches: a point of one link on a plane, line, point or at a distance fixed to another link, by name.
+    #[serde(default)]
+    pub contacts: BTreeMap<String, RawContact>,
     /// How to solve, and what counts as good enough.
     #[serde(default)]
     pub solve: RawSolve,
@@ -251,6 +257,75 @@ pub struct RawLoop {
     pub recording: Option<String>,
 }
 
+/// A point of a link, e.g. the tip of a stylus or the center of a ball.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawTip {
+    /// The link that carries it.
+    pub link: String,
+    /// Where it is in the frame of that link, mm.
+    #[serde(default)]
+    pub at_mm: [f64; 3],
+    /// Prior standard deviation of each of its coordinates, mm: it is estimated; exact when absent.
+    #[serde(default)]
+    pub sigma_mm: Option<f64>,
+}
+
+/// Poses in which a point of the robot touches something.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawContact {
+    /// The recordings; every row of them is a touch. They may have joint positions only.
+    pub recordings: Vec<String>,
+    /// The touching point, by its name under `points`.
+    pub point: String,
+    /// What is touched is fixed to this link, or to the tracker's frame by its name; the robot's root when absent.
+    #[serde(default)]
+    pub on: Option<String>,
+    /// What is touched.
+    pub touches: RawTouched,
+    /// Prior standard deviation of where it is, mm: its place is estimated; exact when absent.
+    #[serde(default)]
+    pub place_sigma_mm: Option<f64>,
+    /// Prior standard deviation of how it is turned (planes and lines), deg: estimated; exact when absent.
+    #[serde(default)]
+    pub place_sigma_deg: Option<f64>,
+    /// Standard deviation of one touch, mm.
+    pub sigma_mm: f64,
+}
+
+/// What a point touches, in the frame of what it is fixed to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum RawTouched {
+    /// A plane, e.g. a table.
+    Plane {
+        /// Any point of the plane, mm.
+        through_mm: [f64; 3],
+        /// Its normal; any length.
+        normal: [f64; 3],
+    },
+    /// A line, e.g. an edge or a taut wire.
+    Line {
+        /// Any point of the line, mm.
+        through_mm: [f64; 3],
+        /// Its direction; any length.
+        direction: [f64; 3],
+    },
+    /// A point, e.g. a cone or a socket.
+    Point {
+        /// Where it is, mm.
+        at_mm: [f64; 3],
+    },
+    /// A point at a known distance, e.g. the far ball of a ball bar.
+    Distance {
+        /// Where the far point is, mm.
+        from_mm: [f64; 3],
+        /// How far away, mm.
+        distance_mm: f64,
+    },
+}
+
 /// Which estimation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -286,6 +361,8 @@ pub enum RawFree {
     Compliance,
     /// Tilt of the moved joints' axes per gravity torque across them.
     LateralCompliance,
+    /// Play of the moved joints: half of it to either side by the direction of approach from the row before.
+    Backlash,
 }
 
 /// Extra freedom or prior width of one joint (fixed joints included).
@@ -301,6 +378,12 @@ pub struct RawJointSolve {
     /// Prior standard deviation of its angle numbers, deg.
     #[serde(default)]
     pub sigma_deg: Option<f64>,
+    /// Physical limit: each position number of its origin stays within this of the description, mm.
+    #[serde(default)]
+    pub within_mm: Option<f64>,
+    /// Physical limit: each angle number (tilts, turns, zero offset) stays within this of the description, deg.
+    #[serde(default)]
+    pub within_deg: Option<f64>,
     /// The joint also turns by an unknown share of these joints' angles (belt or parallelogram coupling).
     #[serde(default)]
     pub coupled_to: Vec<String>,
@@ -322,6 +405,8 @@ pub enum RawJointFree {
     Compliance,
     /// Compliance across the axis.
     LateralCompliance,
+    /// Play, by the direction of approach.
+    Backlash,
     /// Whole origin.
     Origin,
     /// Axis line only.
@@ -346,6 +431,10 @@ pub struct RawPrior {
     pub eccentricity_deg: f64,
     /// Compliance, deg per N m.
     pub compliance_deg_per_nm: f64,
+    /// Half of a joint's play, deg.
+    pub backlash_deg: f64,
+    /// Half of a prismatic joint's play, mm.
+    pub backlash_mm: f64,
 }
 
 impl Default for RawPrior {
@@ -358,8 +447,21 @@ impl Default for RawPrior {
             gain_percent: 1.0,
             eccentricity_deg: 0.5,
             compliance_deg_per_nm: 0.05,
+            backlash_deg: 0.2,
+            backlash_mm: 0.5,
         }
     }
+}
+
+/// Where the load of a joint comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawLoad {
+    /// Gravity on the masses of the URDF at the indicated joint positions.
+    #[default]
+    Gravity,
+    /// The torque columns of the recordings, N m; a joint without one carries no load.
+    Measured,
 }
 
 /// Noise levels: the start of their estimation, or fixed.
@@ -406,6 +508,8 @@ pub struct RawSolve {
     pub prior: RawPrior,
     /// Noise levels.
     pub noise: RawNoise,
+    /// Where the torques of compliance come from: `gravity` (default) or `measured`.
+    pub load: RawLoad,
     /// Detect and remove outliers and swapped markers.
     pub robust: bool,
     /// Limits of the verdict.
@@ -425,6 +529,7 @@ impl Default for RawSolve {
             joints: BTreeMap::new(),
             prior: RawPrior::default(),
             noise: RawNoise::default(),
+            load: RawLoad::default(),
             robust: true,
             limits: RawLimits::default(),
         }

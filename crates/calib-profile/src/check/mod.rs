@@ -64,6 +64,7 @@ pub fn check(
     }
 }
 
+mod contact;
 mod names;
 mod origin;
 mod simulate;
@@ -106,10 +107,10 @@ impl<'a> Checker<'a> {
             self.problems
                 .push(Problem::new(Some(place), finding, "give a number"));
         }
-        if raw.bodies.is_empty() {
+        if raw.bodies.is_empty() && raw.contacts.is_empty() {
             self.problem(
                 &["bodies"],
-                "no tracking body is declared",
+                "neither a tracking body nor a contact is declared",
                 "name at least one body and the link it is bolted to",
             );
         }
@@ -152,6 +153,8 @@ impl<'a> Checker<'a> {
                 .collect(),
             transforms: self.transforms(),
             loops: self.loops(),
+            points: self.tips(),
+            contacts: self.contacts(),
             solve: self.solve(&raw.solve),
             outputs: self.outputs(),
             simulate: raw.simulate.as_ref().map(|s| self.simulation(s)),
@@ -376,6 +379,8 @@ impl<'a> Checker<'a> {
             for (key, value) in [
                 ("sigma_mm", exception.sigma_mm),
                 ("sigma_deg", exception.sigma_deg),
+                ("within_mm", exception.within_mm),
+                ("within_deg", exception.within_deg),
             ] {
                 if let Some(value) = value {
                     self.positive(&["solve", "joints", name, key], value);
@@ -390,6 +395,8 @@ impl<'a> Checker<'a> {
                         .map(|list| list.iter().copied().collect()),
                     sigma_m: exception.sigma_mm.map(|s| s * MM),
                     sigma_rad: exception.sigma_deg.map(|s| s * DEG),
+                    within_m: exception.within_mm.map(|w| w * MM),
+                    within_rad: exception.within_deg.map(|w| w * DEG),
                     coupled_to,
                 },
             );
@@ -403,6 +410,8 @@ impl<'a> Checker<'a> {
             ("gain_percent", prior.gain_percent),
             ("eccentricity_deg", prior.eccentricity_deg),
             ("compliance_deg_per_nm", prior.compliance_deg_per_nm),
+            ("backlash_deg", prior.backlash_deg),
+            ("backlash_mm", prior.backlash_mm),
         ] {
             self.positive(&["solve", "prior", key], value);
         }
@@ -429,11 +438,14 @@ impl<'a> Checker<'a> {
                 gain: prior.gain_percent / 100.0,
                 eccentricity: prior.eccentricity_deg * DEG,
                 compliance: prior.compliance_deg_per_nm * DEG,
+                backlash_rad: prior.backlash_deg * DEG,
+                backlash_m: prior.backlash_mm * MM,
             },
             noise: Noise {
                 joint: raw.noise.joint_deg.map(|s| s * DEG),
                 known: raw.noise.known,
             },
+            load: raw.load,
             robust: raw.robust,
             limits: Limits {
                 held_out_rms: limits.held_out_rms_mm.map(|l| l * MM),

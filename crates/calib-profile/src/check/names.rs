@@ -14,6 +14,7 @@ impl Checker<'_> {
             let what = path.iter().rev().find_map(|k| match *k {
                 "body" | "bodies" | "add_bodies" | "mounts" => Some("body"),
                 "sweep" | "recording" | "recordings" => Some("recording"),
+                "point" => Some("point"),
                 "from" | "to" if path[0] == "loops" => Some("origin"),
                 "from" => Some("body"),
                 "loop_mean_mm" => Some("loop"),

@@ -1,0 +1,149 @@
+//! Contacts: the touching point, what it touches, and which of both is known.
+
+use nalgebra::{Translation3, UnitQuaternion};
+
+use super::*;
+use crate::profile::{Contact, ContactBase, Tip, Touched};
+use crate::raw::{RawContact, RawTouched};
+
+impl Checker<'_> {
+    pub(super) fn contacts(&mut self) -> BTreeMap<String, Contact> {
+        let raw = self.raw;
+        raw.contacts
+            .iter()
+            .map(|(name, c)| (name.clone(), self.contact(name, c)))
+            .collect()
+    }
+
+    pub(super) fn tips(&mut self) -> BTreeMap<String, Tip> {
+        let raw = self.raw;
+        let mut tips = BTreeMap::new();
+        for (name, tip) in &raw.points {
+            if let Some(sigma) = tip.sigma_mm {
+                self.positive(&["points", name, "sigma_mm"], sigma);
+            }
+            let tip = Tip {
+                link: self.link(&["points", name, "link"], &tip.link),
+                at: Point3::from(Vector3::from(tip.at_mm) * MM),
+                sigma: tip.sigma_mm.map(|s| s * MM),
+            };
+            tips.insert(name.clone(), tip);
+        }
+        tips
+    }
+
+    fn contact(&mut self, name: &str, raw: &RawContact) -> Contact {
+        if raw.recordings.is_empty() {
+            self.key_problem(
+                &["contacts", name],
+                format!("contact `{name}` names no recording"),
+                "add `recordings: [<name>]`: the poses in which the point touches",
+            );
+        }
+        for recording in &raw.recordings {
+            self.known(
+                &["contacts", name, "recordings"],
+                recording,
+                self.raw.recordings.keys(),
+            );
+        }
+        self.known(
+            &["contacts", name, "point"],
+            &raw.point,
+            self.raw.points.keys(),
+        );
+        let on = match &raw.on {
+            None => ContactBase::Link(self.robot.root()),
+            Some(on) if *on == self.raw.tracker.frame => ContactBase::Tracker,
+            Some(on) => ContactBase::Link(self.link(&["contacts", name, "on"], on)),
+        };
+        let carrier = self.raw.points.get(&raw.point).map(|p| p.link.as_str());
+        if let (ContactBase::Link(base), Some(carrier)) = (on, carrier)
+            && let Ok(link) = self.robot.link_id(carrier)
+            && self.rigidly_joined(base, link)
+        {
+            self.problem(
+                &["contacts", name, "point"],
+                format!("no joint lies between `{carrier}` and what it touches"),
+                "name a point of the link that moves, and under `on` the link that is touched",
+            );
+        }
+        self.positive(&["contacts", name, "sigma_mm"], raw.sigma_mm);
+        for (key, value) in [
+            ("place_sigma_mm", raw.place_sigma_mm),
+            ("place_sigma_deg", raw.place_sigma_deg),
+        ] {
+            if let Some(value) = value {
+                self.positive(&["contacts", name, key], value);
+            }
+        }
+        let (at, along, touched) = match raw.touches {
+            RawTouched::Plane { through_mm, normal } => (
+                through_mm,
+                self.direction_of(name, "normal", normal),
+                Touched::Plane,
+            ),
+            RawTouched::Line {
+                through_mm,
+                direction,
+            } => (
+                through_mm,
+                self.direction_of(name, "direction", direction),
+                Touched::Line,
+            ),
+            RawTouched::Point { at_mm } => (at_mm, UnitQuaternion::identity(), Touched::Point),
+            RawTouched::Distance {
+                from_mm,
+                distance_mm,
+            } => {
+                if !(distance_mm.is_finite() && distance_mm > 0.0) {
+                    self.problem(
+                        &["contacts", name, "touches"],
+                        format!("{distance_mm} is no distance"),
+                        "give a number above 0; for distance 0 use `point`",
+                    );
+                }
+                let touched = Touched::Distance(distance_mm * MM);
+                (from_mm, UnitQuaternion::identity(), touched)
+            }
+        };
+        if raw.place_sigma_deg.is_some() && matches!(touched, Touched::Point | Touched::Distance(_))
+        {
+            self.problem(
+                &["contacts", name, "place_sigma_deg"],
+                "a point has no orientation",
+                "remove the key",
+            );
+        }
+        Contact {
+            recordings: raw.recordings.clone(),
+            point: raw.point.clone(),
+            on,
+            touched,
+            base_from_place: Isometry3::from_parts(
+                Translation3::from(Vector3::from(at) * MM),
+                along,
+            ),
+            place_sigma: raw.place_sigma_mm.map(|s| s * MM),
+            place_sigma_rad: raw.place_sigma_deg.map(|s| s * DEG),
+            sigma: raw.sigma_mm * MM,
+        }
+    }
+
+    /// Rotation whose z axis is along `v`.
+    fn direction_of(&mut self, name: &str, key: &str, v: [f64; 3]) -> UnitQuaternion<f64> {
+        /// Shorter vectors have no direction worth the name.
+        const SHORTEST: f64 = 1e-9;
+        let Some(along) = Unit::try_new(Vector3::from(v), SHORTEST) else {
+            self.problem(
+                &["contacts", name, "touches"],
+                format!("`{key}` has no length"),
+                "give a vector that is not zero, e.g. [0, 0, 1]",
+            );
+            return UnitQuaternion::identity();
+        };
+        UnitQuaternion::rotation_between(&Vector3::z(), &along).unwrap_or_else(|| {
+            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+        })
+    }
+}

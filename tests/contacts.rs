@@ -1,0 +1,260 @@
+//! Loops that close through touches: an arm without any tracker finds its zero offsets by touching things.
+
+mod scratch;
+
+use std::fmt::Write as _;
+
+use calib_urdf::RobotModel;
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Unit, Vector3};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use scratch::Scratch;
+use serde_json::Value;
+
+/// What one touch misses by, m.
+const TOUCH: f64 = 5e-5;
+
+/// True zero offsets, rad; the first only turns everything that is touched, unless that stands fast.
+const OFFSETS: [f64; 6] = [0.004, -0.006, 0.005, 0.008, -0.007, 0.003];
+
+/// The touching point on the last link, m, as it is; designed at 90, 0, 20 mm.
+const TRUE_TIP: [f64; 3] = [0.0912, -0.0007, 0.0195];
+
+fn urdf(offsets: &[f64; 6]) -> String {
+    let joints = [
+        ("0 0 0.29", [0., 0., 1.]),
+        ("0.03 0 0.11", [0., 1., 0.]),
+        ("0 0 0.35", [0., 1., 0.]),
+        ("0.12 0 0.06", [1., 0., 0.]),
+        ("0.25 0 0", [0., 1., 0.]),
+        ("0.08 0 0", [1., 0., 0.]),
+    ];
+    let mut text = String::from("<robot name=\"arm\">\n  <link name=\"l0\"/>\n");
+    for (i, ((xyz, axis), offset)) in joints.iter().zip(offsets).enumerate() {
+        // All axes are coordinate axes: an offset is that angle of roll, pitch or yaw.
+        let rpy = axis.map(|a| a * offset);
+        let _ = write!(
+            text,
+            "  <link name=\"l{n}\"/>\n  <joint name=\"j{n}\" type=\"revolute\">\n    <parent link=\"l{i}\"/>\n    \
+             <child link=\"l{n}\"/>\n    <origin xyz=\"{xyz}\" rpy=\"{} {} {}\"/>\n    <axis xyz=\"{} {} {}\"/>\n    \
+             <limit lower=\"-3\" upper=\"3\" effort=\"50\" velocity=\"2\"/>\n  </joint>\n",
+            rpy[0],
+            rpy[1],
+            rpy[2],
+            axis[0],
+            axis[1],
+            axis[2],
+            n = i + 1
+        );
+    }
+    text + "</robot>\n"
+}
+
+/// What is touched, and where it truly is in the root.
+#[derive(Clone, Copy)]
+enum Thing {
+    Plane(Vector3<f64>, Unit<Vector3<f64>>),
+    Line(Vector3<f64>, Unit<Vector3<f64>>),
+    Point(Vector3<f64>),
+    Bar(Vector3<f64>, f64),
+}
+
+impl Thing {
+    /// Where a tip at `p` should go to touch.
+    fn nearest(self, p: &Vector3<f64>) -> Vector3<f64> {
+        match self {
+            Self::Plane(o, n) => p - n.into_inner() * n.dot(&(p - o)),
+            Self::Line(o, d) => o + d.into_inner() * d.dot(&(p - o)),
+            Self::Point(o) => o,
+            Self::Bar(o, length) => o + (p - o).normalize() * length,
+        }
+    }
+}
+
+/// Postures in which the true tip touches, with the noise of a touch.
+fn touches(arm: &RobotModel, thing: Thing, n: usize, rng: &mut ChaCha8Rng) -> String {
+    let tip_link = arm.link_id("l6").expect("there");
+    let tip = Point3::from(Vector3::from(TRUE_TIP));
+    let mut table = String::from("j1_rad,j2_rad,j3_rad,j4_rad,j5_rad,j6_rad\n");
+    let mut found = 0;
+    while found < n {
+        let mut q: Vec<f64> = [
+            (-0.5, 0.5),
+            (-0.2, 0.9),
+            (-0.4, 0.7),
+            (-1.5, 1.5),
+            (-1.2, 1.2),
+            (-2.0, 2.0),
+        ]
+        .map(|(low, high)| rng.random_range(low..high))
+        .to_vec();
+        let noise = Vector3::from_fn(|_, _| TOUCH * normal(rng));
+        let at = |q: &[f64]| (arm.root_from_link(q, tip_link) * tip).coords;
+        // The thing is touched where the noise puts it.
+        let wanted = |q: &[f64]| thing.nearest(&(at(q) - noise)) + noise;
+        for _ in 0..60 {
+            let miss = wanted(&q) - at(&q);
+            let mut jacobian = DMatrix::zeros(3, 6);
+            for k in 0..6 {
+                let mut moved = q.clone();
+                moved[k] += 1e-7;
+                jacobian
+                    .column_mut(k)
+                    .copy_from(&((at(&moved) - at(&q)) / 1e-7));
+            }
+            let normal = &jacobian * jacobian.transpose() + DMatrix::identity(3, 3) * 1e-6;
+            let Some(inverse) = normal.try_inverse() else {
+                break;
+            };
+            let step = jacobian.transpose() * inverse * DVector::from_column_slice(miss.as_slice());
+            for k in 0..6 {
+                q[k] += step[k].clamp(-0.2, 0.2);
+            }
+        }
+        if (wanted(&q) - at(&q)).norm() < 1e-9 && q.iter().all(|q| q.abs() < 2.9) {
+            let cells: Vec<String> = q.iter().map(|q| format!("{q:.12}")).collect();
+            let _ = writeln!(table, "{}", cells.join(","));
+            found += 1;
+        }
+    }
+    table
+}
+
+fn normal(rng: &mut impl Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+const PROFILE: &str = r#"calib: 1
+robot: {name: arm, urdf: arm/arm.urdf}
+tracker: {frame: lab}
+bodies: {}
+recordings:
+  bar: {file: arm/bar.csv, use: static}
+  edge: {file: arm/edge.csv, use: static}
+  socket: {file: arm/socket.csv, use: static}
+  table: {file: arm/table.csv, use: static}
+  again: {file: arm/again.csv, use: validation}
+points:
+  tip: {link: l6, at_mm: [90, 0, 20], sigma_mm: 3}
+contacts:
+  bar: {recordings: [bar], point: tip, touches: {distance: {from_mm: [600, -250, 100], distance_mm: 300}}, place_sigma_mm: 20, sigma_mm: 0.05}
+  edge: {recordings: [edge], point: tip, touches: {line: {through_mm: [450, 0, 300], direction: [0, 1, 0]}}, place_sigma_mm: 20, place_sigma_deg: 3, sigma_mm: 0.05}
+  socket: {recordings: [socket, again], point: tip, touches: {point: {at_mm: [500, 200, 250]}}, sigma_mm: 0.05}
+  table: {recordings: [table], point: tip, touches: {plane: {through_mm: [0, 0, 50], normal: [0, 0, 1]}}, place_sigma_mm: 20, place_sigma_deg: 3, sigma_mm: 0.05}
+solve:
+  free: [joint_offsets]
+  noise: {joint_deg: 0}
+  limits: {held_out_rms_mm: 0.5}
+"#;
+
+fn laboratory(profile: &str) -> Scratch {
+    let arm = RobotModel::from_urdf_text(&urdf(&OFFSETS), "true").expect("a robot");
+    let mut rng = ChaCha8Rng::seed_from_u64(20);
+    let unit = |x: f64, y: f64, z: f64| Unit::new_normalize(Vector3::new(x, y, z));
+    let socket = Thing::Point(Vector3::new(0.5, 0.2, 0.25));
+    let mut dir = Scratch::new()
+        .file("arm/arm.urdf", urdf(&[0.0; 6]))
+        .file("arm.yaml", profile);
+    for (file, thing, n) in [
+        (
+            "bar",
+            Thing::Bar(Vector3::new(0.605, -0.256, 0.104), 0.3),
+            40,
+        ),
+        (
+            "edge",
+            Thing::Line(Vector3::new(0.455, 0.0, 0.308), unit(0.02, 1.0, -0.01)),
+            40,
+        ),
+        ("socket", socket, 40),
+        (
+            "table",
+            Thing::Plane(Vector3::new(0.0, 0.0, 0.043), unit(0.01, -0.02, 1.0)),
+            40,
+        ),
+        ("again", socket, 20),
+    ] {
+        let table = touches(&arm, thing, n, &mut rng);
+        dir = dir.file(&format!("arm/{file}.csv"), table);
+    }
+    dir
+}
+
+fn parameter<'a>(report: &'a Value, name: &str) -> &'a Value {
+    let all = report["parameters"].as_array().expect("parameters");
+    let found = all.iter().find(|p| p["name"] == name);
+    found.unwrap_or_else(|| panic!("no parameter `{name}`"))
+}
+
+/// (value − truth)/σ
+fn z(report: &Value, name: &str, truth: f64) -> f64 {
+    let p = parameter(report, name);
+    (p["value"].as_f64().expect("a number") - truth) / p["sigma"].as_f64().expect("a number")
+}
+
+#[test]
+fn an_arm_without_a_tracker_finds_its_offsets_by_touching() {
+    let dir = laboratory(PROFILE);
+    dir.calib(["check", "arm.yaml"]).expect(0);
+    dir.calib(["run", "arm.yaml", "--out", "out"]).expect(0);
+    let report = dir.json("out/report.json");
+    assert_eq!(report["verdict"], "accepted", "{}", report["reasons"]);
+    for (i, truth) in OFFSETS.iter().enumerate() {
+        let name = format!("j{}.offset", i + 1);
+        let p = parameter(&report, &name);
+        let sigma = p["sigma"].as_f64().expect("a number");
+        println!("{name}: {truth} found {} ± {sigma}", p["value"]);
+        assert!(z(&report, &name, *truth).abs() < 4.0, "{name}: {p}");
+        if i < 5 {
+            assert!(sigma < 1e-3, "{name} is hardly known: {p}");
+        }
+    }
+    let held_out = &report["verification"]["held_out"];
+    let rms = |what: &str| held_out[what]["rms_m"].as_f64().expect("a number");
+    assert!(rms("calibrated") < 4.0 * TOUCH, "{held_out}");
+    assert!(rms("nominal") > 20.0 * rms("calibrated"), "{held_out}");
+    // Every touch is a row of the residuals, by the name of its contact.
+    let residuals = dir.read("out/residuals.csv");
+    for contact in ["bar", "edge", "socket", "table"] {
+        let rows = residuals.lines().filter(|l| l.contains(contact)).count();
+        assert_eq!(rows, 40, "{contact}");
+    }
+}
+
+#[test]
+fn places_and_points_are_found_with_the_offsets() {
+    let report = {
+        let dir = laboratory(PROFILE);
+        dir.calib(["run", "arm.yaml", "--out", "out"]).expect(0);
+        dir.json("out/report.json")
+    };
+    for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+        let name = format!("tip.{axis}");
+        assert!(
+            z(&report, &name, TRUE_TIP[k]).abs() < 4.0,
+            "{name}: {}",
+            parameter(&report, &name)
+        );
+    }
+    // The table: z = 50 mm as described, 43 mm below the root's axis in truth, tilted.
+    let table = Isometry3::translation(0.0, 0.0, 0.05);
+    let normal = Unit::new_normalize(Vector3::new(0.01, -0.02, 1.0));
+    let height = normal.dot(&(Vector3::new(0.0, 0.0, 0.043) - table.translation.vector)) / normal.z;
+    let z = z(&report, "table.place.z", height);
+    assert!(z.abs() < 4.0, "{}", parameter(&report, "table.place.z"));
+}
+
+#[test]
+fn a_touch_that_nothing_moves_is_refused() {
+    let dir = laboratory(&PROFILE.replace("tip: {link: l6", "tip: {link: l0"));
+    let ran = dir.calib(["run", "arm.yaml"]).expect(2);
+    assert!(
+        ran.stderr.contains("no joint lies between"),
+        "{}",
+        ran.stderr
+    );
+    let dir = laboratory(&PROFILE.replace("normal: [0, 0, 1]", "normal: [0, 0, 0]"));
+    let ran = dir.calib(["run", "arm.yaml"]).expect(2);
+    assert!(ran.stderr.contains("has no length"), "{}", ran.stderr);
+}
