@@ -10,7 +10,7 @@
 //! A marker of unknown position adds its own 3 columns: `JᵀG_mᵀ w`, `w I`, `w e`. The result equals the
 //! general way to rounding (a test holds both to it).
 
-use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, Dyn, Matrix6, MatrixView, Vector3, Vector6};
 
 use crate::head::HeadKind;
 use crate::model::{Model, Values};
@@ -29,7 +29,6 @@ pub(crate) struct Local {
     pub g: Vec<f64>,
     /// k × PANEL: whitened rows of J waiting to be multiplied, one per column.
     panel: DMatrix<f64>,
-    transposed: DMatrix<f64>,
     filled: usize,
     cost: f64,
 }
@@ -43,7 +42,6 @@ impl Local {
             h: DMatrix::zeros(k, k),
             g: vec![0.0; k],
             panel: DMatrix::zeros(k, panel),
-            transposed: DMatrix::zeros(panel, k),
             filled: 0,
             cost: 0.0,
         }
@@ -66,8 +64,14 @@ impl Local {
             return;
         }
         let rows = self.panel.columns(0, self.filled);
-        let mut transposed = self.transposed.rows_mut(0, self.filled);
-        rows.transpose_to(&mut transposed);
+        // The same numbers read along the other way: row stride k, column stride 1.
+        let transposed = MatrixView::<_, _, _, Dyn, Dyn>::from_slice_with_strides_generic(
+            &self.panel.as_slice()[..self.k * self.filled],
+            Dyn(self.filled),
+            Dyn(self.k),
+            Dyn(self.k),
+            Dyn(1),
+        );
         self.h.gemm(1.0, &rows, &transposed, 1.0);
         self.filled = 0;
     }

@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::compressed::Local;
 use crate::minimize::{cholesky_in_place, solve_in_place};
 use crate::model::{Model, Values};
-use crate::normal::{NormalEquations, Workspace, accumulate};
+use crate::normal::{NormalEquations, Workspace, accumulate, add_prior};
 use crate::path::Derivatives;
 use crate::rows::{SampleRows, add_block};
 
@@ -164,8 +164,25 @@ struct Sums {
     traces: DVector<f64>,
     /// tr(V_g V⁻¹ V_h V⁻¹)
     products: DMatrix<f64>,
-    /// JᵀV⁻¹V_gV⁻¹J
+    /// JᵀV⁻¹V_gV⁻¹J, and last the same of everything that is not to be estimated. Their sum is JᵀV⁻¹J.
     moments: Vec<Local>,
+}
+
+impl Sums {
+    /// H of the sums and the prior; without gradient and cost.
+    fn normal_equations(&self, model: &Model, values: &Values) -> NormalEquations {
+        let n = model.free();
+        let mut system = NormalEquations::new(n);
+        for moment in &self.moments {
+            for a in 0..n {
+                for b in a..n {
+                    system.h[a * n + b] += moment.h[(a, b)];
+                }
+            }
+        }
+        add_prior(model, values, &mut system);
+        system
+    }
 }
 
 /// One pass over the samples; `None` when the model cannot be evaluated.
@@ -188,17 +205,14 @@ fn sums(
         squares: DVector::zeros(count),
         traces: DVector::zeros(count),
         products: DMatrix::zeros(count, count),
-        moments: (0..count).map(|_| Local::new(n, most)).collect(),
+        moments: (0..=count).map(|_| Local::new(n, most)).collect(),
     };
-    let slots_of: Vec<Vec<usize>> = groups
-        .iter()
-        .map(|&g| {
-            let own = model.slots.iter().enumerate();
-            own.filter(|(_, s)| s.group == Some(g))
-                .map(|(k, _)| k)
-                .collect()
-        })
-        .collect();
+    // Random effects of every group, and last those of none.
+    let mut slots_of = vec![Vec::new(); count + 1];
+    for (k, slot) in model.slots.iter().enumerate() {
+        let group = groups.iter().position(|g| slot.group == Some(*g));
+        slots_of[group.unwrap_or(count)].push(k);
+    }
     let place: Vec<Option<usize>> = (0..theta.len())
         .map(|g| groups.iter().position(|h| *h == g))
         .collect();
@@ -243,14 +257,13 @@ fn sums(
             }
         }
         for i in 0..m {
-            let Some(g) = place[group_of[i]] else {
-                continue;
-            };
-            sums.squares[g] += rows.r[i] * rows.r[i];
-            sums.traces[g] += p0[i * m + i];
-            sums.moments[g]
+            let group = place[group_of[i]];
+            sums.moments[group.unwrap_or(count)]
                 .rows(1)
                 .copy_from_slice(&rows.j[i * n..(i + 1) * n]);
+            let Some(g) = group else { continue };
+            sums.squares[g] += rows.r[i] * rows.r[i];
+            sums.traces[g] += p0[i * m + i];
             for j in 0..m {
                 if let Some(h) = place[group_of[j]] {
                     sums.products[(g, h)] += p0[i * m + j] * p0[i * m + j];
@@ -271,9 +284,12 @@ fn sums(
                             .for_each(|(x, j)| *x += ua * j);
                     }
                 }
+                if g == count {
+                    continue;
+                }
                 sums.squares[g] += along * along;
                 sums.traces[g] += upu[a * k + a];
-                for (h, others) in slots_of.iter().enumerate() {
+                for (h, others) in slots_of[..count].iter().enumerate() {
                     for &b in others {
                         sums.products[(g, h)] += upu[a * k + b] * upu[a * k + b];
                     }
@@ -299,7 +315,6 @@ pub(crate) fn score(
     weights: &[f64],
     theta: &[f64],
     work: &mut Workspace,
-    system: &mut NormalEquations,
 ) -> Option<Scoring> {
     let groups: Vec<usize> = (0..theta.len())
         .filter(|&g| model.problem.groups[g].estimate)
@@ -312,14 +327,12 @@ pub(crate) fn score(
             relative_sigma,
         });
     }
-    if !accumulate(model, values, weights, theta, work, system) {
-        return None;
-    }
-    let c = covariance_of(system)?;
     let count = groups.len();
     let sums = sums(model, values, weights, theta, &groups, work)?;
+    let c = covariance_of(&sums.normal_equations(model, values))?;
     // Everything above is 1/θ too large in every factor: exactly the chain rule to log θ.
-    let taken = DVector::from_iterator(count, sums.moments.iter().map(|m| m.h.dot(&c)));
+    let moments = sums.moments[..count].iter();
+    let taken = DVector::from_iterator(count, moments.map(|m| m.h.dot(&c)));
     let share = |g: usize| {
         let left = 1.0 - taken[g] / sums.traces[g];
         if left.is_finite() { left.max(0.0) } else { 0.0 }
@@ -523,6 +536,12 @@ mod tests {
         ));
         let c = covariance_of(&system).unwrap();
         let sums = sums(&model, &values, &weights, &theta, &groups, &mut work).unwrap();
+        // Position noise is stated here: it goes into the rest, and the sum is still all of H.
+        let own = sums.normal_equations(&model, &values);
+        let scale = system.h.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        for (a, b) in own.h.iter().zip(&system.h) {
+            assert!((a - b).abs() < 1e-10 * scale);
+        }
         for (i, &g) in groups.iter().enumerate() {
             let taken = sums.moments[i].h.dot(&c);
             let score = 0.5 * (sums.squares[i] - sums.traces[i] + taken);

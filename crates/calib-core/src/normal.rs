@@ -131,7 +131,7 @@ pub(crate) fn accumulate_rows(
     true
 }
 
-fn add_prior(model: &Model, values: &Values, out: &mut NormalEquations) {
+pub(crate) fn add_prior(model: &Model, values: &Values, out: &mut NormalEquations) {
     let n = out.n;
     out.prior = 0.0;
     for (c, &p) in model.columns.iter().enumerate() {

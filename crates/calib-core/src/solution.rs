@@ -11,7 +11,7 @@ use crate::information::{INDETERMINATE, Information};
 use crate::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize_in};
 use crate::model::{Model, Values};
 use crate::noise::{Scoring, score};
-use crate::normal::{NormalEquations, Workspace};
+use crate::normal::Workspace;
 use crate::observability::{Observability, observe};
 use crate::parameter::{ParameterKind, Unit};
 use crate::problem::{NoiseKind, Problem};
@@ -297,7 +297,6 @@ impl Fit<'_> {
             );
         }
         let mut minimum = self.minimize(&start.values, weights, theta, work, BETWEEN_ROUNDS);
-        let mut system = NormalEquations::new(self.model.free());
         for _ in 0..self.settings.noise_rounds {
             if minimum.status == SolveStatus::NotEvaluable {
                 break;
@@ -306,14 +305,7 @@ impl Fit<'_> {
                 theta: next,
                 change,
                 relative_sigma,
-            }) = score(
-                self.model,
-                &minimum.values,
-                weights,
-                theta,
-                work,
-                &mut system,
-            )
+            }) = score(self.model, &minimum.values, weights, theta, work)
             else {
                 break;
             };
