@@ -2,6 +2,8 @@
 //!
 //! Long tables are cut after three rows, numbers are rounded to what the next machine gives as well.
 
+#[path = "../crates/calib-report/tests/suite/browser.rs"]
+mod browser;
 mod scratch;
 
 use scratch::{Scratch, finished};
@@ -217,4 +219,182 @@ fn numbers_are_rounded_where_they_stand() {
         rounded("translation_m", &json!([0.123_456_7, -1e-9])),
         json!([0.12346, 0.0])
     );
+}
+
+/// Questions of the page by the ids of their headings.
+const QUESTIONS: [&str; 12] = [
+    "trust",
+    "scope",
+    "expected-error",
+    "worst-pose",
+    "not-known",
+    "next",
+    "changed",
+    "thrown-out",
+    "noise",
+    "clocks",
+    "undo",
+    "reproduce",
+];
+
+/// One file that is mailed around.
+const MAX_PAGE_BYTES: usize = 3_000_000;
+
+#[test]
+fn the_page_answers_on_its_first_screen() {
+    for robot in ["ripley", "justin"] {
+        let page = finished(robot, "ml").dir.read("out/report.html");
+        assert!(page.len() < MAX_PAGE_BYTES, "{robot}: {} bytes", page.len());
+        for size in [[1280, 800], [400, 800]] {
+            let script = browser::first_screen(&QUESTIONS);
+            let Some(seen) = browser::open(robot, &page, size, &script) else {
+                println!("skipped: no Chromium is installed");
+                return;
+            };
+            let at = format!("{robot} at {size:?}: {}", seen.told);
+            assert!(seen.console.is_empty(), "{at}: {:?}", seen.console);
+            assert!(seen.hosts.is_empty(), "{at}: {:?}", seen.hosts);
+            assert_eq!(seen.told["loaded"], 0, "{at}");
+            assert_eq!(seen.told["overflow"], 0, "wider than the screen: {at}");
+            for id in QUESTIONS {
+                let how = &seen.told["answers"][id];
+                let linked = size[0] < 1000 && how == "linked";
+                assert!(how == "seen" || linked, "{id} is {how}: {at}");
+            }
+        }
+    }
+}
+
+/// The data of the 3-D view in a page.
+fn view_data(page: &str) -> Value {
+    let data = page
+        .split("id=\"view-data\">")
+        .nth(1)
+        .and_then(|rest| rest.split("</script>").next())
+        .expect("the page has a view");
+    serde_json::from_str(data).expect("JSON")
+}
+
+#[test]
+fn the_data_of_the_pages() {
+    for robot in ["ripley", "justin"] {
+        let data = view_data(&finished(robot, "ml").dir.read("out/report.html"));
+        insta::assert_json_snapshot!(format!("view_{robot}"), rounded("", &data));
+    }
+}
+
+/// A box of 0.2 m as a binary STL, in millimetres: 12 triangles, 12 edges that bend.
+fn box_stl() -> Vec<u8> {
+    let corner = |i: usize| [0, 1, 2].map(|k| if i >> k & 1 == 1 { 100.0_f32 } else { -100.0 });
+    // Two triangles a face; the diagonal is flat.
+    let faces = [
+        [0, 1, 3, 2],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 3, 7, 6],
+        [0, 2, 6, 4],
+        [1, 3, 7, 5],
+    ];
+    let mut stl = vec![0; 80];
+    stl.extend_from_slice(&12u32.to_le_bytes());
+    for [a, b, c, d] in faces {
+        for triangle in [[a, b, c], [a, c, d]] {
+            stl.extend_from_slice(&[0; 12]);
+            for x in triangle.iter().flat_map(|i| corner(*i)) {
+                stl.extend_from_slice(&x.to_le_bytes());
+            }
+            stl.extend_from_slice(&[0; 2]);
+        }
+    }
+    stl
+}
+
+const TEXT_STL: &str = "solid one\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0.1 0 0\nvertex 0 0.1 0\nendloop\nendfacet\nendsolid\n";
+
+#[test]
+fn shapes_of_the_description_are_drawn_and_missing_meshes_are_told() {
+    let visual = |inside: &str| format!("<visual><geometry>{inside}</geometry></visual>");
+    let mesh = |file: &str| {
+        visual(&format!(
+            "<mesh filename=\"{file}\" scale=\"0.001 0.001 0.001\"/>"
+        ))
+    };
+    let shapes = [
+        visual("<box size=\"0.1 0.2 0.3\"/>"),
+        visual("<cylinder radius=\"0.1\" length=\"0.3\"/>"),
+        visual("<sphere radius=\"0.1\"/>"),
+        mesh("../meshes/box.stl"),
+        mesh("package://arm_description/one.STL"),
+        mesh("package://elsewhere/box.stl"),
+        mesh("package://unknown/box.stl"),
+        mesh("broken.stl"),
+        mesh("gone.stl"),
+        mesh("body.dae"),
+        visual("<capsule radius=\"1\"/>"),
+    ];
+    let dir = Scratch::new()
+        .robot("ripley")
+        .file("robots/meshes/box.stl", box_stl())
+        .file("robots/arm_description/one.STL", TEXT_STL)
+        .file("packages/elsewhere/box.stl", box_stl())
+        .file("robots/ripley/broken.stl", &box_stl()[..500])
+        .file("robots/ripley/body.dae", "<COLLADA/>")
+        .edit(
+            "robots/ripley.yaml",
+            "urdf: ripley/r17.urdf}",
+            "urdf: ripley/r17.urdf, packages: {elsewhere: ../packages/elsewhere}}",
+        )
+        .edit(
+            "robots/ripley/r17.urdf",
+            "<link name=\"gripper\"/>",
+            &format!("<link name=\"gripper\">{}</link>", shapes.concat()),
+        );
+    let ran = dir
+        .calib(["run", "robots/ripley.yaml", "--out", "out"])
+        .expect(0);
+    assert_eq!(ran.stderr, "");
+    let data = view_data(&dir.read("out/report.html"));
+    let lines: Vec<usize> = data["outlines"]
+        .as_array()
+        .expect("outlines")
+        .iter()
+        .map(|outline| outline["lines"].as_array().expect("lines").len())
+        .collect();
+    // Box; two rims and four sides; three circles; the box without its diagonals; a triangle; the box again.
+    assert_eq!(lines, [12, 36, 48, 12, 3, 12]);
+    let ends = |k: usize| -> Vec<f64> {
+        let lines = data["outlines"][3]["lines"].as_array().expect("lines");
+        lines
+            .iter()
+            .map(|line| line[k].as_f64().expect("a number"))
+            .collect()
+    };
+    assert!(
+        ends(0).iter().all(|x| (x.abs() - 0.1).abs() < 1e-9),
+        "scaled to metres"
+    );
+    let report = dir.json("out/report.json");
+    let finding = report["findings"]
+        .as_array()
+        .and_then(|all| all.iter().find(|f| f["id"] == "shape-not-drawn"))
+        .expect("a finding");
+    insta::assert_snapshot!("shapes_not_drawn", finding["text"].as_str().expect("text"));
+    let read: Vec<&str> = report["inputs"]
+        .as_array()
+        .expect("inputs")
+        .iter()
+        .filter_map(|input| input["path"].as_str())
+        .filter(|path| path.to_lowercase().ends_with(".stl"))
+        .collect();
+    assert_eq!(
+        read,
+        [
+            "../meshes/box.stl",
+            "package://arm_description/one.STL",
+            "package://elsewhere/box.stl"
+        ]
+    );
+    // The robot is the same with and without its looks.
+    let plain = finished("ripley", "ml");
+    assert_eq!(report["transforms"], plain.report["transforms"]);
 }

@@ -213,12 +213,15 @@ fn calibrate(arguments: &Arguments, options: &Run) -> Result<ExitCode, PipelineE
         let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
         emit(&inspect::summary(&output.report, colour));
         if !arguments.quiet {
-            for path in written
+            // Their names stand in the summary.
+            let results = written
                 .iter()
-                .filter(|p| p.file_name().is_some_and(|n| n != write::MANIFEST))
-            {
-                emit(&format!("wrote {}\n", path.display()));
-            }
+                .filter(|p| p.file_name().is_some_and(|n| n != write::MANIFEST));
+            emit(&format!(
+                "wrote {} files to {}\n",
+                results.count(),
+                out.display()
+            ));
         }
     }
     Ok(output.exit)

@@ -2,25 +2,24 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::{Configuration, FeatureKind, RejectReason};
+use calib_core::{Gauge, RejectReason};
 use calib_profile::{Limits, Method, Usage};
 use calib_recording::Finding;
 use calib_report::{
-    AccuracyLimit, Clock, EstimatorResult, FitSummary, HeldOut, Input, JointCoverage, Limit,
-    LoopClosure, Lost, NotObservable, Output, Parameter, RecordingSummary, RecordingUse, Rejected,
-    Report, ResidualRow, Residuals, Term, Transform, Unit, Verdict, Verification, Workspace,
-    WorkspacePoint, judge,
+    Clock, EstimatorResult, FitSummary, HeldOut, Input, JointCoverage, Limit, LoopClosure, Lost,
+    Meaning, NotObservable, Output, Parameter, RecordingSummary, RecordingUse, Rejected, Report,
+    ResidualRow, Residuals, Term, Transform, Unit, Verdict, Verification, judge, number,
 };
-use calib_urdf::LinkId;
-use nalgebra::{Isometry3, Matrix6};
 
+use crate::accuracy::{accuracy_limits, workspace};
 use crate::export::{Found, PatchedUrdf};
-use crate::kinematics::{Calibration, Loads};
+use crate::kinematics::Calibration;
 use crate::load::Inputs;
 use crate::ml::MlFit;
 use crate::paper::OriginEstimate;
 use crate::residuals::subject;
 use crate::tracks::BodyTrack;
+use crate::write::OutputFile;
 
 /// What the report is made of.
 #[derive(Debug)]
@@ -47,6 +46,8 @@ pub struct Evidence<'a> {
     pub held_out: Option<HeldOut>,
     /// The patched description.
     pub urdf: &'a PatchedUrdf,
+    /// Files that do not depend on the report, and what they are.
+    pub written: &'a [(OutputFile, String)],
     /// Residuals of the fit.
     pub residuals: &'a [ResidualRow],
 }
@@ -58,7 +59,13 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
     let file = &e.inputs.robot.file;
     let limits = limits(&profile.solve.limits, e);
     let mut verdict = judge(&limits);
-    let mut reasons: Vec<String> = limits.iter().map(reason).collect();
+    // What decided: with an exceeded limit the others do not matter.
+    let decided = |l: &&Limit| match verdict {
+        Verdict::Accepted => true,
+        Verdict::Rejected => l.outcome == calib_report::Outcome::Exceeded,
+        Verdict::NotEvaluated => l.outcome == calib_report::Outcome::NotEvaluated,
+    };
+    let mut reasons: Vec<String> = limits.iter().filter(decided).map(reason).collect();
     if limits.is_empty() {
         reasons.push(
             "the profile names no limits (`solve.limits`), so nothing could be accepted".to_owned(),
@@ -76,7 +83,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         verdict = Verdict::Rejected;
         reasons.insert(
             0,
-            format!("the solver did not converge: {:?}", fit.solution.status),
+            format!("the solver did not converge: {}", status_words(fit)),
         );
     }
     let goodness = e.fit.and_then(|fit| fit.solution.goodness_of_fit());
@@ -164,10 +171,10 @@ fn reason(limit: &Limit) -> String {
             format!("{}: not evaluated: {}", limit.quantity, limit.reason)
         }
         (outcome, Some(value)) => format!(
-            "{}: {:.2} mm, limit {:.2} mm: {}",
+            "{}: {}, limit {} ({})",
             limit.quantity,
-            value * 1e3,
-            limit.limit * 1e3,
+            number::plain(value, limit.unit),
+            number::plain(limit.limit, limit.unit),
             outcome.word()
         ),
     }
@@ -221,12 +228,23 @@ fn limits(limits: &Limits, e: &Evidence<'_>) -> Vec<Limit> {
 }
 
 fn scope(e: &Evidence<'_>) -> Vec<String> {
-    let mut scope = vec![
-        "positions of the tracked bodies, in the joint ranges and at the load of the recordings"
-            .to_owned(),
-    ];
+    let profile = &e.inputs.robot.profile;
+    let what = if profile.bodies.is_empty() {
+        "what was touched".to_owned()
+    } else {
+        format!(
+            "positions of the tracked bodies in the tracker's frame `{}`",
+            profile.tracker.frame
+        )
+    };
+    let mut scope = vec![format!(
+        "{what}, in the joint ranges and at the load of the recordings"
+    )];
     if e.robot.effects.iter().any(|j| !j.fits_into_urdf()) {
-        scope.push("with the joint effects of the calibration.yaml applied; the URDF alone leaves them uncorrected".to_owned());
+        scope.push(format!(
+            "only with the joint effects of `{}` applied as well; the URDF alone cannot hold them",
+            crate::export::calibration_name(&e.inputs.robot.profile.outputs.urdf)
+        ));
     }
     if e.method == Method::Paper {
         scope.push("origins are estimated one by one (method: paper); the robot's own geometry is taken as described".to_owned());
@@ -249,7 +267,7 @@ fn next_steps(e: &Evidence<'_>, verdict: Verdict, missing: &[String]) -> Vec<Str
         }
     }
     if let Some(first) = missing.first() {
-        steps.push(format!("free the missing effect in the profile: {first}"));
+        steps.push(format!("free in the profile what is missing: {first}"));
     }
     if let Some(worst) = e
         .findings
@@ -328,6 +346,18 @@ fn not_observable(fit: &MlFit) -> Vec<NotObservable> {
         .null
         .iter()
         .map(|d| NotObservable {
+            meaning: match d.gauge {
+                Gauge::WorldAgainstBase
+                | Gauge::OffsetAgainstOwnOrigin
+                | Gauge::OffsetAgainstNeighbour
+                | Gauge::SlideAlongAxis
+                | Gauge::TurnAboutAxis
+                | Gauge::ParallelAxes
+                | Gauge::ToolAgainstLastOrigin
+                | Gauge::MarkersAgainstMount => Meaning::Convention,
+                // With other motion or another mark it would show.
+                _ => Meaning::NotMeasured,
+            },
             subject: d.terms.first().map_or_else(String::new, |t| t.name.clone()),
             direction: d
                 .terms
@@ -343,6 +373,7 @@ fn not_observable(fit: &MlFit) -> Vec<NotObservable> {
         .collect();
     for joint in &fit.solution.observability.unmoved {
         out.push(NotObservable {
+            meaning: Meaning::NotMeasured,
             subject: joint.clone(),
             direction: Vec::new(),
             text: format!(
@@ -354,10 +385,22 @@ fn not_observable(fit: &MlFit) -> Vec<NotObservable> {
     out
 }
 
+fn status_words(fit: &MlFit) -> String {
+    let iterations = match fit.solution.iterations {
+        1 => "1 iteration".to_owned(),
+        n => format!("{n} iterations"),
+    };
+    if fit.solution.status.is_converged() {
+        format!("converged after {iterations}")
+    } else {
+        format!("{:?} after {iterations}", fit.solution.status)
+    }
+}
+
 fn fit_summary(fit: &MlFit) -> FitSummary {
     let s = &fit.solution;
     FitSummary {
-        status: format!("{:?}", s.status),
+        status: status_words(fit),
         converged: s.status.is_converged(),
         iterations: s.iterations,
         observations: s.weights.iter().filter(|w| **w > 0.0).count(),
@@ -581,280 +624,33 @@ fn estimators(e: &Evidence<'_>) -> Vec<EstimatorResult> {
             unit: Unit::Metre,
             distance: Some((pose.translation.vector - found.pose.translation.vector).norm()),
             text: format!(
-                "{:.2} deg apart in orientation",
-                difference.angular().norm().to_degrees()
+                "orientation {} apart",
+                number::plain(difference.angular().norm(), Unit::Radian)
             ),
         });
     }
     out
 }
 
+/// The files of a run: what they are, and their digests where they do not depend on the report itself.
 fn outputs(e: &Evidence<'_>) -> Vec<Output> {
-    let outputs = &e.inputs.robot.profile.outputs;
     let urdf = &e.inputs.robot.profile.urdf;
-    let output = |path: &str, what: String, text: Option<&str>, changes: Option<String>| Output {
+    let written = e.written.iter().map(|(file, what)| Output {
+        path: file.name.clone(),
+        what: (*what).to_owned(),
+        sha256: Some(calib_urdf::sha256_hex(&file.bytes)),
+        changes: (file.name == e.inputs.robot.profile.outputs.urdf).then(|| urdf.clone()),
+    });
+    let own = [
+        ("report.md", "this report as Markdown"),
+        ("report.json", "this report as data"),
+        ("report.html", "this report as a page"),
+    ];
+    let own = own.map(|(path, what)| Output {
         path: path.to_owned(),
-        what,
-        sha256: text.map(|t| calib_urdf::sha256_hex(t.as_bytes())),
-        changes,
-    };
-    vec![
-        output(
-            &outputs.urdf,
-            format!("URDF with {} changed numbers", e.urdf.changes.len()),
-            Some(&e.urdf.text),
-            Some(urdf.clone()),
-        ),
-        output(
-            &format!("{}.changes.json", outputs.urdf),
-            "what `calib revert` needs".to_owned(),
-            None,
-            None,
-        ),
-        output(
-            &outputs.scene,
-            "scene for the situation model".to_owned(),
-            None,
-            None,
-        ),
-        output(
-            "report.md",
-            "this report as Markdown".to_owned(),
-            None,
-            None,
-        ),
-        output("report.json", "this report as data".to_owned(), None, None),
-        output(
-            "report.html",
-            "this report as a page".to_owned(),
-            None,
-            None,
-        ),
-        output(
-            "residuals.csv",
-            "residuals of the fit".to_owned(),
-            None,
-            None,
-        ),
-    ]
-}
-
-/// Indicated joint positions of a sample as a prediction's configuration, loads included.
-fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configuration {
-    let model = &inputs.robot.model;
-    let mut at = Configuration::zero();
-    let loads = fit.stated.loaded.then(|| Loads::at(model, q));
-    for joint in model.joint_ids() {
-        let Some(edge) = fit.stated.joints[joint.index()] else {
-            continue;
-        };
-        at = at.with(edge, model.position(q, joint));
-        if let Some(loads) = &loads {
-            let index = joint.index();
-            at.regressors.insert(
-                (edge, FeatureKind::TorqueCompliance),
-                loads.about_axis[index],
-            );
-            at.regressors
-                .insert((edge, FeatureKind::Lateral1), loads.across[index][0]);
-            at.regressors
-                .insert((edge, FeatureKind::Lateral2), loads.across[index][1]);
-        }
-    }
-    at
-}
-
-/// The link that the longest chain of joints carries a body on.
-fn tool_link(inputs: &Inputs) -> Option<LinkId> {
-    let model = &inputs.robot.model;
-    inputs
-        .robot
-        .profile
-        .bodies
-        .values()
-        .map(|b| b.link)
-        .max_by_key(|l| {
-            model
-                .chain(model.root(), *l)
-                .iter()
-                .filter(|s| model.joint(s.joint).kind.axis().is_some())
-                .count()
-        })
-}
-
-/// Postures at which the workspace is sampled at most.
-const WORKSPACE_POSES: usize = 60;
-
-fn workspace(inputs: &Inputs, fit: &MlFit) -> Option<Workspace> {
-    let model = &inputs.robot.model;
-    let tool = tool_link(inputs)?;
-    let from = fit.stated.links[model.root().index()]?;
-    let to = fit.stated.links[tool.index()]?;
-    let rows: Vec<&Vec<f64>> = inputs
-        .recordings
-        .values()
-        .filter(|r| r.spec.usage != Usage::Sweep)
-        .flat_map(|r| r.q.iter().flatten())
-        .collect();
-    let step = rows.len().div_ceil(WORKSPACE_POSES).max(1);
-    let mut points = Vec::new();
-    for q in rows.iter().step_by(step) {
-        let at = configuration(inputs, fit, q);
-        let body = fit
-            .stated
-            .bodies
-            .iter()
-            .find(|(name, _)| inputs.robot.profile.bodies[*name].link == tool);
-        // The body, not the link: a zero offset against a mount is a convention that a link frame would show as error.
-        let target = body.map_or(to, |(_, frame)| *frame);
-        let pose = fit.solution.relative_pose(from, target, &at).ok()?;
-        let covariance = pose.covariance?;
-        points.push(WorkspacePoint {
-            position_m: pose.pose.translation.vector.into(),
-            sigma_m: covariance.fixed_view::<3, 3>(3, 3).trace().max(0.0).sqrt(),
-        });
-    }
-    Workspace::of(
-        &model.link(tool).name,
-        &model.link(model.root()).name,
-        points,
-    )
-}
-
-/// What a tool error on a new pose is made of: rms over the held-out poses, in metres.
-fn accuracy_limits(
-    e: &Evidence<'_>,
-    fit: &MlFit,
-    workspace: Option<&Workspace>,
-) -> Vec<AccuracyLimit> {
-    let Some(measured) = e.held_out.as_ref().and_then(|h| h.calibrated) else {
-        return Vec::new();
-    };
-    let sigma_of = |name: &str| {
-        fit.solution
-            .noise
-            .iter()
-            .find(|n| n.name == name)
-            .map(|n| n.sigma)
-    };
-    let parameters = workspace.map_or(0.0, |w| w.rms_sigma_m);
-    let tracker = sigma_of("marker")
-        .or_else(|| sigma_of("body position"))
-        .unwrap_or(0.0)
-        * 3.0_f64.sqrt();
-    let joints = sigma_of("joint").unwrap_or(0.0) * joint_lever(e.inputs);
-    let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
-    let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
-    let total = explained + rest.powi(2);
-    let limit = |source: &str, sigma: f64, text: &str, remedy: &str| AccuracyLimit {
-        source: source.to_owned(),
-        sigma_m: Some(sigma),
-        share: Some(if total > 0.0 {
-            sigma.powi(2) / total
-        } else {
-            0.0
-        }),
-        text: text.to_owned(),
-        remedy: remedy.to_owned(),
-    };
-    let mut limits = vec![
-        limit(
-            "tracker noise",
-            tracker,
-            "one measurement of the body on a held-out pose",
-            "average several frames per pose",
-        ),
-        limit(
-            "joint noise",
-            joints,
-            "the joints do not stop where their encoders say, differently at each pose",
-            "let the robot settle; warm it up",
-        ),
-        limit(
-            "parameters",
-            parameters,
-            "what the recordings leave open about the geometry",
-            "record more poses, spread over the range of motion",
-        ),
-        limit(
-            "not modelled",
-            rest,
-            "what neither noise nor uncertainty explains",
-            "see the missing physics among the findings",
-        ),
-    ];
-    limits.sort_by(|a, b| b.share.unwrap_or(0.0).total_cmp(&a.share.unwrap_or(0.0)));
-    limits
-}
-
-/// Root sum of squares over the joints of how far the tool moves per radian, rms over held-out poses, m.
-fn joint_lever(inputs: &Inputs) -> f64 {
-    let model = &inputs.robot.model;
-    let Some(tool) = tool_link(inputs) else {
-        return 0.0;
-    };
-    let rows: Vec<&Vec<f64>> = inputs
-        .recordings
-        .values()
-        .filter(|r| r.spec.usage == Usage::Validation)
-        .flat_map(|r| r.q.iter().flatten())
-        .collect();
-    let squares: f64 = rows
-        .iter()
-        .map(|q| {
-            let columns = model.jacobian(q, tool);
-            columns
-                .iter()
-                .filter(|(id, _)| model.joint(*id).kind.turns())
-                .map(|(_, c)| c.fixed_rows::<3>(3).norm_squared())
-                .sum::<f64>()
-        })
-        .sum();
-    (squares / rows.len().max(1) as f64).sqrt()
-}
-
-/// σ of every number of every calibrated origin, by `<joint>.<x|y|z|turn about x|y|z>` (m, rad).
-#[must_use]
-pub fn origin_sigmas(inputs: &Inputs, fit: &MlFit) -> BTreeMap<String, f64> {
-    let model = &inputs.robot.model;
-    let mut sigmas = BTreeMap::new();
-    for joint in model.joints() {
-        let (Some(parent), Some(child)) = (
-            fit.stated.links[joint.parent.index()],
-            fit.stated.links[joint.child.index()],
-        ) else {
-            continue;
-        };
-        let Ok(derived) = fit
-            .solution
-            .relative_pose(parent, child, &Configuration::zero())
-        else {
-            continue;
-        };
-        let Some(covariance) = derived.covariance else {
-            continue;
-        };
-        for (what, sigma) in number_sigmas(&derived.pose, &covariance) {
-            sigmas.insert(format!("{}.{what}", joint.name), sigma);
-        }
-    }
-    sigmas
-}
-
-fn number_sigmas(pose: &Isometry3<f64>, covariance: &Matrix6<f64>) -> Vec<(&'static str, f64)> {
-    let r = pose.rotation.to_rotation_matrix();
-    let position = r.matrix() * covariance.fixed_view::<3, 3>(3, 3) * r.matrix().transpose();
-    let sigma = |v: f64| v.max(0.0).sqrt();
-    let mut out = vec![
-        ("x", sigma(position[(0, 0)])),
-        ("y", sigma(position[(1, 1)])),
-        ("z", sigma(position[(2, 2)])),
-    ];
-    for (k, what) in ["turn about x", "turn about y", "turn about z"]
-        .into_iter()
-        .enumerate()
-    {
-        out.push((what, sigma(covariance[(k, k)])));
-    }
-    out
+        what: what.to_owned(),
+        sha256: None,
+        changes: None,
+    });
+    written.chain(own).collect()
 }

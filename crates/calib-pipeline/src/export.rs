@@ -11,6 +11,7 @@ use nalgebra::{Isometry3, Matrix6};
 
 use crate::error::PipelineError;
 use crate::kinematics::Calibration;
+use crate::known::Known;
 use crate::load::Inputs;
 use crate::tracks::BodyTrack;
 
@@ -57,7 +58,7 @@ const UNCHANGED: f64 = 1e-12;
 pub fn patch_urdf(
     inputs: &Inputs,
     robot: &Calibration,
-    sigmas: &BTreeMap<String, f64>,
+    known: &BTreeMap<String, Known>,
 ) -> Result<PatchedUrdf, PipelineError> {
     let nominal = &inputs.robot.model;
     let target = robot.urdf_model();
@@ -95,7 +96,7 @@ pub fn patch_urdf(
     let record = patched.record(original);
     let out = &inputs.robot.profile.outputs.urdf;
     let diff = calib_urdf::unified(original, file, &patched.text, out);
-    let changes = number_changes(nominal, &target, &edits, sigmas);
+    let changes = number_changes(nominal, &target, &edits, known);
     Ok(PatchedUrdf {
         text: patched.text,
         changes,
@@ -109,7 +110,7 @@ fn number_changes(
     nominal: &RobotModel,
     target: &RobotModel,
     edits: &[UrdfEdit],
-    sigmas: &BTreeMap<String, f64>,
+    known: &BTreeMap<String, Known>,
 ) -> Vec<Change> {
     let mut changes = Vec::new();
     for edit in edits {
@@ -122,6 +123,7 @@ fn number_changes(
                 let new = target.joint(id).parent_link_from_joint;
                 let mut push = |what: &str, unit: Unit, old: f64, new: f64| {
                     if (new - old).abs() > UNCHANGED {
+                        let known = known.get(&format!("{joint}.{what}"));
                         changes.push(Change {
                             joint: joint.clone(),
                             what: what.to_owned(),
@@ -129,8 +131,8 @@ fn number_changes(
                             old: Some(old),
                             new,
                             delta: Some(new - old),
-                            sigma: sigmas.get(&format!("{joint}.{what}")).copied(),
-                            data_share: None,
+                            sigma: known.map(|k| k.sigma),
+                            data_share: known.and_then(|k| k.data_share),
                         });
                     }
                 };
@@ -166,7 +168,7 @@ fn number_changes(
                         old: None,
                         new: new[k],
                         delta: None,
-                        sigma: None,
+                        sigma: known.get(&format!("{name}.{what}")).map(|k| k.sigma),
                         data_share: None,
                     });
                 }
@@ -181,6 +183,12 @@ fn numbers(pose: &Isometry3<f64>) -> [f64; 6] {
     let t = pose.translation.vector;
     let rpy = rpy_from_rotation(&pose.rotation);
     [t.x, t.y, t.z, rpy[0], rpy[1], rpy[2]]
+}
+
+/// Name of the file beside a patched URDF that holds what a URDF cannot: `r.calibrated.urdf` gives `r.calibrated.calibration.yaml`.
+#[must_use]
+pub fn calibration_name(urdf: &str) -> String {
+    format!("{}.calibration.yaml", urdf.trim_end_matches(".urdf"))
 }
 
 /// The effects that a URDF cannot hold, as YAML; `None` when there are none.

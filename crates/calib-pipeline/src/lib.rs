@@ -10,6 +10,7 @@
 //!
 //! Stages are functions of plain values. Only [`load`] reads files and only [`mod@write`] writes them.
 
+mod accuracy;
 pub mod assemble;
 pub mod checks;
 pub mod closure;
@@ -22,6 +23,7 @@ pub mod export;
 pub mod fit;
 pub mod inspect;
 pub mod kinematics;
+pub mod known;
 pub mod load;
 pub mod loads;
 pub mod ml;
@@ -30,6 +32,7 @@ pub mod paper;
 pub mod readers;
 pub mod residuals;
 pub mod run;
+pub mod shapes;
 pub mod simulate;
 pub mod start;
 pub mod take_back;

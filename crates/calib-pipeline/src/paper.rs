@@ -41,8 +41,12 @@ pub struct OriginEstimate {
     pub status: Status,
     /// Center of rotation in the tracker's frame, where there is one.
     pub center: Option<Point3<f64>>,
+    /// σ of the center along one axis (rms over the three), m, where the estimator states it.
+    pub center_sigma: Option<f64>,
     /// Axis of rotation in the tracker's frame, where one joint was swept.
     pub axis: Option<Line>,
+    /// σ of the axis' point across it (m) and of its direction (rad), where the estimator states them.
+    pub axis_sigma: [Option<f64>; 2],
     /// The same quantity by other estimators.
     pub estimators: Vec<EstimatorResult>,
 }
@@ -92,6 +96,11 @@ type CenterOutcome = Result<CenterFit, String>;
 struct Centers {
     chosen: CenterOutcome,
     others: Vec<(&'static str, CenterOutcome)>,
+}
+
+fn center_sigma(estimate: &CenterFit) -> Option<f64> {
+    let covariance = estimate.covariance?;
+    Some((covariance.trace() / 3.0).max(0.0).sqrt())
 }
 
 fn body_pose(pose: &Isometry3<f64>) -> BodyPose {
@@ -158,7 +167,9 @@ impl Task<'_> {
             }],
             status: Status::Assumed,
             center: None,
+            center_sigma: None,
             axis: None,
+            axis_sigma: [None; 2],
             estimators: Vec::new(),
         }
     }
@@ -360,7 +371,9 @@ impl Task<'_> {
             unobservable: Vec::new(),
             status: Status::Calibrated,
             center: Some(estimate.center),
+            center_sigma: center_sigma(&estimate),
             axis: None,
+            axis_sigma: [None; 2],
             estimators: self.agreement(&point, &covariance, &others),
         })
     }
@@ -391,7 +404,9 @@ impl Task<'_> {
             unobservable: vec![self.assumed_orientation()],
             status: Status::Assumed,
             center: Some(estimate.center),
+            center_sigma: center_sigma(&estimate),
             axis: None,
+            axis_sigma: [None; 2],
             estimators: self.agreement(&point, &covariance, &others),
         })
     }
@@ -502,7 +517,10 @@ impl Task<'_> {
             ],
             status: Status::Assumed,
             center: None,
+            center_sigma: None,
             axis: Some(axis.line),
+            axis_sigma: [axis.point_variance, axis.direction_variance]
+                .map(|v| v.map(|v| v.max(0.0).sqrt())),
             estimators: Vec::new(),
         })
     }

@@ -17,13 +17,15 @@ use crate::error::{ExitCode, PipelineError};
 use crate::estimators::values;
 use crate::export::{Found, calibration_yaml, patch_urdf, scene};
 use crate::kinematics::Calibration;
+use crate::known::{Known, known_numbers};
 use crate::load::{Inputs, load_recordings, load_robot};
 use crate::ml::{self, Freedom, MlFit};
 use crate::paper::{self, OriginEstimate};
+use crate::shapes;
 use crate::start::{Start, mean_pose, start};
 use crate::tracks::{BodyTrack, body_tracks};
 use crate::verify;
-use crate::view::view;
+use crate::view::{Shown, view};
 use crate::write::OutputFile;
 
 /// How to run.
@@ -60,10 +62,13 @@ pub fn run(
     progress("read profile and robot");
     let robot = load_robot(profile)?;
     progress("read recordings");
-    let inputs = load_recordings(robot, !options.no_plugins)?;
+    let mut inputs = load_recordings(robot, !options.no_plugins)?;
     progress("check data");
     let mut findings = inputs.findings.clone();
     findings.extend(checks::check(&inputs));
+    let (outlines, meshes) = shapes::outlines(&inputs.robot, &mut findings);
+    inputs.digests.extend(meshes);
+    let inputs = inputs;
     if checks::stops(&findings) && !options.force {
         return Err(stopped(&inputs, &findings));
     }
@@ -119,7 +124,7 @@ pub fn run(
         &solved.robot,
     );
     progress("patch the URDF");
-    let urdf = patch_urdf(&inputs, &solved.robot, &solved.origin_sigmas)?;
+    let urdf = patch_urdf(&inputs, &solved.robot, &solved.known)?;
     let scene = scene(
         &inputs,
         &tracks,
@@ -130,6 +135,15 @@ pub fn run(
     progress("write the report");
     let residuals =
         crate::residuals::residual_rows(&inputs, &tracks, &solved.robot, solved.fit.as_ref());
+    let shown = Shown {
+        nominal: &nominal,
+        robot: &solved.robot,
+        origins: &origins,
+        held_out: held_out.as_ref(),
+        fit: solved.fit.as_ref(),
+    };
+    let view = view(&inputs, &tracks, &shown, outlines);
+    let written = written(&inputs, &residuals, &scene, &view, &urdf, &solved.robot)?;
     let report = assemble(&Evidence {
         inputs: &inputs,
         tracks: &tracks,
@@ -142,18 +156,10 @@ pub fn run(
         loops,
         held_out,
         urdf: &urdf,
+        written: &written,
         residuals: &residuals,
     });
-    let view = view(&inputs, &tracks, &nominal, &solved.robot, &origins);
-    let files = files(
-        &inputs,
-        &report,
-        &residuals,
-        &scene,
-        &urdf,
-        &solved.robot,
-        &view,
-    )?;
+    let files = files(&inputs, &report, &scene, written, &view)?;
     let exit = exit_code(&report, solved.fit.as_ref(), &origins);
     Ok(RunOutput {
         report,
@@ -170,7 +176,7 @@ struct Solved {
     registered: Option<Calibration>,
     found: Vec<Found>,
     root_covariance: Option<Matrix6<f64>>,
-    origin_sigmas: BTreeMap<String, f64>,
+    known: BTreeMap<String, Known>,
     fit: Option<MlFit>,
 }
 
@@ -332,7 +338,7 @@ fn paper_result(
         registered: None,
         found,
         root_covariance: None,
-        origin_sigmas: BTreeMap::new(),
+        known: BTreeMap::new(),
         fit: None,
     }
 }
@@ -455,14 +461,14 @@ fn ml_result(
         }
         None => None,
     };
-    let origin_sigmas = crate::assemble::origin_sigmas(inputs, &fit);
+    let known = known_numbers(inputs, &fit);
     Ok(Solved {
         robot: fit.calibration.clone(),
         fk: fit.calibration.clone(),
         registered: Some(registered),
         found,
         root_covariance,
-        origin_sigmas,
+        known,
         fit: Some(fit),
     })
 }
@@ -476,57 +482,102 @@ fn in_words(twist: &calib_geometry::Twist) -> Unobservable {
         const ON_AXIS: f64 = 0.999_95;
         let n = a / a.norm();
         match n.iter().position(|c| c.abs() > ON_AXIS) {
-            Some(k) => ["x", "y", "z"][k].to_owned(),
-            None => format!("[{:.2}, {:.2}, {:.2}]", n.x, n.y, n.z),
+            Some(k) => format!("{} axis", ["x", "y", "z"][k]),
+            None => format!("direction [{:.2}, {:.2}, {:.2}]", n.x, n.y, n.z),
         }
     };
-    let text = match (w.norm() > 1e-6, v.norm() > 1e-6) {
-        (true, false) => format!("a turn about {} of the child", axis(&w)),
-        (false, true) => format!("a shift along {} of the child", axis(&v)),
+    let motion = match (w.norm() > 1e-6, v.norm() > 1e-6) {
+        (true, false) => format!("a turn about its {}", axis(&w)),
+        (false, true) => format!("a shift along its {}", axis(&v)),
         _ => format!(
-            "a turn about {} with a shift along {} of the child",
+            "a turn about its {} with a shift along its {}",
             axis(&w),
             axis(&v)
         ),
-    } + ": the data leave it open, its size is what the priors share out";
+    };
+    let text = format!("{motion}: no measurement shows it, the priors chose its size");
     Unobservable {
         direction,
         text,
-        remedy: "a convention between this frame and its neighbours (see the combinations below); a mark or a second axis would define it".to_owned(),
+        remedy: "usually nothing: it is a convention between this frame and the next, and the combinations below say with which; a mark or a second axis on the link would define it".to_owned(),
     }
 }
 
-fn files(
+/// The files that do not depend on the report, and what they are in words.
+fn written(
     inputs: &Inputs,
-    report: &Report,
     residuals: &[ResidualRow],
     scene: &calib_report::Scene,
+    view: &calib_report::view3d::View3d,
     urdf: &crate::export::PatchedUrdf,
     robot: &Calibration,
-    view: &calib_report::view3d::View3d,
-) -> Result<Vec<OutputFile>, PipelineError> {
+) -> Result<Vec<(OutputFile, String)>, PipelineError> {
     let outputs = &inputs.robot.profile.outputs;
     let mut record = calib_report::json::exact_json(&urdf.record)?;
     record.push('\n');
     let stem = outputs.scene.trim_end_matches(".json");
     let mut files = vec![
+        (
+            OutputFile::text(outputs.urdf.clone(), urdf.text.clone()),
+            format!("URDF with {} changed numbers", urdf.changes.len()),
+        ),
+        (
+            OutputFile::text(format!("{}.changes.json", outputs.urdf), record),
+            "what `calib revert` needs".to_owned(),
+        ),
+    ];
+    if let Some(yaml) = calibration_yaml(inputs, robot) {
+        let name = crate::export::calibration_name(&outputs.urdf);
+        let what = "joint effects that a URDF cannot hold".to_owned();
+        files.push((OutputFile::text(name, yaml), what));
+    }
+    let mut put = |name: String, text: String, what: &str| {
+        files.push((OutputFile::text(name, text), what.to_owned()));
+    };
+    put(
+        outputs.scene.clone(),
+        scene.json()?,
+        "scene for the situation model",
+    );
+    put(
+        format!("{stem}.launch.py"),
+        scene.ros_launch()?,
+        "the scene as a ROS 2 launch file",
+    );
+    put(
+        format!("{stem}.sdf"),
+        scene.sdf()?,
+        "the scene as an SDF world",
+    );
+    put(
+        "residuals.csv".to_owned(),
+        calib_report::csv::residuals_csv(residuals)?,
+        "residuals of the fit, row by row",
+    );
+    files.push((
+        OutputFile {
+            name: format!("{stem}.glb"),
+            bytes: calib_report::glb::glb(scene, view)?,
+        },
+        "robot, markers and errors for viewers of 3-D files (glTF)".to_owned(),
+    ));
+    Ok(files)
+}
+
+fn files(
+    inputs: &Inputs,
+    report: &Report,
+    scene: &calib_report::Scene,
+    written: Vec<(OutputFile, String)>,
+    view: &calib_report::view3d::View3d,
+) -> Result<Vec<OutputFile>, PipelineError> {
+    let outputs = &inputs.robot.profile.outputs;
+    let mut files = vec![
         OutputFile::text("report.md", calib_report::markdown::markdown(report)),
         OutputFile::text("report.json", calib_report::json::report_json(report)?),
         OutputFile::text("report.html", calib_report::html::html(report, Some(view))?),
-        OutputFile::text(
-            "residuals.csv",
-            calib_report::csv::residuals_csv(residuals)?,
-        ),
-        OutputFile::text(outputs.urdf.clone(), urdf.text.clone()),
-        OutputFile::text(format!("{}.changes.json", outputs.urdf), record),
-        OutputFile::text(outputs.scene.clone(), scene.json()?),
-        OutputFile::text(format!("{stem}.launch.py"), scene.ros_launch()?),
-        OutputFile::text(format!("{stem}.sdf"), scene.sdf()?),
     ];
-    if let Some(yaml) = calibration_yaml(inputs, robot) {
-        let stem = outputs.urdf.trim_end_matches(".urdf");
-        files.push(OutputFile::text(format!("{stem}.calibration.yaml"), yaml));
-    }
+    files.extend(written.into_iter().map(|(file, _)| file));
     let report_json = files[1].bytes.clone();
     let scene_json = scene.json()?.into_bytes();
     for (name, parameters) in &outputs.reports {

@@ -1,4 +1,4 @@
-//! Position errors on poses that were not fitted: nominal, registration only, calibrated.
+//! Position and orientation errors on poses that were not fitted: nominal, registration only, calibrated.
 
 use std::collections::BTreeMap;
 
@@ -23,6 +23,8 @@ pub struct Deviation {
     pub subject: String,
     /// Predicted − measured, m.
     pub vector: Vector3<f64>,
+    /// Angle between predicted and measured orientation, rad; `None` for a marker.
+    pub angle: Option<f64>,
 }
 
 /// Deviations of a robot from what the tracker saw of every body that a joint moves, in recordings of one use.
@@ -55,6 +57,7 @@ pub fn deviations(
                         row,
                         subject: contact_name.clone(),
                         vector: off,
+                        angle: None,
                     });
                 }
             }
@@ -67,22 +70,24 @@ pub fn deviations(
                     continue;
                 }
                 let tracker_from_link = robot.tracker_from_root * root_from_link[body.link.index()];
-                let mut push = |subject: &str, predicted: Vector3<f64>, measured: Vector3<f64>| {
+                let mut push = |subject: &str, vector: Vector3<f64>, angle: Option<f64>| {
                     out.push(Deviation {
                         recording: name.clone(),
                         row,
                         subject: subject.to_owned(),
-                        vector: predicted - measured,
+                        vector,
+                        angle,
                     });
                 };
                 let track = &tracks[body_name];
                 let seen: Option<Isometry3<f64>> =
                     track.in_recording(name).get(row).copied().flatten();
                 if let (Some(mount), Some(seen)) = (robot.mounts.get(body_name), seen) {
+                    let predicted = tracker_from_link * mount;
                     push(
                         body_name,
-                        (tracker_from_link * mount).translation.vector,
-                        seen.translation.vector,
+                        predicted.translation.vector - seen.translation.vector,
+                        Some(predicted.rotation.angle_to(&seen.rotation)),
                     );
                 } else if let (BodyKind::Markers { names, .. }, None) =
                     (&body.kind, &track.template)
@@ -91,7 +96,7 @@ pub fn deviations(
                         let on_link = robot.points.get(body_name).and_then(|p| p.get(marker));
                         let seen = loaded.poses.markers.get(marker).and_then(|t| t[row]);
                         if let (Some(on_link), Some(seen)) = (on_link, seen) {
-                            push(marker, (tracker_from_link * on_link).coords, seen.coords);
+                            push(marker, tracker_from_link * on_link - seen, None);
                         }
                     }
                 }
@@ -111,15 +116,12 @@ pub fn held_out(
     calibrated: &Calibration,
 ) -> Option<HeldOut> {
     let validation = |usage| usage == Usage::Validation;
-    let lengths = |robot: Option<&Calibration>| -> Vec<f64> {
-        robot.map_or_else(Vec::new, |r| {
-            deviations(inputs, tracks, r, validation)
-                .iter()
-                .map(|d| d.vector.norm())
-                .collect()
-        })
+    let of = |robot: Option<&Calibration>| {
+        robot.map_or_else(Vec::new, |r| deviations(inputs, tracks, r, validation))
     };
-    let (nominal, registered) = (lengths(nominal), lengths(registration_only));
+    let (nominal, registered) = (of(nominal), of(registration_only));
+    let length = |d: &[Deviation], i: usize| d.get(i).map(|d| d.vector.norm());
+    let angle = |d: &[Deviation], i: usize| d.get(i).and_then(|d| d.angle);
     let best = deviations(inputs, tracks, calibrated, validation);
     if best.is_empty() {
         return None;
@@ -135,13 +137,17 @@ pub fn held_out(
                 .as_ref()
                 .and_then(|g| loaded.poses.labels.get(g));
             PoseError {
-                pose: format!("{}:{} {}", d.recording, loaded.poses.rows[d.row], d.subject),
+                pose: format!("{}:{}", d.recording, loaded.poses.rows[d.row]),
+                subject: d.subject.clone(),
                 group: group.map_or_else(String::new, |g| g[d.row].clone()),
                 joints: joint_values(inputs, &d.recording, d.row),
-                nominal_m: nominal.get(i).copied(),
-                registration_only_m: registered.get(i).copied(),
+                nominal_m: length(&nominal, i),
+                registration_only_m: length(&registered, i),
                 calibrated_m: Some(d.vector.norm()),
                 vector_m: Some(d.vector.into()),
+                nominal_rad: angle(&nominal, i),
+                registration_only_rad: angle(&registered, i),
+                calibrated_rad: d.angle,
             }
         })
         .collect();
@@ -152,9 +158,9 @@ pub fn held_out(
     let touches = inputs.robot.profile.contacts.values().any(touched);
     Some(HeldOut::from_poses(
         if touches {
-            "position of the tracked bodies against their prediction, and how far touches miss"
+            "position of the tracked bodies, and how far touches miss"
         } else {
-            "position of the tracked bodies against their prediction"
+            "position of the tracked bodies"
         },
         poses,
     ))

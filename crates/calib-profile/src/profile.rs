@@ -19,6 +19,8 @@ pub struct Profile {
     pub robot: String,
     /// URDF file, relative to the profile.
     pub urdf: String,
+    /// Folders of packages with meshes, relative to the profile, by name.
+    pub packages: BTreeMap<String, String>,
     /// The tracker.
     pub tracker: Tracker,
     /// Tracking bodies by name.

@@ -59,6 +59,10 @@ pub struct RawRobot {
     pub name: String,
     /// URDF file, relative to the profile.
     pub urdf: String,
+    /// Folders of the packages that the URDF's meshes name (`package://<name>/…`), relative to the profile, by name. Only for
+    /// the picture; packages that lie around the URDF are found without it.
+    #[serde(default)]
+    pub packages: BTreeMap<String, String>,
 }
 
 /// The optical tracker.

@@ -280,12 +280,24 @@ pub struct Workspace {
     pub link: String,
     /// The frame of the positions.
     pub frame: String,
+    /// The frame in which the point is predicted with this uncertainty: the tracker's. Empty where it is [`Workspace::frame`].
+    #[serde(default)]
+    pub relative_to: String,
     /// Positions and their uncertainty.
     pub points: Vec<WorkspacePoint>,
     /// Root mean square of σ over the points, m.
     pub rms_sigma_m: f64,
     /// Largest σ, m.
     pub max_sigma_m: f64,
+}
+
+impl Workspace {
+    /// The same with the frame in which the point is predicted.
+    #[must_use]
+    pub fn relative_to(mut self, frame: impl Into<String>) -> Self {
+        self.relative_to = frame.into();
+        self
+    }
 }
 
 /// The tool at one place.
@@ -314,6 +326,7 @@ impl Workspace {
         Some(Self {
             link: link.into(),
             frame: frame.into(),
+            relative_to: String::new(),
             points,
             rms_sigma_m: stats.rms,
             max_sigma_m: stats.max,

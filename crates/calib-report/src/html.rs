@@ -1,6 +1,6 @@
 //! `report.html`: one file that opens from disk, without network, in light and dark, on paper and by keyboard.
 //!
-//! The first screen answers twelve questions ([`crate::answers`]); below stand the 3-D view and the sections that Markdown has,
+//! The first screen answers twelve questions ([`crate::answers`]), where it is too small by links to the answers; below stand the 3-D view and the sections that Markdown has,
 //! with the pictures of [`crate::plots`]. A content security policy forbids the page to load anything.
 
 use crate::plots::plots;
@@ -26,6 +26,7 @@ struct Page<'a> {
 struct AnswerPart {
     id: &'static str,
     question: &'static str,
+    short: &'static str,
     lines: Vec<Markup>,
 }
 
@@ -129,6 +130,7 @@ pub fn html(report: &Report, view: Option<&View3d>) -> Result<String, ReportErro
             .map(|answer| AnswerPart {
                 id: answer.id,
                 question: answer.question,
+                short: answer.short,
                 lines: answer
                     .lines
                     .iter()

@@ -24,6 +24,7 @@ mod answers;
 pub mod csv;
 mod data;
 mod error;
+pub mod glb;
 pub mod html;
 pub mod json;
 pub mod markdown;
@@ -52,11 +53,13 @@ pub use quantity::{JointValue, Unit};
 pub use report::{FormatVersion, Limit, Method, Outcome, Report, Verdict, judge};
 pub use residuals::{JointResiduals, ResidualBin, ResidualGroup, ResidualRow, Residuals};
 pub use results::{
-    Change, Class, EstimatorResult, NotObservable, Parameter, Status, Term, Transform, Unobservable,
+    Change, Class, EstimatorResult, Meaning, NotObservable, Parameter, Status, Term, Transform,
+    Unobservable,
 };
 pub use scene::Scene;
 pub use schema::{report_schema, scene_schema};
 pub use verification::{
-    ErrorStats, ExpectedError, HeldOut, LoopClosure, LoopGroup, PoseError, Stats, Verification,
+    AngleStats, ErrorStats, ExpectedError, HeldOut, LoopClosure, LoopGroup, OrientationErrors,
+    PoseError, Stats, Verification,
 };
 pub use view3d::View3d;

@@ -407,10 +407,11 @@ fn workspace(plots: &mut Vec<Plot>, report: &Report) {
     plots.push(Plot {
         id: "plot-workspace".into(),
         section: "workspace",
-        title: format!("Predicted σ of {} in {}", workspace.link, workspace.frame),
-        description:
-            "From above and from the side; the stronger the colour, the less certain the tool is there."
-                .into(),
+        title: format!("Predicted σ of {}", workspace.link),
+        description: format!(
+            "Places in {}, from above and from the side; the stronger the colour, the less certain the tool is there.",
+            workspace.frame
+        ),
         kind: PlotKind::Map {
             value: "σ [mm]".into(),
             panels: vec![panel(0, 1), panel(0, 2)],

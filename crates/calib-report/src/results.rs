@@ -133,9 +133,23 @@ pub struct Term {
     pub coefficient: f64,
 }
 
+/// What a direction that the data do not see means for the user of the result.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Meaning {
+    /// Two descriptions of the same robot: every prediction of a tracked body is the same with either.
+    Convention,
+    /// Nothing was recorded that shows it: poses that depend on it are predicted as described, not as measured.
+    #[default]
+    NotMeasured,
+}
+
 /// A combination of parameters that the data cannot tell from nothing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NotObservable {
+    /// What it means for the user.
+    #[serde(default)]
+    pub meaning: Meaning,
     /// What is asked: a joint, an origin, a pair of them.
     pub subject: String,
     /// The direction in parameter space.
@@ -144,6 +158,17 @@ pub struct NotObservable {
     pub text: String,
     /// What to record, or to choose.
     pub remedy: String,
+}
+
+impl NotObservable {
+    /// Its text, with the subject in front where the text does not name it.
+    pub(crate) fn words(&self) -> String {
+        if self.text.contains(&format!("`{}`", self.subject)) {
+            self.text.clone()
+        } else {
+            format!("`{}`: {}", self.subject, self.text)
+        }
+    }
 }
 
 /// How well a parameter is known.

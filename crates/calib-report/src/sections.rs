@@ -105,16 +105,6 @@ fn code(text: &str) -> String {
     }
 }
 
-/// One line that ends like a sentence.
-fn sentence(text: &str) -> String {
-    let text = text.trim();
-    if text.ends_with(['.', '!', '?']) {
-        text.to_owned()
-    } else {
-        format!("{text}.")
-    }
-}
-
 fn mm(metres: f64) -> String {
     number::bare(metres, Unit::Metre)
 }

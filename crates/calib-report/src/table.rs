@@ -187,10 +187,21 @@ fn cell(text: &str) -> String {
 
 /// One line without HTML; text of names and files stands as it is.
 pub(crate) fn markup_free(text: &str) -> String {
-    text.split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
-        .replace('<', "&lt;")
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    // Only `<` before a letter, `/`, `!` or `?` begins markup; "< 1 %" reads better as it is.
+    let mut out = String::with_capacity(line.len());
+    let mut letters = line.chars().peekable();
+    while let Some(c) = letters.next() {
+        let begins = letters
+            .peek()
+            .is_some_and(|next| next.is_ascii_alphabetic() || matches!(next, '/' | '!' | '?'));
+        if c == '<' && begins {
+            out.push_str("&lt;");
+        } else {
+            out.push(c);
+        }
+    }
+    out
 }
 
 /// Words over lines of at most `columns` characters, the first with `first`, the others with `rest` before them.

@@ -1,7 +1,8 @@
 //! The summary for a terminal: the verdict, the numbers that carry it, what is open. At most 80 columns.
 
+use crate::answers::{answers_in, full_stop, sentence};
 use crate::table::{Table, wrap};
-use crate::{Class, Outcome, Report, Severity, Unit, Verdict, answers, number};
+use crate::{Class, Outcome, Report, Severity, Unit, Verdict, number};
 use anstyle::{AnsiColor, Style};
 
 /// Columns of the narrowest terminal that people still use.
@@ -36,11 +37,13 @@ pub fn summary(report: &Report, colour: bool) -> String {
         &report.verdict.word().to_uppercase(),
     );
     text.push('\n');
-    for reason in &report.reasons {
-        text += &wrap(reason, COLUMNS, "- ", "  ");
+    // What was met stands in the table of limits already.
+    let told = report.verdict == Verdict::Accepted && !report.limits.is_empty();
+    for reason in report.reasons.iter().filter(|_| !told) {
+        text += &wrap(&sentence(reason), COLUMNS, "- ", "  ");
     }
     for scope in &report.scope {
-        text += &wrap(scope, COLUMNS, "  for: ", "       ");
+        text += &wrap(&full_stop(scope), COLUMNS, "  for: ", "       ");
     }
 
     if !report.limits.is_empty() {
@@ -71,7 +74,7 @@ pub fn summary(report: &Report, colour: bool) -> String {
     }
 
     if let Some(held_out) = &report.verification.held_out {
-        text += &heading(&format!("Held-out error, {} poses [mm]", held_out.n));
+        text += &heading(&format!("Held-out error [mm], {} values", held_out.n));
         let mut table = Table::new(&["<", ">mean", ">rms", ">95 %", ">max"]);
         for (name, stats) in [
             ("nominal", held_out.nominal),
@@ -92,6 +95,14 @@ pub fn summary(report: &Report, colour: bool) -> String {
                 number::percent(expected.confidence),
                 length(expected.low_m),
                 length(expected.high_m)
+            );
+            text += &wrap(&line, COLUMNS, "  ", "  ");
+        }
+        if let Some(angle) = held_out.orientation.and_then(|o| o.calibrated) {
+            let line = format!(
+                "Orientation: {} rms, {} at most.",
+                number::plain(angle.rms_rad, Unit::Radian),
+                number::plain(angle.max_rad, Unit::Radian)
             );
             text += &wrap(&line, COLUMNS, "  ", "  ");
         }
@@ -147,13 +158,13 @@ pub fn summary(report: &Report, colour: bool) -> String {
         }
         if weak > 0 {
             text += &format!(
-                "  {weak} of {} parameters are not solid: see the report.\n",
+                "  {weak} of {} parameters are not known from the data alone: see the report.\n",
                 report.parameters.len()
             );
         }
     }
 
-    let all = answers(report);
+    let all = answers_in(report, "in the report");
     for (id, title) in [("not-known", "Not known"), ("thrown-out", "Thrown out")] {
         if let Some(answer) = all.iter().find(|answer| answer.id == id) {
             text += &heading(title);
@@ -197,7 +208,7 @@ pub fn summary(report: &Report, colour: bool) -> String {
     if !report.next_steps.is_empty() {
         text += &heading("Next");
         for step in &report.next_steps {
-            text += &wrap(step, COLUMNS, "  - ", "    ");
+            text += &wrap(&sentence(step), COLUMNS, "  - ", "    ");
         }
     }
     if !report.outputs.is_empty() {

@@ -3,6 +3,7 @@ use nalgebra::{Matrix3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::collections::BTreeSet;
 
 /// Errors on data that took no part in the fit.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -20,14 +21,20 @@ pub struct Verification {
 /// The same held-out poses under three models.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldOut {
-    /// Number of poses.
+    /// Number of errors: one a posture and body (or marker).
     pub n: usize,
+    /// Number of postures of the robot behind them: several bodies are seen in one.
+    #[serde(default)]
+    pub postures: usize,
     /// The URDF as it was delivered, mounts and tracker as the profile states them; null when the profile states none.
     pub nominal: Option<ErrorStats>,
     /// The delivered URDF after the best rigid registration of tracker and mounts: what a calibration must beat.
     pub registration_only: Option<ErrorStats>,
     /// The calibrated robot.
     pub calibrated: Option<ErrorStats>,
+    /// Orientation errors of the same three, where a body's orientation is measured; null where none is.
+    #[serde(default)]
+    pub orientation: Option<OrientationErrors>,
     /// What the errors are errors of: "position of gripM".
     #[serde(default)]
     pub quantity: String,
@@ -46,9 +53,17 @@ impl HeldOut {
     /// Summarise the poses: [`ErrorStats`] per model over the poses that have it, the expected error with its 95 % interval, the worst pose.
     #[must_use]
     pub fn from_poses(quantity: impl Into<String>, poses: Vec<PoseError>) -> Self {
-        let over = |error: fn(&PoseError) -> Option<f64>| {
-            ErrorStats::of(&poses.iter().filter_map(error).collect::<Vec<_>>())
+        let lengths = |error: fn(&PoseError) -> Option<f64>| {
+            poses.iter().filter_map(error).collect::<Vec<_>>()
         };
+        let over = |error| ErrorStats::of(&lengths(error));
+        let angles = |error| AngleStats::of(&lengths(error));
+        let orientation = OrientationErrors {
+            nominal: angles(|pose| pose.nominal_rad),
+            registration_only: angles(|pose| pose.registration_only_rad),
+            calibrated: angles(|pose| pose.calibrated_rad),
+        };
+        let postures: BTreeSet<&str> = poses.iter().map(|pose| pose.pose.as_str()).collect();
         let calibrated: Vec<f64> = poses.iter().filter_map(|pose| pose.calibrated_m).collect();
         let worst = poses
             .iter()
@@ -67,6 +82,8 @@ impl HeldOut {
         };
         Self {
             n: poses.len(),
+            postures: postures.len(),
+            orientation: (orientation != OrientationErrors::default()).then_some(orientation),
             nominal: over(|pose| pose.nominal_m),
             registration_only: over(|pose| pose.registration_only_m),
             calibrated: ErrorStats::of(&calibrated),
@@ -81,8 +98,11 @@ impl HeldOut {
 /// One held-out pose.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PoseError {
-    /// The pose's label: `check 7`.
+    /// The posture's label: `check 7`. Errors of one posture share it.
     pub pose: String,
+    /// The body or marker whose error it is; empty where there is only one.
+    #[serde(default)]
+    pub subject: String,
     /// The validation group it belongs to (a torso angle); empty when there is one group.
     pub group: String,
     /// Joint positions.
@@ -95,6 +115,65 @@ pub struct PoseError {
     pub calibrated_m: Option<f64>,
     /// predicted − observed with the calibrated robot, in the tracker frame, m.
     pub vector_m: Option<[f64; 3]>,
+    /// Angle between predicted and observed orientation with the delivered robot, rad; null where no orientation is measured.
+    #[serde(default)]
+    pub nominal_rad: Option<f64>,
+    /// The same after registration only, rad.
+    #[serde(default)]
+    pub registration_only_rad: Option<f64>,
+    /// The same with the calibrated robot, rad.
+    #[serde(default)]
+    pub calibrated_rad: Option<f64>,
+}
+
+impl PoseError {
+    /// Posture and body, as a reader sees them.
+    #[must_use]
+    pub fn label(&self) -> String {
+        if self.subject.is_empty() {
+            self.pose.clone()
+        } else {
+            format!("{} {}", self.pose, self.subject)
+        }
+    }
+}
+
+/// Orientation errors of the same held-out poses under three models.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OrientationErrors {
+    /// As [`HeldOut::nominal`].
+    pub nominal: Option<AngleStats>,
+    /// As [`HeldOut::registration_only`].
+    pub registration_only: Option<AngleStats>,
+    /// As [`HeldOut::calibrated`].
+    pub calibrated: Option<AngleStats>,
+}
+
+/// Angles over poses, rad.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AngleStats {
+    /// Mean.
+    pub mean_rad: f64,
+    /// Root of the mean square.
+    pub rms_rad: f64,
+    /// 95 % quantile, linearly interpolated.
+    pub p95_rad: f64,
+    /// Largest.
+    pub max_rad: f64,
+}
+
+impl AngleStats {
+    /// Of angles; `None` without any finite one.
+    #[must_use]
+    pub fn of(angles_rad: &[f64]) -> Option<Self> {
+        let stats = ErrorStats::of(angles_rad)?;
+        Some(Self {
+            mean_rad: stats.mean_m,
+            rms_rad: stats.rms_m,
+            p95_rad: stats.p95_m,
+            max_rad: stats.max_m,
+        })
+    }
 }
 
 /// Error lengths over poses, m.

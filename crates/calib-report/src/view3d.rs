@@ -118,6 +118,9 @@ pub struct Axis {
     pub sigma_point: Option<f64>,
     /// σ of the direction, rad.
     pub sigma_direction: Option<f64>,
+    /// The frame that point and direction are in, an index into [`View3d::frames`]: the axis moves with the calibrated robot.
+    /// `None`: it stands still in [`View3d::frame`].
+    pub frame: Option<usize>,
 }
 
 impl Axis {
@@ -139,6 +142,9 @@ const OUTLINE_LINES: usize = 15_000;
 
 /// Poses in the page.
 const POSES: usize = 200;
+
+/// Frames of all poses together in the page: 110 bytes each for both robots, a megabyte.
+const POSE_FRAMES: usize = 9_000;
 
 /// Lines of one outline in the still picture.
 const STILL_LINES: usize = 300;
@@ -190,7 +196,8 @@ impl View3d {
                 .collect();
         }
         let fits = |rows: &Vec<[f64; 7]>| rows.len() == frames && rows.iter().all(finite);
-        let step = view.poses.len().div_ceil(POSES).max(1);
+        let most = POSES.min(POSE_FRAMES / frames.max(1)).max(1);
+        let step = view.poses.len().div_ceil(most).max(1);
         view.poses = view
             .poses
             .into_iter()
@@ -210,7 +217,10 @@ impl View3d {
             finite(&circle.center) && finite(&circle.normal) && circle.radius.is_finite()
         });
         view.axes.retain(|axis| {
-            finite(&axis.point) && finite(&axis.direction) && axis.half_length.is_finite()
+            axis.frame.is_none_or(|frame| frame < frames)
+                && finite(&axis.point)
+                && finite(&axis.direction)
+                && axis.half_length.is_finite()
         });
         if !(view.magnification.is_finite() && view.magnification >= 1.0) {
             view.magnification = 1.0;
@@ -245,10 +255,9 @@ impl View3d {
             .clouds
             .iter()
             .flat_map(|cloud| cloud.points.iter().copied());
-        let axes = self
-            .axes
-            .iter()
-            .flat_map(|axis| [axis.end(-1.0), axis.end(1.0)]);
+        // Axes that move with the robot are as long as they are drawn: they do not widen the picture.
+        let still = || self.axes.iter().filter(|axis| axis.frame.is_none());
+        let axes = still().flat_map(|axis| [axis.end(-1.0), axis.end(1.0)]);
         let everything = robot.chain(swept).chain(axes);
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for place in everything.map(|p| flat(&p)) {
@@ -295,7 +304,7 @@ impl View3d {
             });
             body.path("thin", &around.collect::<Vec<_>>());
         }
-        for axis in &self.axes {
+        for axis in still() {
             body.line("line s2", place(&axis.end(-1.0)), place(&axis.end(1.0)));
         }
         if let Some(pose) = self.poses.first() {

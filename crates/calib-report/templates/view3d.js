@@ -128,6 +128,12 @@
       for (let k = 0; k < 3; k++) { const e = [0, 0, 0]; e[k] = long; line(row, add(row, rotate(row.slice(3), e), 1), names[k], 1.5); }
     });
   }
+  // An axis of a joint moves with the calibrated robot.
+  function inWorld(a) {
+    if (a.frame === null) return a;
+    const row = view.poses[pose] && view.poses[pose].calibrated[a.frame];
+    return row && Object.assign({}, a, { point: add(row, rotate(row.slice(3), a.point), 1), direction: rotate(row.slice(3), a.direction) });
+  }
   function drawJoints() {
     for (const s of view.spheres) {
       for (const n of [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) ring(s.center, n, s.radius, colours.s2, 0.7);
@@ -136,7 +142,9 @@
       if (shown.names) text(s.center, s.name, colours.s2);
     }
     for (const c of view.circles) ring(c.center, c.normal, c.radius, colours.s2, 1);
-    for (const a of view.axes) {
+    for (const axis of view.axes) {
+      const a = inWorld(axis);
+      if (!a) continue;
       const ends = [-1, 1].map(function (sign) { return add(a.point, a.direction, sign * a.half_length); });
       line(ends[0], ends[1], colours.s2, 2);
       const sigma = Math.hypot(a.sigma_point || 0, (a.sigma_direction || 0) * a.half_length);

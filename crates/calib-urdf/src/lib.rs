@@ -36,6 +36,7 @@ pub mod revert;
 pub mod rpy;
 pub mod source;
 pub mod verify;
+pub mod visual;
 mod xacro;
 
 pub use axes::{AxisPair, AxisRelation};

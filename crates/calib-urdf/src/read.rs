@@ -5,7 +5,8 @@
 //! a word, and turns a `quat_xyzw` near pitch ±π/2 by up to 0.26°. It is therefore the second reader, whose
 //! forward kinematics a patched file has to agree with (see [`crate::verify()`]), and not the first.
 //!
-//! What does not bear on kinematics (visuals, collisions, meshes, `<gazebo>`, `<ros2_control>`) is not looked at.
+//! What does not bear on kinematics (collisions, `<gazebo>`, `<ros2_control>`) is not looked at; visuals are read apart,
+//! see [`crate::visual`].
 
 mod elements;
 mod tree;

@@ -133,6 +133,7 @@ impl<'a> Checker<'a> {
         Profile {
             robot: raw.robot.name.clone(),
             urdf: raw.robot.urdf.clone(),
+            packages: raw.robot.packages.clone(),
             tracker: Tracker {
                 frame: raw.tracker.frame.clone(),
                 marker_sigma: raw.tracker.marker_sigma_mm.map(|s| s * MM),

@@ -67,7 +67,7 @@ pub(super) fn data(page: &mut Page, report: &Report) {
     let mut table = Table::new(&["<noise", ">found σ", ">stated σ", ">samples", "<how"]);
     for noise in &report.noise {
         let [found, stated] =
-            [noise.sigma, noise.stated].map(|sigma| number::plain_or_unknown(sigma, noise.unit));
+            [noise.sigma, noise.stated].map(|sigma| number::sigma(sigma, noise.unit));
         table.row([
             noise.group.clone(),
             found,
@@ -83,7 +83,7 @@ pub(super) fn data(page: &mut Page, report: &Report) {
         .find(|answer| answer.id == "clocks");
     page.text(format!(
         "Did the clocks agree? {}",
-        clocks.map_or_else(String::new, |answer| answer.lines.join("; "))
+        clocks.map_or_else(String::new, |answer| answer.lines.join(" "))
     ));
 
     let mut table = Table::new(&["<recording", "<what", "<rows", "<why"]);
@@ -161,10 +161,15 @@ pub(super) fn residuals(page: &mut Page, report: &Report) {
 pub(super) fn accuracy(page: &mut Page, report: &Report) {
     if let Some(workspace) = &report.workspace {
         page.section("workspace", "Uncertainty over the workspace");
+        let seen = if workspace.relative_to.is_empty() {
+            &workspace.frame
+        } else {
+            &workspace.relative_to
+        };
         page.text(format!(
-            "{} in {}, {} places: σ {} rms, {} at the worst.",
+            "Predicted position of {} in {} at {} recorded postures: σ {} rms, {} at the worst. Of the parameters only: what a single measurement adds stands below.",
             code(&workspace.link),
-            code(&workspace.frame),
+            code(seen),
             workspace.points.len(),
             number::plain(workspace.rms_sigma_m, Unit::Metre),
             number::plain(workspace.max_sigma_m, Unit::Metre)
@@ -174,6 +179,7 @@ pub(super) fn accuracy(page: &mut Page, report: &Report) {
         return;
     }
     page.section("accuracy", "What limits the accuracy now");
+    page.text("What an error of the tool on a new pose is made of; shares of the variance.");
     let mut table = Table::new(&[
         "<source",
         ">σ at the tool",
@@ -221,5 +227,8 @@ pub(super) fn files(page: &mut Page, report: &Report) {
         ]);
     }
     page.table("", table);
-    page.text(format!("calib {}, seed {}.", report.version, report.seed));
+    page.text(format!(
+        "calib {}, seed {}. A report cannot hold its own digest.",
+        report.version, report.seed
+    ));
 }

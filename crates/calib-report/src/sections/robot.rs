@@ -19,21 +19,34 @@ pub(super) fn changes(page: &mut Page, report: &Report) {
     ]);
     for change in &report.changes {
         let plain = |x: f64| number::fixed_with_unit(x, change.unit, 3);
-        let old = change.old.map_or_else(|| "added".to_owned(), plain);
+        // A number that was added has no change: its σ stands at itself.
+        let (old, new) = match change.old {
+            Some(old) => (plain(old), plain(change.new)),
+            None => (
+                "none".to_owned(),
+                change.sigma.map_or_else(
+                    || plain(change.new),
+                    |sigma| number::with_sigma(change.new, Some(sigma), change.unit),
+                ),
+            ),
+        };
         let delta = change.delta.map_or_else(
-            || number::UNKNOWN.to_owned(),
+            || "added".to_owned(),
             |delta| number::change(delta, change.sigma, change.unit),
         );
         table.row([
             code(&change.joint),
             change.what.clone(),
             old,
-            plain(change.new),
+            new,
             delta,
             change
                 .data_share
                 .map_or_else(|| number::UNKNOWN.to_owned(), number::percent),
         ]);
+    }
+    if !report.changes.is_empty() {
+        page.text("x, y, z along the axes of the parent link; a turn about the axes of the joint's old frame. From the data: the share of the variance known beforehand that the data took away; the rest is what the profile assumed.");
     }
     page.table("", table);
     if !report.urdf_diff.is_empty() {
@@ -46,7 +59,7 @@ pub(super) fn transforms(page: &mut Page, report: &Report) {
         return;
     }
     page.section("transforms", "Transforms");
-    page.text("`parent ← child`; translation ± σ along the parent's axes; roll, pitch, yaw of the URDF; σ of the rotation about the child's axes.");
+    page.text("`parent ← child`; translation ± σ along the parent's axes; roll, pitch, yaw of the URDF; σ of the rotation about the child's axes. \"In part\": a direction of it is a choice, see What is not known.");
     let mut table = Table::new(&[
         "<name",
         "<parent ← child",
@@ -65,11 +78,16 @@ pub(super) fn transforms(page: &mut Page, report: &Report) {
                 Unit::Metre,
             )
         };
+        let finest = transform
+            .sigma_rotation_rad
+            .map(|sigma| sigma.into_iter().fold(f64::INFINITY, f64::min));
         let rpy = transform
             .rpy_rad
-            .map(|angle| number::fixed_in(angle, Unit::Radian, 3))
-            .join(", ")
-            + "°";
+            .map(|angle| {
+                let text = number::with_sigma(angle, finest, Unit::Radian);
+                text.split(" ±").next().unwrap_or_default().to_owned()
+            })
+            .join(", ");
         let sigma = transform.sigma_rotation_rad.map_or_else(
             || number::UNKNOWN.to_owned(),
             |sigma| {
@@ -185,6 +203,7 @@ pub(super) fn estimators(page: &mut Page, report: &Report) {
         return;
     }
     page.section("estimators", "The same by other estimators");
+    page.text("Each against the estimate that this report uses: how far apart, and whether both uncertainties explain it.");
     let mut table = Table::new(&[
         "<quantity",
         "<estimator",
@@ -231,6 +250,7 @@ pub(super) fn parameters(page: &mut Page, report: &Report) {
         return;
     }
     page.section("parameters", "Parameters");
+    page.text("Origins and mounts are corrections to the described pose, in axes of the child. Solid: at most a tenth of the variance known beforehand is left; weak: at most a half; prior only: more; not observable: part of a combination that the data leave open, or of a joint that did not move.");
     let mut table = Table::new(&[
         "<parameter",
         "<kind",

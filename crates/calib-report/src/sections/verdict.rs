@@ -1,9 +1,9 @@
 //! The verdict, the error on new poses, what is open.
 
-use super::{Block, Page, code, mm, sentence};
-use crate::answers::limit_sentence;
+use super::{Block, Page, code, mm};
+use crate::answers::{full_stop, held_out_of, sentence};
 use crate::table::Table;
-use crate::{Report, Verdict, answers, number};
+use crate::{Meaning, NotObservable, Report, Unit, Verdict, answers, number};
 
 /// Held-out poses in the table; all of them stand in `report.json`.
 const POSES: usize = 10;
@@ -16,21 +16,31 @@ pub(super) fn head(page: &mut Page, report: &Report) {
     if report.verdict == Verdict::NotEvaluated {
         page.text("Not a pass: nothing was exceeded, but not every limit could be evaluated.");
     }
-    page.list(&report.reasons);
+    // What was met stands in the table of limits already.
+    if report.verdict != Verdict::Accepted || report.limits.is_empty() {
+        page.list(report.reasons.iter().map(|reason| sentence(reason)));
+    }
+    let mut limits = Table::new(&["<limit", ">found", ">allowed", "<", "<why"]);
+    for limit in &report.limits {
+        limits.row([
+            limit.quantity.clone(),
+            number::plain_or_unknown(limit.value, limit.unit),
+            number::plain(limit.limit, limit.unit),
+            limit.outcome.word().to_owned(),
+            limit.reason.clone(),
+        ]);
+    }
+    page.table("", limits);
     if !report.scope.is_empty() {
         page.text("It holds for:");
-        page.list(&report.scope);
-    }
-    if !report.limits.is_empty() {
-        page.text("Limits:");
-        page.list(report.limits.iter().map(limit_sentence));
+        page.list(report.scope.iter().map(|scope| sentence(scope)));
     }
     let fit = report.fit.as_ref().map_or_else(String::new, |fit| {
         let chi2 = fit.chi2_per_dof.map_or_else(String::new, |chi2| {
             format!(", χ²/dof {}", number::fixed(chi2, 2))
         });
         format!(
-            "; {} ({} observations, {} unknowns{chi2})",
+            "; {} ({} measured poses and points, {} unknowns{chi2})",
             fit.status, fit.observations, fit.unknowns
         )
     });
@@ -52,12 +62,10 @@ pub(super) fn held_out(page: &mut Page, report: &Report) {
         page.text(format!("Not evaluated: {}", reason));
         return;
     };
-    let quantity = if held_out.quantity.is_empty() {
-        String::new()
-    } else {
-        format!("{}, ", held_out.quantity)
-    };
-    page.text(format!("{quantity}{} poses, mm.", held_out.n));
+    page.text(sentence(&format!(
+        "{}; predicted against measured, in mm",
+        held_out_of(held_out)
+    )));
     let mut table = Table::new(&["<model", ">mean", ">rms", ">95 %", ">max"]);
     for (name, stats) in [
         ("nominal", held_out.nominal),
@@ -71,6 +79,29 @@ pub(super) fn held_out(page: &mut Page, report: &Report) {
         table.row([name.to_owned()].into_iter().chain(cells));
     }
     page.table("", table);
+    page.text(
+        "Nominal: the robot as described, its bodies placed by closed forms. Registration only: the robot as described after the best fit of the tracker's place and of the bodies. Calibrated: this result.",
+    );
+    if let Some(orientation) = &held_out.orientation {
+        let mut table = Table::new(&["<model", ">mean", ">rms", ">95 %", ">max"]);
+        for (name, stats) in [
+            ("nominal", orientation.nominal),
+            ("registration only", orientation.registration_only),
+            ("calibrated", orientation.calibrated),
+        ] {
+            let cells = match stats {
+                Some(stats) => {
+                    [stats.mean_rad, stats.rms_rad, stats.p95_rad, stats.max_rad].map(deg)
+                }
+                None => std::array::from_fn(|_| number::UNKNOWN.to_owned()),
+            };
+            table.row([name.to_owned()].into_iter().chain(cells));
+        }
+        page.table(
+            "Orientation of the same bodies, predicted against measured, deg:",
+            table,
+        );
+    }
     if let Some(answer) = answers(report)
         .into_iter()
         .find(|answer| answer.id == "expected-error")
@@ -90,6 +121,7 @@ pub(super) fn held_out(page: &mut Page, report: &Report) {
         ">nominal",
         ">registration only",
         ">calibrated",
+        ">orientation",
         "<joints",
     ]);
     for pose in poses.iter().take(POSES) {
@@ -101,16 +133,21 @@ pub(super) fn held_out(page: &mut Page, report: &Report) {
             .map(|joint| format!("{} {}", joint.joint, number::plain(joint.value, joint.unit)))
             .collect();
         table.row([
-            pose.pose.clone(),
+            pose.label(),
             pose.group.clone(),
             cell(pose.nominal_m),
             cell(pose.registration_only_m),
             cell(pose.calibrated_m),
+            pose.calibrated_rad
+                .map_or_else(String::new, |angle| number::plain(angle, Unit::Radian)),
             joints.join(", "),
         ]);
     }
     let title = if poses.len() > POSES {
-        format!("The {POSES} worst of {} poses, mm:", poses.len())
+        format!(
+            "The {POSES} worst of {}, mm (orientation: calibrated):",
+            poses.len()
+        )
     } else {
         "Every pose, the worst first, mm:".to_owned()
     };
@@ -119,24 +156,41 @@ pub(super) fn held_out(page: &mut Page, report: &Report) {
 
 pub(super) fn open_ends(page: &mut Page, report: &Report) {
     page.section("not-observable", "What is not known");
-    let mut items = Vec::new();
-    for transform in &report.transforms {
-        items.extend(transform.unobservable.iter().map(|item| {
-            (
-                transform.name.as_str(),
-                item.text.as_str(),
-                item.remedy.as_str(),
-            )
-        }));
-    }
-    items.extend(report.not_observable.iter().map(|item| {
-        (
-            item.subject.as_str(),
-            item.text.as_str(),
-            item.remedy.as_str(),
+    let transforms: Vec<(String, String)> = report
+        .transforms
+        .iter()
+        .flat_map(|transform| {
+            transform.unobservable.iter().map(|item| {
+                (
+                    format!("{}: {}", code(&transform.name), full_stop(&item.text)),
+                    item.remedy.clone(),
+                )
+            })
+        })
+        .collect();
+    let of = |meaning: Meaning| {
+        let items = report.not_observable.iter();
+        grouped(
+            &items
+                .filter(|item| item.meaning == meaning)
+                .collect::<Vec<_>>(),
         )
-    }));
-    if items.is_empty() {
+    };
+    let parts = [
+        (
+            "Not measured: what depends on it is predicted as described, not as found.",
+            of(Meaning::NotMeasured),
+        ),
+        (
+            "Directions of transforms (a turn or a shift of the second frame) that no measurement shows:",
+            transforms,
+        ),
+        (
+            "By convention: several descriptions of one robot; the tracked bodies are predicted the same with any of them.",
+            of(Meaning::Convention),
+        ),
+    ];
+    if parts.iter().all(|(_, items)| items.is_empty()) {
         let nothing = report.transforms.is_empty() && report.parameters.is_empty();
         page.text(if nothing {
             "Everything: nothing was solved."
@@ -144,19 +198,70 @@ pub(super) fn open_ends(page: &mut Page, report: &Report) {
             "Everything that was asked for is observable."
         });
     }
-    let item = |(subject, text, remedy): (&str, &str, &str)| {
-        let remedy = if remedy.is_empty() {
-            String::new()
-        } else {
-            sentence(remedy)
+    for (intro, items) in parts {
+        if items.is_empty() {
+            continue;
+        }
+        page.text(intro);
+        let items = shared_remedies(items);
+        let finished = |(text, remedy): (String, String)| {
+            let remedy = if remedy.is_empty() {
+                remedy
+            } else {
+                full_stop(&remedy)
+            };
+            (sentence(&text), remedy)
         };
-        (format!("{}: {}", code(subject), sentence(text)), remedy)
-    };
-    if !items.is_empty() {
-        page.push(Block::List(items.into_iter().map(item).collect()));
+        page.push(Block::List(items.into_iter().map(finished).collect()));
     }
     if !report.next_steps.is_empty() {
         page.section("next-steps", "What to do next");
-        page.list(&report.next_steps);
+        page.list(report.next_steps.iter().map(|step| sentence(step)));
     }
+}
+
+/// Combinations with one reason and one remedy as one item; everything else as it is.
+fn grouped(items: &[&NotObservable]) -> Vec<(String, String)> {
+    const TRADES: &str = " trades against ";
+    let mut out: Vec<(String, String)> = Vec::new();
+    let mut groups: Vec<(&str, &str, Vec<String>)> = Vec::new();
+    for item in items {
+        let Some((trade, reason)) = item
+            .text
+            .rsplit_once(": ")
+            .filter(|(trade, _)| trade.contains(TRADES))
+        else {
+            out.push((item.words(), item.remedy.clone()));
+            continue;
+        };
+        let trade = trade.replacen(TRADES, " against ", 1);
+        match groups
+            .iter_mut()
+            .find(|(r, remedy, _)| *r == reason && *remedy == item.remedy)
+        {
+            Some((_, _, trades)) => trades.push(trade),
+            None => groups.push((reason, &item.remedy, vec![trade])),
+        }
+    }
+    out.extend(groups.into_iter().map(|(reason, remedy, trades)| {
+        (
+            format!("{reason}: {}", trades.join("; ")),
+            remedy.to_owned(),
+        )
+    }));
+    out
+}
+
+/// A remedy that the next item repeats stands once, at the last.
+fn shared_remedies(mut items: Vec<(String, String)>) -> Vec<(String, String)> {
+    for i in 1..items.len() {
+        if items[i - 1].1 == items[i].1 {
+            items[i - 1].1.clear();
+        }
+    }
+    items
+}
+
+fn deg(radians: f64) -> String {
+    number::bare(radians, Unit::Radian)
 }

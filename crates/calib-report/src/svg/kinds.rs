@@ -6,17 +6,24 @@ use crate::number;
 use crate::plots::{Panel, PlotRow, Series, Strip};
 use crate::table::clip;
 
-/// Labels keep to a column of this width.
-const LABELS: f64 = 140.0;
+/// Characters of a label that are shown.
+const LABEL_CHARS: usize = 34;
 
-/// Characters of a label in that column.
-const LABEL_CHARS: usize = 20;
+/// Width of one of them: text of 11 units, as wide as common fonts make it.
+const LABEL_CHAR: f64 = 6.4;
+
+/// Width of the column of labels: as wide as they need.
+fn label_column<'a>(labels: impl Iterator<Item = &'a str>) -> f64 {
+    let longest = labels.map(|label| label.chars().count()).max().unwrap_or(0);
+    16.0 + LABEL_CHAR * longest.clamp(6, LABEL_CHARS) as f64
+}
 
 /// Numbers in words stand right of the rows.
-const TEXTS: f64 = 134.0;
+const TEXTS: f64 = 118.0;
 
 pub(super) fn draw_rows(body: &mut Body, axis: &str, rows: &[PlotRow]) -> f64 {
     const ROW: f64 = 24.0;
+    let labels = label_column(rows.iter().map(|row| row.label.as_str()));
     let values = rows
         .iter()
         .flat_map(|row| {
@@ -29,7 +36,7 @@ pub(super) fn draw_rows(body: &mut Body, axis: &str, rows: &[PlotRow]) -> f64 {
             ]
         })
         .flatten();
-    let scale = Scale::new(values.chain([0.0]), LABELS, WIDTH - LABELS - TEXTS, false);
+    let scale = Scale::new(values.chain([0.0]), labels, WIDTH - labels - TEXTS, false);
     let bottom = 6.0 + ROW * rows.len() as f64;
     for (x, label) in scale.ticks(3.0) {
         let at = scale.place(x);
@@ -40,15 +47,15 @@ pub(super) fn draw_rows(body: &mut Body, axis: &str, rows: &[PlotRow]) -> f64 {
     body.line("axis", [zero, 2.0], [zero, bottom + 2.0]);
     body.text(
         "label middle",
-        LABELS + 0.5 * (WIDTH - LABELS - TEXTS),
+        labels + 0.5 * (WIDTH - labels - TEXTS),
         bottom + 30.0,
         axis,
     );
     for (i, row) in rows.iter().enumerate() {
         let y = 6.0 + ROW * (i as f64 + 0.5);
         body.text(
-            "label end",
-            LABELS - 8.0,
+            "name end",
+            labels - 8.0,
             y + 4.0,
             &clip(&row.label, LABEL_CHARS),
         );
@@ -142,12 +149,13 @@ pub(super) fn draw_xy(
 
 pub(super) fn draw_strips(body: &mut Body, rows: &[Strip]) -> f64 {
     const ROW: f64 = 34.0;
-    let width = WIDTH - LABELS - 10.0;
+    let labels = label_column(rows.iter().map(|row| row.label.as_str()));
+    let width = WIDTH - labels - 10.0;
     for (i, row) in rows.iter().enumerate() {
         let y = 4.0 + ROW * i as f64;
         body.text(
-            "label end",
-            LABELS - 8.0,
+            "name end",
+            labels - 8.0,
             y + 12.0,
             &clip(&row.label, LABEL_CHARS),
         );
@@ -158,14 +166,14 @@ pub(super) fn draw_strips(body: &mut Body, rows: &[Strip]) -> f64 {
             let shade = (count * STEPS as u64).div_ceil(most);
             body.rect(
                 &format!("cell v{shade}"),
-                LABELS + bin as f64 * cell,
+                labels + bin as f64 * cell,
                 y,
                 cell,
                 16.0,
             );
         }
-        body.text("tick", LABELS, y + 28.0, &row.from);
-        body.text("tick end", LABELS + width, y + 28.0, &row.to);
+        body.text("tick", labels, y + 28.0, &row.from);
+        body.text("tick end", labels + width, y + 28.0, &row.to);
     }
     8.0 + ROW * rows.len() as f64
 }

@@ -449,7 +449,7 @@ pub fn rejected() -> Report {
             .collect();
         for (i, length) in lengths.iter().enumerate() {
             poses.push(PoseError {
-                pose: format!("hand {}", i + 1),
+                pose: format!("torso {angle} hand {}", i + 1),
                 group: format!("torso {angle}"),
                 joints: vec![
                     JointValue::metres("lift", 0.1),
@@ -459,6 +459,8 @@ pub fn rejected() -> Report {
                 registration_only_m: Some(length * 1.1),
                 calibrated_m: Some(*length),
                 vector_m: None,
+                calibrated_rad: Some(0.004 + 0.000_02 * i as f64),
+                ..PoseError::default()
             });
         }
         groups.push(LoopGroup {
@@ -522,6 +524,7 @@ pub fn rejected() -> Report {
             }]),
         ],
         not_observable: vec![NotObservable {
+            meaning: calib_report::Meaning::Convention,
             subject: "arm_2, arm_3".into(),
             direction: vec![
                 Term {
@@ -832,6 +835,7 @@ pub fn view() -> View3d {
             half_length: 0.25,
             sigma_point: Some(0.000_2),
             sigma_direction: Some(0.001),
+            frame: None,
         }],
     }
 }

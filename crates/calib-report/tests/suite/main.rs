@@ -1,6 +1,8 @@
 //! One binary for all tests of the renderers: what people and programs read, from three hand-made reports.
 
+mod browser;
 mod examples;
+mod glb;
 mod page;
 mod renderers;
 mod scenes;

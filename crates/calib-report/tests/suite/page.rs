@@ -1,6 +1,6 @@
 //! `report.html`: its data as snapshots, its rules as tests, its answers as a browser shows them.
 
-use crate::examples;
+use crate::{browser, examples};
 use calib_report::{Report, View3d, answers, html::html, json, plots};
 use insta::assert_snapshot;
 use std::path::PathBuf;
@@ -236,6 +236,39 @@ fn a_browser_finds_the_twelve_answers_by_their_headings() {
                 dom.contains("Pose 1 of 10: check 1"),
                 "the view does not say its pose"
             );
+        }
+    }
+}
+
+/// The sizes at which the page is judged: a laptop's window and a telephone's.
+const SIZES: [[u32; 2]; 2] = [[1280, 800], [400, 800]];
+
+#[test]
+fn the_first_screen_shows_or_leads_to_every_answer() {
+    for (name, report, text) in pages() {
+        let answers = answers(&report);
+        let ids: Vec<&str> = answers.iter().map(|answer| answer.id).collect();
+        for size in SIZES {
+            let Some(seen) = browser::open(name, &text, size, &browser::first_screen(&ids)) else {
+                println!("skipped: no Chromium is installed");
+                return;
+            };
+            let at = format!("{name} at {size:?}: {}", seen.told);
+            assert!(seen.console.is_empty(), "{at}: {:?}", seen.console);
+            assert!(seen.hosts.is_empty(), "{at}: {:?}", seen.hosts);
+            assert_eq!(seen.told["wide"], size[0], "{at}");
+            assert_eq!(seen.told["loaded"], 0, "the page loaded something: {at}");
+            assert_eq!(seen.told["overflow"], 0, "wider than the screen: {at}");
+            for id in &ids {
+                let how = &seen.told["answers"][id];
+                // A wide screen has room for all; a narrow one for the first, and a link to each other.
+                let wanted = if size[0] > 1000 || *id == "trust" {
+                    how == "seen"
+                } else {
+                    how == "seen" || how == "linked"
+                };
+                assert!(wanted, "{id} is {how}: {at}");
+            }
         }
     }
 }
