@@ -278,7 +278,7 @@ fn not_known(report: &Report, rest: &str) -> Vec<String> {
             .filter(move |item| item.meaning == meaning)
     };
     let items: Vec<String> = of(Meaning::NotMeasured)
-        .map(|item| sentence(&item.words()))
+        .map(|item| sentence(&item.in_short()))
         .collect();
     let mut lines = short(&items, rest);
     let open: Vec<&Transform> = report.transforms.iter().filter(|t| !t.observable).collect();
@@ -303,7 +303,7 @@ fn not_known(report: &Report, rest: &str) -> Vec<String> {
     if conventions > 0 {
         let s = if conventions == 1 { "" } else { "s" };
         lines.push(format!(
-            "{conventions} combination{s} of parameters, by convention: the tracked bodies are predicted the same with any choice."
+            "{conventions} combination{s} of parameters, by convention: no tracked body depends on the choice."
         ));
     }
     or(lines, "Everything that was asked for is observable.")

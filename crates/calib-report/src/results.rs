@@ -169,6 +169,19 @@ impl NotObservable {
             format!("`{}`: {}", self.subject, self.text)
         }
     }
+
+    /// The same without the parameters that it trades against: those stand in the long report.
+    pub(crate) fn in_short(&self) -> String {
+        match self.text.rsplit_once(": ") {
+            Some((trade, reason)) if trade.contains(Self::TRADES) => {
+                format!("`{}`: {reason}", self.subject)
+            }
+            _ => self.words(),
+        }
+    }
+
+    /// Between a parameter and those that it cannot be told from.
+    pub(crate) const TRADES: &str = " trades against ";
 }
 
 /// How well a parameter is known.

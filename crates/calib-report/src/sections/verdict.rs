@@ -222,19 +222,18 @@ pub(super) fn open_ends(page: &mut Page, report: &Report) {
 
 /// Combinations with one reason and one remedy as one item; everything else as it is.
 fn grouped(items: &[&NotObservable]) -> Vec<(String, String)> {
-    const TRADES: &str = " trades against ";
     let mut out: Vec<(String, String)> = Vec::new();
     let mut groups: Vec<(&str, &str, Vec<String>)> = Vec::new();
     for item in items {
         let Some((trade, reason)) = item
             .text
             .rsplit_once(": ")
-            .filter(|(trade, _)| trade.contains(TRADES))
+            .filter(|(trade, _)| trade.contains(NotObservable::TRADES))
         else {
             out.push((item.words(), item.remedy.clone()));
             continue;
         };
-        let trade = trade.replacen(TRADES, " against ", 1);
+        let trade = trade.replacen(NotObservable::TRADES, " against ", 1);
         match groups
             .iter_mut()
             .find(|(r, remedy, _)| *r == reason && *remedy == item.remedy)

@@ -19,7 +19,7 @@ fn label_column<'a>(labels: impl Iterator<Item = &'a str>) -> f64 {
 }
 
 /// Numbers in words stand right of the rows.
-const TEXTS: f64 = 118.0;
+const TEXTS: f64 = 134.0;
 
 pub(super) fn draw_rows(body: &mut Body, axis: &str, rows: &[PlotRow]) -> f64 {
     const ROW: f64 = 24.0;
