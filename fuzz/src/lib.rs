@@ -142,7 +142,8 @@ pub fn stream(bytes: &[u8]) {
     if broken.is_none() {
         broken = decoder.push(&[]).err();
     }
-    assert_eq!(ended.err(), broken);
+    // How much of a wrong greeting is quoted depends on how much of it was there.
+    assert_eq!(ended.is_err(), broken.is_some());
     assert_eq!(all, pieces);
     for message in pieces {
         if let vrpn::Message::Pose {

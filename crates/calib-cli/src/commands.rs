@@ -83,7 +83,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
             output,
             format,
         } => {
-            let converted = convert::convert(input, output, format.as_deref())?;
+            let bar = byte_bar(arguments.quiet);
+            let progress = &mut |read, all| {
+                bar.set_length(all);
+                bar.set_position(read);
+            };
+            let converted = convert::convert(input, output, format.as_deref(), progress);
+            bar.finish_and_clear();
+            let converted = converted?;
             for note in &converted.notes {
                 eprintln!("calib: {note}");
             }
@@ -232,6 +239,18 @@ fn default_folder(profile: &Path) -> PathBuf {
         .file_stem()
         .map_or_else(|| "profile".into(), std::ffi::OsStr::to_os_string);
     PathBuf::from("results").join(name)
+}
+
+/// A bar of bytes on a terminal, nothing elsewhere.
+fn byte_bar(quiet: bool) -> ProgressBar {
+    if quiet || !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(0);
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {bytes}/{total_bytes}, {eta} left") {
+        bar.set_style(style);
+    }
+    bar
 }
 
 /// A spinner on a terminal, nothing elsewhere.

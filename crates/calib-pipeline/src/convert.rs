@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use calib_recording::{ReadOptions, WriteOptions, read_path, write_recording};
+use calib_recording::{ReadOptions, WriteOptions, read_path_with, write_recording};
 
 use crate::error::PipelineError;
 use crate::write::OutputFile;
@@ -18,7 +18,8 @@ pub struct Converted {
     pub notes: Vec<String>,
 }
 
-/// Reads a recording of any known format and renders it as canonical CSV.
+/// Reads a recording of any known format and renders it as canonical CSV; `progress(bytes read, bytes in all)` is told
+/// how far the reading is.
 ///
 /// # Errors
 /// [`PipelineError`] when it cannot be read, or would not read back the same.
@@ -26,12 +27,13 @@ pub fn convert(
     input: &Path,
     output: &Path,
     format: Option<&str>,
+    progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Converted, PipelineError> {
     let options = ReadOptions {
         format: format.map(str::to_owned),
         ..ReadOptions::default()
     };
-    let recording = read_path(input, &options)?;
+    let recording = read_path_with(input, &options, progress)?;
     let mut notes = vec![format!("read as {}", recording.meta.format)];
     notes.extend(recording.meta.conversions.iter().cloned());
     notes.extend(

@@ -63,9 +63,38 @@ fn c3d(float: bool) -> Vec<u8> {
     for (word, value) in [(2, MARKERS as u16), (4, 1), (5, FRAMES as u16), (9, 3)] {
         header[2 * word - 2..2 * word].copy_from_slice(&value.to_le_bytes());
     }
-    header[12..16].copy_from_slice(&if float { -0.1f32 } else { 0.1 }.to_le_bytes());
+    header[12..16].copy_from_slice(&if float { -0.1f32 } else { 0.1f32 }.to_le_bytes());
     header[20..24].copy_from_slice(&100f32.to_le_bytes());
+    let scale = if float { -0.1f32 } else { 0.1 };
     let mut parameters = vec![1, 0x50, 1, 84];
+    let mut add = |id: i8, name: &str, body: &[u8], last: bool| {
+        parameters.push(name.len() as u8);
+        parameters.push(id as u8);
+        parameters.extend(name.bytes());
+        let link = if last { 0 } else { 2 + body.len() as u16 };
+        parameters.extend(link.to_le_bytes());
+        parameters.extend(body);
+    };
+    let word = |value: u16| [&[2u8, 0], value.to_le_bytes().as_slice(), &[0]].concat();
+    let number = |value: f32| [&[4u8, 0], value.to_le_bytes().as_slice(), &[0]].concat();
+    let labels: Vec<u8> = (0..MARKERS)
+        .flat_map(|k| format!("M{k:02}").into_bytes())
+        .collect();
+    add(-1, "POINT", &[0], false);
+    add(-2, "ANALOG", &[0], false);
+    add(1, "USED", &word(MARKERS as u16), false);
+    add(1, "FRAMES", &word(FRAMES as u16), false);
+    add(1, "DATA_START", &word(3), false);
+    add(1, "SCALE", &number(scale), false);
+    add(1, "RATE", &number(100.0), false);
+    add(1, "UNITS", &[0xff, 2, 2, 1, b'm', b'm', 0], false);
+    add(
+        1,
+        "LABELS",
+        &[&[0xff, 2, 3, MARKERS as u8], labels.as_slice(), &[0]].concat(),
+        false,
+    );
+    add(2, "USED", &word(0), true);
     parameters.resize(512, 0);
     let mut data = Vec::new();
     for frame in 0..FRAMES {

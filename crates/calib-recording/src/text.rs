@@ -108,6 +108,26 @@ pub(crate) struct Cells<'a> {
     separator: Separator,
 }
 
+impl Cells<'_> {
+    /// Whether all cells were given.
+    pub(crate) fn is_at_end(&self) -> bool {
+        self.rest.is_none()
+    }
+
+    /// The next cell when it is a plain decimal number, read in one pass; else `None`, and the cell is still there.
+    #[inline]
+    pub(crate) fn decimal(&mut self) -> Option<f64> {
+        let Separator::Byte(separator) = self.separator else {
+            return None;
+        };
+        let rest = self.rest?;
+        let (value, used) = leading_decimal(rest.as_bytes(), separator)?;
+        // Digits and separator are ASCII, so the cut is a character border.
+        self.rest = (used < rest.len()).then(|| &rest[used + 1..]);
+        Some(value)
+    }
+}
+
 impl<'a> Iterator for Cells<'a> {
     type Item = &'a str;
 
@@ -203,37 +223,52 @@ pub(crate) fn number(cell: &str) -> Number {
     }
 }
 
-/// Decimal numbers of at most 15 digits without exponent, exactly as `str::parse` gives them: both the digits
+/// A decimal number of at most 15 digits without exponent, exactly as `str::parse` gives it: both the digits
 /// (< 2⁵³) and the power of ten (≤ 10²²) are exact doubles, and one division rounds once.
 #[inline]
 fn short_decimal(bytes: &[u8]) -> Option<f64> {
+    // A comma is in no number: all bytes must belong to it.
+    let (value, used) = leading_decimal(bytes, b',')?;
+    (used == bytes.len()).then_some(value)
+}
+
+/// A short decimal number that ends at the separator or at the end, and how many bytes it has.
+#[inline]
+fn leading_decimal(bytes: &[u8], separator: u8) -> Option<(f64, usize)> {
     const POWERS: [f64; 16] = [
         1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
     ];
-    let (negative, digits) = match bytes {
-        [b'-', rest @ ..] => (true, rest),
-        rest => (false, rest),
-    };
-    if digits.len() > 16 {
-        return None;
-    }
-    let (mut mantissa, mut count, mut decimals, mut seen_point) = (0u64, 0usize, 0usize, false);
-    for &b in digits {
-        match b {
-            b'0'..=b'9' => {
-                mantissa = mantissa * 10 + u64::from(b - b'0');
-                count += 1;
-                decimals += usize::from(seen_point);
+    let negative = bytes.first() == Some(&b'-');
+    let start = usize::from(negative);
+    let mut at = start;
+    let mut mantissa = 0u64;
+    // Sixteen digits cannot overflow the mantissa; more than fifteen are refused below.
+    let digits = |at: &mut usize, mantissa: &mut u64| {
+        let end = bytes.len().min(start + 17);
+        while *at < end {
+            let digit = bytes[*at].wrapping_sub(b'0');
+            if digit > 9 {
+                break;
             }
-            b'.' if !seen_point => seen_point = true,
-            _ => return None,
+            *mantissa = *mantissa * 10 + u64::from(digit);
+            *at += 1;
         }
+    };
+    digits(&mut at, &mut mantissa);
+    let (mut count, mut decimals) = (at - start, 0);
+    if bytes.get(at) == Some(&b'.') {
+        at += 1;
+        let point = at;
+        digits(&mut at, &mut mantissa);
+        decimals = at - point;
+        count += decimals;
     }
-    if count == 0 || count > 15 {
+    let ends = bytes.get(at).is_none_or(|&b| b == separator);
+    if !ends || count == 0 || count > 15 {
         return None;
     }
     let value = mantissa as f64 / POWERS[decimals];
-    Some(if negative { -value } else { value })
+    Some((if negative { -value } else { value }, at))
 }
 
 /// The problem of a cell that is no number.
@@ -266,6 +301,36 @@ mod tests {
         assert_eq!(split("\"open,a", comma), ["\"open,a"]);
         assert_eq!(split("  a \t b  ", Separator::Blanks), ["a", "b"]);
         assert_eq!(split("\"\"\"", comma), ["\""]);
+    }
+
+    #[test]
+    fn plain_numbers_are_taken_in_one_pass_and_others_are_left() {
+        let mut row = cells(
+            "1.5,-2,,x,+3,123456789012345,1234567890123456,.5,5.",
+            Separator::Byte(b','),
+        );
+        assert_eq!(row.decimal(), Some(1.5));
+        assert_eq!(row.decimal(), Some(-2.0));
+        for left in ["", "x", "+3"] {
+            assert_eq!(row.decimal(), None);
+            assert_eq!(row.next(), Some(left));
+        }
+        assert_eq!(row.decimal(), Some(123_456_789_012_345.0));
+        assert_eq!(row.decimal(), None);
+        assert_eq!(row.next(), Some("1234567890123456"));
+        assert_eq!(row.decimal(), Some(0.5));
+        assert_eq!(row.decimal(), Some(5.0));
+        assert_eq!((row.decimal(), row.next()), (None, None));
+        // A separator at the end is one more cell; other separators and blanks are not taken for it.
+        let mut row = cells("1,", Separator::Byte(b','));
+        assert_eq!(
+            (row.decimal(), row.decimal(), row.next(), row.next()),
+            (Some(1.0), None, Some(""), None)
+        );
+        assert_eq!(cells("1;2", Separator::Byte(b',')).decimal(), None);
+        assert_eq!(cells("1 ,2", Separator::Byte(b',')).decimal(), None);
+        assert_eq!(cells("1 2", Separator::Blanks).decimal(), None);
+        assert_eq!(cells("1\t2", Separator::Byte(b'\t')).decimal(), Some(1.0));
     }
 
     #[test]

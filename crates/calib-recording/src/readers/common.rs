@@ -23,24 +23,23 @@ pub(super) fn numbers(
     values: &mut Vec<f64>,
 ) -> Placed<()> {
     values.clear();
-    for (i, cell) in cells(text, separator).enumerate() {
-        let value = match number(cell) {
-            Number::Value(value) => value,
-            Number::Empty | Number::Nan => f64::NAN,
-            kind => {
-                let at = At::Cell {
-                    line,
-                    column: format!("#{}", i + 1),
-                };
-                return Err((
-                    at,
-                    not_a_number(cell, kind, "a number, or nothing where the sample was lost"),
-                ));
-            }
-        };
-        if i < columns {
+    let mut row = cells(text, separator);
+    // Plain numbers, one after the other; the first cell that is none, or one too many, goes the long way.
+    loop {
+        while values.len() < columns
+            && let Some(value) = row.decimal()
+        {
             values.push(value);
-        } else if !value.is_nan() {
+        }
+        let i = values.len();
+        if i >= columns {
+            break;
+        }
+        let Some(cell) = row.next() else { break };
+        values.push(cell_value(line, i, cell)?);
+    }
+    for (i, cell) in row.enumerate() {
+        if !cell_value(line, columns + i, cell)?.is_nan() {
             let found = cells(text, separator).count();
             return Err((
                 At::Line(line),
@@ -53,6 +52,23 @@ pub(super) fn numbers(
     }
     values.resize(columns, f64::NAN);
     Ok(())
+}
+
+/// The number of a cell, NaN when there is none; `i` is its position from 0.
+fn cell_value(line: u64, i: usize, cell: &str) -> Placed<f64> {
+    match number(cell) {
+        Number::Value(value) => Ok(value),
+        Number::Empty | Number::Nan => Ok(f64::NAN),
+        kind => {
+            let at = At::Cell {
+                line,
+                column: format!("#{}", i + 1),
+            };
+            let problem =
+                not_a_number(cell, kind, "a number, or nothing where the sample was lost");
+            Err((at, problem))
+        }
+    }
 }
 
 /// A group of coordinates: all, none (lost), or a mistake.

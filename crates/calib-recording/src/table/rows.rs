@@ -200,11 +200,22 @@ impl<'a> Rows<'a> {
     fn read(&mut self, line: u64, text: &str) -> Placed<()> {
         let header = self.layout.columns.len();
         let mut found = 0;
-        for (i, cell) in cells(text, self.separator).enumerate() {
-            found = i + 1;
+        let mut row = cells(text, self.separator);
+        loop {
+            let i = found;
+            if let Some(&Column::Number { slot, scale }) = self.layout.columns.get(i)
+                && let Some(value) = row.decimal()
+            {
+                self.values[slot] = if scale == 1.0 { value } else { value / scale };
+                found += 1;
+                continue;
+            }
+            let Some(cell) = row.next() else { break };
+            found += 1;
             let Some(&column) = self.layout.columns.get(i) else {
-                if cell.is_empty() && i == header {
+                if cell.is_empty() && i == header && row.is_at_end() {
                     found = i;
+                    break;
                 }
                 continue;
             };
