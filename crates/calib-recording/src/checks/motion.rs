@@ -3,7 +3,7 @@
 use super::Expectations;
 use super::statistics::{median, range};
 use crate::JointUnit;
-use crate::finding::{Finding, Severity};
+use crate::finding::{Finding, Severity, counted};
 use crate::poses::Poses;
 use nalgebra::{Point3, Vector3};
 
@@ -51,6 +51,12 @@ pub(super) fn rotations(poses: &Poses) -> Vec<Finding> {
     findings
 }
 
+/// Whether rows belong to one motion: a table that names its holds says nothing of the ways between them.
+fn together(poses: &Poses, a: usize, b: usize) -> bool {
+    let names = poses.labels.get("hold");
+    names.is_none_or(|names| names.get(a) == names.get(b))
+}
+
 /// A body that turns by half a turn or so on the spot: its marker pattern is nearly symmetric.
 pub(super) fn flips(poses: &Poses) -> Vec<Finding> {
     let mut findings = Vec::new();
@@ -59,6 +65,7 @@ pub(super) fn flips(poses: &Poses) -> Vec<Finding> {
         let step = |w: &[usize]| Some((w[0], w[1], track[w[0]]?, track[w[1]]?));
         let steps: Vec<(usize, f64, f64)> = seen
             .windows(2)
+            .filter(|w| together(poses, w[0], w[1]))
             .filter_map(step)
             .map(|(before, row, a, b)| {
                 // What the joints turned between the rows needs no flip (a sweep that starts its next line).
@@ -134,6 +141,7 @@ pub(super) fn jumps(poses: &Poses) -> Vec<Finding> {
     for (name, track) in markers.chain(bodies) {
         // Three neighbouring rows: |p₁ − 2 p₂ + p₃|
         let bends: Vec<(usize, f64)> = (1..track.len().saturating_sub(1))
+            .filter(|&i| together(poses, i - 1, i) && together(poses, i, i + 1))
             .filter_map(|i| Some((i, (track[i - 1]? - track[i]? * 2.0 + track[i + 1]?).norm())))
             .collect();
         let Some(usual) = median(bends.iter().map(|b| b.1).collect()) else {
@@ -166,13 +174,13 @@ pub(super) fn gaps(poses: &Poses) -> Vec<Finding> {
         let steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
         let usual = median(steps.clone()).unwrap_or(0.0);
         let gaps: Vec<usize> = (0..steps.len())
-            .filter(|&i| usual > 0.0 && steps[i] > GAP * usual)
+            .filter(|&i| usual > 0.0 && steps[i] > GAP * usual && together(poses, i, i + 1))
             .collect();
         if !gaps.is_empty() {
             let longest = gaps.iter().map(|&i| steps[i]).fold(0.0, f64::max);
             let text = format!(
-                "{} gaps in time, the longest {longest:.3} s; {usual:.4} s is usual",
-                gaps.len()
+                "{} in time, the longest {longest:.3} s; {usual:.4} s is usual",
+                counted(gaps.len(), "gap")
             );
             let remedy = "the tracker or its network dropped frames: use a cable, or a lower rate";
             findings.push(

@@ -680,6 +680,36 @@ fn nothing_known_and_nothing_recorded_is_no_panic() {
     );
 }
 
+/// As recorded live: rows only while the robot stands still, a jump in place and time from each hold to the next.
+#[test]
+fn holds_that_are_named_are_neither_jumps_nor_gaps() {
+    let Recorded {
+        poses, expected, ..
+    } = record(3, false);
+    let each = |i: &usize| std::iter::repeat_n(*i, 5);
+    let rows: Vec<usize> = (0..36).collect::<Vec<_>>().iter().flat_map(each).collect();
+    let mut live = poses.select(&rows);
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    for point in live.markers.values_mut().flatten().flatten() {
+        *point += Vector3::from_fn(|_, _| SIGMA * normal(&mut rng));
+    }
+    for pose in live.bodies.values_mut().flatten().flatten() {
+        pose.translation.vector += Vector3::from_fn(|_, _| SIGMA * normal(&mut rng));
+    }
+    let time = |i: usize| (i / 5) as f64 * 4.0 + (i % 5) as f64 * 0.01;
+    live.t = Some((0..180).map(time).collect());
+    let ids =
+        |poses: &Poses| -> Vec<&str> { checks(poses, &expected).iter().map(|f| f.id).collect() };
+    let found = ids(&live);
+    assert!(
+        found.contains(&"time-gap") && found.contains(&"jump"),
+        "{found:?}"
+    );
+    let names = (0..180).map(|i| (i / 5 + 1).to_string()).collect();
+    live.labels.insert("hold".to_string(), names);
+    assert_eq!(ids(&live), [""; 0]);
+}
+
 #[test]
 fn quaternions_in_the_other_order_are_found() {
     for seed in 0..SEEDS {
