@@ -147,6 +147,9 @@ fn summaries() {
                 rounded_text(&run.ran.stdout)
             );
             assert_eq!(run.ran.stderr, "", "nothing but results without a terminal");
+            for line in run.ran.stdout.lines() {
+                assert!(line.chars().count() <= 80, "{robot} {method}: {line}");
+            }
         }
     }
 }

@@ -559,7 +559,7 @@ fn written(
             name: format!("{stem}.glb"),
             bytes: calib_report::glb::glb(scene, view)?,
         },
-        "robot, markers and errors for viewers of 3-D files (glTF)".to_owned(),
+        "robot, markers, errors as glTF for viewers".to_owned(),
     ));
     Ok(files)
 }
