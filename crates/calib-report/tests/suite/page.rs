@@ -272,3 +272,40 @@ fn the_first_screen_shows_or_leads_to_every_answer() {
         }
     }
 }
+
+#[test]
+fn every_layer_draws_something_and_errors_grow_with_their_slider() {
+    let page = html(&examples::accepted(), Some(&examples::view())).expect("a page");
+    let script = "
+        const canvas = document.getElementById('canvas'), factor = document.getElementById('factor');
+        const picture = () => canvas.toDataURL();
+        const told = { still: {}, factor: null, grows: false, hidden: document.getElementById('still').hidden };
+        for (const box of document.querySelectorAll('#layers input')) {
+            const before = picture();
+            box.click();
+            const name = box.parentElement.textContent.trim();
+            told.still[name] = before === picture();
+            box.click();
+            if (before !== picture()) told.still[name] = 'does not come back';
+        }
+        const before = picture();
+        factor.value = 3; factor.dispatchEvent(new Event('input'));
+        told.factor = document.getElementById('factor-text').textContent;
+        told.grows = before !== picture();
+        return told;";
+    let Some(seen) = browser::open("layers", &page, SIZES[0], script) else {
+        println!("skipped: no Chromium is installed");
+        return;
+    };
+    assert!(seen.console.is_empty(), "{:?}", seen.console);
+    let layers = seen.told["still"].as_object().expect("layers");
+    assert_eq!(layers.len(), 8, "{}", seen.told);
+    assert!(
+        layers.values().all(|still| still == false),
+        "a layer without a picture: {}",
+        seen.told
+    );
+    assert_eq!(seen.told["factor"], "1000");
+    assert_eq!(seen.told["grows"], true);
+    assert_eq!(seen.told["hidden"], true, "the still picture gives way");
+}
