@@ -14,7 +14,7 @@ pub(super) fn data(page: &mut Page, report: &Report) {
         "<for",
         ">rows",
         ">used",
-        ">rejected",
+        ">whole rows left out",
         "<lost by the tracker",
     ]);
     for recording in &report.recordings {
@@ -64,7 +64,13 @@ pub(super) fn data(page: &mut Page, report: &Report) {
     }
     page.table("Where the joints were:", table);
 
-    let mut table = Table::new(&["<noise", ">found σ", ">stated σ", ">samples", "<how"]);
+    let mut table = Table::new(&[
+        "<noise",
+        ">found σ",
+        ">stated σ",
+        ">from observations",
+        "<how",
+    ]);
     for noise in &report.noise {
         let [found, stated] =
             [noise.sigma, noise.stated].map(|sigma| number::sigma(sigma, noise.unit));
@@ -100,7 +106,7 @@ pub(super) fn data(page: &mut Page, report: &Report) {
             rejected.reason.clone(),
         ]);
     }
-    page.table("Thrown out:", table);
+    page.table("Thrown out of the fit:", table);
 
     let mut table = Table::new(&[
         "<severity",

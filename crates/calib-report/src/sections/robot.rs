@@ -210,7 +210,7 @@ pub(super) fn estimators(page: &mut Page, report: &Report) {
         ">value ± σ",
         ">distance",
         "<agrees",
-        "<why",
+        "<note",
     ]);
     for result in &report.estimators {
         let sigma = |i: usize| {
