@@ -26,7 +26,7 @@ recordings:
       markers: {BL: [x1, y1, z1], BR: [x2, y2, z2], TR: [x3, y3, z3], TL: [x4, y4, z4]}
   validation: {file: validation.csv, use: validation, columns: *columns}
 solve:
-  free: [bodies, tracker, joint_offsets, joint_axes, compliance]
+  free: [bodies, tracker, joint_offsets, joint_axes, compliance, lateral_compliance, backlash]
   limits: {held_out_rms_mm: 3.07}
 ";
 
@@ -53,7 +53,7 @@ fn the_model_that_37_postures_choose_beats_the_field_on_another_day() {
     let ranking = dir.calib(["run", "tiago.yaml", "--compare-models"]);
     assert_eq!(ranking.code, 0, "{}", ranking.stderr);
     assert!(
-        ranking.stdout.contains("* + compliance"),
+        ranking.stdout.contains("* + backlash"),
         "{}",
         ranking.stdout
     );
@@ -81,4 +81,90 @@ fn the_model_that_37_postures_choose_beats_the_field_on_another_day() {
         has("virtual-points"),
         "the four points were computed from one body"
     );
+}
+
+/// The same arm recorded badly: rows were read while it moved, and the fourth marker repeats the third.
+const SPOILED: &str = "calib: 1
+robot: {name: tiago, urdf: tiago.urdf}
+tracker: {frame: qualisys}
+bodies:
+  hand: {link: wrist_ft_tool_link, markers: [m1, m2, m3]}
+recordings:
+  poses:
+    file: poses.csv
+    use: static
+    columns:
+      joint_columns: [arm_1_joint, arm_2_joint, arm_3_joint, arm_4_joint, arm_5_joint, arm_6_joint, arm_7_joint]
+      prismatic: {torso_lift_joint: torso_lift_joint}
+      markers: {m1: [x1, y1, z1], m2: [x2, y2, z2], m3: [x3, y3, z3], m4: [x4, y4, z4]}
+solve:
+  free: [bodies, tracker, joint_offsets, joint_axes, compliance, backlash]
+";
+
+/// Best known fit of that table, m (3-D rms of three markers, in sample).
+const BEST_KNOWN: f64 = 2.6e-3;
+
+/// Which rows are spoiled is known from another table: `tiago_frozen/train.csv` holds the same sweep of the same day,
+/// averaged anew from the raw streams over the time in which the arm stood still. Against it the joint values and the
+/// markers of a spoiled row do not belong together, by (mm at the hand): line 31 9.8, line 20 9.1, line 16 12.0,
+/// line 7 6.9, line 23 5.7, line 15 2.2; all others agree within 1.5. Lines 16, 20 and 31 lie on the straight way to a
+/// neighbouring posture, so the check can say what happened. Line 7 does not, and is named as off. Line 23 is left out by
+/// the fit. Line 15 is within what the 40 mrad of play in `arm_6` do to other rows: no check of this table can tell it.
+#[test]
+fn the_spoiled_table_is_named_line_by_line_and_still_fits() {
+    let Some(data) = data() else { return };
+    let read = |path: &str| std::fs::read(data.join(path)).expect("part of the data");
+    let dir = Scratch::new()
+        .file("tiago.yaml", SPOILED)
+        .file("tiago.urdf", read("tiago_qualisys/tiago_48_schunk.urdf"))
+        .file(
+            "poses.csv",
+            read("tiago_qualisys/qualysis_base_hand_calibration.csv"),
+        );
+    let checked = dir.calib(["check", "tiago.yaml", "--json"]);
+    assert_eq!(
+        checked.code, 3,
+        "the marker that is written twice is an error"
+    );
+    let checked: serde_json::Value = serde_json::from_str(&checked.stdout).expect("JSON");
+    let findings = checked["findings"].as_array().expect("a list");
+    let rows = |id: &str| -> Vec<u64> {
+        findings
+            .iter()
+            .filter(|f| f["id"] == id)
+            .flat_map(|f| f["rows"].as_array().expect("a list").clone())
+            .filter_map(|row| row.as_u64())
+            .collect()
+    };
+    assert_eq!(rows("duplicate-column").len(), 34);
+    assert!(findings.iter().any(|f| f["id"] == "virtual-points"));
+    assert_eq!(rows("unsettled-rows"), [16, 20, 31]);
+    assert_eq!(rows("row-outlier"), [7]);
+    // As it is, the table stops the run; without the repeated marker the rest is fitted.
+    assert_eq!(dir.calib(["run", "tiago.yaml", "--out", "no"]).code, 3);
+    let dir = dir.edit("tiago.yaml", ", m4: [x4, y4, z4]", "");
+    let ran = dir.calib(["run", "tiago.yaml", "--out", "out"]);
+    assert_eq!(ran.code, 1, "no limits are named: {}", ran.stderr);
+    let report = dir.json("out/report.json");
+    let rms = report["residuals"]["all"]["rms_m"]
+        .as_f64()
+        .expect("fitted");
+    let used = report["residuals"]["all"]["samples"]
+        .as_u64()
+        .expect("fitted");
+    println!(
+        "TIAGo, spoiled table: {:.2} mm rms over {used} markers",
+        rms * 1e3
+    );
+    assert!(rms <= BEST_KNOWN && used >= 3 * 26, "{rms} over {used}");
+    let rejected = report["rejected"].as_array().expect("a list");
+    let unsettled = rejected
+        .iter()
+        .find(|r| {
+            r["reason"]
+                .as_str()
+                .is_some_and(|t| t.starts_with("not settled"))
+        })
+        .expect("named");
+    assert_eq!(unsettled["rows"], serde_json::json!([16, 20, 31]));
 }

@@ -6,8 +6,8 @@ use calib_core::{Gauge, RejectReason};
 use calib_profile::{Limits, Method, Usage};
 use calib_recording::Finding;
 use calib_report::{
-    Clock, EstimatorResult, FitSummary, HeldOut, Input, JointCoverage, Limit, LoopClosure, Lost,
-    Meaning, NotObservable, Output, Parameter, RecordingSummary, RecordingUse, Rejected, Report,
+    EstimatorResult, FitSummary, HeldOut, Input, JointCoverage, Limit, LoopClosure, Lost, Meaning,
+    NotObservable, Output, Parameter, RecordingSummary, RecordingUse, Rejected, Report,
     ResidualRow, Residuals, Term, Transform, Unit, Verdict, Verification, judge, number,
 };
 
@@ -125,10 +125,10 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         fit: e.fit.map(fit_summary),
         residuals: Residuals::from_rows(e.residuals),
         noise: e.fit.map_or_else(Vec::new, |fit| noise(e, fit)),
-        clocks: clocks(e.inputs),
+        clocks: crate::clock::clocks(e.inputs, e.fit),
         recordings: recordings(e),
         coverage: coverage(e.inputs),
-        rejected: e.fit.map_or_else(Vec::new, |fit| rejected(e.inputs, fit)),
+        rejected: rejected(e.inputs, e.fit),
         accuracy_limits: e
             .fit
             .map_or_else(Vec::new, |fit| accuracy_limits(e, fit, workspace.as_ref())),
@@ -438,38 +438,6 @@ fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
         .collect()
 }
 
-fn clocks(inputs: &Inputs) -> Vec<Clock> {
-    let untimed = inputs.recordings.values().all(|r| r.poses.t.is_none());
-    if untimed {
-        return vec![Clock {
-            recording: "all".to_owned(),
-            clock: "tracker".to_owned(),
-            against: "joints".to_owned(),
-            agrees: Some(true),
-            text: "static poses, joints and tracker in one row: the clocks do not matter"
-                .to_owned(),
-            ..Clock::default()
-        }];
-    }
-    inputs
-        .recordings
-        .values()
-        .map(|r| Clock {
-            recording: r.name.clone(),
-            clock: "tracker".to_owned(),
-            against: "joints".to_owned(),
-            agrees: r.poses.t.is_none().then_some(true),
-            text: if r.poses.t.is_none() {
-                "static poses: the clocks do not matter".to_owned()
-            } else {
-                "joints and tracker share the rows of one table; their offset was not tested"
-                    .to_owned()
-            },
-            ..Clock::default()
-        })
-        .collect()
-}
-
 fn recordings(e: &Evidence<'_>) -> Vec<RecordingSummary> {
     let mut out = Vec::new();
     for (name, r) in &e.inputs.recordings {
@@ -502,6 +470,8 @@ fn recordings(e: &Evidence<'_>) -> Vec<RecordingSummary> {
             used: r.poses.len() - whole_rows,
             rejected: whole_rows,
             lost,
+            conversions: r.meta.conversions.clone(),
+            up_axis: r.meta.up_axis.clone(),
         });
     }
     out
@@ -532,15 +502,27 @@ fn coverage(inputs: &Inputs) -> Vec<JointCoverage> {
     out
 }
 
-fn rejected(inputs: &Inputs, fit: &MlFit) -> Vec<Rejected> {
-    let mut groups: BTreeMap<(String, String, &'static str), Vec<u64>> = BTreeMap::new();
-    for r in &fit.solution.rejected {
+fn rejected(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Rejected> {
+    let mut groups: BTreeMap<(String, String, &str), Vec<u64>> = BTreeMap::new();
+    for out in &inputs.excluded {
+        let row = inputs.recordings.get(&out.recording);
+        if let Some(row) = row.and_then(|r| r.poses.rows.get(out.row)) {
+            groups
+                .entry((out.recording.clone(), out.body.clone(), &out.reason))
+                .or_default()
+                .push(*row);
+        }
+    }
+    for (fit, r) in fit
+        .into_iter()
+        .flat_map(|fit| fit.solution.rejected.iter().map(move |r| (fit, r)))
+    {
         let (recording, row) = &fit.stated.samples[r.sample];
         let reason = match r.reason {
-            RejectReason::Swap => "lies where another marker of the body should be",
-            RejectReason::Occlusion => "a measured pose on its way was lost",
-            RejectReason::Outlier => "further off than noise explains",
-            RejectReason::NotSettled => "the whole body is off: not settled, or a wrong reading",
+            RejectReason::Swap => "swap: it lies where another marker of the body should be",
+            RejectReason::Occlusion => "occlusion: a measured pose on its way was lost",
+            RejectReason::Outlier => "outlier: further off than noise explains",
+            RejectReason::NotSettled => "not settled: the whole body is off, or a wrong reading",
         };
         let row = inputs.recordings[recording].poses.rows[*row];
         groups

@@ -10,6 +10,9 @@ use crate::checks;
 use crate::error::{ExitCode, PipelineError};
 use crate::estimators::Estimators;
 use crate::load::{Inputs, load_recordings, load_robot};
+use crate::model_checks;
+use crate::relabel::relabel;
+use crate::start::start;
 use crate::tracks::body_tracks;
 
 /// What `calib check` found.
@@ -28,11 +31,30 @@ pub struct Checked {
 /// # Errors
 /// [`PipelineError`] for what cannot be read at all.
 pub fn check(profile: &Path) -> Result<Checked, PipelineError> {
-    let inputs = load_recordings(load_robot(profile)?, true)?;
+    let mut inputs = load_recordings(load_robot(profile)?, true)?;
     let mut findings = inputs.findings.clone();
-    findings.extend(checks::check(&inputs));
-    if !checks::stops(&findings) {
-        body_tracks(&inputs, &mut findings)?;
+    if inputs.robot.profile.solve.robust {
+        findings.extend(relabel(&mut inputs));
+    }
+    let of_data = checks::check(&inputs);
+    // A column written twice does not keep the others from being compared with the robot, row by row.
+    let wrong = of_data
+        .iter()
+        .any(|f| f.severity == Severity::Error && f.id != "duplicate-column");
+    findings.extend(of_data);
+    match body_tracks(&inputs, &mut findings) {
+        Ok(tracks) => {
+            let start = start(&inputs, &tracks);
+            let of_model = model_checks::before_the_fit(&inputs, &tracks, &start);
+            let wrong = wrong || checks::stops(&of_model);
+            findings.extend(of_model);
+            if !wrong && inputs.robot.profile.solve.robust {
+                findings.extend(model_checks::bad_rows_of_inputs(&inputs, &tracks)?.findings);
+            }
+        }
+        // What the data checks found is the reason.
+        Err(_) if wrong => {}
+        Err(error) => return Err(error),
     }
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     Ok(Checked {
@@ -49,14 +71,19 @@ fn lines(inputs: &Inputs) -> Vec<String> {
             calib_profile::Usage::Static => "static poses",
             calib_profile::Usage::Validation => "validation",
         };
-        format!(
+        let mut line = format!(
             "{} ({usage}): {} rows, {} joints, {} bodies, {} markers",
             r.name,
             r.poses.len(),
             r.poses.joints.len(),
             r.poses.bodies.len(),
             r.poses.markers.len()
-        )
+        );
+        if let Some(alignment) = &r.alignment {
+            line += "\n    ";
+            line += &alignment.text();
+        }
+        line
     };
     inputs.recordings.values().map(line).collect()
 }

@@ -11,8 +11,10 @@
 //! Stages are functions of plain values. Only [`load`] reads files and only [`mod@write`] writes them.
 
 mod accuracy;
+pub mod align;
 pub mod assemble;
 pub mod checks;
+pub mod clock;
 pub mod closure;
 pub mod conditions;
 pub mod contacts;
@@ -27,14 +29,17 @@ pub mod known;
 pub mod load;
 pub mod loads;
 pub mod ml;
+pub mod model_checks;
 pub mod models;
 pub mod paper;
 pub mod readers;
+pub mod relabel;
 pub mod residuals;
 pub mod run;
 pub mod shapes;
 pub mod simulate;
 pub mod start;
+pub mod streams;
 pub mod take_back;
 pub mod tracks;
 pub mod verify;

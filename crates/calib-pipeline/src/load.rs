@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use calib_plugin::{Control, Source};
-use calib_profile::{Profile, RecordingSpec};
+use calib_profile::{BodyKind, Profile, RecordingSpec, RobotLog};
 use calib_recording::{
     ColumnMap, Filled, Finding, JointUnit, Meta, Poses, ReadOptions, Recording, Severity,
 };
 use calib_urdf::{RobotModel, sha256_hex};
+use nalgebra::Matrix3;
 
+use crate::align::{Alignment, align, with_robot_log};
 use crate::error::PipelineError;
 use crate::estimators::{Estimators, values};
 use crate::readers;
@@ -54,6 +56,25 @@ pub struct Loaded {
     pub q: Vec<Option<Vec<f64>>>,
     /// Where it comes from and what was converted.
     pub meta: Meta,
+    /// How rows with a time became poses; `None` for a table whose rows are poses.
+    pub alignment: Option<Alignment>,
+    /// Speed of each recorded joint per row of a motion, rad/s or m/s; empty for static poses.
+    pub velocities: BTreeMap<String, Vec<Option<f64>>>,
+    /// Shape of each marker's covariance per row, in units of the usual variance; empty where no scatter is known.
+    pub shapes: BTreeMap<String, Vec<Option<Matrix3<f64>>>>,
+}
+
+/// A body or marker of one row that takes no part in the fit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Excluded {
+    /// The recording.
+    pub recording: String,
+    /// The row, from 0.
+    pub row: usize,
+    /// The body or marker.
+    pub body: String,
+    /// Why.
+    pub reason: String,
 }
 
 /// Everything the estimation needs.
@@ -65,6 +86,8 @@ pub struct Inputs {
     pub recordings: BTreeMap<String, Loaded>,
     /// What was noticed while reading.
     pub findings: Vec<Finding>,
+    /// What of the recordings takes no part, found before the fit.
+    pub excluded: Vec<Excluded>,
     /// Digests of all files read, profile first.
     pub digests: Vec<Digest>,
     /// Estimators, readers and writers that the profile can name.
@@ -150,6 +173,7 @@ pub fn load_recordings(robot: RobotProfile, plugins: bool) -> Result<Inputs, Pip
     let mut recordings = BTreeMap::new();
     let mut findings = Vec::new();
     let mut digests = robot.digests.clone();
+    let mut excluded = Vec::new();
     for (name, spec) in &robot.profile.recordings {
         let path = robot.folder.join(&spec.file);
         let bytes = std::fs::read(&path).map_err(|e| PipelineError::Data {
@@ -162,25 +186,147 @@ pub fn load_recordings(robot: RobotProfile, plugins: bool) -> Result<Inputs, Pip
             sha256: sha256_hex(&bytes),
         });
         let shown = path.display().to_string();
-        let recording = read(spec, &shown, &bytes, &estimators)?;
-        let poses = recording
-            .poses(Filled::Exclude)
-            .map_err(|e| PipelineError::Data {
-                file: shown.clone(),
-                finding: e.to_string(),
-                remedy: "record one table of static poses, or synchronise the streams first"
-                    .to_owned(),
-            })?;
-        let loaded = prepare(&robot, name, spec, poses, recording.meta, &mut findings)?;
+        let mut recording = read(spec, &shown, &bytes, &estimators)?;
+        if let Some(log) = &spec.robot_log {
+            let of_robot = read_robot_log(&robot, name, spec, log, &estimators, &mut digests)?;
+            recording = with_robot_log(recording, of_robot);
+        }
+        let loaded = match &spec.timing {
+            None => {
+                let poses = recording
+                    .poses(Filled::Exclude)
+                    .map_err(|e| PipelineError::Data {
+                        file: shown.clone(),
+                        finding: e.to_string(),
+                        remedy: "add `timing: {}` to the recording in the profile: holds become poses, and the clocks are brought together"
+                            .to_owned(),
+                    })?;
+                prepare(&robot, name, spec, poses, recording.meta, &mut findings)?
+            }
+            Some(timing) => {
+                check_joint_names(&robot, spec, &mut recording)?;
+                let aligned = align(&robot, name, spec, timing, &recording)?;
+                findings.extend(aligned.findings);
+                let meta = recording.meta;
+                let poses = aligned.poses;
+                let mut loaded = prepare(&robot, name, spec, poses, meta, &mut findings)?;
+                loaded.alignment = Some(aligned.alignment);
+                loaded.velocities = aligned.velocities;
+                loaded.shapes = aligned.shapes;
+                excluded.extend(aligned.excluded);
+                loaded
+            }
+        };
         recordings.insert(name.clone(), loaded);
     }
-    Ok(Inputs {
+    let mut inputs = Inputs {
         robot,
         recordings,
         findings,
+        excluded: Vec::new(),
         digests,
         estimators: Arc::new(estimators),
-    })
+    };
+    inputs.exclude(excluded);
+    Ok(inputs)
+}
+
+impl Inputs {
+    /// Takes bodies and markers of single rows out, as if the tracker had lost them, and remembers why.
+    pub fn exclude(&mut self, excluded: Vec<Excluded>) {
+        for out in &excluded {
+            let markers = match self.robot.profile.bodies.get(&out.body).map(|b| &b.kind) {
+                Some(BodyKind::Markers { names, .. }) => names.clone(),
+                Some(BodyKind::Pose) | None => vec![out.body.clone()],
+            };
+            let Some(loaded) = self.recordings.get_mut(&out.recording) else {
+                continue;
+            };
+            if let Some(pose) = loaded
+                .poses
+                .bodies
+                .get_mut(&out.body)
+                .and_then(|track| track.get_mut(out.row))
+            {
+                *pose = None;
+            }
+            for marker in markers {
+                let track = loaded.poses.markers.get_mut(&marker);
+                if let Some(point) = track.and_then(|track| track.get_mut(out.row)) {
+                    *point = None;
+                }
+            }
+        }
+        self.excluded.extend(excluded);
+    }
+}
+
+/// Reads the robot's own log of a recording.
+fn read_robot_log(
+    robot: &RobotProfile,
+    name: &str,
+    spec: &RecordingSpec,
+    log: &RobotLog,
+    estimators: &Estimators,
+    digests: &mut Vec<Digest>,
+) -> Result<Recording, PipelineError> {
+    let path = robot.folder.join(&log.file);
+    let shown = path.display().to_string();
+    let bytes = std::fs::read(&path).map_err(|e| PipelineError::Data {
+        file: shown.clone(),
+        finding: format!("the robot's log of recording `{name}` cannot be read: {e}"),
+        remedy: "correct `robot_log: {file: …}`; it is relative to the profile".to_owned(),
+    })?;
+    digests.push(Digest {
+        path: log.file.clone(),
+        sha256: sha256_hex(&bytes),
+    });
+    let own = RecordingSpec {
+        file: log.file.clone(),
+        group: None,
+        reader: log.reader.clone(),
+        reader_parameters: BTreeMap::new(),
+        columns: log.columns.clone(),
+        ..spec.clone()
+    };
+    let recording = read(&own, &shown, &bytes, estimators)?;
+    if recording.joints.is_empty() {
+        return Err(PipelineError::Data {
+            file: shown,
+            finding: "the robot's log has no joints".to_owned(),
+            remedy: "name the columns as the robot's joints with their unit (`elbow_rad`), or map them under `columns`"
+                .to_owned(),
+        });
+    }
+    Ok(recording)
+}
+
+/// Before streams are aligned: names that are no joint are an error, or dropped where a column map is given.
+fn check_joint_names(
+    robot: &RobotProfile,
+    spec: &RecordingSpec,
+    recording: &mut Recording,
+) -> Result<(), PipelineError> {
+    let mapped = spec.columns.is_some()
+        || spec
+            .robot_log
+            .as_ref()
+            .is_some_and(|log| log.columns.is_some());
+    if mapped {
+        let known = |name: &str| robot.model.joint_id(name).is_ok();
+        recording.joints.retain(|j| known(&j.name));
+    }
+    for joint in &recording.joints {
+        robot
+            .model
+            .joint_id(&joint.name)
+            .map_err(|unknown| PipelineError::Data {
+                file: robot.folder.join(&spec.file).display().to_string(),
+                finding: format!("stream `{}` is no joint: {unknown}", joint.name),
+                remedy: "rename it, or map it under `columns`".to_owned(),
+            })?;
+    }
+    Ok(())
 }
 
 /// Reads one file with the profile's reader: a built-in one directly, a plugin's across the border.
@@ -298,6 +444,9 @@ fn prepare(
         poses,
         q,
         meta,
+        alignment: None,
+        velocities: BTreeMap::new(),
+        shapes: BTreeMap::new(),
     })
 }
 

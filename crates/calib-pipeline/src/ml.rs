@@ -153,6 +153,7 @@ pub fn state(
     }
     add_bodies(&mut stated, inputs, tracks, start);
     add_contacts(&mut stated, inputs);
+    crate::clock::add_clocks(&mut stated, inputs, freedom);
     stated
 }
 
@@ -468,13 +469,15 @@ fn add_bodies(
                 let mut seen = Vec::new();
                 for (sample, (recording, row)) in stated.samples.iter().enumerate() {
                     for (marker, point) in &points {
-                        let track = inputs.recordings[recording].poses.markers.get(marker);
+                        let loaded = &inputs.recordings[recording];
+                        let track = loaded.poses.markers.get(marker);
                         if let Some(position) = track.and_then(|t| t[*row]) {
+                            let shapes = loaded.shapes.get(marker);
                             seen.push(MarkerObservation {
                                 sample,
                                 point: *point,
                                 position,
-                                shape: None,
+                                shape: shapes.and_then(|s| s.get(*row).copied().flatten()),
                             });
                         }
                     }

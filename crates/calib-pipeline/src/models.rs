@@ -39,6 +39,9 @@ pub fn compare_models(
 ) -> Result<Vec<RankedVariant>, PipelineError> {
     let mut inputs = load_recordings(load_robot(profile)?, true)?;
     let mut findings = inputs.findings.clone();
+    if inputs.robot.profile.solve.robust {
+        findings.extend(crate::relabel::relabel(&mut inputs));
+    }
     findings.extend(checks::check(&inputs));
     if checks::stops(&findings) && !force {
         return Err(crate::run::stopped(&inputs, &findings));

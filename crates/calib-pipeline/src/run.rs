@@ -12,6 +12,7 @@ use nalgebra::{Isometry3, Matrix6};
 
 use crate::assemble::{Evidence, assemble};
 use crate::checks;
+use crate::clock;
 use crate::closure::close_loops;
 use crate::error::{ExitCode, PipelineError};
 use crate::estimators::values;
@@ -20,7 +21,9 @@ use crate::kinematics::Calibration;
 use crate::known::{Known, known_numbers};
 use crate::load::{Inputs, load_recordings, load_robot};
 use crate::ml::{self, Freedom, MlFit};
+use crate::model_checks;
 use crate::paper::{self, OriginEstimate};
+use crate::relabel::relabel;
 use crate::shapes;
 use crate::start::{Start, mean_pose, start};
 use crate::tracks::{BodyTrack, body_tracks};
@@ -65,15 +68,22 @@ pub fn run(
     let mut inputs = load_recordings(robot, !options.no_plugins)?;
     progress("check data");
     let mut findings = inputs.findings.clone();
+    if inputs.robot.profile.solve.robust {
+        findings.extend(relabel(&mut inputs));
+    }
     findings.extend(checks::check(&inputs));
     let (outlines, meshes) = shapes::outlines(&inputs.robot, &mut findings);
     inputs.digests.extend(meshes);
-    let inputs = inputs;
-    if checks::stops(&findings) && !options.force {
+    let stops = |findings: &[Finding]| checks::stops(findings) && !options.force;
+    let mut tracks = match body_tracks(&inputs, &mut findings) {
+        Err(_) if stops(&findings) => return Err(stopped(&inputs, &findings)),
+        tracks => tracks?,
+    };
+    let start = start(&inputs, &tracks);
+    findings.extend(model_checks::before_the_fit(&inputs, &tracks, &start));
+    if stops(&findings) {
         return Err(stopped(&inputs, &findings));
     }
-    let tracks = body_tracks(&inputs, &mut findings)?;
-    let start = start(&inputs, &tracks);
     progress("estimate origins");
     let origins = paper::origins(&inputs, &tracks, &start, &inputs.estimators, &mut findings)?;
     let method = options.method.unwrap_or(inputs.robot.profile.solve.method);
@@ -92,12 +102,24 @@ pub fn run(
             progress("fit all loops");
             let mut settings = Settings::default();
             settings.robust.enabled = inputs.robot.profile.solve.robust;
-            let fit = ml::fit(
+            let mut fit = ml::fit(
                 ml::state(&inputs, &tracks, &start, Freedom::Profile),
                 &inputs,
                 &settings,
             )?;
+            if settings.robust.enabled {
+                let bad = model_checks::bad_rows(&inputs, &tracks, &fit);
+                findings.extend(bad.findings);
+                if !bad.unsettled.is_empty() {
+                    progress("fit again without the unsettled rows");
+                    inputs.exclude(bad.unsettled);
+                    tracks = body_tracks(&inputs, &mut Vec::new())?;
+                    let stated = ml::state(&inputs, &tracks, &start, Freedom::Profile);
+                    fit = ml::fit(stated, &inputs, &settings)?;
+                }
+            }
             findings.extend(on_their_limit(&fit));
+            inputs = clock::corrected(&inputs, &fit);
             ml_result(&inputs, fit, registered.calibration)?
         }
     };

@@ -23,10 +23,11 @@ pub use check::check;
 pub use error::{Problem, ProfileError};
 pub use locate::Place;
 pub use profile::{
-    Body, BodyKind, Contact, ContactBase, Error3, Free, JointException, JointFree, JointFreedom,
-    Limits, LinkTransform, Load, Loop, Method, Noise, Orientation, Origin, OriginFreedom, Outputs,
-    ParameterValue, Plugin, PointChoice, Prior, Profile, Protocol, RecordingSpec, SimErrors,
-    SimMount, SimNoise, Simulation, Solve, Steps, SweptAxis, Tip, Touched, Tracker, Usage,
+    Body, BodyKind, Clocks, Contact, ContactBase, Error3, Free, JointException, JointFree,
+    JointFreedom, Limits, LinkTransform, Load, Loop, Method, Noise, Orientation, Origin,
+    OriginFreedom, Outputs, ParameterValue, Plugin, PointChoice, Prior, Profile, Protocol,
+    RecordingSpec, RobotLog, SimErrors, SimMount, SimNoise, Simulation, Solve, Steps, SweptAxis,
+    TimedPoses, Timing, Tip, Touched, Tracker, Usage,
 };
 pub use schema::json_schema;
 

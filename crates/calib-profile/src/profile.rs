@@ -7,8 +7,8 @@ use calib_urdf::{JointId, LinkId};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 pub use crate::raw::{
-    RawFree as Free, RawJointFree as JointFree, RawLoad as Load, RawMethod as Method,
-    RawUse as Usage,
+    RawClocks as Clocks, RawFree as Free, RawJointFree as JointFree, RawLoad as Load,
+    RawMethod as Method, RawTimedPoses as TimedPoses, RawUse as Usage,
 };
 pub use crate::raw::{RawPlugin as Plugin, RawValue as ParameterValue};
 
@@ -104,6 +104,36 @@ pub struct RecordingSpec {
     pub reader_parameters: BTreeMap<String, ParameterValue>,
     /// Meaning of columns that do not follow our own names.
     pub columns: Option<ColumnMap>,
+    /// The robot's own log, where it is another file.
+    pub robot_log: Option<RobotLog>,
+    /// How rows with a time become poses; `None`: every row is a pose.
+    pub timing: Option<Timing>,
+}
+
+/// The robot's own log of its joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotLog {
+    /// File, relative to the profile.
+    pub file: String,
+    /// Reader by id; found from the content when `None`.
+    pub reader: Option<String>,
+    /// Meaning of columns that do not follow our own names.
+    pub columns: Option<ColumnMap>,
+}
+
+/// Time in a recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timing {
+    /// Where the poses come from.
+    pub poses: TimedPoses,
+    /// What is known of the clocks.
+    pub clock: Clocks,
+    /// Shortest hold, s.
+    pub hold: f64,
+    /// Rows taken from a motion, Hz.
+    pub rate: f64,
+    /// Largest offset between the clocks, s.
+    pub max_offset: f64,
 }
 
 /// An unknown transform `body_from_joint`, the joint's frame being that of its child link.

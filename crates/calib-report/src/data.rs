@@ -110,6 +110,12 @@ pub struct RecordingSummary {
     pub rejected: usize,
     /// Samples that the tracker or encoder lost.
     pub lost: Vec<Lost>,
+    /// What was converted on reading: units, rotation conventions, ignored columns. One sentence each.
+    #[serde(default)]
+    pub conversions: Vec<String>,
+    /// The axis that points up, where the file says so (`+Z`).
+    #[serde(default)]
+    pub up_axis: Option<String>,
 }
 
 /// Lost samples of one marker, body or joint.
@@ -166,6 +172,12 @@ pub struct Clock {
     pub offset_s: Option<f64>,
     /// Standard deviation, s.
     pub sigma_s: Option<f64>,
+    /// How much faster the first runs, 1 (5e-5 = 50 ppm); null when it was not estimated.
+    #[serde(default)]
+    pub drift: Option<f64>,
+    /// Its standard deviation.
+    #[serde(default)]
+    pub drift_sigma: Option<f64>,
     /// Whether the clocks agree well enough for this recording; null when it could not be told.
     pub agrees: Option<bool>,
     /// Why, or "static poses: the clocks do not matter".

@@ -13,10 +13,11 @@
 //! Errors of an origin along or about its own axis are not drawn in (1): they are what a zero offset and the
 //! choice of a frame on the axis mean already. The same profile and seed give the same bytes.
 //!
-//! What this crate does not simulate: cameras, marker swaps, clocks.
+//! Two machines with two clocks: [`simulate_streams`]. What this crate does not simulate: cameras, marker swaps.
 
 mod protocol;
 mod robot;
+mod streams;
 mod truth;
 
 use std::collections::BTreeMap;
@@ -32,6 +33,7 @@ use rand_distr::StandardNormal;
 
 pub use protocol::{Commanded, commanded_poses};
 pub use robot::TrueRobot;
+pub use streams::{Motion, StreamPlan, Streams, simulate_streams};
 pub use truth::{Truth, TruthTransform};
 
 /// Recordings by name, and the truth behind them.

@@ -9,8 +9,8 @@ use crate::error::{Problem, ProfileError, expected, one_of};
 use crate::locate::Places;
 use crate::profile::{
     Body, BodyKind, Error3, JointException, Limits, LinkTransform, Loop, Noise, Orientation,
-    Origin, Outputs, PointChoice, Prior, Profile, Protocol, RecordingSpec, SimErrors, SimMount,
-    SimNoise, Simulation, Solve, Steps, SweptAxis, Tracker,
+    Origin, Outputs, PointChoice, Prior, Profile, Protocol, RecordingSpec, RobotLog, SimErrors,
+    SimMount, SimNoise, Simulation, Solve, Steps, SweptAxis, Timing, Tracker,
 };
 use crate::raw::{
     RawBody, RawOrientation, RawOrigin, RawPoint, RawProfile, RawProtocol, RawRecording,
@@ -270,6 +270,35 @@ impl<'a> Checker<'a> {
                 "add `joints: {<joint>_deg: [from, to]}`",
             );
         }
+        if raw.robot_log.is_some() && raw.timing.is_none() {
+            self.key_problem(
+                &["recordings", name, "robot_log"],
+                "two files have two sets of rows",
+                "add `timing: {}`: holds become poses, and the clocks are brought together",
+            );
+        }
+        let timing = raw.timing.as_ref().map(|timing| {
+            for (key, value) in [
+                ("hold_s", timing.hold_s),
+                ("rate_hz", timing.rate_hz),
+                ("max_offset_s", timing.max_offset_s),
+            ] {
+                if !(value.is_finite() && value > 0.0) {
+                    self.problem(
+                        &["recordings", name, "timing", key],
+                        format!("{value} is not above 0"),
+                        "give a number above 0",
+                    );
+                }
+            }
+            Timing {
+                poses: timing.poses,
+                clock: timing.clock,
+                hold: timing.hold_s,
+                rate: timing.rate_hz,
+                max_offset: timing.max_offset_s,
+            }
+        });
         RecordingSpec {
             file: raw.file.clone(),
             usage: raw.usage,
@@ -279,6 +308,12 @@ impl<'a> Checker<'a> {
             reader: raw.reader.clone(),
             reader_parameters: raw.reader_parameters.clone(),
             columns: raw.columns.clone(),
+            robot_log: raw.robot_log.as_ref().map(|log| RobotLog {
+                file: log.file.clone(),
+                reader: log.reader.clone(),
+                columns: log.columns.clone(),
+            }),
+            timing,
         }
     }
 

@@ -9,7 +9,8 @@
 //! ```
 //!
 //! The angles alone do not tell an arm from its mirror image (one joint of three orthogonal ones with the other
-//! sign); the slide does. It is compared in units of the arm's size: `√(Δθ² + (Δd/L)²)`, L the median distance moved.
+//! sign); the slide does. It is compared in units of the arm's size: `√(Δθ² + (Δd/L)²)`, L the
+//! median distance that the body moves.
 //!
 //! What this cannot see: a sign error of the only joint that moves (a mount turned by half a turn explains it), and
 //! links between which no joint moved.
@@ -21,7 +22,7 @@ use crate::sync::OffsetOutcome;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 /// Disagreement, rad (1°), below which the model is not blamed: nominal robots are that good.
-const GOOD_ENOUGH: f64 = 0.0175;
+pub const GOOD_ENOUGH: f64 = 0.0175;
 /// Another explanation must be this many times better.
 const MUCH_BETTER: f64 = 4.0;
 /// A row that disagrees with the others by this many times their usual disagreement does not belong to them.
@@ -72,7 +73,7 @@ fn pairs<'a>(
     } else {
         (0..24).map(|k| 1 + k * k * n / 1200).collect()
     };
-    let size = size(base_from_link);
+    let size = size(tracker_from_body);
     steps
         .into_iter()
         .flat_map(move |step| (0..n.saturating_sub(step)).map(move |i| (i, i + step)))
@@ -86,18 +87,21 @@ fn pairs<'a>(
         })
 }
 
-/// Median distance of the link from the middle of its way, m; at least a centimetre.
-fn size(base_from_link: &[Isometry3<f64>]) -> f64 {
-    let n = base_from_link.len().max(1) as f64;
-    let centre = base_from_link
+/// A body that stays within this of the middle of its way, m, sits on the joint's axis: its slide says little.
+const SMALLEST_SIZE: f64 = 0.05;
+
+/// Median distance of the body from the middle of its way, m: one size for all assumptions about its link.
+fn size(tracker_from_body: &[Option<Isometry3<f64>>]) -> f64 {
+    let places: Vec<Vector3<f64>> = tracker_from_body
         .iter()
+        .flatten()
         .map(|pose| pose.translation.vector)
-        .sum::<nalgebra::Vector3<f64>>()
-        / n;
-    let distances = base_from_link
-        .iter()
-        .map(|pose| (pose.translation.vector - centre).norm());
-    median(distances.collect()).unwrap_or(0.0).max(0.01)
+        .collect();
+    let centre = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
+    let distances = places.iter().map(|place| (place - centre).norm());
+    median(distances.collect())
+        .unwrap_or(0.0)
+        .max(SMALLEST_SIZE)
 }
 
 /// Angle of the motion from `a` to `b`, rad, and its slide along the axis, m, where the axis is well defined.
@@ -149,6 +153,7 @@ pub fn better_explanation(
         }
         "joint-order" => "exchange these joints' columns",
         "clock-lag" => "the joint values lag behind the tracker: synchronise, or record in holds",
+        "unit-mismatch" => "correct the unit in the columns' names, or in the column map",
         _ => "check the profile",
     };
     Some(Finding::new(best.id, Severity::Error, body, text, remedy))

@@ -53,6 +53,8 @@ pub struct ClockMap {
     pub drift_sigma: f64,
     /// Correlation of the two angular speeds at the peak.
     pub correlation: f64,
+    /// The second peak's correlation in units of the first; 0 where there is none.
+    pub second: f64,
 }
 
 impl ClockMap {
@@ -217,7 +219,10 @@ pub fn clock_offset(
             ratio: second.height / first.height,
         };
     }
-    refine(a, b, settings, offset(&first), first.height)
+    let second = peaks
+        .get(1)
+        .map_or(0.0, |p| p.height.max(0.0) / first.height);
+    refine(a, b, settings, offset(&first), (first.height, second))
 }
 
 fn deviation(speed: &[Option<f64>]) -> f64 {
@@ -301,7 +306,7 @@ fn refine(
     b: &RotationTrack,
     settings: &OffsetSettings,
     start: f64,
-    correlation: f64,
+    (correlation, second): (f64, f64),
 ) -> OffsetOutcome {
     let (step_a, step_b, half) = (a.step(), b.step(), settings.half_chord);
     let measured: Vec<(f64, f64)> =
@@ -316,6 +321,7 @@ fn refine(
         offset_sigma: 0.0,
         drift_sigma: 0.0,
         correlation,
+        second,
     };
     let (mut gain, mut constant) = (1.0, 0.0);
     let mut rows: Vec<(Vector4<f64>, f64)> = Vec::new();

@@ -747,6 +747,7 @@ fn every_outcome_of_an_alignment_is_said() {
         offset_sigma: 2e-4,
         drift_sigma: 1e-6,
         correlation: 0.99,
+        second: 0.3,
     };
     let lag = alignment(&OffsetOutcome::Found(map), 1e-3).expect("3.9 s");
     assert_eq!(

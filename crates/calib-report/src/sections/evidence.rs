@@ -40,6 +40,16 @@ pub(super) fn data(page: &mut Page, report: &Report) {
     }
     page.table("", table);
 
+    let mut table = Table::new(&["<recording", "<on reading"]);
+    for recording in &report.recordings {
+        let up = recording.up_axis.as_ref();
+        let up = up.map(|axis| format!("the file says that {axis} is up"));
+        for text in recording.conversions.iter().chain(up.as_ref()) {
+            table.row([code(&recording.name), text.clone()]);
+        }
+    }
+    page.table("What was converted on reading:", table);
+
     let mut table = Table::new(&["<joint", ">from", ">to", ">limits", ">covered", ">samples"]);
     for joint in &report.coverage {
         let limits = match (joint.lower_limit, joint.upper_limit) {

@@ -400,6 +400,7 @@ pub fn accepted() -> Report {
                 used: 40,
                 rejected: 1,
                 lost: vec![Lost { subject: "gripM_2".into(), lost: 3, of: 41 }],
+                ..RecordingSummary::default()
             },
             RecordingSummary { name: "checks".into(), path: "ripley/checks.csv".into(), used_for: RecordingUse::Validation, rows: 10, used: 10, ..RecordingSummary::default() },
         ],
@@ -560,6 +561,8 @@ pub fn rejected() -> Report {
             against: "joints".into(),
             offset_s: Some(0.0213),
             sigma_s: Some(0.0008),
+            drift: None,
+            drift_sigma: None,
             agrees: Some(false),
             text: "rows with motion were left out".into(),
         }],

@@ -1,0 +1,132 @@
+//! Streams between their samples: linear for numbers and points, along the shortest turn for orientations.
+
+use std::collections::BTreeMap;
+
+use calib_recording::{JointUnit, Recording};
+use nalgebra::{Isometry3, Point3};
+
+/// Longest gap, in units of the usual step, that is interpolated.
+const MAX_GAP: f64 = 5.0;
+
+/// A number over time.
+#[derive(Debug, Clone)]
+pub struct Scalars {
+    /// Times, s, never decreasing; empty where the stream has none.
+    pub t: Vec<f64>,
+    /// Values; `None` = not recorded.
+    pub values: Vec<Option<f64>>,
+    /// Angle or length, of a joint.
+    pub unit: Option<JointUnit>,
+    /// Index of its time line.
+    pub timeline: usize,
+    step: f64,
+}
+
+impl Scalars {
+    fn new(
+        recording: &Recording,
+        timeline: usize,
+        values: &[Option<f64>],
+        unit: Option<JointUnit>,
+    ) -> Self {
+        let line = recording.timelines.get(timeline);
+        let t = line.and_then(|l| l.t.clone()).unwrap_or_default();
+        Self {
+            step: usual_step(&t),
+            t,
+            values: values.to_vec(),
+            unit,
+            timeline,
+        }
+    }
+
+    /// All joints of a recording.
+    #[must_use]
+    pub fn of_joints(recording: &Recording) -> BTreeMap<String, Self> {
+        let stream = |j: &calib_recording::JointStream| {
+            (
+                j.name.clone(),
+                Self::new(recording, j.timeline, &j.q, Some(j.unit)),
+            )
+        };
+        recording.joints.iter().map(stream).collect()
+    }
+
+    /// All torques of a recording.
+    #[must_use]
+    pub fn of_torques(recording: &Recording) -> BTreeMap<String, Self> {
+        let stream = |s: &calib_recording::TorqueStream| {
+            (
+                s.name.clone(),
+                Self::new(recording, s.timeline, &s.torque, None),
+            )
+        };
+        recording.torques.iter().map(stream).collect()
+    }
+
+    /// The value at `t`; `None` outside, in gaps, and next to a lost sample.
+    #[must_use]
+    pub fn at(&self, t: f64) -> Option<f64> {
+        let (i, j, f) = between(&self.t, t, self.step)?;
+        let a = *self.values.get(i)?.as_ref()?;
+        if f == 0.0 {
+            return Some(a);
+        }
+        let b = *self.values.get(j)?.as_ref()?;
+        Some(a + f * (b - a))
+    }
+
+    /// Speed at `t`, per s, over the chord `t ± half` (at least one sample to either side).
+    #[must_use]
+    pub fn speed(&self, t: f64, half: f64) -> Option<f64> {
+        let half = half.max(self.step);
+        if half <= 0.0 {
+            return None;
+        }
+        Some((self.at(t + half)? - self.at(t - half)?) / (2.0 * half))
+    }
+}
+
+/// Median step of times, s.
+fn usual_step(t: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Samples before and after `t` and the fraction between them.
+fn between(times: &[f64], t: f64, step: f64) -> Option<(usize, usize, f64)> {
+    let after = times.partition_point(|&known| known <= t);
+    let i = after.checked_sub(1)?;
+    if times[i] == t {
+        return Some((i, i, 0.0));
+    }
+    let gap = times.get(after)? - times[i];
+    (gap <= MAX_GAP * step && gap > 0.0).then(|| (i, after, (t - times[i]) / gap))
+}
+
+/// A marker at `t`; `None` outside, in gaps, and next to a lost sample.
+#[must_use]
+pub fn interpolated_point(
+    times: &[f64],
+    points: &[Option<Point3<f64>>],
+    t: f64,
+) -> Option<Point3<f64>> {
+    let (i, j, f) = between(times, t, usual_step(times))?;
+    let a = *points.get(i)?.as_ref()?;
+    let b = *points.get(j)?.as_ref()?;
+    Some(a + (b - a) * f)
+}
+
+/// A body at `t`; `None` outside, in gaps, and next to a lost sample.
+#[must_use]
+pub fn interpolated_body(
+    times: &[f64],
+    poses: &[Option<Isometry3<f64>>],
+    t: f64,
+) -> Option<Isometry3<f64>> {
+    let (i, j, f) = between(times, t, usual_step(times))?;
+    let a = poses.get(i)?.as_ref()?;
+    let b = poses.get(j)?.as_ref()?;
+    a.try_lerp_slerp(b, f, 1e-9)
+}
