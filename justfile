@@ -16,6 +16,11 @@ doc:
 bench:
     RAYON_NUM_THREADS=1 cargo bench --workspace
 
+# Ten minutes of a fuzz target (cargo-fuzz): just fuzz c3d
+fuzz target:
+    CALIB_FUZZ_SEEDS=$PWD/target/corpus cargo test -p calib-recording -p calib-capture fuzz_seeds
+    cd fuzz && RUSTC_BOOTSTRAP=1 cargo fuzz run {{target}} ../target/corpus/{{target}} -- -max_total_time=600 -rss_limit_mb=2048 -malloc_limit_mb=1024 -timeout=20
+
 # The book's tests, its generated page made anew, and its HTML where mdbook is installed
 book:
     UPDATE_BOOK=1 cargo test -p calib-cli --test book
