@@ -53,7 +53,9 @@ pub enum Command {
         #[command(subcommand)]
         what: Fit,
     },
-    /// What differs between two URDFs
+    /// Write a calibration into your own description of the robot: URDF, xacro, or the YAML of its origins
+    Apply(Apply),
+    /// What differs between two robots: URDFs, xacros, YAMLs of origins
     Diff {
         /// The one
         a: PathBuf,
@@ -63,13 +65,26 @@ pub enum Command {
         #[arg(long, value_enum, default_value_t = DiffFormat::Table)]
         format: DiffFormat,
     },
-    /// Give the original bytes of a patched URDF back
-    Revert {
-        /// The patched URDF; its change record `<file>.changes.json` stands beside it
-        urdf: PathBuf,
-        /// Where to write the original
+    /// What changed between two calibrations of one robot, with 1 % false alarms; exit code 1 when something did
+    Drift {
+        /// Results of the old calibration: a folder or report.json
+        old: PathBuf,
+        /// Results of the new one
+        new: PathBuf,
+        /// Print JSON
         #[arg(long)]
-        out: PathBuf,
+        json: bool,
+    },
+    /// Give the original bytes of a changed URDF, xacro or YAML back
+    Revert {
+        /// The changed file; its change record `<file>.changes.json` stands beside it
+        file: PathBuf,
+        /// Where to write the original
+        #[arg(long, required_unless_present = "in_place")]
+        out: Option<PathBuf>,
+        /// Over the changed file; the record is removed
+        #[arg(long, conflicts_with = "out")]
+        in_place: bool,
     },
     /// Simulation studies of the estimators, with the statistical bound in every cell
     Study(StudyRun),
@@ -173,6 +188,34 @@ pub struct Record {
     /// End after this long, s
     #[arg(long)]
     pub seconds: Option<f64>,
+}
+
+/// `calib apply`.
+#[derive(Debug, Args)]
+#[command(group(clap::ArgGroup::new("destination").required(true).args(["out", "in_place", "diff"])))]
+pub struct Apply {
+    /// What `calib run` wrote: its folder, report.json, or the calibrated URDF
+    pub result: PathBuf,
+    /// What to change: a URDF, a xacro, or a YAML with origins of joints
+    pub target: PathBuf,
+    /// Write here; a folder where the xacro's YAML changes too
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Write over the target, with the record that `calib revert` needs beside it
+    #[arg(long)]
+    pub in_place: bool,
+    /// Write nothing; show the difference line by line
+    #[arg(long)]
+    pub diff: bool,
+    /// The YAML that the xacro loads, where its path cannot be followed
+    #[arg(long, value_name = "FILE")]
+    pub yaml: Option<PathBuf>,
+    /// Also a calibration that was not accepted
+    #[arg(long)]
+    pub force: bool,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Estimation methods.

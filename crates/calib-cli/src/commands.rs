@@ -4,16 +4,17 @@ use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use calib_pipeline::apply::{self, ApplyRequest, Destination};
 use calib_pipeline::run::{RunOptions, run as run_profile};
 use calib_pipeline::{
-    ExitCode, PipelineError, convert, fit, inspect, load, models, simulate, take_back, write,
+    ExitCode, PipelineError, convert, drift, fit, inspect, load, models, simulate, take_back, write,
 };
 use calib_study::{Study, StudyOptions};
 use clap::CommandFactory as _;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::arguments::{
-    Arguments, Command, DiffFormat, Fit, MethodName, Run, SchemaOf, StudyName, StudyRun,
+    Apply, Arguments, Command, DiffFormat, Fit, MethodName, Run, SchemaOf, StudyName, StudyRun,
 };
 use crate::{plugins, record};
 
@@ -72,8 +73,26 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
             emit(&text);
             Ok(ExitCode::Accepted)
         }
-        Command::Revert { urdf, out } => {
-            emit(&format!("{}\n", take_back::revert(urdf, out)?.display()));
+        Command::Apply(options) => apply_result(options),
+        Command::Drift { old, new, json } => {
+            let found = drift::drift(old, new)?;
+            emit(&if *json {
+                drift::json(&found)?
+            } else {
+                drift::text(&found)
+            });
+            Ok(if found.changed {
+                ExitCode::VerdictFail
+            } else {
+                ExitCode::Accepted
+            })
+        }
+        Command::Revert { file, out, .. } => {
+            let written = match out {
+                Some(out) => take_back::revert(file, out)?,
+                None => take_back::revert_in_place(file)?,
+            };
+            emit(&format!("{}\n", written.display()));
             Ok(ExitCode::Accepted)
         }
         Command::Study(study) => run_study(arguments, study),
@@ -134,6 +153,27 @@ fn fit_table(table: &crate::arguments::FitTable) -> fit::TableRequest {
         sigma_m: table.sigma_mm.map(|s| s * 1e-3),
         sigma_rad: table.sigma_deg.map(f64::to_radians),
     }
+}
+
+fn apply_result(options: &Apply) -> Result<ExitCode, PipelineError> {
+    let destination = match &options.out {
+        Some(out) => Destination::To(out.clone()),
+        None if options.in_place => Destination::InPlace,
+        None => Destination::Nowhere,
+    };
+    let applied = apply::apply(&ApplyRequest {
+        result: options.result.clone(),
+        target: options.target.clone(),
+        yaml: options.yaml.clone(),
+        destination,
+        force: options.force,
+    })?;
+    emit(&if options.json {
+        apply::json(&applied)?
+    } else {
+        apply::text(&applied)
+    });
+    Ok(ExitCode::Accepted)
 }
 
 fn run_study(arguments: &Arguments, study: &StudyRun) -> Result<ExitCode, PipelineError> {

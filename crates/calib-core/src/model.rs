@@ -203,6 +203,12 @@ impl Model {
         self.problem.held_out.contains(&sample)
     }
 
+    /// The free parameters, by their place in the problem, in the order of the columns of every matrix.
+    #[must_use]
+    pub fn free_parameters(&self) -> &[usize] {
+        &self.columns
+    }
+
     /// Number of free parameters.
     #[must_use]
     pub fn free(&self) -> usize {

@@ -150,6 +150,9 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             profile.outputs.urdf
         )],
         seed: 0,
+        data_information: e
+            .fit
+            .map(|fit| crate::information::data_information(e.inputs, fit)),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         ..Report::default()
     }

@@ -84,6 +84,17 @@ pub enum PipelineError {
         /// Why.
         text: String,
     },
+    /// A text of a robot's description cannot be changed as asked.
+    #[error("{}", .0.to_string().replace("\nhelp: ", "\n  help: "))]
+    Edit(#[from] calib_urdf::EditError),
+    /// What was asked for should not be done with this result.
+    #[error("{finding}\n  help: {remedy}")]
+    Refused {
+        /// What was found.
+        finding: String,
+        /// What to do.
+        remedy: String,
+    },
     /// The output could not be written; nothing was left half-written.
     #[error("{path}: cannot be written: {source}")]
     Write {
@@ -125,11 +136,14 @@ impl PipelineError {
             | Self::Usage { .. }
             | Self::Simulation(_) => ExitCode::Usage,
             Self::Recording(_) | Self::Data { .. } => ExitCode::Data,
+            Self::Refused { .. } => ExitCode::VerdictFail,
             Self::Solve(_) => ExitCode::NotConverged,
             Self::Plugin { code, .. } => *code,
-            Self::Patch { .. } | Self::Write { .. } | Self::Exists { .. } | Self::Report(_) => {
-                ExitCode::NotWritten
-            }
+            Self::Edit(_)
+            | Self::Patch { .. }
+            | Self::Write { .. }
+            | Self::Exists { .. }
+            | Self::Report(_) => ExitCode::NotWritten,
         }
     }
 

@@ -8,10 +8,12 @@
 //! Calibration ─ export ─► patched URDF, scene        everything ─ assemble ─► Report
 //! ```
 //!
-//! Stages are functions of plain values. Only [`load`] reads files and only [`mod@write`] writes them.
+//! Stages are functions of plain values. Only [`load`] reads files and only [`mod@write`] writes them; [`apply`],
+//! [`take_back`] begin where a run has ended.
 
 mod accuracy;
 pub mod align;
+pub mod apply;
 pub mod assemble;
 pub mod checks;
 pub mod clock;
@@ -19,11 +21,14 @@ pub mod closure;
 pub mod conditions;
 pub mod contacts;
 pub mod convert;
+pub mod drift;
 pub mod error;
 pub mod estimators;
 pub mod export;
 pub mod fit;
+pub mod information;
 pub mod inspect;
+pub mod invariants;
 pub mod kinematics;
 pub mod known;
 pub mod load;

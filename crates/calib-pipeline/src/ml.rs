@@ -549,11 +549,20 @@ fn add_points(
 
 /// The robot that a solution describes.
 fn calibration(stated: &Stated, solution: &Solution, inputs: &Inputs) -> Calibration {
+    calibration_at(stated, &solution.model, &solution.values, inputs)
+}
+
+/// The robot that any values of the parameters describe.
+pub(crate) fn calibration_at(
+    stated: &Stated,
+    solved: &calib_core::Model,
+    values: &calib_core::Values,
+    inputs: &Inputs,
+) -> Calibration {
     let model = &inputs.robot.model;
     let pose = |edge: EdgeId| {
-        solution
-            .model
-            .edge_pose(edge, &solution.values)
+        solved
+            .edge_pose(edge, values)
             .unwrap_or_else(Isometry3::identity)
     };
     let mut robot = Calibration::nominal(model, pose(stated.root));
@@ -562,7 +571,7 @@ fn calibration(stated: &Stated, solution: &Solution, inputs: &Inputs) -> Calibra
             robot.model = robot.model.with_origin(joint, pose(edge));
         }
         if let Some(edge) = stated.joints[joint.index()] {
-            robot.effects[joint.index()] = effects(stated, solution, inputs, joint, edge);
+            robot.effects[joint.index()] = effects(stated, values, inputs, joint, edge);
         }
     }
     robot.mounts = stated
@@ -577,9 +586,7 @@ fn calibration(stated: &Stated, solution: &Solution, inputs: &Inputs) -> Calibra
             .copied()
             .unwrap_or_else(Isometry3::identity);
         let on_link = points.iter().map(|(marker, point)| {
-            let p = solution
-                .model
-                .point_position(point.index(), &solution.values);
+            let p = solved.point_position(point.index(), values);
             (marker.clone(), link_from_body * p)
         });
         robot.points.insert(body.clone(), on_link.collect());
@@ -598,7 +605,7 @@ fn calibration(stated: &Stated, solution: &Solution, inputs: &Inputs) -> Calibra
 
 fn effects(
     stated: &Stated,
-    solution: &Solution,
+    values: &calib_core::Values,
     inputs: &Inputs,
     joint: JointId,
     edge: EdgeId,
@@ -616,7 +623,7 @@ fn effects(
         .map_or(&[][..], |e| &e.coupled_to)
         .iter();
     for feature in &j.features {
-        let c = solution.values.0[feature.parameter.index()];
+        let c = values.0[feature.parameter.index()];
         match feature.kind {
             FeatureKind::ZeroOffset => effects.offset = c,
             FeatureKind::Gain => effects.gain = c,

@@ -120,3 +120,32 @@ pub fn write_new(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>, Pi
     }
     Ok(written)
 }
+
+/// Writes a file beside its place and renames it there; whatever stood there is gone, its permissions stay.
+///
+/// # Errors
+/// [`PipelineError::Write`]; the old file is untouched then.
+pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), PipelineError> {
+    // A link stays a link: the file behind it is replaced.
+    let path = &std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let file = OutputFile {
+        name: name.into_owned(),
+        bytes: bytes.to_vec(),
+    };
+    let temporary = stage(folder, &file)?;
+    let kept = std::fs::metadata(path).map(|old| old.permissions());
+    let done = kept
+        .map_or(Ok(()), |permissions| {
+            std::fs::set_permissions(&temporary, permissions)
+        })
+        .and_then(|()| std::fs::rename(&temporary, path));
+    done.map_err(|e| {
+        let _ = std::fs::remove_file(&temporary);
+        PipelineError::write(path, e)
+    })
+}

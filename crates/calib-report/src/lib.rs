@@ -53,8 +53,8 @@ pub use quantity::{JointValue, Unit};
 pub use report::{FormatVersion, Limit, Method, Outcome, Report, Verdict, judge};
 pub use residuals::{JointResiduals, ResidualBin, ResidualGroup, ResidualRow, Residuals};
 pub use results::{
-    Change, Class, EstimatorResult, Meaning, NotObservable, Parameter, Status, Term, Transform,
-    Unobservable,
+    Change, Class, DataInformation, EstimatorResult, Meaning, NotObservable, Parameter, Quantity,
+    Status, Term, Transform, Unobservable,
 };
 pub use scene::Scene;
 pub use schema::{report_schema, scene_schema};

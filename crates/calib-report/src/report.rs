@@ -1,7 +1,7 @@
 use crate::{
-    AccuracyLimit, Change, Clock, EstimatorResult, Finding, FitSummary, Input, JointCoverage,
-    LoopClosure, Noise, NotObservable, Output, Parameter, RecordingSummary, Rejected, Residuals,
-    Transform, Unit, Verification, Workspace,
+    AccuracyLimit, Change, Clock, DataInformation, EstimatorResult, Finding, FitSummary, Input,
+    JointCoverage, LoopClosure, Noise, NotObservable, Output, Parameter, RecordingSummary,
+    Rejected, Residuals, Transform, Unit, Verification, Workspace,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -94,6 +94,9 @@ pub struct Report {
     /// The seed of everything random.
     #[serde(default)]
     pub seed: u64,
+    /// What the data alone say of the parameters: for `calib drift`. Null with `method: paper`.
+    #[serde(default)]
+    pub data_information: Option<DataInformation>,
     /// Version of the program.
     pub version: String,
 }

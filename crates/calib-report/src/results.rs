@@ -280,6 +280,40 @@ pub struct EstimatorResult {
     pub text: String,
 }
 
+/// What the data alone say, without any prior: enough to compare this calibration with another of the same robot.
+///
+/// With the free parameters x (SI) and the whitened Jacobian J of the fit's residuals at the estimate x̂, U is upper
+/// triangular with `UᵀU = JᵀJ`. The data alone would put x at x̃ with `UᵀU (x̃ − x̂) = P (x̂ − x₀)`, P = diag(1/σ²) of the
+/// priors about the nominal values x₀; directions that the data do not see are the null space of U.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DataInformation {
+    /// Names of the free parameters as in `parameters`, in the order of the columns of U.
+    pub parameters: Vec<String>,
+    /// σ of each parameter's prior about its nominal value, in its unit; null where it has none.
+    pub prior_sigma: Vec<Option<f64>>,
+    /// Rows of U from the diagonal on: row i has its columns i, i + 1, … (one over the parameter's unit).
+    pub root: Vec<Vec<f64>>,
+    /// Degrees of freedom that the noise was found with.
+    pub degrees_of_freedom: f64,
+    /// Numbers of the robot that no choice of frames changes.
+    pub quantities: Vec<Quantity>,
+}
+
+/// A number of the robot that no choice of frames changes, such as the distance between two axes.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Quantity {
+    /// Stable name: `distance.shoulder.elbow`.
+    pub name: String,
+    /// In words: "distance between the axes of shoulder and elbow".
+    pub text: String,
+    /// Of `value`.
+    pub unit: Unit,
+    /// At the estimate.
+    pub value: f64,
+    /// Its derivative by each parameter that it depends on.
+    pub gradient: Vec<Term>,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,6 +8,12 @@ use anstyle::{AnsiColor, Style};
 /// Columns of the narrowest terminal that people still use.
 const COLUMNS: usize = 80;
 
+/// Words over lines that fit a terminal, the first line with `first`, the others with `rest` before them.
+#[must_use]
+pub fn wrapped(text: &str, first: &str, rest: &str) -> String {
+    wrap(text, COLUMNS, first, rest)
+}
+
 /// The summary; `colour` adds ANSI styles (ask the terminal before, this function does not).
 #[must_use]
 pub fn summary(report: &Report, colour: bool) -> String {

@@ -6,6 +6,7 @@
 use crate::error::ReadError;
 use crate::model::{Joint, JointLimits, Mimic, RobotModel};
 use crate::rpy::angle_between;
+use nalgebra::Isometry3;
 use serde::Serialize;
 use std::fmt::{self, Write};
 
@@ -33,6 +34,9 @@ pub struct ModelDiff {
     pub name: Option<Changed<String>>,
     /// The root link before and after, where it differs.
     pub root: Option<Changed<String>>,
+    /// Joints whose origin could not be compared: xacro computes it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_compared: Vec<String>,
 }
 
 /// Before and after.
@@ -143,6 +147,51 @@ pub fn diff_models(a: &RobotModel, b: &RobotModel) -> ModelDiff {
         inertials: inertials.map(|link| link.name.clone()).collect(),
         name: changed(a.name().to_owned(), b.name().to_owned()),
         root: changed(a.link(a.root()).name.clone(), b.link(b.root()).name.clone()),
+        not_compared: Vec::new(),
+    }
+}
+
+/// What differs between two lists of origins, `parent_link_from_joint` by joint: all that a xacro or a kinematics YAML tells.
+#[must_use]
+pub fn diff_origins(a: &[(String, Isometry3<f64>)], b: &[(String, Isometry3<f64>)]) -> ModelDiff {
+    let without = |these: &[(String, Isometry3<f64>)], those: &[(String, Isometry3<f64>)]| {
+        these
+            .iter()
+            .filter(|(name, _)| !those.iter().any(|(other, _)| other == name))
+            .map(|(name, _)| name.clone())
+            .collect()
+    };
+    let joints = a.iter().filter_map(|(name, from)| {
+        let (_, to) = b.iter().find(|(other, _)| other == name)?;
+        Some(moved(name, from, to)).filter(|joint| !joint.is_empty())
+    });
+    ModelDiff {
+        joints: joints.collect(),
+        added_links: Vec::new(),
+        removed_links: Vec::new(),
+        added_joints: without(b, a),
+        removed_joints: without(a, b),
+        inertials: Vec::new(),
+        name: None,
+        root: None,
+        not_compared: Vec::new(),
+    }
+}
+
+/// A joint whose origin changes and nothing else.
+fn moved(joint: &str, from: &Isometry3<f64>, to: &Isometry3<f64>) -> JointDiff {
+    let translation = (to.translation.vector - from.translation.vector) * 1e3;
+    JointDiff {
+        joint: joint.to_owned(),
+        translation_mm: translation.into(),
+        distance_mm: translation.norm(),
+        rotation_deg: angle_between(&from.rotation, &to.rotation).to_degrees(),
+        axis_deg: None,
+        kind: None,
+        parent: None,
+        child: None,
+        limits: None,
+        mimic: None,
     }
 }
 
@@ -155,7 +204,6 @@ fn diff_joint(a: &RobotModel, before: &Joint, b: &RobotModel, after: &Joint) -> 
         &before.parent_link_from_joint,
         &after.parent_link_from_joint,
     );
-    let translation = (to.translation.vector - from.translation.vector) * 1e3;
     let axis_deg = match (before.kind.axis(), after.kind.axis()) {
         (Some(from), Some(to)) => {
             let angle = from.cross(&to).norm().atan2(from.dot(&to)).to_degrees();
@@ -164,10 +212,6 @@ fn diff_joint(a: &RobotModel, before: &Joint, b: &RobotModel, after: &Joint) -> 
         _ => None,
     };
     JointDiff {
-        joint: before.name.clone(),
-        translation_mm: translation.into(),
-        distance_mm: translation.norm(),
-        rotation_deg: angle_between(&from.rotation, &to.rotation).to_degrees(),
         axis_deg,
         kind: changed(before.kind.name(), after.kind.name()),
         parent: changed(
@@ -180,6 +224,7 @@ fn diff_joint(a: &RobotModel, before: &Joint, b: &RobotModel, after: &Joint) -> 
         ),
         limits: changed(before.limits, after.limits),
         mimic: changed(mimic_text(a, before.mimic), mimic_text(b, after.mimic)),
+        ..moved(&before.name, from, to)
     }
 }
 
@@ -219,7 +264,7 @@ impl ModelDiff {
     /// Is nothing different that kinematics, limits or gravity would notice?
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        let nothing = |lists: [&Vec<String>; 5]| lists.iter().all(|list| list.is_empty());
+        let nothing = |lists: [&Vec<String>; 6]| lists.iter().all(|list| list.is_empty());
         self.joints.is_empty()
             && nothing([
                 &self.added_links,
@@ -227,6 +272,7 @@ impl ModelDiff {
                 &self.added_joints,
                 &self.removed_joints,
                 &self.inertials,
+                &self.not_compared,
             ])
             && self.name.is_none()
             && self.root.is_none()
@@ -304,6 +350,7 @@ impl fmt::Display for ModelDiff {
             ("added joints", &self.added_joints),
             ("removed joints", &self.removed_joints),
             ("mass or centre of mass changed", &self.inertials),
+            ("not compared, xacro computes them", &self.not_compared),
         ];
         for (what, names) in lists {
             if !names.is_empty() {

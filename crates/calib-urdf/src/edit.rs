@@ -1,6 +1,6 @@
 //! What may be changed in a URDF, what was changed, and why a change was refused.
 
-use crate::error::{Place, ReadError};
+use crate::error::{Hint, Place, ReadError};
 use crate::model::UnknownName;
 use nalgebra::{Isometry3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
@@ -136,16 +136,63 @@ pub enum EditError {
         found: String,
     },
     #[error(
-        "{file}:{place}: the origin or axis of joint `{joint}` takes the property `{property}`, which is {}: a new value would change more than this joint\nhelp: give this origin a property of its own, or patch the expanded URDF",
-        property_uses(lines)
+        "{file}:{place}: the origin or axis of joint `{joint}` takes {value}, which is {}: a new value would change more than this joint\nhelp: give this origin a {kind} of its own, or patch the expanded URDF",
+        value_uses(lines, included)
     )]
-    XacroProperty {
+    XacroShared {
         file: String,
         place: Place,
         joint: String,
-        property: String,
+        value: String,
+        kind: &'static str,
+        lines: Vec<usize>,
+        included: Vec<String>,
+    },
+    #[error(
+        "{file}:{place}: the origin or axis of joint `{joint}` takes its numbers from `{argument}`, which was not found\nhelp: name that YAML file yourself (calib apply … --yaml FILE)"
+    )]
+    XacroYamlNotFound {
+        file: String,
+        place: Place,
+        joint: String,
+        argument: String,
+    },
+    #[error("{file}:{place}: not well-formed YAML: {reason}")]
+    Yaml {
+        file: String,
+        place: Place,
+        reason: String,
+    },
+    #[error(
+        "{file}:{place}: `{keys}`, which holds the origin of joint `{joint}`, cannot be replaced: {fault}\nhelp: write one plain number there, `x: 0.1`"
+    )]
+    YamlValue {
+        file: String,
+        place: Place,
+        joint: String,
+        keys: String,
+        fault: &'static str,
+    },
+    #[error(
+        "{file}: there is no origin of joint `{joint}`: no key {keys} has x, y, z, roll, pitch, yaw{hint}\nhelp: give the file that holds this joint, or the URDF or xacro"
+    )]
+    YamlNoJoint {
+        file: String,
+        joint: String,
+        keys: String,
+        hint: Hint,
+    },
+    #[error(
+        "{file}: the origin of joint `{joint}` stands in several places (lines {}), of which one cannot be chosen\nhelp: give the file that holds this robot alone",
+        comma_list(lines)
+    )]
+    YamlSeveral {
+        file: String,
+        joint: String,
         lines: Vec<usize>,
     },
+    #[error("{file}: a kinematics YAML holds origins of joints, and nothing else can be set in it")]
+    YamlOnlyOrigins { file: String },
     #[error(
         "{file}:{place}: joint `{joint}` comes from `{template}`, whose name xacro computes\nhelp: patch the expanded URDF"
     )]
@@ -209,10 +256,11 @@ fn comma_list(lines: &[usize]) -> String {
         .join(", ")
 }
 
-fn property_uses(lines: &[usize]) -> String {
-    match lines {
-        [] | [_] => "perhaps used by the included files too".to_owned(),
-        _ => format!("used {}", uses(lines)),
+fn value_uses(lines: &[usize], included: &[String]) -> String {
+    match (lines, included) {
+        ([] | [_], []) => "perhaps used by the included files too".to_owned(),
+        (_, []) => format!("used {}", uses(lines)),
+        _ => format!("used by {} too", included.join(", ")),
     }
 }
 

@@ -21,10 +21,12 @@
 //! and knows no closed kinematic loops.
 
 pub mod axes;
+pub mod companions;
 pub mod decimal;
 pub mod diff;
 pub mod edit;
 pub mod error;
+mod expression;
 mod insert;
 pub mod kinematics;
 pub mod model;
@@ -38,13 +40,20 @@ pub mod source;
 pub mod verify;
 pub mod visual;
 mod xacro;
+mod xacro_origins;
+mod xacro_value;
+mod yaml;
+mod yaml_origins;
 
 pub use axes::{AxisPair, AxisRelation};
-pub use diff::{Changed, JointDiff, ModelDiff, diff, diff_models, unified};
+pub use companions::{Companion, Companions, Reads, Reference, references};
+pub use diff::{Changed, JointDiff, ModelDiff, diff, diff_models, diff_origins, unified};
 pub use edit::{Change, EditError, UrdfEdit};
-pub use patch::{Patched, patch};
+pub use patch::{Patched, PatchedFiles, patch, patch_with};
 pub use revert::{ChangeRecord, Replacement, RevertError, revert, sha256_hex};
 pub use verify::{SecondReader, Verification, verify};
+pub use xacro_origins::{is_xacro, xacro_origins};
+pub use yaml_origins::{YamlOrigin, patch_yaml, ur_key, yaml_origins};
 
 pub use error::{Place, Problem, ReadError, ReadProblem};
 pub use model::{

@@ -4,6 +4,7 @@
 //! `<axis>` and attributes are inserted in the style of their neighbours (indentation, line ending, quotes). The text of a
 //! number that already is the new one within [`SAME_NUMBER`] stays, so a second patch with the same values changes nothing.
 
+use crate::companions::Companions;
 use crate::decimal::{
     SAME_NUMBER, Splice, apply, decimals, same_number, splice_numbers, tidy_angle,
 };
@@ -12,12 +13,16 @@ use crate::error::{Place, Problem, ReadError, ReadProblem};
 use crate::insert;
 use crate::model::{RobotModel, UnknownName};
 use crate::numbers::parse_numbers;
+use crate::revert::ChangeRecord;
 use crate::rpy::{angle_between, rotation_from_rpy, rpy_from_rotation, rpy_near};
-use crate::source::{child, has_quaternions, parse, top_level, xacro_evidence};
+use crate::source::{child, has_quaternions, parse, top_level, value_range, xacro_evidence};
 use crate::xacro;
+use crate::xacro_value::{self, Context, Unwritable};
+use crate::yaml::{self, YamlNode};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3, Vector4};
-use roxmltree::{Attribute, Document, Node};
-use std::collections::BTreeSet;
+use roxmltree::{Document, Node};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 /// A patched text and what is different in it.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +35,17 @@ pub struct Patched {
     pub splices: Vec<Splice>,
 }
 
+/// What [`patch_with`] makes of a text and of the files that it reads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PatchedFiles {
+    /// The text itself.
+    pub main: Patched,
+    /// YAML files that changed: their place in [`Companions::yaml`].
+    pub yaml: Vec<(usize, Patched)>,
+    /// The origins as the texts had them, `parent_link_from_joint` by joint, of all joints that the edits name.
+    pub before: BTreeMap<String, Isometry3<f64>>,
+}
+
 /// Makes the edits in a URDF's text, or in a xacro's where the text is literal.
 ///
 /// For a URDF, the result is read again and compared with the request ([`crate::verify()`]) before it is returned.
@@ -37,23 +53,48 @@ pub struct Patched {
 /// # Errors
 /// [`EditError`]: an unreadable text, an unknown name, a number that is not finite, a text that xacro computes.
 pub fn patch(text: &str, name_for_errors: &str, edits: &[UrdfEdit]) -> Result<Patched, EditError> {
+    Ok(patch_with(text, name_for_errors, edits, &Companions::default())?.main)
+}
+
+/// [`patch()`] of a xacro whose included files and YAML are known: a number that stands in the YAML is replaced there.
+///
+/// # Errors
+/// Those of [`patch()`], and those that begin with `Yaml`.
+pub fn patch_with(
+    text: &str,
+    name_for_errors: &str,
+    edits: &[UrdfEdit],
+    companions: &Companions,
+) -> Result<PatchedFiles, EditError> {
     check_values(edits)?;
     let document = parse(text, name_for_errors)?;
     if xacro_evidence(&document).is_none() {
         let nominal = RobotModel::from_urdf_text(text, name_for_errors)?;
-        let patched = splice_edits(text, name_for_errors, &document, false, edits)?;
+        let patched = splice_edits(text, name_for_errors, &document, false, edits, companions)?;
         crate::verify::verify(
-            &patched.text,
+            &patched.main.text,
             &nominal.with_edits(name_for_errors, edits)?,
             name_for_errors,
         )?;
         return Ok(patched);
     }
-    // A xacro is not expanded here: the new text has at least to hold the numbers that were asked for.
-    let patched = splice_edits(text, name_for_errors, &document, true, edits)?;
-    let again = parse(&patched.text, name_for_errors)?;
-    let left = splice_edits(&patched.text, name_for_errors, &again, true, edits)?;
-    match left.changes.first() {
+    // A xacro is not expanded here: the new texts have at least to hold the numbers that were asked for.
+    let patched = splice_edits(text, name_for_errors, &document, true, edits, companions)?;
+    let again = parse(&patched.main.text, name_for_errors)?;
+    let mut around = companions.clone();
+    for (file, yaml) in &patched.yaml {
+        around.yaml[*file].text.clone_from(&yaml.text);
+    }
+    let left = splice_edits(
+        &patched.main.text,
+        name_for_errors,
+        &again,
+        true,
+        edits,
+        &around,
+    )?;
+    let rest = left.yaml.iter().flat_map(|(_, yaml)| &yaml.changes);
+    match left.main.changes.iter().chain(rest).next() {
         None => Ok(patched),
         Some(change) => Err(EditError::StructureChanged {
             file: name_for_errors.to_owned(),
@@ -72,15 +113,26 @@ fn splice_edits(
     document: &Document<'_>,
     is_xacro: bool,
     edits: &[UrdfEdit],
-) -> Result<Patched, EditError> {
+    companions: &Companions,
+) -> Result<PatchedFiles, EditError> {
+    // A YAML that cannot be read matters only where a number is looked for in it.
+    let yaml: Vec<_> = companions
+        .yaml
+        .iter()
+        .map(|file| yaml::parse(&file.text, &file.name))
+        .collect();
     let mut patcher = Patcher {
         text,
         file,
         document,
         is_xacro,
+        companions,
+        yaml: &yaml,
         quaternions: has_quaternions(document),
         changes: Vec::new(),
         splices: Vec::new(),
+        in_yaml: Vec::new(),
+        before: BTreeMap::new(),
     };
     for edit in edits {
         match edit {
@@ -114,18 +166,65 @@ fn splice_edits(
         }
     }
     let Patcher {
-        mut changes,
-        mut splices,
-        ..
-    } = patcher;
-    // Stable: insertions at one place stay in the order of the edits.
-    splices.sort_by_key(|splice| splice.range.start);
-    changes.sort_by_key(|change| change.line);
-    Ok(Patched {
-        text: apply(text, &splices),
         changes,
         splices,
+        in_yaml,
+        before,
+        ..
+    } = patcher;
+    let mut by_file: BTreeMap<usize, (Vec<Change>, Vec<Splice>)> = BTreeMap::new();
+    for (file, change, splice) in in_yaml {
+        let entry = by_file.entry(file).or_default();
+        entry.0.push(change);
+        entry.1.push(splice);
+    }
+    Ok(PatchedFiles {
+        main: Patched::of(text, changes, splices),
+        yaml: by_file
+            .into_iter()
+            .map(|(file, (changes, splices))| {
+                let text = &companions.yaml[file].text;
+                (file, Patched::of(text, changes, splices))
+            })
+            .collect(),
+        before,
     })
+}
+
+impl Patched {
+    /// The patch that a record tells of; `patched_text` is the text that the record belongs to.
+    #[must_use]
+    pub fn from_record(patched_text: &str, record: &ChangeRecord) -> Self {
+        let mut grown: isize = 0;
+        let splices = record
+            .replacements
+            .iter()
+            .map(|r| {
+                let start = r.at.saturating_add_signed(-grown);
+                grown += r.new.len() as isize - r.old.len() as isize;
+                Splice {
+                    range: start..start + r.old.len(),
+                    new: r.new.clone(),
+                }
+            })
+            .collect();
+        Self {
+            text: patched_text.to_owned(),
+            changes: record.changes.clone(),
+            splices,
+        }
+    }
+
+    pub(crate) fn of(text: &str, mut changes: Vec<Change>, mut splices: Vec<Splice>) -> Self {
+        // Stable: insertions at one place stay in the order of the edits.
+        splices.sort_by_key(|splice| splice.range.start);
+        changes.sort_by_key(|change| change.line);
+        Self {
+            text: apply(text, &splices),
+            changes,
+            splices,
+        }
+    }
 }
 
 /// Numbers that must not reach a file, and edits that contradict each other.
@@ -197,9 +296,15 @@ struct Patcher<'t, 'd> {
     file: &'t str,
     document: &'d Document<'t>,
     is_xacro: bool,
+    companions: &'d Companions,
+    yaml: &'d [Result<YamlNode, EditError>],
     quaternions: bool,
     changes: Vec<Change>,
     splices: Vec<Splice>,
+    /// Changes of companions: which one, what, where.
+    in_yaml: Vec<(usize, Change, Splice)>,
+    /// Origins as read, by joint.
+    before: BTreeMap<String, Isometry3<f64>>,
 }
 
 impl<'t, 'd> Patcher<'t, 'd> {
@@ -227,7 +332,9 @@ impl<'t, 'd> Patcher<'t, 'd> {
     fn set_origin(&mut self, joint: &str, wanted: &Isometry3<f64>) -> Result<(), EditError> {
         let node = self.joint(joint)?;
         let xyz = wanted.translation.vector;
+        let mut before = Isometry3::identity();
         let Some(origin) = child(node, "origin") else {
+            self.before.insert(joint.to_owned(), before);
             let rpy = rpy_from_rotation(&wanted.rotation).map(tidy_angle);
             if is_zero(&xyz)
                 && angle_between(&wanted.rotation, &UnitQuaternion::identity()) <= SAME_NUMBER
@@ -243,25 +350,24 @@ impl<'t, 'd> Patcher<'t, 'd> {
             self.insert_element(node, joint, "origin", element);
             return Ok(());
         };
-        self.set_numbers::<3>(origin, joint, "xyz", [0.0; 3], |_| xyz.into())?;
+        self.set_numbers::<3>(origin, joint, "xyz", [0.0; 3], |old| {
+            before.translation.vector = old.into();
+            xyz.into()
+        })?;
         if self.quaternions && origin.has_attribute("quat_xyzw") {
-            return self.set_numbers::<4>(
-                origin,
-                joint,
-                "quat_xyzw",
-                [0.0, 0.0, 0.0, 1.0],
-                |old| quaternion_near(&wanted.rotation, old),
-            );
+            self.set_numbers::<4>(origin, joint, "quat_xyzw", [0.0, 0.0, 0.0, 1.0], |old| {
+                before.rotation =
+                    UnitQuaternion::new_normalize(Quaternion::from(Vector4::from(old)));
+                quaternion_near(&wanted.rotation, old)
+            })?;
+        } else {
+            self.set_numbers::<3>(origin, joint, "rpy", [0.0; 3], |old| {
+                before.rotation = rotation_from_rpy(&Vector3::from(old));
+                rpy_for(&wanted.rotation, old)
+            })?;
         }
-        self.set_numbers::<3>(origin, joint, "rpy", [0.0; 3], |old| {
-            let old = Vector3::from(old);
-            // The rotation decides, not its angles: at pitch ±π/2 they may differ and mean the same.
-            if angle_between(&rotation_from_rpy(&old), &wanted.rotation) <= SAME_NUMBER {
-                old.into()
-            } else {
-                rpy_near(&wanted.rotation, &old).map(tidy_angle).into()
-            }
-        })
+        self.before.insert(joint.to_owned(), before);
+        Ok(())
     }
 
     fn set_axis(&mut self, joint: &str, wanted: &Vector3<f64>) -> Result<(), EditError> {
@@ -343,7 +449,7 @@ impl<'t, 'd> Patcher<'t, 'd> {
         let raw = value_range(self.text, &attribute);
         let value = &self.text[raw.clone()];
         if self.is_xacro && xacro::is_expression(attribute.value()) {
-            return self.set_properties(element, joint, name, raw, new);
+            return self.set_looked_up(element, joint, name, raw, new);
         }
         let old: [f64; N] = parse_numbers(attribute.value()).map_err(|fault| {
             // A URDF was checked before; a xacro was not.
@@ -378,25 +484,24 @@ impl<'t, 'd> Patcher<'t, 'd> {
         Ok(())
     }
 
-    /// [`Self::set_numbers`] where xacro computes the attribute, and all it does is to look up properties.
-    fn set_properties<const N: usize>(
+    /// [`Self::set_numbers`] where xacro computes the attribute, and all it does is to look up values.
+    fn set_looked_up<const N: usize>(
         &mut self,
         element: Node<'_, '_>,
         joint: &str,
         name: &str,
-        raw: std::ops::Range<usize>,
+        raw: Range<usize>,
         new: impl FnOnce([f64; N]) -> [f64; N],
     ) -> Result<(), EditError> {
         let place = self.place(raw.start);
-        let Some(cells) = xacro::cells::<N>(self.document, self.text, raw.clone(), element) else {
-            return Err(EditError::XacroExpression {
-                file: self.file.to_owned(),
-                place,
-                joint: joint.to_owned(),
-                attribute: name.to_owned(),
-                found: self.text[raw].to_owned(),
-            });
+        let context = Context {
+            text: self.text,
+            document: self.document,
+            companions: self.companions,
+            yaml: self.yaml,
         };
+        let cells = xacro_value::cells::<N>(&context, raw.clone(), element)
+            .map_err(|why| self.unwritable(why, place, joint, name, raw))?;
         let wanted = new(std::array::from_fn(|i| cells[i].value));
         for (cell, wanted) in cells
             .iter()
@@ -404,33 +509,93 @@ impl<'t, 'd> Patcher<'t, 'd> {
             .filter(|(cell, wanted)| !same_number(cell.value, *wanted))
         {
             let mut attribute = format!("{} {name}", element.tag_name().name());
-            if let Some(property) = cell.property {
-                let lines = xacro::property_lines(self.document, self.text, property);
-                if lines.len() != 1 || xacro::has_includes(self.document) {
-                    return Err(EditError::XacroProperty {
+            if let Some(leaf) = &cell.from {
+                let readers = xacro_value::readers(&context, leaf);
+                if !readers.is_one() {
+                    let yaml = cell.yaml.map(|file| &self.companions.yaml[file].name);
+                    let bare = leaf.bare_name();
+                    return Err(EditError::XacroShared {
                         file: self.file.to_owned(),
                         place,
                         joint: joint.to_owned(),
-
-                        property: property.to_owned(),
-                        lines,
+                        value: match yaml {
+                            Some(file) => format!("`{bare}` of {file}"),
+                            None => format!("the property `{bare}`"),
+                        },
+                        kind: if yaml.is_some() { "value" } else { "property" },
+                        lines: readers.lines,
+                        included: readers.included,
                     });
                 }
-                attribute = format!("{attribute} (property {property})");
+                attribute = format!("{attribute} ({})", leaf.name(self.companions));
             }
-            self.changes.push(Change {
-                line: self.place(cell.range.start).line,
+            let text = match cell.yaml {
+                None => self.text,
+                Some(file) => &self.companions.yaml[file].text,
+            };
+            let change = Change {
+                line: Place::of_byte(text, cell.range.start).line,
                 joint: joint.to_owned(),
                 attribute,
-                old: self.text[cell.range.clone()].to_owned(),
+                old: text[cell.range.clone()].to_owned(),
                 new: decimals(&[wanted]),
-            });
-            self.splices.push(Splice {
+            };
+            let splice = Splice {
                 range: cell.range.clone(),
                 new: decimals(&[wanted]),
-            });
+            };
+            match cell.yaml {
+                Some(file) => self.in_yaml.push((file, change, splice)),
+                None => {
+                    self.changes.push(change);
+                    self.splices.push(splice);
+                }
+            }
         }
         Ok(())
+    }
+
+    fn unwritable(
+        &self,
+        why: Unwritable,
+        place: Place,
+        joint: &str,
+        attribute: &str,
+        raw: Range<usize>,
+    ) -> EditError {
+        let file = self.file.to_owned();
+        let joint = joint.to_owned();
+        match why {
+            Unwritable::Computed => EditError::XacroExpression {
+                file,
+                place,
+                joint,
+                attribute: attribute.to_owned(),
+                found: self.text[raw].to_owned(),
+            },
+            Unwritable::NotFound(argument) => EditError::XacroYamlNotFound {
+                file,
+                place,
+                joint,
+                argument,
+            },
+            Unwritable::NoYaml(error) => *error,
+            Unwritable::BadYaml {
+                file: yaml,
+                offset,
+                keys,
+                fault,
+            } => {
+                let yaml = &self.companions.yaml[yaml];
+                EditError::YamlValue {
+                    file: yaml.name.clone(),
+                    place: Place::of_byte(&yaml.text, offset),
+                    joint,
+                    keys,
+                    fault,
+                }
+            }
+        }
     }
 
     fn insert_attribute(&mut self, element: Node<'_, '_>, joint: &str, name: &str, value: &str) {
@@ -564,6 +729,17 @@ impl<'t, 'd> Patcher<'t, 'd> {
     }
 }
 
+/// The `rpy` of a rotation, as near to the old one as can be.
+pub(crate) fn rpy_for(wanted: &UnitQuaternion<f64>, old: [f64; 3]) -> [f64; 3] {
+    let old = Vector3::from(old);
+    // The rotation decides, not its angles: at pitch ±π/2 they may differ and mean the same.
+    if angle_between(&rotation_from_rpy(&old), wanted) <= SAME_NUMBER {
+        old.into()
+    } else {
+        rpy_near(wanted, &old).map(tidy_angle).into()
+    }
+}
+
 fn is_zero(vector: &Vector3<f64>) -> bool {
     vector.iter().all(|x| same_number(*x, 0.0))
 }
@@ -580,16 +756,4 @@ fn quaternion_near(wanted: &UnitQuaternion<f64>, old: [f64; 4]) -> [f64; 4] {
     } else {
         wanted.coords.into()
     }
-}
-
-/// The bytes between an attribute's quotes, found in the text itself (the parser's own range fails after 255 spaces).
-fn value_range(text: &str, attribute: &Attribute<'_, '_>) -> std::ops::Range<usize> {
-    let whole = attribute.range();
-    let end = whole.end - 1;
-    let start = text[whole.clone()].find('=').and_then(|equals| {
-        text[whole.start + equals..end]
-            .find(['"', '\''])
-            .map(|quote| whole.start + equals + quote + 1)
-    });
-    start.unwrap_or(end)..end
 }

@@ -206,3 +206,15 @@ pub(crate) fn xacro_evidence(document: &Document<'_>) -> Option<(usize, String)>
     }
     None
 }
+
+/// The bytes between an attribute's quotes, found in the text itself (the parser's own range fails after 255 spaces).
+pub(crate) fn value_range(text: &str, attribute: &Attribute<'_, '_>) -> std::ops::Range<usize> {
+    let whole = attribute.range();
+    let end = whole.end - 1;
+    let start = text[whole.clone()].find('=').and_then(|equals| {
+        text[whole.start + equals..end]
+            .find(['"', '\''])
+            .map(|quote| whole.start + equals + quote + 1)
+    });
+    start.unwrap_or(end)..end
+}

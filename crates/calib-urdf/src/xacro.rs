@@ -1,15 +1,14 @@
 //! Joints in a xacro file, as far as their text can be patched without expanding it.
 //!
-//! A number may be replaced where the text is literal, or one property that nothing else uses, and stands for one joint. It
-//! may not where xacro computes the number or the name, where a macro is used more than once, and where branches give several texts.
+//! A number may be replaced where the text is literal, a constant, or one property or YAML value that nothing else uses
+//! (see `xacro_value`), and stands for one joint. It may not where xacro computes it, where a macro is used more than
+//! once, and where branches give several texts.
 
 use crate::edit::EditError;
 use crate::error::Place;
 use crate::model::UnknownName;
-use crate::numbers::{parse_numbers, tokens};
 use crate::source::is_element;
 use roxmltree::{Document, Node};
-use std::ops::Range;
 
 /// Does xacro compute this text?
 pub(crate) fn is_expression(value: &str) -> bool {
@@ -36,46 +35,40 @@ pub(crate) fn joint<'a, 'b>(
         .copied()
         .filter(|node| node.attribute("name") == Some(name))
         .collect();
+    let templates: Vec<Node<'_, '_>> = joints
+        .iter()
+        .copied()
+        .filter(|node| {
+            node.attribute("name")
+                .is_some_and(|pattern| matches(pattern, name))
+        })
+        .collect();
     match named.as_slice() {
-        [] => {
-            let template = joints.iter().find(|node| {
-                node.attribute("name")
-                    .is_some_and(|pattern| matches(pattern, name))
-            });
-            Err(match template {
-                Some(node) => EditError::XacroTemplate {
-                    file: file.to_owned(),
-                    place: place(*node),
-                    joint: name.to_owned(),
-                    template: node.attribute("name").unwrap_or("").to_owned(),
-                },
-                None => EditError::UnknownName {
-                    file: file.to_owned(),
-                    source: UnknownName::among(
-                        document.root_element().attribute("name").unwrap_or(""),
-                        "joint",
-                        name,
-                        joints.iter().filter_map(|node| node.attribute("name")),
-                    ),
-                },
-            })
-        }
-        [node] => match enclosing_macro(*node) {
-            None => Ok(*node),
-            Some(definition) => {
-                let lines = use_lines(document, definition, text);
-                if lines.len() == 1 {
-                    return Ok(*node);
-                }
-                Err(EditError::XacroMacro {
-                    file: file.to_owned(),
-                    place: place(*node),
-                    joint: name.to_owned(),
-                    macro_name: definition.attribute("name").unwrap_or("").to_owned(),
-                    lines,
-                })
+        [] if templates.len() == 1 => {
+            // One text for a joint whose name xacro computes: it is this joint's if it is used once.
+            let node = templates[0];
+            used_once(document, text, node, name, file)?;
+            if enclosing_macro(node).is_none() && !has_fixed_part(node) {
+                return Err(template(file, place(node), name, node));
             }
-        },
+            Ok(node)
+        }
+        [] => Err(match templates.first() {
+            Some(node) => template(file, place(*node), name, *node),
+            None => EditError::UnknownName {
+                file: file.to_owned(),
+                source: UnknownName::among(
+                    document.root_element().attribute("name").unwrap_or(""),
+                    "joint",
+                    name,
+                    joints.iter().filter_map(|node| node.attribute("name")),
+                ),
+            },
+        }),
+        [node] => {
+            used_once(document, text, *node, name, file)?;
+            Ok(*node)
+        }
         several => Err(EditError::XacroAmbiguous {
             file: file.to_owned(),
             joint: name.to_owned(),
@@ -84,8 +77,47 @@ pub(crate) fn joint<'a, 'b>(
     }
 }
 
+/// Refuses a joint of a macro that is not used exactly once: one text would be several joints.
+fn used_once(
+    document: &Document<'_>,
+    text: &str,
+    node: Node<'_, '_>,
+    joint: &str,
+    file: &str,
+) -> Result<(), EditError> {
+    let Some(definition) = enclosing_macro(node) else {
+        return Ok(());
+    };
+    let lines = use_lines(document, definition, text);
+    if lines.len() == 1 {
+        return Ok(());
+    }
+    Err(EditError::XacroMacro {
+        file: file.to_owned(),
+        place: Place::of_byte(text, node.range().start),
+        joint: joint.to_owned(),
+        macro_name: definition.attribute("name").unwrap_or("").to_owned(),
+        lines,
+    })
+}
+
+fn template(file: &str, place: Place, joint: &str, node: Node<'_, '_>) -> EditError {
+    EditError::XacroTemplate {
+        file: file.to_owned(),
+        place,
+        joint: joint.to_owned(),
+        template: node.attribute("name").unwrap_or("").to_owned(),
+    }
+}
+
+/// Does the joint's name say more than `${…}`? A name that is computed as a whole fits every joint.
+fn has_fixed_part(node: Node<'_, '_>) -> bool {
+    let name = node.attribute("name").unwrap_or("");
+    !(name.starts_with('$') && name.ends_with(['}', ')']) && name.matches('$').count() == 1)
+}
+
 /// A robot's joint, and not the `<joint>` of a `<transmission>`, `<gazebo>` or `<ros2_control>`.
-fn is_joint(node: Node<'_, '_>) -> bool {
+pub(crate) fn is_joint(node: Node<'_, '_>) -> bool {
     let foreign = |above: Node<'_, '_>| {
         above.is_element()
             && above.tag_name().name() != "robot"
@@ -99,14 +131,15 @@ fn is_joint(node: Node<'_, '_>) -> bool {
         && !node.ancestors().skip(1).any(foreign)
 }
 
-fn is_xacro(node: Node<'_, '_>, name: &str) -> bool {
+/// Is this xacro's own element of that name?
+pub(crate) fn is_xacro(node: Node<'_, '_>, name: &str) -> bool {
     node.tag_name()
         .namespace()
         .is_some_and(|uri| uri.contains("xacro"))
         && node.tag_name().name() == name
 }
 
-fn enclosing_macro<'a, 'b>(node: Node<'a, 'b>) -> Option<Node<'a, 'b>> {
+pub(crate) fn enclosing_macro<'a, 'b>(node: Node<'a, 'b>) -> Option<Node<'a, 'b>> {
     node.ancestors()
         .skip(1)
         .find(|above| is_xacro(*above, "macro"))
@@ -144,105 +177,8 @@ fn use_lines(document: &Document<'_>, definition: Node<'_, '_>, text: &str) -> V
     lines
 }
 
-/// One number of an attribute that xacro computes, where it is a literal or just one property: `0 0 ${height}`.
-pub(crate) struct Cell<'a> {
-    /// Where the number is written: in the attribute, or in the property.
-    pub(crate) range: Range<usize>,
-    pub(crate) value: f64,
-    /// The property's name.
-    pub(crate) property: Option<&'a str>,
-}
-
-/// The numbers of an attribute at byte `start` of the text; `None` where xacro does more than to look up a property.
-pub(crate) fn cells<'a, const N: usize>(
-    document: &Document<'_>,
-    text: &'a str,
-    raw: Range<usize>,
-    joint: Node<'_, '_>,
-) -> Option<[Cell<'a>; N]> {
-    let cells: Option<Vec<Cell<'a>>> = tokens(&text[raw.clone()])
-        .map(|(offset, token)| {
-            let range = raw.start + offset..raw.start + offset + token.len();
-            match token
-                .strip_prefix("${")
-                .and_then(|rest| rest.strip_suffix('}'))
-            {
-                None => parse_numbers::<1>(token).ok().map(|[value]| Cell {
-                    range,
-                    value,
-                    property: None,
-                }),
-                Some(name) => property(document, text, name, joint),
-            }
-        })
-        .collect();
-    cells?.try_into().ok()
-}
-
-/// The one literal definition of a property, directly under `<robot>`; `None` where another one might count.
-fn property<'a>(
-    document: &Document<'_>,
-    text: &'a str,
-    name: &'a str,
-    joint: Node<'_, '_>,
-) -> Option<Cell<'a>> {
-    let is_parameter = enclosing_macro(joint).is_some_and(|definition| {
-        let parameters = definition.attribute("params").unwrap_or("");
-        words(parameters).any(|word| word == name)
-    });
-    let mut definitions = document
-        .descendants()
-        .filter(|node| is_xacro(*node, "property") && node.attribute("name") == Some(name));
-    let (definition, none) = (definitions.next()?, definitions.next());
-    if is_parameter || none.is_some() || definition.parent() != Some(document.root_element()) {
-        return None;
-    }
-    let attribute = definition.attribute_node("value")?;
-    let [value] = parse_numbers(attribute.value()).ok()?;
-    let range = attribute.range_value();
-    // The number itself, without spaces around it.
-    let (offset, token) = tokens(text.get(range.clone())?).next()?;
-    let range = range.start + offset..range.start + offset + token.len();
-    token.parse::<f64>().is_ok().then_some(Cell {
-        range,
-        value,
-        property: Some(name),
-    })
-}
-
-/// The lines in which xacro's expressions name a property; included files are not seen.
-pub(crate) fn property_lines(document: &Document<'_>, text: &str, name: &str) -> Vec<usize> {
-    let named = |value: &str| {
-        value
-            .split("${")
-            .skip(1)
-            .flat_map(|rest| words(rest.split('}').next().unwrap_or("")))
-            .filter(|word| *word == name)
-            .count()
-    };
-    let mut lines = Vec::new();
-    for node in document.descendants() {
-        for attribute in node.attributes() {
-            let line = Place::of_byte(text, attribute.range().start).line;
-            lines.extend(std::iter::repeat_n(line, named(attribute.value())));
-        }
-        if let Some(words) = node.text().filter(|_| node.is_text()) {
-            lines.extend(std::iter::repeat_n(
-                Place::of_byte(text, node.range().start).line,
-                named(words),
-            ));
-        }
-    }
-    lines
-}
-
-/// Does the file take text from another one, which may use its properties too?
-pub(crate) fn has_includes(document: &Document<'_>) -> bool {
-    document.descendants().any(|node| is_xacro(node, "include"))
-}
-
 /// The names in an expression.
-fn words(expression: &str) -> impl Iterator<Item = &str> {
+pub(crate) fn words(expression: &str) -> impl Iterator<Item = &str> {
     expression.split(|c: char| !(c.is_alphanumeric() || c == '_'))
 }
 

@@ -1,0 +1,51 @@
+//! `calib drift`: what changed between two calibrations of one robot.
+//!
+//! Each calibration k gives U_k with `U_kᵀU_k = J_kᵀJ_k`, the data's information without any prior, and the values x̃_k that
+//! the data alone would give (see [`calib_report::DataInformation`]). Where tracker and bodies stood is set up anew each
+//! time: those columns are projected out. With A_k for the rest and y_k = A_k x̃_k, whitened,
+//!
+//! ```text
+//! s = min over x of Σ_k |A_k x − y_k|²  ~  χ²(ν),   ν = rank A₁ + rank A₂ − rank [A₁; A₂]          (1)
+//! z = (g₂ᵀx̃₂ − g₁ᵀx̃₁) / √(g₁ᵀC₁g₁ + g₂ᵀC₂g₂),   C_k = (U_kᵀU_k)⁺                                  (2)
+//! ```
+//!
+//! if nothing changed. (1) asks whether *anything* that both data saw is different: no convention, no prior and no frame
+//! enters. (2) asks it of one number that both data determine (g_k ⊥ null U_k). As the noise was estimated, χ² is F with the
+//! residuals' degrees of freedom, and z is Student's t. False alarms of everything that is said together: [`FALSE_ALARMS`];
+//! half of it for (1), half for all (2) by Holm's procedure.
+//!
+//! What it does **not** protect against: what is the same in both recordings and was modelled in neither (backlash, heat)
+//! may show up as a change where the poses differ.
+
+mod compare;
+mod evidence;
+mod render;
+
+pub use compare::{Changed, Drift, Joint, compare};
+pub use evidence::{Evidence, Number};
+pub use render::{json, text};
+
+use std::path::Path;
+
+use crate::apply::read_report;
+use crate::error::PipelineError;
+
+/// The probability that two calibrations of an unchanged robot are said to differ in anything.
+pub const FALSE_ALARMS: f64 = 0.01;
+
+/// Compares two reports, or folders of results.
+///
+/// # Errors
+/// [`PipelineError`] when one is no report, holds no covariance, or belongs to another robot.
+pub fn drift(old: &Path, new: &Path) -> Result<Drift, PipelineError> {
+    let read = |path: &Path| {
+        let file = if path.is_dir() {
+            path.join("report.json")
+        } else {
+            path.to_path_buf()
+        };
+        let report = read_report(&file)?;
+        Evidence::of(&report, &file.display().to_string())
+    };
+    compare(&read(old)?, &read(new)?)
+}

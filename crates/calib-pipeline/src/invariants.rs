@@ -1,0 +1,185 @@
+//! Numbers of a robot that no choice of frames changes: how the axes of its joints lie to each other at zero.
+//!
+//! ```text
+//! two neighbours k, k+1          distance a and angle α between the axes; for parallel axes the distance and two tilts
+//! three neighbours k, k+1, k+2   along axis k+1: the offset d between the feet of the common normals,
+//!                                and the angle θ between these normals, which a zero offset moves
+//! ```
+//!
+//! These are Denavit and Hartenberg's four (1955). Where an origin lies on its axis and where a frame's x points are
+//! conventions that a calibration cannot know; none of these numbers contains them.
+
+use calib_report::Unit;
+use calib_urdf::{JointId, RobotModel};
+use nalgebra::{Point3, Unit as UnitVector, Vector3};
+
+/// A number that no choice of frames changes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Invariant {
+    /// `distance.shoulder.elbow`
+    pub name: String,
+    /// In words.
+    pub text: String,
+    /// Metres or radians.
+    pub unit: Unit,
+    /// m or rad.
+    pub value: f64,
+}
+
+impl Invariant {
+    /// Is it known up to full turns?
+    #[must_use]
+    pub fn is_angle(&self) -> bool {
+        self.unit == Unit::Radian
+    }
+}
+
+/// Axes whose angle's sine is below this (about 9°) are treated as parallel: their common normal is badly defined.
+const PARALLEL: f64 = 0.15;
+/// Axes nearer than this to each other, and parallel, are one line: no direction between them (m).
+const ONE_LINE: f64 = 1e-3;
+
+/// An axis of a joint at zero, in the root's frame.
+struct Line {
+    name: String,
+    slides: bool,
+    point: Point3<f64>,
+    direction: UnitVector<Vector3<f64>>,
+}
+
+/// All invariants of a robot's moving joints, from the root outwards.
+#[must_use]
+pub fn invariants(model: &RobotModel) -> Vec<Invariant> {
+    let poses = model.forward_kinematics(&model.zero_positions());
+    let line = |id: JointId| {
+        let joint = model.joint(id);
+        let axis = joint.kind.axis()?;
+        // At zero the child stands where the joint's origin is.
+        let at = poses[joint.child.index()];
+        Some(Line {
+            name: joint.name.clone(),
+            slides: !joint.kind.turns(),
+            point: at.translation.vector.into(),
+            direction: at.rotation * axis,
+        })
+    };
+    let mut found = Vec::new();
+    for id in model.joint_ids() {
+        let Some(last) = line(id) else { continue };
+        let mut before = moving_joints_above(model, id).filter_map(line);
+        let (middle, first) = (before.next(), before.next());
+        let Some(middle) = middle else { continue };
+        pair(&middle, &last, &mut found);
+        if let Some(first) = first {
+            triple(&first, &middle, &last, &mut found);
+        }
+    }
+    found
+}
+
+/// The moving joints between a joint and the root, nearest first.
+fn moving_joints_above(model: &RobotModel, id: JointId) -> impl Iterator<Item = JointId> {
+    let mut link = model.joint(id).parent;
+    std::iter::from_fn(move || {
+        loop {
+            let above = model.link(link).parent_joint?;
+            link = model.joint(above).parent;
+            if model.joint(above).kind.axis().is_some() {
+                return Some(above);
+            }
+        }
+    })
+}
+
+fn pair(a: &Line, b: &Line, found: &mut Vec<Invariant>) {
+    let cross = a.direction.cross(&b.direction);
+    let between = b.point - a.point;
+    // Two lines that slide have directions only.
+    let places = !(a.slides || b.slides);
+    let mut push = |kind: &str, text: String, unit: Unit, value: f64| {
+        found.push(Invariant {
+            name: format!("{kind}.{}.{}", a.name, b.name),
+            text,
+            unit,
+            value,
+        });
+    };
+    let axes = format!("the axes of {} and {}", a.name, b.name);
+    if cross.norm() > PARALLEL {
+        push(
+            "angle",
+            format!("angle between {axes}"),
+            Unit::Radian,
+            cross.norm().atan2(a.direction.dot(&b.direction)),
+        );
+        if places {
+            // Signed along a × b: smooth also where the axes meet.
+            push(
+                "distance",
+                format!("distance between {axes}"),
+                Unit::Metre,
+                between.dot(&(cross / cross.norm())),
+            );
+        }
+        return;
+    }
+    let across = between - a.direction.into_inner() * between.dot(&a.direction);
+    if !places || across.norm() < ONE_LINE {
+        return;
+    }
+    let towards = across / across.norm();
+    let sign = a.direction.dot(&b.direction).signum();
+    push(
+        "distance",
+        format!("distance between {axes}"),
+        Unit::Metre,
+        across.norm(),
+    );
+    push(
+        "tilt",
+        format!("tilt of {} towards {}", b.name, a.name),
+        Unit::Radian,
+        (sign * b.direction.dot(&towards)).asin(),
+    );
+    push(
+        "twist",
+        format!("twist of {} against {}", b.name, a.name),
+        Unit::Radian,
+        (sign * b.direction.dot(&a.direction.cross(&towards))).asin(),
+    );
+}
+
+fn triple(a: &Line, b: &Line, c: &Line, found: &mut Vec<Invariant>) {
+    if a.slides || b.slides || c.slides {
+        return;
+    }
+    let (Some(to_a), Some(to_c)) = (normal(b, a), normal(b, c)) else {
+        return;
+    };
+    found.push(Invariant {
+        name: format!("offset.{}", b.name),
+        text: format!("offset along {} between {} and {}", b.name, a.name, c.name),
+        unit: Unit::Metre,
+        value: to_c.0 - to_a.0,
+    });
+    let sine = b.direction.dot(&to_a.1.cross(&to_c.1));
+    found.push(Invariant {
+        name: format!("zero.{}", b.name),
+        text: format!("zero angle of {} between {} and {}", b.name, a.name, c.name),
+        unit: Unit::Radian,
+        value: sine.atan2(to_a.1.dot(&to_c.1)),
+    });
+}
+
+/// Foot of the common normal on `b` (m along it) and the normal's direction; `None` for parallel axes, which have many.
+fn normal(b: &Line, other: &Line) -> Option<(f64, Vector3<f64>)> {
+    let cross = b.direction.cross(&other.direction);
+    let squared = cross.norm_squared();
+    if squared.sqrt() <= PARALLEL {
+        return None;
+    }
+    // s: |p_b + s·d_b − p_o − t·d_o| is smallest
+    let between = other.point - b.point;
+    let s = between.cross(&other.direction).dot(&cross) / squared;
+    Some((s, cross / squared.sqrt()))
+}

@@ -1,0 +1,544 @@
+//! A calibration in other people's files: URDFs, xacros with properties and YAML, the kinematics YAML of a UR arm. Only the
+//! numbers change, everything can be taken back byte for byte, and what several joints share is refused.
+
+mod scratch;
+
+use std::path::PathBuf;
+
+use calib_urdf::rpy::rotation_from_rpy;
+use calib_urdf::{RobotModel, UrdfEdit, patch};
+use nalgebra::{Isometry3, Translation3, Vector3};
+use scratch::{Scratch, files_below, finished, root};
+
+/// Moves the joints, a different way each, and writes what `calib run` would have written.
+fn result(dir: Scratch, folder: &str, urdf: &str, joints: &[&str]) -> Scratch {
+    let model = RobotModel::from_urdf_text(urdf, folder).expect("a robot");
+    let edits: Vec<UrdfEdit> = joints
+        .iter()
+        .enumerate()
+        .map(|(n, joint)| {
+            let small = 1e-3 * (n as f64 + 1.0);
+            let delta = Isometry3::from_parts(
+                Translation3::new(small, -0.5 * small, 0.25 * small),
+                rotation_from_rpy(&Vector3::new(0.3 * small, small, -0.5 * small)),
+            );
+            let id = model.joint_id(joint).expect("a joint");
+            UrdfEdit::SetOrigin {
+                joint: (*joint).to_owned(),
+                parent_link_from_joint: model.joint(id).parent_link_from_joint * delta,
+            }
+        })
+        .collect();
+    let done = patch(urdf, folder, &edits).expect("a patch");
+    let record = serde_json::to_string(&done.record(urdf)).expect("JSON");
+    dir.file(&format!("{folder}/r.calibrated.urdf"), done.text)
+        .file(&format!("{folder}/r.calibrated.urdf.changes.json"), record)
+}
+
+const RESULT: &str = "result/r.calibrated.urdf";
+
+/// The text with every number of an origin replaced by `#`: what no calibration may touch.
+fn without_numbers(text: &str) -> String {
+    let mut out = String::new();
+    for (i, part) in text.split_inclusive(['"', '\'']).enumerate() {
+        let is_value = i % 2 == 1;
+        let number = part
+            .trim_end_matches(['"', '\''])
+            .split_whitespace()
+            .all(|w| w.parse::<f64>().is_ok());
+        match is_value && number {
+            true => out.push('#'),
+            false => out += part,
+        }
+    }
+    out
+}
+
+/// Every URDF and xacro at hand: (name, text, text of the expanded URDF).
+fn robots() -> Vec<(String, String, Option<String>)> {
+    let mut files = Vec::new();
+    let real = std::env::var_os("CALIB_REAL_DATA")
+        .map_or_else(|| root().join("../shared/data"), PathBuf::from);
+    if !real.is_dir() {
+        println!("skipped: no descriptions of real robots (CALIB_REAL_DATA)");
+    }
+    for folder in [root().join("robots"), real] {
+        for (name, bytes) in files_below(&folder) {
+            if name.ends_with(".urdf") || name.ends_with(".xacro") {
+                files.push((name, String::from_utf8(bytes).expect("text")));
+            }
+        }
+    }
+    assert!(files.len() >= 2, "the shipped robots at least");
+    let expanded = |name: &str| {
+        let urdf = name.strip_suffix(".xacro")?;
+        let found = files.iter().find(|(other, _)| other == urdf);
+        found.map(|(_, text)| text.clone())
+    };
+    let all = files.iter();
+    all.map(|(name, text)| (name.clone(), text.clone(), expanded(name)))
+        .collect()
+}
+
+#[test]
+fn every_robot_at_hand_takes_a_result_and_gives_it_back() {
+    for (name, text, expanded) in robots() {
+        if name.ends_with(".urdf") {
+            let model = RobotModel::from_urdf_text(&text, &name).expect("a robot");
+            let joints: Vec<&str> = model.joints().iter().map(|j| j.name.as_str()).collect();
+            applied_and_taken_back(&name, &text, &text, &joints);
+            println!("{name}: all {} joints applied and taken back", joints.len());
+            continue;
+        }
+        let Some(urdf) = expanded else {
+            println!("{name}: skipped, no expanded URDF beside it tells its joints");
+            continue;
+        };
+        let model = RobotModel::from_urdf_text(&urdf, &name).expect("a robot");
+        let mut taken = Vec::new();
+        for joint in model.joints() {
+            let dir = result(Scratch::new(), "result", &urdf, &[&joint.name]);
+            let dir = dir.file("robot.xacro", &text);
+            let ran = dir.calib(["apply", RESULT, "robot.xacro", "--diff"]);
+            if ran.code == 0 {
+                taken.push(joint.name.as_str());
+                continue;
+            }
+            // Never a half-understood file: each refusal says what and where.
+            let said = ran.stderr.lines().next().unwrap_or_default();
+            let known = [
+                "has no joint",
+                "xacro computes",
+                "is written in several places",
+            ];
+            assert!(known.iter().any(|k| said.contains(k)), "{name}: {said}");
+            assert_eq!(ran.code, 7, "{name}: {said}");
+            println!("{name}: {} refused: {said}", joint.name);
+        }
+        assert!(!taken.is_empty(), "{name}: no joint could be applied");
+        applied_and_taken_back(&name, &text, &urdf, &taken);
+        println!("{name}: applied and taken back: {}", taken.join(", "));
+    }
+}
+
+fn applied_and_taken_back(name: &str, text: &str, urdf: &str, joints: &[&str]) {
+    let file = if name.ends_with(".xacro") {
+        "robot.xacro"
+    } else {
+        "robot.urdf"
+    };
+    let dir = result(Scratch::new(), "result", urdf, joints).file(file, text);
+    dir.calib(["apply", RESULT, file, "--in-place"]).expect(0);
+    let patched = dir.read(file);
+    assert!(patched != text, "{name}");
+    let has_all_numbers = |t: &str| t.matches("<origin").count() == text.matches("<origin").count();
+    if has_all_numbers(&patched) && patched.matches("rpy").count() == text.matches("rpy").count() {
+        assert_eq!(without_numbers(&patched), without_numbers(text), "{name}");
+    } else {
+        // An origin or an attribute that was not written had to be added; every old line but those is there still.
+        let gone = text.lines().filter(|l| !patched.lines().any(|p| p == *l));
+        for line in gone {
+            let numbers = line.contains("xyz") || line.contains("rpy") || line.contains("<origin");
+            assert!(numbers, "{name}: {line}");
+        }
+    }
+    let again = dir.calib(["apply", RESULT, file, "--diff"]).expect(0);
+    assert!(again.stdout.contains("holds this result already"), "{name}");
+    dir.calib(["revert", file, "--in-place"]).expect(0);
+    assert!(dir.read(file) == text, "{name}: not the same bytes");
+    assert!(!dir.path(&format!("{file}.changes.json")).exists());
+}
+
+const ARM: &str = r#"<robot name="arm">
+  <link name="base"/><link name="upper"/><link name="fore"/><link name="hand"/>
+  <joint name="shoulder" type="revolute">
+    <parent link="base"/><child link="upper"/>
+    <origin xyz="0 0 0.3" rpy="0 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+  <joint name="elbow" type="revolute">
+    <parent link="upper"/><child link="fore"/>
+    <origin xyz="0.4 0 0" rpy="0 0 0"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+  <joint name="wrist" type="revolute">
+    <parent link="fore"/><child link="hand"/>
+    <origin xyz="0.25 0 0" rpy="0 0 0"/><axis xyz="1 0 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+</robot>
+"#;
+
+const PROPERTIES: &str = r#"<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <!-- lengths in metres -->
+  <xacro:property name="upper_length" value="0.4"/>
+  <xacro:property name="calibration" value="${xacro.load_yaml('$(find my_arm)/config/arm.yaml')}"/>
+  <xacro:property name="w" value="${calibration['joints']['wrist']}"/>
+  <xacro:macro name="arm" params="side">
+    <joint name="${side}shoulder" type="revolute">
+      <parent link="base"/><child link="upper"/>
+      <origin xyz="0 0 0.3" rpy="0 0 0"/>
+    </joint>
+  </xacro:macro>
+  <xacro:arm side=""/>
+  <joint name="elbow" type="revolute">
+    <parent link="upper"/><child link="fore"/>
+    <origin xyz="${upper_length} 0 0" rpy="0 0 0"/>
+  </joint>
+  <joint name="wrist" type="revolute">
+    <parent link="fore"/><child link="hand"/>
+    <origin xyz="${w.x} ${w.y} ${w.z}" rpy="${w.roll} ${w.pitch} ${w.yaw}"/>
+  </joint>
+</robot>
+"#;
+
+const YAML: &str = "# wrist of cell 3\njoints:\n  wrist: {x: 0.25, y: 0.0, z: 0.0, roll: 0.0, pitch: 0.0, yaw: 0.0} # as drawn\n";
+
+fn with_xacro(xacro: &str) -> Scratch {
+    result(
+        Scratch::new(),
+        "result",
+        ARM,
+        &["shoulder", "elbow", "wrist"],
+    )
+    .file(
+        "my_arm/package.xml",
+        "<package><name>my_arm</name></package>",
+    )
+    .file("my_arm/urdf/arm.urdf.xacro", xacro)
+    .file("my_arm/config/arm.yaml", YAML)
+}
+
+#[test]
+fn a_xacro_with_properties_and_a_loaded_yaml() {
+    let dir = with_xacro(PROPERTIES);
+    let xacro = "my_arm/urdf/arm.urdf.xacro";
+    let dry = dir.calib(["apply", RESULT, xacro, "--diff"]).expect(0);
+    insta::assert_snapshot!("xacro_diff", dry.stdout);
+    assert!(dir.read(xacro) == PROPERTIES, "a dry run writes nothing");
+    let ran = dir.calib(["apply", RESULT, xacro, "--in-place"]).expect(0);
+    insta::assert_snapshot!("xacro_in_place", shown(&ran.stdout));
+    assert_eq!(
+        without_numbers(&dir.read(xacro)),
+        without_numbers(PROPERTIES)
+    );
+    let diff = dir
+        .calib(["diff", "result/r.calibrated.urdf", xacro])
+        .expect(0);
+    assert!(diff.stdout.contains("${side}shoulder"), "{}", diff.stdout);
+    let changed = dir.read("my_arm/config/arm.yaml");
+    assert!(changed.starts_with("# wrist of cell 3\n") && changed.ends_with("} # as drawn\n"));
+    for file in [xacro, "my_arm/config/arm.yaml"] {
+        dir.calib(["revert", file, "--in-place"]).expect(0);
+    }
+    assert!(dir.read(xacro) == PROPERTIES && dir.read("my_arm/config/arm.yaml") == YAML);
+    // Somewhere else: two files need a folder.
+    dir.calib(["apply", RESULT, xacro, "--out", "new"])
+        .expect(0);
+    let written: Vec<String> = dir.files("new").into_keys().collect();
+    assert_eq!(
+        written,
+        [
+            "arm.urdf.xacro",
+            "arm.urdf.xacro.changes.json",
+            "arm.yaml",
+            "arm.yaml.changes.json"
+        ]
+    );
+    dir.calib(["revert", "new/arm.yaml", "--out", "old.yaml"])
+        .expect(0);
+    assert!(dir.read("old.yaml") == YAML && dir.read("my_arm/config/arm.yaml") == YAML);
+}
+
+/// The folder of a test is not the same twice.
+fn shown(text: &str) -> String {
+    text.replace("../", "")
+}
+
+#[test]
+fn the_same_yaml_by_itself() {
+    let dir = result(Scratch::new(), "result", ARM, &["wrist"]).file("arm.yaml", YAML);
+    let ran = dir.calib(["apply", RESULT, "arm.yaml", "--out", "new.yaml", "--json"]);
+    let json = ran.expect(0).json();
+    assert_eq!(json["kind"], "yaml");
+    assert_eq!(json["written"], true);
+    assert_eq!(
+        json["files"][0]["changes"].as_array().map(Vec::len),
+        Some(6)
+    );
+    assert_eq!(json["undo"][0], "calib revert new.yaml --out ORIGINAL");
+    let diff = dir.calib(["diff", "arm.yaml", "new.yaml"]).expect(0);
+    insta::assert_snapshot!("yaml_diff", diff.stdout);
+    let unified = dir.calib(["diff", "arm.yaml", "new.yaml", "--format", "unified"]);
+    assert!(
+        unified
+            .expect(0)
+            .stdout
+            .contains("-  wrist: {x: 0.25, y: 0.0,")
+    );
+    let json = dir.calib(["diff", "arm.yaml", "new.yaml", "--format", "json"]);
+    assert_eq!(json.expect(0).json()["joints"][0]["joint"], "wrist");
+}
+
+/// The layout of ur_description's `default_kinematics.yaml`, with numbers of our own.
+fn ur_kinematics() -> String {
+    let mut text = String::from("# arm 7\nkinematics:\n");
+    for (n, key) in [
+        "shoulder",
+        "upper_arm",
+        "forearm",
+        "wrist_1",
+        "wrist_2",
+        "wrist_3",
+    ]
+    .iter()
+    .enumerate()
+    {
+        let n = n as f64;
+        text += &format!(
+            "  {key}:\n    x: {}\n    y: 0\n    z: {}\n    roll: {}\n    pitch: 0\n    yaw: -1.5e-08\n",
+            0.1 * n,
+            0.16 - 0.01 * n,
+            1.570796327 * (n % 2.0)
+        );
+    }
+    text + "  hash: calib_12788084448423163542\n"
+}
+
+#[test]
+fn a_ur_arm_s_kinematics_yaml() {
+    let yaml = ur_kinematics();
+    let names = [
+        "shoulder_pan_joint",
+        "shoulder_lift_joint",
+        "elbow_joint",
+        "wrist_1_joint",
+        "wrist_2_joint",
+        "wrist_3_joint",
+    ];
+    let mut urdf = String::from("<robot name=\"ur\"><link name=\"l0\"/>");
+    for (n, name) in names.iter().enumerate() {
+        let x = n as f64;
+        urdf += &format!(
+            "<link name=\"l{}\"/><joint name=\"{name}\" type=\"continuous\"><parent link=\"l{n}\"/><child link=\"l{}\"/>\
+             <origin xyz=\"{} 0 {}\" rpy=\"{} 0 -1.5e-08\"/><axis xyz=\"0 0 1\"/></joint>",
+            n + 1,
+            n + 1,
+            0.1 * x,
+            0.16 - 0.01 * x,
+            1.570796327 * (x % 2.0)
+        );
+    }
+    urdf += "</robot>";
+    let dir = result(Scratch::new(), "result", &urdf, &names).file("k.yaml", &yaml);
+    let ran = dir
+        .calib(["apply", RESULT, "k.yaml", "--in-place"])
+        .expect(0);
+    insta::assert_snapshot!("ur_in_place", ran.stdout);
+    let changed = dir.read("k.yaml");
+    assert_eq!(changed.lines().count(), yaml.lines().count());
+    assert!(changed.ends_with("  hash: calib_12788084448423163542\n"));
+    let diff = dir
+        .calib(["diff", "result/r.calibrated.urdf", "k.yaml"])
+        .expect(0);
+    assert_eq!(diff.stdout, "no differences\n");
+    dir.calib(["revert", "k.yaml", "--in-place"]).expect(0);
+    assert!(dir.read("k.yaml") == yaml);
+}
+
+#[test]
+fn what_several_joints_share_is_refused() {
+    let twice = PROPERTIES.replace(
+        "  <xacro:arm side=\"\"/>",
+        "  <xacro:arm side=\"\"/>\n  <xacro:arm side=\"left_\"/>",
+    );
+    let shared = PROPERTIES.replace(
+        "<parent link=\"upper\"/>",
+        "<parent link=\"upper\"/><limit upper=\"${upper_length}\"/>",
+    );
+    let computed = PROPERTIES.replace("${upper_length} 0 0", "${upper_length / 2} 0 0");
+    let two_readers = PROPERTIES.replace(
+        "  <joint name=\"wrist\"",
+        "  <link name=\"probe\"><visual><origin xyz=\"${calibration.joints.wrist.x} 0 0\"/></visual></link>\n  <joint name=\"wrist\"",
+    );
+    let lost = PROPERTIES.replace("config/arm.yaml", "config/leg.yaml");
+    let included = PROPERTIES.replace(
+        "  <xacro:macro",
+        "  <xacro:include filename=\"$(find other)/tool.xacro\"/>\n  <xacro:macro",
+    );
+    let mut said = String::new();
+    for (what, xacro) in [
+        ("a macro used twice", &twice),
+        ("a property of two", &shared),
+        ("an expression", &computed),
+        ("a YAML value of two", &two_readers),
+        ("no such YAML", &lost),
+        ("an unknown include", &included),
+    ] {
+        let dir = with_xacro(xacro);
+        let before = dir.files("my_arm");
+        let ran = dir.calib(["apply", RESULT, "my_arm/urdf/arm.urdf.xacro", "--in-place"]);
+        let ran = ran.expect(7);
+        assert!(
+            dir.files("my_arm") == before,
+            "{what}: something was written"
+        );
+        said += &format!("--- {what}\n{}", ran.stderr);
+    }
+    insta::assert_snapshot!("refused_xacro", shown(&said));
+    // The YAML may be named instead of found.
+    let dir = with_xacro(&lost);
+    let arguments = [
+        "apply",
+        RESULT,
+        "my_arm/urdf/arm.urdf.xacro",
+        "--diff",
+        "--yaml",
+    ];
+    let mut arguments = arguments.to_vec();
+    arguments.push("my_arm/config/arm.yaml");
+    dir.calib_with(&arguments).expect(0);
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let dir = || result(Scratch::new(), "result", ARM, &["elbow", "wrist"]).file("arm.urdf", ARM);
+    let mut said = String::new();
+    let mut tell = |what: &str, dir: Scratch, arguments: &[&str], code: i32| {
+        let before = dir.files("");
+        let ran = dir.calib_with(arguments).expect(code);
+        assert!(dir.files("") == before, "{what}: something was written");
+        said += &format!("--- {what}\n{}", ran.stderr);
+    };
+    let apply = ["apply", RESULT, "arm.urdf", "--in-place"];
+    tell(
+        "another robot",
+        dir().edit("arm.urdf", "0.4 0 0", "0.5 0 0"),
+        &apply,
+        3,
+    );
+    tell(
+        "a joint less",
+        dir().edit("arm.urdf", "name=\"wrist\"", "name=\"wirst\""),
+        &apply,
+        7,
+    );
+    tell(
+        "a file is there",
+        dir(),
+        &["apply", RESULT, "arm.urdf", "--out", "arm.urdf"],
+        7,
+    );
+    tell(
+        "no result",
+        dir(),
+        &["apply", "nothing", "arm.urdf", "--diff"],
+        3,
+    );
+    tell(
+        "no record",
+        dir().without("result/r.calibrated.urdf.changes.json"),
+        &apply,
+        3,
+    );
+    tell(
+        "an edited result",
+        dir().edit(RESULT, "velocity=\"1\"", "velocity=\"2\""),
+        &apply,
+        3,
+    );
+    tell(
+        "no YAML in it",
+        dir(),
+        &["apply", RESULT, "arm.urdf", "--diff", "--yaml", "x.yaml"],
+        2,
+    );
+    tell(
+        "a YAML without the joint",
+        dir().file(
+            "k.yaml",
+            "joints: {elbow: {x: 0.4, y: 0, z: 0, roll: 0, pitch: 0, yaw: 0}}\n",
+        ),
+        &["apply", RESULT, "k.yaml", "--in-place"],
+        7,
+    );
+    let twice = dir();
+    twice.calib_with(&apply).expect(0);
+    let other = twice.edit(
+        "arm.urdf",
+        "<limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/>",
+        "<limit lower=\"-2\" upper=\"1\" effort=\"1\" velocity=\"1\"/>",
+    );
+    tell(
+        "edited since",
+        other,
+        &["revert", "arm.urdf", "--in-place"],
+        3,
+    );
+    let half = dir();
+    half.calib_with(&apply).expect(0);
+    let elbow = half.read("arm.urdf");
+    let elbow = elbow
+        .lines()
+        .find(|l| l.contains("0.401"))
+        .expect("elbow")
+        .to_owned();
+    let half = half.without("arm.urdf.changes.json").edit(
+        "arm.urdf",
+        &elbow,
+        "    <origin xyz=\"0.4 0 0\" rpy=\"0 0 0\"/><axis xyz=\"0 1 0\"/>",
+    );
+    tell("half applied", half, &apply, 3);
+    let taken = dir().file("arm.urdf.changes.json", "{}");
+    tell("a record is there", taken, &apply, 3);
+    insta::with_settings!({filters => [("[0-9a-f]{64}", "[sha256]")]}, {
+        insta::assert_snapshot!("refused_result", said);
+    });
+}
+
+#[test]
+fn a_run_is_applied_to_the_robot_it_was_made_for() {
+    for robot in ["ripley", "justin"] {
+        let dir = &finished(robot, "ml").dir;
+        let urdf = match robot {
+            "ripley" => "robots/ripley/r17.urdf",
+            _ => "robots/justin/justin.urdf",
+        };
+        for (n, from) in ["out", "out/report.json"].iter().enumerate() {
+            let new = format!("applied-{n}.urdf");
+            let ran = dir.calib(["apply", from, urdf, "--out", &new]).expect(0);
+            let written = dir.read(&format!("out/{robot}.calibrated.urdf"));
+            assert!(dir.read(&new) == written, "{robot}: what the run wrote");
+            let effects = ran.stdout.contains("calibration.yaml");
+            assert_eq!(effects, robot == "justin", "{}", ran.stdout);
+        }
+        let listed = dir.read("out/report.json");
+        for file in dir.files("out").keys().filter(|f| *f != "calib.manifest") {
+            let named = format!("\"path\": \"{file}\"");
+            assert!(listed.contains(&named), "{robot}: {file} is not listed");
+        }
+    }
+}
+
+#[test]
+fn a_rejected_calibration_is_not_applied() {
+    let dir = Scratch::new().robot("ripley").edit(
+        "robots/ripley.yaml",
+        "held_out_max_mm: 4",
+        "held_out_max_mm: 0.1",
+    );
+    dir.calib(["run", "robots/ripley.yaml", "--out", "out"])
+        .expect(1);
+    let urdf = "robots/ripley/r17.urdf";
+    let ran = dir.calib(["apply", "out", urdf, "--diff"]).expect(1);
+    assert!(ran.stderr.contains("is \"rejected\""), "{}", ran.stderr);
+    assert!(ran.stderr.contains("--force"), "{}", ran.stderr);
+    let forced = dir
+        .calib(["apply", "out", urdf, "--diff", "--force"])
+        .expect(0);
+    assert!(
+        forced
+            .stdout
+            .contains("note: the verdict of this calibration is")
+    );
+}

@@ -1,0 +1,149 @@
+//! Two calibrations of one arm: the same again, and with a longer forearm.
+
+mod scratch;
+
+use scratch::Scratch;
+use serde_json::Value;
+
+/// The robot as it really is: the description with errors of a real arm's size.
+fn true_robot(urdf: &str, longer_mm: f64) -> String {
+    let moved = |text: &str, joint: &str, from: &str, to: String| {
+        let at = text
+            .find(&format!("<joint name=\"{joint}\""))
+            .expect("the joint");
+        let (head, tail) = text.split_at(at);
+        assert!(tail.contains(from), "{joint}: {from}");
+        head.to_owned() + &tail.replacen(from, &to, 1)
+    };
+    let text = moved(
+        urdf,
+        "elbow",
+        "xyz=\"0.375 0 0\" rpy=\"0 0 0\"",
+        "xyz=\"0.3756 0 0.0003\" rpy=\"0.001 0 -0.002\"".to_owned(),
+    );
+    moved(
+        &text,
+        "wrist_pitch",
+        "xyz=\"0.375 0 0\" rpy=\"0 0 0\"",
+        format!(
+            "xyz=\"{} 0 -0.0002\" rpy=\"-0.001 0.002 0.001\"",
+            0.3746 + longer_mm * 1e-3
+        ),
+    )
+}
+
+/// Records the true robot anew (other noise, other poses, bodies mounted elsewhere) and calibrates it.
+fn session(dir: Scratch, name: &str, seed: u32, longer_mm: f64) -> Scratch {
+    let profile = dir.read("robots/ripley.yaml");
+    let truth = true_robot(&dir.read("robots/ripley/r17.urdf"), longer_mm);
+    let (before, rest) = profile
+        .split_once("    joint_offset_deg: 0.3\n")
+        .expect("errors");
+    let after = rest
+        .find("    mount_mm")
+        .map(|at| &rest[at..])
+        .expect("mounts");
+    let fixed = after.find("    fixed:").expect("a fixed error");
+    let noise = after.find("  noise:").expect("noise");
+    let simulated = format!(
+        "{before}    joint_offset_deg: 0\n    axis_mm: 0\n    axis_deg: 0\n{}{}",
+        &after[..fixed],
+        &after[noise..]
+    )
+    .replace("urdf: ripley/r17.urdf", "urdf: ripley/true.urdf");
+    let dir = dir
+        .file("robots/ripley/true.urdf", truth)
+        .file("robots/simulated.yaml", simulated);
+    let recorded = format!("recorded_{name}");
+    let seed = seed.to_string();
+    let arguments = [
+        "simulate",
+        "robots/simulated.yaml",
+        "--seed",
+        &seed,
+        "--out",
+        &recorded,
+    ];
+    dir.calib_with(&arguments).expect(0);
+    let mut dir = dir;
+    for (file, bytes) in dir.files(&recorded) {
+        if file.ends_with(".csv") {
+            dir = dir.file(&format!("robots/ripley/{file}"), bytes);
+        }
+    }
+    let ran = dir.calib_with(&["run", "robots/ripley.yaml", "--out", name, "-q"]);
+    assert!(ran.code < 2, "{}", ran.stderr);
+    dir
+}
+
+fn number<'a>(drift: &'a Value, name: &str) -> &'a Value {
+    let numbers = drift["numbers"].as_array().expect("numbers");
+    let found = numbers.iter().find(|n| n["name"] == name);
+    found.unwrap_or_else(|| panic!("{name} is not among {numbers:?}"))
+}
+
+#[test]
+fn a_longer_forearm_is_found_and_the_rest_is_not() {
+    let dir = Scratch::new().robot("ripley");
+    let dir = session(dir, "old", 1, 0.0);
+    let dir = session(dir, "same", 2, 0.0);
+    let dir = session(dir, "longer", 3, 1.0);
+    let same = dir.calib(["drift", "old", "same"]).expect(0);
+    assert!(same.stdout.contains("NO CHANGE"), "{}", same.stdout);
+    let found = dir.calib(["drift", "old", "longer/report.json"]).expect(1);
+    insta::with_settings!({filters => [(r"\d+\.\d+", "#"), (r"p = [<\de #-]+ \(", "p = # ("), (r" +# σ", " # σ")]}, {
+        insta::assert_snapshot!("longer", found.stdout);
+    });
+    assert!(
+        found.stdout.lines().all(|l| l.chars().count() <= 80),
+        "{}",
+        found.stdout
+    );
+    let json = dir
+        .calib(["drift", "old", "longer", "--json"])
+        .expect(1)
+        .json();
+    let forearm = number(&json, "distance.elbow.wrist_pitch");
+    assert_eq!(forearm["significant"], true, "{forearm}");
+    let (change, sigma) = (
+        forearm["change"].as_f64().expect("a number"),
+        forearm["sigma"].as_f64().expect("a number"),
+    );
+    assert!((change - 1e-3).abs() < 4.0 * sigma, "{change} ± {sigma}");
+    let upper = number(&json, "distance.shoulder.elbow");
+    assert_eq!(upper["significant"], false, "{upper}");
+    // Back and forth is the same change.
+    let back = dir
+        .calib(["drift", "longer", "old", "--json"])
+        .expect(1)
+        .json();
+    let (there, here) = (&back["joint"]["statistic"], &json["joint"]["statistic"]);
+    let gap = there.as_f64().expect("a number") - here.as_f64().expect("a number");
+    assert!(
+        gap.abs() < 1e-6 * here.as_f64().expect("a number"),
+        "{there} {here}"
+    );
+    let itself = dir
+        .calib(["drift", "old", "old", "--json"])
+        .expect(0)
+        .json();
+    assert!(itself["joint"]["statistic"].as_f64().expect("a number") < 1e-9);
+}
+
+#[test]
+fn reports_that_cannot_be_compared() {
+    let ripley = &scratch::finished("ripley", "ml").dir;
+    let paper = &scratch::finished("ripley", "paper").dir;
+    let justin = &scratch::finished("justin", "ml").dir;
+    let dir = Scratch::new()
+        .file("ripley/report.json", ripley.read("out/report.json"))
+        .file("paper/report.json", paper.read("out/report.json"))
+        .file("justin/report.json", justin.read("out/report.json"))
+        .file("none/report.json", "{}");
+    let mut said = String::new();
+    for (other, code) in [("paper", 3), ("justin", 1), ("none", 3), ("missing", 3)] {
+        let ran = dir.calib(["drift", "ripley", other]).expect(code);
+        said += &format!("--- {other}\n{}", ran.stderr);
+    }
+    insta::assert_snapshot!("refused", said);
+}
