@@ -91,7 +91,7 @@ fn a_longer_forearm_is_found_and_the_rest_is_not() {
     let same = dir.calib(["drift", "old", "same"]).expect(0);
     assert!(same.stdout.contains("NO CHANGE"), "{}", same.stdout);
     let found = dir.calib(["drift", "old", "longer/report.json"]).expect(1);
-    insta::with_settings!({filters => [(r"\d+\.\d+", "#"), (r"p = [<\de #-]+ \(", "p = # ("), (r" +# σ", " # σ")]}, {
+    insta::with_settings!({filters => [(r"\d+\.\d+", "#"), (r"p [=<] [\de #-]+ \(", "p # ("), (r" +# σ", " # σ")]}, {
         insta::assert_snapshot!("longer", found.stdout);
     });
     assert!(

@@ -9,7 +9,8 @@
 //! z = (g₂ᵀx̃₂ − g₁ᵀx̃₁) / √(g₁ᵀC₁g₁ + g₂ᵀC₂g₂),   C_k = (U_kᵀU_k)⁺                                  (2)
 //! ```
 //!
-//! if nothing changed. (1) asks whether *anything* that both data saw is different: no convention, no prior and no frame
+//! if nothing changed. A_k and y_k are taken about x_ref, the mean of the two estimates, so that a gauge, which is a curve,
+//! is straight between them. (1) asks whether *anything* that both data saw is different: no convention, no prior and no frame
 //! enters. (2) asks it of one number that both data determine (g_k ⊥ null U_k). As the noise was estimated, χ² is F with the
 //! residuals' degrees of freedom, and z is Student's t. False alarms of everything that is said together: [`FALSE_ALARMS`];
 //! half of it for (1), half for all (2) by Holm's procedure.

@@ -86,7 +86,7 @@ pub enum PipelineError {
     },
     /// A text of a robot's description cannot be changed as asked.
     #[error("{}", .0.to_string().replace("\nhelp: ", "\n  help: "))]
-    Edit(#[from] calib_urdf::EditError),
+    Edit(calib_urdf::EditError),
     /// What was asked for should not be done with this result.
     #[error("{finding}\n  help: {remedy}")]
     Refused {
@@ -122,6 +122,13 @@ pub enum PipelineError {
     /// The report or scene could not be rendered.
     #[error("the report cannot be written: {0}")]
     Report(#[from] calib_report::ReportError),
+}
+
+// Not a `#[from]`: the message is the cause's own, which would then be said twice.
+impl From<calib_urdf::EditError> for PipelineError {
+    fn from(error: calib_urdf::EditError) -> Self {
+        Self::Edit(error)
+    }
 }
 
 impl PipelineError {

@@ -55,7 +55,10 @@ pub(super) fn write(
         if *destination == Destination::InPlace {
             // The record first: whatever happens then, the original can be had.
             write_new(folder, &[record])?;
-            replace(place, &changed.bytes)?;
+            if let Err(error) = replace(place, &changed.bytes) {
+                let _ = std::fs::remove_file(record_path(place));
+                return Err(error);
+            }
         } else {
             write_new(folder, &[changed, record])?;
         }

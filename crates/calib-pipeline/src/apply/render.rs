@@ -1,5 +1,6 @@
 //! What a person and a program read of an application.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::{Applied, Destination, FileChange, Json, JsonFile};
@@ -39,10 +40,11 @@ pub fn text(applied: &Applied) -> String {
     if applied.files.is_empty() {
         let _ = writeln!(out, "\nnothing to do: the target holds this result already");
     }
+    if !applied.files.is_empty() {
+        out.push('\n');
+    }
     for file in &applied.files {
-        let lines: std::collections::BTreeSet<usize> =
-            file.patched.changes.iter().map(|c| c.line).collect();
-        let lines: Vec<String> = lines.iter().map(ToString::to_string).collect();
+        let lines: BTreeSet<usize> = file.patched.changes.iter().map(|c| c.line).collect();
         let line = format!(
             "{}: {} changed, line{} {}",
             file.path.display(),
@@ -51,9 +53,8 @@ pub fn text(applied: &Applied) -> String {
                 n => format!("{n} values"),
             },
             if lines.len() == 1 { "" } else { "s" },
-            lines.join(", ")
+            ranges(&lines)
         );
-        out.push('\n');
         out += &calib_report::terminal::wrapped(&line, "", "  ");
     }
     if applied.destination == Destination::Nowhere {
@@ -82,6 +83,23 @@ pub fn text(applied: &Applied) -> String {
         out += &calib_report::terminal::wrapped(note, "note: ", "      ");
     }
     out
+}
+
+/// `4-9, 11` of 4, 5, … 9, 11.
+fn ranges(lines: &BTreeSet<usize>) -> String {
+    let mut spans: Vec<(usize, usize)> = Vec::new();
+    for &line in lines {
+        match spans.last_mut() {
+            Some((_, last)) if *last + 1 == line => *last = line,
+            _ => spans.push((line, line)),
+        }
+    }
+    let shown = spans.iter().map(|(first, last)| match last - first {
+        0 => first.to_string(),
+        1 => format!("{first}, {last}"),
+        _ => format!("{first}-{last}"),
+    });
+    shown.collect::<Vec<_>>().join(", ")
 }
 
 /// For a program.

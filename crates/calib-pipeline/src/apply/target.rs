@@ -305,7 +305,10 @@ fn resolve(xacro: &Path, argument: &str) -> Option<PathBuf> {
         if beside.is_file() {
             return Some(beside);
         }
-        up.push("..");
+        let inside = up.file_name().is_some();
+        if !(inside && up.pop()) {
+            up.push("..");
+        }
     }
     None
 }

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::FALSE_ALARMS;
-use super::evidence::{Evidence, NULL, Number};
+use super::evidence::{Evidence, NULL, Number, Side};
 use crate::error::PipelineError;
 
 /// A number that both calibrations know.
@@ -160,7 +160,7 @@ fn joint(old: &Evidence, new: &Evidence, dof: f64) -> Result<Joint, PipelineErro
         .parameters
         .iter()
         .zip(&old.of_robot)
-        .filter(|(name, robot)| **robot && new.parameters.contains(name))
+        .filter(|(name, robot)| **robot && new.has_of_robot(name))
         .map(|(name, _)| name.as_str())
         .collect();
     if shared.is_empty() {
@@ -172,30 +172,35 @@ fn joint(old: &Evidence, new: &Evidence, dof: f64) -> Result<Joint, PipelineErro
             remedy: "free the same parameters in both calibrations".to_owned(),
         });
     }
-    let (a1, y1) = old.of_robot(&shared);
-    let (a2, y2) = new.of_robot(&shared);
-    let scale = |a: &DMatrix<f64>| decompose::singular_values(a).max();
-    let largest = scale(&a1).max(scale(&a2));
-    // One tolerance for all three ranks: a direction counts in the sum if it counts in a part.
+    let reference = 0.5 * (old.found(&shared) + new.found(&shared));
+    let mut sides = [
+        old.of_robot(&shared, &reference),
+        new.of_robot(&shared, &reference),
+    ];
+    let largest = sides
+        .iter()
+        .map(|side| decompose::singular_values(&side.a).max())
+        .fold(0.0, f64::max);
+    // One tolerance for all ranks: a direction counts in the sum if it counts in a part.
     let limit = NULL * largest;
+    forget_common_gauges(&mut sides, limit);
     let rank_of = |a: &DMatrix<f64>| {
-        decompose::singular_values(a)
-            .iter()
-            .filter(|s| **s > limit)
-            .count()
+        let values = decompose::singular_values(a);
+        values.iter().filter(|s| **s > limit).count()
     };
+    let [Side { a: a1, y: y1, .. }, Side { a: a2, y: y2, .. }] = &sides;
     let mut a = DMatrix::zeros(a1.nrows() + a2.nrows(), shared.len());
-    a.rows_mut(0, a1.nrows()).copy_from(&a1);
-    a.rows_mut(a1.nrows(), a2.nrows()).copy_from(&a2);
+    a.rows_mut(0, a1.nrows()).copy_from(a1);
+    a.rows_mut(a1.nrows(), a2.nrows()).copy_from(a2);
     let mut y = DVector::zeros(a.nrows());
     // Only what lies in the range of each A says anything about the robot.
     y.rows_mut(0, a1.nrows())
-        .copy_from(&in_range(&a1, &y1, limit));
+        .copy_from(&in_range(a1, y1, limit));
     y.rows_mut(a1.nrows(), a2.nrows())
-        .copy_from(&in_range(&a2, &y2, limit));
+        .copy_from(&in_range(a2, y2, limit));
     let together = in_range(&a, &y, limit);
     let statistic = (&y - together).norm_squared();
-    let degrees = (rank_of(&a1) + rank_of(&a2)).saturating_sub(rank_of(&a));
+    let degrees = (rank_of(a1) + rank_of(a2)).saturating_sub(rank_of(&a));
     let p_value = if degrees == 0 {
         1.0
     } else {
@@ -208,6 +213,54 @@ fn joint(old: &Evidence, new: &Evidence, dof: f64) -> Result<Joint, PipelineErro
         p_value,
         significant: p_value < 0.5 * FALSE_ALARMS,
     })
+}
+
+/// A gauge of one calibration is treated as a gauge of both where that moves no whitened residual by more than this.
+const GAUGE_TILT: f64 = 0.1;
+
+/// Takes the directions out of both sides that neither sees, but for how they bend from one estimate to the other.
+///
+/// A gauge is a curve; the two null spaces are its tangents at two places, and each side seems to see the other's a little.
+/// Left alone, every such pair would cost a direction that both do see.
+fn forget_common_gauges(sides: &mut [Side; 2], limit: f64) {
+    let null = |a: &DMatrix<f64>| {
+        let svd = decompose::svd(a);
+        let unseen: Vec<usize> = (0..svd.v.ncols())
+            .filter(|i| svd.s.get(*i).is_none_or(|s| *s <= limit))
+            .collect();
+        svd.v.select_columns(&unseen)
+    };
+    let (n1, n2) = (null(&sides[0].a), null(&sides[1].a));
+    if n1.ncols() == 0 || n2.ncols() == 0 {
+        return;
+    }
+    // Principal vectors, nearest pairs first.
+    let svd = decompose::svd(&(n1.transpose() * &n2));
+    let mut taken: Vec<DVector<f64>> = Vec::new();
+    for i in 0..svd.s.len() {
+        let mut middle = &n1 * svd.u.column(i) + &n2 * svd.v.column(i);
+        for other in &taken {
+            middle -= other * other.dot(&middle);
+        }
+        let norm = middle.norm();
+        // Half of what two unit vectors at a right angle have: these are no pair.
+        if norm < std::f64::consts::FRAC_1_SQRT_2 {
+            continue;
+        }
+        middle /= norm;
+        let moves =
+            |side: &Side| (&side.a * &middle).norm() * side.from_reference.dot(&middle).abs();
+        if sides.iter().all(|side| moves(side) <= GAUGE_TILT) {
+            taken.push(middle);
+        }
+    }
+    for side in sides {
+        for gauge in &taken {
+            let seen = &side.a * gauge;
+            side.y -= &seen * gauge.dot(&side.from_reference);
+            side.a -= &seen * gauge.transpose();
+        }
+    }
 }
 
 /// The part of y in the range of A.

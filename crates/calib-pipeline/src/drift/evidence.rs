@@ -44,6 +44,8 @@ pub struct Evidence {
     pub scale: DVector<f64>,
     /// U x̃, whitened.
     pub seen: DVector<f64>,
+    /// x̂, scaled.
+    pub found: DVector<f64>,
     /// x̃ − x̂, scaled, of least norm.
     pub without_prior: DVector<f64>,
     /// Singular values and directions of `root`.
@@ -172,6 +174,7 @@ impl Evidence {
             root,
             scale,
             seen,
+            found,
             without_prior,
             singular: svd.s,
             directions: svd.v,
@@ -181,6 +184,13 @@ impl Evidence {
         };
         evidence.numbers = numbers(info, &parameters, &evidence.scale);
         Ok(evidence)
+    }
+
+    /// Is there a parameter of the robot with this name?
+    #[must_use]
+    pub fn has_of_robot(&self, name: &str) -> bool {
+        let mut all = self.parameters.iter().zip(&self.of_robot);
+        all.any(|(other, robot)| *robot && other == name)
     }
 
     /// Does the data alone determine this number?
@@ -209,25 +219,59 @@ impl Evidence {
         )
     }
 
-    /// A and y of the robot's own parameters, in the order of `names`: what is left when tracker and bodies may stand anywhere.
+    /// A, A x̃ − A x_ref and x̃ − x_ref of the robot's own parameters, in the order of `names`: what is left when tracker and
+    /// bodies may stand anywhere. `reference` is x_ref by name, scaled.
     #[must_use]
-    pub fn of_robot(&self, names: &[&str]) -> (DMatrix<f64>, DVector<f64>) {
+    pub(super) fn of_robot(&self, names: &[&str], reference: &DVector<f64>) -> Side {
         let column = |name: &&str| self.parameters.iter().position(|p| p == name);
         let shared: Vec<usize> = names.iter().filter_map(column).collect();
         let rest: Vec<usize> = (0..self.parameters.len())
             .filter(|i| !shared.contains(i))
             .collect();
-        let a = self.root.select_columns(&shared);
-        if rest.is_empty() {
-            return (a, self.seen.clone());
+        let mut a = self.root.select_columns(&shared);
+        let mut y = &self.seen - &a * reference;
+        if !rest.is_empty() {
+            let svd = decompose::svd(&self.root.select_columns(&rest));
+            let q = svd.u.columns(0, decompose::rank(&svd.s, NULL)).into_owned();
+            a -= &q * (q.transpose() * &a);
+            y -= &q * (q.transpose() * &y);
         }
-        let svd = decompose::svd(&self.root.select_columns(&rest));
-        let rank = decompose::rank(&svd.s, NULL);
-        let q = svd.u.columns(0, rank);
-        let a = &a - q * (q.transpose() * &a);
-        let y = &self.seen - q * (q.transpose() * &self.seen);
-        (a, y)
+        let from_reference = DVector::from_iterator(
+            shared.len(),
+            shared
+                .iter()
+                .enumerate()
+                .map(|(k, &i)| self.found[i] + self.without_prior[i] - reference[k]),
+        );
+        Side {
+            a,
+            y,
+            from_reference,
+        }
     }
+
+    /// x̂ of some parameters, scaled.
+    #[must_use]
+    pub(super) fn found(&self, names: &[&str]) -> DVector<f64> {
+        let place = |name: &&str| self.parameters.iter().position(|p| p == name);
+        DVector::from_iterator(
+            names.len(),
+            names
+                .iter()
+                .map(|name| place(name).map_or(0.0, |i| self.found[i])),
+        )
+    }
+}
+
+/// One calibration's part of equation (1), tracker and bodies projected out.
+#[derive(Debug, Clone)]
+pub(super) struct Side {
+    /// A, whitened rows by shared parameters.
+    pub a: DMatrix<f64>,
+    /// What the data say, A (x̃ − x_ref).
+    pub y: DVector<f64>,
+    /// x̃ − x_ref.
+    pub from_reference: DVector<f64>,
 }
 
 /// The invariants, and every parameter of the robot by itself.

@@ -23,7 +23,7 @@ pub fn text(drift: &Drift) -> String {
     };
     out += &terminal::wrapped(
         &format!(
-            "all at once: squared distance {:.1}, p = {} ({} directions that both recordings see)",
+            "all at once: squared distance {:.1}, p {} ({} directions that both recordings see)",
             drift.joint.statistic,
             probability(drift.joint.p_value),
             drift.joint.degrees_of_freedom
@@ -96,7 +96,7 @@ fn section(out: &mut String, heading: &str, rows: &[&Changed]) {
         .map(|r| r.text.chars().count())
         .max()
         .unwrap_or(0)
-        .min(50);
+        .min(48);
     for row in rows {
         let change = number::change(row.change, Some(row.sigma), row.unit);
         let sigmas = (row.change / row.sigma).abs();
@@ -115,9 +115,9 @@ fn probability(p: f64) -> String {
     if p < SMALLEST {
         format!("< {SMALLEST:e}")
     } else if p < 1e-3 {
-        format!("{p:.1e}")
+        format!("= {p:.1e}")
     } else {
-        format!("{p:.3}")
+        format!("= {p:.3}")
     }
 }
 
