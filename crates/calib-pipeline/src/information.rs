@@ -14,16 +14,24 @@ pub fn data_information(inputs: &Inputs, fit: &MlFit) -> DataInformation {
     let solution = &fit.solution;
     let free = solution.model.free_parameters();
     let information = &solution.information;
-    let n = free.len();
+    // A parameter on one of its limits is held there: its own gradient is the limit's, not the data's.
+    let columns: Vec<usize> = (0..free.len())
+        .filter(|c| !solution.parameters[free[*c]].at_bound)
+        .collect();
+    let n = columns.len();
+    if n == 0 {
+        return DataInformation::default();
+    }
     // J scaled = U₁ diag(d) Wᵀ: diag(d) Wᵀ S⁻¹ has the same JᵀJ; its triangular factor is unique up to signs.
     let mut root = information.directions.transpose();
-    for i in 0..n {
-        root.row_mut(i).scale_mut(information.singular_values[i]);
+    for (i, d) in information.singular_values.iter().enumerate() {
+        root.row_mut(i).scale_mut(*d);
     }
-    let mut root = DMatrix::from(root.qr().r());
-    for c in 0..n {
-        root.column_mut(c).unscale_mut(information.scale[c]);
+    let mut root: DMatrix<f64> = root.select_columns(&columns).qr().r();
+    for (c, &column) in columns.iter().enumerate() {
+        root.column_mut(c).unscale_mut(information.scale[column]);
     }
+    let free: Vec<usize> = columns.iter().map(|&c| free[c]).collect();
     for r in 0..n {
         if root[(r, r)] < 0.0 {
             root.row_mut(r).neg_mut();

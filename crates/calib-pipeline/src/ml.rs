@@ -592,9 +592,7 @@ pub(crate) fn calibration_at(
         robot.points.insert(body.clone(), on_link.collect());
     }
     for (name, point) in &stated.tips {
-        let at = solution
-            .model
-            .point_position(point.index(), &solution.values);
+        let at = solved.point_position(point.index(), values);
         robot.tips.insert(name.clone(), at);
     }
     for (name, place) in &stated.contacts {

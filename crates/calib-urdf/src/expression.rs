@@ -284,7 +284,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn look_ups() {
+    fn a_look_up() {
         let name = |root: &str, keys: &[&str]| {
             Some(Access {
                 root: Root::Name(root.to_owned()),
