@@ -23,7 +23,7 @@ use crate::{
     input::{Input, InputKind, cloud_of},
     options::Options,
     outcome::{CorError, CorEstimate, Known, Noise, NotObservable, Outcome, Shape},
-    sphere::{leaves_its_plane, prepare},
+    sphere::{Spread, leaves_its_plane, prepare},
     sphere_ml::isotropic,
 };
 
@@ -65,10 +65,11 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
         .sigma_t
         .unwrap_or_else(|| (end.normal.cost / dof.max(1) as f64).sqrt());
     let residual_sigma = (end.normal.cost / dof.max(1) as f64).sqrt();
-    let kappa = match leaves_its_plane(ID, &cloud, &factor, residual_sigma, dof, options) {
-        Ok(kappa) => kappa,
-        Err(answer) => return Ok(answer),
-    };
+    let Spread { kappa, doubt } =
+        match leaves_its_plane(ID, &cloud, &factor, residual_sigma, dof, options) {
+            Ok(spread) => spread,
+            Err(answer) => return Ok(answer),
+        };
     let inverse = problem
         .reduced(&end.normal, 0.0)
         .and_then(|(h, _)| h.cholesky())
@@ -99,8 +100,8 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
         rms: (end.normal.cost / (3 * cloud.points.len()) as f64).sqrt(),
         used: cloud.points.len(),
         rejected: Vec::new(),
-        verdict: if weak { Verdict::Weak } else { Verdict::Ok },
-        reason: weak.then(|| {
+        verdict: if weak || doubt.is_some() { Verdict::Weak } else { Verdict::Ok },
+        reason: doubt.or_else(|| weak.then(|| {
             format!(
                 "σ = {weakest:.3e} along ({:.2}, {:.2}, {:.2}) exceeds {:.0} % of the radius {radius:.3e}",
                 worst[0],
@@ -108,7 +109,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
                 worst[2],
                 100.0 * options.weak_fraction
             )
-        }),
+        })),
     })))
 }
 

@@ -39,6 +39,7 @@ pub mod bounds;
 pub mod gamage;
 pub mod hotspot;
 pub mod hotspot_ml;
+pub mod hyper_n;
 mod input;
 mod options;
 mod outcome;
@@ -48,6 +49,7 @@ pub mod score;
 mod seeded;
 pub mod sfa;
 mod sphere;
+pub mod sphere_eiv;
 pub mod sphere_ml;
 
 pub use calib_geometry::measured::{DataError, Pose, Tracks};

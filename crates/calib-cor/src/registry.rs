@@ -4,11 +4,11 @@ use serde::Serialize;
 
 use crate::{
     algebraic::{self, Algebraic},
-    ball_bundle, gamage, hotspot, hotspot_ml,
+    ball_bundle, gamage, hotspot, hotspot_ml, hyper_n,
     input::{Input, InputKind},
     options::Options,
     outcome::{CorError, Outcome},
-    robust, score, sfa, sphere_ml,
+    robust, score, sfa, sphere_eiv, sphere_ml,
 };
 
 /// The entry point all estimators share.
@@ -90,6 +90,14 @@ const TABLE: &[EstimatorInfo] = &[
         fit: |input, options| algebraic::fit(Algebraic::Hyper, input, options),
     },
     EstimatorInfo {
+        id: "hyper_n",
+        name: "sphere fit without second-order bias, for few samples",
+        input: InputKind::Points,
+        summary: "hyper with the terms of order 1/n",
+        source: "Rangarajan & Kanatani 2009 (HyperLS)",
+        fit: hyper_n::fit,
+    },
+    EstimatorInfo {
         id: "gamage_lasenby",
         name: "several markers, linear",
         input: InputKind::Points,
@@ -112,6 +120,14 @@ const TABLE: &[EstimatorInfo] = &[
         summary: "common center, own radii; per-marker noise and 3 × 3 covariances on request",
         source: "orthogonal-distance sphere, joint likelihood, see the book",
         fit: sphere_ml::fit,
+    },
+    EstimatorInfo {
+        id: "sphere_eiv",
+        name: "several markers, errors in variables",
+        input: InputKind::Points,
+        summary: "ml_sphere with foot points in the metric of the covariances, the bias of the center taken off",
+        source: "Box 1971; Kanatani 2008",
+        fit: sphere_eiv::fit,
     },
     EstimatorInfo {
         id: "hotspot_ml",
@@ -141,16 +157,16 @@ const TABLE: &[EstimatorInfo] = &[
         id: "robust",
         name: "center with outliers",
         input: InputKind::PointsOrPoses,
-        summary: "consensus, Huber, Geman–McClure, χ² gate, plain fit of the inliers",
-        source: "Huber 1964; Yang et al. 2020",
+        summary: "consensus, then each sample belongs in part, maximum likelihood of the inliers",
+        source: "Dempster et al. 1977; evidence for each choice, see the book",
         fit: robust::robust,
     },
     EstimatorInfo {
         id: "consensus",
         name: "center by random subsets",
         input: InputKind::PointsOrPoses,
-        summary: "MSAC with stated noise, least median of squares without; inliers refitted",
-        source: "Torr & Zisserman 2000; Rousseeuw 1984",
+        summary: "the choice of inliers with the greatest evidence, noise stated or not; inliers refitted",
+        source: "Torr & Zisserman 2000; Moisan & Stival 2004",
         fit: robust::consensus,
     },
 ];

@@ -1,19 +1,26 @@
-//! Outliers: consensus, then Huber, then Geman–McClure by graduated non-convexity, then a χ² gate and a
-//! plain maximum-likelihood fit of what is left, so that the covariance is valid.
+//! Outliers: which samples belong to the joint is decided by the evidence for each choice, then they are fitted plainly.
 //!
 //! ```text
-//! consensus   draw subsets; MSAC  Σ min(d²/σ², T)  with a stated σ, else least median of squares
-//! Huber       w = min(1, k/d), 0 far off         d: residual in σ; k = 1.345 (1 dof), 2.8 (3 dof)
-//! GNC         w = (μT / (d² + μT))²,   μ = 8 … 1,   T = χ²_dof(0.999)
-//! gate        d² ≤ T,  σ re-estimated from the inliers, until the set stands still
+//! h of n samples are within the noise, the others either off by any order of magnitude alike, or anywhere as far as the farthest:
+//! density 1/(S_q |d|^q D) or 1/(V_q d_max^q), whichever explains them better. Residuals of q components, p unknowns, ν = qh − p, RSS their squares.  σ integrated out with the prior 1/σ:
+//! cost(h) = ν/2 ln(π RSS) − ln Γ(ν/2) − Σ_out ln density + ln C(n, h)                              (1)
+//! cost(h) = RSS/2σ² + ν ln(σ√2π)      − Σ_out ln density + ln C(n, h)        where σ is stated        (2)
+//! S₁ = V₁ = 2,  S₃ = 4π,  V₃ = 4π/3,  D = ln 10⁴: four decades;   h ≥ (n + p/q + 1)/2
 //! ```
 //!
-//! A residual vector is weighted as a whole. The threshold is in units of the noise: metres or millimetres do
-//! not matter, nor the seed beyond the choice of subsets. More than half of outliers need a stated σ.
-//! Huber 1964; Yang et al. 2020 (GNC); Torr & Zisserman 2000 (MSAC); Rousseeuw 1984 (LMedS).
+//! Subsets give candidates; each is refitted to the samples of least cost until they stand still, the cheapest wins (`consensus`).
+//! `robust` then lets every sample belong in part (expectation and maximisation over the same two classes) before it decides, and fits by
+//! maximum likelihood, so that the covariance is valid. In the end every sample belongs whose residual would not surprise among n (χ², one
+//! recording in twenty). Metres or millimetres do not matter.
+//!
+//! Where another center explains the samples almost as well (cost within [`RIVAL`]) the answer is that there is none: this is where the
+//! method breaks down, and it says so (nine points with three outliers leave two degrees of freedom). A choice of h among n samples makes a circle look
+//! less planar by chance: the test of one axis is therefore made at `significance / C(n, h)`.
+//! Torr & Zisserman 2000 (MSAC); Moisan & Stival 2004 (a threshold from the data); Dempster et al. 1977.
 
 use calib_geometry::{
     Verdict,
+    chance::chi2_tail,
     decompose::symmetric_eigen_small,
     measured::{Cloud, Pose},
 };
@@ -29,24 +36,22 @@ use crate::{
     sphere_ml,
 };
 
-/// χ²(0.999) for 1 and 3 degrees of freedom.
-const GATE: [f64; 2] = [10.828, 16.266];
-/// χ²(0.5) for 1 and 3 degrees of freedom: turns a median square into a variance.
-const MEDIAN: [f64; 2] = [0.4549, 2.3660];
-/// Huber's constants: 95 % efficiency at the normal for one, the same for three degrees of freedom.
-const HUBER: [f64; 2] = [1.345, 2.8];
 /// Samples that score a subset; more would not rank subsets better.
 const SCORED: usize = 1000;
-/// Rounds of Huber's weights, enough to forget which four samples the consensus drew.
-const HUBER_ROUNDS: usize = 8;
-/// Huber's weights end at this multiple of the gate (25: five times its distance).
-const FAR: f64 = 25.0;
-/// Graduation of Geman & McClure's weights; the last ones repeat until they stand still.
-const MU: [f64; 9] = [8.0, 5.0, 3.0, 2.0, 1.5, 1.0, 1.0, 1.0, 1.0];
-/// Rounds of the gate.
+/// Candidates that are refitted.
+const REFINED: usize = 24;
+/// Rounds of refitting a candidate, and of sharing samples between the classes.
 const ROUNDS: usize = 30;
-/// Part of the largest squared residual that counts as rounding on exact data.
-const EXACT: f64 = 1e-24;
+/// Difference of costs (natural logarithm of the odds) within which another center is a rival: 100 to 1.
+const RIVAL: f64 = 4.6;
+/// ln D: outliers spread over four decades.
+const DECADES: f64 = 2.22;
+/// −ln of the prior of a scale that the outliers share.
+const SCALE: f64 = 3.0;
+/// An outlier is never more likely than at this many σ: closer ones are not told from the noise.
+const NEAREST: f64 = 3.0;
+/// Part of the data's size below which residuals are rounding.
+const EXACT: f64 = 1e-12;
 
 /// Robust fit: spheres for points and markers, hot spot for poses.
 ///
@@ -81,107 +86,377 @@ fn dispatch(
 /// A model that can be fitted with weights and measured against each sample.
 trait Model {
     type Estimate: Clone;
-    /// Index into the tables of constants: 0 for one, 1 for three residual components.
-    const DOF: usize;
-    /// Unknowns, for the finite-sample factor of the median.
+    /// Components of a residual.
+    const COMPONENTS: usize;
+    /// Unknowns.
     fn unknowns(&self) -> usize;
     fn samples(&self) -> usize;
+    /// Where sample k is.
+    fn place(&self, k: usize) -> Vector3<f64>;
     fn subset_fit(&self, random: &mut Seeded) -> Option<Self::Estimate>;
     /// `|residual|²` of sample k.
     fn square(&self, estimate: &Self::Estimate, k: usize) -> f64;
     fn weighted(&self, start: &Self::Estimate, weights: &[f64]) -> Option<Self::Estimate>;
+    /// The center, and the size of the joint: a center further off than a tenth of it is another one.
+    fn center(&self, estimate: &Self::Estimate) -> (Vector3<f64>, f64);
 }
 
-/// Flags of the inliers, residuals and noise; `None` where no subset gave a model.
-fn inliers<M: Model>(
-    model: &M,
-    options: &Options,
-    reweight: bool,
-) -> Option<(Vec<bool>, Vec<f64>)> {
-    let n = model.samples();
-    let gate = GATE[M::DOF];
-    let squares = |e: &M::Estimate| -> Vec<f64> { (0..n).map(|k| model.square(e, k)).collect() };
-    // σ² of one component from the median of squared residuals; Rousseeuw's factor for small samples.
-    let finite = 1.0 + 5.0 / (n as f64 - model.unknowns() as f64).max(1.0);
-    let scale = |squares: &[f64]| match options.sigma_t {
-        Some(sigma) if M::DOF == 0 => sigma * sigma,
-        _ => (median(squares) / MEDIAN[M::DOF]) * finite * finite,
-    };
+/// Costs (1) and (2).
+struct Evidence {
+    components: usize,
+    unknowns: usize,
+    sigma: Option<f64>,
+    /// ln S_q + ln D.
+    spread: f64,
+    /// ln V_q.
+    volume: f64,
+    /// Smallest square that is not rounding.
+    floor: f64,
+    /// ln Γ(k/2), k = 0, 1, …
+    half_gamma: Vec<f64>,
+}
 
-    let mut random = Seeded::new(options.seed);
-    let stride = n.div_ceil(SCORED);
-    let mut best: Option<(f64, M::Estimate)> = None;
-    let mut scored = Vec::with_capacity(n / stride + 1);
-    for _ in 0..options.subsets {
-        let Some(candidate) = model.subset_fit(&mut random) else {
-            continue;
-        };
-        scored.clear();
-        scored.extend((0..n).step_by(stride).map(|k| model.square(&candidate, k)));
-        let score = match options.sigma_t {
-            Some(sigma) if M::DOF == 0 => {
-                scored.iter().map(|d| (d / (sigma * sigma)).min(gate)).sum()
-            }
-            _ => median(&scored),
-        };
-        if score.is_finite() && best.as_ref().is_none_or(|(lowest, _)| score < *lowest) {
-            best = Some((score, candidate));
+impl Evidence {
+    fn of<M: Model>(model: &M, stated: Option<f64>) -> Self {
+        let n = model.samples();
+        let middle =
+            Vector3::from_fn(|i, _| median(&(0..n).map(|k| model.place(k)[i]).collect::<Vec<_>>()));
+        let reach = (0..n)
+            .map(|k| (model.place(k) - middle).norm())
+            .fold(0.0, f64::max);
+        let region = (2.0 * reach).max(f64::MIN_POSITIVE.sqrt());
+        let mut half_gamma = vec![0.0, std::f64::consts::PI.sqrt().ln(), 0.0];
+        for k in 3..=(M::COMPONENTS.max(2) * n + 2) {
+            let x: f64 = half_gamma[k - 2] + (k as f64 / 2.0 - 1.0).ln();
+            half_gamma.push(x);
+        }
+        Self {
+            components: M::COMPONENTS,
+            unknowns: model.unknowns(),
+            sigma: if M::COMPONENTS == 1 { stated } else { None },
+            spread: DECADES
+                + if M::COMPONENTS == 1 {
+                    2.0_f64.ln()
+                } else {
+                    (4.0 * std::f64::consts::PI).ln()
+                },
+            volume: if M::COMPONENTS == 1 {
+                2.0_f64.ln()
+            } else {
+                (4.0 * std::f64::consts::PI / 3.0).ln()
+            },
+            floor: (EXACT * region).powi(2),
+            half_gamma,
         }
     }
-    let mut estimate = best?.1;
 
-    if reweight {
-        // The consensus decides the noise; reweighting may lower it, never let outliers widen it again.
-        let mut variance = f64::INFINITY;
-        for (round, mu) in std::iter::repeat_n(None, HUBER_ROUNDS)
-            .chain(MU.iter().copied().map(Some))
-            .enumerate()
-        {
-            let d = squares(&estimate);
-            let floor = EXACT * d.iter().copied().fold(0.0, f64::max);
-            variance = variance.min(scale(&d)).max(floor).max(f64::MIN_POSITIVE);
-            let weight = |d2: f64| match mu {
-                // A bounded pull is not enough for a sphere: far samples would drag it out of the basin.
-                None if d2 > FAR * gate => 0.0,
-                None => (HUBER[M::DOF] / d2.sqrt()).min(1.0),
-                Some(mu) => (mu * gate / (d2 + mu * gate)).powi(2),
+    /// Fewest samples that can be called the majority: those left out are no more than what the others have to spare.
+    fn fewest(&self, n: usize) -> usize {
+        (n + self.unknowns.div_ceil(self.components))
+            .div_ceil(2)
+            .min(n)
+    }
+
+    fn ln_choices(&self, n: usize, h: usize) -> f64 {
+        let ln_factorial = |k: usize| self.half_gamma[2 * k + 2];
+        ln_factorial(n) - ln_factorial(h) - ln_factorial(n - h)
+    }
+
+    /// −ln density of an outlier of any order of magnitude.
+    fn outside(&self, square: f64) -> f64 {
+        self.spread + self.ln_length(square)
+    }
+
+    /// ln |d|^q.
+    fn ln_length(&self, square: f64) -> f64 {
+        0.5 * self.components as f64 * square.max(self.floor).ln()
+    }
+
+    /// `outside` is the cost of those left out.
+    fn cost(&self, rss: f64, outside: f64, h: usize, n: usize) -> f64 {
+        let free = self.components * h - self.unknowns;
+        let rss = rss.max(self.floor * h as f64);
+        let noise = match self.sigma {
+            None => 0.5 * free as f64 * (std::f64::consts::PI * rss).ln() - self.half_gamma[free],
+            Some(sigma) => {
+                rss / (2.0 * sigma * sigma)
+                    + free as f64 * (sigma * (2.0 * std::f64::consts::PI).sqrt()).ln()
+            }
+        };
+        noise + outside + self.ln_choices(n, h)
+    }
+
+    /// Least cost over the number of samples, those of least residual first.
+    fn best(&self, sorted: &[f64]) -> Best {
+        let n = sorted.len();
+        let fewest = self.fewest(n);
+        let farthest = sorted.last().copied().unwrap_or(0.0);
+        let even = self.volume + self.ln_length(farthest);
+        let mut rss = 0.0;
+        let mut outside: f64 = sorted.iter().map(|d| self.outside(*d)).sum();
+        let mut best = Best {
+            cost: f64::INFINITY,
+            count: n,
+            even: None,
+        };
+        for (k, square) in sorted.iter().enumerate() {
+            rss += square;
+            outside -= self.outside(*square);
+            let count = k + 1;
+            if count < fewest || self.components * count <= self.unknowns {
+                continue;
+            }
+            let left = (n - count) as f64;
+            let evenly = if count < n {
+                left * even + (self.components as f64 * left).ln() + SCALE
+            } else {
+                f64::INFINITY
             };
-            let weights: Vec<f64> = d.iter().map(|d| weight(d / variance)).collect();
-            match model.weighted(&estimate, &weights) {
-                Some(next) => estimate = next,
-                None if round == 0 => return None,
-                None => break,
+            let cost = self.cost(rss, outside.min(evenly), count, n);
+            if cost < best.cost {
+                best = Best {
+                    cost,
+                    count,
+                    even: (evenly < outside).then_some(even),
+                };
             }
         }
+        best
     }
 
-    let mut variance = scale(&squares(&estimate)).max(f64::MIN_POSITIVE);
-    let mut keep = vec![true; n];
-    let mut d = squares(&estimate);
+    /// ln of the odds that a sample belongs, when `total` of n do.
+    fn odds(&self, square: f64, even: Option<f64>, variance: f64, total: f64, n: usize) -> f64 {
+        let out = (n as f64 - total).max(0.5);
+        (total / out).ln()
+            - 0.5 * self.components as f64 * (2.0 * std::f64::consts::PI * variance).ln()
+            - square / (2.0 * variance)
+            + even.unwrap_or_else(|| self.outside(square.max(NEAREST * NEAREST * variance)))
+    }
+
+    /// Variance of one component among the chosen.
+    fn variance(&self, rss: f64, count: f64) -> f64 {
+        match self.sigma {
+            Some(sigma) => sigma * sigma,
+            None => rss / (self.components as f64 * count - self.unknowns as f64).max(0.5),
+        }
+        .max(self.floor)
+        .max(f64::MIN_POSITIVE)
+    }
+}
+
+/// The best number of samples.
+struct Best {
+    cost: f64,
+    count: usize,
+    /// −ln density of the outliers where they are spread evenly, else by orders of magnitude.
+    even: Option<f64>,
+}
+
+/// Samples that belong together.
+struct Chosen<E> {
+    cost: f64,
+    even: Option<f64>,
+    keep: Vec<bool>,
+    estimate: E,
+}
+
+/// Refits to the samples of least cost until they stand still.
+fn settle<M: Model>(
+    model: &M,
+    evidence: &Evidence,
+    start: M::Estimate,
+) -> Option<Chosen<M::Estimate>> {
+    let n = model.samples();
+    let mut estimate = start;
+    let mut chosen: Option<Chosen<M::Estimate>> = None;
     for _ in 0..ROUNDS {
-        let next: Vec<bool> = d.iter().map(|d| *d <= gate * variance).collect();
-        let weights: Vec<f64> = next.iter().map(|k| f64::from(u8::from(*k))).collect();
-        let count = next.iter().filter(|k| **k).count();
-        if count <= model.unknowns() {
-            return None;
-        }
-        let Some(fitted) = model.weighted(&estimate, &weights) else {
+        let squares: Vec<f64> = (0..n).map(|k| model.square(&estimate, k)).collect();
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|a, b| squares[*a].total_cmp(&squares[*b]));
+        let sorted: Vec<f64> = order.iter().map(|k| squares[*k]).collect();
+        let Best { cost, count, even } = evidence.best(&sorted);
+        if !cost.is_finite() {
             break;
-        };
-        estimate = fitted;
-        d = squares(&estimate);
-        if !(options.sigma_t.is_some() && M::DOF == 0) {
-            let components = (2 * M::DOF + 1) * count - model.unknowns();
-            let rss: f64 = d.iter().zip(&weights).map(|(d, w)| d * w).sum();
-            variance = (rss / components as f64).max(f64::MIN_POSITIVE);
         }
-        let settled = next == keep;
-        keep = next;
+        let mut keep = vec![false; n];
+        for k in &order[..count] {
+            keep[*k] = true;
+        }
+        let settled = chosen.as_ref().is_some_and(|c| c.keep == keep);
+        if chosen.as_ref().is_none_or(|c| cost < c.cost) {
+            chosen = Some(Chosen {
+                cost,
+                even,
+                keep: keep.clone(),
+                estimate: estimate.clone(),
+            });
+        } else {
+            break;
+        }
         if settled {
             break;
         }
+        let weights: Vec<f64> = keep.iter().map(|k| f64::from(u8::from(*k))).collect();
+        match model.weighted(&estimate, &weights) {
+            Some(next) => estimate = next,
+            None => break,
+        }
     }
-    Some((keep, d.iter().map(|d| (d / variance).sqrt()).collect()))
+    chosen
+}
+
+/// What the choice of samples came to.
+struct Choice {
+    keep: Vec<bool>,
+    /// Residuals over the noise.
+    sigmas: Vec<f64>,
+    gate_sigmas: f64,
+    /// ln of the number of ways to choose as many samples.
+    ln_choices: f64,
+}
+
+/// Why there is none.
+enum NoChoice {
+    NoSubset,
+    Rival { off: f64, cost: f64 },
+}
+
+fn choose<M: Model>(model: &M, options: &Options, shared: bool) -> Result<Choice, NoChoice> {
+    let n = model.samples();
+    let evidence = Evidence::of(model, options.sigma_t);
+    let mut random = Seeded::new(options.seed);
+    let stride = n.div_ceil(SCORED);
+    // All samples at once are a candidate too: where there are no outliers, it is the answer.
+    let mut candidates: Vec<(f64, M::Estimate)> = Vec::new();
+    let mut scored = Vec::with_capacity(n / stride + 1);
+    let mut offer = |candidate: M::Estimate, candidates: &mut Vec<(f64, M::Estimate)>| {
+        scored.clear();
+        scored.extend((0..n).step_by(stride).map(|k| model.square(&candidate, k)));
+        scored.sort_unstable_by(f64::total_cmp);
+        let Best { cost, .. } = evidence.best(&scored);
+        if cost.is_finite() {
+            candidates.push((cost, candidate));
+        }
+    };
+    for _ in 0..options.subsets {
+        if let Some(candidate) = model.subset_fit(&mut random) {
+            offer(candidate, &mut candidates);
+        }
+    }
+    candidates.sort_by(|a, b| a.0.total_cmp(&b.0));
+    candidates.truncate(REFINED);
+    if let Some(all) = candidates
+        .first()
+        .and_then(|(_, start)| model.weighted(start, &vec![1.0; n]))
+    {
+        candidates.push((0.0, all));
+    }
+    let mut settled: Vec<Chosen<M::Estimate>> = Vec::new();
+    for (_, start) in candidates {
+        if let Some(found) = settle(model, &evidence, start)
+            && settled.iter().all(|other| other.keep != found.keep)
+        {
+            settled.push(found);
+        }
+    }
+    settled.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let best = settled.first().ok_or(NoChoice::NoSubset)?;
+    let (center, size) = model.center(&best.estimate);
+    for rival in &settled[1..] {
+        let off = (model.center(&rival.estimate).0 - center).norm();
+        if rival.cost - best.cost < RIVAL && off > options.weak_fraction * size {
+            return Err(NoChoice::Rival {
+                off,
+                cost: rival.cost - best.cost,
+            });
+        }
+    }
+
+    let count = best.keep.iter().filter(|k| **k).count();
+    let mut squares: Vec<f64> = (0..n).map(|k| model.square(&best.estimate, k)).collect();
+    let rss = |squares: &[f64], weights: &[f64]| -> f64 {
+        squares.iter().zip(weights).map(|(d, w)| d * w).sum()
+    };
+    let mut weights: Vec<f64> = best.keep.iter().map(|k| f64::from(u8::from(*k))).collect();
+    let mut total = count as f64;
+    let mut variance = evidence.variance(rss(&squares, &weights), total);
+    let mut keep = best.keep.clone();
+    if shared && count < n {
+        let mut estimate = best.estimate.clone();
+        for _ in 0..ROUNDS {
+            let next: Vec<f64> = squares
+                .iter()
+                .map(|d| 1.0 / (1.0 + (-evidence.odds(*d, best.even, variance, total, n)).exp()))
+                .collect();
+            let Some(fitted) = model.weighted(&estimate, &next) else {
+                break;
+            };
+            let sum: f64 = next.iter().sum();
+            if sum * M::COMPONENTS as f64 <= evidence.unknowns as f64 + 0.5 {
+                break;
+            }
+            let change = next
+                .iter()
+                .zip(&weights)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
+            estimate = fitted;
+            weights = next;
+            total = sum;
+            squares = (0..n).map(|k| model.square(&estimate, k)).collect();
+            variance = evidence.variance(rss(&squares, &weights), total);
+            if change < 1e-9 {
+                break;
+            }
+        }
+        let belongs: Vec<bool> = weights.iter().map(|w| *w > 0.5).collect();
+        if belongs.iter().filter(|k| **k).count() >= evidence.fewest(n) {
+            keep = belongs;
+        }
+    }
+    // Real noise has longer tails than the normal: what would not surprise among so many samples belongs.
+    let surprising = surprising(M::COMPONENTS, n);
+    let mut estimate = best.estimate.clone();
+    for _ in 0..ROUNDS {
+        let flags: Vec<f64> = keep.iter().map(|k| f64::from(u8::from(*k))).collect();
+        let Some(fitted) = model.weighted(&estimate, &flags) else {
+            break;
+        };
+        estimate = fitted;
+        squares = (0..n).map(|k| model.square(&estimate, k)).collect();
+        variance = evidence.variance(rss(&squares, &flags), flags.iter().sum());
+        let grown: Vec<bool> = squares
+            .iter()
+            .zip(&keep)
+            .map(|(d, kept)| *kept || *d <= surprising * variance)
+            .collect();
+        if grown == keep {
+            break;
+        }
+        keep = grown;
+    }
+    let kept = keep.iter().filter(|k| **k).count();
+    Ok(Choice {
+        sigmas: squares.iter().map(|d| (d / variance).sqrt()).collect(),
+        gate_sigmas: surprising.sqrt(),
+        ln_choices: evidence.ln_choices(n, kept),
+        keep,
+    })
+}
+
+/// The square of a normal residual of so many components that the largest of n exceeds once in twenty recordings.
+fn surprising(components: usize, n: usize) -> f64 {
+    let chance = 0.05 / n.max(1) as f64;
+    let (mut low, mut high) = (0.0, 1000.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if chi2_tail(middle, components as f64) > chance {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
 }
 
 fn median(values: &[f64]) -> f64 {
@@ -193,20 +468,14 @@ fn median(values: &[f64]) -> f64 {
     *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-fn rejected(
-    keep: &[bool],
-    sigmas: &[f64],
-    dof: usize,
-    label: impl Fn(usize) -> (usize, usize),
-) -> Vec<Rejected> {
-    let gate_sigmas = GATE[dof].sqrt();
-    (0..keep.len())
-        .filter(|&k| !keep[k])
+fn rejected(choice: &Choice, label: impl Fn(usize) -> (usize, usize)) -> Vec<Rejected> {
+    (0..choice.keep.len())
+        .filter(|&k| !choice.keep[k])
         .map(|k| {
             let (marker, row) = label(k);
             let reason = RejectReason::Outlier {
-                residual_sigmas: sigmas[k],
-                gate_sigmas,
+                residual_sigmas: choice.sigmas[k],
+                gate_sigmas: choice.gate_sigmas,
             };
             Rejected {
                 marker,
@@ -217,11 +486,21 @@ fn rejected(
         .collect()
 }
 
-fn no_consensus(estimator: &'static str, n: usize) -> Outcome {
+fn no_choice(estimator: &'static str, n: usize, why: &NoChoice) -> Outcome {
+    let reason = match why {
+        NoChoice::NoSubset => {
+            format!("no subset of the {n} samples gives a center that others agree with")
+        }
+        NoChoice::Rival { off, cost } => format!(
+            "two centers {off:.3e} apart explain the {n} samples about equally well (odds {:.0} to 1, \
+             100 to 1 are needed): too few samples for so many outliers, or state the noise",
+            cost.exp()
+        ),
+    };
     Outcome::NotObservable(crate::outcome::NotObservable {
         estimator,
-        verdict: Verdict::Diverged,
-        reason: format!("no subset of the {n} samples gives a center that others agree with"),
+        verdict: Verdict::NotUnique,
+        reason,
         known: crate::outcome::Known::Nothing,
     })
 }
@@ -235,7 +514,7 @@ struct Spheres<'a> {
 
 impl Model for Spheres<'_> {
     type Estimate = (Vector3<f64>, Vec<f64>);
-    const DOF: usize = 0;
+    const COMPONENTS: usize = 1;
 
     fn unknowns(&self) -> usize {
         3 + self.cloud.markers()
@@ -243,6 +522,17 @@ impl Model for Spheres<'_> {
 
     fn samples(&self) -> usize {
         self.cloud.points.len()
+    }
+
+    fn place(&self, k: usize) -> Vector3<f64> {
+        self.cloud.points[k]
+    }
+
+    fn center(&self, (center, radii): &Self::Estimate) -> (Vector3<f64>, f64) {
+        (
+            *center,
+            radii.iter().sum::<f64>() / radii.len().max(1) as f64,
+        )
     }
 
     /// Four samples of one marker give a center; the radii are the medians of the distances.
@@ -307,14 +597,19 @@ fn points_fit(
         cloud: &cloud,
         marker_of,
     };
-    let Some((keep, sigmas)) = inliers(&model, options, reweight) else {
-        return Ok(no_consensus(estimator, cloud.points.len()));
+    let choice = match choose(&model, options, reweight) {
+        Ok(choice) => choice,
+        Err(why) => return Ok(no_choice(estimator, cloud.points.len(), &why)),
     };
-    let out = rejected(&keep, &sigmas, 0, |k| cloud.labels[k]);
+    let out = rejected(&choice, |k| cloud.labels[k]);
+    let options = Options {
+        significance: (options.significance * (-choice.ln_choices).exp()).max(f64::MIN_POSITIVE),
+        ..options.clone()
+    };
     Ok(sphere_ml::fit_cloud(
         estimator,
-        &cloud.select(&keep),
-        options,
+        &cloud.select(&choice.keep),
+        &options,
         out,
     ))
 }
@@ -327,7 +622,7 @@ struct HotSpots<'a> {
 
 impl Model for HotSpots<'_> {
     type Estimate = (Vector3<f64>, Vector3<f64>);
-    const DOF: usize = 1;
+    const COMPONENTS: usize = 3;
 
     fn unknowns(&self) -> usize {
         6
@@ -335,6 +630,14 @@ impl Model for HotSpots<'_> {
 
     fn samples(&self) -> usize {
         self.poses.len()
+    }
+
+    fn place(&self, k: usize) -> Vector3<f64> {
+        self.poses[k].1.translation
+    }
+
+    fn center(&self, (center, body_point): &Self::Estimate) -> (Vector3<f64>, f64) {
+        (*center, body_point.norm())
     }
 
     fn subset_fit(&self, random: &mut Seeded) -> Option<Self::Estimate> {
@@ -404,16 +707,17 @@ fn poses_fit(
         .filter_map(|(row, p)| Some((row, p.as_ref()?)))
         .collect();
     let model = HotSpots { poses: seen };
-    let Some((keep, sigmas)) = inliers(&model, options, reweight) else {
-        return Ok(no_consensus(estimator, model.samples()));
+    let choice = match choose(&model, options, reweight) {
+        Ok(choice) => choice,
+        Err(why) => return Ok(no_choice(estimator, model.samples(), &why)),
     };
     let mut kept = poses.to_vec();
     for (k, (row, _)) in model.poses.iter().enumerate() {
-        if !keep[k] {
+        if !choice.keep[k] {
             kept[*row] = None;
         }
     }
-    let out = rejected(&keep, &sigmas, 1, |k| (0, model.poses[k].0));
+    let out = rejected(&choice, |k| (0, model.poses[k].0));
     if reweight {
         hotspot_ml::fit_poses(estimator, &kept, options, out)
     } else {

@@ -23,7 +23,11 @@ use crate::{
     outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Rejected, Shape},
 };
 
-/// Residual degrees of freedom from which the residuals say more about the noise than the tracker does.
+/// Chance, in units of the significance, up to which a doubtful recording still gets its answer, called weak, where it has fewer than
+/// [`ENOUGH_DOF`] degrees of freedom: no test separates a sweep from a grid both ways there, so what is between the two is said to be.
+const DOUBT: f64 = 50.0;
+
+/// Residual degrees of freedom from which the residuals say more about the noise than the tracker does, and enough to test it.
 const ENOUGH_DOF: usize = 10;
 
 /// Rank check of a cloud; `Err` carries the answer.
@@ -193,10 +197,11 @@ pub(crate) fn judge(
     } else {
         0.0
     };
-    let kappa = match leaves_its_plane(estimator, cloud, factor, plain_sigma, dof, options) {
-        Ok(kappa) => kappa,
-        Err(answer) => return answer,
-    };
+    let Spread { kappa, doubt } =
+        match leaves_its_plane(estimator, cloud, factor, plain_sigma, dof, options) {
+            Ok(spread) => spread,
+            Err(answer) => return answer,
+        };
 
     // Noise inflates the spread of the weakest direction: take its share off the information.
     let mut covariance = Matrix3::zeros();
@@ -219,6 +224,8 @@ pub(crate) fn judge(
                 100.0 * options.weak_fraction
             )),
         )
+    } else if doubt.is_some() {
+        (Verdict::Weak, doubt)
     } else {
         (Verdict::Ok, None)
     };
@@ -248,8 +255,17 @@ pub(crate) fn judge(
     }))
 }
 
-/// H₀: every marker stays in a plane, so that s₃² is noise alone. Returns κ, the spread across the
-/// planes in units of the noise variance, or the answer that H₀ cannot be excluded.
+/// The spread across the planes.
+pub(crate) struct Spread {
+    /// In units of the noise variance.
+    pub kappa: f64,
+    /// Why H₀ is unlikely, but not excluded.
+    pub doubt: Option<String>,
+}
+
+/// H₀: every marker stays in a plane, so that s₃² is noise alone. Returns the spread across the
+/// planes, or the answer that H₀ cannot be excluded. With few degrees of freedom there is doubt between the two: H₀ is not excluded
+/// at the significance, but at [`DOUBT`] times it.
 ///
 /// `sigma` is the noise that the fit's own residuals show with `dof` degrees of freedom.
 pub(crate) fn leaves_its_plane(
@@ -259,11 +275,16 @@ pub(crate) fn leaves_its_plane(
     sigma: f64,
     dof: usize,
     options: &Options,
-) -> Result<f64, Outcome> {
+) -> Result<Spread, Outcome> {
     let (n, markers) = (cloud.points.len(), cloud.markers());
     let (noise, noise_dof, how) = match options.sigma_t {
         Some(stated) if dof < ENOUGH_DOF => (stated, None, "stated"),
-        _ if dof == 0 => return Ok(f64::INFINITY),
+        _ if dof == 0 => {
+            return Ok(Spread {
+                kappa: f64::INFINITY,
+                doubt: None,
+            });
+        }
         _ => (sigma, Some(dof as f64), "estimated"),
     };
     // κ_k = (s_k² / degrees of freedom) / σ² and the chance of such a value from noise alone
@@ -278,7 +299,22 @@ pub(crate) fn leaves_its_plane(
     };
     let (kappa, chance) = test(2, n - markers - 2);
     if chance <= options.significance {
-        return Ok(kappa);
+        return Ok(Spread { kappa, doubt: None });
+    }
+    // A spread of no more than the noise is no answer even where chance says otherwise.
+    let few = dof < ENOUGH_DOF;
+    if few && chance <= (DOUBT * options.significance).min(0.5) && kappa > 1.0 {
+        let doubt = format!(
+            "the points may be coplanar: their spread across the best plane{} is {:.2} times the {how} noise of \
+             {noise:.3e} (chance {chance:.1e}, beyond doubt below {:.0e})",
+            if markers > 1 { "s" } else { "" },
+            kappa.sqrt(),
+            options.significance
+        );
+        return Ok(Spread {
+            kappa,
+            doubt: Some(doubt),
+        });
     }
     let verdict = if test(1, n - markers - 1).1 <= options.significance {
         Verdict::Coplanar

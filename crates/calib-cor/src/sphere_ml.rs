@@ -180,7 +180,10 @@ impl Problem for Radial<'_> {
 
 /// Restricted maximum likelihood over one variance for each marker; returns the center and the inverse
 /// variance of each sample.
-fn with_noise_per_marker(cloud: &Cloud, start: Vector3<f64>) -> (Vector3<f64>, Vec<f64>) {
+pub(crate) fn with_noise_per_marker(
+    cloud: &Cloud,
+    start: Vector3<f64>,
+) -> (Vector3<f64>, Vec<f64>) {
     let mut center = start;
     let mut variances = vec![1.0; cloud.markers()];
     let mut weights = vec![1.0; cloud.points.len()];

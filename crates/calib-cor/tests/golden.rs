@@ -91,6 +91,7 @@ fn spheres() {
         ("sfa", "pratt"),
         ("taubin", "taubin"),
         ("hyper", "hyper"),
+        ("hyper_n", "hyper_n"),
         ("gamage_lasenby", "gamage_lasenby"),
         ("halvorsen", "halvorsen"),
         ("ml_sphere", "ml"),
@@ -114,6 +115,9 @@ fn spheres() {
             }
             let estimate = outcome.estimate().expect(&what);
             let want = &case["expect"][theirs];
+            if want.is_null() {
+                continue;
+            }
             let off = (estimate.center.coords - vector(&want["center"])).norm();
             if ours == "sfa" {
                 assert!(off < COBYLA_MM, "{what}: center off by {off:e}");

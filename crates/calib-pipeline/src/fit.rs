@@ -268,8 +268,9 @@ pub fn cor(request: &TableRequest) -> Result<Answer, PipelineError> {
     let default = if table.pair.is_some() {
         "score"
     } else if table.body.is_some() {
-        // A rigid body: pivot calibration as everybody else does it. `--all` shows the likelihood estimates beside it.
-        "hse"
+        // A rigid body: pivot calibration as everybody else does it, without the rows that are off; where none are, it is `hse`.
+        // `--all` shows the likelihood estimates beside it.
+        "consensus"
     } else {
         "sfe"
     };

@@ -151,7 +151,7 @@ pub(crate) fn standards(study: Study, cells: &[Cell]) -> Vec<Standard> {
 fn is_good_sphere(cell: &Cell) -> bool {
     matches!(
         cell.estimator.as_str(),
-        "sfe" | "sfa" | "taubin" | "hyper" | "halvorsen" | "ml_sphere"
+        "sfe" | "sfa" | "taubin" | "hyper" | "hyper_n" | "halvorsen" | "ml_sphere" | "sphere_eiv"
     )
 }
 
@@ -181,29 +181,28 @@ fn cor(cells: &[Cell]) -> Vec<Standard> {
             }),
         ),
         judge(
-            "sphere weighted by covariances, depth noise × 3–5, σ across ≤ 1 mm: efficiency",
+            "sphere weighted by covariances (sphere_eiv), noise along the sight ≤ 3 mm: efficiency",
             0.99,
             true,
-            efficiencies(cells, |c| {
-                c.method == "ml_sphere, covariances" && c.scene.sigma_t_m < 1.1e-3
-            }),
+            depth(cells, 0.0, 3.1e-3),
         ),
         judge(
-            "the same at σ across 2.5 and 5 mm (along it up to 25 mm)",
+            "the same, noise along the sight 5 mm",
             0.99,
             true,
-            efficiencies(cells, |c| {
-                c.method == "ml_sphere, covariances" && c.scene.sigma_t_m > 1.1e-3
-            }),
+            depth(cells, 3.1e-3, 5.1e-3),
+        ),
+        judge(
+            "the same, noise along the sight 7.5 to 25 mm",
+            0.99,
+            true,
+            depth(cells, 5.1e-3, 1.0),
         ),
     ];
     // The bias in units of the measurement noise, and in units of the estimate's own spread.
     let arc = |c: &&Cell| {
         c.scene.part == Part::Arc
-            && matches!(
-                c.method.as_str(),
-                "hyper" | "ml_sphere" | "hotspot_ml, σ known"
-            )
+            && matches!(c.method.as_str(), "sphere_eiv" | "hotspot_ml, σ known")
     };
     let biases = |unit: &dyn Fn(&Cell) -> Option<f64>| -> Vec<Value> {
         cells
@@ -216,7 +215,7 @@ fn cor(cells: &[Cell]) -> Vec<Standard> {
             .collect()
     };
     out.push(judge(
-        "bias / σ of the measurements, arcs 180° to 20° (hyper, ml_sphere, hotspot_ml)",
+        "bias / σ of the measurements, arcs 180° to 20° (sphere_eiv, hotspot_ml)",
         0.1,
         false,
         biases(&|c| Some(c.scene.sigma_t_m)),
@@ -255,21 +254,42 @@ fn cor(cells: &[Cell]) -> Vec<Standard> {
             |c| c.observable,
         ));
     }
-    for (robust, most, text) in [
-        (false, 1.1e-3, "σ 1 mm, plain methods"),
-        (false, 2.6e-3, "σ 1 and 2.5 mm, plain methods"),
-        (false, 1.0, "σ 1, 2.5 and 5 mm, plain methods"),
-        (true, 1.0, "σ 1, 2.5 and 5 mm, robust and consensus methods"),
+    // Refused: no center is given. Doubted: it is given, but called weak.
+    for (robust, doubted, text) in [
+        (false, false, "hand and head grids refused, plain methods"),
+        (
+            true,
+            false,
+            "hand and head grids refused, robust and consensus methods",
+        ),
+        (
+            false,
+            true,
+            "hand and head grids refused or called weak, plain methods",
+        ),
     ] {
         out.push(rates(
-            &format!("hand and head grids called not observable, {text}: rate"),
+            &format!("{text}: rate"),
             1e-3,
             cells,
-            |c| c.scene.part == Part::Grid && c.scene.sigma_t_m < most && is_robust(c) == robust,
-            |c| c.trials - c.observable,
+            |c| c.scene.part == Part::Grid && is_robust(c) == robust,
+            |c| c.trials - if doubted { c.observable } else { c.answered },
         ));
     }
     out
+}
+
+/// Efficiencies under noise along the line of sight of a size between the two, m.
+fn depth(cells: &[Cell], above: f64, to: f64) -> Vec<Value> {
+    efficiencies(cells, |c| {
+        let ratio = if c.scene.condition == "depth × 5" {
+            5.0
+        } else {
+            3.0
+        };
+        let along = ratio * c.scene.sigma_t_m;
+        c.method == "sphere_eiv, covariances" && along > above && along < to
+    })
 }
 
 /// rms of the robust methods over that of the plain one on the clean recording of the same trials.

@@ -64,6 +64,8 @@ impl OneAxis {
                 1,
             ),
             ("ml_sphere", "ml_sphere", Given::Marker, false, 1),
+            ("hyper_n", "hyper_n", Given::Marker, false, 5),
+            ("sphere_eiv", "sphere_eiv", Given::Marker, false, 1),
             (
                 "ml_sphere, 3 markers",
                 "ml_sphere",

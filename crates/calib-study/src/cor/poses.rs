@@ -176,10 +176,12 @@ impl PoseScene {
                 method("kasa", "kasa", Gets::Points, false, 1),
                 method("taubin", "taubin", Gets::Points, false, 1),
                 method("hyper", "hyper", Gets::Points, false, 1),
+                method("hyper_n", "hyper_n", Gets::Points, false, 10),
                 method("gamage_lasenby", "gamage_lasenby", Gets::Points, false, 1),
                 method("halvorsen", "halvorsen", Gets::Points, false, 1),
                 method("ml_sphere", "ml_sphere", Gets::Points, false, 1),
                 method("ml_sphere, σ known", "ml_sphere", Gets::Points, true, 1),
+                method("sphere_eiv", "sphere_eiv", Gets::Points, false, 1),
                 method("robust, points", "robust", Gets::Points, false, 10),
                 method("consensus, points", "consensus", Gets::Points, false, 10),
             ]);
@@ -201,6 +203,8 @@ impl PoseScene {
             method("taubin", "taubin", Gets::Points, false, 1),
             method("hyper", "hyper", Gets::Points, false, 1),
             method("ml_sphere", "ml_sphere", Gets::Points, false, 1),
+            method("hyper_n", "hyper_n", Gets::Points, false, 5),
+            method("sphere_eiv", "sphere_eiv", Gets::Points, false, 1),
             method("hse", "hse", Gets::Poses, false, 1),
             method("hotspot_ml, σ known", "hotspot_ml", Gets::Poses, true, 1),
         ];
@@ -303,7 +307,12 @@ impl DepthScene {
         let uses = [
             ("sfe", "sfe", Options::default()),
             ("ml_sphere", "ml_sphere", Options::default()),
-            ("ml_sphere, covariances", "ml_sphere", weighted_options),
+            (
+                "ml_sphere, covariances",
+                "ml_sphere",
+                weighted_options.clone(),
+            ),
+            ("sphere_eiv, covariances", "sphere_eiv", weighted_options),
         ];
         let (mut methods, mut rows) = (Vec::new(), Vec::new());
         for (name, id, options) in uses {
