@@ -39,6 +39,7 @@ pub mod frame_ml;
 pub mod frame_planes;
 pub mod halvorsen;
 pub mod hinge_bundle;
+pub mod hinge_poses;
 mod input;
 mod judge;
 pub mod line_ml;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::{
-    halvorsen, hinge_bundle,
+    halvorsen, hinge_bundle, hinge_poses,
     input::{Input, InputKind},
     line_ml,
     options::Options,
@@ -104,6 +104,14 @@ const TABLE: &[EstimatorInfo] = &[
         summary: "direction from orientations alone",
         source: "top singular pair of the mean rotation",
         fit: shared_axis::rotation_axis,
+    },
+    EstimatorInfo {
+        id: "hinge_poses",
+        name: "axis of poses, errors in variables",
+        input: InputKind::Poses,
+        summary: "weighs orientations against positions, of one or two moving bodies",
+        source: "joint likelihood, see the book",
+        fit: hinge_poses::fit,
     },
     EstimatorInfo {
         id: "halvorsen_line",

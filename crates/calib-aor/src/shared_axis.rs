@@ -27,7 +27,8 @@ use crate::{
 /// a ball's directions differ by less.
 const STANDS_OUT: f64 = 0.25;
 
-/// SARA: direction and point.
+/// SARA: direction and point. Its direction is that of the rotations alone, as [`rotation_axis`]'s; the positions place the
+/// axis. [`crate::hinge_poses`] lets them turn it too.
 ///
 /// # Errors
 /// [`AorError`] for tables of different length, matrices that are no rotations, or another kind of data.
@@ -44,7 +45,11 @@ pub fn rotation_axis(input: &Input<'_>, options: &Options) -> Result<Outcome, Ao
     run("rotation_axis", input, options)
 }
 
-fn run(estimator: &'static str, input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+pub(crate) fn run(
+    estimator: &'static str,
+    input: &Input<'_>,
+    options: &Options,
+) -> Result<Outcome, AorError> {
     options.check()?;
     let relative = parent_from_child(input)?;
     let sums = PoseSums::of(&relative)?;
@@ -208,7 +213,7 @@ fn run(estimator: &'static str, input: &Input<'_>, options: &Options) -> Result<
 }
 
 /// The child's poses in the parent, row by row.
-fn parent_from_child(input: &Input<'_>) -> Result<Vec<Option<Pose>>, AorError> {
+pub(crate) fn parent_from_child(input: &Input<'_>) -> Result<Vec<Option<Pose>>, AorError> {
     match *input {
         Input::Poses(poses) => Ok(poses.to_vec()),
         Input::TwoBodies { parent, child } => {

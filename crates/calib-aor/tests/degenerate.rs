@@ -161,7 +161,7 @@ fn poses_that_have_no_axis() {
         ("NaN", nan, "not_finite"),
     ];
     for (what, data, expected) in table {
-        for id in ["sara", "rotation_axis"] {
+        for id in ["sara", "rotation_axis", "hinge_poses"] {
             let got = word(fit(id, &Input::Poses(&data), &Options::default()));
             if expected.is_empty() {
                 assert_ne!(got, "ok", "{what}: {id}");

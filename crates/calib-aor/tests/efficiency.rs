@@ -323,7 +323,7 @@ fn frames_reach_the_bound_in_full() {
 
 // ---- poses ---------------------------------------------------------------------------------------------
 
-fn sara_study(trials: u64) {
+fn sara_study(id: &str, trials: u64) {
     let hinge = Hinge::slanted();
     let body = nalgebra::Isometry3::new(
         Vector3::new(1.28, -0.72, 0.95),
@@ -336,7 +336,7 @@ fn sara_study(trials: u64) {
         for seed in 0..trials {
             let mut noise = Noise::new(seed);
             let data = hinge.poses(&body, &angles, 1.0 * MM, 0.3_f64.to_radians(), &mut noise);
-            let outcome = fit("sara", &Input::Poses(&data), &Options::default()).expect("sara");
+            let outcome = fit(id, &Input::Poses(&data), &Options::default()).expect(id);
             let e = outcome.estimate().expect("an axis");
             let angle = e.line.direction.cross(&hinge.axis).norm();
             direction.add(angle * angle, e.covariance.fixed_view::<3, 3>(0, 0).trace());
@@ -356,7 +356,7 @@ fn sara_study(trials: u64) {
             let mc = 3.0 * error / efficiency;
             let ratio = tally.predicted / tally.error2;
             println!(
-                "sara arc {arc} {kind}: rms {:.3e}, covariance / error² {ratio:.3} ± {mc:.3}",
+                "{id} arc {arc} {kind}: rms {:.3e}, covariance / error² {ratio:.3} ± {mc:.3}",
                 tally.mse().sqrt()
             );
             assert!(
@@ -369,11 +369,35 @@ fn sara_study(trials: u64) {
 
 #[test]
 fn the_covariance_of_a_shared_axis_is_true() {
-    sara_study(200);
+    sara_study("sara", 200);
+    sara_study("hinge_poses", 200);
 }
 
 #[test]
 #[ignore = "full counts"]
 fn the_covariance_of_a_shared_axis_is_true_in_full() {
-    sara_study(5000);
+    sara_study("sara", 5000);
+    sara_study("hinge_poses", 5000);
+}
+
+/// A body far from the axis knows it by its path: orientations alone are many times worse than both together.
+#[test]
+fn positions_turn_the_axis_of_poses() {
+    let hinge = Hinge::slanted();
+    let body = nalgebra::Isometry3::new(
+        Vector3::new(1.28, -0.72, 0.95),
+        Vector3::new(0.3, 0.2, -0.5),
+    );
+    let angles = steps(0.0, 120.0, 20);
+    let mut squares = [0.0; 2];
+    for seed in 0..100 {
+        let mut noise = Noise::new(seed);
+        let data = hinge.poses(&body, &angles, 0.2 * MM, 2.0_f64.to_radians(), &mut noise);
+        for (square, id) in squares.iter_mut().zip(["rotation_axis", "hinge_poses"]) {
+            let outcome = fit(id, &Input::Poses(&data), &Options::default()).expect(id);
+            let e = outcome.estimate().expect("an axis");
+            *square += e.line.direction.cross(&hinge.axis).norm_squared();
+        }
+    }
+    assert!(squares[1] < 0.1 * squares[0], "{squares:?}");
 }

@@ -68,7 +68,7 @@ fn the_axis_of_a_hinge_is_its_pin() {
     let Some(tracks) = hinge() else { return };
     let upper = body(&tracks, &["up1", "up2", "up3", "up4", "up5"]);
     let lower = body(&tracks, &["dw1", "dw2", "dw3", "dw4", "dw5"]);
-    for id in ["sara", "rotation_axis"] {
+    for id in ["sara", "rotation_axis", "hinge_poses"] {
         let input = Input::TwoBodies {
             parent: &upper,
             child: &lower,

@@ -305,6 +305,26 @@ fn settle<M: Model>(
     chosen
 }
 
+/// All samples, as a choice.
+fn everything<M: Model>(
+    model: &M,
+    evidence: &Evidence,
+    start: Option<&M::Estimate>,
+) -> Option<Chosen<M::Estimate>> {
+    let n = model.samples();
+    let estimate = model.weighted(start?, &vec![1.0; n])?;
+    let rss = (0..n).map(|k| model.square(&estimate, k)).sum();
+    if evidence.components * n <= evidence.unknowns {
+        return None;
+    }
+    Some(Chosen {
+        cost: evidence.cost(rss, 0.0, n, n),
+        even: None,
+        keep: vec![true; n],
+        estimate,
+    })
+}
+
 /// What the choice of samples came to.
 struct Choice {
     keep: Vec<bool>,
@@ -360,14 +380,23 @@ fn choose<M: Model>(model: &M, options: &Options, shared: bool) -> Result<Choice
         }
     }
     settled.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    // Nothing is left out without need: outliers have to be evident.
+    if let Some(all) = everything(model, &evidence, settled.first().map(|c| &c.estimate))
+        && settled
+            .first()
+            .is_some_and(|best| all.cost - best.cost < RIVAL)
+    {
+        settled.retain(|other| other.keep != all.keep);
+        settled.insert(0, all);
+    }
     let best = settled.first().ok_or(NoChoice::NoSubset)?;
     let (center, size) = model.center(&best.estimate);
     for rival in &settled[1..] {
         let off = (model.center(&rival.estimate).0 - center).norm();
-        if rival.cost - best.cost < RIVAL && off > options.weak_fraction * size {
+        if (rival.cost - best.cost).abs() < RIVAL && off > options.weak_fraction * size {
             return Err(NoChoice::Rival {
                 off,
-                cost: rival.cost - best.cost,
+                cost: (rival.cost - best.cost).abs(),
             });
         }
     }

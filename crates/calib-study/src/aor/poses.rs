@@ -43,6 +43,26 @@ impl PoseScene {
                 bound,
                 None,
             ),
+            method(
+                "hinge_poses",
+                "hinge_poses",
+                Options::default(),
+                2,
+                bound,
+                None,
+            ),
+            method(
+                "hinge_poses, σ known",
+                "hinge_poses",
+                Options {
+                    sigma_t: Some(scene.sigma_t_m),
+                    sigma_r: Some(scene.sigma_r_rad),
+                    ..Options::default()
+                },
+                2,
+                bound,
+                None,
+            ),
         ]
         .into_iter()
         .flatten()
@@ -65,7 +85,7 @@ impl Experiment for PoseScene {
         &self.rows
     }
 
-    fn trial(&self, _: u64, noise: &mut Noise, tallies: &mut [Tally]) {
+    fn trial(&self, number: u64, noise: &mut Noise, tallies: &mut [Tally]) {
         let poses: Vec<Option<Pose>> = self
             .truth
             .iter()
@@ -78,7 +98,9 @@ impl Experiment for PoseScene {
             })
             .collect();
         for (method, pair) in self.methods.iter().zip(tallies.chunks_mut(2)) {
-            method.record(&Input::Poses(&poses), None, pair);
+            if number.is_multiple_of(method.every) {
+                method.record(&Input::Poses(&poses), None, pair);
+            }
         }
     }
 }
