@@ -343,7 +343,7 @@ pub struct StudyRun {
     /// Which study
     #[arg(value_enum)]
     pub study: StudyName,
-    /// Trials of an ordinary cell
+    /// Trials of an ordinary cell (cor, aor: 1500); robots drawn (justin, ripley: 100)
     #[arg(long)]
     pub trials: Option<u64>,
     /// Seed
@@ -355,6 +355,9 @@ pub struct StudyRun {
     /// Folder for the tables and pictures; an interrupted study continues there
     #[arg(long)]
     pub out: Option<PathBuf>,
+    /// The robot of a case study, instead of robots/justin.yaml or robots/ripley.yaml
+    #[arg(long)]
+    pub profile: Option<PathBuf>,
     /// Begin anew instead of continuing
     #[arg(long)]
     pub restart: bool,
@@ -370,6 +373,10 @@ pub enum StudyName {
     Cor,
     /// Axes of rotation and frames, paper §4 and §5.2
     Aor,
+    /// Case study over many simulated robots, paper §5: Table 1
+    Justin,
+    /// Case study over many simulated robots, paper §6: Table 2
+    Ripley,
 }
 
 /// `calib plugins …`.

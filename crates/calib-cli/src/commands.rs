@@ -7,7 +7,8 @@ use std::time::Duration;
 use calib_pipeline::apply::{self, ApplyRequest, Destination};
 use calib_pipeline::run::{RunOptions, run as run_profile};
 use calib_pipeline::{
-    ExitCode, PipelineError, convert, drift, fit, inspect, load, models, simulate, take_back, write,
+    ExitCode, PipelineError, cases, convert, drift, fit, inspect, load, models, simulate, take_back,
+    write,
 };
 use calib_study::{Study, StudyOptions};
 use clap::CommandFactory as _;
@@ -176,7 +177,69 @@ fn apply_result(options: &Apply) -> Result<ExitCode, PipelineError> {
     Ok(ExitCode::Accepted)
 }
 
+fn run_cases(
+    arguments: &Arguments,
+    study: &StudyRun,
+    name: &str,
+) -> Result<ExitCode, PipelineError> {
+    let options = cases::CaseOptions {
+        profile: study
+            .profile
+            .clone()
+            .unwrap_or_else(|| PathBuf::from(format!("robots/{name}.yaml"))),
+        name: name.to_owned(),
+        robots: study.trials.unwrap_or(100),
+        seed: study.seed.unwrap_or(1),
+        threads: study.threads,
+        out: study.out.clone(),
+        resume: !study.restart,
+    };
+    let bar = study_bar(arguments.quiet, "robots");
+    let result = cases::run_cases(&options, &|done, total| {
+        bar.set_length(total);
+        bar.set_position(done);
+    })?;
+    bar.finish_and_clear();
+    let json = cases::json(&result).map_err(|e| PipelineError::Usage {
+        finding: format!("the study cannot be written: {e}"),
+        remedy: "leave out --json".to_owned(),
+    })?;
+    let text = cases::markdown(&result);
+    emit(if study.json { &json } else { &text });
+    if let Some(out) = &study.out {
+        let files = [
+            write::OutputFile::text(format!("{name}.csv"), cases::csv(&result)),
+            write::OutputFile::text(format!("{name}.json"), json),
+            write::OutputFile::text(format!("{name}.md"), text),
+            write::OutputFile::text(format!("{name}.svg"), cases::svg(&result)),
+        ];
+        for path in write::write_all(out, &files)? {
+            eprintln!("wrote {}", path.display());
+        }
+    }
+    Ok(ExitCode::Accepted)
+}
+
+fn study_bar(quiet: bool, what: &str) -> ProgressBar {
+    let bar = if quiet || !std::io::stderr().is_terminal() {
+        ProgressBar::hidden()
+    } else {
+        ProgressBar::new(0)
+    };
+    let template = format!("{{bar:30}} {{pos}}/{{len}} {what}, {{eta}} left");
+    if let Ok(style) = ProgressStyle::with_template(&template) {
+        bar.set_style(style);
+    }
+    bar
+}
+
 fn run_study(arguments: &Arguments, study: &StudyRun) -> Result<ExitCode, PipelineError> {
+    let which = match study.study {
+        StudyName::Cor => Study::Cor,
+        StudyName::Aor => Study::Aor,
+        StudyName::Justin => return run_cases(arguments, study, "justin"),
+        StudyName::Ripley => return run_cases(arguments, study, "ripley"),
+    };
     let default = StudyOptions::default();
     let options = StudyOptions {
         trials: study.trials.unwrap_or(default.trials),
@@ -185,21 +248,10 @@ fn run_study(arguments: &Arguments, study: &StudyRun) -> Result<ExitCode, Pipeli
         out: study.out.clone(),
         resume: !study.restart,
     };
-    let bar = if arguments.quiet || !std::io::stderr().is_terminal() {
-        ProgressBar::hidden()
-    } else {
-        ProgressBar::new(0)
-    };
-    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} scenes, {eta} left") {
-        bar.set_style(style);
-    }
+    let bar = study_bar(arguments.quiet, "trials");
     let progress = |done: u64, total: u64| {
         bar.set_length(total);
         bar.set_position(done);
-    };
-    let which = match study.study {
-        StudyName::Cor => Study::Cor,
-        StudyName::Aor => Study::Aor,
     };
     let failed = |e: calib_study::StudyError| PipelineError::Usage {
         finding: e.to_string(),

@@ -215,6 +215,9 @@ fn side(file: &Path, poses: &Poses, names: &[String]) -> Result<Vec<Option<Pose>
     poses_of_markers(file, &markers)
 }
 
+/// Without a named estimator, rows that raise the residuals so many times are left out: they are no noise.
+const GROSS: f64 = 3.0;
+
 /// `calib fit cor`.
 ///
 /// # Errors
@@ -265,12 +268,17 @@ pub fn cor(request: &TableRequest) -> Result<Answer, PipelineError> {
         }
         return Ok(comparison("center_m", &lines));
     }
-    let default = if table.pair.is_some() {
+    let default = if request.estimator.is_some() {
+        ""
+    } else if table.pair.is_some() {
         "score"
     } else if table.body.is_some() {
-        // A rigid body: pivot calibration as everybody else does it, without the rows that are off; where none are, it is `hse`.
-        // `--all` shows the likelihood estimates beside it.
-        "consensus"
+        // A rigid body: pivot calibration as everybody else does it. `--all` shows the likelihood estimates beside it.
+        let rms = |id: &str| run(id).ok()?.estimate().map(|e| e.rms);
+        match (rms("hse"), rms("consensus")) {
+            (Some(all), Some(inliers)) if GROSS * inliers < all => "consensus",
+            _ => "hse",
+        }
     } else {
         "sfe"
     };

@@ -15,6 +15,7 @@ mod accuracy;
 pub mod align;
 pub mod apply;
 pub mod assemble;
+pub mod cases;
 pub mod checks;
 pub mod clock;
 pub mod closure;

@@ -329,6 +329,39 @@ fn check_joint_names(
     Ok(())
 }
 
+/// Recordings that are in memory: simulated ones, by the profile's names.
+///
+/// # Errors
+/// [`PipelineError`] for a recording of the profile that is missing, and as [`load_recordings`] for tables that do not fit the robot.
+pub fn of_tables(
+    robot: RobotProfile,
+    mut tables: BTreeMap<String, Poses>,
+) -> Result<Inputs, PipelineError> {
+    let estimators = Estimators::of_profile(&robot.profile, &robot.folder, true)?;
+    let mut recordings = BTreeMap::new();
+    let mut findings = Vec::new();
+    for (name, spec) in &robot.profile.recordings {
+        let poses = tables.remove(name).ok_or_else(|| PipelineError::Usage {
+            finding: format!("recording `{name}` is not simulated"),
+            remedy: "add it under `simulate.recordings`".to_owned(),
+        })?;
+        let meta = Meta {
+            source: spec.file.clone(),
+            format: "simulated".to_owned(),
+            ..Meta::default()
+        };
+        let loaded = prepare(&robot, name, spec, poses, meta, &mut findings)?;
+        recordings.insert(name.clone(), loaded);
+    }
+    Ok(Inputs {
+        digests: robot.digests.clone(),
+        robot,
+        recordings,
+        findings,
+        estimators: Arc::new(estimators),
+    })
+}
+
 /// Reads one file with the profile's reader: a built-in one directly, a plugin's across the border.
 fn read(
     spec: &RecordingSpec,

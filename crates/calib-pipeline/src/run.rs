@@ -65,7 +65,18 @@ pub fn run(
     progress("read profile and robot");
     let robot = load_robot(profile)?;
     progress("read recordings");
-    let mut inputs = load_recordings(robot, !options.no_plugins)?;
+    run_on(load_recordings(robot, !options.no_plugins)?, options, progress)
+}
+
+/// [`run`] on recordings that are in memory.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_on(
+    mut inputs: Inputs,
+    options: &RunOptions,
+    progress: &mut dyn FnMut(&str),
+) -> Result<RunOutput, PipelineError> {
     progress("check data");
     let mut findings = inputs.findings.clone();
     if inputs.robot.profile.solve.robust {
