@@ -1,0 +1,107 @@
+//! `calib study` as a user runs it: small studies, and the book's pages against them.
+
+mod scratch;
+
+use scratch::{Scratch, root};
+
+/// Headings, table heads and numbers of rows: what a page has whatever the number of trials.
+fn shape(page: &str) -> Vec<String> {
+    let mut out = Vec::new();
+    let mut rows = 0;
+    let mut lines = page.lines().peekable();
+    while let Some(line) = lines.next() {
+        if line.starts_with('|') {
+            if lines.peek().is_some_and(|next| next.starts_with("|---")) {
+                out.push(line.to_owned());
+                rows = 0;
+            } else {
+                rows += 1;
+            }
+        } else if rows > 0 {
+            // The rule below a table's head is no row.
+            out.push(format!("{} rows", rows - 1));
+            rows = 0;
+        }
+        if let Some(heading) = line.strip_prefix('#') {
+            // Numbers of robots and seeds differ.
+            out.push(heading.split(':').next().unwrap_or(heading).to_owned());
+        }
+    }
+    out
+}
+
+/// The book's pages are outputs of the studies as they are now: the same parts, methods and scenes.
+#[test]
+fn the_books_pages_have_the_shape_of_the_studies() {
+    for study in ["cor", "aor", "justin", "ripley"] {
+        let printed = Scratch::new()
+            .robot("justin")
+            .robot("ripley")
+            .calib(["study", study, "--trials", "1"])
+            .expect(0)
+            .stdout;
+        let page = std::fs::read_to_string(root().join(format!("book/src/studies/{study}.md")))
+            .expect("the page of a study");
+        assert_eq!(
+            shape(&page),
+            shape(&printed),
+            "book/src/studies/{study}.md is old: `just studies` makes it anew"
+        );
+    }
+}
+
+/// Threads and interruptions change nothing, and the likelihood is nearer to the truth than the two steps.
+#[test]
+fn a_case_study_continues_where_it_stopped() {
+    let dir = Scratch::new().robot("ripley");
+    let run = |more: &[&str]| {
+        let mut words = vec!["study", "ripley", "--json"];
+        words.extend_from_slice(more);
+        dir.calib(words).expect(0).json()
+    };
+    let whole = run(&["--trials", "3", "--threads", "2"]);
+    run(&["--trials", "1", "--out", "kept"]);
+    let continued = run(&["--trials", "3", "--out", "kept", "--threads", "1"]);
+    assert_eq!(whole, continued);
+    for file in [
+        "ripley.csv",
+        "ripley.json",
+        "ripley.md",
+        "ripley.svg",
+        "ripley.state.jsonl",
+    ] {
+        assert!(dir.path("kept").join(file).exists(), "{file}");
+    }
+    let mean = |method: &str| {
+        let off: Vec<f64> = whole["results"]
+            .as_array()
+            .expect("results")
+            .iter()
+            .filter(|r| r["method"] == method)
+            .map(|r| {
+                assert!(r["failure"].is_null(), "{}", r["failure"]);
+                r["off"]["gripM_from_endJ"]["translation_m"]
+                    .as_f64()
+                    .expect("an error")
+            })
+            .collect();
+        assert_eq!(off.len(), 3);
+        off.iter().sum::<f64>() / 3.0
+    };
+    assert!(
+        mean("ml") < 0.5 * mean("paper"),
+        "{} {}",
+        mean("ml"),
+        mean("paper")
+    );
+}
+
+#[test]
+fn a_state_of_another_robot_is_not_continued() {
+    let dir = Scratch::new()
+        .robot("ripley")
+        .file("kept/ripley.state.jsonl", "{\"calib_case_study\":0}\n");
+    let ran = dir.calib(["study", "ripley", "--trials", "1", "--out", "kept"]);
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert!(ran.stderr.contains("--restart"), "{}", ran.stderr);
+}
