@@ -29,7 +29,7 @@ book:
 # The book's study pages, made anew (a quarter of an hour of two processors)
 studies:
     cargo run --release -q -p calib-cli -- study cor --trials 1500 --seed 1 --out target/studies
-    cargo run --release -q -p calib-cli -- study aor --trials 800 --seed 1 --out target/studies
+    cargo run --release -q -p calib-cli -- study aor --trials 1500 --seed 1 --out target/studies
     for study in justin ripley; do cargo run --release -q -p calib-cli -- study $study --trials 50 --seed 1 --out target/studies; done
     mkdir -p book/src/studies && cp target/studies/*.md book/src/studies/
 

@@ -65,7 +65,11 @@ pub fn run(
     progress("read profile and robot");
     let robot = load_robot(profile)?;
     progress("read recordings");
-    run_on(load_recordings(robot, !options.no_plugins)?, options, progress)
+    run_on(
+        load_recordings(robot, !options.no_plugins)?,
+        options,
+        progress,
+    )
 }
 
 /// [`run`] on recordings that are in memory.
