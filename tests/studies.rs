@@ -57,7 +57,7 @@ fn a_case_study_continues_where_it_stopped() {
     let run = |more: &[&str]| {
         let mut words = vec!["study", "ripley", "--json"];
         words.extend_from_slice(more);
-        dir.calib(words).expect(0).json()
+        dir.calib_with(&words).expect(0).json()
     };
     let whole = run(&["--trials", "3", "--threads", "2"]);
     run(&["--trials", "1", "--out", "kept"]);
