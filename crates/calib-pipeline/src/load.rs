@@ -354,6 +354,7 @@ pub fn of_tables(
         recordings.insert(name.clone(), loaded);
     }
     Ok(Inputs {
+        excluded: Vec::new(),
         digests: robot.digests.clone(),
         robot,
         recordings,
