@@ -7,8 +7,8 @@ use std::time::Duration;
 use calib_pipeline::apply::{self, ApplyRequest, Destination};
 use calib_pipeline::run::{RunOptions, run as run_profile};
 use calib_pipeline::{
-    ExitCode, PipelineError, cases, convert, drift, fit, inspect, load, models, simulate, take_back,
-    write,
+    ExitCode, PipelineError, cases, convert, drift, fit, inspect, load, models, simulate,
+    take_back, write,
 };
 use calib_study::{Study, StudyOptions};
 use clap::CommandFactory as _;
