@@ -84,6 +84,11 @@ fn without_digests(text: &str) -> String {
 /// A report with lengths to 0.01 mm, angles to 1e-5 rad and other numbers to three digits; long lists cut.
 fn rounded(key: &str, value: &Value) -> Value {
     match value {
+        // A matrix as wide as the fit: that it is there, and for how many parameters.
+        Value::Object(object) if key == "data_information" => {
+            let parameters = object["parameters"].as_array().map_or(0, Vec::len);
+            json!(format!("{parameters} parameters"))
+        }
         Value::Object(object) => object
             .iter()
             .map(|(k, v)| (k.clone(), rounded(k, v)))
