@@ -53,14 +53,12 @@ pub fn compare_models(
     let start = start(&inputs, &tracks);
     let loaded = is_loaded(&inputs);
     let mut free: BTreeSet<Free> = [Free::Bodies, Free::Tracker].into();
-    // Play goes by the side that a joint came from: without times nothing says that the rows are in order.
-    let ordered = inputs.recordings.values().all(|r| r.poses.t.is_some());
     let mut variants = Vec::new();
     for (name, added) in STEPS {
         let needs_load = added
             .iter()
             .any(|f| matches!(f, Free::Compliance | Free::LateralCompliance));
-        if needs_load && !loaded || added.contains(&Free::Backlash) && !ordered {
+        if needs_load && !loaded {
             continue;
         }
         free.extend(added.iter().copied());
