@@ -136,17 +136,17 @@ pub enum EditError {
         found: String,
     },
     #[error(
-        "{file}:{place}: the origin or axis of joint `{joint}` takes {value}, which is {}: a new value would change more than this joint\nhelp: give this origin a {kind} of its own, or patch the expanded URDF",
-        value_uses(lines, included)
+        "{file}:{place}: the origin or axis of joint `{joint}` takes {value}, which is {}: a new value would change more than this joint\nhelp: give this origin a {} of its own, or patch the expanded URDF",
+        value_uses(lines, included),
+        if value.starts_with('`') { "value" } else { "property" }
     )]
     XacroShared {
         file: String,
         place: Place,
         joint: String,
         value: String,
-        kind: &'static str,
-        lines: Vec<usize>,
-        included: Vec<String>,
+        lines: Box<[usize]>,
+        included: Box<[String]>,
     },
     #[error(
         "{file}:{place}: the origin or axis of joint `{joint}` takes its numbers from `{argument}`, which was not found\nhelp: name that YAML file yourself (calib apply … --yaml FILE)"

@@ -522,9 +522,8 @@ impl<'t, 'd> Patcher<'t, 'd> {
                             Some(file) => format!("`{bare}` of {file}"),
                             None => format!("the property `{bare}`"),
                         },
-                        kind: if yaml.is_some() { "value" } else { "property" },
-                        lines: readers.lines,
-                        included: readers.included,
+                        lines: readers.lines.into(),
+                        included: readers.included.into(),
                     });
                 }
                 attribute = format!("{attribute} ({})", leaf.name(self.companions));
