@@ -294,7 +294,7 @@ fn ur_kinematics() -> String {
             "  {key}:\n    x: {}\n    y: 0\n    z: {}\n    roll: {}\n    pitch: 0\n    yaw: -1.5e-08\n",
             0.1 * n,
             0.16 - 0.01 * n,
-            1.570796327 * (n % 2.0)
+            (std::f64::consts::FRAC_PI_2 * 1e9).round() / 1e9 * (n % 2.0)
         );
     }
     text + "  hash: calib_12788084448423163542\n"
@@ -321,7 +321,7 @@ fn a_ur_arm_s_kinematics_yaml() {
             n + 1,
             0.1 * x,
             0.16 - 0.01 * x,
-            1.570796327 * (x % 2.0)
+            (std::f64::consts::FRAC_PI_2 * 1e9).round() / 1e9 * (x % 2.0)
         );
     }
     urdf += "</robot>";
