@@ -24,6 +24,7 @@ use calib_recording::{Finding, Severity};
 use calib_urdf::{JointId, LinkId};
 use nalgebra::{Isometry3, Vector6};
 
+use crate::conditions::{Conditions, conditions};
 use crate::error::PipelineError;
 use crate::load::{Excluded, Inputs, Loaded};
 use crate::ml::{self, Freedom, MlFit};
@@ -367,12 +368,18 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
         return bad;
     }
     let rejected = rejected_bodies(fit);
+    let (model, load) = (&inputs.robot.model, inputs.robot.profile.solve.load);
+    let recordings = inputs.recordings.iter();
+    let conditions = recordings
+        .map(|(name, r)| (name.as_str(), conditions(r, model, load)))
+        .collect();
     for name in inputs.robot.profile.bodies.keys() {
         let off = BodyError {
             inputs,
             fit,
             name,
             track: &tracks[name],
+            conditions: &conditions,
         };
         let Some(usual) = off.usual(&rejected) else {
             continue;
@@ -517,29 +524,40 @@ struct FarOff {
 /// Usual size of rotation, rad, and position, m, errors per component.
 type Usual = (f64, f64);
 
+/// What one row says of a body and of the joints.
+struct SeenRow<'a> {
+    seen: &'a Isometry3<f64>,
+    q: &'a [f64],
+    under: &'a Conditions,
+}
+
 /// The pose error of one body under a fit.
 struct BodyError<'a> {
     inputs: &'a Inputs,
     fit: &'a MlFit,
     name: &'a str,
     track: &'a BodyTrack,
+    /// From which side the joints came and what they held, by recording and row.
+    conditions: &'a BTreeMap<&'a str, Vec<Conditions>>,
 }
 
-impl BodyError<'_> {
+impl<'a> BodyError<'a> {
     /// Predicted ⊟ seen in body axes, `[rad; m]`, at joint positions `q`.
-    fn at(&self, seen: &Isometry3<f64>, q: &[f64]) -> Option<Vector6<f64>> {
+    fn at(&self, row: &SeenRow<'_>, q: &[f64]) -> Option<Vector6<f64>> {
         let robot = &self.fit.calibration;
         let link = self.inputs.robot.profile.bodies[self.name].link;
         let mount = robot.mounts.get(self.name)?;
-        let predicted = robot.tracker_from_root * robot.root_from_link(q)[link.index()] * mount;
-        let seen_from_predicted = seen.inverse() * predicted;
+        let predicted = robot.tracker_from_root
+            * robot.root_from_link_under(q, row.under)[link.index()]
+            * mount;
+        let seen_from_predicted = row.seen.inverse() * predicted;
         let w = so3::log(&seen_from_predicted.rotation);
         let t = seen_from_predicted.translation.vector;
         Some(Vector6::new(w.x, w.y, w.z, t.x, t.y, t.z))
     }
 
-    fn weighted(&self, seen: &Isometry3<f64>, q: &[f64], usual: Usual) -> Option<Vector6<f64>> {
-        let mut e = self.at(seen, q)?;
+    fn weighted(&self, row: &SeenRow<'_>, q: &[f64], usual: Usual) -> Option<Vector6<f64>> {
+        let mut e = self.at(row, q)?;
         for i in 0..3 {
             e[i] /= usual.0;
             e[i + 3] /= usual.1;
@@ -547,9 +565,12 @@ impl BodyError<'_> {
         Some(e)
     }
 
-    fn seen(&self, loaded: &Loaded, row: usize) -> Option<(&Isometry3<f64>, Vec<f64>)> {
-        let seen = self.track.in_recording(&loaded.name).get(row)?.as_ref()?;
-        Some((seen, loaded.q.get(row)?.clone()?))
+    fn seen(&self, loaded: &'a Loaded, row: usize) -> Option<SeenRow<'a>> {
+        Some(SeenRow {
+            seen: self.track.in_recording(&loaded.name).get(row)?.as_ref()?,
+            q: loaded.q.get(row)?.as_ref()?,
+            under: self.conditions.get(loaded.name.as_str())?.get(row)?,
+        })
     }
 
     /// Robust size of the errors of the rows that take part; `None` below eight of them, or without a body frame.
@@ -563,7 +584,7 @@ impl BodyError<'_> {
                 }
                 if let Some(e) = self
                     .seen(loaded, row)
-                    .and_then(|(seen, q)| self.at(seen, &q))
+                    .and_then(|seen| self.at(&seen, seen.q))
                 {
                     turns.push(e.fixed_rows::<3>(0).norm());
                     shifts.push(e.fixed_rows::<3>(3).norm());
@@ -581,43 +602,42 @@ impl BodyError<'_> {
     }
 
     /// Part of the squared error that a step along `direction` leaves, with the step.
-    fn explained(
-        &self,
-        seen: &Isometry3<f64>,
-        q: &[f64],
-        direction: &[f64],
-        usual: Usual,
-    ) -> Option<(f64, f64)> {
+    fn explained(&self, row: &SeenRow<'_>, direction: &[f64], usual: Usual) -> Option<(f64, f64)> {
         /// Step of the difference quotient: a thousandth of the way.
         const STEP: f64 = 1e-3;
-        let moved =
-            |f: f64| -> Vec<f64> { q.iter().zip(direction).map(|(q, d)| q + f * d).collect() };
-        let e = self.weighted(seen, q, usual)?;
-        let slope = (self.weighted(seen, &moved(STEP), usual)? - e) / STEP;
+        let moved = |f: f64| -> Vec<f64> {
+            row.q
+                .iter()
+                .zip(direction)
+                .map(|(q, d)| q + f * d)
+                .collect()
+        };
+        let e = self.weighted(row, row.q, usual)?;
+        let slope = (self.weighted(row, &moved(STEP), usual)? - e) / STEP;
         let size = slope.norm_squared();
         if size <= 0.0 || e.norm_squared() <= 0.0 {
             return None;
         }
         let step = -slope.dot(&e) / size;
-        let left = self.weighted(seen, &moved(step), usual)?;
+        let left = self.weighted(row, &moved(step), usual)?;
         Some((step, left.norm_squared() / e.norm_squared()))
     }
 
     /// Equation (1).
-    fn between_rows(&self, loaded: &Loaded, row: usize, usual: Usual) -> Option<OnTheWay> {
-        let (seen, q) = self.seen(loaded, row)?;
+    fn between_rows(&self, loaded: &'a Loaded, row: usize, usual: Usual) -> Option<OnTheWay> {
+        let seen = self.seen(loaded, row)?;
         let neighbours = [row.checked_sub(1), row.checked_add(1)];
         let best = neighbours
             .into_iter()
             .flatten()
             .filter_map(|k| loaded.q.get(k)?.as_ref())
             .filter_map(|other| {
-                let way: Vec<f64> = other.iter().zip(&q).map(|(o, q)| o - q).collect();
-                self.explained(seen, &q, &way, usual)
+                let way: Vec<f64> = other.iter().zip(seen.q).map(|(o, q)| o - q).collect();
+                self.explained(&seen, &way, usual)
             })
             .filter(|(fraction, left)| *left < LEFT && fraction.abs() < LARGEST_FRACTION)
             .min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let e = self.at(seen, &q)?;
+        let e = self.at(&seen, seen.q)?;
         Some(OnTheWay {
             fraction: best.0,
             position: e.fixed_rows::<3>(3).norm(),
@@ -625,11 +645,11 @@ impl BodyError<'_> {
         })
     }
 
-    fn far_off(&self, loaded: &Loaded, row: usize, usual: Usual) -> Option<FarOff> {
-        let (seen, q) = self.seen(loaded, row)?;
-        let e = self.at(seen, &q)?;
+    fn far_off(&self, loaded: &'a Loaded, row: usize, usual: Usual) -> Option<FarOff> {
+        let seen = self.seen(loaded, row)?;
+        let e = self.at(&seen, seen.q)?;
         // √χ²₆(½) is what is usual.
-        let ratio = self.weighted(seen, &q, usual)?.norm() / 2.313;
+        let ratio = self.weighted(&seen, seen.q, usual)?.norm() / 2.313;
         if ratio < FAR_OFF {
             return None;
         }
@@ -640,9 +660,9 @@ impl BodyError<'_> {
             .into_iter()
             .filter(|joint| model.joint(*joint).kind.axis().is_some())
             .filter_map(|joint| {
-                let mut only = vec![0.0; q.len()];
+                let mut only = vec![0.0; seen.q.len()];
                 only[joint.index()] = 1.0;
-                let (_, left) = self.explained(seen, &q, &only, usual)?;
+                let (_, left) = self.explained(&seen, &only, usual)?;
                 Some((left, joint))
             })
             .filter(|(left, _)| *left < ONE_JOINT_LEFT)
