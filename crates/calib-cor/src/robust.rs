@@ -13,7 +13,7 @@
 //! maximum likelihood, so that the covariance is valid. In the end every sample belongs whose residual would not surprise among n (χ², one
 //! recording in twenty). Metres or millimetres do not matter.
 //!
-//! Where another center explains the samples almost as well (cost within [`RIVAL`]) the answer is that there is none: this is where the
+//! Where another center explains the samples almost as well (cost within `RIVAL`) the answer is that there is none: this is where the
 //! method breaks down, and it says so (nine points with three outliers leave two degrees of freedom). A choice of h among n samples makes a circle look
 //! less planar by chance: the test of one axis is therefore made at `significance / C(n, h)`.
 //! Torr & Zisserman 2000 (MSAC); Moisan & Stival 2004 (a threshold from the data); Dempster et al. 1977.
