@@ -294,9 +294,42 @@ pub struct FitTable {
     /// Stated noise of the orientation about each axis, deg
     #[arg(long)]
     pub sigma_deg: Option<f64>,
+    /// Stated noise along the line of sight, mm; --sigma-mm is then the noise across it
+    #[arg(long)]
+    pub sigma_sight_mm: Option<f64>,
+    /// Where the line of sight begins, m in the tracker's frame
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, default_value = "0,0,0", allow_hyphen_values = true)]
+    pub camera_m: [f64; 3],
+    /// Covariance of every sample: a CSV with `<marker>.xx_mm2`, xy, xz, yy, yz, zz, line by line as the table
+    #[arg(long, value_name = "FILE")]
+    pub covariances: Option<PathBuf>,
+    /// Every marker has a noise of its own, estimated (centers)
+    #[arg(long)]
+    pub noise_per_marker: bool,
+    /// Joint column whose angles are taken as exact (axes); rows without an angle are left out
+    #[arg(long)]
+    pub joint: Option<String>,
+    /// A center that the axis passes through, m (axes: `planar_radial`)
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
+    pub center_m: Option<[f64; 3]>,
+    /// Report the axis towards this direction, where joint angles do not decide (axes)
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
+    pub towards: Option<[f64; 3]>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// Three numbers, `0.1,-0.2,0.3`.
+fn triple(text: &str) -> Result<[f64; 3], String> {
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    let numbers: Option<Vec<f64>> = parts
+        .iter()
+        .map(|p| p.parse().ok().filter(|x: &f64| x.is_finite()))
+        .collect();
+    numbers
+        .and_then(|n| n.try_into().ok())
+        .ok_or_else(|| "write three numbers with commas between them, like 0.1,-0.2,0.3".to_owned())
 }
 
 /// `calib fit frame`.
@@ -316,6 +349,12 @@ pub struct FitFrame {
     /// `algorithm1` or `frame_ml`
     #[arg(long, default_value = "algorithm1")]
     pub estimator: String,
+    /// Stated noise of one coordinate, mm
+    #[arg(long)]
+    pub sigma_mm: Option<f64>,
+    /// Stated noise of the orientation about each axis, deg
+    #[arg(long)]
+    pub sigma_deg: Option<f64>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

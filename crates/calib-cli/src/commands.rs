@@ -54,6 +54,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
                     distal: f.distal.clone(),
                     body: f.body.clone(),
                     estimator: f.estimator.clone(),
+                    sigma_m: f.sigma_mm.map(|s| s * 1e-3),
+                    sigma_rad: f.sigma_deg.map(f64::to_radians),
                 })?,
                 Fit::Handeye(f) => fit::handeye(&f.file, &f.robot, &f.measured)?,
             };
@@ -153,6 +155,13 @@ fn fit_table(table: &crate::arguments::FitTable) -> fit::TableRequest {
         child: table.child.clone(),
         sigma_m: table.sigma_mm.map(|s| s * 1e-3),
         sigma_rad: table.sigma_deg.map(f64::to_radians),
+        sight_m: table.sigma_sight_mm.map(|s| s * 1e-3),
+        camera_m: table.camera_m.into(),
+        covariances: table.covariances.clone(),
+        noise_per_marker: table.noise_per_marker,
+        joint: table.joint.clone(),
+        center_m: table.center_m.map(Into::into),
+        towards: table.towards.map(Into::into),
     }
 }
 

@@ -17,8 +17,10 @@
 //!
 //! Gower 1975, Psychometrika 40, 33–51 (generalised Procrustes); Kabsch 1976.
 
+mod groups;
 mod learn;
 mod pose;
 
+pub use groups::rigid_groups;
 pub use learn::{MarkerFit, NotABody, Template};
 pub use pose::{BodyPoses, RowPose, WithoutPose, body_from_markers, body_poses};

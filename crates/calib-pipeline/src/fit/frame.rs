@@ -1,0 +1,153 @@
+//! `calib fit frame`.
+
+use calib_aor::{Center, FrameAxes, FrameOptions, FrameOutcome, FrameSample, Letter};
+use calib_cor::Pose;
+use calib_recording::ReadOptions;
+use serde_json::json;
+
+use super::table::{it_has, read_poses};
+use super::{
+    Answer, FrameRequest, answer, data, matrix, not_observable, pose_text, pose_value, unknown,
+    usage,
+};
+use crate::error::PipelineError;
+
+/// `calib fit frame`.
+///
+/// # Errors
+/// As [`super::cor`]; also for joints that the table does not have.
+pub fn frame(request: &FrameRequest) -> Result<Answer, PipelineError> {
+    let file = &request.file;
+    let poses = read_poses(file, &ReadOptions::default())?;
+    let (proximal_letter, proximal) = axis_of(&request.proximal)?;
+    let (distal_letter, distal) = axis_of(&request.distal)?;
+    let column = |joint: &str| {
+        poses.joints.get(joint).ok_or_else(|| {
+            data(
+                file,
+                format!("has no joint `{joint}`"),
+                it_has(poses.joints.keys()),
+            )
+        })
+    };
+    let body = match (&request.body, poses.bodies.len()) {
+        (Some(name), _) => poses
+            .bodies
+            .get(name)
+            .ok_or_else(|| data(file, format!("has no body `{name}`"), "correct --body"))?,
+        (None, 1) => poses
+            .bodies
+            .values()
+            .next()
+            .ok_or_else(|| data(file, "has no body", "give poses"))?,
+        (None, n) => {
+            return Err(data(
+                file,
+                format!("has {n} bodies"),
+                "name one with --body",
+            ));
+        }
+    };
+    let (a, b) = (column(proximal)?, column(distal)?);
+    let samples: Vec<FrameSample> = a
+        .iter()
+        .zip(b)
+        .zip(body)
+        .filter_map(|((a, b), pose)| {
+            Some(FrameSample {
+                world_from_body: pose.map(Pose::from),
+                proximal: (*a)?,
+                distal: (*b)?,
+            })
+        })
+        .collect();
+    let options = FrameOptions {
+        axes: FrameAxes {
+            proximal: proximal_letter,
+            distal: distal_letter,
+        },
+        sigma_t: request.sigma_m,
+        sigma_r: request.sigma_rad,
+        ..FrameOptions::default()
+    };
+    let outcome = match request.estimator.as_str() {
+        "algorithm1" => {
+            let center = |poses: &[Option<Pose>]| {
+                let fit = calib_cor::fit(
+                    "sfe",
+                    &calib_cor::Input::Poses(poses),
+                    &calib_cor::Options::default(),
+                )
+                .ok()?;
+                fit.estimate().map(|e| e.center)
+            };
+            calib_aor::frame_planes::algorithm1(&samples, Center::From(&center), &options)
+        }
+        "frame_ml" => {
+            calib_aor::frame_ml::fit(&samples, calib_aor::frame_ml::Residuals::Poses, &options)
+        }
+        other => {
+            return Err(unknown(
+                other,
+                &["algorithm1", "frame_ml"],
+                "calib fit frame",
+            ));
+        }
+    };
+    let outcome = outcome.map_err(|e| data(file, e.to_string(), "correct or remove the row"))?;
+    let f = match outcome {
+        FrameOutcome::Estimate(f) => f,
+        FrameOutcome::NotObservable(n) => {
+            return Ok(not_observable(
+                &request.estimator,
+                n.verdict.as_str(),
+                &n.reason,
+            ));
+        }
+    };
+    let value = json!({
+        "estimator": request.estimator,
+        "observable": true,
+        "reason": f.reason,
+        "body_from_joint": pose_value(&f.body_from_joint),
+        "covariance": matrix(f.covariance.row_iter().map(|r| r.iter().copied().collect()).collect()),
+        "orthogonality_defect_rad": f.orthogonality_defect,
+        "rms_m": f.rms_t,
+        "rms_rad": f.rms_r,
+        "used": f.used,
+    });
+    let sigma = f.covariance.diagonal().map(|v| v.max(0.0).sqrt());
+    let text = format!(
+        "{}: body_from_joint {}\n  sigma {:.4}, {:.4}, {:.4} mm; {:.4}, {:.4}, {:.4} deg\n  axes {:.3} deg off square; rms {:.4} mm, {:.4} deg; {} samples\n",
+        request.estimator,
+        pose_text(&f.body_from_joint),
+        sigma[3] * 1e3,
+        sigma[4] * 1e3,
+        sigma[5] * 1e3,
+        sigma[0].to_degrees(),
+        sigma[1].to_degrees(),
+        sigma[2].to_degrees(),
+        f.orthogonality_defect.to_degrees(),
+        f.rms_t * 1e3,
+        f.rms_r.to_degrees(),
+        f.used
+    );
+    Ok(answer(text, &value, true))
+}
+
+fn axis_of(text: &str) -> Result<(Letter, &str), PipelineError> {
+    let wrong = || {
+        usage(
+            format!("`{text}` is no axis and joint"),
+            "write it like z=pan",
+        )
+    };
+    let (letter, joint) = text.split_once('=').ok_or_else(wrong)?;
+    let letter = match letter {
+        "x" => Letter::X,
+        "y" => Letter::Y,
+        "z" => Letter::Z,
+        _ => return Err(wrong()),
+    };
+    Ok((letter, joint))
+}

@@ -1,0 +1,252 @@
+//! The measurements of one table, in whichever forms it can give.
+
+use std::path::{Path, PathBuf};
+
+use calib_cor::Pose;
+use calib_recording::rigid_body::{Template, body_poses, rigid_groups};
+use calib_recording::{Filled, Poses, ReadOptions, read_path};
+use nalgebra::{Isometry3, Matrix3, Point3};
+
+use super::{TableRequest, covariances, data, usage};
+use crate::error::PipelineError;
+
+/// Markers of one name and its samples, row by row.
+pub(super) type Track = (String, Vec<Option<Point3<f64>>>);
+
+/// What the estimators are given.
+pub(super) struct Table {
+    pub file: PathBuf,
+    /// Row numbers of the file, for messages.
+    pub rows: Vec<u64>,
+    /// Where there are only bodies, the origin of the body.
+    pub markers: Vec<Track>,
+    /// `markers` is no more than the body's origin.
+    pub origin_only: bool,
+    /// One rigid body: that of the table, or the markers as one.
+    pub body: Option<Vec<Option<Pose>>>,
+    /// Both sides of the joint.
+    pub pair: Option<[Vec<Option<Pose>>; 2]>,
+    /// Covariance of every marker in every row, m²; empty where none are stated.
+    pub covariances: Vec<Vec<Matrix3<f64>>>,
+    /// Joint angle of every row, rad; empty where no joint was named.
+    pub angles: Vec<f64>,
+}
+
+impl Table {
+    pub fn read(request: &TableRequest) -> Result<Self, PipelineError> {
+        let Some(file) = &request.file else {
+            return Err(usage(
+                "no table was given",
+                "name a CSV of points or poses, or --list the estimators",
+            ));
+        };
+        let mut poses = read_poses(file, &ReadOptions::default())?;
+        let angles = match &request.joint {
+            Some(joint) => keep_rows_with(file, &mut poses, joint)?,
+            None => Vec::new(),
+        };
+        let pair = match (request.parent.is_empty(), request.child.is_empty()) {
+            (false, false) => Some([
+                side(file, &poses, &request.parent)?,
+                side(file, &poses, &request.child)?,
+            ]),
+            (true, true) => None,
+            _ => {
+                return Err(usage(
+                    "one side of the joint is missing",
+                    "give both --parent and --child",
+                ));
+            }
+        };
+        let wanted = |name: &String| request.only.is_empty() || request.only.contains(name);
+        for name in &request.only {
+            if !poses.markers.contains_key(name) && !poses.bodies.contains_key(name) {
+                return Err(data(
+                    file,
+                    format!("has no marker or body `{name}`"),
+                    it_has(poses.markers.keys().chain(poses.bodies.keys())),
+                ));
+            }
+        }
+        let markers: Vec<Track> = poses
+            .markers
+            .iter()
+            .filter(|(name, _)| wanted(name))
+            .map(|(name, track)| (name.clone(), track.clone()))
+            .collect();
+        let bodies: Vec<&String> = poses.bodies.keys().filter(|n| wanted(n)).collect();
+        let groups = rigid(&markers);
+        // Two markers make no body: each has a sphere or a circle of its own.
+        if markers.len() >= 3 && groups.len() > 1 && request.only.is_empty() && pair.is_none() {
+            return Err(several_bodies(file, &markers, &groups));
+        }
+        let body = match bodies.as_slice() {
+            [only] => Some(as_poses(&poses.bodies[*only])),
+            [] if markers.len() >= 3 && groups.len() == 1 => poses_of_markers(file, &markers).ok(),
+            _ => None,
+        };
+        if markers.is_empty() && body.is_none() && pair.is_none() {
+            return Err(data(
+                file,
+                format!("has {} bodies and no markers to choose from", bodies.len()),
+                "name one body with --use-only",
+            ));
+        }
+        // A sphere needs points: the origin of a body is one.
+        let origin = || -> Option<Track> {
+            let track = body.as_ref()?.iter();
+            let points = track.map(|p| p.map(|p| Point3::from(p.translation)));
+            Some(((*bodies.first()?).clone(), points.collect()))
+        };
+        let origin_only = markers.is_empty();
+        let markers = if origin_only {
+            origin().into_iter().collect()
+        } else {
+            markers
+        };
+        let covariances = covariances::of(request, &markers, &poses.rows)?;
+        Ok(Self {
+            file: file.clone(),
+            rows: poses.rows,
+            markers,
+            origin_only,
+            body,
+            pair,
+            covariances,
+            angles,
+        })
+    }
+
+    pub fn tracks(&self) -> Vec<Vec<Option<Point3<f64>>>> {
+        self.markers.iter().map(|(_, t)| t.clone()).collect()
+    }
+}
+
+/// The rows in which a joint's angle is known, and the angles, rad.
+fn keep_rows_with(file: &Path, poses: &mut Poses, joint: &str) -> Result<Vec<f64>, PipelineError> {
+    let column = poses.joints.get(joint).cloned().ok_or_else(|| {
+        data(
+            file,
+            format!("has no joint `{joint}`"),
+            it_has(poses.joints.keys()),
+        )
+    })?;
+    fn keep<T: Clone>(track: &mut Vec<T>, column: &[Option<f64>]) {
+        let mut known = column.iter();
+        track.retain(|_| known.next().is_some_and(Option::is_some));
+    }
+    keep(&mut poses.rows, &column);
+    for track in poses.markers.values_mut() {
+        keep(track, &column);
+    }
+    for track in poses.bodies.values_mut() {
+        keep(track, &column);
+    }
+    Ok(column.into_iter().flatten().collect())
+}
+
+fn rigid(markers: &[Track]) -> Vec<Vec<usize>> {
+    let tracks: Vec<&[Option<Point3<f64>>]> = markers.iter().map(|(_, t)| t.as_slice()).collect();
+    rigid_groups(&tracks)
+}
+
+/// Refuses the table, and names the group that moves most: most likely the one that was meant.
+fn several_bodies(file: &Path, markers: &[Track], groups: &[Vec<usize>]) -> PipelineError {
+    let names = |group: &[usize]| -> String {
+        let names: Vec<&str> = group.iter().map(|&m| markers[m].0.as_str()).collect();
+        names.join(",")
+    };
+    let listed: Vec<String> = groups.iter().map(|g| format!("{{{}}}", names(g))).collect();
+    let moving = groups
+        .iter()
+        .max_by(|a, b| travel(markers, a).total_cmp(&travel(markers, b)))
+        .map_or_else(String::new, |group| names(group));
+    data(
+        file,
+        format!(
+            "its markers move against each other, in {} groups: {}",
+            groups.len(),
+            listed.join(" ")
+        ),
+        format!(
+            "say which of them belong to the moving body (--use-only {moving} moves most), or both sides of the joint (--parent, --child)"
+        ),
+    )
+}
+
+/// How far the markers of a group go from their mean place, m² a marker and row.
+fn travel(markers: &[Track], group: &[usize]) -> f64 {
+    let of = |&m: &usize| -> f64 {
+        let seen: Vec<&Point3<f64>> = markers[m].1.iter().flatten().collect();
+        let n = seen.len().max(1) as f64;
+        let mean = seen
+            .iter()
+            .map(|p| p.coords)
+            .sum::<nalgebra::Vector3<f64>>()
+            / n;
+        let squares = seen.iter().map(|p| (p.coords - mean).norm_squared());
+        squares.sum::<f64>() / n
+    };
+    group.iter().map(of).sum::<f64>() / group.len().max(1) as f64
+}
+
+/// What a table has instead of what was asked for.
+pub(super) fn it_has<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    let names: Vec<String> = names.map(|n| format!("`{n}`")).collect();
+    if names.is_empty() {
+        "it has none".to_owned()
+    } else {
+        format!("it has {}", names.join(", "))
+    }
+}
+
+pub(super) fn read_poses(file: &Path, options: &ReadOptions) -> Result<Poses, PipelineError> {
+    let recording = read_path(file, options)?;
+    recording
+        .poses(Filled::Exclude)
+        .map_err(|e| data(file, e.to_string(), "give one table"))
+}
+
+fn as_poses(track: &[Option<Isometry3<f64>>]) -> Vec<Option<Pose>> {
+    track.iter().map(|p| p.map(Pose::from)).collect()
+}
+
+fn poses_of_markers(file: &Path, markers: &[Track]) -> Result<Vec<Option<Pose>>, PipelineError> {
+    let names: Vec<String> = markers.iter().map(|(n, _)| n.clone()).collect();
+    let tracks: Vec<&[Option<Point3<f64>>]> = markers.iter().map(|(_, t)| t.as_slice()).collect();
+    let no_body = |error: calib_recording::rigid_body::NotABody| {
+        data(
+            file,
+            error.to_string(),
+            "give the markers of one rigid body",
+        )
+    };
+    let template = Template::learn(&names, &tracks).map_err(no_body)?;
+    let poses = body_poses(&names, &tracks, Some(template), None).map_err(no_body)?;
+    Ok(as_poses(&poses.track()))
+}
+
+/// One side of a joint: a body of the table, or its markers as one.
+fn side(file: &Path, poses: &Poses, names: &[String]) -> Result<Vec<Option<Pose>>, PipelineError> {
+    if let [body] = names
+        && let Some(track) = poses.bodies.get(body)
+    {
+        return Ok(as_poses(track));
+    }
+    let mut markers = Vec::new();
+    for name in names {
+        let track = poses.markers.get(name).ok_or_else(|| {
+            data(
+                file,
+                format!("has no marker `{name}`"),
+                it_has(poses.markers.keys()),
+            )
+        })?;
+        markers.push((name.clone(), track.clone()));
+    }
+    let groups = rigid(&markers);
+    if groups.len() > 1 {
+        return Err(several_bodies(file, &markers, &groups));
+    }
+    poses_of_markers(file, &markers)
+}
