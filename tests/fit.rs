@@ -454,7 +454,7 @@ fn markers_of_several_bodies_are_not_taken_for_one() {
             "--estimator",
             "hse",
         ])
-        .expect(2);
+        .expect(3);
     let ran = Scratch::new()
         .calib([
             "fit",

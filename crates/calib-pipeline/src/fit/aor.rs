@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use calib_aor::AorError;
 use nalgebra::Unit;
 use serde_json::json;
 
@@ -44,7 +45,7 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
         }
     }
     let tracks = table.tracks();
-    let run = |id: &str| -> Result<calib_aor::Outcome, calib_aor::AorError> {
+    let run = |id: &str| -> Result<calib_aor::Outcome, AorError> {
         let info = calib_aor::estimator(id)?;
         match (info.input, &table.body, &table.pair) {
             (calib_aor::InputKind::Poses, _, Some([parent, child])) => {
@@ -86,16 +87,7 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
         "planar_radial"
     };
     let id = request.estimator.as_deref().unwrap_or(default);
-    let outcome = run(id).map_err(|error| match &error {
-        calib_aor::AorError::Unknown { id, known } => unknown(id, known, "calib fit aor"),
-        calib_aor::AorError::Data(_) => {
-            data(&table.file, error.to_string(), "correct or remove the row")
-        }
-        _ => usage(
-            error.to_string(),
-            "see `calib fit aor --list`; bodies of two sides need --parent and --child",
-        ),
-    })?;
+    let outcome = run(id).map_err(|error| aor_error(&table, id, &error))?;
     let Some(e) = outcome.estimate().filter(|_| outcome.is_observable()) else {
         return Ok(not_observable(
             id,
@@ -139,6 +131,16 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
         rejected.len()
     );
     Ok(answer(text, &value, true))
+}
+
+fn aor_error(table: &Table, id: &str, error: &AorError) -> PipelineError {
+    const LIST: &str = "calib fit aor";
+    match error {
+        AorError::Unknown { id, known } => unknown(id, known, LIST),
+        AorError::WrongInput { .. } => table.wrong_input(id, error, LIST),
+        AorError::BadOption { .. } => usage(error.to_string(), "correct the option"),
+        AorError::Data(_) => data(&table.file, error.to_string(), "correct or remove the row"),
+    }
 }
 
 /// The frame that an axis is given in: the tracker's, or the parent's when two bodies move.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use calib_cor::{InputKind, Shape};
+use calib_cor::{CorError, InputKind, Shape};
 use serde_json::json;
 
 use super::comparison::comparison;
@@ -60,7 +60,7 @@ pub fn cor(request: &TableRequest) -> Result<Answer, PipelineError> {
         ));
     }
     let tracks = table.tracks();
-    let run = |id: &str| -> Result<calib_cor::Outcome, calib_cor::CorError> {
+    let run = |id: &str| -> Result<calib_cor::Outcome, CorError> {
         let info = calib_cor::estimator(id)?;
         match (info.input, &table.body, &table.pair) {
             (InputKind::TwoBodies, _, Some([first, second])) => {
@@ -109,18 +109,17 @@ pub fn cor(request: &TableRequest) -> Result<Answer, PipelineError> {
         "sfe"
     };
     let id = request.estimator.as_deref().unwrap_or(default);
-    let outcome = run(id).map_err(|e| cor_error(&table.file, e))?;
+    let outcome = run(id).map_err(|e| cor_error(&table, id, &e))?;
     Ok(cor_answer(&table, id, &outcome))
 }
 
-fn cor_error(file: &std::path::Path, error: calib_cor::CorError) -> PipelineError {
-    match &error {
-        calib_cor::CorError::Unknown { id, known } => unknown(id, known, "calib fit cor"),
-        calib_cor::CorError::WrongInput { .. } | calib_cor::CorError::BadOption { .. } => usage(
-            error.to_string(),
-            "see `calib fit cor --list`; bodies of two sides need --parent and --child",
-        ),
-        _ => data(file, error.to_string(), "correct or remove the row"),
+fn cor_error(table: &Table, id: &str, error: &CorError) -> PipelineError {
+    const LIST: &str = "calib fit cor";
+    match error {
+        CorError::Unknown { id, known } => unknown(id, known, LIST),
+        CorError::WrongInput { .. } => table.wrong_input(id, error, LIST),
+        CorError::BadOption { .. } => usage(error.to_string(), "correct the option"),
+        _ => data(&table.file, error.to_string(), "correct or remove the row"),
     }
 }
 

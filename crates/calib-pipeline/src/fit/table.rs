@@ -22,6 +22,8 @@ pub(super) struct Table {
     pub markers: Vec<Track>,
     /// `markers` is no more than the body's origin.
     pub origin_only: bool,
+    /// The markers keep their distances.
+    pub rigid: bool,
     /// One rigid body: that of the table, or the markers as one.
     pub body: Option<Vec<Option<Pose>>>,
     /// Both sides of the joint.
@@ -110,11 +112,32 @@ impl Table {
             rows: poses.rows,
             markers,
             origin_only,
+            rigid: groups.len() <= 1,
             body,
             pair,
             covariances,
             angles,
         })
+    }
+
+    /// Why an estimator cannot take these data.
+    pub fn wrong_input(
+        &self,
+        id: &str,
+        error: &dyn std::error::Error,
+        list: &str,
+    ) -> PipelineError {
+        if self.rigid {
+            return usage(
+                format!("`{id}`: {error}"),
+                format!("see `{list} --list`; bodies of two sides need --parent and --child"),
+            );
+        }
+        data(
+            &self.file,
+            format!("`{id}` needs a rigid body, and these markers move against each other"),
+            "name the markers of one body with --use-only, or both sides of the joint with --parent and --child",
+        )
     }
 
     pub fn tracks(&self) -> Vec<Vec<Option<Point3<f64>>>> {
