@@ -103,6 +103,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
         unit_covariance: spread_out(&unit, &frame),
         residuals: 2 * n,
         held: None,
+        gain_by_turning: None,
     };
     Ok(judge(&cloud, &factor, candidate, options))
 }

@@ -5,7 +5,12 @@
 //! C = σ² (JᵀJ)⁻¹,  the direction's weakest variance divided by 1 − 1/κ                              (2)
 //! ```
 //!
-//! A short arc looks like a chord: its normal is known only as well as its sagitta stands out of the noise.
+//! A short arc looks like a chord: its normal is known only as well as its sagitta stands out of the noise. Markers of one
+//! rigid body know more ([`crate::straight`]): there κ is the gain over a motion without a turn,
+//!
+//! ```text
+//! κ = (cost of straight motion − cost of the hinge) / 2 / σ̂²  ~  F(2, ν)    if the body does not turn    (3)
+//! ```
 
 use calib_geometry::{
     Line, Verdict, chance,
@@ -87,6 +92,8 @@ pub(crate) struct Candidate {
     pub residuals: usize,
     /// Center that was held, world.
     pub held: Option<Point3<f64>>,
+    /// What the best motion without a turn costs above the fitted one; `None` for circles that are not rigid to each other.
+    pub gain_by_turning: Option<f64>,
 }
 
 /// Noise, observability, sign and the circles of each marker.
@@ -105,6 +112,7 @@ pub(crate) fn judge(
         unit_covariance,
         residuals,
         held,
+        gain_by_turning,
     } = candidate;
     let estimated = if dof > 0 {
         (cost / dof as f64).sqrt()
@@ -112,7 +120,11 @@ pub(crate) fn judge(
         0.0
     };
     let sigma = options.sigma_t.unwrap_or(estimated);
-    let kappa = match leaves_its_line(estimator, cloud, factor, estimated, dof, options) {
+    let test = match gain_by_turning {
+        Some(gain) => turns(estimator, cloud, factor, estimated, dof, gain, options),
+        None => leaves_its_line(estimator, cloud, factor, estimated, dof, options),
+    };
+    let kappa = match test {
         Ok(kappa) => kappa,
         Err(answer) => return answer,
     };
@@ -207,6 +219,49 @@ pub(crate) fn judge(
     }))
 }
 
+/// The noise that a test compares with, and its degrees of freedom (`None`: stated, exact).
+struct Yardstick {
+    noise: f64,
+    dof: Option<f64>,
+}
+
+impl Yardstick {
+    /// `None` where nothing tells the noise: all is answered.
+    fn of(sigma: f64, dof: usize, options: &Options) -> Option<Self> {
+        /// Residual degrees of freedom from which they say more about the noise than the tracker does.
+        const ENOUGH_DOF: usize = 10;
+        match options.sigma_t {
+            Some(noise) if dof < ENOUGH_DOF => Some(Self { noise, dof: None }),
+            _ if dof == 0 => None,
+            _ => Some(Self {
+                noise: sigma,
+                dof: Some(dof as f64),
+            }),
+        }
+    }
+
+    /// Sum of squares over its degrees of freedom in units of the noise, and the chance of it being noise alone.
+    fn test(&self, squares: f64, dof: usize) -> (f64, f64) {
+        let d = dof.max(1) as f64;
+        let kappa = squares / d / (self.noise * self.noise);
+        let chance = match self.dof {
+            Some(noise_dof) => chance::f_tail(kappa, d, noise_dof),
+            None => chance::chi2_tail(kappa * d, d),
+        };
+        (kappa, chance)
+    }
+
+    /// The word for markers that do not turn: do they move at all?
+    fn word(&self, cloud: &Cloud, factor: &Factor, options: &Options) -> Verdict {
+        let dof = cloud.points.len() - cloud.markers();
+        if self.test(factor.s[0] * factor.s[0], dof).1 <= options.significance {
+            Verdict::Collinear
+        } else {
+            Verdict::Coincident
+        }
+    }
+}
+
 /// H₀: every marker stays on a line within its noise, so that s₂² is noise alone. Returns κ.
 pub(crate) fn leaves_its_line(
     estimator: &'static str,
@@ -216,36 +271,48 @@ pub(crate) fn leaves_its_line(
     dof: usize,
     options: &Options,
 ) -> Result<f64, Outcome> {
-    /// Residual degrees of freedom from which they say more about the noise than the tracker does.
-    const ENOUGH_DOF: usize = 10;
-    let (n, markers) = (cloud.points.len(), cloud.markers());
-    let (noise, noise_dof) = match options.sigma_t {
-        Some(stated) if dof < ENOUGH_DOF => (stated, None),
-        _ if dof == 0 => return Ok(f64::INFINITY),
-        _ => (sigma, Some(dof as f64)),
+    let Some(yardstick) = Yardstick::of(sigma, dof, options) else {
+        return Ok(f64::INFINITY);
     };
-    let test = |k: usize, test_dof: usize| {
-        let d = test_dof.max(1) as f64;
-        let kappa = factor.s[k] * factor.s[k] / d / (noise * noise);
-        let chance = match noise_dof {
-            Some(noise_dof) => chance::f_tail(kappa, d, noise_dof),
-            None => chance::chi2_tail(kappa * d, d),
-        };
-        (kappa, chance)
-    };
-    let (kappa, chance) = test(1, n - markers - 1);
+    let across = cloud.points.len() - cloud.markers() - 1;
+    let (kappa, chance) = yardstick.test(factor.s[1] * factor.s[1], across);
     if chance <= options.significance {
         return Ok(kappa);
     }
-    let verdict = if test(0, n - markers).1 <= options.significance {
-        Verdict::Collinear
-    } else {
-        Verdict::Coincident
-    };
+    let verdict = yardstick.word(cloud, factor, options);
     let reason = format!(
         "the points are {verdict} within their noise: their spread across the best line is {:.2} times the \
-         noise of {noise:.3e} (chance {chance:.1e}, accepted below {:.0e})",
+         noise of {:.3e} (chance {chance:.1e}, accepted below {:.0e})",
         kappa.sqrt(),
+        yardstick.noise,
+        options.significance
+    );
+    Err(no_plane(estimator, verdict, reason, cloud, factor))
+}
+
+/// H₀: the markers' body does not turn, so that the hinge's gain over a straight motion is noise alone. Returns κ.
+fn turns(
+    estimator: &'static str,
+    cloud: &Cloud,
+    factor: &Factor,
+    sigma: f64,
+    dof: usize,
+    gain: f64,
+    options: &Options,
+) -> Result<f64, Outcome> {
+    let Some(yardstick) = Yardstick::of(sigma, dof, options) else {
+        return Ok(f64::INFINITY);
+    };
+    let (kappa, chance) = yardstick.test(gain.max(0.0), 2);
+    let verdict = yardstick.word(cloud, factor, options);
+    if chance <= options.significance && verdict == Verdict::Collinear {
+        return Ok(kappa);
+    }
+    let reason = format!(
+        "the points are {verdict} within their noise: a turn of their body explains {:.2} times the noise of \
+         {:.3e} more than a straight motion (chance {chance:.1e}, accepted below {:.0e})",
+        kappa.sqrt(),
+        yardstick.noise,
         options.significance
     );
     Err(no_plane(estimator, verdict, reason, cloud, factor))

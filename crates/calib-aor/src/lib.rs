@@ -49,6 +49,7 @@ pub mod planar_radial;
 pub mod plane;
 mod registry;
 pub mod shared_axis;
+mod straight;
 
 pub use calib_geometry::measured::{DataError, Pose, Tracks};
 pub use frame::{

@@ -88,6 +88,7 @@ fn common_line(estimator: &'static str, cloud: &Cloud, factor: &Factor) -> Optio
         unit_covariance: spread_out(&unit, &axis.frame),
         residuals: 2 * n,
         held: None,
+        gain_by_turning: None,
     })
 }
 
@@ -137,5 +138,6 @@ fn own_centers(estimator: &'static str, cloud: &Cloud, factor: &Factor) -> Optio
         unit_covariance,
         residuals: 2 * n,
         held: None,
+        gain_by_turning: None,
     })
 }

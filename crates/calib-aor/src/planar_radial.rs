@@ -98,6 +98,7 @@ fn run(
         unit_covariance: spread_out(&unit, &axis.frame),
         residuals: 2 * n,
         held: options.center,
+        gain_by_turning: None,
     };
     Ok(judge(&cloud, &factor, candidate, options))
 }

@@ -65,6 +65,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
         unit_covariance: spread_out(&unit, &axis.frame),
         residuals,
         held: options.center,
+        gain_by_turning: None,
     };
     Ok(judge(&cloud, &factor, candidate, options))
 }
