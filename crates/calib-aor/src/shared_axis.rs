@@ -66,7 +66,7 @@ pub(crate) fn run(
         Some(Verdict::NoRotation) => {
             let reason = format!(
                 "the body does not turn: its rotations differ by {:.1e} rad rms",
-                (sums.lambda.sum().max(0.0) / 2.0 / sums.n as f64).sqrt()
+                (sums.lambda.sum().max(0.0) / 2.0 / sums.total).sqrt()
             );
             return Ok(Outcome::none(
                 estimator,

@@ -5,7 +5,7 @@
 //! Kåsa: a = 1.   Taubin: C_T = Σ ∇∇ᵀ.   Pratt: u'C_P u = |b|² − 4ae.   C = C_T + β (C_P − C_T)
 //! ```
 //!
-//! With the centroid as origin, b and e can be eliminated and one scalar equation is left for the
+//! (Sums and means are weighted where samples have weights.) With the centroid as origin, b and e can be eliminated and one scalar equation is left for the
 //! multiplier λ, in the factor of [`calib_geometry::factor`] (all sums divided by n):
 //!
 //! ```text
@@ -69,12 +69,11 @@ pub(crate) fn solve(cloud: &Cloud, factor: &Factor, member: Algebraic) -> (Vecto
     let center = factor.center(lambda * factor.total);
     let radii = (0..cloud.markers())
         .map(|p| {
-            let points = cloud.marker(p);
-            let square = points
-                .iter()
-                .map(|x| (x - center).norm_squared())
+            let square = cloud
+                .range(p)
+                .map(|k| cloud.weight(k) * (cloud.points[k] - center).norm_squared())
                 .sum::<f64>()
-                / points.len() as f64;
+                / cloud.total(cloud.range(p));
             (square + 2.0 * member.beta() * lambda).max(0.0).sqrt()
         })
         .collect();
@@ -133,7 +132,7 @@ pub fn fit(member: Algebraic, input: &Input<'_>, options: &Options) -> Result<Ou
         Algebraic::Pratt => "sfe",
         Algebraic::Hyper => "hyper",
     };
-    let cloud = cloud_of(input, &[])?;
+    let cloud = cloud_of(input, options)?;
     let factor = match prepare(estimator, &cloud, false) {
         Ok(factor) => factor,
         Err(answer) => return Ok(answer),

@@ -44,7 +44,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
             got: input.kind(),
         });
     }
-    let cloud = cloud_of(input, &[])?;
+    let cloud = cloud_of(input, options)?;
     let factor = match prepare(ID, &cloud, false) {
         Ok(factor) => factor,
         Err(answer) => return Ok(answer),
@@ -97,7 +97,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
         covariance,
         shape: Shape::Radii { bias: vec![0.0; radii.len()], radii },
         noise: Noise { sigma_t: sigma, sigma_r: None, estimated: options.sigma_t.is_none() },
-        rms: (end.normal.cost / (3 * cloud.points.len()) as f64).sqrt(),
+        rms: (end.normal.cost / (3.0 * cloud.total(0..cloud.points.len()))).sqrt(),
         used: cloud.points.len(),
         rejected: Vec::new(),
         verdict: if weak || doubt.is_some() { Verdict::Weak } else { Verdict::Ok },
@@ -117,6 +117,8 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
 pub(crate) struct Bundle {
     /// For each frame: (marker, position).
     frames: Vec<Vec<(usize, Vector3<f64>)>>,
+    /// Weight of each frame.
+    weights: Vec<f64>,
     markers: usize,
     /// The frame whose orientation is held.
     reference: usize,
@@ -153,17 +155,20 @@ pub(crate) struct Step {
 impl Bundle {
     fn of(cloud: &Cloud) -> Self {
         let rows = cloud.labels.iter().map(|l| l.1 + 1).max().unwrap_or(0);
-        let mut frames = vec![Vec::new(); rows];
+        let mut frames = vec![(Vec::new(), 1.0); rows];
         for p in 0..cloud.markers() {
-            for k in cloud.starts[p]..cloud.starts[p + 1] {
-                frames[cloud.labels[k].1].push((p, cloud.points[k]));
+            for k in cloud.range(p) {
+                let frame = &mut frames[cloud.labels[k].1];
+                frame.0.push((p, cloud.points[k]));
+                frame.1 = cloud.weight(k);
             }
         }
-        frames.retain(|f| !f.is_empty());
-        Self::new(frames, cloud.markers())
+        frames.retain(|f| !f.0.is_empty());
+        let (frames, weights) = frames.into_iter().unzip();
+        Self::new(frames, weights, cloud.markers())
     }
 
-    pub fn new(frames: Vec<Vec<(usize, Vector3<f64>)>>, markers: usize) -> Self {
+    pub fn new(frames: Vec<Vec<(usize, Vector3<f64>)>>, weights: Vec<f64>, markers: usize) -> Self {
         let reference = (0..frames.len()).fold(0, |best, i| {
             if frames[i].len() > frames[best].len() {
                 i
@@ -173,6 +178,7 @@ impl Bundle {
         });
         Self {
             frames,
+            weights,
             markers,
             reference,
         }
@@ -305,7 +311,8 @@ impl Problem for Bundle {
             frames: Vec::with_capacity(self.frames.len()),
             cost: 0.0,
         };
-        for (frame, orientation) in self.frames.iter().zip(&x.orientations) {
+        for ((frame, orientation), &w) in self.frames.iter().zip(&x.orientations).zip(&self.weights)
+        {
             let r = orientation.to_rotation_matrix().into_inner();
             let mut block = FrameBlock {
                 own: Matrix3::zeros(),
@@ -317,25 +324,26 @@ impl Problem for Bundle {
                 let y = r.tr_mul(&(x.center - v));
                 let e = x.layout[p] + y;
                 let cross = so3::skew(&y);
-                normal.cost += e.norm_squared();
-                block.own += cross.transpose() * cross;
-                block.gradient += cross.transpose() * e;
-                block.to_center += cross.transpose() * r.transpose();
-                block.to_markers.push((p, cross.transpose()));
+                let back = cross.transpose() * w;
+                normal.cost += w * e.norm_squared();
+                block.own += back * cross;
+                block.gradient += back * e;
+                block.to_center += back * r.transpose();
+                block.to_markers.push((p, back));
                 let at = 3 + 3 * p;
                 let h = &mut normal.shared;
                 for k in 0..3 {
-                    h[(k, k)] += 1.0;
-                    h[(at + k, at + k)] += 1.0;
+                    h[(k, k)] += w;
+                    h[(at + k, at + k)] += w;
                     for l in 0..3 {
-                        h[(at + k, l)] += r[(l, k)];
-                        h[(l, at + k)] += r[(l, k)];
+                        h[(at + k, l)] += w * r[(l, k)];
+                        h[(l, at + k)] += w * r[(l, k)];
                     }
                 }
                 let world = r * e;
                 for k in 0..3 {
-                    normal.gradient[k] += world[k];
-                    normal.gradient[at + k] += e[k];
+                    normal.gradient[k] += w * world[k];
+                    normal.gradient[at + k] += w * e[k];
                 }
             }
             normal.frames.push(block);
@@ -410,7 +418,7 @@ pub(crate) fn unit_bound(
         .iter()
         .map(|r| layout.iter().enumerate().map(|(p, b)| (p, r * b)).collect())
         .collect();
-    let problem = Bundle::new(frames, layout.len());
+    let problem = Bundle::new(frames, vec![1.0; orientations.len()], layout.len());
     let truth = State {
         center: Vector3::zeros(),
         layout: layout.to_vec(),

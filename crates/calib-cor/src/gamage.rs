@@ -51,7 +51,7 @@ fn run(
     fit: impl Fn(&Cloud, &Factor) -> (Vector3<f64>, Vec<f64>),
 ) -> Result<Outcome, CorError> {
     options.check()?;
-    let cloud = cloud_of(input, &[])?;
+    let cloud = cloud_of(input, options)?;
     let equal_markers = match prepare(estimator, &cloud, true) {
         Ok(factor) => factor,
         Err(answer) => return Ok(answer),
@@ -84,33 +84,44 @@ fn run(
 fn rms_radii(cloud: &Cloud, center: &Vector3<f64>) -> Vec<f64> {
     (0..cloud.markers())
         .map(|p| {
-            let points = cloud.marker(p);
-            let square: f64 = points.iter().map(|x| (x - center).norm_squared()).sum();
-            (square / points.len() as f64).sqrt()
+            let range = cloud.range(p);
+            let squares = range
+                .clone()
+                .map(|k| cloud.weight(k) * (cloud.points[k] - center).norm_squared());
+            (squares.sum::<f64>() / cloud.total(range)).sqrt()
         })
         .collect()
 }
 
 /// The fixed point of (2) and (3): center and σ². Not finite where the noise exceeds the spread.
 pub(crate) fn compensate(cloud: &Cloud, factor: &Factor) -> (Vector3<f64>, f64) {
-    let markers = cloud.markers() as f64;
+    // What noise adds to a marker's covariance: σ² n_p / Σw.
+    let shares: Vec<f64> = (0..cloud.markers())
+        .map(|p| cloud.range(p).len() as f64 / cloud.total(cloud.range(p)))
+        .collect();
+    let share: f64 = shares.iter().sum();
     let means: Vector3<f64> = (0..cloud.markers())
-        .map(|p| cloud.marker(p).iter().sum::<Vector3<f64>>() / cloud.marker(p).len() as f64)
+        .map(|p| {
+            let points = cloud.range(p).map(|k| cloud.points[k] * cloud.weight(k));
+            points.sum::<Vector3<f64>>() * (shares[p] / cloud.total(cloud.range(p)))
+        })
         .sum();
     let mut center = factor.center(0.0);
     let mut sigma2 = 0.0;
     for _ in 0..ROUNDS {
         sigma2 = (0..cloud.markers())
             .map(|p| {
-                let points = cloud.marker(p);
-                let n = points.len() as f64;
-                let squares = points.iter().map(|x| (x - center).norm_squared());
-                let mean = squares.clone().sum::<f64>() / n;
-                squares.map(|q| (q - mean) * (q - mean)).sum::<f64>() / (4.0 * mean)
+                let squares = cloud
+                    .range(p)
+                    .map(|k| (cloud.weight(k), (cloud.points[k] - center).norm_squared()));
+                let mean =
+                    squares.clone().map(|(w, q)| w * q).sum::<f64>() / cloud.total(cloud.range(p));
+                let off = squares.map(|(w, q)| w * (q - mean) * (q - mean));
+                off.sum::<f64>() / (4.0 * mean)
             })
             .sum::<f64>()
             / cloud.points.len() as f64;
-        let shift = markers * sigma2;
+        let shift = share * sigma2;
         if shift >= factor.s[2] * factor.s[2] {
             return (Vector3::repeat(f64::NAN), sigma2);
         }

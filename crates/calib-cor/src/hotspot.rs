@@ -9,7 +9,11 @@
 //! is drawn towards the mean position by about σ_r² over the spread of the rotations (7 mm at ±10° and 1°).
 //! [`crate::hotspot_ml`] has no such bias. The covariance is that of the noise the residuals show along and across p.
 
-use calib_geometry::{Line, Verdict, measured::Pose, pose_sums::PoseSums};
+use calib_geometry::{
+    Line, Verdict,
+    measured::{Pose, RowWeights},
+    pose_sums::PoseSums,
+};
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::{
@@ -33,29 +37,46 @@ pub(crate) struct HotSpot {
     pub center: Vector3<f64>,
 }
 
+/// Poses with their rows and weights; lost rows and those of weight 0 are left out.
+pub(crate) fn weighed<'a>(
+    poses: &'a [Option<Pose>],
+    options: &'a Options,
+) -> impl Iterator<Item = (&'a Pose, f64)> + Clone {
+    let weights = RowWeights(&options.weights);
+    poses
+        .iter()
+        .enumerate()
+        .filter_map(move |(row, pose)| Some((pose.as_ref()?, weights.of(row))))
+        .filter(|(_, w)| *w > 0.0)
+}
+
 /// Residuals `R_iᵀ(o − t_i) − p` split along and across p.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Spread {
-    /// Σ of squares along p.
+    /// Weighted sum of squares along p.
     pub along: f64,
-    /// Σ of squares across p.
+    /// Weighted sum of squares across p.
     pub across: f64,
-    /// Σ (R_i p̂)(R_i p̂)ᵀ.
+    /// Σ w (R_i p̂)(R_i p̂)ᵀ.
     pub directions: Matrix3<f64>,
 }
 
 impl Spread {
-    pub fn of(poses: &[Option<Pose>], body_point: &Vector3<f64>, center: &Vector3<f64>) -> Self {
+    pub fn of<'a>(
+        poses: impl Iterator<Item = (&'a Pose, f64)>,
+        body_point: &Vector3<f64>,
+        center: &Vector3<f64>,
+    ) -> Self {
         let unit = body_point.try_normalize(0.0).unwrap_or_else(Vector3::x);
         let (mut along, mut total) = (0.0, 0.0);
         let mut directions = Matrix3::zeros();
-        for pose in poses.iter().flatten() {
+        for (pose, w) in poses {
             let turned = pose.rotation * unit;
             let e = center - pose.translation - pose.rotation * body_point;
             let a = e.dot(&turned);
-            along += a * a;
-            total += e.norm_squared();
-            directions += turned * turned.transpose();
+            along += w * a * a;
+            total += w * e.norm_squared();
+            directions += turned * (turned * w).transpose();
         }
         Self {
             along,
@@ -91,7 +112,9 @@ pub fn hse(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
 /// As [`hse`].
 pub fn hsa(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
     let poses = poses_of(input)?;
-    linear("hsa", poses, options, Vec::new(), conjugate_gradients)
+    linear("hsa", poses, options, Vec::new(), |sums, poses| {
+        conjugate_gradients(sums, weighed(poses, options))
+    })
 }
 
 pub(crate) fn poses_of<'a>(input: &Input<'a>) -> Result<&'a [Option<Pose>], CorError> {
@@ -112,7 +135,7 @@ pub(crate) fn linear(
     solve: impl Fn(&PoseSums, &[Option<Pose>]) -> Vector3<f64>,
 ) -> Result<Outcome, CorError> {
     options.check()?;
-    let sums = match prepare(estimator, poses)? {
+    let sums = match prepare(estimator, poses, options)? {
         Ok(sums) => sums,
         Err(answer) => return Ok(answer),
     };
@@ -123,7 +146,7 @@ pub(crate) fn linear(
         body_point,
         center,
     };
-    let spread = Spread::of(poses, &spot.body_point, &spot.center);
+    let spread = Spread::of(weighed(poses, options), &spot.body_point, &spot.center);
     if let Some(answer) = single_axis(estimator, &spot, &spread, options) {
         return Ok(answer);
     }
@@ -145,8 +168,9 @@ pub(crate) fn linear(
 pub(crate) fn prepare(
     estimator: &'static str,
     poses: &[Option<Pose>],
+    options: &Options,
 ) -> Result<Result<PoseSums, Outcome>, CorError> {
-    let sums = PoseSums::of(poses)?;
+    let sums = PoseSums::weighted(poses, RowWeights(&options.weights))?;
     Ok(match sums.rank_verdict() {
         None => Ok(sums),
         Some(Verdict::TooFew) => Err(Outcome::too_few(estimator, sums.n, 3, "poses")),
@@ -155,7 +179,7 @@ pub(crate) fn prepare(
             let reason = match verdict {
                 Verdict::NoRotation => format!(
                     "the body does not turn: its rotations differ by {:.1e} rad rms",
-                    (sums.lambda.sum().max(0.0) / 2.0 / sums.n as f64).sqrt()
+                    (sums.lambda.sum().max(0.0) / 2.0 / sums.total).sqrt()
                 ),
                 _ if sums.n == 2 => "two poses always share one axis of rotation".to_string(),
                 _ => format!(
@@ -217,9 +241,9 @@ fn noise_levels(spot: &HotSpot, spread: &Spread) -> (f64, f64) {
     (along.sqrt(), across.sqrt())
 }
 
-/// Σ A_iᵀ Σ_i A_i over [o; p], Σ_i = R_i (σ_a² p̂p̂ᵀ + σ_x² (I − p̂p̂ᵀ)) R_iᵀ.
+/// Σ w A_iᵀ Σ_i A_i over [o; p], Σ_i = R_i (σ_a² p̂p̂ᵀ + σ_x² (I − p̂p̂ᵀ)) R_iᵀ.
 fn middle(spot: &HotSpot, spread: &Spread, sigma_along: f64, sigma_across: f64) -> Matrix6<f64> {
-    let n = spot.sums.n as f64;
+    let n = spot.sums.total;
     let unit = spot
         .body_point
         .try_normalize(0.0)
@@ -248,7 +272,7 @@ fn sandwich(spot: &HotSpot, spread: &Spread, sigma_along: f64, sigma_across: f64
 
 /// (A'A)⁻¹ over [o; p], by eliminating o: the block of p is M⁻¹.
 fn inverse_normal(sums: &PoseSums) -> Matrix6<f64> {
-    let n = sums.n as f64;
+    let n = sums.total;
     let mut m_inverse = Matrix3::zeros();
     for k in 0..3 {
         let v = sums.directions.column(k);
@@ -306,7 +330,7 @@ pub(crate) fn finish(
             covariance,
         },
         noise,
-        rms: ((spread.along + spread.across) / (3 * n) as f64).sqrt(),
+        rms: ((spread.along + spread.across) / (3.0 * spot.sums.total)).sqrt(),
         used: n,
         rejected,
         verdict,
@@ -316,18 +340,21 @@ pub(crate) fn finish(
 
 /// CGLS (Hestenes & Stiefel) on the rows `(R_i − R̄) p = −(t_i − t̄)`: the center is eliminated, since the
 /// mean of the rows gives it.
-fn conjugate_gradients(sums: &PoseSums, poses: &[Option<Pose>]) -> Vector3<f64> {
-    let apply = |p: &Vector3<f64>, f: &mut dyn FnMut(&Pose, Vector3<f64>)| {
-        for pose in poses.iter().flatten() {
-            f(pose, pose.rotation * p - sums.mean_r * p);
+fn conjugate_gradients<'a>(
+    sums: &PoseSums,
+    poses: impl Iterator<Item = (&'a Pose, f64)> + Clone,
+) -> Vector3<f64> {
+    let apply = |p: &Vector3<f64>, f: &mut dyn FnMut(&Pose, f64, Vector3<f64>)| {
+        for (pose, w) in poses.clone() {
+            f(pose, w, pose.rotation * p - sums.mean_r * p);
         }
     };
     let mut x = Vector3::zeros();
     // gradient: s = Aᵀ(b − A x)
     let gradient = |x: &Vector3<f64>| {
         let mut s = Vector3::zeros();
-        apply(x, &mut |pose, ax| {
-            let residual = sums.mean_t - pose.translation - ax;
+        apply(x, &mut |pose, w, ax| {
+            let residual = (sums.mean_t - pose.translation - ax) * w;
             s += (pose.rotation - sums.mean_r).tr_mul(&residual);
         });
         s
@@ -341,7 +368,9 @@ fn conjugate_gradients(sums: &PoseSums, poses: &[Option<Pose>]) -> Vector3<f64> 
             break;
         }
         let mut curvature = 0.0;
-        apply(&direction, &mut |_, ad| curvature += ad.norm_squared());
+        apply(&direction, &mut |_, w, ad| {
+            curvature += w * ad.norm_squared();
+        });
         if curvature <= 0.0 {
             break;
         }

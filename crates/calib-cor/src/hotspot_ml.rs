@@ -20,7 +20,7 @@ use calib_geometry::{
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::{
-    hotspot::{HotSpot, Spread, finish, poses_of, prepare, single_axis, stack},
+    hotspot::{HotSpot, Spread, finish, poses_of, prepare, single_axis, stack, weighed},
     input::Input,
     options::Options,
     outcome::{CorError, Known, Noise, NotObservable, Outcome, Rejected},
@@ -50,7 +50,7 @@ pub(crate) fn fit_poses(
     rejected: Vec<Rejected>,
 ) -> Result<Outcome, CorError> {
     options.check()?;
-    let sums = match prepare(estimator, poses)? {
+    let sums = match prepare(estimator, poses, options)? {
         Ok(sums) => sums,
         Err(answer) => return Ok(answer),
     };
@@ -61,7 +61,7 @@ pub(crate) fn fit_poses(
         body_point,
         center,
     };
-    let spread = Spread::of(poses, &spot.body_point, &spot.center);
+    let spread = Spread::of(weighed(poses, options), &spot.body_point, &spot.center);
     if let Some(answer) = single_axis(estimator, &spot, &spread, options) {
         return Ok(answer);
     }
@@ -91,7 +91,7 @@ pub(crate) fn fit_poses(
         sigma_r: Some(sigma_r),
         estimated: options.sigma_t.is_none() || options.sigma_r.is_none(),
     };
-    let spread = Spread::of(poses, &spot.body_point, &spot.center);
+    let spread = Spread::of(weighed(poses, options), &spot.body_point, &spot.center);
     Ok(finish(
         estimator, &spot, &spread, covariance, noise, rejected, options,
     ))
@@ -117,9 +117,11 @@ fn maximise(
     let mut round = 0;
     let fixed = options.sigma_t.is_some() && options.sigma_r.is_some();
     let mut change = f64::INFINITY;
+    let mut seen: Vec<(&Pose, f64)> = Vec::with_capacity(spot.sums.n);
+    seen.extend(weighed(poses, options));
     loop {
         let problem = Likelihood {
-            poses,
+            poses: std::mem::take(&mut seen),
             origin: spot.sums.mean_t,
             sigma_t,
             sigma_r,
@@ -134,6 +136,7 @@ fn maximise(
             x = end.x;
         }
         last = end.normal;
+        seen = problem.poses;
         round += 1;
         let (old_t, old_r) = (sigma_t, sigma_r);
         if options.sigma_t.is_none() {
@@ -187,7 +190,7 @@ fn covariance(normal: &Normal, n: usize, options: &Options) -> Option<Matrix6<f6
 }
 
 struct Likelihood<'a> {
-    poses: &'a [Option<Pose>],
+    poses: Vec<(&'a Pose, f64)>,
     /// Centers are relative to it.
     origin: Vector3<f64>,
     sigma_t: f64,
@@ -225,7 +228,7 @@ impl Problem for Likelihood<'_> {
         let (mut sum_cr, mut sum_w) = (Matrix3::zeros(), 0.0);
         let (mut g_o, mut g_q, mut along_p) = (Vector3::zeros(), Vector3::zeros(), 0.0);
         let (mut n, mut cost, mut radial, mut arc, mut sum_e) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for pose in self.poses.iter().flatten() {
+        for &(pose, row) in &self.poses {
             // In the world: ŵ = R q̂ needs no rotation.
             let d = o - (pose.translation - self.origin);
             let length_q = d.norm();
@@ -237,15 +240,18 @@ impl Problem for Likelihood<'_> {
             let phi = sine.atan2(cosine);
             let ratio = if sine > 1e-9 { phi / sine } else { 1.0 };
             let product = length_q * length_p;
-            let w = 1.0 / (r2 + t2 / product);
-            n += 1.0;
-            cost += e * e / t2 + phi * phi * w;
-            radial += e * e;
-            arc += phi * phi * product;
+            // A row of weight `row` has both noises smaller by its root.
+            let e_row = row * e;
+            let w_alone = 1.0 / (r2 + t2 / product);
+            let w = row * w_alone;
+            n += row;
+            cost += e_row * e / t2 + phi * phi * w;
+            radial += e_row * e;
+            arc += row * phi * phi * product;
             // ∇_q ∠²/2 = φ/sin φ (cos φ q̂ − p̂)/|q|, and likewise for p; ∂w/∂|q| = w² σ_t²/(|q|²|p|)
-            let pull = 0.5 * phi * phi * w * w * t2 / product;
+            let pull = 0.5 * phi * phi * w * w_alone * t2 / product;
             let swing = ratio * w;
-            g_o += unit_w * (e / t2 + (pull + swing * cosine) / length_q)
+            g_o += unit_w * (e_row / t2 + (pull + swing * cosine) / length_q)
                 - pose.rotation * unit_p * (swing / length_q);
             g_q += unit_q * swing;
             along_p += pull + swing * cosine;
@@ -253,13 +259,13 @@ impl Problem for Likelihood<'_> {
             let b = w / (length_q * length_q);
             let c = w / product;
             let ww = unit_w * unit_w.transpose();
-            turned += unit_w;
-            turned2 += ww;
+            turned += unit_w * row;
+            turned2 += ww * row;
             sum_b += b;
             sum_bww += ww * b;
             sum_cr += (pose.rotation - unit_w * unit_q.transpose()) * c;
             sum_w += w;
-            sum_e += e;
+            sum_e += e_row;
         }
         let g_p = unit_p * (along_p / length_p - sum_e / t2) - g_q / length_p;
         let h_oo = turned2 / t2 + Matrix3::identity() * sum_b - sum_bww;

@@ -31,7 +31,7 @@ use crate::{
 pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
     const ID: &str = "hyper_n";
     options.check()?;
-    let cloud = cloud_of(input, &[])?;
+    let cloud = cloud_of(input, options)?;
     let factor = match prepare(ID, &cloud, false) {
         Ok(factor) => factor,
         Err(answer) => return Ok(answer),
@@ -55,33 +55,27 @@ fn hyper_least_squares(cloud: &Cloud, factor: &Factor) -> (Vector3<f64>, Vec<f64
         // As many samples as unknowns: an exact fit has no bias, and N vanishes on it.
         return solve(cloud, factor, Algebraic::Hyper);
     }
-    let n = cloud.points.len() as f64;
-    let middle = cloud.points.iter().sum::<Vector3<f64>>() / n;
-    let scale = (cloud
-        .points
-        .iter()
-        .map(|x| (x - middle).norm_squared())
-        .sum::<f64>()
-        / n)
-        .sqrt();
+    let n = cloud.total(0..cloud.points.len());
+    let scale = factor.mean_square.sqrt();
     let size = 4 + cloud.markers();
     // Rows of ξ, and the gradient of its first four entries.
-    let rows: Vec<(Vector3<f64>, DVector<f64>)> = (0..cloud.markers())
+    let rows: Vec<(f64, Vector3<f64>, DVector<f64>)> = (0..cloud.markers())
         .flat_map(|p| {
-            cloud.marker(p).iter().map(move |x| {
-                let y = (x - middle) / scale;
+            cloud.range(p).map(move |k| {
+                let y = cloud.points[k] / scale;
                 let mut xi = DVector::zeros(size);
                 xi[0] = y.norm_squared();
                 xi.fixed_rows_mut::<3>(1).copy_from(&y);
                 xi[4 + p] = 1.0;
-                (y, xi)
+                (cloud.weight(k), y, xi)
             })
         })
         .collect();
     let mut moment = DMatrix::zeros(size, size);
     let mut mean = DVector::zeros(size);
-    for (_, xi) in &rows {
-        moment += xi * xi.transpose() / n;
+    // A row of weight w has the noise σ²/w: what is linear in noise and weight counts rows, not weights.
+    for (w, _, xi) in &rows {
+        moment += xi * xi.transpose() * (*w / n);
         mean += xi / n;
     }
     // Ascending: the first is the sphere that nearly holds.
@@ -98,7 +92,7 @@ fn hyper_least_squares(cloud: &Cloud, factor: &Factor) -> (Vector3<f64>, Vec<f64
         constraint[(0, k)] += 3.0 * mean[k];
         constraint[(k, 0)] += 3.0 * mean[k];
     }
-    for (y, xi) in &rows {
+    for (w, y, xi) in &rows {
         let mut v = DMatrix::zeros(size, size);
         v[(0, 0)] = 4.0 * y.norm_squared();
         for k in 0..3 {
@@ -112,9 +106,11 @@ fn hyper_least_squares(cloud: &Cloud, factor: &Factor) -> (Vector3<f64>, Vec<f64
         let share = xi.dot(&seen);
         constraint += &v / n;
         constraint -=
-            (xi * xi.transpose() * trace + &v * share + &cross + cross.transpose()) / n / n;
+            (xi * xi.transpose() * trace + &v * share + &cross + cross.transpose()) * (*w / n / n);
     }
-    let table = DMatrix::from_fn(rows.len(), size, |i, j| rows[i].1[j] / n.sqrt());
+    let table = DMatrix::from_fn(rows.len(), size, |i, j| {
+        rows[i].2[j] * (rows[i].0 / n).sqrt()
+    });
     let pairs = pencil_eigen(&table, &constraint);
     let Some(u) = pairs
         .iter()
@@ -128,7 +124,7 @@ fn hyper_least_squares(cloud: &Cloud, factor: &Factor) -> (Vector3<f64>, Vec<f64
     let radii: Vec<f64> = (0..cloud.markers())
         .map(|p| (m.norm_squared() - u[4 + p] / u[0]).max(0.0).sqrt() * scale)
         .collect();
-    let center = m * scale + middle;
+    let center = m * scale;
     if radii.iter().all(|r| *r > 0.0 && r.is_finite()) && center.iter().all(|x| x.is_finite()) {
         (center, radii)
     } else {

@@ -1,10 +1,9 @@
 //! What an estimator is given, and which estimators it serves.
 
-use calib_geometry::measured::{Cloud, Pose, Tracks};
-use nalgebra::Matrix3;
+use calib_geometry::measured::{Cloud, Pose, RowWeights, Tracks};
 use serde::{Deserialize, Serialize};
 
-use crate::outcome::CorError;
+use crate::{options::Options, outcome::CorError};
 
 /// Measurements of a joint's motion, in one tracker frame and one length unit.
 #[derive(Debug, Clone, Copy)]
@@ -61,14 +60,14 @@ impl Input<'_> {
     }
 }
 
-/// The samples of `input` as clouds of points.
-pub(crate) fn cloud_of(
-    input: &Input<'_>,
-    covariances: &[Vec<Matrix3<f64>>],
-) -> Result<Cloud, CorError> {
+/// The samples of `input` as clouds of points, with their weights and covariances.
+pub(crate) fn cloud_of(input: &Input<'_>, options: &Options) -> Result<Cloud, CorError> {
+    let weights = RowWeights(&options.weights);
     match *input {
-        Input::Points(tracks) | Input::Markers(tracks) => Ok(Cloud::gather(tracks, covariances)?),
-        Input::Poses(poses) => Ok(Cloud::of_origins(poses)?),
+        Input::Points(tracks) | Input::Markers(tracks) => {
+            Ok(Cloud::weighted(tracks, &options.covariances, weights)?)
+        }
+        Input::Poses(poses) => Ok(Cloud::of_weighted_origins(poses, weights)?),
         Input::TwoBodies { .. } => Err(CorError::WrongInput {
             expects: InputKind::Points,
             got: input.kind(),

@@ -13,8 +13,11 @@ pub struct Options {
     /// Orientation noise about one axis, rad, where the tracker states it. `None`: estimated.
     pub sigma_r: Option<f64>,
     /// Covariance of each sample, marker × sample, for the estimators that weigh samples
-    /// (`ml_sphere`); empty for equal, isotropic noise.
+    /// (`sphere_eiv`, `ml_sphere`); empty for equal, isotropic noise.
     pub covariances: Vec<Vec<Matrix3<f64>>>,
+    /// How many single samples each row is worth (the mean of k readings: k): its noise variance is σ²/w, and σ that of a row of weight 1.
+    /// Empty: one each. A row of weight 0 counts as lost.
+    pub weights: Vec<f64>,
     /// `ml_sphere`: one noise level for each marker (restricted maximum likelihood) instead of a common one.
     pub noise_per_marker: bool,
     /// Probability of calling an unanswerable recording answerable. 10⁻³: the border that the golden cases use.
@@ -33,6 +36,7 @@ impl Default for Options {
             sigma_t: None,
             sigma_r: None,
             covariances: Vec::new(),
+            weights: Vec::new(),
             noise_per_marker: false,
             significance: 1e-3,
             weak_fraction: 0.1,

@@ -615,7 +615,7 @@ fn points_fit(
     options: &Options,
     reweight: bool,
 ) -> Result<Outcome, CorError> {
-    let cloud = cloud_of(input, &options.covariances)?;
+    let cloud = cloud_of(input, options)?;
     if let Err(answer) = prepare(estimator, &cloud, false) {
         return Ok(answer);
     }
@@ -727,7 +727,7 @@ fn poses_fit(
     options: &Options,
     reweight: bool,
 ) -> Result<Outcome, CorError> {
-    if let Err(answer) = hotspot::prepare(estimator, poses)? {
+    if let Err(answer) = hotspot::prepare(estimator, poses, options)? {
         return Ok(answer);
     }
     let seen: Vec<(usize, &Pose)> = poses

@@ -10,7 +10,7 @@
 use calib_geometry::{
     Line, Verdict,
     decompose::svd_small,
-    measured::{DataError, Pose},
+    measured::{DataError, Pose, RowWeights},
     row_qr::RowQr,
 };
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
@@ -55,23 +55,28 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
             _ => None,
         });
     }
-    let sums = match crate::hotspot::prepare("score", &relative)? {
+    let sums = match crate::hotspot::prepare("score", &relative, options)? {
         Ok(sums) => sums,
         Err(answer) => return Ok(in_second(answer)),
     };
 
+    let weights = RowWeights(&options.weights);
     let pairs = || {
         first
             .iter()
             .zip(second)
-            .filter_map(|(a, b)| Some((a.as_ref()?, b.as_ref()?)))
+            .enumerate()
+            .filter_map(move |(row, (a, b))| Some((a.as_ref()?, b.as_ref()?, weights.of(row))))
+            .filter(|(_, _, w)| *w > 0.0)
     };
     let mut qr = RowQr::<7>::default();
-    for (a, b) in pairs() {
+    for (a, b, w) in pairs() {
+        let root = w.sqrt();
         for k in 0..3 {
             let (r, s) = (a.rotation.row(k), b.rotation.row(k));
             let rhs = b.translation[k] - a.translation[k];
-            qr.push([r[0], r[1], r[2], -s[0], -s[1], -s[2], rhs]);
+            let row = [r[0], r[1], r[2], -s[0], -s[1], -s[2], rhs];
+            qr.push(row.map(|x| x * root));
         }
     }
     let r = qr.factor();
@@ -83,9 +88,9 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
 
     let n = sums.n;
     let (mut rss, mut gaps) = (0.0, 0.0);
-    for (a, b) in pairs() {
+    for (a, b, w) in pairs() {
         let gap = a.transform(&in_first) - b.transform(&in_second_body);
-        rss += gap.norm_squared();
+        rss += w * gap.norm_squared();
         gaps += gap.norm();
     }
     let sigma2 = rss / (3 * n - 6) as f64;
@@ -133,7 +138,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
             mean_gap: gaps / n as f64,
         },
         noise: Noise { sigma_t: sigma2.sqrt(), sigma_r: None, estimated: true },
-        rms: (rss / (3 * n) as f64).sqrt(),
+        rms: (rss / (3.0 * sums.total)).sqrt(),
         used: n,
         rejected: Vec::new(),
         verdict: if weak { Verdict::Weak } else { Verdict::Ok },

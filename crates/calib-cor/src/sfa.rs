@@ -8,6 +8,7 @@
 //! span 10¹² and the method stops anywhere. On centered data it equals the closed form to its own
 //! tolerance. It is here because the paper compares it; [`crate::algebraic`] is faster and exact.
 
+use calib_geometry::measured::Cloud;
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use crate::{
@@ -36,14 +37,14 @@ const LAST_STEP: f64 = 1e-9;
 /// [`CorError`] for data that are no numbers or of another kind.
 pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
     options.check()?;
-    let cloud = cloud_of(input, &[])?;
+    let cloud = cloud_of(input, options)?;
     let factor = match prepare("sfa", &cloud, false) {
         Ok(factor) => factor,
         Err(answer) => return Ok(answer),
     };
     let scale = factor.mean_square.sqrt();
     let scaled: Vec<Vector3<f64>> = cloud.points.iter().map(|x| x / scale).collect();
-    let (a, b) = minimise_algebraic(&scaled, &cloud.starts, options.seed);
+    let (a, b) = minimise_algebraic(&cloud, &scaled, options.seed);
     let center = b * (-0.5 / a) * scale;
     let radii = crate::sphere::mean_radii(&cloud, &center);
     let candidate = Candidate {
@@ -60,21 +61,22 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
 
 /// (a, b) of least cost over all starts. The offsets e_p follow from (a, b) in closed form for all
 /// markers but enter the constraint through their mean, which is the fifth unknown.
-fn minimise_algebraic(points: &[Vector3<f64>], starts: &[usize], seed: u64) -> (f64, Vector3<f64>) {
+fn minimise_algebraic(cloud: &Cloud, points: &[Vector3<f64>], seed: u64) -> (f64, Vector3<f64>) {
     // S/n over (w, x, y, z, 1) with each marker's mean taken out of the first four, and the mean offset back in.
-    let n = points.len() as f64;
+    let n = cloud.total(0..points.len());
     let mut s = SMatrix::<f64, 5, 5>::zeros();
     let mut mean = SVector::<f64, 4>::zeros();
     let row = |x: &Vector3<f64>| SVector::<f64, 4>::new(x.norm_squared(), x.x, x.y, x.z);
-    for p in 1..starts.len() {
-        let marker = &points[starts[p - 1]..starts[p]];
-        let own = marker.iter().map(row).sum::<SVector<f64, 4>>() / marker.len() as f64;
-        for x in marker {
+    for p in 0..cloud.markers() {
+        let marker = || cloud.range(p).map(|k| (&points[k], cloud.weight(k)));
+        let total = cloud.total(cloud.range(p));
+        let own = marker().map(|(x, w)| row(x) * w).sum::<SVector<f64, 4>>() / total;
+        for (x, w) in marker() {
             let d = row(x) - own;
             let mut block = s.fixed_view_mut::<4, 4>(0, 0);
-            block += d * d.transpose() / n;
+            block += d * d.transpose() * (w / n);
         }
-        mean += own * (marker.len() as f64 / n);
+        mean += own * (total / n);
     }
     let mut full = SVector::<f64, 5>::zeros();
     full.fixed_rows_mut::<4>(0).copy_from(&mean);

@@ -1,7 +1,7 @@
 //! What all sphere fits share: the judgement of a fitted center.
 //!
 //! ```text
-//! σ̂² = Σ (|x − m| − r_p)² / (n − P − 3)                                                     (1)
+//! σ̂² = Σ w (|x − m| − r_p)² / (n − P − 3)      σ is the noise of a sample of weight 1            (1)
 //! κ = (s₃² / (n − P − 2)) / σ̂²  ~  F(n − P − 2, n − P − 3)   if every marker stays in a plane   (2)
 //! C = σ² (JᵀJ)⁻¹,  J = −(u − ū_p),   the weakest variance divided by 1 − 1/κ                    (3)
 //! ```
@@ -89,8 +89,11 @@ fn not_observable(
 pub(crate) fn mean_radii(cloud: &Cloud, center: &Vector3<f64>) -> Vec<f64> {
     (0..cloud.markers())
         .map(|p| {
-            let points = cloud.marker(p);
-            points.iter().map(|x| (x - center).norm()).sum::<f64>() / points.len() as f64
+            let range = cloud.range(p);
+            let lengths = range
+                .clone()
+                .map(|k| cloud.weight(k) * (cloud.points[k] - center).norm());
+            lengths.sum::<f64>() / cloud.total(range)
         })
         .collect()
 }
@@ -104,7 +107,7 @@ pub(crate) struct Candidate {
     pub radii: Vec<f64>,
     /// Bias of those radii in units of σ²/r (second-order noise analysis).
     pub radius_bias: f64,
-    /// Inverse noise variance of each sample, relative to a unit variance; empty: all 1.
+    /// Inverse noise variance of each sample, relative to a unit variance; empty: all 1. The cloud's weights multiply them.
     pub weights: Vec<f64>,
     /// True where the weights are inverse variances in the points' unit: nothing is left to estimate.
     pub absolute: bool,
@@ -141,12 +144,12 @@ pub(crate) fn judge(
             known: Known::Nothing,
         });
     }
-    let weight = |k: usize| if weights.is_empty() { 1.0 } else { weights[k] };
+    let weight = |k: usize| weights.get(k).copied().unwrap_or(1.0);
     // JᵀWJ with J = −(u − ū_p): the radii are eliminated by centering each marker's directions.
     let mut information = Matrix3::zeros();
     let (mut rss, mut weighted_rss) = (0.0, 0.0);
     for p in 0..markers {
-        let range = cloud.starts[p]..cloud.starts[p + 1];
+        let range = cloud.range(p);
         let (mut sum, mut sum_u, mut sum_d) = (0.0, Vector3::zeros(), 0.0);
         let (mut scatter_u, mut sum_dd, mut plain_d) = (Matrix3::zeros(), 0.0, 0.0);
         let guess = radii[p];
@@ -159,21 +162,22 @@ pub(crate) fn judge(
             } else {
                 Vector3::zeros()
             };
-            let w = weight(k);
+            let plain = cloud.weight(k);
+            let w = weight(k) * plain;
             let e = length - guess;
             sum += w;
             sum_u += u * w;
             scatter_u += u * (u * w).transpose();
             sum_d += w * e;
             sum_dd += w * e * e;
-            plain_d += e;
-            plain_dd += e * e;
+            plain_d += plain * e;
+            plain_dd += plain * e * e;
         }
         let mean_u = sum_u / sum;
         information += scatter_u - mean_u * mean_u.transpose() * sum;
         // Residuals about the least-squares radius, whatever radius the estimator states.
         weighted_rss += (sum_dd - sum_d * sum_d / sum).max(0.0);
-        rss += (plain_dd - plain_d * plain_d / range.len() as f64).max(0.0);
+        rss += (plain_dd - plain_d * plain_d / cloud.total(range)).max(0.0);
     }
     let dof = n - markers - 3;
     let estimated = if dof > 0 {
@@ -247,7 +251,7 @@ pub(crate) fn judge(
             sigma_r: None,
             estimated: from_data,
         },
-        rms: (rss / n as f64).sqrt(),
+        rms: (rss / cloud.total(0..n)).sqrt(),
         used: n,
         rejected,
         verdict,

@@ -41,7 +41,7 @@ const FOOT_STEPS: usize = 60;
 pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
     const ID: &str = "sphere_eiv";
     options.check()?;
-    let cloud = cloud_of(input, &options.covariances)?;
+    let cloud = cloud_of(input, options)?;
     let factor = match prepare(ID, &cloud, false) {
         Ok(factor) => factor,
         Err(answer) => return Ok(answer),

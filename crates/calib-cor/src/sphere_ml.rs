@@ -37,7 +37,7 @@ const NOISE_ROUNDS: usize = 50;
 /// [`CorError`] for data that are no numbers, covariances that are none, or another kind of data.
 pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
     options.check()?;
-    let cloud = cloud_of(input, &options.covariances)?;
+    let cloud = cloud_of(input, options)?;
     Ok(fit_cloud("ml_sphere", &cloud, options, Vec::new()))
 }
 
@@ -94,7 +94,7 @@ pub(crate) fn isotropic(cloud: &Cloud, start: Vector3<f64>, weights: &[f64]) -> 
 
 struct Radial<'a> {
     cloud: &'a Cloud,
-    /// One for each sample, or empty for all alike.
+    /// One for each sample beside the cloud's own, or empty for all alike.
     weights: &'a [f64],
 }
 
@@ -122,11 +122,7 @@ impl Problem for Radial<'_> {
             let (mut sum_u, mut sum_ue) = (Vector3::zeros(), Vector3::zeros());
             let mut sum_uu = Matrix3::zeros();
             for k in range {
-                let w = if self.weights.is_empty() {
-                    1.0
-                } else {
-                    self.weights[k]
-                };
+                let w = self.cloud.weight(k) * self.weights.get(k).copied().unwrap_or(1.0);
                 let d = self.cloud.points[k] - center;
                 let length = d.norm();
                 let u = if length > 0.0 {
@@ -228,13 +224,17 @@ pub(crate) fn with_noise_per_marker(
 }
 
 fn select_marker(cloud: &Cloud, p: usize) -> Cloud {
-    let range = cloud.starts[p]..cloud.starts[p + 1];
+    let range = cloud.range(p);
     Cloud {
         origin: cloud.origin,
         points: cloud.points[range.clone()].to_vec(),
         starts: vec![0, range.len()],
-        labels: cloud.labels[range].to_vec(),
+        labels: cloud.labels[range.clone()].to_vec(),
         covariances: Vec::new(),
+        weights: cloud
+            .weights
+            .get(range)
+            .map_or_else(Vec::new, <[f64]>::to_vec),
         magnitude: cloud.magnitude,
     }
 }
@@ -266,14 +266,14 @@ fn anisotropic(cloud: &Cloud, start: Vector3<f64>) -> Vector3<f64> {
     center
 }
 
-/// Weighted mean distance of each marker's samples.
+/// Weighted mean distance of each marker's samples; the cloud's weights multiply those given.
 pub(crate) fn weighted_radii(cloud: &Cloud, center: &Vector3<f64>, weights: &[f64]) -> Vec<f64> {
     (0..cloud.markers())
         .map(|p| {
-            let range = cloud.starts[p]..cloud.starts[p + 1];
-            let sum: f64 = weights[range.clone()].iter().sum();
+            let range = cloud.range(p);
+            let sum: f64 = range.clone().map(|k| weights[k] * cloud.weight(k)).sum();
             range
-                .map(|k| weights[k] * (cloud.points[k] - center).norm())
+                .map(|k| weights[k] * cloud.weight(k) * (cloud.points[k] - center).norm())
                 .sum::<f64>()
                 / sum
         })

@@ -34,23 +34,25 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Factor of the cloud; `equal_markers` weighs a sample of marker p by 1/n_p (Gamage & Lasenby).
+    /// Factor of the cloud with its weights (centroids are weighted too); `equal_markers` weighs a sample of marker p by 1/n_p (Gamage & Lasenby).
     #[must_use]
     pub fn of(cloud: &Cloud, equal_markers: bool) -> Self {
         let mut qr = RowQr::<4>::default();
         let mut mean_square = 0.0;
         for p in 0..cloud.markers() {
-            let points = cloud.marker(p);
-            let n = points.len() as f64;
-            let mean = points.iter().sum::<Vector3<f64>>() / n;
-            let mean_w = points.iter().map(Vector3::norm_squared).sum::<f64>() / n;
-            mean_square += n * mean_w;
-            let weight = if equal_markers { 1.0 / n.sqrt() } else { 1.0 };
-            for x in points {
-                let d = (x - mean) * weight;
-                qr.push([d.x, d.y, d.z, (x.norm_squared() - mean_w) * weight]);
+            let points = || cloud.range(p).map(|k| (&cloud.points[k], cloud.weight(k)));
+            let own = cloud.total(cloud.range(p));
+            let mean = points().map(|(x, w)| x * w).sum::<Vector3<f64>>() / own;
+            let mean_w = points().map(|(x, w)| x.norm_squared() * w).sum::<f64>() / own;
+            mean_square += own * mean_w;
+            let share = if equal_markers { 1.0 / own } else { 1.0 };
+            for (x, w) in points() {
+                let root = (share * w).sqrt();
+                let d = (x - mean) * root;
+                qr.push([d.x, d.y, d.z, (x.norm_squared() - mean_w) * root]);
             }
         }
+        let total = cloud.total(0..cloud.points.len());
         let r = qr.factor();
         let svd = svd_small(&r.fixed_view::<3, 3>(0, 0).into_owned());
         Self {
@@ -58,11 +60,11 @@ impl Factor {
             v: svd.v,
             c: svd.u.tr_mul(&r.fixed_view::<3, 1>(0, 3)),
             rho: r[(3, 3)],
-            mean_square: mean_square / cloud.points.len().max(1) as f64,
+            mean_square: mean_square / total.max(f64::MIN_POSITIVE),
             total: if equal_markers {
                 cloud.markers() as f64
             } else {
-                cloud.points.len() as f64
+                total
             },
         }
     }
@@ -89,7 +91,7 @@ impl Factor {
 #[must_use]
 pub fn rank_verdict(cloud: &Cloud, factor: &Factor) -> Option<Verdict> {
     // Coordinates carry rounding of this size each.
-    let rounding = 8.0 * f64::EPSILON * cloud.magnitude * (cloud.points.len() as f64).sqrt();
+    let rounding = 8.0 * f64::EPSILON * cloud.magnitude * cloud.total(0..cloud.points.len()).sqrt();
     let s = factor.s;
     let floor = (RANK * s[0]).max(rounding);
     if s[0] <= rounding {

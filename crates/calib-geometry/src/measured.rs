@@ -64,6 +64,41 @@ impl Pose {
     }
 }
 
+/// How many single samples each row is worth: its noise variance is σ²/w. Empty: one each. A row of weight 0 counts as lost.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct RowWeights<'a>(pub &'a [f64]);
+
+impl RowWeights<'_> {
+    /// Weight of a row.
+    #[inline]
+    #[must_use]
+    pub fn of(self, row: usize) -> f64 {
+        self.0.get(row).copied().unwrap_or(1.0)
+    }
+
+    /// # Errors
+    /// [`DataError::NotWeight`] for a weight that is negative or not finite, [`DataError::Lengths`] for another number of weights than rows.
+    pub fn check(self, rows: usize) -> Result<(), DataError> {
+        if self.0.is_empty() {
+            return Ok(());
+        }
+        if self.0.len() != rows {
+            return Err(DataError::Lengths {
+                what: "weights and rows",
+                left: self.0.len(),
+                right: rows,
+            });
+        }
+        match self.0.iter().position(|w| !(w.is_finite() && *w >= 0.0)) {
+            Some(row) => Err(DataError::NotWeight {
+                row,
+                weight: self.0[row],
+            }),
+            None => Ok(()),
+        }
+    }
+}
+
 /// One trajectory for each marker; `None` is a lost sample. Lengths may differ between markers where
 /// only spheres are fitted; a rigid body needs simultaneous rows.
 pub type Tracks = [Vec<Option<Point3<f64>>>];
@@ -81,6 +116,8 @@ pub struct Cloud {
     pub labels: Vec<(usize, usize)>,
     /// 3 × 3 covariance of each point, or empty.
     pub covariances: Vec<Matrix3<f64>>,
+    /// Weight of each point ([`RowWeights`]), or empty where all are alike.
+    pub weights: Vec<f64>,
     /// Largest coordinate magnitude before centring: what rounding is relative to.
     pub magnitude: f64,
 }
@@ -93,6 +130,19 @@ impl Cloud {
     /// # Errors
     /// [`DataError`] for samples that are not finite and covariances that are none.
     pub fn gather(tracks: &Tracks, covariances: &[Vec<Matrix3<f64>>]) -> Result<Self, DataError> {
+        Self::weighted(tracks, covariances, RowWeights::default())
+    }
+
+    /// The same with a weight for each row.
+    ///
+    /// # Errors
+    /// As [`Self::gather`]; also for weights that are none.
+    pub fn weighted(
+        tracks: &Tracks,
+        covariances: &[Vec<Matrix3<f64>>],
+        weights: RowWeights<'_>,
+    ) -> Result<Self, DataError> {
+        weights.check(tracks.iter().map(Vec::len).max().unwrap_or(0))?;
         let mut points = Vec::new();
         let mut labels = Vec::new();
         let mut starts = vec![0];
@@ -130,6 +180,9 @@ impl Cloud {
             }
             for (row, sample) in track.iter().enumerate() {
                 let Some(p) = sample else { continue };
+                if weights.of(row) == 0.0 {
+                    continue;
+                }
                 if !p.iter().all(|x| x.is_finite()) {
                     return Err(DataError::NotFinite { marker, row });
                 }
@@ -144,12 +197,20 @@ impl Cloud {
             }
             close(&mut points, &mut labels, &mut kept);
         }
+        let of_points = match weights.0 {
+            [] => Vec::new(),
+            _ => labels
+                .iter()
+                .map(|l: &(usize, usize)| weights.of(l.1))
+                .collect(),
+        };
         let mut cloud = Self {
             origin: Vector3::zeros(),
             points,
             starts,
             labels,
             covariances: kept,
+            weights: of_points,
             magnitude: 0.0,
         };
         cloud.center();
@@ -161,11 +222,22 @@ impl Cloud {
     /// # Errors
     /// [`DataError::NotFinite`].
     pub fn of_origins(poses: &[Option<Pose>]) -> Result<Self, DataError> {
+        Self::of_weighted_origins(poses, RowWeights::default())
+    }
+
+    /// The same with a weight for each row.
+    ///
+    /// # Errors
+    /// [`DataError::NotFinite`]; also for weights that are none.
+    pub fn of_weighted_origins(
+        poses: &[Option<Pose>],
+        weights: RowWeights<'_>,
+    ) -> Result<Self, DataError> {
         let track = poses
             .iter()
             .map(|p| p.as_ref().map(|p| p.translation.into()))
             .collect();
-        Self::gather(&[track], &[])
+        Self::weighted(&[track], &[], weights)
     }
 
     fn center(&mut self) {
@@ -174,12 +246,46 @@ impl Cloud {
         };
         self.magnitude = self.points.iter().fold(0.0, |m: f64, p| m.max(p.amax()));
         // Relative to the first point, so that a far origin costs no digits.
-        let offset =
-            self.points.iter().map(|p| p - first).sum::<Vector3<f64>>() / self.points.len() as f64;
+        for p in &mut self.points {
+            *p -= first;
+        }
+        let offset = self.centroid();
         self.origin = first + offset;
         for p in &mut self.points {
-            *p -= self.origin;
+            *p -= offset;
         }
+    }
+
+    /// Weighted mean of all points, relative to the origin.
+    fn centroid(&self) -> Vector3<f64> {
+        let weighted = self
+            .points
+            .iter()
+            .enumerate()
+            .map(|(k, x)| x * self.weight(k));
+        weighted.sum::<Vector3<f64>>() / self.total(0..self.points.len()).max(f64::MIN_POSITIVE)
+    }
+
+    /// Weight of point k; 1 where all are alike.
+    #[inline]
+    #[must_use]
+    pub fn weight(&self, k: usize) -> f64 {
+        self.weights.get(k).copied().unwrap_or(1.0)
+    }
+
+    /// Sum of the weights of some points: their number where all are alike.
+    #[must_use]
+    pub fn total(&self, points: std::ops::Range<usize>) -> f64 {
+        match self.weights.as_slice() {
+            [] => points.len() as f64,
+            weights => weights[points].iter().sum(),
+        }
+    }
+
+    /// The points of marker p.
+    #[must_use]
+    pub fn range(&self, p: usize) -> std::ops::Range<usize> {
+        self.starts[p]..self.starts[p + 1]
     }
 
     /// Number of markers kept.
@@ -191,7 +297,7 @@ impl Cloud {
     /// Samples of marker p, relative to the origin.
     #[must_use]
     pub fn marker(&self, p: usize) -> &[Vector3<f64>] {
-        &self.points[self.starts[p]..self.starts[p + 1]]
+        &self.points[self.range(p)]
     }
 
     /// The cloud restricted to points whose flag is set.
@@ -203,10 +309,11 @@ impl Cloud {
             starts: vec![0],
             labels: Vec::new(),
             covariances: Vec::new(),
+            weights: Vec::new(),
             magnitude: self.magnitude,
         };
         for p in 0..self.markers() {
-            let range = self.starts[p]..self.starts[p + 1];
+            let range = self.range(p);
             if range.clone().filter(|&k| keep[k]).count() < 2 {
                 continue;
             }
@@ -216,11 +323,12 @@ impl Cloud {
                 if !self.covariances.is_empty() {
                     out.covariances.push(self.covariances[k]);
                 }
+                out.weights.extend(self.weights.get(k));
             }
             out.starts.push(out.points.len());
         }
         // The algebraic fits assume the common centroid as origin.
-        let shift = out.points.iter().sum::<Vector3<f64>>() / out.points.len().max(1) as f64;
+        let shift = out.centroid();
         out.origin += shift;
         for p in &mut out.points {
             *p -= shift;
@@ -232,6 +340,14 @@ impl Cloud {
 /// Data that no estimator can read.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum DataError {
+    /// A weight that is negative or no number.
+    #[error("row {row}: the weight {weight} is no number from 0 up")]
+    NotWeight {
+        /// Row of the weight.
+        row: usize,
+        /// The weight.
+        weight: f64,
+    },
     /// NaN or infinity in the data.
     #[error("marker {marker}, row {row}: not a finite number")]
     NotFinite {
@@ -277,7 +393,7 @@ impl DataError {
         match self {
             Self::NotFinite { .. } => Some(Verdict::NotFinite),
             Self::NotRotation { .. } => Some(Verdict::NotRotation),
-            Self::NotCovariance { .. } | Self::Lengths { .. } => None,
+            Self::NotCovariance { .. } | Self::NotWeight { .. } | Self::Lengths { .. } => None,
         }
     }
 }

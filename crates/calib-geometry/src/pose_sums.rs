@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, Unit, Vector3};
 use crate::{
     chance::{chi2_tail, f_tail},
     decompose::{svd_small, symmetric_eigen_small},
-    measured::{DataError, Pose},
+    measured::{DataError, Pose, RowWeights},
     row_qr::RowQr,
     verdict::Verdict,
 };
@@ -31,6 +31,8 @@ const WORST_SIGMA_R: f64 = 0.0873;
 pub struct PoseSums {
     /// Poses.
     pub n: usize,
+    /// Sum of their weights: `n` where all are alike. It stands for n in (1) to (3).
+    pub total: f64,
     /// Mean rotation matrix (not a rotation).
     pub mean_r: Matrix3<f64>,
     /// Mean translation.
@@ -47,7 +49,16 @@ impl PoseSums {
     /// # Errors
     /// [`DataError`] for a pose that is not finite or not a rotation.
     pub fn of(poses: &[Option<Pose>]) -> Result<Self, DataError> {
-        let mut n = 0;
+        Self::weighted(poses, RowWeights::default())
+    }
+
+    /// The same with a weight for each row: sums and means are weighted.
+    ///
+    /// # Errors
+    /// As [`Self::of`]; also for weights that are none.
+    pub fn weighted(poses: &[Option<Pose>], weights: RowWeights<'_>) -> Result<Self, DataError> {
+        weights.check(poses.len())?;
+        let (mut n, mut total) = (0, 0.0);
         let (mut sum_r, mut sum_gram) = (Matrix3::zeros(), Matrix3::zeros());
         let (mut sum_t, mut sum_rt) = (Vector3::zeros(), Vector3::zeros());
         // Translations relative to the first: a far origin costs no digits.
@@ -58,19 +69,25 @@ impl PoseSums {
             .map_or(Vector3::zeros(), |p| p.translation);
         for (row, pose) in poses.iter().enumerate() {
             let Some(pose) = pose else { continue };
-            sum_gram += pose.check(row)?;
+            let w = weights.of(row);
+            if w == 0.0 {
+                continue;
+            }
+            sum_gram += pose.check(row)? * w;
             let t = pose.translation - first;
-            sum_r += pose.rotation;
-            sum_t += t;
-            sum_rt += pose.rotation.tr_mul(&t);
+            sum_r += pose.rotation * w;
+            sum_t += t * w;
+            sum_rt += pose.rotation.tr_mul(&t) * w;
             n += 1;
+            total += w;
         }
-        let count = (n as f64).max(1.0);
+        let count = if n == 0 { 1.0 } else { total };
         let (mean_r, mean_t) = (sum_r / count, sum_t / count);
         let m = sum_gram - mean_r.tr_mul(&sum_r);
         let eigen = symmetric_eigen_small(&m);
         let mut sums = Self {
             n,
+            total: count,
             mean_r,
             mean_t: first + mean_t,
             lambda: eigen.values,
@@ -78,17 +95,19 @@ impl PoseSums {
             right: -eigen.vectors.tr_mul(&(sum_rt - sum_r.tr_mul(&mean_t))),
         };
         if eigen.values[0] < SUMS_ENOUGH * count {
-            sums.refine(poses);
+            sums.refine(poses, weights);
         }
         Ok(sums)
     }
 
     /// The same from a QR of the centered rows: for nearly single-axis motion.
-    fn refine(&mut self, poses: &[Option<Pose>]) {
+    fn refine(&mut self, poses: &[Option<Pose>], weights: RowWeights<'_>) {
         let mut qr = RowQr::<4>::default();
-        for pose in poses.iter().flatten() {
-            let d = pose.rotation - self.mean_r;
-            let t = pose.translation - self.mean_t;
+        for (row, pose) in poses.iter().enumerate() {
+            let Some(pose) = pose else { continue };
+            let root = weights.of(row).sqrt();
+            let d = (pose.rotation - self.mean_r) * root;
+            let t = (pose.translation - self.mean_t) * root;
             for k in 0..3 {
                 qr.push([d[(k, 0)], d[(k, 1)], d[(k, 2)], t[k]]);
             }
@@ -122,7 +141,7 @@ impl PoseSums {
     /// Largest and smallest singular values of `[R_i, −I]`.
     #[must_use]
     pub fn extreme_singular_values(&self) -> (f64, f64) {
-        let n = self.n as f64;
+        let n = self.total;
         let largest = (1.0 - self.lambda[0] / n).clamp(0.0, 1.0).sqrt();
         (
             (n * (1.0 + largest)).sqrt(),
@@ -140,7 +159,7 @@ impl PoseSums {
     /// Verdict by rank alone: exact data, or too few.
     #[must_use]
     pub fn rank_verdict(&self) -> Option<Verdict> {
-        let n = self.n as f64;
+        let n = self.total;
         if self.n < 2 {
             Some(Verdict::TooFew)
         } else if self.lambda[2] <= (RANK * RANK) * n {
@@ -187,7 +206,7 @@ impl PoseSums {
                 format!(
                     "the body turns by {:.3}° rms, no more than the {source} orientation noise of {:.3}° \
                      (chance {chance:.1e})",
-                    (self.lambda.sum() / 2.0 / n).sqrt().to_degrees(),
+                    (self.lambda.sum() / 2.0 / self.total).sqrt().to_degrees(),
                     sigma_r.to_degrees()
                 ),
             ));
