@@ -147,6 +147,14 @@ fn profiles() {
         2,
     );
     said.run(
+        "unknown axis estimator",
+        &edited(
+            "axes: {x: wrist_roll}",
+            "axes: {x: wrist_roll}\n    axis: planar_radail",
+        ),
+        2,
+    );
+    said.run(
         "unknown estimator",
         &edited("center: sfe", "center: sfee"),
         2,
@@ -195,6 +203,19 @@ fn recordings() {
     let cells = |change: fn(usize, &str, &str) -> String| ripley().cells(SWEEP, change);
     let edited = |from: &str, to: &str| ripley().edit(SWEEP, from, to);
     said.run("missing", &ripley().without(SWEEP), 3);
+    said.run(
+        "misspelled in the profile",
+        &ripley().edit(PROFILE, "ripley/base_sweep.csv", "ripley/base_swep.csv"),
+        3,
+    );
+    // Without a `simulate` section the recordings alone know the marker: said once for all of them.
+    let profile = ripley().read(PROFILE);
+    let profile = profile.split("\nsimulate:").next().unwrap_or_default();
+    said.run(
+        "a misspelled marker",
+        &ripley().file(PROFILE, profile.replace("[gripM_1", "[gripM_l")),
+        3,
+    );
     said.run("empty", &ripley().file(SWEEP, ""), 3);
     said.run(
         "a header and no rows",

@@ -1,6 +1,8 @@
 //! What can go wrong, and with which exit code the program ends.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use crate::paths;
 
 /// Exit codes of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,15 +30,19 @@ pub enum ExitCode {
 #[derive(Debug, thiserror::Error)]
 pub enum PipelineError {
     /// A profile or robot description cannot be read.
-    #[error("{path}: cannot be read: {source}")]
+    #[error("{path}: cannot be read: {source}\n  help: {remedy}")]
     Read {
         /// The file.
         path: String,
         /// Why.
         source: std::io::Error,
+        /// What to do.
+        remedy: String,
     },
     /// A profile or robot description is not text.
-    #[error("{path}: is not UTF-8 text (byte {offset}); save it as UTF-8")]
+    #[error(
+        "{path}: is not UTF-8 text (byte {offset})\n  help: save it as UTF-8, or name another file"
+    )]
     NotText {
         /// The file.
         path: String,
@@ -85,7 +91,7 @@ pub enum PipelineError {
         text: String,
     },
     /// A text of a robot's description cannot be changed as asked.
-    #[error("{}", .0.to_string().replace("\nhelp: ", "\n  help: "))]
+    #[error("{0}")]
     Edit(calib_urdf::EditError),
     /// What was asked for should not be done with this result.
     #[error("{finding}\n  help: {remedy}")]
@@ -96,12 +102,14 @@ pub enum PipelineError {
         remedy: String,
     },
     /// The output could not be written; nothing was left half-written.
-    #[error("{path}: cannot be written: {source}")]
+    #[error("{path}: cannot be written: {source}\n  help: {remedy}")]
     Write {
         /// The file or folder.
         path: String,
         /// Why.
         source: std::io::Error,
+        /// What to do.
+        remedy: String,
     },
     /// Something that is there already would be overwritten.
     #[error(
@@ -156,14 +164,16 @@ impl PipelineError {
 
     pub(crate) fn write(path: &Path, source: std::io::Error) -> Self {
         Self::Write {
+            remedy: paths::writing(path, &source),
             path: path.display().to_string(),
             source,
         }
     }
 
-    pub(crate) fn read(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
+    pub(crate) fn read(path: &Path, source: std::io::Error) -> Self {
         Self::Read {
-            path: path.into().display().to_string(),
+            remedy: paths::reading(path, &source),
+            path: path.display().to_string(),
             source,
         }
     }

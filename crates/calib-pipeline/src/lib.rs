@@ -38,6 +38,7 @@ pub mod ml;
 pub mod model_checks;
 pub mod models;
 pub mod paper;
+mod paths;
 pub mod readers;
 pub mod relabel;
 pub mod residuals;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use calib_plugin::{Control, Source};
-use calib_profile::{BodyKind, Profile, RecordingSpec, RobotLog};
+use calib_profile::{BodyKind, Profile, ProfileError, RecordingSpec, RobotLog};
 use calib_recording::{
     ColumnMap, Filled, Finding, JointUnit, Meta, Poses, ReadOptions, Recording, Severity,
 };
@@ -15,7 +15,7 @@ use nalgebra::Matrix3;
 use crate::align::{Alignment, align, with_robot_log};
 use crate::error::PipelineError;
 use crate::estimators::{Estimators, values};
-use crate::readers;
+use crate::{paths, readers};
 
 /// A profile with its robot, before any recording is read.
 #[derive(Debug, Clone)]
@@ -109,7 +109,18 @@ pub fn load_robot(profile_path: &Path) -> Result<RobotProfile, PipelineError> {
         .parent()
         .map_or_else(PathBuf::new, Path::to_path_buf);
     let urdf_path = folder.join(&raw.robot.urdf);
-    let urdf_text = read_text(&urdf_path)?;
+    let urdf_text = read_text(&urdf_path).map_err(|error| match error {
+        PipelineError::Read {
+            path,
+            source,
+            remedy,
+        } => PipelineError::Read {
+            path,
+            source,
+            remedy: format!("{remedy} `robot: urdf` in {shown} starts from the profile's folder"),
+        },
+        other => other,
+    })?;
     let model = RobotModel::from_urdf_text(&urdf_text, &urdf_path.display().to_string())?;
     let profile = calib_profile::check(&raw, &text, &shown, &model)?;
     known_estimators(&profile, &text, &shown)?;
@@ -142,24 +153,29 @@ fn known_estimators(profile: &Profile, text: &str, shown: &str) -> Result<(), Pi
         // What plugins offer is known when they are loaded.
         return Ok(());
     }
-    let ids: Vec<&str> = calib_cor::estimators().iter().map(|e| e.id).collect();
+    let centers: Vec<&str> = calib_cor::estimators().iter().map(|e| e.id).collect();
+    let axes: Vec<&str> = calib_aor::estimators().iter().map(|e| e.id).collect();
     for (name, origin) in &profile.origins {
-        let wanted = origin.center.as_str();
-        if ids.contains(&wanted) {
-            continue;
+        for (key, wanted, ids) in [
+            ("center", &origin.center, &centers),
+            ("axis", &origin.axis, &axes),
+        ] {
+            if ids.contains(&wanted.as_str()) {
+                continue;
+            }
+            let near = match calib_urdf::nearest::nearest(wanted, ids.iter().copied()) {
+                Some(near) => format!("did you mean `{near}`? "),
+                None => String::new(),
+            };
+            return Err(ProfileError::at(
+                shown,
+                text,
+                &["origins", name, key],
+                format!("origin `{name}`: no {key} estimator is called `{wanted}`"),
+                format!("{near}known: {}", ids.join(", ")),
+            )
+            .into());
         }
-        let place = text
-            .lines()
-            .position(|line| line.contains("center:") && line.contains(wanted))
-            .map_or_else(String::new, |line| format!(":{}", line + 1));
-        let nearest = calib_urdf::nearest::nearest(wanted, ids.iter().copied())
-            .map_or_else(String::new, |near| format!("did you mean `{near}`? "));
-        return Err(PipelineError::Usage {
-            finding: format!(
-                "{shown}{place}: origin `{name}`: no center estimator is called `{wanted}`"
-            ),
-            remedy: format!("{nearest}known: {}", ids.join(", ")),
-        });
     }
     Ok(())
 }
@@ -179,7 +195,10 @@ pub fn load_recordings(robot: RobotProfile, plugins: bool) -> Result<Inputs, Pip
         let bytes = std::fs::read(&path).map_err(|e| PipelineError::Data {
             file: path.display().to_string(),
             finding: format!("recording `{name}` cannot be read: {e}"),
-            remedy: "correct `file`; it is relative to the profile".to_owned(),
+            remedy: format!(
+                "{} `file` starts from the profile's folder",
+                paths::reading(&path, &e)
+            ),
         })?;
         digests.push(Digest {
             path: spec.file.clone(),
@@ -275,7 +294,10 @@ fn read_robot_log(
     let bytes = std::fs::read(&path).map_err(|e| PipelineError::Data {
         file: shown.clone(),
         finding: format!("the robot's log of recording `{name}` cannot be read: {e}"),
-        remedy: "correct `robot_log: {file: …}`; it is relative to the profile".to_owned(),
+        remedy: format!(
+            "{} `robot_log: {{file: …}}` starts from the profile's folder",
+            paths::reading(&path, &e)
+        ),
     })?;
     digests.push(Digest {
         path: log.file.clone(),
@@ -470,7 +492,6 @@ fn prepare(
             ));
         }
     }
-    check_bodies(robot, name, &poses, findings);
     let q = joint_vectors(model, spec, &poses);
     Ok(Loaded {
         name: name.to_owned(),
@@ -529,28 +550,6 @@ fn in_file(mut finding: Finding, file: &str) -> Finding {
         };
     }
     finding
-}
-
-/// Says which declared bodies and markers a recording does not have; none of one body is "not in view".
-fn check_bodies(robot: &RobotProfile, name: &str, poses: &Poses, findings: &mut Vec<Finding>) {
-    for (body, spec) in &robot.profile.bodies {
-        if let calib_profile::BodyKind::Markers { names, .. } = &spec.kind {
-            let missing: Vec<&str> = names
-                .iter()
-                .filter(|m| !poses.markers.contains_key(*m))
-                .map(String::as_str)
-                .collect();
-            if !missing.is_empty() && missing.len() < names.len() {
-                findings.push(Finding::new(
-                    "marker-not-recorded",
-                    Severity::Warning,
-                    format!("{name}: {body}"),
-                    format!("the recording has no column for {}", missing.join(", ")),
-                    "export all markers of the body, or remove them from the profile",
-                ));
-            }
-        }
-    }
 }
 
 fn joint_vectors(model: &RobotModel, spec: &RecordingSpec, poses: &Poses) -> Vec<Option<Vec<f64>>> {

@@ -117,7 +117,7 @@ pub fn original(changed: &Path) -> Result<String, PipelineError> {
     calib_urdf::revert(&text(changed)?, &record).map_err(|e| {
         let said = e.to_string();
         let (finding, remedy) = said
-            .split_once("\nhelp: ")
+            .split_once("\n  help: ")
             .unwrap_or((&said, "revert the file as it was written"));
         PipelineError::Data {
             file: changed.display().to_string(),

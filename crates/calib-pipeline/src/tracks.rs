@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use calib_profile::{Body, BodyKind, Usage};
 use calib_recording::Finding;
 use calib_recording::rigid_body::{NotABody, Template, body_poses};
+use calib_urdf::nearest::nearest;
 use nalgebra::{Isometry3, Point3};
 
 use crate::error::PipelineError;
@@ -77,6 +78,23 @@ fn slices(tracks: &[Vec<Option<Point3<f64>>>]) -> Vec<&[Option<Point3<f64>>]> {
     tracks.iter().map(Vec::as_slice).collect()
 }
 
+/// What the recordings have that is called almost like the body, or like its first marker.
+fn recorded_as(inputs: &Inputs, name: &str, body: &Body) -> String {
+    let recordings = || inputs.recordings.values();
+    let near = match &body.kind {
+        BodyKind::Pose => {
+            let bodies = recordings().flat_map(|r| r.poses.bodies.keys());
+            let strangers = bodies.filter(|b| !inputs.robot.profile.bodies.contains_key(*b));
+            nearest(name, strangers.map(String::as_str))
+        }
+        BodyKind::Markers { names, .. } => names.first().and_then(|first| {
+            let markers = recordings().flat_map(|r| r.poses.markers.keys());
+            nearest(first, markers.map(String::as_str))
+        }),
+    };
+    near.map_or_else(String::new, |near| format!("did you mean `{near}`? "))
+}
+
 fn body_track(
     inputs: &Inputs,
     name: &str,
@@ -93,7 +111,10 @@ fn body_track(
     let not_seen = || PipelineError::Data {
         file: inputs.robot.file.clone(),
         finding: format!("no recording that is fitted shows body `{name}`"),
-        remedy: "record it, check the column names, or remove it from the profile".to_owned(),
+        remedy: format!(
+            "{}record it, check the column names, or remove it from the profile",
+            recorded_as(inputs, name, body)
+        ),
     };
     let names = match &body.kind {
         BodyKind::Pose => {

@@ -4,7 +4,7 @@ use std::fmt;
 
 use calib_urdf::nearest::nearest;
 
-use crate::locate::Place;
+use crate::locate::{Place, Places};
 
 /// One problem.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,6 +49,20 @@ impl ProfileError {
             lines: text.lines().map(str::to_owned).collect(),
             problems,
         }
+    }
+}
+
+impl ProfileError {
+    /// One problem at the value that `path` (keys, or list positions as decimal numbers) leads to.
+    pub fn at(
+        file: &str,
+        text: &str,
+        path: &[&str],
+        finding: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        let place = Places::of(text).value(path);
+        Self::new(file, text, vec![Problem::new(place, finding, remedy)])
     }
 }
 
@@ -150,13 +164,32 @@ pub(crate) fn from_yaml(error: &serde_saphyr::Error, text: &str, file: &str) -> 
             format!("the key `{field}` is missing here"),
             format!("add `{field}: …`"),
         ),
+        Yaml::NonFiniteFloat { value, .. } => (
+            format!("`{value}` is not finite"),
+            "give a finite number".to_owned(),
+        ),
+        Yaml::InvalidScalar { ty, .. } => {
+            let (finding, remedy) = match *ty {
+                "floating point" => (
+                    "a number belongs here",
+                    "give it without its unit, which stands in the key",
+                ),
+                "boolean" => ("`true` or `false` belongs here", "write one of the two"),
+                _ => (
+                    "a whole number belongs here",
+                    "give 0 or more, without point or unit",
+                ),
+            };
+            (finding.to_owned(), remedy.to_owned())
+        }
         other => {
             let full = other.to_string();
-            let finding = full
-                .lines()
-                .next()
-                .unwrap_or("not readable as YAML")
-                .to_owned();
+            let first = full.lines().next().unwrap_or("not readable as YAML");
+            // The place stands before the message.
+            let finding = match first.rsplit_once(" at line ") {
+                Some((finding, _)) if place.is_some() => finding.to_owned(),
+                _ => first.to_owned(),
+            };
             (
                 finding,
                 "a profile is YAML: keys, colons, indentation; see the profiles in `robots/`"

@@ -22,7 +22,11 @@ impl Places {
     /// Reads the structure; a text that is no YAML has no places.
     #[must_use]
     pub fn of(text: &str) -> Self {
-        Self(serde_saphyr::from_str::<Tree>(text).ok())
+        // Otherwise one `.nan` would make the whole text unreadable, and no problem would have a place.
+        let options = serde_saphyr::options! {
+            non_finite_float_policy: serde_saphyr::options::NonFiniteFloatPolicy::PassThrough,
+        };
+        Self(serde_saphyr::from_str_with_options::<Tree>(text, options).ok())
     }
 
     /// Place of the value at `path` (keys, or list positions as decimal numbers); the nearest enclosing one

@@ -89,7 +89,7 @@ pub enum EditError {
         joint: String,
     },
     #[error(
-        "{file}:{place}: joint `{joint}` has no <limit>\nhelp: write <limit lower=\"…\" upper=\"…\" effort=\"…\" velocity=\"…\"/>; effort and velocity cannot be guessed"
+        "{file}:{place}: joint `{joint}` has no <limit>\n  help: write <limit lower=\"…\" upper=\"…\" effort=\"…\" velocity=\"…\"/>; effort and velocity cannot be guessed"
     )]
     NoLimit {
         file: String,
@@ -110,7 +110,7 @@ pub enum EditError {
         upper: String,
     },
     #[error(
-        "{file}: the {kind} `{name}` exists already and is not the frame to be added\nhelp: choose another name for the frame, for example with a prefix"
+        "{file}: the {kind} `{name}` exists already and is not the frame to be added\n  help: choose another name for the frame, for example with a prefix"
     )]
     NameTaken {
         file: String,
@@ -126,7 +126,7 @@ pub enum EditError {
         reason: &'static str,
     },
     #[error(
-        "{file}:{place}: `{attribute}` of joint `{joint}` is \"{found}\", which xacro computes, so there is no number to replace\nhelp: patch the expanded URDF, or the property that the expression uses"
+        "{file}:{place}: `{attribute}` of joint `{joint}` is \"{found}\", which xacro computes, so there is no number to replace\n  help: patch the expanded URDF, or the property that the expression uses"
     )]
     XacroExpression {
         file: String,
@@ -136,7 +136,7 @@ pub enum EditError {
         found: String,
     },
     #[error(
-        "{file}:{place}: the origin or axis of joint `{joint}` takes {value}, which is {}: a new value would change more than this joint\nhelp: give this origin a {} of its own, or patch the expanded URDF",
+        "{file}:{place}: the origin or axis of joint `{joint}` takes {value}, which is {}: a new value would change more than this joint\n  help: give this origin a {} of its own, or patch the expanded URDF",
         value_uses(lines, included),
         if value.starts_with('`') { "value" } else { "property" }
     )]
@@ -149,7 +149,7 @@ pub enum EditError {
         included: Box<[String]>,
     },
     #[error(
-        "{file}:{place}: the origin or axis of joint `{joint}` takes its numbers from `{argument}`, which was not found\nhelp: name that YAML file yourself (calib apply … --yaml FILE)"
+        "{file}:{place}: the origin or axis of joint `{joint}` takes its numbers from `{argument}`, which was not found\n  help: name that YAML file yourself (calib apply … --yaml FILE)"
     )]
     XacroYamlNotFound {
         file: String,
@@ -164,7 +164,7 @@ pub enum EditError {
         reason: String,
     },
     #[error(
-        "{file}:{place}: `{keys}`, which holds the origin of joint `{joint}`, cannot be replaced: {fault}\nhelp: write one plain number there, `x: 0.1`"
+        "{file}:{place}: `{keys}`, which holds the origin of joint `{joint}`, cannot be replaced: {fault}\n  help: write one plain number there, `x: 0.1`"
     )]
     YamlValue {
         file: String,
@@ -174,7 +174,7 @@ pub enum EditError {
         fault: &'static str,
     },
     #[error(
-        "{file}: there is no origin of joint `{joint}`: no key {keys} has x, y, z, roll, pitch, yaw{hint}\nhelp: give the file that holds this joint, or the URDF or xacro"
+        "{file}: there is no origin of joint `{joint}`: no key {keys} has x, y, z, roll, pitch, yaw{hint}\n  help: give the file that holds this joint, or the URDF or xacro"
     )]
     YamlNoJoint {
         file: String,
@@ -183,7 +183,7 @@ pub enum EditError {
         hint: Hint,
     },
     #[error(
-        "{file}: the origin of joint `{joint}` stands in several places (lines {}), of which one cannot be chosen\nhelp: give the file that holds this robot alone",
+        "{file}: the origin of joint `{joint}` stands in several places (lines {}), of which one cannot be chosen\n  help: give the file that holds this robot alone",
         comma_list(lines)
     )]
     YamlSeveral {
@@ -194,7 +194,7 @@ pub enum EditError {
     #[error("{file}: a kinematics YAML holds origins of joints, and nothing else can be set in it")]
     YamlOnlyOrigins { file: String },
     #[error(
-        "{file}:{place}: joint `{joint}` comes from `{template}`, whose name xacro computes\nhelp: patch the expanded URDF"
+        "{file}:{place}: joint `{joint}` comes from `{template}`, whose name xacro computes\n  help: patch the expanded URDF"
     )]
     XacroTemplate {
         file: String,
@@ -203,7 +203,7 @@ pub enum EditError {
         template: String,
     },
     #[error(
-        "{file}:{place}: joint `{joint}` stands in the macro `{macro_name}`, which is used {}: one text, several joints\nhelp: patch the expanded URDF, or give the macro a parameter for this origin",
+        "{file}:{place}: joint `{joint}` stands in the macro `{macro_name}`, which is used {}: one text, several joints\n  help: patch the expanded URDF, or give the macro a parameter for this origin",
         uses(lines)
     )]
     XacroMacro {
@@ -214,7 +214,7 @@ pub enum EditError {
         lines: Vec<usize>,
     },
     #[error(
-        "{file}: joint `{joint}` is written in several places (lines {}), of which xacro chooses\nhelp: patch the expanded URDF",
+        "{file}: joint `{joint}` is written in several places (lines {}), of which xacro chooses\n  help: patch the expanded URDF",
         comma_list(lines)
     )]
     XacroAmbiguous {

@@ -349,7 +349,7 @@ impl fmt::Display for ReadError {
             }
             let remedy = found.problem.remedy();
             if !remedy.is_empty() {
-                write!(f, "\nhelp: {remedy}")?;
+                write!(f, "\n  help: {remedy}")?;
             }
         }
         if self.problems.len() > SHOWN {

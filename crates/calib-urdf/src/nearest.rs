@@ -1,19 +1,36 @@
 //! The name that a person probably meant.
 
+use std::cmp::Reverse;
+
 /// Of `known`, the name nearest to `wrong` by edit distance; `None` when nothing is near enough to be a slip.
 ///
-/// Near enough: a third of the letters (at least one) may be wrong, capital letters count nothing.
+/// Near enough: a third of the letters (at least one) may be wrong, capital letters count nothing. Of names that
+/// are equally near, the one with the same letters in another order (`haed` is `head`, not `hand`), then the one
+/// that begins alike.
 #[must_use]
 pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let lower = wrong.to_lowercase();
     known
         .into_iter()
-        .map(|name| (edit_distance(&lower, &name.to_lowercase()), name))
+        .map(|name| {
+            let other = name.to_lowercase();
+            let begins_alike = (lower.chars().zip(other.chars()))
+                .take_while(|(a, b)| a == b)
+                .count();
+            let unlike = (letters(&lower) != letters(&other), Reverse(begins_alike));
+            (edit_distance(&lower, &other), unlike, name)
+        })
         .min()
-        .filter(|(distance, name)| {
+        .filter(|(distance, _, name)| {
             *distance <= (name.chars().count().max(lower.chars().count()) / 3).max(1)
         })
-        .map(|(_, name)| name)
+        .map(|(_, _, name)| name)
+}
+
+fn letters(word: &str) -> Vec<char> {
+    let mut letters: Vec<char> = word.chars().collect();
+    letters.sort_unstable();
+    letters
 }
 
 /// Letters to insert, delete, exchange or swap with their neighbour: `wirst` is one slip away from `wrist`.
@@ -52,6 +69,13 @@ mod tests {
         assert_eq!(edit_distance("", "abc"), 3);
         assert_eq!(edit_distance("wirst", "wrist"), 1);
         assert_eq!(edit_distance("abc", "abc"), 0);
+    }
+
+    #[test]
+    fn of_equally_near_names_the_likelier_slip() {
+        assert_eq!(nearest("haed", ["hand", "head"]), Some("head"));
+        assert_eq!(nearest("heI", ["haI", "heT"]), Some("heT"));
+        assert_eq!(nearest("ab", ["ad", "ac"]), Some("ac"));
     }
 
     #[test]

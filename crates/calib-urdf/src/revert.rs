@@ -48,13 +48,13 @@ pub struct Replacement {
 #[allow(missing_docs, reason = "each variant's text is its documentation")]
 pub enum RevertError {
     #[error(
-        "the record has the version {found}, expected {RECORD_VERSION}\nhelp: revert with the calib that wrote it"
+        "the record has the version {found}, expected {RECORD_VERSION}\n  help: revert with the calib that wrote it"
     )]
     Version { found: u32 },
     #[error("nothing to revert: the file already is the original")]
     AlreadyOriginal,
     #[error(
-        "the file was edited after it was patched (sha256 {found}, recorded {recorded})\nhelp: undo those edits first, or patch the original again; the record lists the old values"
+        "the file was edited after it was patched (sha256 {found}, recorded {recorded})\n  help: undo those edits first, or patch the original again; the record lists the old values"
     )]
     Edited { found: String, recorded: String },
     #[error("the record does not describe this file: at byte {at} it expects \"{expected}\"")]

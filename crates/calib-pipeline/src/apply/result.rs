@@ -66,7 +66,7 @@ pub fn find(path: &Path, force: bool) -> Result<Calibrated, PipelineError> {
     let record = read_record(&urdf)?;
     let original = calib_urdf::revert(&urdf_text, &record).map_err(|e| PipelineError::Data {
         file: name.clone(),
-        finding: e.to_string().replace("\nhelp: ", "; "),
+        finding: e.to_string().replace("\n  help: ", "; "),
         remedy: "give the results as `calib run` wrote them".to_owned(),
     })?;
     let before = RobotModel::from_urdf_text(&original, &name)?;

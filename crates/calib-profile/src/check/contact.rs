@@ -11,7 +11,7 @@ impl Checker<'_> {
         let raw = self.raw;
         raw.contacts
             .iter()
-            .map(|(name, c)| (name.clone(), self.contact(name, c)))
+            .filter_map(|(name, c)| Some((name.clone(), self.contact(name, c)?)))
             .collect()
     }
 
@@ -22,17 +22,19 @@ impl Checker<'_> {
             if let Some(sigma) = tip.sigma_mm {
                 self.positive(&["points", name, "sigma_mm"], sigma);
             }
-            let tip = Tip {
-                link: self.link(&["points", name, "link"], &tip.link),
-                at: Point3::from(Vector3::from(tip.at_mm) * MM),
-                sigma: tip.sigma_mm.map(|s| s * MM),
-            };
-            tips.insert(name.clone(), tip);
+            if let Some(link) = self.link(&["points", name, "link"], &tip.link) {
+                let tip = Tip {
+                    link,
+                    at: Point3::from(Vector3::from(tip.at_mm) * MM),
+                    sigma: tip.sigma_mm.map(|s| s * MM),
+                };
+                tips.insert(name.clone(), tip);
+            }
         }
         tips
     }
 
-    fn contact(&mut self, name: &str, raw: &RawContact) -> Contact {
+    fn contact(&mut self, name: &str, raw: &RawContact) -> Option<Contact> {
         if raw.recordings.is_empty() {
             self.key_problem(
                 &["contacts", name],
@@ -40,25 +42,29 @@ impl Checker<'_> {
                 "add `recordings: [<name>]`: the poses in which the point touches",
             );
         }
-        for recording in &raw.recordings {
+        for (i, recording) in raw.recordings.iter().enumerate() {
             self.known(
-                &["contacts", name, "recordings"],
+                "recording",
+                &["contacts", name, "recordings", &i.to_string()],
                 recording,
                 self.raw.recordings.keys(),
             );
         }
         self.known(
+            "point",
             &["contacts", name, "point"],
             &raw.point,
             self.raw.points.keys(),
         );
         let on = match &raw.on {
-            None => ContactBase::Link(self.robot.root()),
-            Some(on) if *on == self.raw.tracker.frame => ContactBase::Tracker,
-            Some(on) => ContactBase::Link(self.link(&["contacts", name, "on"], on)),
+            None => Some(ContactBase::Link(self.robot.root())),
+            Some(on) if *on == self.raw.tracker.frame => Some(ContactBase::Tracker),
+            Some(on) => self
+                .link(&["contacts", name, "on"], on)
+                .map(ContactBase::Link),
         };
         let carrier = self.raw.points.get(&raw.point).map(|p| p.link.as_str());
-        if let (ContactBase::Link(base), Some(carrier)) = (on, carrier)
+        if let (Some(ContactBase::Link(base)), Some(carrier)) = (on, carrier)
             && let Ok(link) = self.robot.link_id(carrier)
             && self.rigidly_joined(base, link)
         {
@@ -96,7 +102,7 @@ impl Checker<'_> {
                 from_mm,
                 distance_mm,
             } => {
-                if !(distance_mm.is_finite() && distance_mm > 0.0) {
+                if !(distance_mm > 0.0 || self.named_already(distance_mm)) {
                     self.problem(
                         &["contacts", name, "touches"],
                         format!("{distance_mm} is no distance"),
@@ -115,10 +121,10 @@ impl Checker<'_> {
                 "remove the key",
             );
         }
-        Contact {
+        Some(Contact {
             recordings: raw.recordings.clone(),
             point: raw.point.clone(),
-            on,
+            on: on?,
             touched,
             base_from_place: Isometry3::from_parts(
                 Translation3::from(Vector3::from(at) * MM),
@@ -127,7 +133,7 @@ impl Checker<'_> {
             place_sigma: raw.place_sigma_mm.map(|s| s * MM),
             place_sigma_rad: raw.place_sigma_deg.map(|s| s * DEG),
             sigma: raw.sigma_mm * MM,
-        }
+        })
     }
 
     /// Rotation whose z axis is along `v`.

@@ -6,7 +6,7 @@ use calib_urdf::{JointId, JointKind, LinkId, RobotModel};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use crate::error::{Problem, ProfileError, expected, one_of};
-use crate::locate::Places;
+use crate::locate::{Place, Places};
 use crate::profile::{
     Body, BodyKind, Error3, JointException, Limits, LinkTransform, Loop, Noise, Orientation,
     Origin, Outputs, PointChoice, Prior, Profile, Protocol, RecordingSpec, RobotLog, SimErrors,
@@ -40,7 +40,7 @@ pub fn check(
     file: &str,
     robot: &RobotModel,
 ) -> Result<Profile, ProfileError> {
-    let Some(any_joint) = robot.joint_ids().next() else {
+    if robot.joints().is_empty() {
         let place = Places::of(text).value(&["robot", "urdf"]);
         let finding = format!("`{}` has no joints", raw.robot.urdf);
         return Err(ProfileError::new(
@@ -48,15 +48,16 @@ pub fn check(
             text,
             vec![Problem::new(place, finding, "name the URDF of a robot")],
         ));
-    };
+    }
     let mut checker = Checker {
         raw,
         robot,
-        any_joint,
         places: Places::of(text),
         problems: Vec::new(),
+        unknown: BTreeMap::new(),
     };
     let profile = checker.profile();
+    checker.name_the_unknown();
     if checker.problems.is_empty() {
         Ok(profile)
     } else {
@@ -69,12 +70,15 @@ mod names;
 mod origin;
 mod simulate;
 
+/// What does not resolve is left out of the checked profile, and nothing is concluded from it: one slip of the
+/// pen is one problem. The profile of a checker with problems is not given out.
 struct Checker<'a> {
     raw: &'a RawProfile,
     robot: &'a RobotModel,
-    any_joint: JointId,
     places: Places,
     problems: Vec<Problem>,
+    /// Names that nothing is called, with the remedy and every place.
+    unknown: BTreeMap<String, (String, Vec<Option<Place>>)>,
 }
 
 impl<'a> Checker<'a> {
@@ -103,9 +107,11 @@ impl<'a> Checker<'a> {
             );
         }
         for place in self.places.not_finite() {
-            let finding = "a number that is not finite";
-            self.problems
-                .push(Problem::new(Some(place), finding, "give a number"));
+            self.problems.push(Problem::new(
+                Some(place),
+                "a number that is not finite",
+                "give a finite number",
+            ));
         }
         if raw.bodies.is_empty() && raw.contacts.is_empty() {
             self.problem(
@@ -150,7 +156,7 @@ impl<'a> Checker<'a> {
             origins: raw
                 .origins
                 .iter()
-                .map(|(name, o)| (name.clone(), self.origin(name, o)))
+                .filter_map(|(name, o)| Some((name.clone(), self.origin(name, o)?)))
                 .collect(),
             transforms: self.transforms(),
             loops: self.loops(),
@@ -176,12 +182,14 @@ impl<'a> Checker<'a> {
                     );
                 }
             }
-            bodies.insert(name.clone(), self.body(name, body));
+            if let Some(body) = self.body(name, body) {
+                bodies.insert(name.clone(), body);
+            }
         }
         bodies
     }
 
-    fn body(&mut self, name: &str, raw: &RawBody) -> Body {
+    fn body(&mut self, name: &str, raw: &RawBody) -> Option<Body> {
         let link = self.link(&["bodies", name, "link"], &raw.link);
         let kind = match (raw.pose, raw.markers.is_empty()) {
             (true, true) => BodyKind::Pose,
@@ -209,36 +217,30 @@ impl<'a> Checker<'a> {
                 BodyKind::Pose
             }
         };
-        Body {
-            link,
+        Some(Body {
+            link: link?,
             kind,
             mount: raw.mount.as_ref().map(pose),
-        }
+        })
     }
 
     fn template(&mut self, name: &str, raw: &RawBody) -> Option<Vec<Point3<f64>>> {
         if raw.template_mm.is_empty() {
             return None;
         }
-        for marker in raw.template_mm.keys().filter(|m| !raw.markers.contains(m)) {
-            self.problem(
-                &["bodies", name, "template_mm", marker],
-                format!("`{marker}` is not a marker of `{name}`"),
-                expected(marker, raw.markers.iter().map(String::as_str)),
-            );
-        }
-        let mut points = Vec::new();
-        for marker in &raw.markers {
-            match raw.template_mm.get(marker) {
-                Some(p) => points.push(Point3::from(Vector3::from(*p) * MM)),
-                None => self.problem(
-                    &["bodies", name, "template_mm"],
-                    format!("the template has no marker `{marker}`"),
-                    "give all markers of the body or none",
-                ),
-            }
-        }
-        Some(points)
+        self.marker_places(
+            &["bodies", name, "template_mm"],
+            name,
+            &raw.template_mm,
+            "give all markers of the body or none",
+            true,
+        );
+        let points = raw.markers.iter().filter_map(|m| raw.template_mm.get(m));
+        Some(
+            points
+                .map(|p| Point3::from(Vector3::from(*p) * MM))
+                .collect(),
+        )
     }
 
     fn recording(&mut self, name: &str, raw: &RawRecording) -> RecordingSpec {
@@ -283,7 +285,7 @@ impl<'a> Checker<'a> {
                 ("rate_hz", timing.rate_hz),
                 ("max_offset_s", timing.max_offset_s),
             ] {
-                if !(value.is_finite() && value > 0.0) {
+                if !(value > 0.0 || self.named_already(value)) {
                     self.problem(
                         &["recordings", name, "timing", key],
                         format!("{value} is not above 0"),
@@ -327,7 +329,7 @@ impl<'a> Checker<'a> {
             let correct = t
                 .correct
                 .as_ref()
-                .and_then(|joint| self.joint_at(&path, joint));
+                .and_then(|joint| self.joint(&path, joint));
             if let (Some(joint), Some(joint_name)) = (correct, &t.correct) {
                 if self.robot.joint(joint).kind != JointKind::Fixed {
                     self.problem(
@@ -336,11 +338,12 @@ impl<'a> Checker<'a> {
                         "name a fixed joint, e.g. the one that stands the robot on its table",
                     );
                 }
-                if !self
-                    .robot
-                    .chain(parent, child)
-                    .iter()
-                    .any(|step| step.joint == joint)
+                if let (Some(parent), Some(child)) = (parent, child)
+                    && !self
+                        .robot
+                        .chain(parent, child)
+                        .iter()
+                        .any(|step| step.joint == joint)
                 {
                     self.problem(
                         &path,
@@ -352,14 +355,16 @@ impl<'a> Checker<'a> {
                     );
                 }
             }
-            transforms.insert(
-                name.clone(),
-                LinkTransform {
-                    parent,
-                    child,
-                    correct,
-                },
-            );
+            if let (Some(parent), Some(child)) = (parent, child) {
+                transforms.insert(
+                    name.clone(),
+                    LinkTransform {
+                        parent,
+                        child,
+                        correct,
+                    },
+                );
+            }
         }
         transforms
     }
@@ -367,8 +372,9 @@ impl<'a> Checker<'a> {
     fn loops(&mut self) -> BTreeMap<String, Loop> {
         let raw = self.raw;
         for (name, l) in &raw.loops {
-            self.known(&["loops", name, "from"], &l.from, raw.origins.keys());
-            self.known(&["loops", name, "to"], &l.to, raw.origins.keys());
+            for (key, end) in [("from", &l.from), ("to", &l.to)] {
+                self.known("origin", &["loops", name, key], end, raw.origins.keys());
+            }
             if l.from == l.to {
                 self.problem(
                     &["loops", name, "to"],
@@ -378,6 +384,7 @@ impl<'a> Checker<'a> {
             }
             if let Some(recording) = &l.recording {
                 self.known(
+                    "recording",
                     &["loops", name, "recording"],
                     recording,
                     raw.recordings.keys(),
@@ -403,14 +410,13 @@ impl<'a> Checker<'a> {
         let mut joints = BTreeMap::new();
         for (name, exception) in &raw.joints {
             let path = ["solve", "joints", name.as_str()];
-            let Some(joint) = self.joint_at(&path, name) else {
+            let Some(joint) = self.joint(&path, name) else {
                 continue;
             };
             let mut coupled_to = Vec::new();
-            for other in &exception.coupled_to {
-                if let Some(id) = self.joint_at(&["solve", "joints", name, "coupled_to"], other) {
-                    coupled_to.push(id);
-                }
+            for (i, other) in exception.coupled_to.iter().enumerate() {
+                let at = i.to_string();
+                coupled_to.extend(self.joint(&["solve", "joints", name, "coupled_to", &at], other));
             }
             for (key, value) in [
                 ("sigma_mm", exception.sigma_mm),
@@ -457,6 +463,7 @@ impl<'a> Checker<'a> {
         let limits = &raw.limits;
         for loop_name in limits.loop_mean_mm.keys() {
             self.known(
+                "loop",
                 &["solve", "limits", "loop_mean_mm", loop_name],
                 loop_name,
                 self.raw.loops.keys(),
@@ -498,8 +505,9 @@ impl<'a> Checker<'a> {
 
     fn outputs(&mut self) -> Outputs {
         let raw = &self.raw.outputs;
-        for body in &raw.add_bodies {
-            self.known(&["outputs", "add_bodies"], body, self.raw.bodies.keys());
+        for (i, body) in raw.add_bodies.iter().enumerate() {
+            let path = ["outputs", "add_bodies", &i.to_string()];
+            self.known("body", &path, body, self.raw.bodies.keys());
         }
         let named = |name: &Option<String>, suffix: &str| {
             name.clone()

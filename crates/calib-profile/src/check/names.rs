@@ -1,80 +1,129 @@
 //! Names, units and limits: what every section of a profile is checked with.
 
+use calib_urdf::nearest::nearest;
+
 use super::*;
 
 impl Checker<'_> {
+    /// Notes that nothing `what` is called `name`; its place is the key that is the name, or else the value.
+    fn unknown(&mut self, path: &[&str], name: &str, finding: String, remedy: String) {
+        let place = match path.last() {
+            Some(last) if *last == name => self.places.key(path),
+            _ => None,
+        };
+        let place = place.or_else(|| self.places.value(path));
+        let (_, places) = self.unknown.entry(finding).or_insert((remedy, Vec::new()));
+        places.push(place);
+    }
+
+    /// Every unknown name once, at its first place, with the lines of the others.
+    pub(super) fn name_the_unknown(&mut self) {
+        for (finding, (remedy, mut places)) in std::mem::take(&mut self.unknown) {
+            places.sort();
+            let first = places.first().copied().flatten();
+            let mut others: Vec<usize> = places.iter().flatten().map(|p| p.line).collect();
+            others.retain(|line| first.is_none_or(|first| *line != first.line));
+            others.dedup();
+            let finding = match others
+                .iter()
+                .map(usize::to_string)
+                .collect::<Vec<_>>()
+                .as_slice()
+            {
+                [] => finding,
+                [line] => format!("{finding} (also in line {line})"),
+                [lines @ .., last] => {
+                    format!("{finding} (also in lines {} and {last})", lines.join(", "))
+                }
+            };
+            self.problems.push(Problem::new(first, finding, remedy));
+        }
+    }
+
     pub(super) fn known<'n>(
         &mut self,
+        what: &str,
         path: &[&str],
         name: &str,
         names: impl IntoIterator<Item = &'n String>,
     ) {
         let names: BTreeSet<&str> = names.into_iter().map(String::as_str).collect();
         if !names.contains(name) {
-            let what = path.iter().rev().find_map(|k| match *k {
-                "body" | "bodies" | "add_bodies" | "mounts" => Some("body"),
-                "sweep" | "recording" | "recordings" => Some("recording"),
-                "point" => Some("point"),
-                "from" | "to" if path[0] == "loops" => Some("origin"),
-                "from" => Some("body"),
-                "loop_mean_mm" => Some("loop"),
-                _ => None,
-            });
-            self.problem(
-                path,
-                format!("no {} is called `{name}`", what.unwrap_or("origin")),
-                expected(name, names),
-            );
+            let finding = format!("no {what} is called `{name}`");
+            self.unknown(path, name, finding, expected(name, names));
         }
     }
 
-    pub(super) fn link(&mut self, path: &[&str], name: &str) -> LinkId {
-        match self.robot.link_id(name) {
-            Ok(id) => id,
-            Err(_) => {
-                let names: Vec<&str> = self.robot.links().iter().map(|l| l.name.as_str()).collect();
-                self.problem(
-                    path,
-                    format!("the URDF has no link `{name}`"),
-                    expected(name, names),
-                );
-                self.robot.root()
-            }
+    /// Each marker of a body has its place in a list of points; a marker without a place is not named where a
+    /// misspelled place is its. Further points are a problem where they are `forbidden`.
+    pub(super) fn marker_places(
+        &mut self,
+        path: &[&str],
+        body: &str,
+        points: &BTreeMap<String, [f64; 3]>,
+        remedy: &str,
+        forbidden: bool,
+    ) {
+        let Some(markers) = self.raw.bodies.get(body).map(|b| &b.markers) else {
+            return;
+        };
+        let missing = || {
+            let without = markers.iter().filter(|m| !points.contains_key(*m));
+            without.map(String::as_str)
+        };
+        let mut meant = BTreeSet::new();
+        for stranger in points.keys().filter(|m| !markers.contains(m)) {
+            let near = nearest(stranger, missing());
+            meant.extend(near);
+            let help = match near {
+                Some(near) => format!("did you mean `{near}`?"),
+                None if forbidden => expected(stranger, markers.iter().map(String::as_str)),
+                None => continue,
+            };
+            let mut at = path.to_vec();
+            at.push(stranger);
+            let finding = format!("`{stranger}` is not a marker of `{body}`");
+            self.unknown(&at, stranger, finding, help);
+        }
+        for marker in missing().filter(|m| !meant.contains(m)) {
+            let finding = format!("marker `{marker}` of `{body}` has no place here");
+            self.key_problem(path, finding, remedy);
         }
     }
 
-    /// The joint, or any joint where the name did not resolve: the problem is noted and no profile is returned.
-    pub(super) fn joint(&mut self, path: &[&str], name: &str) -> JointId {
-        self.joint_at(path, name).unwrap_or(self.any_joint)
+    pub(super) fn link(&mut self, path: &[&str], name: &str) -> Option<LinkId> {
+        let found = self.robot.link_id(name).ok();
+        if found.is_none() {
+            let names = self.robot.links().iter().map(|l| l.name.as_str());
+            let finding = format!("the URDF has no link `{name}`");
+            self.unknown(path, name, finding, expected(name, names));
+        }
+        found
     }
 
-    pub(super) fn joint_at(&mut self, path: &[&str], name: &str) -> Option<JointId> {
-        match self.robot.joint_id(name) {
-            Ok(id) => Some(id),
-            Err(_) => {
-                let names: Vec<&str> = self
-                    .robot
-                    .joints()
-                    .iter()
-                    .map(|j| j.name.as_str())
-                    .collect();
-                self.problem(
-                    path,
-                    format!("the URDF has no joint `{name}`"),
-                    expected(name, names),
-                );
-                None
-            }
+    pub(super) fn joint(&mut self, path: &[&str], name: &str) -> Option<JointId> {
+        self.joint_called(path, name, name)
+    }
+
+    /// The joint `name`, which `written` (the name, or the name and a unit) asks for.
+    fn joint_called(&mut self, path: &[&str], written: &str, name: &str) -> Option<JointId> {
+        let found = self.robot.joint_id(name).ok();
+        if found.is_none() {
+            let names = self.robot.joints().iter().map(|j| j.name.as_str());
+            let finding = format!("the URDF has no joint `{name}`");
+            self.unknown(path, written, finding, expected(name, names));
         }
+        found
     }
 
     /// `waist_deg` → joint and factor to SI, with the unit checked against the kind of the joint.
     pub(super) fn joint_key(&mut self, path: &[&str], key: &str) -> Option<(JointId, f64)> {
         let Some((name, unit)) = split_joint_key(key) else {
-            let known = self
-                .robot
-                .independent_joints()
-                .map(|id| format!("{}_deg", self.robot.joint(id).name));
+            let known = self.robot.independent_joints().map(|id| {
+                let joint = self.robot.joint(id);
+                let unit = if joint.kind.turns() { "deg" } else { "mm" };
+                format!("{}_{unit}", joint.name)
+            });
             let known: Vec<String> = known.collect();
             self.key_problem(
                 path,
@@ -86,23 +135,7 @@ impl Checker<'_> {
             );
             return None;
         };
-        let joint = match self.robot.joint_id(name) {
-            Ok(id) => id,
-            Err(_) => {
-                let names: Vec<&str> = self
-                    .robot
-                    .joints()
-                    .iter()
-                    .map(|j| j.name.as_str())
-                    .collect();
-                self.key_problem(
-                    path,
-                    format!("the URDF has no joint `{name}`"),
-                    expected(name, names),
-                );
-                return None;
-            }
-        };
+        let joint = self.joint_called(path, key, name)?;
         let kind = &self.robot.joint(joint).kind;
         if *kind == JointKind::Fixed {
             self.key_problem(
@@ -159,6 +192,9 @@ impl Checker<'_> {
         };
         /// Rounding of degrees written with two decimals.
         const SLACK: f64 = 1e-3;
+        if self.named_already(low) || self.named_already(high) {
+            return;
+        }
         if low < lower - SLACK || high > upper + SLACK {
             let (unit, factor) = if joint.kind.turns() {
                 ("deg", DEG)
@@ -188,8 +224,13 @@ impl Checker<'_> {
             .all(|step| self.robot.joint(step.joint).kind == JointKind::Fixed)
     }
 
+    /// A number that is not finite is named with all such numbers, at its place.
+    pub(super) fn named_already(&self, value: f64) -> bool {
+        !value.is_finite() && !self.places.not_finite().is_empty()
+    }
+
     pub(super) fn positive(&mut self, path: &[&str], value: f64) {
-        if !(value.is_finite() && value > 0.0) {
+        if !(value > 0.0 || self.named_already(value)) {
             self.problem(
                 path,
                 format!("{value} is no standard deviation"),
@@ -199,7 +240,7 @@ impl Checker<'_> {
     }
 
     pub(super) fn not_negative(&mut self, path: &[&str], value: f64) {
-        if !(value.is_finite() && value >= 0.0) {
+        if !(value >= 0.0 || self.named_already(value)) {
             self.problem(
                 path,
                 format!("{value} is no noise level"),

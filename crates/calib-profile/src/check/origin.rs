@@ -3,14 +3,16 @@
 use super::*;
 
 impl Checker<'_> {
-    pub(super) fn origin(&mut self, name: &str, raw: &RawOrigin) -> Origin {
+    pub(super) fn origin(&mut self, name: &str, raw: &RawOrigin) -> Option<Origin> {
         let joint = self.joint(&["origins", name, "joint"], &raw.joint);
-        let child = self.robot.joint(joint).child;
+        let child = joint.map(|joint| self.robot.joint(joint).child);
         let link = match &raw.link {
             Some(link) => self.link(&["origins", name, "link"], link),
             None => child,
         };
-        if !self.rigidly_joined(child, link) {
+        if let (Some(child), Some(link)) = (child, link)
+            && !self.rigidly_joined(child, link)
+        {
             let child_name = self.robot.link(child).name.clone();
             self.problem(
                 &["origins", name, "link"],
@@ -22,37 +24,9 @@ impl Checker<'_> {
                 "name a link that is fixed to it",
             );
         }
+        self.origin_body(name, raw, child);
         self.known(
-            &["origins", name, "body"],
-            &raw.body,
-            self.raw.bodies.keys(),
-        );
-        if let Some(body) = self.raw.bodies.get(&raw.body) {
-            if let Ok(body_link) = self.robot.link_id(&body.link)
-                && !self.rigidly_joined(child, body_link)
-            {
-                self.problem(
-                    &["origins", name, "body"],
-                    format!(
-                        "body `{}` sits on `{}`, which moves against the child link of `{}`",
-                        raw.body, body.link, raw.joint
-                    ),
-                    "mount the body on the joint's child link, or name the joint that carries it",
-                );
-            }
-            if !body.pose && body.markers.len() < 3 {
-                self.problem(
-                    &["origins", name, "body"],
-                    format!(
-                        "body `{}` has {} markers: they give points, not a frame",
-                        raw.body,
-                        body.markers.len()
-                    ),
-                    "an origin is expressed in a body frame: it needs 3 markers or a 6-DoF body",
-                );
-            }
-        }
-        self.known(
+            "recording",
             &["origins", name, "sweep"],
             &raw.sweep,
             self.raw.recordings.keys(),
@@ -67,11 +41,11 @@ impl Checker<'_> {
             );
         }
         let axes = self.axes(name, raw, joint);
-        let orientation = self.orientation(name, raw, axes.len());
-        let point = self.point(name, raw, axes.len());
-        Origin {
-            joint,
-            link,
+        let orientation = self.orientation(name, raw);
+        let point = self.point(name, raw);
+        Some(Origin {
+            joint: joint?,
+            link: link?,
             body: raw.body.clone(),
             sweep: raw.sweep.clone(),
             center: raw
@@ -84,17 +58,49 @@ impl Checker<'_> {
             axes,
             orientation,
             point,
+        })
+    }
+
+    /// The body that moves with the origin; `child` is the child link of the origin's joint.
+    fn origin_body(&mut self, name: &str, raw: &RawOrigin, child: Option<LinkId>) {
+        let path = ["origins", name, "body"];
+        self.known("body", &path, &raw.body, self.raw.bodies.keys());
+        let Some(body) = self.raw.bodies.get(&raw.body) else {
+            return;
+        };
+        if let (Some(child), Ok(body_link)) = (child, self.robot.link_id(&body.link))
+            && !self.rigidly_joined(child, body_link)
+        {
+            self.problem(
+                &path,
+                format!(
+                    "body `{}` sits on `{}`, which moves against the child link of `{}`",
+                    raw.body, body.link, raw.joint
+                ),
+                "mount the body on the joint's child link, or name the joint that carries it",
+            );
+        }
+        if !body.pose && body.markers.len() < 3 {
+            self.problem(
+                &path,
+                format!(
+                    "body `{}` has {} markers: they give points, not a frame",
+                    raw.body,
+                    body.markers.len()
+                ),
+                "an origin is expressed in a body frame: it needs 3 markers or a 6-DoF body",
+            );
         }
     }
 
     /// The swept joints, proximal first, each checked to turn about the stated axis of the joint frame at zero.
-    pub(super) fn axes(
+    fn axes(
         &mut self,
         name: &str,
         raw: &RawOrigin,
-        origin_joint: JointId,
+        origin_joint: Option<JointId>,
     ) -> Vec<SweptAxis> {
-        let child = self.robot.joint(origin_joint).child;
+        let child = origin_joint.map(|joint| self.robot.joint(joint).child);
         let zero = self.robot.forward_kinematics(&self.robot.zero_positions());
         let mut axes = Vec::new();
         for (label, joint_name) in &raw.axes {
@@ -107,7 +113,9 @@ impl Checker<'_> {
                 );
                 continue;
             };
-            let joint = self.joint(&path, joint_name);
+            let Some(joint) = self.joint(&path, joint_name) else {
+                continue;
+            };
             let Some(axis) = self
                 .robot
                 .joint(joint)
@@ -120,6 +128,9 @@ impl Checker<'_> {
                     format!("joint `{joint_name}` does not turn"),
                     "name a revolute joint",
                 );
+                continue;
+            };
+            let Some(child) = child else {
                 continue;
             };
             if !self.robot.carries(joint, child) {
@@ -146,10 +157,10 @@ impl Checker<'_> {
                 direction: Unit::new_normalize(in_child.into_inner()),
             });
         }
-        if axes.len() > 2 {
+        if raw.axes.len() > 2 {
             self.problem(
                 &["origins", name, "axes"],
-                format!("{} axes were given", axes.len()),
+                format!("{} axes were given", raw.axes.len()),
                 "an origin takes one or two swept axes",
             );
         }
@@ -170,10 +181,11 @@ impl Checker<'_> {
         axes
     }
 
-    pub(super) fn orientation(&mut self, name: &str, raw: &RawOrigin, axes: usize) -> Orientation {
+    fn orientation(&mut self, name: &str, raw: &RawOrigin) -> Orientation {
         match &raw.orientation {
             Some(RawOrientation::From(body)) => {
                 self.known(
+                    "body",
                     &["origins", name, "orientation", "from"],
                     body,
                     self.raw.bodies.keys(),
@@ -181,6 +193,8 @@ impl Checker<'_> {
                 Orientation::FromBody(body.clone())
             }
             None => {
+                // As many as were written: one whose name is wrong was named above.
+                let axes = raw.axes.len();
                 if axes < 2 {
                     self.key_problem(&["origins", name], format!("origin `{name}` has {axes} swept axes: its orientation is open"), "give two `axes`, or `orientation: {from: <body>}` to take it from the URDF");
                 }
@@ -189,15 +203,11 @@ impl Checker<'_> {
         }
     }
 
-    pub(super) fn point(
-        &mut self,
-        name: &str,
-        raw: &RawOrigin,
-        axes: usize,
-    ) -> Option<PointChoice> {
+    fn point(&mut self, name: &str, raw: &RawOrigin) -> Option<PointChoice> {
         match &raw.point {
             Some(RawPoint::NominalDistanceFrom(origin)) => {
                 self.known(
+                    "origin",
                     &["origins", name, "point", "nominal_distance_from"],
                     origin,
                     self.raw.origins.keys(),
@@ -213,7 +223,7 @@ impl Checker<'_> {
             }
             Some(RawPoint::FromBodyMm(distance)) => Some(PointChoice::FromBody(distance * MM)),
             None => {
-                if axes == 1 {
+                if raw.axes.len() == 1 {
                     self.key_problem(&["origins", name], format!("origin `{name}` sweeps one axis: only a line can be observed, not a point on it"), "choose the point with `point: {from_body_mm: 0}` or `point: {nominal_distance_from: <origin>}`");
                 }
                 None

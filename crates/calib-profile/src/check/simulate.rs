@@ -1,23 +1,22 @@
 //! The `simulate` section.
 
+use calib_urdf::nearest::nearest;
+
 use super::*;
 
 impl Checker<'_> {
     pub(super) fn simulation(&mut self, raw: &RawSimulate) -> Simulation {
         let mut mounts = BTreeMap::new();
         for (name, mount) in &raw.mounts {
-            self.known(&["simulate", "mounts", name], name, self.raw.bodies.keys());
-            if let Some(body) = self.raw.bodies.get(name) {
-                for marker in &body.markers {
-                    if !mount.markers_mm.contains_key(marker) {
-                        self.problem(
-                            &["simulate", "mounts", name],
-                            format!("marker `{marker}` has no place"),
-                            "give it under `markers_mm`",
-                        );
-                    }
-                }
-            }
+            let path = ["simulate", "mounts", name];
+            self.known("body", &path, name, self.raw.bodies.keys());
+            self.marker_places(
+                &["simulate", "mounts", name, "markers_mm"],
+                name,
+                &mount.markers_mm,
+                "give it under `markers_mm`",
+                false,
+            );
             let rigid = pose(&crate::raw::RawPose {
                 xyz_mm: mount.xyz_mm,
                 rpy_deg: mount.rpy_deg,
@@ -35,13 +34,15 @@ impl Checker<'_> {
                 },
             );
         }
-        for name in self
-            .raw
-            .bodies
-            .keys()
-            .filter(|name| !raw.mounts.contains_key(*name))
-        {
-            self.problem(
+        let bodies = &self.raw.bodies;
+        let without = || bodies.keys().filter(|name| !raw.mounts.contains_key(*name));
+        // A mount whose body nobody knows is the mount of the body that it almost names.
+        let strangers = raw.mounts.keys().filter(|name| !bodies.contains_key(*name));
+        let meant: BTreeSet<&str> = strangers
+            .filter_map(|name| nearest(name, without().map(String::as_str)))
+            .collect();
+        for name in without().filter(|name| !meant.contains(name.as_str())) {
+            self.key_problem(
                 &["simulate", "mounts"],
                 format!("body `{name}` has no simulated mount"),
                 format!("add `{name}: {{xyz_mm: […], rpy_deg: […]}}`"),
@@ -49,20 +50,20 @@ impl Checker<'_> {
         }
         let mut fixed: BTreeMap<JointId, Isometry3<f64>> = BTreeMap::new();
         for (joint, change) in &raw.errors.fixed {
-            if let Some(id) = self.joint_at(&["simulate", "errors", "fixed", joint], joint) {
+            if let Some(id) = self.joint(&["simulate", "errors", "fixed", joint], joint) {
                 fixed.insert(id, pose(change));
             }
         }
         let mut compliance = BTreeMap::new();
         for (joint, value) in &raw.errors.compliance_deg_per_nm {
-            if let Some(id) = self.joint_at(
+            if let Some(id) = self.joint(
                 &["simulate", "errors", "compliance_deg_per_nm", joint],
                 joint,
             ) {
                 compliance.insert(id, value * DEG);
             }
         }
-        if !(0.0..1.0).contains(&raw.noise.occluded) {
+        if !(0.0..1.0).contains(&raw.noise.occluded) && !self.named_already(raw.noise.occluded) {
             self.problem(
                 &["simulate", "noise", "occluded"],
                 format!("{} is no share of lost samples", raw.noise.occluded),
@@ -72,6 +73,7 @@ impl Checker<'_> {
         let mut recordings = BTreeMap::new();
         for (name, protocol) in &raw.recordings {
             self.known(
+                "recording",
                 &["simulate", "recordings", name],
                 name,
                 self.raw.recordings.keys(),
@@ -152,15 +154,15 @@ impl Checker<'_> {
                 random.insert(joint, (low, high));
             }
         }
-        if random.is_empty() != (raw.poses == 0) {
+        if raw.random.is_empty() != (raw.poses == 0) {
             self.problem(
                 &at("poses"),
                 "`random` and `poses` belong together",
                 "give both or neither",
             );
         }
-        if grid.is_empty() == random.is_empty() {
-            self.problem(
+        if raw.grid.is_empty() == raw.random.is_empty() {
+            self.key_problem(
                 &["simulate", "recordings", name],
                 "a protocol is either a grid or random poses",
                 "give `grid` or `random`, not both",
@@ -181,8 +183,9 @@ impl Checker<'_> {
                 "name one joint",
             );
         }
-        for body in raw.bodies.iter().flatten() {
-            self.known(&at("bodies"), body, self.raw.bodies.keys());
+        for (i, body) in raw.bodies.iter().flatten().enumerate() {
+            let path = ["simulate", "recordings", name, "bodies", &i.to_string()];
+            self.known("body", &path, body, self.raw.bodies.keys());
         }
         Protocol {
             grid,

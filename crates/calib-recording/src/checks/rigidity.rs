@@ -4,6 +4,7 @@
 
 use super::Expectations;
 use super::statistics::{median, robust_sigma};
+use crate::error::nearest_word;
 use crate::finding::{Finding, Severity, are, counted};
 use crate::poses::Poses;
 use crate::rigid_body::Template;
@@ -56,12 +57,27 @@ pub(super) fn rigidity(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
                 missing.join(", "),
                 known.join(", ")
             );
+            // A column of another body is not what was meant.
+            let ours = |column: &&str| !expected.bodies.values().flatten().any(|m| m == column);
+            let strangers = || known.iter().copied().filter(ours);
+            let near: Vec<String> = missing
+                .iter()
+                .filter_map(|marker| nearest_word(marker, strangers()))
+                .collect();
+            let help = if near.is_empty() {
+                "correct the marker's name in the profile".to_owned()
+            } else {
+                format!(
+                    "did you mean `{}`? correct the marker's name in the profile",
+                    near.join("`, `")
+                )
+            };
             findings.push(Finding::new(
                 "missing-marker",
                 Severity::Error,
                 name,
                 text,
-                "correct the marker's name in the profile",
+                help,
             ));
             continue;
         }
