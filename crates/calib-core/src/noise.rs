@@ -488,68 +488,117 @@ mod tests {
         p
     }
 
-    /// −½ [ Σ log det V + log det H + Σ eᵀV⁻¹e ] by dense factors: what (2) is the gradient of at fixed values.
-    fn likelihood(model: &Model, weights: &[f64], theta: &[f64]) -> f64 {
-        let values = model.start();
-        let mut work = Workspace::new(model);
-        work.cache.update(&model.problem, &values);
-        let n = model.free();
-        let mut h = DMatrix::zeros(n, n);
-        let mut sum = 0.0;
-        for sample in 0..model.problem.samples {
-            let s = whitened(model, &values, weights, theta, sample, &mut work).unwrap();
-            h += s.a.tr_mul(&s.a);
-            sum += s.log_det + s.w.norm_squared();
-        }
-        for (i, &p) in model.columns.iter().enumerate() {
-            if let Some(sigma) = model.problem.parameters[p].prior_sigma {
-                h[(i, i)] += 1.0 / (sigma * sigma);
+    /// A model at its start, with the noise that was stated; every observation of its own weight.
+    struct Case {
+        model: Model,
+        values: Values,
+        weights: Vec<f64>,
+        theta: Vec<f64>,
+        work: Workspace,
+    }
+
+    impl Case {
+        fn new(weight: impl Fn(usize) -> f64) -> Self {
+            let model = Model::new(&problem()).unwrap();
+            let sigmas = model.problem.groups.iter().map(|g| g.sigma);
+            Self {
+                values: model.start(),
+                weights: (0..model.observation_count()).map(weight).collect(),
+                theta: sigmas.map(|s| s.powi(2)).collect(),
+                work: Workspace::new(&model),
+                model,
             }
         }
-        let cholesky = nalgebra::Cholesky::new(h).unwrap();
-        -0.5 * (sum + 2.0 * cholesky.l().diagonal().map(f64::ln).sum())
+
+        fn system(&mut self) -> NormalEquations {
+            let mut system = NormalEquations::new(self.model.free());
+            let (model, values, work) = (&self.model, &self.values, &mut self.work);
+            assert!(accumulate(
+                model,
+                values,
+                &self.weights,
+                &self.theta,
+                work,
+                &mut system
+            ));
+            system
+        }
+
+        /// Every sample in dense factors, at other variances than the stated ones.
+        fn dense(&mut self, theta: &[f64]) -> Vec<Whitened> {
+            let (model, values, work) = (&self.model, &self.values, &mut self.work);
+            work.cache.update(&model.problem, values);
+            (0..model.problem.samples)
+                .map(|s| whitened(model, values, &self.weights, theta, s, work).unwrap())
+                .collect()
+        }
+
+        /// Variances of which one is `factor` times what was stated.
+        fn scaled(&self, group: usize, factor: f64) -> Vec<f64> {
+            let mut theta = self.theta.clone();
+            theta[group] *= factor;
+            theta
+        }
+
+        /// Diagonal of the prior's information.
+        fn prior(&self, column: usize) -> f64 {
+            let sigma = self.model.problem.parameters[self.model.columns[column]].prior_sigma;
+            sigma.map_or(0.0, |s| 1.0 / (s * s))
+        }
+
+        /// −½ [ Σ log det V + log det H + Σ eᵀV⁻¹e ] by dense factors: what (2) is the gradient of at fixed values.
+        fn likelihood(&mut self, theta: &[f64]) -> f64 {
+            let n = self.model.free();
+            let mut h = DMatrix::from_fn(n, n, |i, j| if i == j { self.prior(i) } else { 0.0 });
+            let mut sum = 0.0;
+            for s in self.dense(theta) {
+                h += s.a.tr_mul(&s.a);
+                sum += s.log_det + s.w.norm_squared();
+            }
+            let cholesky = nalgebra::Cholesky::new(h).unwrap();
+            -0.5 * (sum + 2.0 * cholesky.l().diagonal().map(f64::ln).sum())
+        }
+    }
+
+    /// Groups of [`problem`] that are estimated: joint, marker, orientation.
+    const GROUPS: [usize; 3] = [0, 1, 2];
+
+    fn unequal_weights(observation: usize) -> f64 {
+        [1.0, 0.3, 2.0][observation % 3]
+    }
+
+    fn sums_of(case: &mut Case) -> Sums {
+        let (model, values) = (&case.model, &case.values);
+        sums(
+            model,
+            values,
+            &case.weights,
+            &case.theta,
+            &GROUPS,
+            &mut case.work,
+        )
+        .unwrap()
     }
 
     #[test]
     fn the_score_is_the_gradient_of_the_restricted_likelihood() {
-        let model = Model::new(&problem()).unwrap();
-        let mut work = Workspace::new(&model);
-        let weights: Vec<f64> = (0..model.observation_count())
-            .map(|o| [1.0, 0.3, 2.0][o % 3])
-            .collect();
-        let theta: Vec<f64> = model
-            .problem
-            .groups
-            .iter()
-            .map(|g| g.sigma.powi(2))
-            .collect();
-        let groups = [0, 1, 2];
-        let values = model.start();
-        let mut system = NormalEquations::new(model.free());
-        assert!(accumulate(
-            &model,
-            &values,
-            &weights,
-            &theta,
-            &mut work,
-            &mut system
-        ));
+        let mut case = Case::new(unequal_weights);
+        let system = case.system();
         let c = covariance_of(&system).unwrap();
-        let sums = sums(&model, &values, &weights, &theta, &groups, &mut work).unwrap();
+        let sums = sums_of(&mut case);
         // Position noise is stated here: it goes into the rest, and the sum is still all of H.
-        let own = sums.normal_equations(&model, &values);
+        let own = sums.normal_equations(&case.model, &case.values);
         let scale = system.h.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         for (a, b) in own.h.iter().zip(&system.h) {
             assert!((a - b).abs() < 1e-10 * scale);
         }
-        for (i, &g) in groups.iter().enumerate() {
+        for (i, &g) in GROUPS.iter().enumerate() {
             let taken = sums.moments[i].h.dot(&c);
             let score = 0.5 * (sums.squares[i] - sums.traces[i] + taken);
             const STEP: f64 = 1e-4;
-            let at = |factor: f64| {
-                let mut theta = theta.clone();
-                theta[g] *= factor.exp();
-                likelihood(&model, &weights, &theta)
+            let mut at = |step: f64| {
+                let theta = case.scaled(g, step.exp());
+                case.likelihood(&theta)
             };
             let slope = (at(STEP) - at(-STEP)) / (2.0 * STEP);
             assert!(
@@ -557,36 +606,53 @@ mod tests {
                 "{g}: {score} {slope}"
             );
         }
-        // Uncorrected for the parameters, (3) is −E of the second derivative of the likelihood of the data alone.
-        assert!(sums.products.iter().all(|x| *x >= 0.0));
-        assert!((&sums.products - sums.products.transpose()).amax() < 1e-9 * sums.products.amax());
+    }
+
+    /// The sums of (3) against dense factors: tr(V_g V⁻¹) and tr(V_g V⁻¹ V_h V⁻¹), in log θ.
+    #[test]
+    fn the_expected_information_is_that_of_dense_factors() {
+        let mut case = Case::new(unequal_weights);
+        let sums = sums_of(&mut case);
+        let at = case.dense(&case.theta.clone());
+        // B_g = L⁻¹ (∂V/∂log θ_g) L⁻ᵀ; V is linear in θ, so the difference to twice θ_g is the derivative.
+        let changes: Vec<Vec<DMatrix<f64>>> = GROUPS
+            .iter()
+            .map(|&g| {
+                let twice = case.dense(&case.scaled(g, 2.0));
+                let of_sample = |(s, twice): (&Whitened, &Whitened)| {
+                    let change = &twice.l * twice.l.transpose() - &s.l * s.l.transpose();
+                    &s.l_inverse * change * s.l_inverse.transpose()
+                };
+                at.iter().zip(&twice).map(of_sample).collect()
+            })
+            .collect();
+        for g in 0..GROUPS.len() {
+            let trace: f64 = changes[g].iter().map(DMatrix::trace).sum();
+            assert!((sums.traces[g] - trace).abs() < 1e-9 * trace, "{g}");
+            for h in 0..GROUPS.len() {
+                // tr(B_g B_h) of symmetric matrices
+                let pairs = changes[g].iter().zip(&changes[h]);
+                let dense: f64 = pairs.map(|(a, b)| a.dot(b)).sum();
+                let found = sums.products[(g, h)];
+                assert!(
+                    dense > 0.0,
+                    "groups {g} and {h} share no row: nothing is tested"
+                );
+                assert!(
+                    (found - dense).abs() < 1e-9 * dense,
+                    "{g} {h}: {found} {dense}"
+                );
+            }
+        }
     }
 
     #[test]
     fn dense_and_structured_whitening_give_the_same_normal_equations() {
-        let model = Model::new(&problem()).unwrap();
-        let mut work = Workspace::new(&model);
-        let weights = vec![0.7; model.observation_count()];
-        let theta: Vec<f64> = model
-            .problem
-            .groups
-            .iter()
-            .map(|g| g.sigma.powi(2))
-            .collect();
-        let values = model.start();
-        let n = model.free();
-        let mut system = NormalEquations::new(n);
-        assert!(accumulate(
-            &model,
-            &values,
-            &weights,
-            &theta,
-            &mut work,
-            &mut system
-        ));
+        let mut case = Case::new(|_| 0.7);
+        let system = case.system();
+        let n = case.model.free();
         let (mut h, mut g, mut cost) = (DMatrix::zeros(n, n), DVector::zeros(n), 0.0);
-        for sample in 0..model.problem.samples {
-            let s = whitened(&model, &values, &weights, &theta, sample, &mut work).unwrap();
+        for s in case.dense(&case.theta.clone()) {
             h += s.a.tr_mul(&s.a);
             g += s.a.tr_mul(&s.w);
             cost += s.w.norm_squared();
@@ -594,19 +660,15 @@ mod tests {
         let scale = h.amax();
         for a in 0..n {
             for b in a..n {
-                let prior = if a == b {
-                    let sigma = model.problem.parameters[model.columns[a]].prior_sigma;
-                    sigma.map_or(0.0, |s| 1.0 / (s * s))
-                } else {
-                    0.0
-                };
+                let prior = if a == b { case.prior(a) } else { 0.0 };
                 assert!((system.h[a * n + b] - prior - h[(a, b)]).abs() < 1e-11 * scale);
             }
             assert!((system.g[a] - g[a]).abs() < 1e-10 * g.amax());
         }
         assert!((system.data - cost).abs() < 1e-11 * cost);
         // A step is judged by the V that proposed it.
-        let again = crate::normal::cost(&model, &values, &weights, &theta, &mut work);
+        let (model, values, work) = (&case.model, &case.values, &mut case.work);
+        let again = crate::normal::cost(model, values, &case.weights, &case.theta, work);
         assert!((again - system.cost()).abs() < 1e-11 * cost);
     }
 }

@@ -76,6 +76,6 @@ mod tests {
         assert_eq!(near("base_swep.csv").as_deref(), Some("base_sweep.csv"));
         assert_eq!(near("r17.rudf").as_deref(), Some("r17.urdf"));
         assert_eq!(near("wrst_sweep.tsv").as_deref(), Some("wrist_sweep.csv"));
-        assert_eq!(near("hand_sweep.csv"), None, "another sweep was not meant");
+        assert_eq!(near("torso_tests.csv"), None, "no neighbour was meant");
     }
 }
