@@ -610,6 +610,47 @@ fn noise_that_cannot_be_used_is_an_error_with_a_remedy() {
 }
 
 #[test]
+fn rows_have_weights() {
+    let rows = 60;
+    let column = |of: &dyn Fn(usize) -> f64| {
+        let lines: Vec<String> = (0..rows).map(|k| of(k).to_string()).collect();
+        format!("weight\n{}\n", lines.join("\n"))
+    };
+    let dir = seen_from_afar()
+        .file("equal.csv", column(&|_| 4.0))
+        .file("zero.csv", column(&|k| f64::from(u8::from(k >= 10))))
+        .file("bad.csv", column(&|k| if k == 3 { -1.0 } else { 1.0 }))
+        .file("short.csv", "weight\n1\n");
+    let fit = |more: &[&str]| {
+        let mut arguments = vec!["fit", "cor", "ball.csv", "--json"];
+        arguments.extend(more);
+        dir.calib_with(&arguments).expect(0).json()
+    };
+    let (plain, equal, zero) = (
+        fit(&[]),
+        fit(&["--weights", "equal.csv"]),
+        fit(&["--weights", "zero.csv"]),
+    );
+    for (a, b) in numbers(&plain["center_m"])
+        .iter()
+        .zip(numbers(&equal["center_m"]))
+    {
+        assert!((a - b).abs() < 1e-9, "{plain} {equal}");
+    }
+    assert_eq!((&plain["used"], &zero["used"]), (&60.into(), &50.into()));
+    for (file, says) in [
+        ("bad.csv", "line 5: the weight is `-1`"),
+        ("short.csv", "has 1 lines, the table 60 rows"),
+        ("noise.csv", "has no column `weight`"),
+    ] {
+        let ran = dir
+            .calib(["fit", "cor", "ball.csv", "--weights", file])
+            .expect(3);
+        assert!(ran.stderr.contains(says), "{}", ran.stderr);
+    }
+}
+
+#[test]
 fn every_marker_may_have_its_own_noise() {
     let mut table = String::from("a.x_m,a.y_m,a.z_m,b.x_m,b.y_m,b.z_m\n");
     for k in 0..60 {

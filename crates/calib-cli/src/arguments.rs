@@ -303,6 +303,9 @@ pub struct FitTable {
     /// Covariance of every sample: a CSV with `<marker>.xx_mm2`, xy, xz, yy, yz, zz, line by line as the table
     #[arg(long, value_name = "FILE")]
     pub covariances: Option<PathBuf>,
+    /// How many readings each row is worth: a CSV with the column `weight`, line by line as the table
+    #[arg(long, value_name = "FILE")]
+    pub weights: Option<PathBuf>,
     /// Every marker has a noise of its own, estimated (centers)
     #[arg(long)]
     pub noise_per_marker: bool,

@@ -158,6 +158,7 @@ fn fit_table(table: &crate::arguments::FitTable) -> fit::TableRequest {
         sight_m: table.sigma_sight_mm.map(|s| s * 1e-3),
         camera_m: table.camera_m.into(),
         covariances: table.covariances.clone(),
+        weights: table.weights.clone(),
         noise_per_marker: table.noise_per_marker,
         joint: table.joint.clone(),
         center_m: table.center_m.map(Into::into),

@@ -34,6 +34,7 @@ pub fn cor(request: &TableRequest) -> Result<Answer, PipelineError> {
         sigma_t: request.sigma_m,
         sigma_r: request.sigma_rad,
         covariances: table.covariances.clone(),
+        weights: table.weights.clone(),
         noise_per_marker: request.noise_per_marker,
         ..Default::default()
     };

@@ -6,9 +6,9 @@
 mod aor;
 mod comparison;
 mod cor;
-mod covariances;
 mod frame;
 mod handeye;
+mod noise;
 mod table;
 
 pub use aor::aor;
@@ -51,6 +51,8 @@ pub struct TableRequest {
     pub camera_m: Point3<f64>,
     /// CSV with the covariance of every sample.
     pub covariances: Option<PathBuf>,
+    /// CSV with the weight of every row.
+    pub weights: Option<PathBuf>,
     /// Centers: every marker has a noise of its own.
     pub noise_per_marker: bool,
     /// Axes: the joint column whose angles are taken as exact.

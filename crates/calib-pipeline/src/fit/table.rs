@@ -7,7 +7,7 @@ use calib_recording::rigid_body::{Template, body_poses, rigid_groups};
 use calib_recording::{Filled, Poses, ReadOptions, read_path};
 use nalgebra::{Isometry3, Matrix3, Point3};
 
-use super::{TableRequest, covariances, data, usage};
+use super::{TableRequest, data, noise, usage};
 use crate::error::PipelineError;
 
 /// Markers of one name and its samples, row by row.
@@ -30,6 +30,8 @@ pub(super) struct Table {
     pub pair: Option<[Vec<Option<Pose>>; 2]>,
     /// Covariance of every marker in every row, m²; empty where none are stated.
     pub covariances: Vec<Vec<Matrix3<f64>>>,
+    /// How many readings each row is worth; empty where all are alike.
+    pub weights: Vec<f64>,
     /// Joint angle of every row, rad; empty where no joint was named.
     pub angles: Vec<f64>,
 }
@@ -43,8 +45,9 @@ impl Table {
             ));
         };
         let mut poses = read_poses(file, &ReadOptions::default())?;
+        let mut weights = noise::weights(request.weights.as_deref(), poses.rows.len())?;
         let angles = match &request.joint {
-            Some(joint) => keep_rows_with(file, &mut poses, joint)?,
+            Some(joint) => keep_rows_with(file, &mut poses, &mut weights, joint)?,
             None => Vec::new(),
         };
         let pair = match (request.parent.is_empty(), request.child.is_empty()) {
@@ -106,7 +109,7 @@ impl Table {
         } else {
             markers
         };
-        let covariances = covariances::of(request, &markers, &poses.rows)?;
+        let covariances = noise::covariances(request, &markers, &poses.rows)?;
         Ok(Self {
             file: file.clone(),
             rows: poses.rows,
@@ -116,6 +119,7 @@ impl Table {
             body,
             pair,
             covariances,
+            weights,
             angles,
         })
     }
@@ -146,7 +150,12 @@ impl Table {
 }
 
 /// The rows in which a joint's angle is known, and the angles, rad.
-fn keep_rows_with(file: &Path, poses: &mut Poses, joint: &str) -> Result<Vec<f64>, PipelineError> {
+fn keep_rows_with(
+    file: &Path,
+    poses: &mut Poses,
+    weights: &mut Vec<f64>,
+    joint: &str,
+) -> Result<Vec<f64>, PipelineError> {
     let column = poses.joints.get(joint).cloned().ok_or_else(|| {
         data(
             file,
@@ -159,6 +168,7 @@ fn keep_rows_with(file: &Path, poses: &mut Poses, joint: &str) -> Result<Vec<f64
         track.retain(|_| known.next().is_some_and(Option::is_some));
     }
     keep(&mut poses.rows, &column);
+    keep(weights, &column);
     for track in poses.markers.values_mut() {
         keep(track, &column);
     }

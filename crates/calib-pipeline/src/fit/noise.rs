@@ -1,4 +1,4 @@
-//! The covariance of every sample: stated by a file, or by the noise along the line of sight.
+//! What is known of every sample: its covariance, from a file or from the noise along the line of sight, and the weight of its row.
 //!
 //! ```text
 //! Σ = σ² (I − u uᵀ) + σ_s² u uᵀ,      u = (x − camera) / |x − camera|                                  (1)
@@ -25,7 +25,7 @@ const ENTRIES: [(&str, usize, usize); 6] = [
 const MM2: f64 = 1e-6;
 
 /// Marker × row, m²; empty where nothing was stated.
-pub(super) fn of(
+pub(super) fn covariances(
     request: &TableRequest,
     markers: &[Track],
     rows: &[u64],
@@ -65,6 +65,76 @@ pub(super) fn of(
     }
 }
 
+/// How many readings each row is worth, from the column `weight` of a CSV; empty where no file was given.
+pub(super) fn weights(file: Option<&Path>, rows: usize) -> Result<Vec<f64>, PipelineError> {
+    const COLUMN: &str = "weight";
+    let Some(file) = file else {
+        return Ok(Vec::new());
+    };
+    let (header, records) = read(file, "a CSV with the column `weight`")?;
+    let column = column(file, &header, COLUMN, "one line for each row of the table")?;
+    let mut out = Vec::with_capacity(rows);
+    for (row, record) in records.iter().enumerate() {
+        let cell = record.get(column).unwrap_or("");
+        let weight = cell
+            .parse()
+            .ok()
+            .filter(|w: &f64| w.is_finite() && *w >= 0.0);
+        out.push(weight.ok_or_else(|| {
+            data(
+                file,
+                format!(
+                    "line {}: the weight is `{cell}`, no number from 0 up",
+                    row + 2
+                ),
+                "say how many readings the row is worth; 0 leaves it out",
+            )
+        })?);
+    }
+    same_rows(file, out.len(), rows)?;
+    Ok(out)
+}
+
+fn read(
+    file: &Path,
+    remedy: &str,
+) -> Result<(csv::StringRecord, Vec<csv::StringRecord>), PipelineError> {
+    let unreadable = |error: csv::Error| data(file, error.to_string(), format!("give {remedy}"));
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_path(file)
+        .map_err(unreadable)?;
+    let header = reader.headers().map_err(unreadable)?.clone();
+    let records = reader
+        .records()
+        .collect::<Result<_, _>>()
+        .map_err(unreadable)?;
+    Ok((header, records))
+}
+
+fn column(
+    file: &Path,
+    header: &csv::StringRecord,
+    name: &str,
+    remedy: &str,
+) -> Result<usize, PipelineError> {
+    header
+        .iter()
+        .position(|h| h == name)
+        .ok_or_else(|| data(file, format!("has no column `{name}`"), remedy))
+}
+
+fn same_rows(file: &Path, lines: usize, rows: usize) -> Result<(), PipelineError> {
+    if lines == rows {
+        return Ok(());
+    }
+    Err(data(
+        file,
+        format!("has {lines} lines, the table {rows} rows"),
+        "one line for each row of the table",
+    ))
+}
+
 /// (1).
 fn along_sight(x: &Point3<f64>, camera: &Point3<f64>, across: f64, along: f64) -> Matrix3<f64> {
     let u = (x - camera).try_normalize(0.0).unwrap_or_default();
@@ -77,36 +147,25 @@ fn from_file(
     markers: &[Track],
     rows: usize,
 ) -> Result<Vec<Vec<Matrix3<f64>>>, PipelineError> {
-    let unreadable = |error: csv::Error| {
-        data(
-            file,
-            error.to_string(),
-            "give a CSV with the columns <marker>.xx_mm2, xy, xz, yy, yz, zz",
-        )
-    };
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_path(file)
-        .map_err(unreadable)?;
-    let header = reader.headers().map_err(unreadable)?.clone();
+    let (header, records) = read(
+        file,
+        "a CSV with the columns <marker>.xx_mm2, xy, xz, yy, yz, zz",
+    )?;
     let mut columns = Vec::new();
     for (marker, _) in markers {
         let mut of_marker = [0; 6];
         for (at, (entry, ..)) in of_marker.iter_mut().zip(ENTRIES) {
-            let name = format!("{marker}.{entry}_mm2");
-            *at = header.iter().position(|h| h == name).ok_or_else(|| {
-                data(
-                    file,
-                    format!("has no column `{name}`"),
-                    "six columns are needed for every marker that is used: xx, xy, xz, yy, yz, zz",
-                )
-            })?;
+            *at = column(
+                file,
+                &header,
+                &format!("{marker}.{entry}_mm2"),
+                "six columns are needed for every marker that is used: xx, xy, xz, yy, yz, zz",
+            )?;
         }
         columns.push(of_marker);
     }
     let mut out = vec![Vec::with_capacity(rows); markers.len()];
-    for (row, record) in reader.records().enumerate() {
-        let record = record.map_err(unreadable)?;
+    for (row, record) in records.iter().enumerate() {
         for (p, ((marker, track), at)) in markers.iter().zip(&columns).enumerate() {
             let lost = track.get(row).is_none_or(Option::is_none);
             let mut sigma = Matrix3::identity();
@@ -131,13 +190,6 @@ fn from_file(
             out[p].push(sigma);
         }
     }
-    let lines = out.first().map_or(0, Vec::len);
-    if lines != rows {
-        return Err(data(
-            file,
-            format!("has {lines} lines, the table {rows} rows"),
-            "one line of covariances for each row of the table",
-        ));
-    }
+    same_rows(file, records.len(), rows)?;
     Ok(out)
 }
