@@ -20,10 +20,10 @@ pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
             let unlike = (letters(&lower) != letters(&other), Reverse(begins_alike));
             (edit_distance(&lower, &other), unlike, name)
         })
-        .min()
         .filter(|(distance, _, name)| {
             *distance <= (name.chars().count().max(lower.chars().count()) / 3).max(1)
         })
+        .min()
         .map(|(_, _, name)| name)
 }
 
@@ -76,6 +76,8 @@ mod tests {
         assert_eq!(nearest("haed", ["hand", "head"]), Some("head"));
         assert_eq!(nearest("heI", ["haI", "heT"]), Some("heT"));
         assert_eq!(nearest("ab", ["ad", "ac"]), Some("ac"));
+        // `sfe` is as near, but half of it would be wrong.
+        assert_eq!(nearest("sphere", ["sfe", "ml_sphere"]), Some("ml_sphere"));
     }
 
     #[test]
