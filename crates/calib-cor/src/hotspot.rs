@@ -7,7 +7,11 @@
 //!
 //! Both are the same least-squares point. It is inconsistent: noise in R_i enters the matrix, and the answer
 //! is drawn towards the mean position by about σ_r² over the spread of the rotations (7 mm at ±10° and 1°).
-//! [`crate::hotspot_ml`] has no such bias. The covariance is that of the noise the residuals show along and across p.
+//! [`crate::hotspot_ml`] has no such bias. The covariance is that of the noise the residuals show along and across p, and of the bias:
+//!
+//! ```text
+//! noise lengthens M = Σ(R_i − R̄)ᵀ(R_i − R̄) by 2(n − 1)σ_r²:   δp = −Σ_k v_k (v_k·p) shift/(λ_k − shift)      (6)
+//! ```
 
 use calib_geometry::{
     Line, Verdict,
@@ -151,9 +155,11 @@ pub(crate) fn linear(
         return Ok(answer);
     }
     let (sigma_along, sigma_across) = noise_levels(&spot, &spread);
-    let covariance = sandwich(&spot, &spread, sigma_along, sigma_across);
     let reach = spot.body_point.norm();
     let sigma_r2 = (sigma_across * sigma_across - sigma_along * sigma_along) / (reach * reach);
+    let drawn = drawn(&spot, options.sigma_r.map_or(sigma_r2.max(0.0), |s| s * s));
+    let covariance =
+        sandwich(&spot, &spread, sigma_along, sigma_across) + drawn * drawn.transpose();
     let noise = Noise {
         sigma_t: sigma_along,
         sigma_r: (sigma_r2 > 0.0 && sigma_r2.is_finite()).then(|| sigma_r2.sqrt()),
@@ -268,6 +274,24 @@ fn middle(spot: &HotSpot, spread: &Spread, sigma_along: f64, sigma_across: f64) 
 fn sandwich(spot: &HotSpot, spread: &Spread, sigma_along: f64, sigma_across: f64) -> Matrix6<f64> {
     let bread = inverse_normal(&spot.sums);
     bread * middle(spot, spread, sigma_along, sigma_across) * bread
+}
+
+/// (6) over [o; p]: what orientation noise of variance `sigma_r2` takes from the least-squares point. Where the noise is most of the
+/// rotations' spread the point is ten times as uncertain as it is long.
+fn drawn(spot: &HotSpot, sigma_r2: f64) -> Vector6<f64> {
+    let sums = &spot.sums;
+    if !sigma_r2.is_finite() {
+        return Vector6::zeros();
+    }
+    let shift = 2.0 * (sums.n as f64 - 1.0) * sigma_r2;
+    let in_body: Vector3<f64> = (0..3)
+        .map(|k| {
+            let v = sums.directions.column(k);
+            let left = (sums.lambda[k] - shift).max(0.1 * sums.lambda[k]);
+            v * (v.dot(&spot.body_point) * shift / left)
+        })
+        .sum();
+    stack(&(sums.mean_r * in_body), &in_body)
 }
 
 /// (A'A)⁻¹ over [o; p], by eliminating o: the block of p is M⁻¹.

@@ -123,8 +123,28 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
         let v = svd.v.column(k);
         covariance += v * v.transpose() * (sigma2 / (svd.s[k] * svd.s[k]));
     }
+    // As in the hot spot, orientation noise lengthens AᵀA by 2nσ_r² and draws both points towards their bodies.
+    let sigma_r2 = options.sigma_r.map_or_else(
+        || {
+            orientation_variance(
+                pairs(),
+                &in_first,
+                &in_second_body,
+                3.0 * n as f64 * sigma2 / rss,
+            )
+        },
+        |s| s * s,
+    );
+    let shift = 2.0 * n as f64 * sigma_r2;
+    let drawn: Vector6<f64> = (0..6)
+        .map(|k| {
+            let (v, square) = (svd.v.column(k), svd.s[k] * svd.s[k]);
+            v * (v.dot(&x) * shift / (square - shift).max(0.1 * square))
+        })
+        .sum();
+    covariance += drawn * drawn.transpose();
     let of_center: Matrix3<f64> = covariance.fixed_view::<3, 3>(3, 3).into_owned();
-    let weakest = svd.s[5].recip() * sigma2.sqrt();
+    let weakest = (sigma2 / (svd.s[5] * svd.s[5]) + drawn.norm_squared()).sqrt();
     let reach = in_first.norm().max(in_second_body.norm());
     let weak = weakest > options.weak_fraction * reach;
     Ok(Outcome::Estimate(Box::new(CorEstimate {
@@ -149,6 +169,38 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
             )
         }),
     })))
+}
+
+/// σ_r² from the gaps: along the longer lever they hold no orientation noise of its own body.
+///
+/// ```text
+/// E|g|² = 6σ_t² + 2σ_r²(l² + s²),    E(g·û)² = 2σ_t² + σ_r² s² (1 − c²)      l ≥ s: levers, û: along l, c: cosine between them
+/// ```
+fn orientation_variance<'a>(
+    pairs: impl Iterator<Item = (&'a Pose, &'a Pose, f64)>,
+    in_first: &Vector3<f64>,
+    in_second: &Vector3<f64>,
+    per_degree: f64,
+) -> f64 {
+    let of_first = in_first.norm() >= in_second.norm();
+    let (mut all, mut along, mut cosines, mut total) = (0.0, 0.0, 0.0, 0.0);
+    for (a, b, w) in pairs {
+        let (p, q) = (a.rotation * in_first, b.rotation * in_second);
+        let gap = p + a.translation - q - b.translation;
+        let (long, short) = if of_first { (p, q) } else { (q, p) };
+        let unit = long.try_normalize(0.0).unwrap_or_default();
+        let other = short.try_normalize(0.0).unwrap_or_default();
+        all += w * gap.norm_squared();
+        along += w * gap.dot(&unit).powi(2);
+        cosines += unit.dot(&other).powi(2);
+        total += 1.0;
+    }
+    let (l2, s2) = (
+        in_first.norm_squared().max(in_second.norm_squared()),
+        in_first.norm_squared().min(in_second.norm_squared()),
+    );
+    let of_noise = 2.0 * (l2 + s2) - 3.0 * s2 * (1.0 - cosines / total);
+    ((all - 3.0 * along) * per_degree / total / of_noise).max(0.0)
 }
 
 /// Text of a rank verdict, with the frame its line is given in.
