@@ -397,6 +397,35 @@ fn what_cannot_be_observed_ends_with_four() {
     );
 }
 
+/// A weak answer is shown, with its doubt, and does not pass for a good one.
+#[test]
+fn a_weak_answer_says_so() {
+    let mut table = String::from("m.x_m,m.y_m,m.z_m\n");
+    for k in 0..40 {
+        // A cap of 12 degrees on a radius of 150 mm, to 1 mm.
+        let (a, b) = (2.4 * k as f64, 0.2 * (k as f64 / 40.0).sqrt());
+        let x = [
+            0.15 * b.sin() * a.cos(),
+            0.15 * b.sin() * a.sin(),
+            0.15 * b.cos(),
+        ];
+        let at = |i: usize| x[i] + 1e-3 * jitter(3 * k + i);
+        table += &format!("{},{},{}\n", at(0), at(1), at(2));
+    }
+    let dir = Scratch::new().file("cap.csv", table);
+    let ran = dir
+        .calib(["fit", "cor", "cap.csv", "--json"])
+        .expect(4)
+        .json();
+    assert_eq!(
+        (&ran["observable"], &ran["verdict"]),
+        (&false.into(), &"weak".into())
+    );
+    assert_eq!(numbers(&ran["center_m"]).len(), 3);
+    let text = dir.calib(["fit", "cor", "cap.csv"]).expect(4).stdout;
+    assert!(text.contains("weak: σ = "), "{text}");
+}
+
 #[test]
 fn estimators_are_listed() {
     for (what, known) in [

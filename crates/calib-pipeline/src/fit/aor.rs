@@ -9,7 +9,8 @@ use serde_json::json;
 use super::comparison::comparison;
 use super::table::Table;
 use super::{
-    Answer, TableRequest, answer, coordinates, data, listed, matrix, not_observable, unknown, usage,
+    Answer, TableRequest, answer, coordinates, data, doubt, listed, matrix, not_observable,
+    unknown, usage,
 };
 use crate::error::PipelineError;
 
@@ -88,7 +89,7 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
     };
     let id = request.estimator.as_deref().unwrap_or(default);
     let outcome = run(id).map_err(|error| aor_error(&table, id, &error))?;
-    let Some(e) = outcome.estimate().filter(|_| outcome.is_observable()) else {
+    let Some(e) = outcome.estimate() else {
         return Ok(not_observable(
             id,
             outcome.verdict().as_str(),
@@ -103,7 +104,8 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
     let frame = axis_frame(request);
     let value = json!({
         "estimator": id,
-        "observable": true,
+        "observable": outcome.is_observable(),
+        "verdict": outcome.verdict().as_str(),
         "reason": e.reason,
         "frame": frame,
         "point_m": e.line.point.coords.as_slice(),
@@ -117,6 +119,7 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
         "{id}: direction {} in the frame of {frame}\n",
         coordinates(e.line.direction.as_slice())
     );
+    text += &doubt(e.reason.as_deref());
     let _ = writeln!(text, "  sigma {:.4} deg", e.sigma_direction.to_degrees());
     let _ = writeln!(
         text,
@@ -130,7 +133,7 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
         e.used,
         rejected.len()
     );
-    Ok(answer(text, &value, true))
+    Ok(answer(text, &value, outcome.is_observable()))
 }
 
 fn aor_error(table: &Table, id: &str, error: &AorError) -> PipelineError {

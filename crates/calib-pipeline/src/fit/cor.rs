@@ -8,7 +8,8 @@ use serde_json::json;
 use super::comparison::comparison;
 use super::table::Table;
 use super::{
-    Answer, TableRequest, answer, coordinates, data, listed, matrix, not_observable, unknown, usage,
+    Answer, TableRequest, answer, coordinates, data, doubt, listed, matrix, not_observable,
+    unknown, usage,
 };
 use crate::error::PipelineError;
 
@@ -125,7 +126,7 @@ fn cor_error(table: &Table, id: &str, error: &CorError) -> PipelineError {
 }
 
 fn cor_answer(table: &Table, id: &str, outcome: &calib_cor::Outcome) -> Answer {
-    let Some(e) = outcome.estimate().filter(|_| outcome.is_observable()) else {
+    let Some(e) = outcome.estimate() else {
         return not_observable(
             id,
             outcome.verdict().as_str(),
@@ -139,7 +140,8 @@ fn cor_answer(table: &Table, id: &str, outcome: &calib_cor::Outcome) -> Answer {
         .collect();
     let mut value = json!({
         "estimator": id,
-        "observable": true,
+        "observable": outcome.is_observable(),
+        "verdict": outcome.verdict().as_str(),
         "reason": e.reason,
         "center_m": e.center.coords.as_slice(),
     });
@@ -147,6 +149,7 @@ fn cor_answer(table: &Table, id: &str, outcome: &calib_cor::Outcome) -> Answer {
         "{id}: center {} m\n",
         coordinates(e.center.coords.as_slice())
     );
+    text += &doubt(e.reason.as_deref());
     let sigma = e.covariance.diagonal().map(|v| v.max(0.0).sqrt() * 1e3);
     let _ = writeln!(
         text,
@@ -205,5 +208,5 @@ fn cor_answer(table: &Table, id: &str, outcome: &calib_cor::Outcome) -> Answer {
         e.used,
         rejected.len()
     );
-    answer(text, &value, true)
+    answer(text, &value, outcome.is_observable())
 }

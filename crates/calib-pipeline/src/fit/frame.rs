@@ -7,8 +7,8 @@ use serde_json::json;
 
 use super::table::{it_has, read_poses};
 use super::{
-    Answer, FrameRequest, answer, data, matrix, not_observable, pose_text, pose_value, unknown,
-    usage,
+    Answer, FrameRequest, answer, data, doubt, matrix, not_observable, pose_text, pose_value,
+    unknown, usage,
 };
 use crate::error::PipelineError;
 
@@ -105,9 +105,11 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, PipelineError> {
             ));
         }
     };
+    let observable = f.verdict == calib_geometry::Verdict::Ok;
     let value = json!({
         "estimator": request.estimator,
-        "observable": true,
+        "observable": observable,
+        "verdict": f.verdict.as_str(),
         "reason": f.reason,
         "body_from_joint": pose_value(&f.body_from_joint),
         "covariance": matrix(f.covariance.row_iter().map(|r| r.iter().copied().collect()).collect()),
@@ -118,9 +120,10 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, PipelineError> {
     });
     let sigma = f.covariance.diagonal().map(|v| v.max(0.0).sqrt());
     let text = format!(
-        "{}: body_from_joint {}\n  sigma {:.4}, {:.4}, {:.4} mm; {:.4}, {:.4}, {:.4} deg\n  axes {:.3} deg off square; rms {:.4} mm, {:.4} deg; {} samples\n",
+        "{}: body_from_joint {}\n{}  sigma {:.4}, {:.4}, {:.4} mm; {:.4}, {:.4}, {:.4} deg\n  axes {:.3} deg off square; rms {:.4} mm, {:.4} deg; {} samples\n",
         request.estimator,
         pose_text(&f.body_from_joint),
+        doubt(f.reason.as_deref()),
         sigma[3] * 1e3,
         sigma[4] * 1e3,
         sigma[5] * 1e3,
@@ -132,7 +135,7 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, PipelineError> {
         f.rms_r.to_degrees(),
         f.used
     );
-    Ok(answer(text, &value, true))
+    Ok(answer(text, &value, observable))
 }
 
 fn axis_of(text: &str) -> Result<(Letter, &str), PipelineError> {

@@ -127,6 +127,11 @@ fn data(file: &Path, finding: impl Into<String>, remedy: impl Into<String>) -> P
     }
 }
 
+/// The line of an answer that is not to be relied upon.
+fn doubt(reason: Option<&str>) -> String {
+    reason.map_or_else(String::new, |why| format!("  weak: {why}\n"))
+}
+
 fn not_observable(id: &str, verdict: &str, reason: &str) -> Answer {
     let value =
         json!({ "estimator": id, "observable": false, "verdict": verdict, "reason": reason });
