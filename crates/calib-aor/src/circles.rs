@@ -98,6 +98,37 @@ pub(crate) fn linearize(cloud: &Cloud, axis: &Axis) -> Normal {
     total
 }
 
+/// Curvature of f at the modelled circles: levers of the measured points would count their noise as knowledge.
+pub(crate) fn information(cloud: &Cloud, axis: &Axis) -> Matrix4<f64> {
+    let mut total = Matrix4::zeros();
+    for p in 0..cloud.markers() {
+        total += information_of_marker(cloud.marker(p), axis);
+    }
+    total
+}
+
+/// [`information`] of one marker.
+pub(crate) fn information_of_marker(points: &[Vector3<f64>], axis: &Axis) -> Matrix4<f64> {
+    let n = axis.frame.n;
+    let apart = |x: &Vector3<f64>| {
+        let d = x - axis.point;
+        let a = d.dot(&n);
+        (a, d - n * a)
+    };
+    let count = points.len() as f64;
+    let (mut height, mut radius) = (0.0, 0.0);
+    for (a, w) in points.iter().map(apart) {
+        height += a / count;
+        radius += w.norm() / count;
+    }
+    let modelled: Vec<Vector3<f64>> = points
+        .iter()
+        .map(apart)
+        .map(|(_, w)| axis.point + n * height + w * (radius / w.norm().max(f64::MIN_POSITIVE)))
+        .collect();
+    linearize_marker(&modelled, axis).hessian
+}
+
 /// Which unknowns move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Free {
@@ -105,6 +136,8 @@ pub(crate) enum Free {
     Line,
     /// Direction only; the point is held.
     Direction,
+    /// Place only; the direction is held.
+    Point,
 }
 
 struct CommonLine<'a> {
@@ -139,6 +172,12 @@ impl Problem for CommonLine<'_> {
                 let s = -block.cholesky()?.solve(&g);
                 Vector4::new(s.x, s.y, 0.0, 0.0)
             }
+            Free::Point => {
+                let block: Matrix2<f64> = h.fixed_view::<2, 2>(2, 2).into();
+                let g: Vector2<f64> = normal.gradient.fixed_rows::<2>(2).into();
+                let s = -block.cholesky()?.solve(&g);
+                Vector4::new(0.0, 0.0, s.x, s.y)
+            }
         };
         Some((
             step,
@@ -168,6 +207,11 @@ pub(crate) fn minimise_line(
     let end = minimise(&CommonLine { cloud, free, size }, start, MAX_STEPS);
     let far = (end.x.point - start.point).norm() > 1e4 * size;
     (end.stop != Stop::Broken && end.normal.cost.is_finite() && !far).then_some((end.x, end.normal))
+}
+
+/// The axis along a held direction whose circles are nearest to the samples; `start` where it runs away.
+pub(crate) fn placed(cloud: &Cloud, start: Axis, size: f64) -> Axis {
+    minimise_line(cloud, start, Free::Point, size).map_or(start, |(axis, _)| axis)
 }
 
 /// The direction that several markers share, each with its own center.
@@ -276,7 +320,8 @@ impl OwnCenters<'_> {
     }
 }
 
-/// Least-squares center (Taubin's weighting) of circles in the plane across n, common to all markers given.
+/// Linear least-squares center of circles in the plane across n, common to all markers given: a start. Noise pulls it
+/// towards the samples, on short arcs by more than its own error.
 pub(crate) fn flat_center(
     cloud: &Cloud,
     frame: &AxisFrame,

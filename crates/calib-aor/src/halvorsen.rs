@@ -6,6 +6,7 @@
 //!
 //! n is the direction of least displacement, c the least-squares point of the bisecting planes. With all pairs
 //! n is the plane's normal; with pairs a fixed number of rows apart the result depends on that choice.
+//! The point is drawn towards the samples, on short arcs by more than its scatter: the covariance holds both.
 //! Halvorsen et al. 1999, J. Biomech. 32(11), 1221–1227.
 
 use calib_geometry::row_qr::RowQr;
@@ -13,7 +14,7 @@ use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3};
 
 use crate::{
     axis_frame::AxisFrame,
-    circles::{Axis, Free, linearize, minimise_line, spread_out},
+    circles::{Axis, Free, information, linearize, minimise_line, placed, spread_out},
     input::{Input, cloud_of},
     judge::{Candidate, inverse_or_zero, judge, prepare},
     options::Options,
@@ -84,13 +85,16 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
     let axis = Axis { frame, point };
     let normal = linearize(&cloud, &axis);
     let (n, markers) = (cloud.points.len(), cloud.markers());
+    let known = information(&cloud, &axis);
     let mut unit = Matrix4::zeros();
-    let planar: Matrix2<f64> = normal.hessian.fixed_view::<2, 2>(0, 0).into();
-    let shift: Matrix2<f64> = normal.hessian.fixed_view::<2, 2>(2, 2).into();
+    let planar: Matrix2<f64> = known.fixed_view::<2, 2>(0, 0).into();
+    let shift: Matrix2<f64> = known.fixed_view::<2, 2>(2, 2).into();
     unit.fixed_view_mut::<2, 2>(0, 0)
         .copy_from(&inverse_or_zero(&planar));
     unit.fixed_view_mut::<2, 2>(2, 2)
         .copy_from(&inverse_or_zero(&shift));
+    // Noise lengthens every displacement, and pulls the point towards the samples (1): that too is an error of the point.
+    let pulled = point - placed(&cloud, axis, factor.s[0]).point;
     // The pairs weigh samples unevenly: the noise level comes from the best line, not from this one.
     let cost = minimise_line(&cloud, axis, Free::Line, factor.s[0])
         .map_or(normal.cost, |(_, best)| best.cost);
@@ -105,5 +109,10 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
         held: None,
         gain_by_turning: None,
     };
-    Ok(judge(&cloud, &factor, candidate, options))
+    let mut outcome = judge(&cloud, &factor, candidate, options);
+    if let Outcome::Estimate(e) = &mut outcome {
+        let mut of_point = e.covariance.fixed_view_mut::<3, 3>(3, 3);
+        of_point += pulled * pulled.transpose();
+    }
+    Ok(outcome)
 }

@@ -75,13 +75,23 @@ fn no_plane(
     Outcome::none(estimator, verdict, reason, known)
 }
 
+/// σ of an own center, in radii, above which its circle is as good as straight: the curvature is three deviations from none.
+const KNOWN_CENTER: f64 = 1.0 / 3.0;
+
+/// Center of one marker's circle.
+pub(crate) struct OwnCenter {
+    pub center: Vector3<f64>,
+    /// Largest variance of the center for unit noise.
+    pub unit_variance: f64,
+}
+
 /// A fitted axis to be judged.
 pub(crate) struct Candidate {
     pub estimator: &'static str,
     /// Relative to the cloud's origin.
     pub axis: Axis,
     /// Center of each marker's circle where they have their own; empty: all on the line.
-    pub own_centers: Vec<Vector3<f64>>,
+    pub own_centers: Vec<OwnCenter>,
     /// Σ of squared residuals.
     pub cost: f64,
     /// Residuals less unknowns.
@@ -149,7 +159,7 @@ pub(crate) fn judge(
     let sigma_direction = (eigen.values[2].max(0.0) * (1.0 + excess)).sqrt();
 
     let n = axis.frame.n;
-    let center_of = |p: usize| own_centers.get(p).copied().unwrap_or(axis.point);
+    let center_of = |p: usize| own_centers.get(p).map_or(axis.point, |c| c.center);
     let angle_about = |p: usize, x: &Vector3<f64>| {
         let d = x - center_of(p);
         d.dot(&axis.frame.e2).atan2(d.dot(&axis.frame.e1))
@@ -187,6 +197,12 @@ pub(crate) fn judge(
     // τ = (v̄ − m)·n (paper Eq. 15, ‖n‖ = 1)
     let from = held.map_or(axis.point + cloud.origin, |m| m.coords);
     let tau = (cloud.origin - from).dot(&n) * s;
+    let adrift = own_centers
+        .iter()
+        .zip(&circles)
+        .map(|(own, circle)| (own.unit_variance.max(0.0).sqrt() * sigma, circle.radius))
+        .filter(|(deviation, radius)| *deviation > KNOWN_CENTER * radius)
+        .max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
     let (verdict, reason) = if sigma_direction > options.weak_angle {
         let arc = circles.iter().map(|c| c.arc).fold(0.0, f64::max);
         let text = format!(
@@ -194,6 +210,12 @@ pub(crate) fn judge(
             sigma_direction.to_degrees(),
             options.weak_angle.to_degrees(),
             arc.to_degrees()
+        );
+        (Verdict::Weak, Some(text))
+    } else if let Some((deviation, radius)) = adrift {
+        let text = format!(
+            "the direction is known, the own center of a circle is not: σ {deviation:.2e} for a radius of {radius:.2e}; \
+             where the markers share an axis, `line_ml` tells it"
         );
         (Verdict::Weak, Some(text))
     } else {

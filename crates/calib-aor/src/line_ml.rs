@@ -6,6 +6,9 @@
 //! circle_ml   the same with one marker: the orthogonal-distance circle in space
 //! ```
 //!
+//! `dir_ml` reports the line that all circles share along its direction: on short arcs own centers run away, and are
+//! named (`weak`) where their σ is beyond a third of their radius.
+//!
 //! The common-line fit starts from the plane normal and one center for all markers; starting from each
 //! circle's own center diverges on short arcs.
 
@@ -13,9 +16,12 @@ use calib_geometry::{Verdict, factor::Factor, measured::Cloud};
 use nalgebra::{Matrix4, Matrix6};
 
 use crate::{
-    circles::{Axis, Centers, Free, OwnCenters, flat_center, minimise_line, spread_out},
+    circles::{
+        Axis, Centers, Free, Normal, OwnCenters, flat_center, information, information_of_marker,
+        minimise_line, placed, spread_out,
+    },
     input::{Input, cloud_of},
-    judge::{Candidate, inverse_or_zero, judge, prepare},
+    judge::{Candidate, OwnCenter, inverse_or_zero, judge, prepare},
     options::Options,
     outcome::{AorError, Known, Outcome},
     plane,
@@ -77,7 +83,7 @@ fn run(
 fn common_line(estimator: &'static str, cloud: &Cloud, factor: &Factor) -> Option<Candidate> {
     let start = plane::start(cloud, factor, &Options::default());
     let (axis, normal) = minimise_line(cloud, start, Free::Line, factor.s[0])?;
-    let unit = normal.hessian.try_inverse()?;
+    let unit = information(cloud, &axis).try_inverse()?;
     let (n, markers) = (cloud.points.len(), cloud.markers());
     Some(Candidate {
         estimator,
@@ -105,34 +111,63 @@ fn own_centers(estimator: &'static str, cloud: &Cloud, factor: &Factor) -> Optio
         frame: start.frame,
         points,
     })?;
-    let (h, _, own) = problem.reduced(&normals, 0.0)?;
+    // For the covariance the curvature at the modelled circles.
+    let modelled: Vec<Normal> = normals
+        .iter()
+        .enumerate()
+        .map(|(p, normal)| Normal {
+            hessian: information_of_marker(
+                cloud.marker(p),
+                &Axis {
+                    frame: end.frame,
+                    point: end.points[p],
+                },
+            ),
+            ..normal.clone()
+        })
+        .collect();
+    let (h, _, own) = problem.reduced(&modelled, 0.0)?;
     let (n, markers) = (cloud.points.len(), cloud.markers());
-    // The reported point is the mean of the centers across n: its covariance from the markers' own blocks.
-    let mean = end.points.iter().sum::<nalgebra::Vector3<f64>>() / markers as f64;
+    // The reported line is the common one of this direction: a mean of centers is as wild as the flattest arc's.
+    // Its noise for a held direction is none of the direction's, which came from what the own centers left over.
+    let axis = placed(
+        cloud,
+        Axis {
+            frame: end.frame,
+            point: start.point,
+        },
+        factor.s[0],
+    );
+    let common = information(cloud, &axis);
+    let alone = inverse_or_zero(&common.fixed_view::<2, 2>(2, 2).into());
+    let cross = -alone * common.fixed_view::<2, 2>(2, 0);
     let of_turn = inverse_or_zero(&h);
     let mut unit = Matrix4::zeros();
     unit.fixed_view_mut::<2, 2>(0, 0).copy_from(&of_turn);
-    let mut cross = nalgebra::Matrix2::zeros();
-    let mut alone = nalgebra::Matrix2::zeros();
-    for (inverse, coupling) in &own {
-        // c_p = −H_cc⁻¹ H_cn turn + own noise
-        cross -= inverse * coupling / markers as f64;
-        alone += inverse / (markers * markers) as f64;
-    }
     unit.fixed_view_mut::<2, 2>(2, 2)
         .copy_from(&(alone + cross * of_turn * cross.transpose()));
     unit.fixed_view_mut::<2, 2>(2, 0)
         .copy_from(&(cross * of_turn));
     unit.fixed_view_mut::<2, 2>(0, 2)
         .copy_from(&(cross * of_turn).transpose());
-    let unit_covariance: Matrix6<f64> = spread_out(&unit, &end.frame);
+    let unit_covariance: Matrix6<f64> = spread_out(&unit, &axis.frame);
     Some(Candidate {
         estimator,
-        axis: Axis {
-            frame: end.frame,
-            point: mean,
-        },
-        own_centers: end.points,
+        axis,
+        own_centers: end
+            .points
+            .iter()
+            .zip(&own)
+            .map(|(center, (inverse, coupling))| {
+                // c_p = −H_cc⁻¹ H_cn turn + own noise
+                let shift = inverse * coupling;
+                let covariance = inverse + shift * of_turn * shift.transpose();
+                OwnCenter {
+                    center: *center,
+                    unit_variance: covariance.symmetric_eigenvalues().max(),
+                }
+            })
+            .collect(),
         cost: normals.iter().map(|n| n.cost).sum(),
         dof: (2 * n).saturating_sub(2 + 4 * markers),
         unit_covariance,

@@ -17,7 +17,7 @@ use calib_geometry::{Verdict, measured::Cloud};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix4};
 
 use crate::{
-    circles::{Axis, Free, linearize, minimise_line, spread_out},
+    circles::{Axis, Free, information, linearize, minimise_line, spread_out},
     input::{Input, cloud_of},
     judge::{Candidate, inverse_or_zero, judge, prepare},
     options::Options,
@@ -80,14 +80,14 @@ fn run(
     let normal = linearize(&cloud, &axis);
     let (n, markers) = (cloud.points.len(), cloud.markers());
     let unknowns = 2 * markers + if free == Free::Line { 4 } else { 2 };
+    let known = information(&cloud, &axis);
     let mut unit = Matrix4::zeros();
-    match free {
-        Free::Line => unit = normal.hessian.try_inverse().unwrap_or_else(Matrix4::zeros),
-        Free::Direction => {
-            let h: Matrix2<f64> = normal.hessian.fixed_view::<2, 2>(0, 0).into();
-            unit.fixed_view_mut::<2, 2>(0, 0)
-                .copy_from(&inverse_or_zero(&h));
-        }
+    if free == Free::Direction {
+        let h: Matrix2<f64> = known.fixed_view::<2, 2>(0, 0).into();
+        unit.fixed_view_mut::<2, 2>(0, 0)
+            .copy_from(&inverse_or_zero(&h));
+    } else {
+        unit = known.try_inverse().unwrap_or_else(Matrix4::zeros);
     }
     let candidate = Candidate {
         estimator,

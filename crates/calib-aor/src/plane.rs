@@ -1,7 +1,7 @@
 //! Plane fit: the two-step baseline. The axis is the normal of the best plane of each marker's samples.
 //!
 //! ```text
-//! n = direction of least spread of x − x̄_p;   point: the circle's center in that plane, or a given center
+//! n = direction of least spread of x − x̄_p;   point: the circle's center in that plane (least distances), or a given center
 //! ```
 //!
 //! Gamage & Lasenby 2002, Cerveri et al. 2005. For one clean circle it is as good as any (errors of second
@@ -12,7 +12,7 @@ use nalgebra::{Matrix2, Matrix4};
 
 use crate::{
     axis_frame::AxisFrame,
-    circles::{Axis, flat_center, linearize, spread_out},
+    circles::{Axis, flat_center, information, linearize, placed, spread_out},
     input::{Input, cloud_of},
     judge::{Candidate, inverse_or_zero, judge, prepare},
     options::Options,
@@ -30,7 +30,10 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
         Ok(factor) => factor,
         Err(answer) => return Ok(answer),
     };
-    let axis = start(&cloud, &factor, options);
+    let mut axis = start(&cloud, &factor, options);
+    if options.center.is_none() {
+        axis = placed(&cloud, axis, factor.s[0]);
+    }
     let normal = linearize(&cloud, &axis);
     let (n, markers) = (cloud.points.len(), cloud.markers());
     // Only the planar part of the cost speaks about n: Σ (d·e)² across the normal.
@@ -44,7 +47,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
         }
         m
     };
-    let shift: Matrix2<f64> = normal.hessian.fixed_view::<2, 2>(2, 2).into();
+    let shift: Matrix2<f64> = information(&cloud, &axis).fixed_view::<2, 2>(2, 2).into();
     let mut unit = Matrix4::zeros();
     unit.fixed_view_mut::<2, 2>(0, 0)
         .copy_from(&inverse_or_zero(&spread));

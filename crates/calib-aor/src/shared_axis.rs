@@ -159,6 +159,14 @@ pub(crate) fn run(
         + per_mean * (sigma_r * sigma_r);
     let of_point =
         perpendicular * strong * perpendicular * (sigma * sigma) + per_mean * (sigma * sigma);
+    // Noise of the orientations lengthens the spread M by 2(n−1)σ_r² and draws the point towards the body's origin.
+    let (p, count) = (&child_point, n - 1.0);
+    let drawn = |k: usize| {
+        let v = sums.directions.column(k);
+        v * (v.dot(p) * 2.0 * count * sigma_r * sigma_r / sums.lambda[k])
+    };
+    let drawn = sums.mean_r * (drawn(1) + drawn(2));
+    let of_point = of_point + perpendicular * drawn * drawn.transpose() * perpendicular;
     let mut covariance = Matrix6::zeros();
     covariance
         .fixed_view_mut::<3, 3>(0, 0)
