@@ -10,7 +10,7 @@
 //! Each θ_i is eliminated from its own pose. Of dW the turn about z and the shift along z, of dY the turn about z do nothing that the
 //! others cannot: nine unknowns are left. SARA's direction is that of the rotations alone; a body far from the axis knows more by its path, a body
 //! near it by its orientations, and (1) takes both for what they are worth. σ_r and σ_t are stated, or estimated by restricted
-//! maximum likelihood. It starts from [`crate::shared_axis`] and shares its verdicts.
+//! maximum likelihood; two bodies are taken to be measured alike. It starts from [`crate::shared_axis`] and shares its verdicts.
 
 use calib_geometry::{
     Line, Verdict,
@@ -112,7 +112,7 @@ fn refine(
             return diverged("no minimum of the likelihood");
         }
         state = end.x;
-        let Some(c) = end.normal.hessian.cholesky().map(|h| h.inverse()) else {
+        let Some(c) = inverse_of_nine(&end.normal.hessian) else {
             return diverged("the poses do not fix the axis");
         };
         let [of_r, of_t] = problem.components(&state, &end.normal, &c);
@@ -264,6 +264,7 @@ struct Hinge<'a> {
     weights: Vec<Matrix6<f64>>,
     /// σ_r² A and σ_t² B of each pose.
     parts: Vec<[Matrix6<f64>; 2]>,
+    two_bodies: bool,
     scale: f64,
 }
 
@@ -297,6 +298,7 @@ impl<'a> Hinge<'a> {
             poses,
             weights,
             parts,
+            two_bodies,
             scale,
         }
     }
@@ -317,14 +319,34 @@ impl<'a> Hinge<'a> {
                 expected[k] += (p * parts[k]).trace();
             }
         }
+        // Between two bodies a turn of one is a shift of the other, and the share of one kind of noise can come out as none: the
+        // least informative prior that forbids it, p(σ) ∝ σ (Chung et al. 2013), where there is something to share.
+        let prior = |k: usize| {
+            if self.two_bodies {
+                f64::min(1.0, 0.5 * expected[k])
+            } else {
+                0.0
+            }
+        };
         [0, 1].map(|k| {
             if expected[k] > 1e-9 {
-                seen[k] / expected[k]
+                (seen[k] + prior(k)) / expected[k]
             } else {
                 1.0
             }
         })
     }
+}
+
+/// Inverse of the curvature, whose angles and lengths differ by decades.
+fn inverse_of_nine(hessian: &Nine) -> Option<Nine> {
+    let d = hessian
+        .diagonal()
+        .map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
+    let inverse = Nine::from_fn(|i, k| hessian[(i, k)] * d[i] * d[k])
+        .cholesky()?
+        .inverse();
+    Some(Nine::from_fn(|i, k| inverse[(i, k)] * d[i] * d[k]))
 }
 
 /// Inverse of a covariance whose angles and lengths differ by decades.
