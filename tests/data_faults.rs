@@ -150,6 +150,91 @@ fn radians_in_a_column_of_degrees() {
 }
 
 #[test]
+fn quaternions_with_w_first() {
+    let profile = "robots/justin.yaml";
+    let tables = ["arm_poses", "hand_sweep", "head_sweep", "torso_tests"];
+    // The columns keep their names: what is called x is w.
+    let dir = tables
+        .iter()
+        .fold(Scratch::new().robot("justin"), |dir, table| {
+            let table = format!("robots/justin/{table}.csv");
+            let text = dir.read(&table);
+            let named = |text: String, body: &str| {
+                [
+                    ("qw", "w first"),
+                    ("qz", "qw"),
+                    ("qy", "qz"),
+                    ("qx", "qy"),
+                    ("w first", "qx"),
+                ]
+                .iter()
+                .fold(text, |text, (from, to)| {
+                    text.replace(&format!("{body}.{from}"), &format!("{body}.{to}"))
+                })
+            };
+            let text = ["heT", "haT"].iter().fold(text, |t, body| named(t, body));
+            dir.file(&table, text)
+        });
+    let found = findings(&dir, profile);
+    for body in ["heT", "haT"] {
+        let named = found.iter().find(|f| {
+            let subject = f["subject"].as_str().unwrap_or_default();
+            f["id"] == "quaternion-order" && subject.ends_with(body)
+        });
+        let named = named.unwrap_or_else(|| panic!("{body}: {found:#?}"));
+        let remedy = named["remedy"].as_str().unwrap_or_default();
+        assert!(remedy.contains("quaternion_wxyz"), "{remedy}");
+    }
+    let checked = dir.calib(["check", profile]);
+    assert_eq!(checked.code, 3, "{}", checked.stdout);
+    let ran = dir.calib(["run", profile, "--out", "out"]);
+    assert_eq!(ran.code, 3, "{}", ran.stdout);
+    assert!(ran.stderr.contains("quaternion_wxyz"), "{}", ran.stderr);
+    assert!(!dir.path("out").exists());
+    // With the scalar under its own name again, nothing is wrong.
+    let clean = Scratch::new().robot("justin");
+    assert!(findings(&clean, profile).is_empty());
+}
+
+#[test]
+fn a_recording_with_y_up() {
+    let said = |dir: Scratch| dir.edit(PROFILE, "frame: vicon,", "frame: vicon, up_axis: +Z,");
+    let clean = findings(&said(ripley()), PROFILE);
+    assert!(clean.is_empty(), "{clean:#?}");
+    // (x, y, z) with z up is (x, z, −y) with y up.
+    let dir = TABLES.iter().fold(said(ripley()), |dir, table| {
+        let dir = dir.cells(table, |_, name, cell| match cell.parse::<f64>() {
+            Ok(y) if name.ends_with(".y_m") => (-y).to_string(),
+            _ => cell.to_owned(),
+        });
+        let text = dir.read(table);
+        let text = text
+            .replace(".y_m", ".\u{1}")
+            .replace(".z_m", ".y_m")
+            .replace(".\u{1}", ".z_m");
+        dir.file(table, text)
+    });
+    let found = findings(&dir, PROFILE);
+    assert_eq!(found.len(), TABLES.len(), "{found:#?}");
+    for finding in &found {
+        assert_eq!(finding["id"], "up-axis");
+        assert_eq!(finding["severity"], "warning");
+        let text = finding["text"].as_str().unwrap_or_default();
+        assert!(text.contains("90°") && text.contains("+Y"), "{text}");
+        let remedy = finding["remedy"].as_str().unwrap_or_default();
+        assert!(remedy.contains("`tracker: {up_axis: +Y}`"), "{remedy}");
+    }
+    // Only gravity asks where up is: a warning, which the report repeats.
+    let ran = dir.calib(["run", PROFILE, "--out", "out"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
+    let report = dir.json("out/report.json");
+    let listed = report["findings"].as_array().expect("a list");
+    assert!(listed.iter().any(|f| f["id"] == "up-axis"), "{listed:#?}");
+    let other = dir.edit(PROFILE, "up_axis: +Z", "up_axis: +Y");
+    assert!(findings(&other, PROFILE).is_empty());
+}
+
+#[test]
 fn exchanged_markers_are_put_right_and_listed() {
     // Two labels exchanged in every seventh row of the arm poses, three turned around in every eleventh.
     let dir = ripley();

@@ -88,7 +88,9 @@ pub fn before_the_fit(
     }
     wrong_joint_values(&mut findings, inputs);
     for (name, loaded) in &inputs.recordings {
-        let declared = loaded.meta.up_axis.as_deref();
+        // What the person says counts more than what the exporter wrote.
+        let stated = inputs.robot.profile.tracker.up_axis.map(|axis| axis.name());
+        let declared = stated.or(loaded.meta.up_axis.as_deref());
         let tilted = declared.and_then(|axis| up_axis(axis, &start.tracker_from_root, BASE_TILT));
         findings.extend(tilted.map(|mut finding| {
             finding.subject.clone_from(name);

@@ -27,7 +27,7 @@ pub use profile::{
     JointFreedom, Limits, LinkTransform, Load, Loop, Method, Noise, Orientation, Origin,
     OriginFreedom, Outputs, ParameterValue, Plugin, PointChoice, Prior, Profile, Protocol,
     RecordingSpec, RobotLog, SimErrors, SimMount, SimNoise, Simulation, Solve, Steps, SweptAxis,
-    TimedPoses, Timing, Tip, Touched, Tracker, Usage,
+    TimedPoses, Timing, Tip, Touched, Tracker, UpAxis, Usage,
 };
 pub use schema::json_schema;
 

@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 pub use crate::raw::{
     RawClocks as Clocks, RawFree as Free, RawJointFree as JointFree, RawLoad as Load,
-    RawMethod as Method, RawTimedPoses as TimedPoses, RawUse as Usage,
+    RawMethod as Method, RawTimedPoses as TimedPoses, RawUpAxis as UpAxis, RawUse as Usage,
 };
 pub use crate::raw::{RawPlugin as Plugin, RawValue as ParameterValue};
 
@@ -58,6 +58,8 @@ pub struct Tracker {
     pub body_sigma: Option<f64>,
     /// A body's orientation about each axis, rad.
     pub body_sigma_rad: Option<f64>,
+    /// Axis of the tracker's frame along which the robot's root has its z, where it was said.
+    pub up_axis: Option<UpAxis>,
 }
 
 /// A tracking body on a link.

@@ -80,6 +80,48 @@ pub struct RawTracker {
     /// Stated standard deviation of a body's orientation about each axis, deg.
     #[serde(default)]
     pub body_sigma_deg: Option<f64>,
+    /// The axis of the tracker's world frame along which the robot's root frame has its z: `+Z` for a robot that stands
+    /// upright before a tracker whose z is up. Only compared with what the recordings show, never assumed.
+    #[serde(default)]
+    pub up_axis: Option<RawUpAxis>,
+}
+
+/// An axis of the tracker's world frame, with its sign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum RawUpAxis {
+    /// Along x.
+    #[serde(rename = "+X")]
+    PlusX,
+    /// Along y.
+    #[serde(rename = "+Y")]
+    PlusY,
+    /// Along z.
+    #[serde(rename = "+Z")]
+    PlusZ,
+    /// Against x.
+    #[serde(rename = "-X")]
+    MinusX,
+    /// Against y.
+    #[serde(rename = "-Y")]
+    MinusY,
+    /// Against z.
+    #[serde(rename = "-Z")]
+    MinusZ,
+}
+
+impl RawUpAxis {
+    /// As in the profile: `+Z`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PlusX => "+X",
+            Self::PlusY => "+Y",
+            Self::PlusZ => "+Z",
+            Self::MinusX => "-X",
+            Self::MinusY => "-Y",
+            Self::MinusZ => "-Z",
+        }
+    }
 }
 
 /// A tracking body: markers, or a 6-DoF body, bolted to one link.

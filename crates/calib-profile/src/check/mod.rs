@@ -145,6 +145,7 @@ impl<'a> Checker<'a> {
                 marker_sigma: raw.tracker.marker_sigma_mm.map(|s| s * MM),
                 body_sigma: raw.tracker.body_sigma_mm.map(|s| s * MM),
                 body_sigma_rad: raw.tracker.body_sigma_deg.map(|s| s * DEG),
+                up_axis: raw.tracker.up_axis,
             },
             bodies: self.bodies(),
             recordings: raw

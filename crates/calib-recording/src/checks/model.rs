@@ -211,10 +211,12 @@ pub fn up_axis(declared: &str, tracker_from_base: &Isometry3<f64>, tilt: f64) ->
         .iter()
         .max_by(|a, b| base_up.dot(&a.1).total_cmp(&base_up.dot(&b.1)))?;
     let text = format!(
-        "the recording says {declared} is up, the robot's base points {:.0}° away from it, nearest to {nearest}",
+        "{declared} is said to be up; the robot's base, as found, points {:.0}° away from it, nearest to {nearest}",
         off.to_degrees()
     );
-    let remedy = "set the tracker's up axis in the profile, or say how the robot is mounted";
+    let remedy = format!(
+        "export with the other axis up; or, if the robot is mounted that way, say `tracker: {{up_axis: {nearest}}}`"
+    );
     Some(Finding::new(
         "up-axis",
         Severity::Warning,
