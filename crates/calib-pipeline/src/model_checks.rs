@@ -15,7 +15,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_geometry::so3;
-use calib_profile::{BodyKind, Usage};
+use calib_profile::{BodyKind, UpAxis, Usage};
 use calib_recording::checks::model::{
     GOOD_ENOUGH, Prediction, better_explanation, disagreement, quaternion_order, spoiled_rows,
     up_axis,
@@ -89,7 +89,7 @@ pub fn before_the_fit(
     wrong_joint_values(&mut findings, inputs);
     for (name, loaded) in &inputs.recordings {
         // What the person says counts more than what the exporter wrote.
-        let stated = inputs.robot.profile.tracker.up_axis.map(|axis| axis.name());
+        let stated = inputs.robot.profile.tracker.up_axis.map(UpAxis::name);
         let declared = stated.or(loaded.meta.up_axis.as_deref());
         let tilted = declared.and_then(|axis| up_axis(axis, &start.tracker_from_root, BASE_TILT));
         findings.extend(tilted.map(|mut finding| {
