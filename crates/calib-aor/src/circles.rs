@@ -204,9 +204,73 @@ pub(crate) fn minimise_line(
     free: Free,
     size: f64,
 ) -> Option<(Axis, Normal)> {
-    let end = minimise(&CommonLine { cloud, free, size }, start, MAX_STEPS);
+    let problem = CommonLine { cloud, free, size };
+    let end = minimise(&problem, start, MAX_STEPS);
     let far = (end.x.point - start.point).norm() > 1e4 * size;
-    (end.stop != Stop::Broken && end.normal.cost.is_finite() && !far).then_some((end.x, end.normal))
+    if end.stop == Stop::Broken || !end.normal.cost.is_finite() || far {
+        return None;
+    }
+    Some(problem.settled(end.x, end.normal))
+}
+
+impl CommonLine<'_> {
+    /// Newton's steps from where Gauss–Newton's cost no longer tells: around a center held in the wrong place the residuals are
+    /// large, Gauss–Newton halves its error at best, and its cost stands still at 10⁻⁸ rad.
+    fn settled(&self, mut x: Axis, mut normal: Normal) -> (Axis, Normal) {
+        const STEPS: usize = 6;
+        const SETTLED: f64 = 1e-13;
+        let size_of = |s: &Vector4<f64>| {
+            let shift = if self.size > 0.0 { self.size } else { 1.0 };
+            s[0].hypot(s[1]).max(s[2].hypot(s[3]) / shift)
+        };
+        // What Gauss–Newton would still do.
+        let Some((step, _)) = self.solve(&normal, 0.0) else {
+            return (x, normal);
+        };
+        let mut last = size_of(&step);
+        if last <= SETTLED {
+            return (x, normal);
+        }
+        for _ in 0..STEPS {
+            let curved = Normal {
+                hessian: self.curvature(&x),
+                ..normal.clone()
+            };
+            let Some((step, _)) = self.solve(&curved, 0.0) else {
+                break;
+            };
+            let length = size_of(&step);
+            // Beside a minimum Newton's steps shrink; where they do not, the place stays Gauss–Newton's.
+            if length.is_nan() || length > 10.0 * last {
+                break;
+            }
+            x = self.retract(&x, &step);
+            normal = self.linearize(&x);
+            if length <= SETTLED || length > 0.5 * last && length < 1e-9 {
+                break;
+            }
+            last = length;
+        }
+        (x, normal)
+    }
+
+    /// The Hessian in full, from differences of the gradient.
+    fn curvature(&self, x: &Axis) -> Matrix4<f64> {
+        const H: f64 = 1e-5;
+        let mut hessian = Matrix4::zeros();
+        for k in 0..4 {
+            let h = if k < 2 { H } else { H * self.size };
+            if h <= 0.0 {
+                continue;
+            }
+            let mut by = Vector4::zeros();
+            by[k] = h;
+            let ahead = self.linearize(&self.retract(x, &by)).gradient;
+            let behind = self.linearize(&self.retract(x, &-by)).gradient;
+            hessian.set_column(k, &((ahead - behind) / (2.0 * h)));
+        }
+        (hessian + hessian.transpose()) * 0.5
+    }
 }
 
 /// The axis along a held direction whose circles are nearest to the samples; `start` where it runs away.

@@ -27,6 +27,10 @@ use crate::{
 
 /// Walks of the simplex: each starts afresh around the last end, which frees it from a collapsed shape.
 const WALKS: usize = 6;
+/// Surfaces through costs at the end of the walks, each around the last one's minimum, until it stands still.
+const SURFACES: usize = 12;
+/// Step, in rad and in sizes of the data, below which a surface only repeats rounding.
+const STANDS_STILL: f64 = 1e-13;
 /// Steps of one walk; four unknowns need a few hundred.
 const STEPS: u64 = 2000;
 
@@ -170,25 +174,32 @@ fn walk(cloud: &Cloud, start: Axis, free: Free, size: f64) -> Option<Axis> {
         .at(&best);
         edge *= 0.03;
     }
-    for _ in 0..2 {
-        axis = quadratic_surface(
-            &Walk {
-                cloud,
-                start: axis,
-                size,
-            },
-            unknowns,
-        )
-        .unwrap_or(axis);
+    for _ in 0..SURFACES {
+        let at = Walk {
+            cloud,
+            start: axis,
+            size,
+        };
+        let Some(step) = quadratic_surface(&at, unknowns) else {
+            break;
+        };
+        axis = at.at(step.as_slice());
+        if step.amax() < STANDS_STILL {
+            break;
+        }
     }
     Some(axis)
 }
 
-/// Minimum of the quadratic surface through costs around the walk's end (Nelder & Mead 1965, appendix): costs
-/// near a minimum agree to half of the digits, so comparing them finds it to 10⁻⁸ only.
-fn quadratic_surface(walk: &Walk<'_>, unknowns: usize) -> Option<Axis> {
-    /// Far enough for differences above rounding, near enough for the cubic terms to vanish.
-    const STEP: f64 = 1e-5;
+/// Step to the minimum of the quadratic surface through costs around the walk's end (Nelder & Mead 1965, appendix): costs
+/// near a minimum agree to half of the digits, so comparing them finds it to 10⁻⁸ only. Only costs are used.
+fn quadratic_surface(walk: &Walk<'_>, unknowns: usize) -> Option<DVector<f64>> {
+    /// Far enough for differences above rounding; what is left of the fifth order is below it.
+    const SLOPE: f64 = 1e-4;
+    /// Curvature needs fewer digits, and a wider stencil.
+    const CURVATURE: f64 = 1e-3;
+    /// A walk that ended away from the minimum is not mended here.
+    const NEAR: f64 = 1e-2;
     let cost = |moves: &[(usize, f64)]| {
         let mut x = vec![0.0; unknowns];
         for (k, by) in moves {
@@ -200,21 +211,19 @@ fn quadratic_surface(walk: &Walk<'_>, unknowns: usize) -> Option<Axis> {
     let mut gradient = DVector::zeros(unknowns);
     let mut hessian = DMatrix::zeros(unknowns, unknowns);
     for i in 0..unknowns {
-        let (up, down) = (cost(&[(i, STEP)]), cost(&[(i, -STEP)]));
-        gradient[i] = (up - down) / (2.0 * STEP);
-        // Curvature from a wider stencil: it needs fewer digits.
-        let wide = 100.0 * STEP;
-        hessian[(i, i)] = (cost(&[(i, wide)]) + cost(&[(i, -wide)]) - 2.0 * here) / (wide * wide);
+        // Fourth order: (8 (f₁ − f₋₁) − (f₂ − f₋₂)) / 12h
+        let apart = |by: f64| cost(&[(i, by)]) - cost(&[(i, -by)]);
+        gradient[i] = (8.0 * apart(SLOPE) - apart(2.0 * SLOPE)) / (12.0 * SLOPE);
+        let h = CURVATURE;
+        hessian[(i, i)] = (cost(&[(i, h)]) + cost(&[(i, -h)]) - 2.0 * here) / (h * h);
         for j in 0..i {
-            let mixed = cost(&[(i, wide), (j, wide)])
-                - cost(&[(i, wide), (j, -wide)])
-                - cost(&[(i, -wide), (j, wide)])
-                + cost(&[(i, -wide), (j, -wide)]);
-            hessian[(i, j)] = mixed / (4.0 * wide * wide);
+            let mixed =
+                cost(&[(i, h), (j, h)]) - cost(&[(i, h), (j, -h)]) - cost(&[(i, -h), (j, h)])
+                    + cost(&[(i, -h), (j, -h)]);
+            hessian[(i, j)] = mixed / (4.0 * h * h);
             hessian[(j, i)] = hessian[(i, j)];
         }
     }
     let step = -hessian.cholesky()?.solve(&gradient);
-    // A walk that ended away from the minimum is not mended here.
-    (step.amax() < 1e-3).then(|| walk.at(step.as_slice()))
+    (step.amax() < NEAR).then_some(step)
 }

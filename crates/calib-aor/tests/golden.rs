@@ -96,19 +96,13 @@ fn compare(what: &str, got: &AorEstimate, want: &Value, tolerance: f64) {
             assert!(off < tolerance, "{what}: line off by {off:e}");
         }
     }
-    // The reference is the Gauss–Newton minimum; a simplex finds the place across a flat valley to half of the digits.
-    let allowed = if what.ends_with("planar_radial as circle_ml") {
-        10.0 * tolerance
-    } else {
-        tolerance
-    };
     if want["circle_center"].is_array() {
         let off = (got.circles[0].center.coords - vector(&want["circle_center"])).norm();
-        assert!(off < allowed, "{what}: circle center off by {off:e}");
+        assert!(off < tolerance, "{what}: circle center off by {off:e}");
     }
     if let Some(radius) = want["radius"].as_f64() {
         assert!(
-            (got.circles[0].radius - radius).abs() < allowed,
+            (got.circles[0].radius - radius).abs() < tolerance,
             "{what}: radius"
         );
     }
