@@ -25,7 +25,7 @@ use nalgebra::{
 
 use crate::{
     frame::{FrameAxes, FrameEstimate, FrameOutcome, FrameSample, axes_in_body, residuals},
-    frame_planes::{FrameOptions, check, judge},
+    frame_settings::{FrameOptions, check, judge},
     outcome::{AorError, Known, NotObservable},
 };
 

@@ -26,6 +26,7 @@ use nalgebra::{
 use crate::{
     axis_frame::AxisFrame,
     input::Input,
+    judge::weak_direction,
     options::Options,
     outcome::{AorError, AorEstimate, Known, Outcome},
     shared_axis,
@@ -192,17 +193,12 @@ fn estimate(
         axis = -axis;
         child_axis = -child_axis;
     }
-    let (verdict, reason) = if sigma_direction > options.weak_angle {
-        let text = format!(
-            "σ of the direction is {:.2}°, more than {:.1}°: the body turns too little for noise of {:.2}° and {sigma_t:.2e}",
-            sigma_direction.to_degrees(),
-            options.weak_angle.to_degrees(),
+    let (verdict, reason) = weak_direction(sigma_direction, options, || {
+        format!(
+            "the body turns too little for noise of {:.2}° and {sigma_t:.2e}",
             sigma_r.to_degrees()
-        );
-        (Verdict::Weak, Some(text))
-    } else {
-        (Verdict::Ok, None)
-    };
+        )
+    });
     Outcome::Estimate(Box::new(AorEstimate {
         line: Line {
             point: Point3::from(point),

@@ -203,23 +203,22 @@ pub(crate) fn judge(
         .map(|(own, circle)| (own.unit_variance.max(0.0).sqrt() * sigma, circle.radius))
         .filter(|(deviation, radius)| *deviation > KNOWN_CENTER * radius)
         .max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
-    let (verdict, reason) = if sigma_direction > options.weak_angle {
-        let arc = circles.iter().map(|c| c.arc).fold(0.0, f64::max);
-        let text = format!(
-            "σ of the direction is {:.2}°, more than {:.1}°: arcs of at most {:.0}° with a noise of {sigma:.2e}",
-            sigma_direction.to_degrees(),
-            options.weak_angle.to_degrees(),
+    let arc = circles.iter().map(|c| c.arc).fold(0.0, f64::max);
+    let weak = weak_direction(sigma_direction, options, || {
+        format!(
+            "arcs of at most {:.0}° with a noise of {sigma:.2e}",
             arc.to_degrees()
-        );
-        (Verdict::Weak, Some(text))
-    } else if let Some((deviation, radius)) = adrift {
-        let text = format!(
-            "the direction is known, the own center of a circle is not: σ {deviation:.2e} for a radius of {radius:.2e}; \
-             where the markers share an axis, `line_ml` tells it"
-        );
-        (Verdict::Weak, Some(text))
-    } else {
-        (Verdict::Ok, None)
+        )
+    });
+    let (verdict, reason) = match (weak, adrift) {
+        ((Verdict::Ok, _), Some((deviation, radius))) => {
+            let text = format!(
+                "the direction is known, the own center of a circle is not: σ {deviation:.2e} for a radius of {radius:.2e}; \
+                 where the markers share an axis, `line_ml` tells it"
+            );
+            (Verdict::Weak, Some(text))
+        }
+        (weak, _) => weak,
     };
     Outcome::Estimate(Box::new(AorEstimate {
         estimator,
@@ -239,6 +238,24 @@ pub(crate) fn judge(
         verdict,
         reason,
     }))
+}
+
+/// `weak`, with the reason, where the direction is known worse than [`Options::weak_angle`].
+pub(crate) fn weak_direction(
+    sigma: f64,
+    options: &Options,
+    because: impl FnOnce() -> String,
+) -> (Verdict, Option<String>) {
+    if sigma <= options.weak_angle {
+        return (Verdict::Ok, None);
+    }
+    let text = format!(
+        "σ of the direction is {:.2}°, more than {:.1}°: {}",
+        sigma.to_degrees(),
+        options.weak_angle.to_degrees(),
+        because()
+    );
+    (Verdict::Weak, Some(text))
 }
 
 /// The noise that a test compares with, and its degrees of freedom (`None`: stated, exact).

@@ -35,8 +35,10 @@ mod axis_frame;
 pub mod bounds;
 mod circles;
 pub mod frame;
+mod frame_grid;
 pub mod frame_ml;
 pub mod frame_planes;
+mod frame_settings;
 pub mod halvorsen;
 pub mod hinge_bundle;
 pub mod hinge_poses;
@@ -55,7 +57,8 @@ pub use calib_geometry::measured::{DataError, Pose, Tracks};
 pub use frame::{
     FrameAxes, FrameEstimate, FrameFromAxes, FrameOutcome, FrameSample, Letter, frame_from_axes,
 };
-pub use frame_planes::{Center, CenterOf, FrameOptions, PlaneFit};
+pub use frame_planes::{Center, CenterOf};
+pub use frame_settings::{FrameOptions, PlaneFit};
 pub use input::{Input, InputKind};
 pub use options::Options;
 pub use outcome::{AorError, AorEstimate, Circle, Known, NotObservable, Outcome};

@@ -19,6 +19,7 @@ use nalgebra::{Matrix3, Matrix6, Point3, Unit, Vector3};
 use crate::{
     axis_frame::sign,
     input::{Input, InputKind},
+    judge::weak_direction,
     options::Options,
     outcome::{AorError, AorEstimate, Known, Outcome},
 };
@@ -185,17 +186,12 @@ pub(crate) fn run(
             ))
         });
     let s = sign(&parent_axis, options.towards, turns);
-    let (verdict, reason) = if sigma_direction > options.weak_angle {
-        let text = format!(
-            "σ of the direction is {:.2}°, more than {:.1}°: the body turns too little for an orientation noise of {:.2}°",
-            sigma_direction.to_degrees(),
-            options.weak_angle.to_degrees(),
+    let (verdict, reason) = weak_direction(sigma_direction, options, || {
+        format!(
+            "the body turns too little for an orientation noise of {:.2}°",
             sigma_r.to_degrees()
-        );
-        (Verdict::Weak, Some(text))
-    } else {
-        (Verdict::Ok, None)
-    };
+        )
+    });
     let flipped = |axis: Unit<Vector3<f64>>| if s < 0.0 { -axis } else { axis };
     Ok(Outcome::Estimate(Box::new(AorEstimate {
         estimator,
