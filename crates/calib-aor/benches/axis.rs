@@ -1,4 +1,5 @@
-//! Time of each axis estimator at n = 36, 1 000 and 100 000 samples, and of the frame, one thread.
+//! Time of each axis estimator at n = 36, 1 000 and 100 000 samples, between two bodies too, and of the frames on grids
+//! of 36 and 1 000, one thread.
 
 use calib_aor::{
     Center, FrameOptions, FrameSample, Input, InputKind, Options, Pose, estimators, fit,
@@ -21,7 +22,7 @@ fn axes(c: &mut Criterion) {
     let axis = Unit::new_normalize(Vector3::new(-0.18, -0.83, 0.53));
     for n in [36, 1_000, 100_000] {
         let mut markers = vec![Vec::new(); 3];
-        let mut poses = Vec::new();
+        let (mut poses, mut parents) = (Vec::new(), Vec::new());
         for k in 0..n {
             let turn = UnitQuaternion::from_axis_angle(&axis, 2.0 * f64::from(k) / f64::from(n));
             for (p, track) in markers.iter_mut().enumerate() {
@@ -32,6 +33,14 @@ fn axes(c: &mut Criterion) {
             poses.push(Some(Pose {
                 rotation: measured.to_rotation_matrix().into_inner(),
                 translation: point + turn * Vector3::new(0.1, 0.0, 0.05) + normal(1e-3),
+            }));
+        }
+        // The parent stands still and is measured with the same noise.
+        for _ in 0..n {
+            let turn = UnitQuaternion::from_scaled_axis(normal(5e-3));
+            parents.push(Some(Pose {
+                rotation: turn.to_rotation_matrix().into_inner(),
+                translation: normal(1e-3),
             }));
         }
         let mut group = c.benchmark_group(format!("axis/{n}"));
@@ -50,6 +59,16 @@ fn axes(c: &mut Criterion) {
             group.bench_function(BenchmarkId::from_parameter(info.id), |b| {
                 b.iter(|| fit(info.id, black_box(&input), &Options::default()));
             });
+            if info.input == InputKind::Poses {
+                let input = Input::TwoBodies {
+                    parent: &parents,
+                    child: &poses,
+                };
+                let name = format!("{}, two bodies", info.id);
+                group.bench_function(BenchmarkId::from_parameter(name), |b| {
+                    b.iter(|| fit(info.id, black_box(&input), &Options::default()));
+                });
+            }
         }
         group.finish();
     }
@@ -57,32 +76,39 @@ fn axes(c: &mut Criterion) {
     let joint = Isometry3::new(point, Vector3::new(0.4, -0.7, 1.1));
     let body = Isometry3::new(Vector3::new(0.0, -0.1, 0.0), Vector3::new(-0.9, 0.3, 0.5));
     let options = FrameOptions::default();
-    let mut samples = Vec::new();
-    for i in 0..6 {
-        for j in 0..6 {
-            let (p, d) = (0.6 * f64::from(i) - 0.8, 0.4 * f64::from(j) - 0.8);
-            let truth = joint * options.axes.turned(p, d) * body.inverse();
-            let measured = truth.rotation * UnitQuaternion::from_scaled_axis(normal(5e-3));
-            samples.push(FrameSample {
-                world_from_body: Some(Pose {
-                    rotation: measured.to_rotation_matrix().into_inner(),
-                    translation: truth.translation.vector + normal(1e-3),
-                }),
-                proximal: p,
-                distal: d,
-            });
-        }
-    }
     let center = Center::Given {
         point: point.into(),
         covariance: Matrix3::identity() * 1e-8,
     };
-    c.bench_function("frame/36/algorithm1", |b| {
-        b.iter(|| frame_planes::algorithm1(black_box(&samples), center, &options));
-    });
-    c.bench_function("frame/36/frame_ml", |b| {
-        b.iter(|| frame_ml::fit(black_box(&samples), Residuals::Poses, &options));
-    });
+    for (proximal, distal) in [(6, 6), (40, 25)] {
+        let mut samples = Vec::new();
+        for i in 0..proximal {
+            for j in 0..distal {
+                let p = 3.0 * f64::from(i) / f64::from(proximal - 1) - 0.8;
+                let d = 2.0 * f64::from(j) / f64::from(distal - 1) - 0.8;
+                let truth = joint * options.axes.turned(p, d) * body.inverse();
+                let measured = truth.rotation * UnitQuaternion::from_scaled_axis(normal(5e-3));
+                samples.push(FrameSample {
+                    world_from_body: Some(Pose {
+                        rotation: measured.to_rotation_matrix().into_inner(),
+                        translation: truth.translation.vector + normal(1e-3),
+                    }),
+                    proximal: p,
+                    distal: d,
+                });
+            }
+        }
+        let mut group = c.benchmark_group(format!("frame/{}", samples.len()));
+        group.throughput(Throughput::Elements(samples.len() as u64));
+        group.sample_size(10);
+        group.bench_function("algorithm1", |b| {
+            b.iter(|| frame_planes::algorithm1(black_box(&samples), center, &options));
+        });
+        group.bench_function("frame_ml", |b| {
+            b.iter(|| frame_ml::fit(black_box(&samples), Residuals::Poses, &options));
+        });
+        group.finish();
+    }
 }
 
 criterion_group!(benches, axes);
