@@ -2,7 +2,7 @@
 
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use calib_pipeline::apply::{self, ApplyRequest, Destination};
 use calib_pipeline::run::{RunOptions, run as run_profile};
@@ -17,6 +17,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::arguments::{
     Apply, Arguments, Command, DiffFormat, Fit, MethodName, Run, SchemaOf, StudyName, StudyRun,
 };
+use crate::remaining::with_remaining;
 use crate::{plugins, record};
 
 /// Writes results to standard output; a reader that went away (`| head`) is no error.
@@ -295,7 +296,14 @@ fn calibrate(arguments: &Arguments, options: &Run) -> Result<ExitCode, PipelineE
         }
     };
     if options.compare_models {
-        let ranked = models::compare_models(&options.profile, options.force, &mut progress)?;
+        let mut began = Instant::now();
+        let mut report = |stage: &str, done: usize, all: usize| {
+            if done == 0 {
+                began = Instant::now();
+            }
+            progress(&with_remaining(stage, done, all, began.elapsed()));
+        };
+        let ranked = models::compare_models(&options.profile, options.force, &mut report)?;
         bar.finish_and_clear();
         emit(&if options.json {
             models::json(&ranked)

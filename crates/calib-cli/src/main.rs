@@ -4,6 +4,7 @@ mod arguments;
 mod commands;
 mod plugins;
 mod record;
+mod remaining;
 
 use std::error::Error;
 use std::process::ExitCode;

@@ -58,11 +58,25 @@ pub fn compare(
     settings: &Settings,
     criterion: Criterion,
 ) -> Result<Vec<RankedVariant>, Error> {
+    compare_with(variants, settings, criterion, &mut |_| {})
+}
+
+/// As [`compare`]; `done(n)` is told when n variants are solved.
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_with(
+    variants: &[(String, Problem)],
+    settings: &Settings,
+    criterion: Criterion,
+    done: &mut dyn FnMut(usize),
+) -> Result<Vec<RankedVariant>, Error> {
     let mut solved = Vec::new();
     for (name, problem) in variants {
         let solution = solve(problem, settings)?;
         let loo = solution.leave_one_out().ok_or(Error::NotEvaluable)?;
         solved.push((name, solution, loo));
+        done(solved.len());
     }
     let common = common_vectors(&solved);
     let samples: std::collections::BTreeSet<usize> = common.iter().map(|(s, _, _)| *s).collect();

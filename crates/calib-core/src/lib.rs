@@ -162,7 +162,7 @@ mod validate;
 pub use baseline::Baseline;
 pub use chart::Chart;
 pub use closure::{ClosureStatistics, Spread};
-pub use compare::{Criterion, RankedVariant, compare};
+pub use compare::{Criterion, RankedVariant, compare, compare_with};
 pub use derived::{Configuration, DerivedPoint, DerivedPose};
 pub use edge::{Axis, Candidate, Edge, EdgeKind, Feature, FeatureKind, Joint, Role, UnknownPose};
 pub use error::Error;

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use calib_core::{RankedVariant, Settings, compare};
+use calib_core::{RankedVariant, Settings, compare_with};
 use calib_profile::Free;
 use serde_json::json;
 
@@ -28,14 +28,15 @@ const STEPS: [(&str, &[Free]); 8] = [
     ("+ gains", &[Free::JointGains]),
 ];
 
-/// Ranks the models on the fitted recordings alone; validation recordings are not looked at.
+/// Ranks the models on the fitted recordings alone; validation recordings are not looked at. `progress(stage, done, all)`
+/// is told what is done next, and how many of all models are fitted; `all` is 0 until they are stated.
 ///
 /// # Errors
 /// [`PipelineError`] as for a run; data errors stop unless `force`.
 pub fn compare_models(
     profile: &Path,
     force: bool,
-    progress: &mut dyn FnMut(&str),
+    progress: &mut dyn FnMut(&str, usize, usize),
 ) -> Result<Vec<RankedVariant>, PipelineError> {
     let mut inputs = load_recordings(load_robot(profile)?, true)?;
     let mut findings = inputs.findings.clone();
@@ -68,17 +69,23 @@ pub fn compare_models(
         } else {
             Freedom::Profile
         };
-        progress(&format!("state model: {name}"));
+        progress(&format!("state model: {name}"), 0, 0);
         variants.push((
             name.to_owned(),
             state(&inputs, &tracks, &start, freedom).problem,
         ));
     }
-    progress("fit and predict each pose from the others");
-    Ok(compare(
+    let all = variants.len();
+    let stage = |done: usize| match variants.get(done) {
+        Some((name, _)) => format!("fit and predict each pose from the others: {name}"),
+        None => "rank".to_owned(),
+    };
+    progress(&stage(0), 0, all);
+    Ok(compare_with(
         &variants,
         &Settings::default(),
         calib_core::Criterion::LogDensity,
+        &mut |done| progress(&stage(done), done, all),
     )?)
 }
 

@@ -6,7 +6,13 @@ use nalgebra::Point3;
 use std::hint::black_box;
 
 const MARKERS: usize = 60;
-const FRAMES: usize = 4000;
+
+/// 4000, or what `CALIB_BENCH_FRAMES` says, up to the 65 535 that a C3D header can count.
+fn frames() -> usize {
+    let asked = std::env::var("CALIB_BENCH_FRAMES").ok();
+    let asked = asked.and_then(|text| text.parse().ok());
+    asked.unwrap_or(4000).clamp(1, usize::from(u16::MAX))
+}
 
 /// A smooth, never repeating coordinate, mm.
 fn coordinate(frame: usize, k: usize) -> f64 {
@@ -14,7 +20,7 @@ fn coordinate(frame: usize, k: usize) -> f64 {
 }
 
 /// Nexus CSV with six significant digits.
-fn nexus() -> Vec<u8> {
+fn nexus(frames: usize) -> Vec<u8> {
     let mut text = String::from("Trajectories\r\n100\r\n,");
     (0..MARKERS).for_each(|k| text.push_str(&format!(",Body:M{k},,")));
     text.push_str("\r\nFrame,Sub Frame");
@@ -22,7 +28,7 @@ fn nexus() -> Vec<u8> {
     text.push_str("\r\n,");
     (0..3 * MARKERS).for_each(|_| text.push_str(",mm"));
     text.push_str("\r\n");
-    for frame in 0..FRAMES {
+    for frame in 0..frames {
         text.push_str(&format!("{},0", frame + 1));
         (0..3 * MARKERS).for_each(|k| text.push_str(&format!(",{:.3}", coordinate(frame, k))));
         text.push_str("\r\n");
@@ -31,12 +37,12 @@ fn nexus() -> Vec<u8> {
 }
 
 /// Our own table with micrometres.
-fn canonical() -> Vec<u8> {
+fn canonical(frames: usize) -> Vec<u8> {
     let mut poses = Poses {
-        rows: (0..FRAMES as u64).collect(),
+        rows: (0..frames as u64).collect(),
         ..Poses::default()
     };
-    poses.t = Some((0..FRAMES).map(|i| i as f64 * 0.01).collect());
+    poses.t = Some((0..frames).map(|i| i as f64 * 0.01).collect());
     for k in 0..MARKERS {
         let point = |frame| {
             Point3::new(
@@ -47,7 +53,7 @@ fn canonical() -> Vec<u8> {
         };
         poses.markers.insert(
             format!("m{k}"),
-            (0..FRAMES).map(|frame| Some(point(frame))).collect(),
+            (0..frames).map(|frame| Some(point(frame))).collect(),
         );
     }
     write_poses(&poses, &WriteOptions::micro())
@@ -56,11 +62,11 @@ fn canonical() -> Vec<u8> {
 }
 
 /// C3D, Intel, float or integer points, no analog data.
-fn c3d(float: bool) -> Vec<u8> {
+fn c3d(frames: usize, float: bool) -> Vec<u8> {
     let mut header = vec![0u8; 512];
     header[0] = 2;
     header[1] = 0x50;
-    for (word, value) in [(2, MARKERS as u16), (4, 1), (5, FRAMES as u16), (9, 3)] {
+    for (word, value) in [(2, MARKERS as u16), (4, 1), (5, frames as u16), (9, 3)] {
         header[2 * word - 2..2 * word].copy_from_slice(&value.to_le_bytes());
     }
     header[12..16].copy_from_slice(&if float { -0.1f32 } else { 0.1f32 }.to_le_bytes());
@@ -83,7 +89,7 @@ fn c3d(float: bool) -> Vec<u8> {
     add(-1, "POINT", &[0], false);
     add(-2, "ANALOG", &[0], false);
     add(1, "USED", &word(MARKERS as u16), false);
-    add(1, "FRAMES", &word(FRAMES as u16), false);
+    add(1, "FRAMES", &word(frames as u16), false);
     add(1, "DATA_START", &word(3), false);
     add(1, "SCALE", &number(scale), false);
     add(1, "RATE", &number(100.0), false);
@@ -97,7 +103,7 @@ fn c3d(float: bool) -> Vec<u8> {
     add(2, "USED", &word(0), true);
     parameters.resize(512, 0);
     let mut data = Vec::new();
-    for frame in 0..FRAMES {
+    for frame in 0..frames {
         for k in 0..MARKERS {
             for axis in 0..3 {
                 let value = coordinate(frame, 3 * k + axis);
@@ -121,16 +127,18 @@ fn c3d(float: bool) -> Vec<u8> {
 fn reading(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("reading");
     group.sample_size(20);
+    let frames = frames();
     for (name, bytes) in [
-        ("nexus_csv", nexus()),
-        ("canonical_csv", canonical()),
-        ("c3d_float", c3d(true)),
-        ("c3d_integer", c3d(false)),
+        ("nexus_csv", nexus(frames)),
+        ("canonical_csv", canonical(frames)),
+        ("c3d_float", c3d(frames, true)),
+        ("c3d_integer", c3d(frames, false)),
     ] {
         // For other programs to read the same files.
         if let Some(folder) = std::env::var_os("CALIB_BENCH_FILES") {
             let path = std::path::Path::new(&folder).join(name);
-            if let Err(error) = std::fs::write(&path, &bytes) {
+            let made = std::fs::create_dir_all(&folder);
+            if let Err(error) = made.and_then(|()| std::fs::write(&path, &bytes)) {
                 eprintln!("{}: {error}", path.display());
             }
         }
