@@ -34,19 +34,22 @@ pub(crate) struct Normal {
     pub cost: f64,
 }
 
-/// Linearises f for the samples of one marker.
-pub(crate) fn linearize_marker(points: &[Vector3<f64>], axis: &Axis) -> Normal {
+/// Linearises f for the samples of one marker, with their weights.
+pub(crate) fn linearize_marker(
+    samples: impl Iterator<Item = (Vector3<f64>, f64)> + Clone,
+    axis: &Axis,
+) -> Normal {
     let AxisFrame { e1, e2, n } = axis.frame;
-    let count = points.len() as f64;
+    let mut total = 0.0;
     let (mut sum_a, mut sum_r) = (Vector4::zeros(), Vector4::zeros());
     let (mut mean_a, mut mean_r) = (0.0, 0.0);
     let mut hessian = Matrix4::zeros();
     let mut gradient = Vector4::zeros();
     let mut cost = 0.0;
     // Residuals relative to the first sample's: differences keep their digits.
-    let first = points[0] - axis.point;
+    let first = samples.clone().next().map_or(Vector3::zeros(), |(x, _)| x - axis.point);
     let (a0, r0) = (first.dot(&n), (first - n * first.dot(&n)).norm());
-    for x in points {
+    for (x, weight) in samples {
         let d = x - axis.point;
         let a = d.dot(&n);
         let w = d - n * a;
@@ -61,20 +64,21 @@ pub(crate) fn linearize_marker(points: &[Vector3<f64>], axis: &Axis) -> Normal {
         let j_a = Vector4::new(d.dot(&e1), d.dot(&e2), 0.0, 0.0);
         let j_r = Vector4::new(-a * u1, -a * u2, -u1, -u2);
         let (e_a, e_r) = (a - a0, length - r0);
-        hessian += j_a * j_a.transpose() + j_r * j_r.transpose();
-        gradient += j_a * e_a + j_r * e_r;
-        cost += e_a * e_a + e_r * e_r;
-        sum_a += j_a;
-        sum_r += j_r;
-        mean_a += e_a;
-        mean_r += e_r;
+        hessian += (j_a * j_a.transpose() + j_r * j_r.transpose()) * weight;
+        gradient += (j_a * e_a + j_r * e_r) * weight;
+        cost += weight * (e_a * e_a + e_r * e_r);
+        sum_a += j_a * weight;
+        sum_r += j_r * weight;
+        mean_a += weight * e_a;
+        mean_r += weight * e_r;
+        total += weight;
     }
     // Heights and radii are means: center residuals and rows.
-    mean_a /= count;
-    mean_r /= count;
-    hessian -= (sum_a * sum_a.transpose() + sum_r * sum_r.transpose()) / count;
+    mean_a /= total;
+    mean_r /= total;
+    hessian -= (sum_a * sum_a.transpose() + sum_r * sum_r.transpose()) / total;
     gradient -= sum_a * mean_a + sum_r * mean_r;
-    cost -= count * (mean_a * mean_a + mean_r * mean_r);
+    cost -= total * (mean_a * mean_a + mean_r * mean_r);
     Normal {
         hessian,
         gradient,
@@ -90,7 +94,7 @@ pub(crate) fn linearize(cloud: &Cloud, axis: &Axis) -> Normal {
         cost: 0.0,
     };
     for p in 0..cloud.markers() {
-        let part = linearize_marker(cloud.marker(p), axis);
+        let part = linearize_marker(cloud.samples(p), axis);
         total.hessian += part.hessian;
         total.gradient += part.gradient;
         total.cost += part.cost;
@@ -102,31 +106,34 @@ pub(crate) fn linearize(cloud: &Cloud, axis: &Axis) -> Normal {
 pub(crate) fn information(cloud: &Cloud, axis: &Axis) -> Matrix4<f64> {
     let mut total = Matrix4::zeros();
     for p in 0..cloud.markers() {
-        total += information_of_marker(cloud.marker(p), axis);
+        total += information_of_marker(cloud.samples(p), axis);
     }
     total
 }
 
 /// [`information`] of one marker.
-pub(crate) fn information_of_marker(points: &[Vector3<f64>], axis: &Axis) -> Matrix4<f64> {
+pub(crate) fn information_of_marker(
+    samples: impl Iterator<Item = (Vector3<f64>, f64)> + Clone,
+    axis: &Axis,
+) -> Matrix4<f64> {
     let n = axis.frame.n;
-    let apart = |x: &Vector3<f64>| {
+    let apart = |(x, weight): (Vector3<f64>, f64)| {
         let d = x - axis.point;
         let a = d.dot(&n);
-        (a, d - n * a)
+        (a, d - n * a, weight)
     };
-    let count = points.len() as f64;
-    let (mut height, mut radius) = (0.0, 0.0);
-    for (a, w) in points.iter().map(apart) {
-        height += a / count;
-        radius += w.norm() / count;
+    let (mut height, mut radius, mut total) = (0.0, 0.0, 0.0);
+    for (a, w, weight) in samples.clone().map(apart) {
+        height += weight * a;
+        radius += weight * w.norm();
+        total += weight;
     }
-    let modelled: Vec<Vector3<f64>> = points
-        .iter()
-        .map(apart)
-        .map(|(_, w)| axis.point + n * height + w * (radius / w.norm().max(f64::MIN_POSITIVE)))
-        .collect();
-    linearize_marker(&modelled, axis).hessian
+    let middle = axis.point + n * (height / total);
+    let modelled = samples.map(apart).map(|(_, w, weight)| {
+        let on_circle = w * (radius / total / w.norm().max(f64::MIN_POSITIVE));
+        (middle + on_circle, weight)
+    });
+    linearize_marker(modelled, axis).hessian
 }
 
 /// Which unknowns move.
@@ -303,7 +310,7 @@ impl Problem for OwnCenters<'_> {
                     frame: x.frame,
                     point: x.points[p],
                 };
-                linearize_marker(self.cloud.marker(p), &axis)
+                linearize_marker(self.cloud.samples(p), &axis)
             })
             .collect()
     }
@@ -397,17 +404,17 @@ pub(crate) fn flat_center(
     let mut height = 0.0;
     let mut total = 0.0;
     for p in markers {
-        let points = cloud.marker(p);
-        let n = points.len() as f64;
-        let mean = points.iter().map(flat).sum::<Vector2<f64>>() / n;
-        let mean_w = points.iter().map(|x| flat(x).norm_squared()).sum::<f64>() / n;
-        for x in points {
-            let q = flat(x) - mean;
-            a += q * q.transpose();
-            b += q * (0.5 * (flat(x).norm_squared() - mean_w));
-            height += x.dot(&frame.n);
+        let points = || cloud.samples(p).map(|(x, w)| (flat(&x), w));
+        let own = cloud.total(cloud.range(p));
+        let mean = points().map(|(q, w)| q * w).sum::<Vector2<f64>>() / own;
+        let mean_w = points().map(|(q, w)| w * q.norm_squared()).sum::<f64>() / own;
+        for (flat, w) in points() {
+            let q = (flat - mean) * w;
+            a += q * (flat - mean).transpose();
+            b += q * (0.5 * (flat.norm_squared() - mean_w));
         }
-        total += n;
+        height += cloud.samples(p).map(|(x, w)| w * x.dot(&frame.n)).sum::<f64>();
+        total += own;
     }
     let m = a.cholesky().map_or(Vector2::zeros(), |c| c.solve(&b));
     frame.e1 * m.x + frame.e2 * m.y + frame.n * (height / total)

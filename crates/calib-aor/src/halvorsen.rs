@@ -27,7 +27,7 @@ use crate::{
 /// [`AorError`] for data that are no numbers or of another kind.
 pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
     options.check()?;
-    let cloud = cloud_of(input)?;
+    let cloud = cloud_of(input, options)?;
     let factor = match prepare("halvorsen_line", &cloud) {
         Ok(factor) => factor,
         Err(answer) => return Ok(answer),
@@ -35,19 +35,22 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
     // Directions of the displacements, from their triangular factor; and Σ d (d·μ).
     let (mut spread, mut right) = (RowQr::<3>::default(), Vector3::zeros());
     let mut pairs = 0;
-    let mut add = |a: &Vector3<f64>, b: &Vector3<f64>| {
-        let d = b - a;
+    let mut add = |i: usize, j: usize| {
+        let (a, b) = (&cloud.points[i], &cloud.points[j]);
+        // All pairs of rows that count w_i and w_j times.
+        let root = (cloud.weight(i) * cloud.weight(j)).sqrt();
+        let d = (b - a) * root;
         spread.push([d.x, d.y, d.z]);
-        right += d * (0.5 * (b.norm_squared() - a.norm_squared()));
+        right += d * (0.5 * root * (b.norm_squared() - a.norm_squared()));
         pairs += 1;
     };
     for p in 0..cloud.markers() {
-        let range = cloud.starts[p]..cloud.starts[p + 1];
+        let range = cloud.range(p);
         match options.separation {
             None => {
                 for i in range.clone() {
                     for j in i + 1..range.end {
-                        add(&cloud.points[i], &cloud.points[j]);
+                        add(i, j);
                     }
                 }
             }
@@ -55,7 +58,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
                 for i in range.clone() {
                     let other = cloud.labels[i].1 + rows.max(1);
                     if let Some(j) = (i + 1..range.end).find(|&j| cloud.labels[j].1 == other) {
-                        add(&cloud.points[i], &cloud.points[j]);
+                        add(i, j);
                     }
                 }
             }

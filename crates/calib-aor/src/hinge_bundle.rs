@@ -47,7 +47,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
             got: input.word(),
         });
     }
-    let cloud = cloud_of(input)?;
+    let cloud = cloud_of(input, options)?;
     let factor = match prepare(ID, &cloud) {
         Ok(factor) => factor,
         Err(answer) => return Ok(answer),

@@ -1,9 +1,9 @@
 //! What an estimator is given, and which estimators it serves.
 
-use calib_geometry::measured::{Cloud, Pose, Tracks};
+use calib_geometry::measured::{Cloud, Pose, RowWeights, Tracks};
 use serde::{Deserialize, Serialize};
 
-use crate::outcome::AorError;
+use crate::{options::Options, outcome::AorError};
 
 /// Measurements of one joint's motion, in one tracker frame and one length unit.
 #[derive(Debug, Clone, Copy)]
@@ -58,11 +58,12 @@ impl Input<'_> {
     }
 }
 
-/// The samples as a cloud of points.
-pub(crate) fn cloud_of(input: &Input<'_>) -> Result<Cloud, AorError> {
+/// The samples as a cloud of points, with their weights.
+pub(crate) fn cloud_of(input: &Input<'_>, options: &Options) -> Result<Cloud, AorError> {
+    let weights = RowWeights(&options.weights);
     match *input {
-        Input::Points(tracks) | Input::Markers(tracks) => Ok(Cloud::gather(tracks, &[])?),
-        Input::Poses(poses) => Ok(Cloud::of_origins(poses)?),
+        Input::Points(tracks) | Input::Markers(tracks) => Ok(Cloud::weighted(tracks, &[], weights)?),
+        Input::Poses(poses) => Ok(Cloud::of_weighted_origins(poses, weights)?),
         Input::TwoBodies { .. } => Err(AorError::WrongInput {
             expects: InputKind::Points,
             got: input.word(),

@@ -64,7 +64,7 @@ fn run(
     solve: impl Fn(&'static str, &Cloud, &Factor) -> Option<Candidate>,
 ) -> Result<Outcome, AorError> {
     options.check()?;
-    let cloud = cloud_of(input)?;
+    let cloud = cloud_of(input, options)?;
     let factor = match prepare(estimator, &cloud) {
         Ok(factor) => factor,
         Err(answer) => return Ok(answer),
@@ -117,7 +117,7 @@ fn own_centers(estimator: &'static str, cloud: &Cloud, factor: &Factor) -> Optio
         .enumerate()
         .map(|(p, normal)| Normal {
             hessian: information_of_marker(
-                cloud.marker(p),
+                cloud.samples(p),
                 &Axis {
                     frame: end.frame,
                     point: end.points[p],

@@ -16,6 +16,9 @@ pub struct Options {
     /// Joint angle of every row, rad, from the encoders. They give the axis its sign, and the hinge
     /// bundle takes them as exact. Empty: unknown.
     pub angles: Vec<f64>,
+    /// How many single samples each row is worth (the mean of k readings: k): its noise variance is σ²/w, and σ that of a row of weight 1.
+    /// Empty: one each. A row of weight 0 counts as lost.
+    pub weights: Vec<f64>,
     /// Direction that the axis is reported towards where angles do not decide its sign.
     pub towards: Option<Unit<Vector3<f64>>>,
     /// `halvorsen_line`: rows between the two samples of a pair; `None`: all pairs.
@@ -34,6 +37,7 @@ impl Default for Options {
             sigma_r: None,
             center: None,
             angles: Vec::new(),
+            weights: Vec::new(),
             towards: None,
             separation: None,
             significance: 1e-3,

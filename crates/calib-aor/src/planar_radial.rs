@@ -62,7 +62,7 @@ fn run(
     solve: impl Fn(&Cloud, Axis, Free, f64) -> Option<Axis>,
 ) -> Result<Outcome, AorError> {
     options.check()?;
-    let cloud = cloud_of(input)?;
+    let cloud = cloud_of(input, options)?;
     let factor = match prepare(estimator, &cloud) {
         Ok(factor) => factor,
         Err(answer) => return Ok(answer),

@@ -25,7 +25,7 @@ use crate::{
 /// [`AorError`] for data that are no numbers or of another kind.
 pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
     options.check()?;
-    let cloud = cloud_of(input)?;
+    let cloud = cloud_of(input, options)?;
     let factor = match prepare("plane", &cloud) {
         Ok(factor) => factor,
         Err(answer) => return Ok(answer),

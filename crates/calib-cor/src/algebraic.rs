@@ -70,8 +70,8 @@ pub(crate) fn solve(cloud: &Cloud, factor: &Factor, member: Algebraic) -> (Vecto
     let radii = (0..cloud.markers())
         .map(|p| {
             let square = cloud
-                .range(p)
-                .map(|k| cloud.weight(k) * (cloud.points[k] - center).norm_squared())
+                .samples(p)
+                .map(|(x, w)| w * (x - center).norm_squared())
                 .sum::<f64>()
                 / cloud.total(cloud.range(p));
             (square + 2.0 * member.beta() * lambda).max(0.0).sqrt()

@@ -84,11 +84,8 @@ fn run(
 fn rms_radii(cloud: &Cloud, center: &Vector3<f64>) -> Vec<f64> {
     (0..cloud.markers())
         .map(|p| {
-            let range = cloud.range(p);
-            let squares = range
-                .clone()
-                .map(|k| cloud.weight(k) * (cloud.points[k] - center).norm_squared());
-            (squares.sum::<f64>() / cloud.total(range)).sqrt()
+            let squares = cloud.samples(p).map(|(x, w)| w * (x - center).norm_squared());
+            (squares.sum::<f64>() / cloud.total(cloud.range(p))).sqrt()
         })
         .collect()
 }
@@ -102,7 +99,7 @@ pub(crate) fn compensate(cloud: &Cloud, factor: &Factor) -> (Vector3<f64>, f64) 
     let share: f64 = shares.iter().sum();
     let means: Vector3<f64> = (0..cloud.markers())
         .map(|p| {
-            let points = cloud.range(p).map(|k| cloud.points[k] * cloud.weight(k));
+            let points = cloud.samples(p).map(|(x, w)| x * w);
             points.sum::<Vector3<f64>>() * (shares[p] / cloud.total(cloud.range(p)))
         })
         .sum();
@@ -111,9 +108,7 @@ pub(crate) fn compensate(cloud: &Cloud, factor: &Factor) -> (Vector3<f64>, f64) 
     for _ in 0..ROUNDS {
         sigma2 = (0..cloud.markers())
             .map(|p| {
-                let squares = cloud
-                    .range(p)
-                    .map(|k| (cloud.weight(k), (cloud.points[k] - center).norm_squared()));
+                let squares = cloud.samples(p).map(|(x, w)| (w, (x - center).norm_squared()));
                 let mean =
                     squares.clone().map(|(w, q)| w * q).sum::<f64>() / cloud.total(cloud.range(p));
                 let off = squares.map(|(w, q)| w * (q - mean) * (q - mean));

@@ -89,11 +89,8 @@ fn not_observable(
 pub(crate) fn mean_radii(cloud: &Cloud, center: &Vector3<f64>) -> Vec<f64> {
     (0..cloud.markers())
         .map(|p| {
-            let range = cloud.range(p);
-            let lengths = range
-                .clone()
-                .map(|k| cloud.weight(k) * (cloud.points[k] - center).norm());
-            lengths.sum::<f64>() / cloud.total(range)
+            let lengths = cloud.samples(p).map(|(x, w)| w * (x - center).norm());
+            lengths.sum::<f64>() / cloud.total(cloud.range(p))
         })
         .collect()
 }

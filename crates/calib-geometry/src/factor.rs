@@ -40,13 +40,12 @@ impl Factor {
         let mut qr = RowQr::<4>::default();
         let mut mean_square = 0.0;
         for p in 0..cloud.markers() {
-            let points = || cloud.range(p).map(|k| (&cloud.points[k], cloud.weight(k)));
             let own = cloud.total(cloud.range(p));
-            let mean = points().map(|(x, w)| x * w).sum::<Vector3<f64>>() / own;
-            let mean_w = points().map(|(x, w)| x.norm_squared() * w).sum::<f64>() / own;
+            let mean = cloud.samples(p).map(|(x, w)| x * w).sum::<Vector3<f64>>() / own;
+            let mean_w = cloud.samples(p).map(|(x, w)| x.norm_squared() * w).sum::<f64>() / own;
             mean_square += own * mean_w;
             let share = if equal_markers { 1.0 / own } else { 1.0 };
-            for (x, w) in points() {
+            for (x, w) in cloud.samples(p) {
                 let root = (share * w).sqrt();
                 let d = (x - mean) * root;
                 qr.push([d.x, d.y, d.z, (x.norm_squared() - mean_w) * root]);

@@ -300,6 +300,11 @@ impl Cloud {
         &self.points[self.range(p)]
     }
 
+    /// Samples of marker p with their weights.
+    pub fn samples(&self, p: usize) -> impl Iterator<Item = (Vector3<f64>, f64)> + Clone {
+        self.range(p).map(|k| (self.points[k], self.weight(k)))
+    }
+
     /// The cloud restricted to points whose flag is set.
     #[must_use]
     pub fn select(&self, keep: &[bool]) -> Self {
