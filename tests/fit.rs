@@ -397,6 +397,51 @@ fn what_cannot_be_observed_ends_with_four() {
     );
 }
 
+#[test]
+fn axes_and_frames_take_weights() {
+    let weights = |rows: usize, of: &dyn Fn(usize) -> u8| {
+        let lines: Vec<String> = (0..rows).map(|k| of(k).to_string()).collect();
+        format!("weight\n{}\n", lines.join("\n"))
+    };
+    let dir = pivot()
+        .file("four.csv", weights(49, &|_| 4))
+        .file("zero.csv", weights(49, &|k| u8::from(k >= 7)));
+    let frame = |more: &[&str]| {
+        let mut arguments = vec!["fit", "frame", "pivot.csv", "--proximal", "z=a", "--distal"];
+        arguments.extend(["x=b", "--json"]);
+        arguments.extend(more);
+        dir.calib_with(&arguments).expect(0).json()
+    };
+    for estimator in ["algorithm1", "frame_ml"] {
+        let all = frame(&["--estimator", estimator, "--weights", "four.csv"]);
+        let fewer = frame(&["--estimator", estimator, "--weights", "zero.csv"]);
+        let pose = &all["body_from_joint"]["translation_m"];
+        assert_near("frame", pose, [0.0, -150.0, 0.0], 1e-6);
+        assert_eq!((&all["used"], &fewer["used"]), (&49.into(), &42.into()));
+    }
+    let fit = dir.calib([
+        "fit",
+        "aor",
+        "pivot.csv",
+        "--weights",
+        "zero.csv",
+        "--all",
+        "--json",
+    ]);
+    assert!(matches!(fit.code, 0 | 4), "{}", fit.stderr);
+    // Rows without an angle leave with their weights.
+    let one = dir.calib([
+        "fit",
+        "aor",
+        "pivot.csv",
+        "--weights",
+        "four.csv",
+        "--joint",
+        "a",
+    ]);
+    assert!(matches!(one.code, 0 | 4), "{}", one.stderr);
+}
+
 /// A weak answer is shown, with its doubt, and does not pass for a good one.
 #[test]
 fn a_weak_answer_says_so() {

@@ -95,6 +95,7 @@ fn axes(c: &mut Criterion) {
                     }),
                     proximal: p,
                     distal: d,
+                    weight: 1.0,
                 });
             }
         }

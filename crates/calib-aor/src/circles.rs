@@ -47,7 +47,10 @@ pub(crate) fn linearize_marker(
     let mut gradient = Vector4::zeros();
     let mut cost = 0.0;
     // Residuals relative to the first sample's: differences keep their digits.
-    let first = samples.clone().next().map_or(Vector3::zeros(), |(x, _)| x - axis.point);
+    let first = samples
+        .clone()
+        .next()
+        .map_or(Vector3::zeros(), |(x, _)| x - axis.point);
     let (a0, r0) = (first.dot(&n), (first - n * first.dot(&n)).norm());
     for (x, weight) in samples {
         let d = x - axis.point;
@@ -413,7 +416,10 @@ pub(crate) fn flat_center(
             a += q * (flat - mean).transpose();
             b += q * (0.5 * (flat.norm_squared() - mean_w));
         }
-        height += cloud.samples(p).map(|(x, w)| w * x.dot(&frame.n)).sum::<f64>();
+        height += cloud
+            .samples(p)
+            .map(|(x, w)| w * x.dot(&frame.n))
+            .sum::<f64>();
         total += own;
     }
     let m = a.cholesky().map_or(Vector2::zeros(), |c| c.solve(&b));

@@ -27,6 +27,15 @@ pub struct FrameSample {
     pub proximal: f64,
     /// Angle of the distal joint, rad.
     pub distal: f64,
+    /// How many single samples it is worth: its noise variance is σ²/w. A sample of weight 0 counts as not seen.
+    pub weight: f64,
+}
+
+impl FrameSample {
+    /// The pose, where it was seen and counts.
+    pub(crate) fn seen(&self) -> Option<&Pose> {
+        self.world_from_body.as_ref().filter(|_| self.weight != 0.0)
+    }
 }
 
 /// A coordinate axis of the joint's frame.
@@ -237,19 +246,21 @@ pub(crate) fn residuals(
     body_from_joint: &Isometry3<f64>,
 ) -> (f64, f64) {
     let joint_from_body = body_from_joint.inverse();
-    let (mut t2, mut r2, mut n) = (0.0, 0.0, 0.0_f64);
+    let (mut t2, mut r2, mut total) = (0.0, 0.0, 0.0_f64);
     for sample in samples {
-        let Some(pose) = &sample.world_from_body else {
+        let Some(pose) = sample.seen() else {
             continue;
         };
+        let w = sample.weight;
         let turn = axes.turned(sample.proximal, sample.distal);
         let predicted = world_from_joint * turn * joint_from_body;
-        t2 += (predicted.translation.vector - pose.translation).norm_squared();
+        t2 += w * (predicted.translation.vector - pose.translation).norm_squared();
         let measured = so3::quaternion_of(&Rotation3::from_matrix_unchecked(pose.rotation));
-        r2 += so3::log(&(predicted.rotation.inverse() * measured)).norm_squared();
-        n += 1.0;
+        r2 += w * so3::log(&(predicted.rotation.inverse() * measured)).norm_squared();
+        total += w;
     }
-    ((t2 / n.max(1.0)).sqrt(), (r2 / n.max(1.0)).sqrt())
+    let total = total.max(f64::MIN_POSITIVE);
+    ((t2 / total).sqrt(), (r2 / total).sqrt())
 }
 
 /// Both axes in the body.

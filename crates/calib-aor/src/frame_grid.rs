@@ -78,10 +78,7 @@ impl Grid {
     pub fn of(samples: &[FrameSample], options: &FrameOptions) -> Result<Self, FrameOutcome> {
         let around_proximal = planes(samples, options.same_angle, |s| (s.distal, s.proximal));
         let around_distal = planes(samples, options.same_angle, |s| (s.proximal, s.distal));
-        let seen = samples
-            .iter()
-            .filter(|s| s.world_from_body.is_some())
-            .count();
+        let seen = samples.iter().filter(|s| s.seen().is_some()).count();
         for (axis, held, found) in [
             ("proximal", "distal", &around_proximal),
             ("distal", "proximal", &around_distal),
@@ -113,7 +110,7 @@ fn planes(
     held_and_swept: impl Fn(&FrameSample) -> (f64, f64),
 ) -> Vec<Vec<usize>> {
     let mut rows: Vec<usize> = (0..samples.len())
-        .filter(|&k| samples[k].world_from_body.is_some())
+        .filter(|&k| samples[k].seen().is_some())
         .collect();
     rows.sort_by(|&a, &b| {
         held_and_swept(&samples[a])
@@ -151,17 +148,19 @@ fn circle_axis(
     // Every circle in its own rows of one table, so that the angles pair up.
     let rows: usize = circles.iter().map(Vec::len).sum();
     let mut tracks = vec![vec![None; rows]; circles.len()];
-    let mut angles = Vec::with_capacity(rows);
+    let (mut angles, mut weights) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
     for (track, circle) in tracks.iter_mut().zip(circles) {
         for &k in circle {
             let pose = samples[k].world_from_body.as_ref();
             track[angles.len()] = pose.map(|p| Point3::from(p.translation));
             angles.push(swept(&samples[k]));
+            weights.push(samples[k].weight);
         }
     }
     let fit_options = Options {
         center: (options.fit != PlaneFit::CommonLine).then_some(*m),
         angles,
+        weights,
         // The mean over all planes is judged, not each plane.
         significance: 1.0,
         weak_angle: f64::MAX,
@@ -203,6 +202,7 @@ pub(crate) fn nearest_to_axes(samples: &[FrameSample], grid: &Grid) -> Option<Po
             .collect();
         let tracks = [track];
         let options = Options {
+            weights: rows.iter().map(|&k| samples[k].weight).collect(),
             significance: 1.0,
             weak_angle: f64::MAX,
             ..Options::default()

@@ -68,12 +68,16 @@ pub fn fit(
             known: Known::Nothing,
         }))
     };
-    let seen: Vec<(UnitQuaternion<f64>, Pose, UnitQuaternion<f64>)> = samples
+    let seen: Vec<Seen> = samples
         .iter()
         .filter_map(|s| {
-            let pose = s.world_from_body?;
-            let measured = so3::quaternion_of(&Rotation3::from_matrix_unchecked(pose.rotation));
-            Some((options.axes.turned(s.proximal, s.distal), pose, measured))
+            let pose = *s.seen()?;
+            Some(Seen {
+                turn: options.axes.turned(s.proximal, s.distal),
+                pose,
+                measured: so3::quaternion_of(&Rotation3::from_matrix_unchecked(pose.rotation)),
+                weight: s.weight,
+            })
         })
         .collect();
     let n = seen.len();
@@ -161,29 +165,34 @@ pub fn fit(
     let mut of_y: Matrix6<f64> = inverse.fixed_view::<6, 6>(6, 6).into();
     if which == Residuals::Points {
         // The rotation part of Y was not measured by positions: take the samples' mean.
-        let mean = seen
-            .iter()
-            .map(|(a, _, r)| (world_from_joint.rotation * a).inverse() * r)
-            .collect::<Vec<_>>();
-        let Ok(rotation) = calib_geometry::mean::chordal_mean(&mean) else {
+        let turned = |s: &Seen| (world_from_joint.rotation * s.turn).inverse() * s.measured;
+        let rotations = seen.iter().map(|s| (turned(s), s.weight));
+        let Ok(rotation) = calib_geometry::mean::weighted_chordal_mean(rotations) else {
             return none(
                 Verdict::NotUnique,
                 "the body's orientations have no mean".into(),
             );
         };
-        // The place p of the body in the joint keeps its covariance; [v] is in the body's axes.
-        let old: Matrix3<f64> = of_y.fixed_view::<3, 3>(3, 3).into();
-        let turn = (rotation.inverse() * joint_from_body.rotation).to_rotation_matrix();
-        let of_w: Matrix3<f64> = inverse.fixed_view::<3, 3>(0, 0).into();
-        joint_from_body.rotation = rotation;
+        // Errors of W and of the place go together: R_W exp(a) turns sample i's orientation by −A_iᵀ a, the mean by −R_Yᵀ Ā a.
         let r = rotation.to_rotation_matrix();
-        of_y.fill(0.0);
-        of_y.fixed_view_mut::<3, 3>(3, 3)
-            .copy_from(&(turn.matrix() * old * turn.matrix().transpose()));
-        // Orientation: that of the joint's own frame and the mean's noise.
-        let per_mean = Matrix3::identity() * (problem.sigma_r * problem.sigma_r / n as f64);
-        of_y.fixed_view_mut::<3, 3>(0, 0)
-            .copy_from(&(r.matrix().transpose() * of_w * r.matrix() + per_mean));
+        let turn = (rotation.inverse() * joint_from_body.rotation).to_rotation_matrix();
+        let mean_turn = seen
+            .iter()
+            .map(|s| s.turn.to_rotation_matrix().into_inner() * s.weight)
+            .sum::<Matrix3<f64>>()
+            / total(&seen);
+        let mut carried = SMatrix::<f64, 6, 12>::zeros();
+        carried
+            .fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&-(mean_turn * r.matrix()).transpose());
+        carried
+            .fixed_view_mut::<3, 3>(3, 9)
+            .copy_from(turn.matrix());
+        joint_from_body.rotation = rotation;
+        of_y = carried * inverse * carried.transpose();
+        let per_mean = Matrix3::identity() * (problem.sigma_r * problem.sigma_r / total(&seen));
+        let mut own = of_y.fixed_view_mut::<3, 3>(0, 0);
+        own += per_mean;
     }
     let body_from_joint = joint_from_body.inverse();
     // X = Y⁻¹: X exp(ξ) with ξ = −Ad(Y) b
@@ -220,12 +229,7 @@ pub fn fit(
 }
 
 fn range(samples: &[FrameSample], angle: impl Fn(&FrameSample) -> f64) -> f64 {
-    let seen = || {
-        samples
-            .iter()
-            .filter(|s| s.world_from_body.is_some())
-            .map(&angle)
-    };
+    let seen = || samples.iter().filter(|s| s.seen().is_some()).map(&angle);
     seen().fold(f64::NEG_INFINITY, f64::max) - seen().fold(f64::INFINITY, f64::min)
 }
 
@@ -251,7 +255,19 @@ impl Start {
     }
 }
 
-type Seen = (UnitQuaternion<f64>, Pose, UnitQuaternion<f64>);
+/// A sample that counts.
+struct Seen {
+    /// The joint's turn by its angles.
+    turn: UnitQuaternion<f64>,
+    pose: Pose,
+    /// The pose's rotation.
+    measured: UnitQuaternion<f64>,
+    weight: f64,
+}
+
+fn total(seen: &[Seen]) -> f64 {
+    seen.iter().map(|s| s.weight).sum()
+}
 
 /// (2): rotations from a null vector, then positions.
 fn linear_start(seen: &[Seen]) -> Option<Start> {
@@ -259,14 +275,14 @@ fn linear_start(seen: &[Seen]) -> Option<Start> {
     let picked: Vec<&Seen> = seen.iter().step_by(stride).collect();
     // R_W A − R Q = 0 for the entries of R_W and Q = R_Yᵀ, column-major: (Aᵀ ⊗ I) vec R_W = (I ⊗ R) vec Q
     let mut rows = DMatrix::zeros(9 * picked.len(), 18);
-    for (k, (turn, pose, _)) in picked.iter().enumerate() {
-        let a = turn.to_rotation_matrix();
+    for (k, sample) in picked.iter().enumerate() {
+        let a = sample.turn.to_rotation_matrix();
         for column in 0..3 {
             for i in 0..3 {
                 let row = 9 * k + 3 * column + i;
                 for l in 0..3 {
                     rows[(row, 3 * l + i)] = a[(l, column)];
-                    rows[(row, 9 + 3 * column + l)] = -pose.rotation[(i, l)];
+                    rows[(row, 9 + 3 * column + l)] = -sample.pose.rotation[(i, l)];
                 }
             }
         }
@@ -280,26 +296,31 @@ fn linear_start(seen: &[Seen]) -> Option<Start> {
     }
     let r_w = so3::nearest_rotation(&r_w)?;
     // Given R_W the best R_Y is a projection: it repairs a poor null vector.
-    let sum = picked.iter().fold(Matrix3::zeros(), |s, (a, pose, _)| {
-        s + (r_w * a).to_rotation_matrix().matrix().transpose() * pose.rotation
+    let sum = picked.iter().fold(Matrix3::zeros(), |sum, s| {
+        let turned = (r_w * s.turn).to_rotation_matrix();
+        sum + turned.matrix().transpose() * s.pose.rotation * s.weight
     });
     let r_y = so3::nearest_rotation(&sum).or_else(|| so3::nearest_rotation(&q.transpose()))?;
 
-    let n = seen.len() as f64;
+    let n = total(seen);
     let mean_t = seen
         .iter()
-        .map(|(_, p, _)| p.translation)
+        .map(|s| s.pose.translation * s.weight)
         .sum::<Vector3<f64>>()
         / n;
-    let turn = |a: &UnitQuaternion<f64>| (r_w * a).to_rotation_matrix().into_inner();
-    let mean_r = seen.iter().map(|(a, _, _)| turn(a)).sum::<Matrix3<f64>>() / n;
+    let turn = |s: &Seen| (r_w * s.turn).to_rotation_matrix().into_inner();
+    let mean_r = seen
+        .iter()
+        .map(|s| turn(s) * s.weight)
+        .sum::<Matrix3<f64>>()
+        / n;
     let (mut m, mut b, mut spread) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
-    for (a, pose, _) in seen {
-        let d = turn(a) - mean_r;
-        let t = pose.translation - mean_t;
-        m += d.tr_mul(&d);
-        b += d.tr_mul(&t);
-        spread += t.norm_squared();
+    for s in seen {
+        let d = turn(s) - mean_r;
+        let t = s.pose.translation - mean_t;
+        m += d.tr_mul(&d) * s.weight;
+        b += d.tr_mul(&t) * s.weight;
+        spread += s.weight * t.norm_squared();
     }
     let eigen = symmetric_eigen_small(&m);
     if eigen.values[0] <= 1e-12 * eigen.values[2] {
@@ -379,8 +400,17 @@ impl Problem for Joint<'_> {
             t2: 0.0,
             r2: 0.0,
         };
-        let (wt, wr) = (self.sigma_t.powi(-2), self.sigma_r.powi(-2));
-        for (turn, pose, measured) in self.seen {
+        for sample in self.seen {
+            let Seen {
+                turn,
+                pose,
+                measured,
+                weight,
+            } = sample;
+            let (wt, wr) = (
+                weight * self.sigma_t.powi(-2),
+                weight * self.sigma_r.powi(-2),
+            );
             let behind = turn * x.y;
             let predicted = x.w * behind;
             // W exp(a) · A Y exp(b):   δ = Ad((A Y)⁻¹) a + b,  residual falls by δ
@@ -395,8 +425,8 @@ impl Problem for Joint<'_> {
             j_t.fixed_view_mut::<3, 3>(0, 9).fill_with_identity();
             normal.of_positions += j_t.transpose() * j_t * wt;
             normal.gradient -= j_t.transpose() * u * wt;
-            normal.t2 += u.norm_squared();
-            normal.r2 += phi.norm_squared();
+            normal.t2 += weight * u.norm_squared();
+            normal.r2 += weight * phi.norm_squared();
             normal.cost += u.norm_squared() * wt;
             if self.with_rotations {
                 let mut j_r = SMatrix::<f64, 3, 12>::zeros();
@@ -457,7 +487,12 @@ pub fn bound(
         .map(|(p, d)| {
             let turn = axes.turned(*p, *d);
             let predicted = turn * y;
-            (turn, Pose::from(predicted), predicted.rotation)
+            Seen {
+                turn,
+                pose: Pose::from(predicted),
+                measured: predicted.rotation,
+                weight: 1.0,
+            }
         })
         .collect();
     let scale = y.translation.vector.norm().max(f64::MIN_POSITIVE);

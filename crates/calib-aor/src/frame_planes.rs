@@ -15,7 +15,7 @@
 
 use calib_geometry::{
     Verdict,
-    mean::{axis_mean, chordal_mean},
+    mean::{axis_mean, weighted_chordal_mean},
     measured::Pose,
     se3, so3,
 };
@@ -72,10 +72,7 @@ pub fn algorithm1(
             value: f64::NAN,
         });
     }
-    let seen = samples
-        .iter()
-        .filter(|s| s.world_from_body.is_some())
-        .count();
+    let seen = samples.iter().filter(|s| s.seen().is_some()).count();
     let grid = match Grid::of(samples, options) {
         Ok(grid) => grid,
         Err(answer) => return Ok(answer),
@@ -94,8 +91,13 @@ pub fn algorithm1(
     let n = seen as f64;
     // Twelve unknowns over six residuals a sample: six to each kind of noise.
     let dof = (3.0 * n - 6.0).max(1.0);
-    let sigma_t = options.sigma_t.unwrap_or(rms_t * (n / dof).sqrt());
-    let sigma_r = options.sigma_r.unwrap_or(rms_r * (n / dof).sqrt());
+    let total: f64 = samples
+        .iter()
+        .filter(|s| s.seen().is_some())
+        .map(|s| s.weight)
+        .sum();
+    let sigma_t = options.sigma_t.unwrap_or(rms_t * (total / dof).sqrt());
+    let sigma_r = options.sigma_r.unwrap_or(rms_r * (total / dof).sqrt());
     let covariance = propagate(samples, &grid, &center, options, &base, (sigma_t, sigma_r));
     let (proximal_in_body, distal_in_body) = axes_in_body(options.axes, &fitted.body_from_joint);
     let reach = fitted.body_from_joint.translation.vector.norm();
@@ -195,7 +197,7 @@ fn center_of(
     match center {
         Center::Given { point, .. } => Ok(*point),
         Center::From(estimator) => {
-            let poses: Vec<Option<Pose>> = samples.iter().map(|s| s.world_from_body).collect();
+            let poses: Vec<Option<Pose>> = samples.iter().map(|s| s.seen().copied()).collect();
             estimator(&poses).ok_or_else(|| {
                 none(
                     Verdict::Diverged,
@@ -262,23 +264,21 @@ fn assemble(
     );
 
     let mut rotations = Vec::with_capacity(samples.len());
-    let mut origin = Vector3::zeros();
+    let (mut origin, mut total) = (Vector3::zeros(), 0.0);
     for sample in samples {
-        let Some(pose) = &sample.world_from_body else {
+        let Some(pose) = sample.seen() else {
             continue;
         };
         let measured = so3::quaternion_of(&Rotation3::from_matrix_unchecked(pose.rotation));
         let turned =
             world_from_joint.rotation * options.axes.turned(sample.proximal, sample.distal);
-        rotations.push(measured.inverse() * turned);
-        origin += pose.rotation.tr_mul(&(m.coords - pose.translation));
+        rotations.push((measured.inverse() * turned, sample.weight));
+        origin += pose.rotation.tr_mul(&(m.coords - pose.translation)) * sample.weight;
+        total += sample.weight;
     }
-    let rotation =
-        chordal_mean(&rotations).map_err(|why| none(Verdict::NotUnique, why.to_string()))?;
-    let body_from_joint = Isometry3::from_parts(
-        Translation3::from(origin / rotations.len() as f64),
-        rotation,
-    );
+    let rotation = weighted_chordal_mean(rotations)
+        .map_err(|why| none(Verdict::NotUnique, why.to_string()))?;
+    let body_from_joint = Isometry3::from_parts(Translation3::from(origin / total), rotation);
     Ok(Fitted {
         world_from_joint,
         body_from_joint,
@@ -334,9 +334,11 @@ fn propagate(
     };
     let mut moved = samples.to_vec();
     for k in 0..samples.len() {
-        let Some(pose) = samples[k].world_from_body else {
+        let Some(pose) = samples[k].seen().copied() else {
             continue;
         };
+        let root = samples[k].weight.sqrt();
+        let (sigma_t, sigma_r) = (sigma_t / root, sigma_r / root);
         for axis in 0..3 {
             let mut shifted = pose;
             shifted.translation[axis] += STEP * sigma_t;

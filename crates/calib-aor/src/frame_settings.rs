@@ -1,6 +1,6 @@
 //! Settings of both frame estimators, what they refuse to read, and when a frame is weak.
 
-use calib_geometry::Verdict;
+use calib_geometry::{Verdict, measured::RowWeights};
 use nalgebra::Matrix6;
 
 use crate::{
@@ -106,7 +106,13 @@ pub(crate) fn check(samples: &[FrameSample], options: &FrameOptions) -> Result<(
                 value,
             });
         }
-        if let Some(pose) = &sample.world_from_body {
+        RowWeights(&[sample.weight])
+            .check(1)
+            .map_err(|_| AorError::BadOption {
+                name: "weight of a sample",
+                value: sample.weight,
+            })?;
+        if let Some(pose) = sample.seen() {
             pose.check(row)?;
         }
     }

@@ -97,6 +97,8 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
 pub(crate) struct Bundle {
     /// For each frame: (marker, position).
     frames: Vec<Vec<(usize, Vector3<f64>)>>,
+    /// Weight of each frame.
+    weights: Vec<f64>,
     /// Encoder angle of each frame, or empty.
     angles: Vec<f64>,
     markers: usize,
@@ -140,24 +142,28 @@ impl Bundle {
                 },
             ));
         }
-        let mut frames = vec![Vec::new(); rows];
+        let mut frames = vec![(Vec::new(), 1.0); rows];
         for p in 0..cloud.markers() {
-            for k in cloud.starts[p]..cloud.starts[p + 1] {
-                frames[cloud.labels[k].1].push((p, cloud.points[k]));
+            for k in cloud.range(p) {
+                let frame = &mut frames[cloud.labels[k].1];
+                frame.0.push((p, cloud.points[k]));
+                frame.1 = cloud.weight(k);
             }
         }
-        let (mut kept, mut kept_angles) = (Vec::new(), Vec::new());
-        for (row, frame) in frames.into_iter().enumerate() {
+        let (mut kept, mut weights, mut kept_angles) = (Vec::new(), Vec::new(), Vec::new());
+        for (row, (frame, weight)) in frames.into_iter().enumerate() {
             if !frame.is_empty() {
                 kept.push(frame);
+                weights.push(weight);
                 kept_angles.extend(angles.get(row));
             }
         }
-        Ok(Self::new(kept, kept_angles, cloud.markers(), size))
+        Ok(Self::new(kept, weights, kept_angles, cloud.markers(), size))
     }
 
     fn new(
         frames: Vec<Vec<(usize, Vector3<f64>)>>,
+        weights: Vec<f64>,
         angles: Vec<f64>,
         markers: usize,
         size: f64,
@@ -171,6 +177,7 @@ impl Bundle {
         });
         Self {
             frames,
+            weights,
             angles,
             markers,
             reference,
@@ -295,7 +302,7 @@ impl Bundle {
         let gained = |f: &FrameBlock| f.gradient * f.gradient / f.own;
         let moving = normal.frames.iter().filter(|f| f.own > 0.0);
         let hinge = normal.cost - moving.map(gained).sum::<f64>();
-        Some(straight::cost(&self.frames, self.markers)? - hinge)
+        Some(straight::cost(&self.frames, &self.weights, self.markers)? - hinge)
     }
 
     /// Information about axis and places at the modelled positions: measured ones would add their noise to every lever arm.
@@ -308,6 +315,7 @@ impl Bundle {
         let frames = self.frames.iter().zip(&x.angles).map(modelled).collect();
         let at = Self {
             frames,
+            weights: self.weights.clone(),
             angles: self.angles.clone(),
             ..*self
         };
@@ -364,7 +372,7 @@ impl Problem for Bundle {
             cost: 0.0,
         };
         let m = x.axis.frame.matrix();
-        for (frame, angle) in self.frames.iter().zip(&x.angles) {
+        for ((frame, angle), &w) in self.frames.iter().zip(&x.angles).zip(&self.weights) {
             let rz: Matrix3<f64> =
                 Rotation3::from_axis_angle(&Vector3::z_axis(), *angle).into_inner();
             let mut block = FrameBlock {
@@ -377,7 +385,7 @@ impl Problem for Bundle {
                 let y = m.tr_mul(&(x.axis.point - v));
                 let z = rz * x.places[*p];
                 let e = y + z;
-                normal.cost += e.norm_squared();
+                normal.cost += w * e.norm_squared();
                 // n ← n + a e₁ + b e₂ is the turn (−b, a, 0) in the frame
                 let cross = so3::skew(&y);
                 let mut j = SMatrix::<f64, 3, 4>::zeros();
@@ -388,23 +396,23 @@ impl Problem for Bundle {
                 let spin = Vector3::new(-z.y, z.x, 0.0);
                 let at = 4 + 3 * p;
                 let mut corner = normal.shared.fixed_view_mut::<4, 4>(0, 0);
-                corner += j.transpose() * j;
-                let side = j.transpose() * rz;
+                corner += j.transpose() * j * w;
+                let side = j.transpose() * rz * w;
                 let mut right = normal.shared.fixed_view_mut::<4, 3>(0, at);
                 right += side;
                 let mut below = normal.shared.fixed_view_mut::<3, 4>(at, 0);
                 below += side.transpose();
                 for k in 0..3 {
-                    normal.shared[(at + k, at + k)] += 1.0;
+                    normal.shared[(at + k, at + k)] += w;
                 }
                 let mut g = normal.gradient.fixed_rows_mut::<4>(0);
-                g += j.transpose() * e;
+                g += j.transpose() * e * w;
                 let mut g = normal.gradient.fixed_rows_mut::<3>(at);
-                g += rz.transpose() * e;
-                block.own += spin.norm_squared();
-                block.gradient += spin.dot(&e);
-                block.to_axis += j.transpose() * spin;
-                block.to_places.push((*p, rz.transpose() * spin));
+                g += rz.transpose() * e * w;
+                block.own += w * spin.norm_squared();
+                block.gradient += w * spin.dot(&e);
+                block.to_axis += j.transpose() * spin * w;
+                block.to_places.push((*p, rz.transpose() * spin * w));
             }
             normal.frames.push(block);
         }
@@ -493,7 +501,8 @@ pub(crate) fn unit_bound(
     } else {
         Vec::new()
     };
-    let problem = Bundle::new(frames, known, places.len(), 1.0);
+    let weights = vec![1.0; angles.len()];
+    let problem = Bundle::new(frames, weights, known, places.len(), 1.0);
     // The reference frame's angle is the zero of the others.
     let zero = if angles_known {
         0.0
@@ -555,7 +564,7 @@ mod tests {
                 let Some(found) = outcome.estimate() else {
                     continue;
                 };
-                let cloud = cloud_of(&input).expect("markers");
+                let cloud = cloud_of(&input, &Options::default()).expect("markers");
                 let cost = found.rms * found.rms * (3 * cloud.points.len()) as f64;
                 let size = prepare("", &cloud).expect("a plane").s[0];
                 let bundle = Bundle::of(&cloud, &[], size).expect("frames");

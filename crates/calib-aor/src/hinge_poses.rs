@@ -15,7 +15,7 @@
 use calib_geometry::{
     Line, Verdict,
     levenberg::{Problem, Stop, minimise},
-    measured::Pose,
+    measured::{Pose, RowWeights},
     se3, so3,
 };
 use nalgebra::{
@@ -53,16 +53,18 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
         return Ok(outcome);
     };
     let two_bodies = matches!(input, Input::TwoBodies { .. });
-    let poses: Vec<Isometry3<f64>> = shared_axis::parent_from_child(input)?
+    let weights = RowWeights(&options.weights);
+    let (poses, weights): (Vec<Isometry3<f64>>, Vec<f64>) = shared_axis::parent_from_child(input)?
         .iter()
-        .flatten()
-        .map(isometry)
-        .collect();
+        .enumerate()
+        .filter_map(|(row, pose)| Some((isometry(pose.as_ref()?), weights.of(row))))
+        .filter(|(_, w)| *w > 0.0)
+        .unzip();
     if poses.len() < 3 {
         // Two poses are as many numbers as unknowns: nothing to weigh.
         return Ok(Outcome::Estimate(start));
     }
-    Ok(refine(*start, &poses, two_bodies, options))
+    Ok(refine(*start, &poses, &weights, two_bodies, options))
 }
 
 fn isometry(pose: &Pose) -> Isometry3<f64> {
@@ -76,6 +78,7 @@ fn isometry(pose: &Pose) -> Isometry3<f64> {
 fn refine(
     start: AorEstimate,
     poses: &[Isometry3<f64>],
+    weights: &[f64],
     two_bodies: bool,
     options: &Options,
 ) -> Outcome {
@@ -104,7 +107,7 @@ fn refine(
     let mut ended = None;
     let mut change = f64::INFINITY;
     for round in 0..NOISE_ROUNDS {
-        let problem = Hinge::of(poses, two_bodies, sigma_r, sigma_t, scale);
+        let problem = Hinge::of(poses, weights, two_bodies, [sigma_r, sigma_t], scale);
         let fixed = options.sigma_r.is_some() && options.sigma_t.is_some();
         // While the noise levels still move, a few steps for each round are enough.
         let steps = if fixed || change < 1e-6 { MAX_STEPS } else { 4 };
@@ -131,10 +134,12 @@ fn refine(
         let rss = poses
             .iter()
             .zip(&state.angles)
-            .map(|(t, a)| {
-                (state.modelled(*a).translation.vector - t.translation.vector).norm_squared()
+            .zip(weights)
+            .map(|((t, a), w)| {
+                w * (state.modelled(*a).translation.vector - t.translation.vector).norm_squared()
             })
             .sum::<f64>();
+        let rss = rss * poses.len() as f64 / weights.iter().sum::<f64>();
         ended = Some((c, rss));
         if fixed || (change < 1e-9 && last < 1e-6) || round + 1 == NOISE_ROUNDS {
             break;
@@ -258,7 +263,7 @@ struct Hinge<'a> {
     poses: &'a [Isometry3<f64>],
     /// Inverse covariance of each pose's noise.
     weights: Vec<Matrix6<f64>>,
-    /// σ_r² A and σ_t² B of each pose.
+    /// σ_r² A and σ_t² B of each pose, over its weight.
     parts: Vec<[Matrix6<f64>; 2]>,
     two_bodies: bool,
     scale: f64,
@@ -267,9 +272,9 @@ struct Hinge<'a> {
 impl<'a> Hinge<'a> {
     fn of(
         poses: &'a [Isometry3<f64>],
+        weights: &[f64],
         two_bodies: bool,
-        sigma_r: f64,
-        sigma_t: f64,
+        [sigma_r, sigma_t]: [f64; 2],
         scale: f64,
     ) -> Self {
         let diagonal = |r: f64, t: f64| {
@@ -278,7 +283,9 @@ impl<'a> Hinge<'a> {
         let own = [diagonal(sigma_r, 0.0), diagonal(0.0, sigma_t)];
         let parts: Vec<[Matrix6<f64>; 2]> = poses
             .iter()
-            .map(|t| {
+            .zip(weights)
+            .map(|(t, w)| {
+                let own = own.map(|m| m / *w);
                 if !two_bodies {
                     return own;
                 }

@@ -62,7 +62,9 @@ impl Input<'_> {
 pub(crate) fn cloud_of(input: &Input<'_>, options: &Options) -> Result<Cloud, AorError> {
     let weights = RowWeights(&options.weights);
     match *input {
-        Input::Points(tracks) | Input::Markers(tracks) => Ok(Cloud::weighted(tracks, &[], weights)?),
+        Input::Points(tracks) | Input::Markers(tracks) => {
+            Ok(Cloud::weighted(tracks, &[], weights)?)
+        }
         Input::Poses(poses) => Ok(Cloud::of_weighted_origins(poses, weights)?),
         Input::TwoBodies { .. } => Err(AorError::WrongInput {
             expects: InputKind::Points,

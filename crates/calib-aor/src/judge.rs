@@ -175,19 +175,22 @@ pub(crate) fn judge(
 
     let mut circles = Vec::with_capacity(cloud.markers());
     for p in 0..cloud.markers() {
-        let points = cloud.marker(p);
-        let count = points.len() as f64;
+        let count = cloud.total(cloud.range(p));
         let c = center_of(p);
-        let height = points.iter().map(|x| (x - c).dot(&n)).sum::<f64>() / count;
-        let radius = points
-            .iter()
-            .map(|x| {
+        let height = cloud
+            .samples(p)
+            .map(|(x, w)| w * (x - c).dot(&n))
+            .sum::<f64>()
+            / count;
+        let radius = cloud
+            .samples(p)
+            .map(|(x, w)| {
                 let d = x - c;
-                (d - n * d.dot(&n)).norm()
+                w * (d - n * d.dot(&n)).norm()
             })
             .sum::<f64>()
             / count;
-        let mut angles: Vec<f64> = points.iter().map(|x| angle_about(p, x)).collect();
+        let mut angles: Vec<f64> = cloud.marker(p).iter().map(|x| angle_about(p, x)).collect();
         circles.push(Circle {
             center: Point3::from(cloud.origin + c + n * height),
             radius,
@@ -220,6 +223,7 @@ pub(crate) fn judge(
         }
         (weak, _) => weak,
     };
+    let per_weight = cloud.points.len() as f64 / cloud.total(0..cloud.points.len());
     Outcome::Estimate(Box::new(AorEstimate {
         estimator,
         line: Line {
@@ -232,7 +236,7 @@ pub(crate) fn judge(
         tau,
         circles,
         sigma,
-        rms: (cost / residuals.max(1) as f64).sqrt(),
+        rms: (cost / residuals.max(1) as f64 * per_weight).sqrt(),
         used: cloud.points.len(),
         rejected: Vec::new(),
         verdict,

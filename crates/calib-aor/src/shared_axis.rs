@@ -11,7 +11,7 @@
 
 use calib_geometry::{
     Line, Verdict, chance,
-    measured::{DataError, Pose},
+    measured::{DataError, Pose, RowWeights},
     pose_sums::PoseSums,
 };
 use nalgebra::{Matrix3, Matrix6, Point3, Unit, Vector3};
@@ -53,7 +53,8 @@ pub(crate) fn run(
 ) -> Result<Outcome, AorError> {
     options.check()?;
     let relative = parent_from_child(input)?;
-    let sums = PoseSums::of(&relative)?;
+    let weights = RowWeights(&options.weights);
+    let sums = PoseSums::weighted(&relative, weights)?;
     match sums.rank_verdict() {
         Some(Verdict::TooFew) => {
             let reason = format!("{} poses, at least 2 are needed", sums.n);
@@ -93,8 +94,8 @@ pub(crate) fn run(
         let reason = format!(
             "no axis stands out: the rotations spread {:.2}° rms about the best axis's perpendicular and \
              {:.2}° about the next",
-            (sums.lambda[0].max(0.0) / n).sqrt().to_degrees(),
-            (sums.lambda[1] / n).sqrt().to_degrees()
+            (sums.lambda[0].max(0.0) / sums.total).sqrt().to_degrees(),
+            (sums.lambda[1] / sums.total).sqrt().to_degrees()
         );
         return Ok(Outcome::none(
             estimator,
@@ -114,7 +115,7 @@ pub(crate) fn run(
         if chance > options.significance {
             let reason = format!(
                 "the body turns by {:.3}° rms, no more than its orientation noise of {:.3}° (chance {chance:.1e})",
-                (sums.lambda.sum() / 2.0 / n).sqrt().to_degrees(),
+                (sums.lambda.sum() / 2.0 / sums.total).sqrt().to_degrees(),
                 sigma_r.to_degrees()
             );
             return Ok(Outcome::none(
@@ -136,10 +137,12 @@ pub(crate) fn run(
 
     // Residuals across the axis.
     let (mut rss, mut across) = (0.0, 0.0);
-    for pose in relative.iter().flatten() {
+    for (row, pose) in relative.iter().enumerate() {
+        let Some(pose) = pose else { continue };
+        let w = weights.of(row);
         let e = pose.transform(&child_point) - parent_point;
-        rss += e.norm_squared();
-        across += (e - parent_axis.into_inner() * e.dot(&parent_axis)).norm_squared();
+        rss += w * e.norm_squared();
+        across += w * (e - parent_axis.into_inner() * e.dot(&parent_axis)).norm_squared();
     }
     let sigma = if dof > 0.0 {
         (across / dof).sqrt()
@@ -155,7 +158,7 @@ pub(crate) fn run(
     }
     let strong = sums.mean_r * strong * sums.mean_r.transpose();
     let perpendicular = Matrix3::identity() - parent_axis.into_inner() * parent_axis.transpose();
-    let per_mean = perpendicular / n;
+    let per_mean = perpendicular / sums.total;
     let of_direction = perpendicular * strong * perpendicular * (sigma_r * sigma_r)
         + per_mean * (sigma_r * sigma_r);
     let of_point =
@@ -208,7 +211,7 @@ pub(crate) fn run(
         tau: 0.0,
         circles: Vec::new(),
         sigma,
-        rms: (rss / (3.0 * n)).sqrt(),
+        rms: (rss / (3.0 * sums.total)).sqrt(),
         used: sums.n,
         rejected: Vec::new(),
         verdict,

@@ -13,22 +13,31 @@
 use calib_geometry::decompose::symmetric_eigen_small;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-/// Σ of squared residuals of the best motion (1); `frames`: (marker, position) of each frame, all markers linked by frames.
+/// Σ of squared residuals of the best motion (1); `frames`: (marker, position) of each frame, with its weight, all markers linked by frames.
 ///
 /// `None` where they are not linked.
-pub(crate) fn cost(frames: &[Vec<(usize, Vector3<f64>)>], markers: usize) -> Option<f64> {
+pub(crate) fn cost(
+    frames: &[Vec<(usize, Vector3<f64>)>],
+    weights: &[f64],
+    markers: usize,
+) -> Option<f64> {
     let mut means = vec![(Vector3::zeros(), 0.0); markers];
-    for (p, v) in frames.iter().flatten() {
-        means[*p].0 += v;
-        means[*p].1 += 1.0;
+    for (frame, w) in frames.iter().zip(weights) {
+        for (p, v) in frame {
+            means[*p].0 += v * *w;
+            means[*p].1 += w;
+        }
     }
-    let means: Vec<Vector3<f64>> = means.iter().map(|(s, n)| s / f64::max(*n, 1.0)).collect();
+    let means: Vec<Vector3<f64>> = means
+        .iter()
+        .map(|(s, n)| s / f64::max(*n, f64::MIN_POSITIVE))
+        .collect();
     let mut scatter = Matrix3::zeros();
     // Normal equations of the markers' places with every frame's D eliminated; the first place is the gauge.
     let mut normal = DMatrix::<f64>::zeros(markers, markers);
     let mut right = DMatrix::<f64>::zeros(markers, 3);
     let mut apart = Matrix3::zeros();
-    for frame in frames {
+    for (frame, &w) in frames.iter().zip(weights) {
         let share = 1.0 / frame.len().max(1) as f64;
         let middle = frame
             .iter()
@@ -36,15 +45,15 @@ pub(crate) fn cost(frames: &[Vec<(usize, Vector3<f64>)>], markers: usize) -> Opt
             .sum::<Vector3<f64>>();
         for (p, v) in frame {
             let d = v - means[*p];
-            scatter += d * d.transpose();
+            scatter += d * (d * w).transpose();
             let left = d - middle;
-            apart += left * left.transpose();
-            normal[(*p, *p)] += 1.0;
+            apart += left * (left * w).transpose();
+            normal[(*p, *p)] += w;
             for (q, _) in frame {
-                normal[(*p, *q)] -= share;
+                normal[(*p, *q)] -= w * share;
             }
             for k in 0..3 {
-                right[(*p, k)] += left[k];
+                right[(*p, k)] += w * left[k];
             }
         }
     }
@@ -81,7 +90,7 @@ mod tests {
                 seen.filter(|(p, _)| (i + p) % 4 != 0).collect()
             })
             .collect();
-        assert!(cost(&frames, 3).expect("linked") < 1e-12);
+        assert!(cost(&frames, &vec![1.0; frames.len()], 3).expect("linked") < 1e-12);
     }
 
     /// Against the cost at its own minimum, searched over u, with b and d by alternation.
@@ -93,7 +102,7 @@ mod tests {
                 body().iter().map(|b| turn * b).enumerate().collect()
             })
             .collect();
-        let closed = cost(&frames, 3).expect("linked");
+        let closed = cost(&frames, &vec![1.0; frames.len()], 3).expect("linked");
         let mut b = body().to_vec();
         let mut u = Vector3::new(0.3, 0.2, 0.9).normalize();
         let mut d = vec![0.0; frames.len()];
@@ -129,6 +138,6 @@ mod tests {
     #[test]
     fn markers_that_no_frame_links_have_no_common_motion() {
         let v = Vector3::x();
-        assert!(cost(&[vec![(0, v)], vec![(1, v)]], 2).is_none());
+        assert!(cost(&[vec![(0, v)], vec![(1, v)]], &[1.0, 1.0], 2).is_none());
     }
 }

@@ -360,6 +360,7 @@ fn parallel_axes_are_named() {
                 world_from_body: pose,
                 proximal: p,
                 distal: d,
+                weight: 1.0,
             });
         }
     }

@@ -300,6 +300,7 @@ fn grid(case: &Value) -> Vec<FrameSample> {
                 world_from_body: Some(pose),
                 proximal: *proximal,
                 distal: *distal,
+                weight: 1.0,
             });
         }
     }

@@ -249,8 +249,7 @@ proptest! {
             }
         }
         let samples: Vec<FrameSample> = poses.iter().enumerate().map(|(k, p)| FrameSample {
-            world_from_body: *p, proximal: (k % 3) as f64, distal: (k / 3) as f64,
-        }).collect();
+            world_from_body: *p, proximal: (k % 3) as f64, distal: (k / 3) as f64, weight: 1.0 }).collect();
         let options = FrameOptions { sigma_t: sigma, ..FrameOptions::default() };
         for outcome in [
             frame_planes::algorithm1(&samples, Center::NearestToAxes, &options),

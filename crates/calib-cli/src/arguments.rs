@@ -358,6 +358,9 @@ pub struct FitFrame {
     /// Stated noise of the orientation about each axis, deg
     #[arg(long)]
     pub sigma_deg: Option<f64>,
+    /// How many readings each row is worth: a CSV with the column `weight`, line by line as the table
+    #[arg(long, value_name = "FILE")]
+    pub weights: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

@@ -57,6 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
                     estimator: f.estimator.clone(),
                     sigma_m: f.sigma_mm.map(|s| s * 1e-3),
                     sigma_rad: f.sigma_deg.map(f64::to_radians),
+                    weights: f.weights.clone(),
                 })?,
                 Fit::Handeye(f) => fit::handeye(&f.file, &f.robot, &f.measured)?,
             };

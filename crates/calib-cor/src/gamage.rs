@@ -84,7 +84,9 @@ fn run(
 fn rms_radii(cloud: &Cloud, center: &Vector3<f64>) -> Vec<f64> {
     (0..cloud.markers())
         .map(|p| {
-            let squares = cloud.samples(p).map(|(x, w)| w * (x - center).norm_squared());
+            let squares = cloud
+                .samples(p)
+                .map(|(x, w)| w * (x - center).norm_squared());
             (squares.sum::<f64>() / cloud.total(cloud.range(p))).sqrt()
         })
         .collect()
@@ -108,7 +110,9 @@ pub(crate) fn compensate(cloud: &Cloud, factor: &Factor) -> (Vector3<f64>, f64) 
     for _ in 0..ROUNDS {
         sigma2 = (0..cloud.markers())
             .map(|p| {
-                let squares = cloud.samples(p).map(|(x, w)| (w, (x - center).norm_squared()));
+                let squares = cloud
+                    .samples(p)
+                    .map(|(x, w)| (w, (x - center).norm_squared()));
                 let mean =
                     squares.clone().map(|(w, q)| w * q).sum::<f64>() / cloud.total(cloud.range(p));
                 let off = squares.map(|(w, q)| w * (q - mean) * (q - mean));

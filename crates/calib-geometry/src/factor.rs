@@ -42,7 +42,11 @@ impl Factor {
         for p in 0..cloud.markers() {
             let own = cloud.total(cloud.range(p));
             let mean = cloud.samples(p).map(|(x, w)| x * w).sum::<Vector3<f64>>() / own;
-            let mean_w = cloud.samples(p).map(|(x, w)| x.norm_squared() * w).sum::<f64>() / own;
+            let mean_w = cloud
+                .samples(p)
+                .map(|(x, w)| x.norm_squared() * w)
+                .sum::<f64>()
+                / own;
             mean_square += own * mean_w;
             let share = if equal_markers { 1.0 / own } else { 1.0 };
             for (x, w) in cloud.samples(p) {

@@ -40,15 +40,27 @@ pub enum MeanError {
 /// # Errors
 /// [`MeanError`] when empty, not finite, or not unique (e.g. two rotations 180° apart).
 pub fn chordal_mean(rotations: &[UnitQuaternion<f64>]) -> Result<UnitQuaternion<f64>, MeanError> {
-    if rotations.is_empty() {
-        return Err(MeanError::Empty);
-    }
+    weighted_chordal_mean(rotations.iter().map(|r| (*r, 1.0)))
+}
+
+/// Chordal L2 mean of rotations with weights.
+///
+/// # Errors
+/// As [`chordal_mean`]; weights count as part of their rotation.
+pub fn weighted_chordal_mean(
+    rotations: impl IntoIterator<Item = (UnitQuaternion<f64>, f64)>,
+) -> Result<UnitQuaternion<f64>, MeanError> {
     let mut sum = Matrix3::zeros();
-    for (index, r) in rotations.iter().enumerate() {
-        if !r.coords.iter().all(|x| x.is_finite()) {
+    let mut empty = true;
+    for (index, (r, w)) in rotations.into_iter().enumerate() {
+        if !(w.is_finite() && r.coords.iter().all(|x| x.is_finite())) {
             return Err(MeanError::NotFinite { index });
         }
-        sum += r.to_rotation_matrix().matrix();
+        sum += r.to_rotation_matrix().matrix() * w;
+        empty = false;
+    }
+    if empty {
+        return Err(MeanError::Empty);
     }
     so3::nearest_rotation(&sum).ok_or(MeanError::NotUnique {
         gap: 0.0,

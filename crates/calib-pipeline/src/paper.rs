@@ -335,6 +335,7 @@ impl Task<'_> {
                 world_from_body: Some(r.tracker_from_body.into()),
                 proximal: self.inputs.robot.model.position(r.q, proximal.joint),
                 distal: self.inputs.robot.model.position(r.q, distal.joint),
+                weight: 1.0,
             })
             .collect();
         let tracker = &self.inputs.robot.profile.tracker;

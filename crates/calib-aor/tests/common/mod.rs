@@ -156,6 +156,7 @@ impl Joint {
             }),
             proximal,
             distal,
+            weight: 1.0,
         }
     }
 

@@ -31,6 +31,7 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
         sigma_r: request.sigma_rad,
         center: request.center_m,
         angles: table.angles.clone(),
+        weights: table.weights.clone(),
         towards: request.towards.and_then(|d| Unit::try_new(d, 0.0)),
         ..Default::default()
     };

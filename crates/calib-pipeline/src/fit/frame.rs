@@ -7,8 +7,8 @@ use serde_json::json;
 
 use super::table::{it_has, read_poses};
 use super::{
-    Answer, FrameRequest, answer, data, doubt, matrix, not_observable, pose_text, pose_value,
-    unknown, usage,
+    Answer, FrameRequest, answer, data, doubt, matrix, noise, not_observable, pose_text,
+    pose_value, unknown, usage,
 };
 use crate::error::PipelineError;
 
@@ -49,15 +49,18 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, PipelineError> {
         }
     };
     let (a, b) = (column(proximal)?, column(distal)?);
+    let weights = noise::weights(request.weights.as_deref(), poses.rows.len())?;
     let samples: Vec<FrameSample> = a
         .iter()
         .zip(b)
         .zip(body)
-        .filter_map(|((a, b), pose)| {
+        .enumerate()
+        .filter_map(|(row, ((a, b), pose))| {
             Some(FrameSample {
                 world_from_body: pose.map(Pose::from),
                 proximal: (*a)?,
                 distal: (*b)?,
+                weight: weights.get(row).copied().unwrap_or(1.0),
             })
         })
         .collect();
@@ -73,12 +76,11 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, PipelineError> {
     let outcome = match request.estimator.as_str() {
         "algorithm1" => {
             let center = |poses: &[Option<Pose>]| {
-                let fit = calib_cor::fit(
-                    "sfe",
-                    &calib_cor::Input::Poses(poses),
-                    &calib_cor::Options::default(),
-                )
-                .ok()?;
+                let options = calib_cor::Options {
+                    weights: samples.iter().map(|s| s.weight).collect(),
+                    ..calib_cor::Options::default()
+                };
+                let fit = calib_cor::fit("sfe", &calib_cor::Input::Poses(poses), &options).ok()?;
                 fit.estimate().map(|e| e.center)
             };
             calib_aor::frame_planes::algorithm1(&samples, Center::From(&center), &options)

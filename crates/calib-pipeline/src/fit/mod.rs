@@ -80,6 +80,8 @@ pub struct FrameRequest {
     pub sigma_m: Option<f64>,
     /// Stated noise of the orientation about each axis, rad.
     pub sigma_rad: Option<f64>,
+    /// CSV with the weight of every row.
+    pub weights: Option<PathBuf>,
 }
 
 /// An answer in both forms.

@@ -111,6 +111,7 @@ impl FrameScene {
             }),
             proximal,
             distal,
+            weight: 1.0,
         }
     }
 
