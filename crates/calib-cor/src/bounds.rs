@@ -7,11 +7,26 @@
 //! ```
 //!
 //! (1) does not depend on the radius; (2) has the true poses eliminated. All at the truth.
+//!
+//! Samples with covariances of their own, feet (where on the sphere a sample belongs) unknown:
+//!
+//! ```text
+//! C ≥ I⁻¹,   I = Σ_p Σ_k w_pk (u_pk − ū_p)(u_pk − ū_p)ᵀ,   w = 1/uᵀΣu,  ū weighted             (3)
+//! C ≥ the same with w λ instead of w                                                        (4)
+//! C ≈ I⁻¹ + I⁻¹ E I⁻¹                                                                       (5)
+//! ```
+//!
+//! (3) is the Cramér–Rao bound: what is left as the noise goes to zero. (4) holds for every unbiased estimator at any noise: λ ≤ 1 is the share
+//! of a sample's information that no displacement of its foot along the bent sphere imitates. (5) is no bound but what the best estimator has
+//! to second order that reads direction and weight of a sample off the sample. λ and E: see [`crate::bend`].
 
 use calib_geometry::measured::Pose;
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
-use crate::ball_bundle;
+use crate::{
+    ball_bundle,
+    bend::{Bend, share_left},
+};
 
 /// Bound (1) for markers whose true positions, relative to the center, are given marker by marker.
 ///
@@ -78,4 +93,70 @@ pub fn ball(
     sigma: f64,
 ) -> Option<Matrix3<f64>> {
     Some(ball_bundle::unit_bound(layout, orientations)? * (sigma * sigma))
+}
+
+/// Bounds (3), (4) and the second-order figure (5) of a sphere whose samples have covariances of their own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SphereBounds {
+    /// (3): the Cramér–Rao bound.
+    pub cramer_rao: Matrix3<f64>,
+    /// (4): below this no unbiased estimator can be, however large the noise.
+    pub unbiased: Matrix3<f64>,
+    /// (5): the least that can be had to second order by weighing samples by what they themselves say.
+    pub second_order: Matrix3<f64>,
+}
+
+/// Bounds of the center for true positions relative to it and their covariances, marker by marker. The radius of a marker is that of its first sample.
+///
+/// `None` where the positions determine no center, a covariance is not positive definite, or the numbers of both differ.
+#[must_use]
+pub fn sphere_center_weighted(
+    markers: &[Vec<Vector3<f64>>],
+    covariances: &[Vec<Matrix3<f64>>],
+) -> Option<SphereBounds> {
+    if markers.len() != covariances.len() {
+        return None;
+    }
+    let (mut plain, mut left, mut excess) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
+    for (arms, noise) in markers.iter().zip(covariances) {
+        if arms.len() != noise.len() {
+            return None;
+        }
+        let mut samples = Vec::with_capacity(arms.len());
+        for (arm, covariance) in arms.iter().zip(noise) {
+            let u = arm.try_normalize(0.0)?;
+            covariance.cholesky()?;
+            samples.push((u, covariance, 1.0 / u.dot(&(covariance * u))));
+        }
+        let radius = arms.first().map_or(0.0, Vector3::norm);
+        let mean = weighted_mean(samples.iter().map(|(u, _, w)| (*u, *w)));
+        let mut shares = Vec::with_capacity(samples.len());
+        for (u, covariance, w) in &samples {
+            let d = u - mean;
+            plain += d * (d * *w).transpose();
+            excess += Bend::of(covariance, u, radius).excess(&d);
+            shares.push((*u, w * share_left(covariance, u, radius)));
+        }
+        let mean = weighted_mean(shares.iter().copied());
+        for (u, w) in shares {
+            left += (u - mean) * ((u - mean) * w).transpose();
+        }
+    }
+    let eigen = calib_geometry::decompose::symmetric_eigen_small(&plain);
+    if eigen.values[0] <= 1e-12 * eigen.values[2] {
+        return None;
+    }
+    let cramer_rao = plain.cholesky()?.inverse();
+    Some(SphereBounds {
+        cramer_rao,
+        unbiased: left.cholesky()?.inverse(),
+        second_order: cramer_rao + cramer_rao * excess * cramer_rao,
+    })
+}
+
+fn weighted_mean(samples: impl Iterator<Item = (Vector3<f64>, f64)>) -> Vector3<f64> {
+    let (sum, total) = samples.fold((Vector3::zeros(), 0.0), |(sum, total), (u, w)| {
+        (sum + u * w, total + w)
+    });
+    sum / total
 }

@@ -35,6 +35,7 @@
 
 pub mod algebraic;
 pub mod ball_bundle;
+pub mod bend;
 pub mod bounds;
 pub mod gamage;
 pub mod hotspot;

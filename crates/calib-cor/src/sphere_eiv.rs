@@ -11,7 +11,18 @@
 //! is not where the sample came from. (1) knows; its gradient (3) is exact because the feet are optimal. With equal, isotropic noise (1) is the
 //! sphere of least squares. (4) is the second-order bias of least squares (Box 1971), what makes a short arc seem larger than it is:
 //! a center known to 6 % of the radius is 0.4 % of it too far.
-//! What is left: noise so long that the sphere bends under it (12 mm on a radius of 100 mm) costs information that no estimator gets back.
+//!
+//! Noise so long that the sphere bends under it ([`crate::bend`]) pushes each height by E[h], which depends on the direction, and the center by
+//!
+//! ```text
+//! β = H⁻¹ Σ D_k E[h_k]/v_k,   H = Σ D_k D_kᵀ/v_k,  D = ν − ν̄;      m̂ − c β,   c = ρ²/(1 + ρ²),  ρ² = βᵀ H β    (5)
+//! cov = H⁻¹ + H⁻¹ E H⁻¹ + (1 − c)² β βᵀ,   E: (3) there                                                     (6)
+//! ```
+//!
+//! β does not fall with the number of samples, the uncertainty does. Taking off all of it makes the score of every foot unbiased and costs
+//! more than it gives while β is the smaller one (1.5 % of efficiency against 0.3 % with 25 mm along the sight at 250 mm): c is the share that is best
+//! where the correction is as uncertain as the estimate. What of it is left stands in the covariance. Information that the bend takes away, no estimator gets back:
+//! [`crate::bounds::sphere_center_weighted`].
 
 use calib_geometry::{
     decompose::symmetric_eigen_small,
@@ -22,6 +33,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::{
     algebraic::{Algebraic, solve},
+    bend::Bend,
     input::{Input, cloud_of},
     options::Options,
     outcome::{CorError, Outcome},
@@ -51,6 +63,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
     let mut normals = Vec::new();
     let mut absolute = false;
     let mut center;
+    let mut added = Matrix3::zeros();
     if cloud.covariances.is_empty() {
         center = isotropic(&cloud, start, &[]);
         if options.noise_per_marker && cloud.markers() > 1 {
@@ -75,6 +88,10 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
                 weights.push(1.0 / foot.variance);
                 normals.push(foot.normal);
             }
+        }
+        if let Some((bias, covariance)) = bent(&cloud, &normals, &weights, &end.x.radii) {
+            center -= bias;
+            added = covariance;
         }
         absolute = true;
     }
@@ -112,7 +129,46 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
         absolute,
         rejected: Vec::new(),
     };
-    Ok(judge(&cloud, &factor, candidate, options))
+    let mut outcome = judge(&cloud, &factor, candidate, options);
+    if let Outcome::Estimate(estimate) = &mut outcome {
+        estimate.covariance += added;
+    }
+    Ok(outcome)
+}
+
+/// c β of (5), and what (6) adds to H⁻¹. `None` where the directions span no volume or the numbers are none.
+fn bent(
+    cloud: &Cloud,
+    normals: &[Vector3<f64>],
+    weights: &[f64],
+    radii: &[f64],
+) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+    let (mut information, mut excess) = (Matrix3::zeros(), Matrix3::zeros());
+    let mut push = Vector3::zeros();
+    for p in 0..cloud.markers() {
+        let range = cloud.starts[p]..cloud.starts[p + 1];
+        let total: f64 = weights[range.clone()].iter().sum();
+        let mean = range
+            .clone()
+            .map(|k| normals[k] * weights[k])
+            .sum::<Vector3<f64>>()
+            / total;
+        for k in range {
+            let d = normals[k] - mean;
+            let bend = Bend::of(&cloud.covariances[k], &normals[k], radii[p]);
+            information += d * (d * weights[k]).transpose();
+            push += d * (weights[k] * bend.mean_height());
+            excess += bend.excess(&d);
+        }
+    }
+    let inverse = information.cholesky()?.inverse();
+    let bias = inverse * push;
+    let size = bias.dot(&push);
+    let share = size / (1.0 + size);
+    let left = bias * (1.0 - share);
+    let added = inverse * excess * inverse + left * left.transpose();
+    let fine = bias.iter().chain(added.iter()).all(|x| x.is_finite());
+    fine.then_some((bias * share, added))
 }
 
 /// σ̂² of the radial residuals.
@@ -316,5 +372,59 @@ impl Problem for Feet<'_> {
 
     fn is_negligible(&self, x: &State, (center, _): &Self::Step) -> bool {
         center.norm() <= 1e-14 * (x.center.norm() + self.cloud.points[0].norm())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// The mean and the variance of the heights over a sphere, from many samples of one foot, against (2) of `bend`.
+    #[test]
+    fn heights_have_the_mean_of_the_bend() {
+        const TRIALS: usize = 40_000;
+        let radius = 0.1;
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        for (normal, sigmas) in [
+            (Vector3::new(0.3, -0.5, 0.8), [2e-3, 5e-3, 8e-3]),
+            (Vector3::new(1.0, 0.0, 0.0), [2e-3, 2e-3, 10e-3]),
+            (Vector3::new(0.2, 0.2, -1.0), [3e-3, 3e-3, 3e-3]),
+        ] {
+            let normal = normal.normalize();
+            let root = Matrix3::from_diagonal(&Vector3::from(sigmas));
+            let covariance = root * root;
+            let points: Vec<Vector3<f64>> = (0..TRIALS)
+                .map(|_| {
+                    let z = Vector3::from_fn(|_, _| StandardNormal.sample(&mut random));
+                    normal * radius + root * z
+                })
+                .collect();
+            let cloud = Cloud {
+                origin: Vector3::zeros(),
+                starts: vec![0, TRIALS],
+                labels: vec![(0, 0); TRIALS],
+                covariances: vec![covariance; TRIALS],
+                magnitude: 1.0,
+                points,
+            };
+            let feet = Feet::of(&cloud);
+            let heights: Vec<f64> = (0..TRIALS)
+                .map(|k| feet.foot(k, &Vector3::zeros(), radius).height)
+                .collect();
+            let mean = heights.iter().sum::<f64>() / TRIALS as f64;
+            let spread = heights.iter().map(|h| (h - mean).powi(2)).sum::<f64>() / TRIALS as f64;
+            let bend = Bend::of(&covariance, &normal, radius);
+            let expected = bend.mean_height();
+            let error = (spread / TRIALS as f64).sqrt();
+            // Fourth order in the noise.
+            let next = expected * bend.added_share();
+            assert!(
+                (mean - expected).abs() < 3.5 * error + next,
+                "{mean:e} ± {error:e}, expected {expected:e}"
+            );
+            assert!(expected > 4.0 * error, "the test must be able to fail");
+        }
     }
 }

@@ -159,4 +159,8 @@ pub struct Cell {
     pub efficiency_mc: Option<f64>,
     /// Mean of the covariances that the method reports / mean square of the error; 1 where they are true.
     pub covariance_ratio: Option<f64>,
+    /// Efficiency that no unbiased estimator exceeds in this scene, where that is known to be less than 1.
+    pub unbiased_limit: Option<f64>,
+    /// Efficiency that the best estimator has to second order in the noise, where that is known to be less than 1.
+    pub second_order_limit: Option<f64>,
 }

@@ -198,6 +198,22 @@ fn cor(cells: &[Cell]) -> Vec<Standard> {
             true,
             depth(cells, 5.1e-3, 1.0),
         ),
+        judge(
+            "the same where an unbiased estimator can have 0.99 (column `unbiased ≤`)",
+            0.99,
+            true,
+            within(cells, 5.1e-3, |c| {
+                c.unbiased_limit
+                    .is_some_and(|limit| limit >= 0.99)
+                    .then_some(1.0)
+            }),
+        ),
+        judge(
+            "the same over what is left to second order, noise along the sight 5 to 25 mm",
+            0.99,
+            true,
+            within(cells, 3.1e-3, |c| c.second_order_limit),
+        ),
     ];
     // The bias in units of the measurement noise, and in units of the estimate's own spread.
     let arc = |c: &&Cell| {
@@ -281,15 +297,29 @@ fn cor(cells: &[Cell]) -> Vec<Standard> {
 
 /// Efficiencies under noise along the line of sight of a size between the two, m.
 fn depth(cells: &[Cell], above: f64, to: f64) -> Vec<Value> {
-    efficiencies(cells, |c| {
-        let ratio = if c.scene.condition == "depth × 5" {
-            5.0
-        } else {
-            3.0
-        };
-        let along = ratio * c.scene.sigma_t_m;
-        c.method == "sphere_eiv, covariances" && along > above && along < to
-    })
+    efficiencies(cells, |c| is_deep(c, above, to))
+}
+
+/// The same above a size, over what `limit` says can be had; cells without a limit are left out.
+fn within(cells: &[Cell], above: f64, limit: impl Fn(&Cell) -> Option<f64>) -> Vec<Value> {
+    cells
+        .iter()
+        .filter(|c| is_deep(c, above, 1.0))
+        .filter_map(|c| {
+            let limit = limit(c)?;
+            Some((label(c), c.efficiency? / limit, c.efficiency_mc? / limit))
+        })
+        .collect()
+}
+
+fn is_deep(cell: &Cell, above: f64, to: f64) -> bool {
+    let ratio = if cell.scene.condition == "depth × 5" {
+        5.0
+    } else {
+        3.0
+    };
+    let along = ratio * cell.scene.sigma_t_m;
+    cell.method == "sphere_eiv, covariances" && along > above && along < to
 }
 
 /// rms of the robust methods over that of the plain one on the clean recording of the same trials.

@@ -231,7 +231,13 @@ fn cells_of(
     }
     rows.iter()
         .zip(&sums)
-        .map(|(row, sum)| sum.cell(experiment.scene(), row))
+        .map(|(row, sum)| {
+            let mut cell = sum.cell(experiment.scene(), row);
+            let limits = experiment.limits();
+            cell.unbiased_limit = limits.unbiased;
+            cell.second_order_limit = limits.second_order;
+            cell
+        })
         .collect()
 }
 

@@ -114,6 +114,8 @@ impl Tally {
             efficiency: None,
             efficiency_mc: None,
             covariance_ratio: None,
+            unbiased_limit: None,
+            second_order_limit: None,
         };
         if self.answered < 2 || self.e2 <= 0.0 {
             return cell;

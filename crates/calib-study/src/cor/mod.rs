@@ -1,6 +1,7 @@
 //! The study of centers (paper §3.3): which scenes, which methods.
 
 mod bodies;
+mod depth;
 mod markers;
 mod method;
 mod one_axis;
@@ -52,7 +53,7 @@ pub(crate) fn plan() -> Vec<Box<dyn Experiment>> {
             }
             for sigma_mm in [0.5, 1.0, 2.5, 5.0] {
                 for ratio in DEPTHS {
-                    plan.push(Box::new(poses::DepthScene::new(
+                    plan.push(Box::new(depth::DepthScene::new(
                         scene(Part::Depth, samples, radius_mm, sigma_mm, 0.0),
                         ratio,
                     )));

@@ -9,7 +9,7 @@ use crate::run::StudyResult;
 pub fn csv(result: &StudyResult) -> String {
     let mut out = String::from(
         "study,part,motion,condition,samples,radius_m,sigma_t_m,sigma_r_rad,method,estimator,quantity,unit,trials,answered,observable,\
-         rms,rms_mc,mean_abs,bias,bias_mc,bound,efficiency,efficiency_mc,covariance_ratio\n",
+         rms,rms_mc,mean_abs,bias,bias_mc,bound,efficiency,efficiency_mc,covariance_ratio,unbiased_limit,second_order_limit\n",
     );
     for cell in &result.cells {
         let s = &cell.scene;
@@ -42,6 +42,8 @@ pub fn csv(result: &StudyResult) -> String {
             cell.efficiency,
             cell.efficiency_mc,
             cell.covariance_ratio,
+            cell.unbiased_limit,
+            cell.second_order_limit,
         ] {
             out.push(',');
             if let Some(value) = value {

@@ -134,8 +134,16 @@ struct Table<'a> {
     shown: &'a dyn Fn(&Cell) -> String,
 }
 
+/// A column that belongs to the scene, whatever the method.
+type Beside = (&'static str, fn(&Cell) -> Option<f64>);
+
 /// Lines are scenes, columns methods; a method that does not occur in a scene leaves a blank.
 fn table(out: &mut String, cells: &[Cell], t: &Table<'_>) {
+    table_beside(out, cells, t, &[]);
+}
+
+/// The same with columns of the scene itself after the methods'.
+fn table_beside(out: &mut String, cells: &[Cell], t: &Table<'_>, beside: &[Beside]) {
     let picked: Vec<&Cell> = cells.iter().filter(|c| (t.picked)(c)).collect();
     let (mut scenes, mut methods): (Vec<&Scene>, Vec<&str>) = (Vec::new(), Vec::new());
     for cell in &picked {
@@ -156,9 +164,18 @@ fn table(out: &mut String, cells: &[Cell], t: &Table<'_>) {
     let _ = writeln!(
         out,
         "| motion | n | r mm | σ mm | σ ° | {} |",
-        methods.join(" | ")
+        methods
+            .iter()
+            .copied()
+            .chain(beside.iter().map(|(name, _)| *name))
+            .collect::<Vec<_>>()
+            .join(" | ")
     );
-    let _ = writeln!(out, "|---|---|---|---|---|{}", "---|".repeat(methods.len()));
+    let _ = writeln!(
+        out,
+        "|---|---|---|---|---|{}",
+        "---|".repeat(methods.len() + beside.len())
+    );
     for scene in scenes {
         let mut motion = scene.motion.clone();
         if !scene.condition.is_empty() {
@@ -180,6 +197,15 @@ fn table(out: &mut String, cells: &[Cell], t: &Table<'_>) {
                 out,
                 " {} |",
                 found.map_or_else(String::new, |c| (t.shown)(c))
+            );
+        }
+        for (_, value) in beside {
+            let found = picked.iter().find(|c| c.scene == *scene);
+            let value = found.and_then(|c| value(c));
+            let _ = write!(
+                out,
+                " {} |",
+                value.map_or_else(|| "—".to_owned(), |v| format!("{v:.3}"))
             );
         }
         out.push('\n');
@@ -287,15 +313,21 @@ fn cor(out: &mut String, cells: &[Cell]) {
             shown: &|c| format!("{}; rms {} mm", efficiency(c), shown(c, c.rms)),
         },
     );
-    table(
+    table_beside(
         out,
         cells,
         &Table {
             title: "Depth noise: efficiency",
-            note: "σ is the noise across the line of sight.",
+            note: "σ is the noise across the line of sight. `unbiased ≤`: no unbiased estimator is above that, however the feet of the samples are found. \
+                   `second order`: what is left to second order where direction and weight of a sample are read off the sample itself; at large noise, terms beyond it count. \
+                   Both computed, not simulated (`calib_cor::bounds::sphere_center_weighted`).",
             picked: &|c| c.scene.part == Part::Depth,
             shown: &efficiency,
         },
+        &[
+            ("unbiased ≤", |c| c.unbiased_limit),
+            ("second order", |c| c.second_order_limit),
+        ],
     );
     table(
         out,
