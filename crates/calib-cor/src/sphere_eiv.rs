@@ -85,7 +85,8 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
         for p in 0..cloud.markers() {
             for k in cloud.starts[p]..cloud.starts[p + 1] {
                 let foot = problem.foot(k, &end.x.center, end.x.radii[p]);
-                weights.push(1.0 / foot.variance);
+                // The cloud's own weights stand in the foot's variance already, and multiply these.
+                weights.push(1.0 / (foot.variance * cloud.weight(k)));
                 normals.push(foot.normal);
             }
         }
@@ -146,18 +147,23 @@ fn bent(
     let (mut information, mut excess) = (Matrix3::zeros(), Matrix3::zeros());
     let mut push = Vector3::zeros();
     for p in 0..cloud.markers() {
-        let range = cloud.starts[p]..cloud.starts[p + 1];
-        let total: f64 = weights[range.clone()].iter().sum();
+        let range = cloud.range(p);
+        let weight = |k: usize| weights[k] * cloud.weight(k);
+        let total: f64 = range.clone().map(weight).sum();
         let mean = range
             .clone()
-            .map(|k| normals[k] * weights[k])
+            .map(|k| normals[k] * weight(k))
             .sum::<Vector3<f64>>()
             / total;
         for k in range {
             let d = normals[k] - mean;
-            let bend = Bend::of(&cloud.covariances[k], &normals[k], radii[p]);
-            information += d * (d * weights[k]).transpose();
-            push += d * (weights[k] * bend.mean_height());
+            let bend = Bend::of(
+                &(cloud.covariances[k] / cloud.weight(k)),
+                &normals[k],
+                radii[p],
+            );
+            information += d * (d * weight(k)).transpose();
+            push += d * (weight(k) * bend.mean_height());
             excess += bend.excess(&d);
         }
     }
@@ -176,10 +182,9 @@ fn residual_variance(cloud: &Cloud, center: &Vector3<f64>, radii: &[f64]) -> f64
     let dof = cloud.points.len() - cloud.markers() - 3;
     let rss: f64 = (0..cloud.markers())
         .flat_map(|p| {
-            cloud
-                .marker(p)
-                .iter()
-                .map(move |x| ((x - center).norm() - radii[p]).powi(2))
+            cloud.range(p).map(move |k| {
+                cloud.weight(k) * ((cloud.points[k] - center).norm() - radii[p]).powi(2)
+            })
         })
         .sum();
     if dof > 0 { rss / dof as f64 } else { 0.0 }
@@ -193,7 +198,7 @@ fn bias(
     radii: &[f64],
     variance: f64,
 ) -> Option<Vector3<f64>> {
-    let weight = |k: usize| if weights.is_empty() { 1.0 } else { weights[k] };
+    let weight = |k: usize| weights.get(k).copied().unwrap_or(1.0) * cloud.weight(k);
     let mut information = Matrix3::zeros();
     let mut means = Vec::with_capacity(cloud.markers());
     for p in 0..cloud.markers() {
@@ -257,9 +262,10 @@ impl<'a> Feet<'a> {
         let axes = cloud
             .covariances
             .iter()
-            .map(|c| {
+            .enumerate()
+            .map(|(k, c)| {
                 let eigen = symmetric_eigen_small(c);
-                (eigen.values, eigen.vectors)
+                (eigen.values / cloud.weight(k), eigen.vectors)
             })
             .collect();
         Self { cloud, axes }
@@ -406,6 +412,7 @@ mod tests {
                 starts: vec![0, TRIALS],
                 labels: vec![(0, 0); TRIALS],
                 covariances: vec![covariance; TRIALS],
+                weights: Vec::new(),
                 magnitude: 1.0,
                 points,
             };

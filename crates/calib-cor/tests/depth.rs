@@ -248,3 +248,39 @@ fn isotropic_covariances_change_nothing() {
         (plain - weighed).norm()
     );
 }
+
+/// A row that is the mean of k readings has the k-th part of their covariance, said either way.
+#[test]
+fn weights_divide_covariances() {
+    let (root, arms) = (WORST.root() * 0.2, WORST.arms());
+    let worth: Vec<f64> = (0..arms.len()).map(|k| [1.0, 4.0, 2.5][k % 3]).collect();
+    let mut noise = Noise::new(3);
+    let tracks = [arms
+        .iter()
+        .zip(&worth)
+        .map(|(a, w)| {
+            Some(Point3::from(
+                CENTER + a + root * noise.vector(w.sqrt().recip()),
+            ))
+        })
+        .collect::<Vec<_>>()];
+    let estimate = |options: Options| {
+        let outcome = fit("sphere_eiv", &Input::Points(&tracks), &options).expect("eiv");
+        outcome.estimate().expect("a center").clone()
+    };
+    let weighed = estimate(Options {
+        covariances: vec![vec![root * root; arms.len()]],
+        weights: worth.clone(),
+        ..Options::default()
+    });
+    let divided = estimate(Options {
+        covariances: vec![worth.iter().map(|w| root * root / *w).collect()],
+        ..Options::default()
+    });
+    let off = (weighed.center - divided.center).norm();
+    assert!(off < 1e-9, "{off}");
+    let scale = divided.covariance.norm();
+    // The test of planes, which shares the weakest direction's noise out, sees weights but not covariances.
+    let differ = (weighed.covariance - divided.covariance).norm();
+    assert!(differ < 1e-2 * scale, "{differ} of {scale}");
+}

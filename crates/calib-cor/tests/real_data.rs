@@ -96,6 +96,45 @@ fn a_clean_pivot_gives_the_stated_tip_and_post() {
     }
 }
 
+/// The bad rows are the end of the recording, one piece: rows 338–480 of the table (numbered from 1, without the heading).
+const FIRST_BAD: usize = 338 - 1;
+
+/// What the rows themselves say, whoever chooses them: least squares on the good ones alone is 0.364 mm (norm of the difference; its largest
+/// coordinate is 0.25 mm) from the tip of the clean recording. The required 0.30 mm is therefore not reached, and no choice of rows reaches it but by
+/// luck: two recordings of one probe differ by this much (likelihood against likelihood: 0.376 mm; 0.35 with the rows that `robust` keeps).
+#[test]
+fn the_good_rows_alone_are_as_far_from_the_stated_tip() {
+    let (Some(poses), Some(clean)) = (
+        pivot_poses("pivot_outliers.csv"),
+        pivot_poses("pivot_clean.csv"),
+    ) else {
+        return;
+    };
+    let options = Options::default();
+    let good = &poses[..FIRST_BAD];
+    let tip = |id: &str, poses: &[Option<Pose>]| {
+        body_point(&fit(id, &Input::Poses(poses), &options).expect(id)).0
+    };
+    let off = tip("hse", good) - Vector3::from(TIP_MM);
+    println!("least squares on {} good rows: {:.4} mm", good.len(), off.norm());
+    assert!((0.36..0.37).contains(&off.norm()), "{}", off.norm());
+    assert!((0.24..0.26).contains(&off.amax()), "{}", off.amax());
+    let likely = (tip("hotspot_ml", good) - tip("hotspot_ml", &clean)).norm();
+    println!("likelihood against likelihood: {likely:.4} mm");
+    assert!((0.37..0.38).contains(&likely), "{likely}");
+    // The rest is bad, every row of it: far beyond the noise of the good ones.
+    let at = fit("hse", &Input::Poses(good), &options).expect("hse");
+    let (tip, post) = body_point(&at);
+    let residual = |pose: &Option<Pose>| pose.as_ref().map(|p| (p.transform(&tip) - post).norm());
+    let farthest = |poses: &[Option<Pose>]| poses.iter().filter_map(residual).fold(0.0, f64::max);
+    let nearest = |poses: &[Option<Pose>]| {
+        let all = poses.iter().filter_map(residual);
+        all.fold(f64::INFINITY, f64::min)
+    };
+    println!("residuals: good to {:.2} mm, bad from {:.2} mm", farthest(good), nearest(&poses[FIRST_BAD..]));
+    assert!(nearest(&poses[FIRST_BAD..]) > farthest(good));
+}
+
 /// About 30 % of the rows are thrown far off; plain least squares is 30 mm off. The stated tip is that of least squares on the clean
 /// recording; least squares on all 337 good rows of this one is 0.364 mm from it, so no choice of rows comes closer but by luck.
 #[test]
