@@ -116,7 +116,11 @@ fn the_good_rows_alone_are_as_far_from_the_stated_tip() {
         body_point(&fit(id, &Input::Poses(poses), &options).expect(id)).0
     };
     let off = tip("hse", good) - Vector3::from(TIP_MM);
-    println!("least squares on {} good rows: {:.4} mm", good.len(), off.norm());
+    println!(
+        "least squares on {} good rows: {:.4} mm",
+        good.len(),
+        off.norm()
+    );
     assert!((0.36..0.37).contains(&off.norm()), "{}", off.norm());
     assert!((0.24..0.26).contains(&off.amax()), "{}", off.amax());
     let likely = (tip("hotspot_ml", good) - tip("hotspot_ml", &clean)).norm();
@@ -131,7 +135,11 @@ fn the_good_rows_alone_are_as_far_from_the_stated_tip() {
         let all = poses.iter().filter_map(residual);
         all.fold(f64::INFINITY, f64::min)
     };
-    println!("residuals: good to {:.2} mm, bad from {:.2} mm", farthest(good), nearest(&poses[FIRST_BAD..]));
+    println!(
+        "residuals: good to {:.2} mm, bad from {:.2} mm",
+        farthest(good),
+        nearest(&poses[FIRST_BAD..])
+    );
     assert!(nearest(&poses[FIRST_BAD..]) > farthest(good));
 }
 

@@ -182,14 +182,14 @@ impl PoseScene {
                 method("ml_sphere", "ml_sphere", Gets::Points, false, 1),
                 method("ml_sphere, σ known", "ml_sphere", Gets::Points, true, 1),
                 method("sphere_eiv", "sphere_eiv", Gets::Points, false, 1),
-                method("robust, points", "robust", Gets::Points, false, 10),
-                method("consensus, points", "consensus", Gets::Points, false, 10),
+                method("robust, points", "robust", Gets::Points, false, 5),
+                method("consensus, points", "consensus", Gets::Points, false, 5),
             ]);
         }
         if (0.99..1.01).contains(&turn_deg) {
             methods.extend([
-                method("robust, poses", "robust", Gets::Poses, false, 10),
-                method("consensus, poses", "consensus", Gets::Poses, false, 10),
+                method("robust, poses", "robust", Gets::Poses, false, 5),
+                method("consensus, poses", "consensus", Gets::Poses, false, 5),
             ]);
         }
         Self::with(scene, turns, methods)
