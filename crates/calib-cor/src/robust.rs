@@ -10,11 +10,14 @@
 //!
 //! Subsets give candidates; each is refitted to the samples of least cost until they stand still, the cheapest wins (`consensus`).
 //! `robust` then lets every sample belong in part (expectation and maximisation over the same two classes) before it decides, and fits by
-//! maximum likelihood, so that the covariance is valid. In the end every sample belongs whose residual would not surprise among n (χ², one
+//! maximum likelihood, so that the covariance is valid. For `consensus` every sample belongs in the end whose residual would not surprise among n (χ², one
 //! recording in twenty). Metres or millimetres do not matter.
 //!
 //! Where another center explains the samples almost as well (cost within `RIVAL`) the answer is that there is none: this is where the
-//! method breaks down, and it says so (nine points with three outliers leave two degrees of freedom). A choice of h among n samples makes a circle look
+//! method breaks down, and it says so (nine points with three outliers leave two degrees of freedom). Likewise where, with some left out, fewer degrees of
+//! freedom are left than there are unknowns and the noise is not stated; and where the center rests on one sample that no other confirms: with redundancy
+//! 1 − h_k (leverage h_k) an error of σ/√(1 − h_k) hides in the noise and takes the center |C J_k|σ/√(1 − h_k) away (external reliability, Baarda 1968);
+//! beyond `weak_fraction` of the size nobody can know which sample is the wrong one. A choice of h among n samples makes a circle look
 //! less planar by chance: the test of one axis is therefore made at `significance / C(n, h)`.
 //! Torr & Zisserman 2000 (MSAC); Moisan & Stival 2004 (a threshold from the data); Dempster et al. 1977.
 
@@ -97,6 +100,9 @@ trait Model {
     /// `|residual|²` of sample k.
     fn square(&self, estimate: &Self::Estimate, k: usize) -> f64;
     fn weighted(&self, start: &Self::Estimate, weights: &[f64]) -> Option<Self::Estimate>;
+    /// What an error of one of the samples that are kept does, where a single one may decide: for each (sample, redundancy, shift).
+    /// Redundancy is the part of the error's square that its own residual shows, shift how far an error of one unit takes the center.
+    fn influence(&self, estimate: &Self::Estimate, keep: &[bool]) -> Vec<(usize, f64, f64)>;
     /// The center, and the size of the joint: a center further off than a tenth of it is another one.
     fn center(&self, estimate: &Self::Estimate) -> (Vector3<f64>, f64);
 }
@@ -338,7 +344,21 @@ struct Choice {
 /// Why there is none.
 enum NoChoice {
     NoSubset,
-    Rival { off: f64, cost: f64 },
+    Rival {
+        off: f64,
+        cost: f64,
+    },
+    /// What is left has fewer degrees of freedom than the fit has unknowns.
+    FewLeft {
+        kept: usize,
+        free: usize,
+        unknowns: usize,
+    },
+    /// An error of this sample, too small to be seen, takes the center that far.
+    Unchecked {
+        sample: usize,
+        shift: f64,
+    },
 }
 
 fn choose<M: Model>(model: &M, options: &Options, shared: bool) -> Result<Choice, NoChoice> {
@@ -443,7 +463,9 @@ fn choose<M: Model>(model: &M, options: &Options, shared: bool) -> Result<Choice
             keep = belongs;
         }
     }
-    // Real noise has longer tails than the normal: what would not surprise among so many samples belongs.
+    // Real noise has longer tails than the normal: what would not surprise among so many samples belongs. Not so where the classes were
+    // weighed against each other sample by sample: an outlier near the others would come back in.
+    let grows = !(shared && count < n);
     let surprising = surprising(M::COMPONENTS, n);
     let mut estimate = best.estimate.clone();
     for _ in 0..ROUNDS {
@@ -457,7 +479,7 @@ fn choose<M: Model>(model: &M, options: &Options, shared: bool) -> Result<Choice
         let grown: Vec<bool> = squares
             .iter()
             .zip(&keep)
-            .map(|(d, kept)| *kept || *d <= surprising * variance)
+            .map(|(d, kept)| *kept || (grows && *d <= surprising * variance))
             .collect();
         if grown == keep {
             break;
@@ -465,12 +487,44 @@ fn choose<M: Model>(model: &M, options: &Options, shared: bool) -> Result<Choice
         keep = grown;
     }
     let kept = keep.iter().filter(|k| **k).count();
+    if kept < n {
+        let free = (M::COMPONENTS * kept).saturating_sub(evidence.unknowns);
+        if evidence.sigma.is_none() && free < evidence.unknowns {
+            return Err(NoChoice::FewLeft {
+                kept,
+                free,
+                unknowns: evidence.unknowns,
+            });
+        }
+        // Known to one σ only: as a center whose σ is that large is weak. The fitted size may be wrong itself, what was seen is not.
+        let (_, size) = model.center(&estimate);
+        let limit = options.weak_fraction * size.min(spread(model, &keep));
+        let worst = model
+            .influence(&estimate, &keep)
+            .into_iter()
+            .map(|(k, redundancy, shift)| (k, shift * (variance / redundancy.max(1e-12)).sqrt()))
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((sample, shift)) = worst
+            && shift > limit
+        {
+            let shift = shift * surprising.sqrt();
+            return Err(NoChoice::Unchecked { sample, shift });
+        }
+    }
     Ok(Choice {
         sigmas: squares.iter().map(|d| (d / variance).sqrt()).collect(),
         gate_sigmas: surprising.sqrt(),
         ln_choices: evidence.ln_choices(n, kept),
         keep,
     })
+}
+
+/// Root mean square distance of the kept samples from their mean.
+fn spread<M: Model>(model: &M, keep: &[bool]) -> f64 {
+    let places = || (0..keep.len()).filter(|k| keep[*k]).map(|k| model.place(k));
+    let count = places().count().max(1) as f64;
+    let mean = places().sum::<Vector3<f64>>() / count;
+    (places().map(|x| (x - mean).norm_squared()).sum::<f64>() / count).sqrt()
 }
 
 /// The square of a normal residual of so many components that the largest of n exceeds once in twenty recordings.
@@ -520,6 +574,18 @@ fn no_choice(estimator: &'static str, n: usize, why: &NoChoice) -> Outcome {
         NoChoice::NoSubset => {
             format!("no subset of the {n} samples gives a center that others agree with")
         }
+        NoChoice::FewLeft {
+            kept,
+            free,
+            unknowns,
+        } => format!(
+            "{kept} of {n} samples belong together: {free} degrees of freedom beyond {unknowns} unknowns are too few to tell the noise \
+             from a lucky choice: more samples, or state the noise"
+        ),
+        NoChoice::Unchecked { sample, shift } => format!(
+            "with outliers about, the center rests on sample {sample} (of those seen, from 0), which no other one confirms: an error of it that nobody \
+             would see takes the center {shift:.3e} away"
+        ),
         NoChoice::Rival { off, cost } => format!(
             "two centers {off:.3e} apart explain the {n} samples about equally well (odds {:.0} to 1, \
              100 to 1 are needed): too few samples for so many outliers, or state the noise",
@@ -602,6 +668,44 @@ impl Model for Spheres<'_> {
         e * e
     }
 
+    /// Unknowns are the center and the radius of each marker, so that a sample's line is `[−u, 0, …, −1, …, 0]`.
+    fn influence(&self, (center, _): &Self::Estimate, keep: &[bool]) -> Vec<(usize, f64, f64)> {
+        let mut kept: Vec<(usize, Vector3<f64>)> = Vec::new();
+        let mut means = vec![(Vector3::zeros(), 0.0); self.cloud.markers()];
+        for k in (0..self.samples()).filter(|k| keep[*k]) {
+            let u = (self.cloud.points[k] - center)
+                .try_normalize(0.0)
+                .unwrap_or_default();
+            let w = self.cloud.weight(k);
+            let (sum, total) = &mut means[self.marker_of[k]];
+            *sum += u * w;
+            *total += w;
+            kept.push((k, u));
+        }
+        let off = |k: usize, u: &Vector3<f64>| {
+            let (sum, total) = means[self.marker_of[k]];
+            (u - sum / total, total)
+        };
+        let information: Matrix3<f64> = kept
+            .iter()
+            .map(|(k, u)| {
+                let d = off(*k, u).0;
+                d * (d * self.cloud.weight(*k)).transpose()
+            })
+            .sum();
+        let Some(inverse) = information.cholesky().map(|c| c.inverse()) else {
+            return Vec::new();
+        };
+        kept.iter()
+            .map(|(k, u)| {
+                let (d, total) = off(*k, u);
+                let pull = inverse * d * self.cloud.weight(*k);
+                let leverage = self.cloud.weight(*k) / total + d.dot(&pull);
+                (*k, (1.0 - leverage).max(0.0), pull.norm())
+            })
+            .collect()
+    }
+
     fn weighted(&self, (start, _): &Self::Estimate, weights: &[f64]) -> Option<Self::Estimate> {
         let center = sphere_ml::isotropic(self.cloud, *start, weights);
         let radii = sphere_ml::weighted_radii(self.cloud, &center, weights);
@@ -676,6 +780,11 @@ impl Model for HotSpots<'_> {
 
     fn square(&self, (center, body_point): &Self::Estimate, k: usize) -> f64 {
         (self.poses[k].1.transform(body_point) - center).norm_squared()
+    }
+
+    /// Two poses about different axes determine a center, and each has three components: no single one decides.
+    fn influence(&self, _: &Self::Estimate, _: &[bool]) -> Vec<(usize, f64, f64)> {
+        Vec::new()
     }
 
     fn weighted(&self, _: &Self::Estimate, weights: &[f64]) -> Option<Self::Estimate> {

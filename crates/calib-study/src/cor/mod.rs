@@ -4,6 +4,7 @@ mod bodies;
 mod depth;
 mod markers;
 mod method;
+mod mixture;
 mod one_axis;
 mod outliers;
 mod poses;

@@ -2,7 +2,8 @@
 //!
 //! Each trial draws a clean recording, moves exactly 30 % of its poses by up to the reach in every coordinate, and asks: the robust
 //! estimators with all samples, the plain estimator with the clean recording (the yardstick), and the plain estimator
-//! with the moved ones (what happens without protection). With seven tenths left, 1/√0.7 = 1.20 is what perfect
+//! with the moved ones (what happens without protection). Where outliers hide, one who knows
+//! everything about them but which ones they are says what is possible ([`super::mixture`]). With seven tenths left, 1/√0.7 = 1.20 is what perfect
 //! knowledge of them gives on average; with few poses, which ones are lost matters.
 
 use calib_cor::{EstimatorInfo, Input, Options, Pose, estimators};
@@ -10,6 +11,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::{
     method::{Gets, record},
+    mixture::Mixture,
     poses::{Ball, CENTER},
 };
 use crate::{
@@ -19,6 +21,9 @@ use crate::{
     noise::Noise,
     tally::{Row, Tally},
 };
+
+/// Part of the poses that are somewhere else.
+const SHARE: f64 = 0.3;
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Sees {
@@ -41,6 +46,8 @@ pub(crate) struct OutlierScene {
     reach: f64,
     uses: Vec<Use>,
     rows: Vec<Row>,
+    /// Where outliers hide among the points: the best that could be done, in the last row.
+    oracle: Option<Mixture>,
 }
 
 impl OutlierScene {
@@ -141,7 +148,18 @@ impl OutlierScene {
                 });
             }
         }
+        let oracle = (reach < scene.radius_m).then(|| {
+            rows.push(Row {
+                method: "known mixture, points".to_owned(),
+                estimator: "known_mixture",
+                quantity: Quantity::Center,
+                bound: ball.bound(Gets::Points),
+                control: None,
+            });
+            Mixture::new(&ball.arms(), scene.sigma_t_m, SHARE, reach)
+        });
         Self {
+            oracle,
             scene: Scene {
                 condition: format!("30 % outliers, ±{} mm", reach * 1e3),
                 ..scene
@@ -173,7 +191,7 @@ impl Experiment for OutlierScene {
         let n = draw.poses.len();
         let mut moved = draw.poses.clone();
         let mut left = draw.poses.clone();
-        let mut to_move = 3 * n / 10;
+        let mut to_move = (SHARE * n as f64 + 1e-9) as usize;
         while to_move > 0 {
             let k = noise.below(n);
             if left[k].take().is_some()
@@ -182,6 +200,11 @@ impl Experiment for OutlierScene {
                 pose.translation += Vector3::from_fn(|_, _| self.reach * noise.between(-1.0, 1.0));
                 to_move -= 1;
             }
+        }
+        if let (Some(oracle), Some(tally)) = (&self.oracle, tallies.last_mut()) {
+            let points: Vec<_> = moved.iter().flatten().map(|p| p.translation).collect();
+            let found = oracle.center(&points, &CENTER, self.scene.radius_m);
+            tally.error(true, found - CENTER, 0.0, None);
         }
         for (one, tally) in self.uses.iter().zip(tallies) {
             let poses = match one.sees {

@@ -126,6 +126,11 @@ impl Ball {
         draw
     }
 
+    /// True positions of the body relative to the center.
+    pub fn arms(&self) -> Vec<Vector3<f64>> {
+        self.turns.iter().map(|r| -(r * self.point)).collect()
+    }
+
     pub fn options(&self, known: bool) -> Options {
         Options {
             sigma_t: known.then_some(self.sigma_t),

@@ -362,7 +362,8 @@ fn cor(out: &mut String, cells: &[Cell]) {
         cells,
         &Table {
             title: "Outliers: rms error, mm",
-            note: "`clean`: the same recordings before their poses were moved; `inliers`: only the poses that were not moved.",
+            note: "`clean`: the same recordings before their poses were moved; `inliers`: only the poses that were not moved; \
+                   `known mixture`: one who knows the noise, the share of outliers, their distribution and every direction, but not which samples they are.",
             picked: &|c| c.scene.part == Part::Outliers,
             shown: &|c| {
                 let mut text = shown(c, c.rms);
