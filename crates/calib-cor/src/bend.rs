@@ -7,7 +7,7 @@
 //! E[h] = tr T / 2r,   var h = v + tr T²/2r² + …      height of x over the sphere, in the metric of Σ   (2)
 //! ```
 //!
-//! (2) holds for every foot: with equal, isotropic noise E[h] is the constant σ²/r, which the radius swallows; otherwise it depends on the
+//! (2) holds for every foot: with equal, isotropic noise the mean is the constant σ²/r, which the radius swallows; otherwise it depends on the
 //! direction and pushes the center. The score of a center is Σ D h/v with D = ν − ν̄, read off the same sample at the foot of (1), which
 //! itself moves by T/r². To second order its variance is Σ D Dᵀ/v + E,
 //!

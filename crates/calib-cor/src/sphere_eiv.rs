@@ -12,7 +12,7 @@
 //! sphere of least squares. (4) is the second-order bias of least squares (Box 1971), what makes a short arc seem larger than it is:
 //! a center known to 6 % of the radius is 0.4 % of it too far.
 //!
-//! Noise so long that the sphere bends under it ([`crate::bend`]) pushes each height by E[h], which depends on the direction, and the center by
+//! Noise so long that the sphere bends under it ([`crate::bend`]) pushes each height by its mean, which depends on the direction, and the center by
 //!
 //! ```text
 //! β = H⁻¹ Σ D_k E[h_k]/v_k,   H = Σ D_k D_kᵀ/v_k,  D = ν − ν̄;      m̂ − c β,   c = ρ²/(1 + ρ²),  ρ² = βᵀ H β    (5)
