@@ -52,6 +52,12 @@ impl Refusals {
             (dir.files("") != before, "something was written".to_owned()),
             (ran.stderr.contains("panicked"), "panicked".to_owned()),
             (said.is_empty(), "no word of explanation".to_owned()),
+            (
+                // A result with a reason is no error.
+                ran.stderr.contains("error: ")
+                    && !(said.contains("  help: ") || said.contains("try '--help'")),
+                "no remedy".to_owned(),
+            ),
         ];
         let faults = faults.into_iter().filter(|(is, _)| *is);
         self.wrong

@@ -16,7 +16,11 @@ fn main() -> ExitCode {
     match commands::run(&arguments) {
         Ok(code) => ExitCode::from(code as u8),
         Err(error) => {
-            eprintln!("error: {}", with_causes(&error));
+            let said = with_causes(&error);
+            eprintln!("error: {said}");
+            if !said.contains("\n  help: ") {
+                eprintln!("  help: {}", error.remedy());
+            }
             ExitCode::from(error.exit_code() as u8)
         }
     }

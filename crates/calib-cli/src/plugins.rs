@@ -29,6 +29,11 @@ pub fn run(what: Option<&Plugins>) -> Result<ExitCode, PipelineError> {
             let host = Host::new(SearchPath::from_environment(None), true);
             let conformance = check(&host, plugin, &Limits::default());
             emit(&format!("{}\n", conformance.to_string().trim_end()));
+            if !conformance.passed() {
+                eprintln!(
+                    "  help: give the library's file with its folder (`./libname.so`), or a name on CALIB_PLUGIN_PATH; the contract is `calib plugins header`"
+                );
+            }
             Ok(if conformance.passed() {
                 ExitCode::Accepted
             } else {

@@ -112,12 +112,12 @@ pub enum PipelineError {
         remedy: String,
     },
     /// Something that is there already would be overwritten.
-    #[error(
-        "{path} exists already and was not made by this program\n  help: choose another folder with --out"
-    )]
+    #[error("{path} exists already\n  help: {remedy}")]
     Exists {
         /// The file.
         path: String,
+        /// What to do.
+        remedy: &'static str,
     },
     /// A plugin or an estimator failed, or is not what the profile needs.
     #[error("{text}")]
@@ -159,6 +159,24 @@ impl PipelineError {
             | Self::Write { .. }
             | Self::Exists { .. }
             | Self::Report(_) => ExitCode::NotWritten,
+        }
+    }
+
+    /// What to do, for an error whose text does not say it in a `help:` line of its own.
+    #[must_use]
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Solve(_) => "look at what `calib check` says of the profile and the recordings",
+            Self::Plugin { .. } => {
+                "`calib plugins` lists what there is, `calib plugins check PLUGIN` tests a plugin"
+            }
+            Self::Patch { .. } => "look at the names under `outputs`, and at the URDF there",
+            Self::Urdf(_) => "correct it there, or export the description again",
+            Self::Edit(_) => "nothing was written; give the expanded URDF",
+            Self::Report(_) => {
+                "look at what `calib check` says; the results are not finite or not whole"
+            }
+            _ => "`calib help` shows the commands and what they take",
         }
     }
 

@@ -136,6 +136,7 @@ pub fn revert(changed: &Path, out: &Path) -> Result<PathBuf, PipelineError> {
     if out.exists() {
         return Err(PipelineError::Exists {
             path: out.display().to_string(),
+            remedy: "choose another name, or move it away",
         });
     }
     write::replace(out, original.as_bytes())?;

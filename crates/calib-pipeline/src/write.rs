@@ -49,6 +49,7 @@ pub fn write_all(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>, Pi
         if path.exists() && !ours.contains(&file.name) {
             return Err(PipelineError::Exists {
                 path: path.display().to_string(),
+                remedy: "it was not made by this program: choose another folder with --out",
             });
         }
     }
@@ -107,6 +108,7 @@ pub fn write_new(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>, Pi
         if path.exists() {
             return Err(PipelineError::Exists {
                 path: path.display().to_string(),
+                remedy: "choose another name, or move it away",
             });
         }
     }

@@ -36,15 +36,13 @@ pub struct Error {
 #[non_exhaustive]
 pub enum Problem {
     /// The operating system refused.
-    #[error("cannot be read")]
+    #[error("cannot be read: {0}")]
     Io(#[source] std::io::Error),
     /// No bytes at all.
     #[error("the file is empty; expected a header line and one row per pose or sample")]
     Empty,
     /// More bytes than the caller allows.
-    #[error(
-        "the file has {bytes} bytes, the limit is {limit}; cut the recording into parts or raise the limit"
-    )]
+    #[error("the file has {bytes} bytes, the limit is {limit}")]
     TooLarge {
         /// Size of the file.
         bytes: u64,
@@ -52,13 +50,13 @@ pub enum Problem {
         limit: u64,
     },
     /// Text that is not UTF-8.
-    #[error("byte {byte} of this line is not UTF-8; save the file as UTF-8")]
+    #[error("byte {byte} of this line is not UTF-8")]
     NotUtf8 {
         /// Offset within the line, from 0.
         byte: usize,
     },
     /// A line longer than any table has.
-    #[error("the line is longer than {limit} bytes; is this a text file?")]
+    #[error("the line is longer than {limit} bytes")]
     LineTooLong {
         /// The limit.
         limit: usize,
@@ -67,7 +65,7 @@ pub enum Problem {
     #[error("no data rows below the header")]
     NoRows,
     /// Two columns of the same name.
-    #[error("column `{name}` occurs twice (columns {first} and {second}); rename or remove one")]
+    #[error("column `{name}` occurs twice (columns {first} and {second})")]
     DuplicateColumn {
         /// The name.
         name: String,
@@ -133,15 +131,13 @@ pub enum Problem {
         expected: String,
     },
     /// Infinity.
-    #[error("found `{found}`: not finite; leave the cell empty where nothing was measured")]
+    #[error("found `{found}`: not finite")]
     NotFinite {
         /// What stands there.
         found: String,
     },
     /// Some coordinates of one sample are given and others are not.
-    #[error(
-        "{entity} `{name}` is given in part: {given} of {needed} coordinates; leave all empty when it was lost"
-    )]
+    #[error("{entity} `{name}` is given in part: {given} of {needed} coordinates")]
     PartlyLost {
         /// `marker` or `body`.
         entity: &'static str,
@@ -153,7 +149,7 @@ pub enum Problem {
         needed: usize,
     },
     /// Time goes backwards.
-    #[error("time goes back from {previous} s to {found} s; sort the rows by time")]
+    #[error("time goes back from {previous} s to {found} s")]
     TimeBackwards {
         /// Time of the row before.
         previous: f64,
@@ -161,7 +157,7 @@ pub enum Problem {
         found: f64,
     },
     /// The frame number goes back.
-    #[error("frame goes back from {previous} to {found}; sort the rows by frame")]
+    #[error("frame goes back from {previous} to {found}")]
     FrameBackwards {
         /// Frame of the row before.
         previous: i64,
@@ -179,9 +175,7 @@ pub enum Problem {
         frame: i64,
     },
     /// A quaternion that is no rotation.
-    #[error(
-        "body `{body}`: the quaternion has length {norm:.6}, expected 1 within {tolerance}; check the columns' order and scale"
-    )]
+    #[error("body `{body}`: the quaternion has length {norm:.6}, expected 1 within {tolerance}")]
     NotUnit {
         /// The body.
         body: String,
@@ -213,9 +207,7 @@ pub enum Problem {
         needed: u64,
     },
     /// So many names and frames, so few samples, that the table would be almost empty.
-    #[error(
-        "{entities} names × {frames} frames, but only {samples} samples; is the name column right?"
-    )]
+    #[error("{entities} names × {frames} frames, but only {samples} samples")]
     TooSparse {
         /// Distinct markers or bodies.
         entities: usize,
@@ -225,9 +217,7 @@ pub enum Problem {
         samples: usize,
     },
     /// No reader recognises the file.
-    #[error(
-        "no reader recognises this file; known are {known}; name the format, or describe the columns with a column map"
-    )]
+    #[error("no reader recognises this file; known are {known}")]
     UnknownFormat {
         /// Names of the readers.
         known: String,
@@ -243,13 +233,64 @@ pub enum Problem {
         nearest: Option<String>,
     },
     /// The format is known, this dialect of it is not supported.
-    #[error("{what} is not supported; {remedy}")]
+    #[error("{what} is not supported")]
     Unsupported {
         /// What was found.
         what: String,
         /// What the person can do.
         remedy: String,
     },
+}
+
+impl Problem {
+    /// What the person can do about it.
+    #[must_use]
+    pub fn remedy(&self) -> String {
+        let text = match self {
+            Problem::Io(source) => match source.kind() {
+                std::io::ErrorKind::PermissionDenied => "give yourself the right to read it",
+                std::io::ErrorKind::IsADirectory => "name a file in it",
+                _ => "correct the path",
+            },
+            Problem::Empty | Problem::NoRows => {
+                "export the recording again; the copy or download was probably cut off"
+            }
+            Problem::TooLarge { .. } => "cut the recording into parts, or raise the limit",
+            Problem::NotUtf8 { .. } => "save the file as UTF-8",
+            Problem::LineTooLong { .. } => {
+                "give the recording: a text file of lines, or name its format"
+            }
+            Problem::DuplicateColumn { .. } => "rename or remove one",
+            Problem::UnknownColumn { .. } | Problem::MissingColumn { .. } => {
+                "correct the name, or map the columns with a column map (`columns` in the profile)"
+            }
+            Problem::IncompleteEntity { .. } => {
+                "export all its columns, or remove those that are there"
+            }
+            Problem::Ragged { .. } => "complete the line; a lost sample has empty cells",
+            Problem::Unexpected { .. } | Problem::Misfit { .. } => {
+                "export the recording again, or correct it there"
+            }
+            Problem::NotFinite { .. } => "leave the cell empty where nothing was measured",
+            Problem::PartlyLost { .. } => "leave all empty when it was lost",
+            Problem::TimeBackwards { .. } => "sort the rows by time",
+            Problem::FrameBackwards { .. } => "sort the rows by frame",
+            Problem::RepeatedSample { .. } => "remove one of them",
+            Problem::NotUnit { .. } | Problem::NotRotation { .. } => {
+                "check the columns' order and scale"
+            }
+            Problem::Truncated { .. } => "copy the file again: its end is missing",
+            Problem::TooSparse { .. } => "is the name column right? correct the column map",
+            Problem::UnknownFormat { .. } => {
+                "name the format, or describe the columns with a column map"
+            }
+            Problem::UnknownReader { .. } => {
+                "name one of these, or leave it out: the content tells"
+            }
+            Problem::Unsupported { remedy, .. } => remedy,
+        };
+        text.to_owned()
+    }
 }
 
 fn quoted(found: &str) -> String {
@@ -280,7 +321,8 @@ impl fmt::Display for Error {
                 )
             }
             At::Byte(byte) => write!(f, "{}: byte {byte}: {}", self.file, self.problem),
-        }
+        }?;
+        write!(f, "\n  help: {}", self.problem.remedy())
     }
 }
 

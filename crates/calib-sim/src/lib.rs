@@ -49,10 +49,14 @@ pub struct Simulated {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimError {
     /// The profile does not say how.
-    #[error("the profile has no `simulate` section")]
+    #[error(
+        "the profile has no `simulate` section\n  help: add one; those of `robots/ripley.yaml` and `robots/justin.yaml` show how"
+    )]
     NoSection,
     /// Markers of a body do not span a frame.
-    #[error("body `{body}`: {source}")]
+    #[error(
+        "body `{body}`: {source}\n  help: give its simulated markers other places (`simulate: {{mounts: …}}`)"
+    )]
     Body {
         /// The body.
         body: String,

@@ -74,15 +74,19 @@ pub struct Change {
 pub enum EditError {
     #[error(transparent)]
     Read(#[from] ReadError),
-    #[error("{file}: {source}")]
+    #[error(
+        "{file}: {source}\n  help: give the description of the robot that was calibrated; this one has other names"
+    )]
     UnknownName { file: String, source: UnknownName },
     #[error(
-        "the new {what} of joint `{joint}` is not a finite number: the solution must not be written"
+        "the new {what} of joint `{joint}` is not a finite number: the solution must not be written\n  help: calibrate again and look at its verdict"
     )]
     NotFinite { joint: String, what: &'static str },
-    #[error("joint `{joint}` is given two new values for its {what}")]
+    #[error("joint `{joint}` is given two new values for its {what}\n  help: give one")]
     EditedTwice { joint: String, what: &'static str },
-    #[error("{file}:{place}: joint `{joint}` is fixed, so it has no axis to set")]
+    #[error(
+        "{file}:{place}: joint `{joint}` is fixed, so it has no axis to set\n  help: give the description whose joint moves"
+    )]
     NoAxis {
         file: String,
         place: Place,
@@ -96,14 +100,18 @@ pub enum EditError {
         place: Place,
         joint: String,
     },
-    #[error("{file}:{place}: joint `{joint}` is {kind}, so it has no position limits")]
+    #[error(
+        "{file}:{place}: joint `{joint}` is {kind}, so it has no position limits\n  help: leave its limits as they are"
+    )]
     NoPositionLimits {
         file: String,
         place: Place,
         joint: String,
         kind: String,
     },
-    #[error("the new lower limit {lower} of joint `{joint}` is above the new upper limit {upper}")]
+    #[error(
+        "the new lower limit {lower} of joint `{joint}` is above the new upper limit {upper}\n  help: exchange them"
+    )]
     LimitsReversed {
         joint: String,
         lower: String,
@@ -117,9 +125,11 @@ pub enum EditError {
         kind: &'static str,
         name: String,
     },
-    #[error("the frame `{name}` is to be added twice")]
+    #[error(
+        "the frame `{name}` is to be added twice\n  help: name each body once under `outputs: {{add_bodies: …}}`"
+    )]
     FrameTwice { name: String },
-    #[error("a {kind} cannot be named `{name}`: {reason}")]
+    #[error("a {kind} cannot be named `{name}`: {reason}\n  help: rename the body in the profile")]
     BadName {
         kind: &'static str,
         name: String,
@@ -157,7 +167,9 @@ pub enum EditError {
         joint: String,
         argument: String,
     },
-    #[error("{file}:{place}: not well-formed YAML: {reason}")]
+    #[error(
+        "{file}:{place}: not well-formed YAML: {reason}\n  help: mend the YAML there, or give another file"
+    )]
     Yaml {
         file: String,
         place: Place,
@@ -191,7 +203,9 @@ pub enum EditError {
         joint: String,
         lines: Vec<usize>,
     },
-    #[error("{file}: a kinematics YAML holds origins of joints, and nothing else can be set in it")]
+    #[error(
+        "{file}: a kinematics YAML holds origins of joints, and nothing else can be set in it\n  help: apply to the URDF or xacro"
+    )]
     YamlOnlyOrigins { file: String },
     #[error(
         "{file}:{place}: joint `{joint}` comes from `{template}`, whose name xacro computes\n  help: patch the expanded URDF"

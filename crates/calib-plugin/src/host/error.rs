@@ -14,7 +14,7 @@ pub enum PluginError {
     /// No such file.
     #[error(
         "plugin `{name}` was not found; looked for {}{}",
-        looked.join(", "),
+        if looked.is_empty() { "it nowhere: it is a name, and the search path is empty".to_owned() } else { looked.join(", ") },
         there(known)
     )]
     NotFound {

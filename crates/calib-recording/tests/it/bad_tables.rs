@@ -99,7 +99,7 @@ fn every_bad_table_has_its_message() {
 fn what_is_no_text_is_refused() {
     assert_eq!(
         error(b"q_rad\n1\n\xff\xfe\n"),
-        "poses.csv:3: byte 0 of this line is not UTF-8; save the file as UTF-8"
+        "poses.csv:3: byte 0 of this line is not UTF-8\n  help: save the file as UTF-8"
     );
     assert!(
         error([0u8; 600]).contains("no reader recognises"),
@@ -163,7 +163,7 @@ fn a_column_map_that_does_not_fit_says_which_column() {
         .to_string();
     assert_eq!(
         message,
-        "log.csv:1: joint `arm_1_jonit` needs column `arm_1_jonit`, which the header does not have; did you mean `arm_1_joint`?"
+        "log.csv:1: joint `arm_1_jonit` needs column `arm_1_jonit`, which the header does not have; did you mean `arm_1_joint`?\n  help: correct the name, or map the columns with a column map (`columns` in the profile)"
     );
     let preset = ColumnMap {
         preset: Some("ur_rdte".into()),

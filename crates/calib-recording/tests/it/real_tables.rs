@@ -248,7 +248,10 @@ fn tables_of_other_makers_through_a_column_map() {
     let cut = read_bytes("aurora.csv", text_of.as_bytes(), &options)
         .expect_err("cut")
         .to_string();
-    assert_eq!(cut, "aurora.csv:164: 6 cells, the header has 33");
+    assert_eq!(
+        cut,
+        "aurora.csv:164: 6 cells, the header has 33\n  help: complete the line; a lost sample has empty cells"
+    );
     let whole = text_of.rsplit_once('\n').map_or("", |(whole, _)| whole);
     let recording = read_bytes("aurora.csv", whole.as_bytes(), &options).expect("readable");
     let aurora = recording.poses(Filled::Exclude).expect("one table");
