@@ -66,6 +66,13 @@ fn plan(name: &str) -> Plan {
     }
 }
 
+/// A session of the plan for a body of that name, which writes to `path`.
+fn session(path: &std::path::Path, name: &str) -> Session {
+    let plan = plan(name);
+    let table = Table::create(path, &[], &plan.header()).expect("made");
+    Session::new(plan, table)
+}
+
 #[test]
 fn datagrams_of_ours_and_of_others() {
     let (mut source, sender) = udp();
@@ -131,9 +138,7 @@ fn a_real_log_datagram_by_datagram_is_the_log() {
 fn lost_disordered_and_foreign_datagrams_in_a_recording() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("a.csv");
-    let plan = plan("body_0");
-    let table = Table::create(&path, &[], &plan.header()).expect("made");
-    let mut session = Session::new(plan, table);
+    let mut session = session(&path, "body_0");
     let (mut source, sender) = udp();
     for number in [1u64, 2, 4, 3, 4, 5, 8] {
         let seen: &[(u32, Isometry3<f64>)] = if number == 5 { &[] } else { &[(0, pose(0.5))] };
@@ -307,9 +312,7 @@ fn servers_that_are_none() {
 fn a_stream_that_goes_wrong_in_the_middle_keeps_what_was_recorded() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("a.csv");
-    let plan = plan("Head_0");
-    let table = Table::create(&path, &[], &plan.header()).expect("made");
-    let mut session = Session::new(plan, table);
+    let mut session = session(&path, "Head_0");
     let mut says = greeting("Head");
     for i in 0..20 {
         says.extend(report((100, i * 10_000), 0, &pose(0.1)));
