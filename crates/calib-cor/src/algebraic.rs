@@ -138,6 +138,11 @@ pub fn fit(member: Algebraic, input: &Input<'_>, options: &Options) -> Result<Ou
         Err(answer) => return Ok(answer),
     };
     let (center, radii) = solve(&cloud, &factor, member);
+    // Kåsa's constraint lets noise lengthen the spread; Taubin's takes it off, and the difference is the bias.
+    let known_bias = match member {
+        Algebraic::Kasa => center - solve(&cloud, &factor, Algebraic::Taubin).0,
+        _ => Vector3::zeros(),
+    };
     let candidate = Candidate {
         estimator,
         center,
@@ -145,6 +150,7 @@ pub fn fit(member: Algebraic, input: &Input<'_>, options: &Options) -> Result<Ou
         radius_bias: member.radius_bias(),
         weights: Vec::new(),
         absolute: false,
+        known_bias,
         rejected: Vec::new(),
     };
     Ok(judge(&cloud, &factor, candidate, options))

@@ -58,7 +58,10 @@ fn run(
     };
     // The test counts samples, so it needs the factor in which each sample weighs the same.
     let factor = Factor::of(&cloud, false);
+    let compensated = compensate(&cloud, &equal_markers).0;
     let judged = |(center, radii): (Vector3<f64>, Vec<f64>)| {
+        // Zero for Halvorsen's own.
+        let bias = center - compensated;
         let candidate = Candidate {
             estimator,
             center,
@@ -66,6 +69,11 @@ fn run(
             radius_bias: 1.5,
             weights: Vec::new(),
             absolute: false,
+            known_bias: if bias.iter().all(|x| x.is_finite()) {
+                bias
+            } else {
+                Vector3::zeros()
+            },
             rejected: Vec::new(),
         };
         judge(&cloud, &factor, candidate, options)

@@ -44,6 +44,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
         radius_bias: 0.0,
         weights: Vec::new(),
         absolute: false,
+        known_bias: Vector3::zeros(),
         rejected: Vec::new(),
     };
     Ok(judge(&cloud, &factor, candidate, options))

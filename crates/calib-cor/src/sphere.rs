@@ -3,10 +3,10 @@
 //! ```text
 //! σ̂² = Σ w (|x − m| − r_p)² / (n − P − 3)      σ is the noise of a sample of weight 1            (1)
 //! κ = (s₃² / (n − P − 2)) / σ̂²  ~  F(n − P − 2, n − P − 3)   if every marker stays in a plane   (2)
-//! C = σ² (JᵀJ)⁻¹,  J = −(u − ū_p),   the weakest variance divided by 1 − 1/κ                    (3)
+//! C = σ² (JᵀJ)⁻¹ + b bᵀ,  J = −(u − ū_p),   the weakest variance divided by 1 − 1/κ              (3)
 //! ```
 //!
-//! With noise J has full rank even for a sweep about one axis, and (3) alone would look trustworthy; the test
+//! b is a bias that the estimator is known to have (Kåsa's). With noise J has full rank even for a sweep about one axis, and (3) alone would look trustworthy; the test
 //! (2) compares the spread across the best planes (s₃, [`calib_geometry::factor`]) with the noise.
 
 use calib_geometry::{
@@ -108,6 +108,8 @@ pub(crate) struct Candidate {
     pub weights: Vec<f64>,
     /// True where the weights are inverse variances in the points' unit: nothing is left to estimate.
     pub absolute: bool,
+    /// What the center is known to be off by and was not taken off: it counts as uncertainty.
+    pub known_bias: Vector3<f64>,
     pub rejected: Vec<Rejected>,
 }
 
@@ -125,6 +127,7 @@ pub(crate) fn judge(
         radius_bias,
         weights,
         absolute,
+        known_bias,
         rejected,
     } = candidate;
     let (n, markers) = (cloud.points.len(), cloud.markers());
@@ -211,7 +214,9 @@ pub(crate) fn judge(
         let trust = if k == 0 { 1.0 - 1.0 / kappa } else { 1.0 };
         covariance += axis * axis.transpose() * (sigma * sigma / (eigen.values[k] * trust));
     }
+    covariance += known_bias * known_bias.transpose();
     let weakest = sigma / (eigen.values[0] * (1.0 - 1.0 / kappa)).sqrt();
+    let weakest = weakest.hypot(known_bias.dot(&eigen.vectors.column(0)));
     let radius = radii.iter().sum::<f64>() / markers as f64;
     let (verdict, reason) = if weakest > options.weak_fraction * radius {
         let axis = eigen.vectors.column(0);

@@ -128,6 +128,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
         radius_bias: 1.0,
         weights,
         absolute,
+        known_bias: Vector3::zeros(),
         rejected: Vec::new(),
     };
     let mut outcome = judge(&cloud, &factor, candidate, options);

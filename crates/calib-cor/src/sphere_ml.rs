@@ -76,6 +76,7 @@ pub(crate) fn fit_cloud(
         radius_bias: 1.0,
         weights,
         absolute,
+        known_bias: Vector3::zeros(),
         rejected,
     };
     judge(cloud, &factor, candidate, options)

@@ -18,10 +18,10 @@ struct Cell {
 
 fn cells() -> Vec<Cell> {
     let mut out = Vec::new();
-    for (range, name, z, x) in [
-        (0, "hand", [-45.0, 135.0], [-45.0, 80.0]),
-        (1, "60°", [-30.0, 30.0], [-30.0, 30.0]),
-        (2, "20°", [-10.0, 10.0], [-10.0, 10.0]),
+    for (name, z, x) in [
+        ("hand", [-45.0, 135.0], [-45.0, 80.0]),
+        ("60°", [-30.0, 30.0], [-30.0, 30.0]),
+        ("20°", [-10.0, 10.0], [-10.0, 10.0]),
     ] {
         for n in [4, 7] {
             for (radius, sigma_t, degrees) in [
@@ -31,7 +31,6 @@ fn cells() -> Vec<Cell> {
                 (0.25, 1e-3, 5.0),
                 (0.1, 5e-3, 2.0),
             ] {
-                let _ = range;
                 out.push(Cell {
                     name,
                     turns: grid(z, n, x, n),
@@ -45,8 +44,8 @@ fn cells() -> Vec<Cell> {
     out
 }
 
-/// Mean of eᵀC⁻¹e/3 over the answers, their number, and how many of them are called weak.
-fn ratio(cell: &Cell, id: &str, kind: InputKind, trials: u64) -> (f64, u64, u64) {
+/// Mean of eᵀC⁻¹e/3 over the answers that are not called weak, and their number.
+fn ratio(cell: &Cell, id: &str, kind: InputKind, trials: u64) -> (f64, u64) {
     let layout = [
         Vector3::new(1.0, 0.2, 0.0),
         Vector3::new(0.8, -0.3, 0.5),
@@ -54,7 +53,7 @@ fn ratio(cell: &Cell, id: &str, kind: InputKind, trials: u64) -> (f64, u64, u64)
     ];
     let arm = Vector3::new(-0.8, 0.5, -0.3).normalize() * cell.radius;
     let place = Vector3::new(-0.05, 0.03, 0.08);
-    let (mut sum, mut answered, mut weak) = (0.0, 0, 0);
+    let (mut sum, mut answered) = (0.0, 0);
     for seed in 0..trials {
         let mut noise = Noise::new(seed);
         let mut markers = vec![Vec::new(); layout.len()];
@@ -89,24 +88,28 @@ fn ratio(cell: &Cell, id: &str, kind: InputKind, trials: u64) -> (f64, u64, u64)
             _ => (Input::Markers(&markers), CENTER),
         };
         let outcome = fit(id, &input, &Options::default()).expect(id);
-        let Some(estimate) = outcome.estimate() else {
+        let Some(estimate) = outcome.estimate().filter(|_| outcome.is_observable()) else {
             continue;
         };
         answered += 1;
-        weak += u64::from(!outcome.is_observable());
         let e = estimate.center.coords - truth;
         let inverse = estimate.covariance.try_inverse().expect("definite");
         sum += e.dot(&(inverse * e)) / 3.0;
     }
-    (sum / answered.max(1) as f64, answered, weak)
+    (sum / answered.max(1) as f64, answered)
 }
 
 #[test]
-#[ignore = "study"]
-fn print_all() {
+fn covariances_are_not_too_small() {
+    const TRIALS: u64 = 100;
+    /// Of fewer answers those that look best have been picked by the tests of observability.
+    const ENOUGH: u64 = 50;
+    /// 1 and five Monte-Carlo errors of 100 trials; estimated noise adds to few degrees of freedom.
+    const LIMIT: f64 = 1.45;
+    let mut judged = 0;
     for cell in cells() {
-        print!(
-            "{:<5} n {:<3} r {:<4} {} mm {:.2}°: ",
+        let name = format!(
+            "{}, n {}, r {} mm, {} mm, {:.2}°",
             cell.name,
             cell.turns.len(),
             cell.radius * 1e3,
@@ -114,12 +117,16 @@ fn print_all() {
             cell.sigma_r.to_degrees()
         );
         for info in estimators() {
+            // COBYLA finds what SFE finds; the robust ones are judged with outliers.
             if matches!(info.id, "sfa" | "robust" | "consensus") {
                 continue;
             }
-            let (ratio, answered, weak) = ratio(&cell, info.id, info.input, 100);
-            print!(" {} {ratio:.2}/{answered}/{weak}", info.id);
+            let (ratio, answered) = ratio(&cell, info.id, info.input, TRIALS);
+            if answered >= ENOUGH {
+                judged += 1;
+                assert!(ratio < LIMIT, "{name}: {} {ratio:.2}", info.id);
+            }
         }
-        println!();
     }
+    assert!(judged > 300, "{judged} cells");
 }
