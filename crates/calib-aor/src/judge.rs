@@ -132,7 +132,10 @@ pub(crate) fn judge(
     let sigma = options.sigma_t.unwrap_or(estimated);
     let test = match gain_by_turning {
         Some(gain) => turns(estimator, cloud, factor, estimated, dof, gain, options),
-        None => leaves_its_line(estimator, cloud, factor, estimated, dof, options),
+        None => {
+            let own = cloud.markers() == 1 || !own_centers.is_empty();
+            leaves_its_line(estimator, cloud, factor, estimated, dof, own, options)
+        }
     };
     let kappa = match test {
         Ok(kappa) => kappa,
@@ -294,10 +297,15 @@ impl Yardstick {
         (kappa, chance)
     }
 
+    /// Markers that only scatter about their places: their spread is no wider than the noise.
+    fn rests(&self, cloud: &Cloud, factor: &Factor, options: &Options) -> bool {
+        let dof = cloud.points.len() - cloud.markers();
+        self.test(factor.s[0] * factor.s[0], dof).1 > options.significance
+    }
+
     /// The word for markers that do not turn: do they move at all?
     fn word(&self, cloud: &Cloud, factor: &Factor, options: &Options) -> Verdict {
-        let dof = cloud.points.len() - cloud.markers();
-        if self.test(factor.s[0] * factor.s[0], dof).1 <= options.significance {
+        if !self.rests(cloud, factor, options) {
             Verdict::Collinear
         } else {
             Verdict::Coincident
@@ -305,13 +313,28 @@ impl Yardstick {
     }
 }
 
-/// H₀: every marker stays on a line within its noise, so that s₂² is noise alone. Returns κ.
-pub(crate) fn leaves_its_line(
+/// Chance of such unlike spreads in three directions where noise alone, alike in all, makes them (Mauchly 1940, Bartlett's factor).
+fn alike_in_all_directions(factor: &Factor, dof: usize) -> f64 {
+    let squares = factor.s.component_mul(&factor.s);
+    let mean = squares.sum() / 3.0;
+    let log: f64 = squares.iter().map(|x| (x / mean).ln()).sum();
+    let count = dof as f64 - 23.0 / 18.0;
+    if count <= 3.0 {
+        // Too few for the approximation, and for a cloud.
+        return 0.0;
+    }
+    chance::chi2_tail(-count * log, 5.0)
+}
+
+/// H₀: every marker stays on a line within its noise, so that s₂² is noise alone. Returns κ. `own_circles`: no two markers share a
+/// center.
+fn leaves_its_line(
     estimator: &'static str,
     cloud: &Cloud,
     factor: &Factor,
     sigma: f64,
     dof: usize,
+    own_circles: bool,
     options: &Options,
 ) -> Result<f64, Outcome> {
     let Some(yardstick) = Yardstick::of(sigma, dof, options) else {
@@ -319,10 +342,18 @@ pub(crate) fn leaves_its_line(
     };
     let across = cloud.points.len() - cloud.markers() - 1;
     let (kappa, chance) = yardstick.test(factor.s[1] * factor.s[1], across);
-    if chance <= options.significance {
+    // A circle of its own through a cloud of noise leaves too little for the noise: κ alone would take one cloud in a hundred for a circle.
+    let cloudy = own_circles
+        && yardstick.dof.is_some()
+        && alike_in_all_directions(factor, across + 1) > options.significance;
+    if chance <= options.significance && !cloudy {
         return Ok(kappa);
     }
-    let verdict = yardstick.word(cloud, factor, options);
+    let verdict = if cloudy {
+        Verdict::Coincident
+    } else {
+        yardstick.word(cloud, factor, options)
+    };
     let reason = format!(
         "the points are {verdict} within their noise: their spread across the best line is {:.2} times the \
          noise of {:.3e} (chance {chance:.1e}, accepted below {:.0e})",

@@ -295,6 +295,35 @@ fn a_body_that_slides_has_no_axis() {
     assert!(weak <= 3 * 5 * TRIALS / 1000, "{weak} of {}", 5 * TRIALS);
 }
 
+/// A marker that rests in its noise is not given an axis, though a circle through the cloud leaves less than the noise.
+#[test]
+fn a_marker_that_rests_has_no_axis() {
+    const TRIALS: u64 = 2000;
+    let hinge = Hinge::slanted();
+    for (id, markers) in [
+        ("plane", 1),
+        ("circle_ml", 1),
+        ("hinge_bundle", 1),
+        ("dir_ml", 4),
+    ] {
+        let places = hinge.layout(markers, 0.1);
+        for n in [6, 10, 19] {
+            let angles = vec![0.3; n];
+            let mut answered = 0;
+            for seed in 0..TRIALS {
+                let data = hinge.tracks(&places, &angles, 1.0 * MM, &mut Noise::new(seed));
+                let outcome = fit(id, &Input::Markers(&data), &Options::default()).expect(id);
+                answered += u64::from(outcome.verdict() == Verdict::Ok);
+            }
+            println!("{id}, n {n}: {answered} of {TRIALS}");
+            assert!(
+                answered <= 2 * TRIALS / 1000,
+                "{id}, n {n}: {answered} of {TRIALS}"
+            );
+        }
+    }
+}
+
 /// Frames miss markers, as in a real recording: the straight motion is found with gaps, and the axis answered.
 #[test]
 fn occluded_markers_do_not_cost_the_answer() {
