@@ -315,14 +315,15 @@ impl Yardstick {
 
 /// Chance of such unlike spreads in three directions where noise alone, alike in all, makes them (Mauchly 1940, Bartlett's factor).
 fn alike_in_all_directions(factor: &Factor, dof: usize) -> f64 {
+    /// Below it three spreads are too uncertain to tell an arc from a cloud.
+    const ENOUGH: usize = 9;
+    if dof < ENOUGH {
+        return 0.0;
+    }
     let squares = factor.s.component_mul(&factor.s);
     let mean = squares.sum() / 3.0;
     let log: f64 = squares.iter().map(|x| (x / mean).ln()).sum();
     let count = dof as f64 - 23.0 / 18.0;
-    if count <= 3.0 {
-        // Too few for the approximation, and for a cloud.
-        return 0.0;
-    }
     chance::chi2_tail(-count * log, 5.0)
 }
 
