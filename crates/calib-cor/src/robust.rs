@@ -25,7 +25,7 @@ use calib_geometry::{
     Verdict,
     chance::chi2_tail,
     decompose::symmetric_eigen_small,
-    measured::{Cloud, Pose},
+    measured::{Cloud, Pose, RowWeights},
 };
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
@@ -97,7 +97,7 @@ trait Model {
     /// Where sample k is.
     fn place(&self, k: usize) -> Vector3<f64>;
     fn subset_fit(&self, random: &mut Seeded) -> Option<Self::Estimate>;
-    /// `|residual|²` of sample k.
+    /// `|residual|²` of sample k, as of one of weight 1.
     fn square(&self, estimate: &Self::Estimate, k: usize) -> f64;
     fn weighted(&self, start: &Self::Estimate, weights: &[f64]) -> Option<Self::Estimate>;
     /// What an error of one of the samples that are kept does, where a single one may decide: for each (sample, redundancy, shift).
@@ -665,7 +665,7 @@ impl Model for Spheres<'_> {
 
     fn square(&self, (center, radii): &Self::Estimate, k: usize) -> f64 {
         let e = (self.cloud.points[k] - center).norm() - radii[self.marker_of[k]];
-        e * e
+        self.cloud.weight(k) * e * e
     }
 
     /// Unknowns are the center and the radius of each marker, so that a sample's line is `[−u, 0, …, −1, …, 0]`.
@@ -750,7 +750,8 @@ fn points_fit(
 // ---- hot spot ------------------------------------------------------------------------------------------
 
 struct HotSpots<'a> {
-    poses: Vec<(usize, &'a Pose)>,
+    /// Row, pose and weight.
+    poses: Vec<(usize, &'a Pose, f64)>,
 }
 
 impl Model for HotSpots<'_> {
@@ -775,11 +776,12 @@ impl Model for HotSpots<'_> {
 
     fn subset_fit(&self, random: &mut Seeded) -> Option<Self::Estimate> {
         let chosen = random.subset::<3>(self.samples());
-        solve(chosen.iter().map(|&k| (self.poses[k].1, 1.0)))
+        solve(chosen.iter().map(|&k| (self.poses[k].1, self.poses[k].2)))
     }
 
     fn square(&self, (center, body_point): &Self::Estimate, k: usize) -> f64 {
-        (self.poses[k].1.transform(body_point) - center).norm_squared()
+        let (_, pose, w) = self.poses[k];
+        w * (pose.transform(body_point) - center).norm_squared()
     }
 
     /// Two poses about different axes determine a center, and each has three components: no single one decides.
@@ -792,7 +794,7 @@ impl Model for HotSpots<'_> {
             self.poses
                 .iter()
                 .zip(weights)
-                .map(|((_, pose), w)| (*pose, *w)),
+                .map(|((_, pose, own), w)| (*pose, own * w)),
         )
     }
 }
@@ -839,10 +841,12 @@ fn poses_fit(
     if let Err(answer) = hotspot::prepare(estimator, poses, options)? {
         return Ok(answer);
     }
-    let seen: Vec<(usize, &Pose)> = poses
+    let weights = RowWeights(&options.weights);
+    let seen: Vec<(usize, &Pose, f64)> = poses
         .iter()
         .enumerate()
-        .filter_map(|(row, p)| Some((row, p.as_ref()?)))
+        .filter_map(|(row, p)| Some((row, p.as_ref()?, weights.of(row))))
+        .filter(|(.., w)| *w > 0.0)
         .collect();
     let model = HotSpots { poses: seen };
     let choice = match choose(&model, options, reweight) {
@@ -850,7 +854,7 @@ fn poses_fit(
         Err(why) => return Ok(no_choice(estimator, model.samples(), &why)),
     };
     let mut kept = poses.to_vec();
-    for (k, (row, _)) in model.poses.iter().enumerate() {
+    for (k, (row, ..)) in model.poses.iter().enumerate() {
         if !choice.keep[k] {
             kept[*row] = None;
         }
