@@ -77,8 +77,13 @@ pub enum PipelineError {
         remedy: String,
     },
     /// The simulation cannot be made.
-    #[error("{0}")]
-    Simulation(#[from] calib_sim::SimError),
+    #[error("{file}: {source}")]
+    Simulation {
+        /// The profile.
+        file: String,
+        /// Why.
+        source: Box<calib_sim::SimError>,
+    },
     /// The solver refused the problem.
     #[error("the estimation problem cannot be stated: {0}")]
     Solve(#[from] calib_core::Error),
@@ -149,7 +154,7 @@ impl PipelineError {
             | Self::Profile(_)
             | Self::Urdf(_)
             | Self::Usage { .. }
-            | Self::Simulation(_) => ExitCode::Usage,
+            | Self::Simulation { .. } => ExitCode::Usage,
             Self::Recording(_) | Self::Data { .. } => ExitCode::Data,
             Self::Refused { .. } => ExitCode::VerdictFail,
             Self::Solve(_) => ExitCode::NotConverged,

@@ -11,7 +11,12 @@ use crate::write::OutputFile;
 /// # Errors
 /// [`PipelineError`] when the profile has no `simulate` section or the tables cannot be written.
 pub fn simulate(robot: &RobotProfile, seed: Option<u64>) -> Result<Vec<OutputFile>, PipelineError> {
-    let simulated = calib_sim::simulate(&robot.profile, &robot.model, seed)?;
+    let simulated = calib_sim::simulate(&robot.profile, &robot.model, seed).map_err(|source| {
+        PipelineError::Simulation {
+            file: robot.file.clone(),
+            source: Box::new(source),
+        }
+    })?;
     let mut files = Vec::new();
     for (name, poses) in &simulated.recordings {
         let options = WriteOptions {

@@ -145,7 +145,13 @@ pub(crate) fn usage(finding: &str, remedy: &str) -> PipelineError {
 
 /// Draws a robot and calibrates it by both methods.
 fn one_robot(robot: &RobotProfile, seed: u64) -> Result<Vec<RobotResult>, PipelineError> {
-    let simulated = calib_sim::simulate(&robot.profile, &robot.model, Some(seed))?;
+    let simulated =
+        calib_sim::simulate(&robot.profile, &robot.model, Some(seed)).map_err(|source| {
+            PipelineError::Simulation {
+                file: robot.file.clone(),
+                source: Box::new(source),
+            }
+        })?;
     let mut out = Vec::new();
     for (method, word) in METHODS {
         let options = RunOptions {
