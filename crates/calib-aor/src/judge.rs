@@ -78,6 +78,12 @@ fn no_plane(
 /// σ of an own center, in radii, above which its circle is as good as straight: the curvature is three deviations from none.
 const KNOWN_CENTER: f64 = 1.0 / 3.0;
 
+/// Degrees of freedom below which three spreads are too uncertain to tell an arc from a cloud.
+const ENOUGH_TO_TELL: usize = 9;
+
+/// Chance, in units of the significance, from which so few samples are beyond doubt.
+const BEYOND_DOUBT: f64 = 0.1;
+
 /// Center of one marker's circle.
 pub(crate) struct OwnCenter {
     pub center: Vector3<f64>,
@@ -131,14 +137,15 @@ pub(crate) fn judge(
     };
     let sigma = options.sigma_t.unwrap_or(estimated);
     let test = match gain_by_turning {
-        Some(gain) => turns(estimator, cloud, factor, estimated, dof, gain, options),
+        Some(gain) => turns(estimator, cloud, factor, estimated, dof, gain, options)
+            .map(|kappa| Turn { kappa, doubt: None }),
         None => {
             let own = cloud.markers() == 1 || !own_centers.is_empty();
             leaves_its_line(estimator, cloud, factor, estimated, dof, own, options)
         }
     };
-    let kappa = match test {
-        Ok(kappa) => kappa,
+    let Turn { kappa, doubt } = match test {
+        Ok(turn) => turn,
         Err(answer) => return answer,
     };
 
@@ -216,6 +223,10 @@ pub(crate) fn judge(
             arc.to_degrees()
         )
     });
+    let weak = match (weak, doubt) {
+        ((Verdict::Ok, _), Some(doubt)) => (Verdict::Weak, Some(doubt)),
+        (weak, _) => weak,
+    };
     let (verdict, reason) = match (weak, adrift) {
         ((Verdict::Ok, _), Some((deviation, radius))) => {
             let text = format!(
@@ -315,9 +326,7 @@ impl Yardstick {
 
 /// Chance of such unlike spreads in three directions where noise alone, alike in all, makes them (Mauchly 1940, Bartlett's factor).
 fn alike_in_all_directions(factor: &Factor, dof: usize) -> f64 {
-    /// Below it three spreads are too uncertain to tell an arc from a cloud.
-    const ENOUGH: usize = 9;
-    if dof < ENOUGH {
+    if dof < ENOUGH_TO_TELL {
         return 0.0;
     }
     let squares = factor.s.component_mul(&factor.s);
@@ -325,6 +334,14 @@ fn alike_in_all_directions(factor: &Factor, dof: usize) -> f64 {
     let log: f64 = squares.iter().map(|x| (x / mean).ln()).sum();
     let count = dof as f64 - 23.0 / 18.0;
     chance::chi2_tail(-count * log, 5.0)
+}
+
+/// The markers turn.
+struct Turn {
+    /// In units of the noise variance.
+    kappa: f64,
+    /// Why rest is unlikely, but not excluded.
+    doubt: Option<String>,
 }
 
 /// H₀: every marker stays on a line within its noise, so that s₂² is noise alone. Returns κ. `own_circles`: no two markers share a
@@ -337,9 +354,12 @@ fn leaves_its_line(
     dof: usize,
     own_circles: bool,
     options: &Options,
-) -> Result<f64, Outcome> {
+) -> Result<Turn, Outcome> {
     let Some(yardstick) = Yardstick::of(sigma, dof, options) else {
-        return Ok(f64::INFINITY);
+        return Ok(Turn {
+            kappa: f64::INFINITY,
+            doubt: None,
+        });
     };
     let across = cloud.points.len() - cloud.markers() - 1;
     let (kappa, chance) = yardstick.test(factor.s[1] * factor.s[1], across);
@@ -348,7 +368,18 @@ fn leaves_its_line(
         && yardstick.dof.is_some()
         && alike_in_all_directions(factor, across + 1) > options.significance;
     if chance <= options.significance && !cloudy {
-        return Ok(kappa);
+        // So few samples cannot be asked whether they scatter alike in all directions; one cloud in a hundred passes.
+        let few = own_circles && yardstick.dof.is_some() && across + 1 < ENOUGH_TO_TELL;
+        let doubt = (few && chance > BEYOND_DOUBT * options.significance).then(|| {
+            format!(
+                "the marker may rest: its spread across the best line is {:.2} times the noise of {:.3e} (chance {chance:.1e}, beyond \
+                 doubt below {:.0e})",
+                kappa.sqrt(),
+                yardstick.noise,
+                BEYOND_DOUBT * options.significance
+            )
+        });
+        return Ok(Turn { kappa, doubt });
     }
     let verdict = if cloudy {
         Verdict::Coincident

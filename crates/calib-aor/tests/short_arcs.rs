@@ -307,7 +307,7 @@ fn a_marker_that_rests_has_no_axis() {
         ("dir_ml", 4),
     ] {
         let places = hinge.layout(markers, 0.1);
-        for n in [10, 19, 40] {
+        for n in [5, 6, 8, 9, 10, 19, 40] {
             let angles = vec![0.3; n];
             let mut answered = 0;
             for seed in 0..TRIALS {
