@@ -138,6 +138,33 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
     Ok(outcome)
 }
 
+/// What a sample says about the center.
+struct Direction {
+    marker: usize,
+    /// D: its normal off the weighted mean of its marker's.
+    off: Vector3<f64>,
+    weight: f64,
+}
+
+/// D and weight of every sample; `weights` multiply the cloud's own, none are all 1.
+fn directions(cloud: &Cloud, normals: &[Vector3<f64>], weights: &[f64]) -> Vec<Direction> {
+    let weight = |k: usize| weights.get(k).copied().unwrap_or(1.0) * cloud.weight(k);
+    let mut out = Vec::with_capacity(cloud.points.len());
+    for marker in 0..cloud.markers() {
+        let (mut sum, mut total) = (Vector3::zeros(), 0.0);
+        for k in cloud.range(marker) {
+            sum += normals[k] * weight(k);
+            total += weight(k);
+        }
+        out.extend(cloud.range(marker).map(|k| Direction {
+            marker,
+            off: normals[k] - sum / total,
+            weight: weight(k),
+        }));
+    }
+    out
+}
+
 /// c β of (5), and what (6) adds to H⁻¹. `None` where the directions span no volume or the numbers are none.
 fn bent(
     cloud: &Cloud,
@@ -147,26 +174,12 @@ fn bent(
 ) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     let (mut information, mut excess) = (Matrix3::zeros(), Matrix3::zeros());
     let mut push = Vector3::zeros();
-    for p in 0..cloud.markers() {
-        let range = cloud.range(p);
-        let weight = |k: usize| weights[k] * cloud.weight(k);
-        let total: f64 = range.clone().map(weight).sum();
-        let mean = range
-            .clone()
-            .map(|k| normals[k] * weight(k))
-            .sum::<Vector3<f64>>()
-            / total;
-        for k in range {
-            let d = normals[k] - mean;
-            let bend = Bend::of(
-                &(cloud.covariances[k] / cloud.weight(k)),
-                &normals[k],
-                radii[p],
-            );
-            information += d * (d * weight(k)).transpose();
-            push += d * (weight(k) * bend.mean_height());
-            excess += bend.excess(&d);
-        }
+    for (k, one) in directions(cloud, normals, weights).iter().enumerate() {
+        let covariance = cloud.covariances[k] / cloud.weight(k);
+        let bend = Bend::of(&covariance, &normals[k], radii[one.marker]);
+        information += one.off * (one.off * one.weight).transpose();
+        push += one.off * (one.weight * bend.mean_height());
+        excess += bend.excess(&one.off);
     }
     let inverse = information.cholesky()?.inverse();
     let bias = inverse * push;
@@ -199,31 +212,16 @@ fn bias(
     radii: &[f64],
     variance: f64,
 ) -> Option<Vector3<f64>> {
-    let weight = |k: usize| weights.get(k).copied().unwrap_or(1.0) * cloud.weight(k);
-    let mut information = Matrix3::zeros();
-    let mut means = Vec::with_capacity(cloud.markers());
-    for p in 0..cloud.markers() {
-        let range = cloud.starts[p]..cloud.starts[p + 1];
-        let total: f64 = range.clone().map(weight).sum();
-        let mean = range
-            .clone()
-            .map(|k| normals[k] * weight(k))
-            .sum::<Vector3<f64>>()
-            / total;
-        for k in range {
-            let d = normals[k] - mean;
-            information += d * (d * weight(k)).transpose();
-        }
-        means.push(mean);
-    }
+    let directions = directions(cloud, normals, weights);
+    let information: Matrix3<f64> = directions
+        .iter()
+        .map(|one| one.off * (one.off * one.weight).transpose())
+        .sum();
     let covariance = information.cholesky()?.inverse() * variance;
     let mut pull = Vector3::zeros();
-    for p in 0..cloud.markers() {
-        for k in cloud.starts[p]..cloud.starts[p + 1] {
-            let nu = normals[k];
-            let bend = (covariance.trace() - nu.dot(&(covariance * nu))) / radii[p];
-            pull += (nu - means[p]) * (weight(k) * bend);
-        }
+    for (nu, one) in normals.iter().zip(&directions) {
+        let bend = (covariance.trace() - nu.dot(&(covariance * nu))) / radii[one.marker];
+        pull += one.off * (one.weight * bend);
     }
     let bias = covariance * pull * (0.5 / variance.max(f64::MIN_POSITIVE));
     let small = bias.norm_squared() < 0.25 * covariance.trace();
