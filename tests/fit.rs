@@ -798,6 +798,10 @@ fn an_axis_takes_its_sign_from_the_joint_and_goes_through_a_stated_center() {
     );
     assert!(numbers(&held["direction"])[2].abs() > 0.999, "{held}");
     let ran = dir
+        .calib(["fit", "aor", "axis.csv", "--towards", "0,0,0"])
+        .expect(2);
+    assert!(ran.stderr.contains("no direction"), "{}", ran.stderr);
+    let ran = dir
         .calib(["fit", "aor", "axis.csv", "--joint", "elbow"])
         .expect(3);
     assert!(ran.stderr.contains("it has `a`, `b`"), "{}", ran.stderr);

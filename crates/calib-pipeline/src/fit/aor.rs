@@ -26,6 +26,12 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
         return Ok(listed(rows));
     }
     let table = Table::read(request)?;
+    if request.towards.is_some_and(|d| d.norm() == 0.0) {
+        return Err(usage(
+            "--towards 0,0,0 is no direction",
+            "name a side, like 0,0,1",
+        ));
+    }
     let options = calib_aor::Options {
         sigma_t: request.sigma_m,
         sigma_r: request.sigma_rad,
