@@ -5,7 +5,7 @@ mod truth;
 
 use std::collections::BTreeMap;
 
-use calib_pipeline::load::{RobotProfile, load_robot};
+use calib_pipeline::prepare::load::{RobotProfile, load_robot};
 use calib_recording::{WriteOptions, write_poses};
 use calib_sim::{Motion, StreamPlan, Streams, simulate_streams};
 use scratch::{Scratch, root};

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use calib_pipeline::apply::{self, ApplyRequest, Destination};
+use calib_pipeline::formulate::models;
+use calib_pipeline::output::write;
+use calib_pipeline::prepare::{inspect, load};
 use calib_pipeline::run::{RunOptions, run as run_profile};
-use calib_pipeline::{
-    ExitCode, PipelineError, cases, convert, drift, fit, inspect, load, models, simulate,
-    take_back, write,
-};
+use calib_pipeline::{ExitCode, PipelineError, cases, convert, drift, fit, simulate, take_back};
 use calib_study::{Study, StudyOptions};
 use clap::CommandFactory as _;
 use indicatif::{ProgressBar, ProgressStyle};

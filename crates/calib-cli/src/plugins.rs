@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::io::Write as _;
 
-use calib_pipeline::estimators::Estimators;
+use calib_pipeline::estimate::estimators::Estimators;
 use calib_pipeline::{ExitCode, PipelineError};
 use calib_plugin::check::{Limits, check};
 use calib_plugin::{HEADER, Host, Kind, Language, SearchPath, new_project};

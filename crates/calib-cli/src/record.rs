@@ -11,8 +11,9 @@ use calib_capture::{
     Screen, Session, Source, SourceError, Survey, Table, Terminal, Unit, WatchedKind, grid,
     map_names, parse_joints, survey,
 };
-use calib_pipeline::load::RobotProfile;
-use calib_pipeline::{ExitCode, PipelineError, load};
+use calib_pipeline::prepare::load;
+use calib_pipeline::prepare::load::RobotProfile;
+use calib_pipeline::{ExitCode, PipelineError};
 use calib_profile::{BodyKind, RecordingSpec};
 
 use crate::arguments::Record;

@@ -36,12 +36,12 @@
 //! |---|---|
 //! | did it converge, and how good is it | [`Solution::status`], `chi2`, `chi2_stated`, `degrees_of_freedom` |
 //! | how noisy are markers, bodies, joints | [`Solution::noise`] (REML where [`NoiseGroup::estimate`] is set) |
-//! | which rows were left out, and why | [`Solution::rejected`]; exchanged labels: [`relabel`] before solving |
+//! | which rows were left out, and why | [`Solution::rejected`]; exchanged labels: [`relabel()`] before solving |
 //! | what cannot be known, in words | [`Solution::observability`], [`ParameterEstimate::class`] and `data_share` |
 //! | how well does it predict | [`Solution::leave_one_out`], [`Solution::held_out`] with [`Problem::held_out`], [`k_fold`] |
 //! | against what | [`Problem::baseline`]: nominal, registration only |
 //! | which physics is missing | [`Solution::goodness_of_fit`], with [`Problem::candidate`] effects |
-//! | which model | [`compare`] |
+//! | which model | [`compare()`] |
 //! | can I trust the intervals if the noise model is wrong | [`sandwich`] |
 //! | how well does a loop close | [`ClosureStatistics`], [`Solution::pose_at_sample`] |
 //! | hand–eye with a proof of optimality | [`handeye`] |
@@ -125,63 +125,39 @@
 //! # Ok::<(), Error>(())
 //! ```
 
-mod baseline;
-mod bounded;
-mod chart;
-mod check;
-mod closure;
-mod compare;
-mod compressed;
-mod dense;
-mod derived;
-mod edge;
-mod error;
-mod folds;
-mod goodness;
+mod analysis;
+mod graph;
 pub mod handeye;
-mod head;
-mod ids;
-mod information;
-mod minimize;
 mod model;
-mod noise;
-mod normal;
-mod null_space;
-mod observability;
-mod parameter;
-mod path;
-mod pose;
-mod problem;
-mod relabel;
-mod robust;
-mod rows;
-mod solution;
-mod structured;
-mod validate;
+mod solve;
 
-pub use baseline::Baseline;
-pub use chart::Chart;
-pub use closure::{ClosureStatistics, Spread};
-pub use compare::{Criterion, RankedVariant, compare, compare_with};
-pub use derived::{Configuration, DerivedPoint, DerivedPose};
-pub use edge::{Axis, Candidate, Edge, EdgeKind, Feature, FeatureKind, Joint, Role, UnknownPose};
-pub use error::Error;
-pub use folds::{folds, k_fold};
-pub use goodness::{GoodnessOfFit, ScoreTest};
-pub use head::{
+pub use analysis::closure::{ClosureStatistics, Spread};
+pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};
+pub use analysis::folds::{folds, k_fold};
+pub use analysis::goodness::{GoodnessOfFit, ScoreTest};
+pub use analysis::information::{Information, NULL_TOLERANCE};
+pub use analysis::observability::{Direction, Gauge, Observability, Term};
+pub use analysis::solution::{
+    NoiseEstimate, ParameterClass, ParameterEstimate, Settings, Solution, solve,
+};
+pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
+pub use graph::baseline::Baseline;
+pub use graph::chart::Chart;
+pub use graph::edge::{
+    Axis, Candidate, Edge, EdgeKind, Feature, FeatureKind, Joint, Role, UnknownPose,
+};
+pub use graph::error::Error;
+pub use graph::head::{
     DirectionObservation, Head, HeadKind, MarkerObservation, PoseNoise, PoseObservation,
 };
-pub use ids::{EdgeId, FrameId, GroupId, ParameterId, PointId};
-pub use information::{Information, NULL_TOLERANCE};
-pub use minimize::{MinimizeSettings, Minimum, SolveStatus, minimize};
-pub use model::{MIN_JOINT_RANGE, Model, Values};
-pub use noise::sandwich;
-pub use observability::{Direction, Gauge, Observability, Term};
-pub use parameter::{
+pub use graph::ids::{EdgeId, FrameId, GroupId, ParameterId, PointId};
+pub use graph::parameter::{
     DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA, Parameter, ParameterKind, Unit,
 };
-pub use problem::{NoiseGroup, NoiseKind, Point, Problem};
-pub use relabel::{Relabelled, relabel};
-pub use robust::{RejectReason, Rejection, RobustSettings};
-pub use solution::{NoiseEstimate, ParameterClass, ParameterEstimate, Settings, Solution, solve};
-pub use validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
+pub use graph::problem::{NoiseGroup, NoiseKind, Point, Problem};
+pub use model::derived::{Configuration, DerivedPoint, DerivedPose};
+pub use model::layout::{MIN_JOINT_RANGE, Model, Values};
+pub use solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize};
+pub use solve::noise::sandwich;
+pub use solve::relabel::{Relabelled, relabel};
+pub use solve::robust::{RejectReason, Rejection, RobustSettings};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use calib_recording::{ReadOptions, WriteOptions, read_path_with, write_recording};
 
 use crate::error::PipelineError;
-use crate::write::OutputFile;
+use crate::output::write::OutputFile;
 
 /// What a conversion gives: the files (one per clock) and what the reader did and noticed.
 #[derive(Debug, Clone)]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::paths;
+use crate::prepare::paths;
 
 /// Exit codes of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

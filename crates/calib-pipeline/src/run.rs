@@ -10,26 +10,26 @@ use calib_report::{Report, ResidualRow, Status, Unobservable, Verdict};
 use calib_urdf::JointId;
 use nalgebra::{Isometry3, Matrix6};
 
-use crate::assemble::{Evidence, assemble};
-use crate::checks;
-use crate::clock;
-use crate::closure::close_loops;
 use crate::error::{ExitCode, PipelineError};
-use crate::estimators::values;
-use crate::export::{Found, calibration_yaml, patch_urdf, scene};
-use crate::kinematics::Calibration;
-use crate::known::{Known, known_numbers};
-use crate::load::{Inputs, load_recordings, load_robot};
-use crate::ml::{self, Freedom, MlFit};
-use crate::model_checks;
-use crate::paper::{self, OriginEstimate};
-use crate::relabel::relabel;
-use crate::shapes;
-use crate::start::{Start, mean_pose, start};
-use crate::tracks::{BodyTrack, body_tracks};
-use crate::verify;
-use crate::view::{Shown, view};
-use crate::write::OutputFile;
+use crate::estimate::estimators::values;
+use crate::estimate::paper::{self, OriginEstimate};
+use crate::estimate::start::{Start, mean_pose, start};
+use crate::formulate::kinematics::Calibration;
+use crate::formulate::ml::{self, Freedom, MlFit};
+use crate::output::assemble::{Evidence, assemble};
+use crate::output::export::{Found, calibration_yaml, patch_urdf, scene};
+use crate::output::shapes;
+use crate::output::view::{Shown, view};
+use crate::output::write::OutputFile;
+use crate::prepare::checks;
+use crate::prepare::clock;
+use crate::prepare::load::{Inputs, load_recordings, load_robot};
+use crate::prepare::model_checks;
+use crate::prepare::relabel::relabel;
+use crate::prepare::tracks::{BodyTrack, body_tracks};
+use crate::verify::closure::close_loops;
+use crate::verify::held_out;
+use crate::verify::known::{Known, known_numbers};
 
 /// How to run.
 #[derive(Debug, Clone, Default)]
@@ -153,7 +153,7 @@ pub fn run_on(
         })
         .collect();
     let loops = close_loops(&inputs, &tracks, &body_from_origin, &solved.fk);
-    let held_out = verify::held_out(
+    let held_out = held_out::held_out(
         &inputs,
         &tracks,
         Some(&nominal),
@@ -170,8 +170,12 @@ pub fn run_on(
         &solved.found,
     );
     progress("write the report");
-    let residuals =
-        crate::residuals::residual_rows(&inputs, &tracks, &solved.robot, solved.fit.as_ref());
+    let residuals = crate::verify::residuals::residual_rows(
+        &inputs,
+        &tracks,
+        &solved.robot,
+        solved.fit.as_ref(),
+    );
     let shown = Shown {
         nominal: &nominal,
         robot: &solved.robot,
@@ -546,7 +550,7 @@ fn written(
     residuals: &[ResidualRow],
     scene: &calib_report::Scene,
     view: &calib_report::view3d::View3d,
-    urdf: &crate::export::PatchedUrdf,
+    urdf: &crate::output::export::PatchedUrdf,
     robot: &Calibration,
 ) -> Result<Vec<(OutputFile, String)>, PipelineError> {
     let outputs = &inputs.robot.profile.outputs;
@@ -564,7 +568,7 @@ fn written(
         ),
     ];
     if let Some(yaml) = calibration_yaml(inputs, robot) {
-        let name = crate::export::calibration_name(&outputs.urdf);
+        let name = crate::output::export::calibration_name(&outputs.urdf);
         let what = "joint effects that a URDF cannot hold".to_owned();
         files.push((OutputFile::text(name, yaml), what));
     }

@@ -3,8 +3,8 @@
 use calib_recording::WriteOptions;
 
 use crate::error::PipelineError;
-use crate::load::RobotProfile;
-use crate::write::OutputFile;
+use crate::output::write::OutputFile;
+use crate::prepare::load::RobotProfile;
 
 /// The files of a simulation: every recording under its profile path's file name, and `truth.json`.
 ///

@@ -6,7 +6,7 @@ use calib_urdf::{ChangeRecord, source};
 
 use crate::apply::{Kind, origins};
 use crate::error::PipelineError;
-use crate::write;
+use crate::output::write;
 
 fn text(path: &Path) -> Result<String, PipelineError> {
     Ok(source::read_text(path, &path.display().to_string())?)

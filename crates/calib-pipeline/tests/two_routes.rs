@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use calib_core::{Configuration, FeatureKind, Settings};
-use calib_pipeline::kinematics::Loads;
-use calib_pipeline::load::{load_recordings, load_robot};
-use calib_pipeline::ml::{Freedom, fit, state};
-use calib_pipeline::start::start;
-use calib_pipeline::tracks::body_tracks;
+use calib_pipeline::estimate::start::start;
+use calib_pipeline::formulate::kinematics::Loads;
+use calib_pipeline::formulate::ml::{Freedom, fit, state};
+use calib_pipeline::prepare::load::{load_recordings, load_robot};
+use calib_pipeline::prepare::tracks::body_tracks;
 use calib_profile::Free;
 
 /// Rounding of a chain of a dozen rotations.
@@ -89,7 +89,7 @@ fn the_load_about_an_axis_is_the_description_s_gravity_torque() {
     let loads = Loads::at(&robot.model, &q);
     let torques = robot
         .model
-        .gravity_torques(&q, &calib_pipeline::loads::GRAVITY);
+        .gravity_torques(&q, &calib_pipeline::prepare::loads::GRAVITY);
     for joint in robot.model.independent_joints() {
         let (a, b) = (loads.about_axis[joint.index()], torques[joint.index()]);
         assert!(

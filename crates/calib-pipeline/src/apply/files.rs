@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::{Destination, FileChange};
 use crate::error::PipelineError;
+use crate::output::write::{OutputFile, replace, write_new};
 use crate::take_back::record_path;
-use crate::write::{OutputFile, replace, write_new};
 
 /// Writes the files, each with its record; nothing where they go nowhere.
 pub(super) fn write(

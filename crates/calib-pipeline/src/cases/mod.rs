@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::error::PipelineError;
-use crate::load::{RobotProfile, load_robot, of_tables};
+use crate::prepare::load::{RobotProfile, load_robot, of_tables};
 use crate::run::{RunOptions, run_on};
 
 pub use render::{csv, json, markdown, svg};

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{CaseOptions, RobotResult, usage};
 use crate::error::PipelineError;
-use crate::load::RobotProfile;
+use crate::prepare::load::RobotProfile;
 
 /// What must be the same for robots to be kept. The number of robots is not: a longer study continues a shorter one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,0 +1,335 @@
+//! Does the model explain the data, and if not, which physics is missing?
+//!
+//! For an effect with coefficient c that is not in the model, a = ∂e/∂c:
+//!
+//! ```text
+//! U = Σ_s aᵀ V⁻¹ e,   I = Σ_s aᵀV⁻¹a − bᵀ C b,   b = Σ_s JᵀV⁻¹a                             (1)
+//! ĉ = −U / I,   z² = U² / max(I, Σ_s u_s²)  ~  χ²(1) if c = 0 (Rao's score test)            (2)
+//! ```
+//!
+//! No refit is needed. `Σ u_s²` (u_s the sample's own share of U once parameters and effect are fitted) is the
+//! variance that samples as clusters show: correlated residuals inside a sample cannot fake significance. If the
+//! stated noise is too small, z² is divided by χ²/dof.
+
+use nalgebra::{DVector, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::analysis::solution::Solution;
+use crate::graph::edge::{EdgeKind, FeatureKind};
+use crate::model::layout::Model;
+use crate::solve::noise::{Whitened, covariance_of, whitened};
+use crate::solve::normal::{NormalEquations, Workspace, accumulate};
+use crate::solve::rows::{dot, residual};
+
+/// One effect that was tested.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ScoreTest {
+    /// What it is called, for instance `elbow.compliance`.
+    pub name: String,
+    /// The joint; `None` for drift of the whole frame and for the common clock.
+    pub joint: Option<String>,
+    /// The physics in words.
+    pub physics: String,
+    /// Coefficient that one step towards the better model gives (rad, 1, rad/Nm, s, m/s …).
+    pub estimate: f64,
+    /// z² of equation (2).
+    pub z2: f64,
+    /// Probability of so large a z² if the effect were absent.
+    pub p_value: f64,
+    /// The same after correction for the number of effects tested (Bonferroni).
+    pub p_corrected: f64,
+    /// Share of χ² that the effect would remove.
+    pub explains: f64,
+}
+
+/// Result of the goodness-of-fit analysis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GoodnessOfFit {
+    /// χ²/dof with the noise levels as stated.
+    pub chi2_per_dof: f64,
+    /// Probability of so large a χ² if model and stated noise are right; `None` when every noise level
+    /// was estimated (χ²/dof is then 1 by construction).
+    pub p_value: Option<f64>,
+    /// Every effect tested, most significant first.
+    pub tests: Vec<ScoreTest>,
+    /// The effects that are missing, in words; empty when none is significant.
+    pub missing: Vec<String>,
+}
+
+/// An effect counts as missing when chance would show one as large in less than 1 of 1000 analyses…
+const SIGNIFICANT: f64 = 1e-3;
+/// …and when it explains this share of χ²: smaller ones are real but do not matter.
+const RELEVANT: f64 = 0.02;
+
+/// What is regressed on.
+enum Effect {
+    /// (edge, lateral axis, regressor) of each joint that takes part.
+    Joints(Vec<(usize, Option<usize>, Vec<f64>)>),
+    /// A drift of the measuring frame along one of its axes.
+    Drift(usize, Vec<f64>),
+}
+
+struct Candidate {
+    name: String,
+    joint: Option<String>,
+    physics: &'static str,
+    effect: Effect,
+}
+
+impl Solution {
+    /// Score tests of every effect that the problem declares ([`Problem::candidate`](crate::Problem::candidate)) and of those that
+    /// follow from the readings alone (gain, eccentricity), plus drift where times are given. `None`
+    /// when the model cannot be evaluated.
+    #[must_use]
+    pub fn goodness_of_fit(&self) -> Option<GoodnessOfFit> {
+        let candidates = candidates(&self.model);
+        let mut tests = self.score_tests(&candidates)?;
+        tests.sort_by(|a, b| b.z2.total_cmp(&a.z2).then_with(|| a.name.cmp(&b.name)));
+        let chi2_per_dof = self.chi2_stated / self.degrees_of_freedom.max(1.0);
+        let all_estimated = self.noise.iter().all(|n| n.estimated);
+        let p_value = (!all_estimated && self.degrees_of_freedom >= 1.0)
+            .then(|| ChiSquared::new(self.degrees_of_freedom).ok())
+            .flatten()
+            .map(|d| d.sf(self.chi2_stated));
+        let missing = tests
+            .iter()
+            .filter(|t| t.p_corrected < SIGNIFICANT && t.explains > RELEVANT)
+            .map(|t| {
+                format!(
+                    "{} (`{}`): explains {:.0} % of χ², p = {:.0e}",
+                    t.physics,
+                    t.name,
+                    100.0 * t.explains,
+                    t.p_corrected.max(1e-300)
+                )
+            })
+            .collect();
+        Some(GoodnessOfFit {
+            chi2_per_dof,
+            p_value,
+            tests,
+            missing,
+        })
+    }
+
+    fn score_tests(&self, candidates: &[Candidate]) -> Option<Vec<ScoreTest>> {
+        let model = &self.model;
+        let n = model.free();
+        let mut work = Workspace::new(model);
+        let mut system = NormalEquations::new(n);
+        if !accumulate(
+            model,
+            &self.values,
+            &self.weights,
+            &self.theta,
+            &mut work,
+            &mut system,
+        ) {
+            return None;
+        }
+        let c = covariance_of(&system)?;
+        let count = candidates.len();
+        let mut u = vec![0.0; count];
+        let mut raw = vec![0.0; count];
+        let mut b = vec![DVector::<f64>::zeros(n); count];
+        self.each_sample(candidates, &mut work, |s, columns| {
+            for (k, a) in columns.iter().enumerate() {
+                let alpha = &s.l_inverse * a;
+                u[k] += alpha.dot(&s.w);
+                raw[k] += alpha.norm_squared();
+                b[k] += s.a.tr_mul(&alpha);
+            }
+        });
+        let taken: Vec<DVector<f64>> = b.iter().map(|b| &c * b).collect();
+        let information: Vec<f64> = (0..count).map(|k| raw[k] - b[k].dot(&taken[k])).collect();
+        // Second pass: each sample's share of U once the effect has been taken out, so that a strong
+        // effect does not count as its own noise.
+        let mut clusters = vec![0.0; count];
+        self.each_sample(candidates, &mut work, |s, columns| {
+            for (k, a) in columns.iter().enumerate() {
+                let own = &s.l_inverse * a - &s.a * &taken[k];
+                let share = own.dot(&s.w) - u[k] / information[k] * own.norm_squared();
+                clusters[k] += share * share;
+            }
+        });
+        let inflation = (self.chi2 / self.degrees_of_freedom.max(1.0)).max(1.0);
+        let one = ChiSquared::new(1.0).ok()?;
+        let mut out = Vec::new();
+        for (k, candidate) in candidates.iter().enumerate() {
+            let information = information[k];
+            // An effect that the parameters already imitate cannot be tested.
+            if information.is_nan() || information <= 1e-6 * raw[k] || raw[k] == 0.0 {
+                continue;
+            }
+            let z2 = (u[k] * u[k] / (information * inflation))
+                .min(u[k] * u[k] / clusters[k].max(1e-300));
+            let p_value = one.sf(z2);
+            out.push(ScoreTest {
+                name: candidate.name.clone(),
+                joint: candidate.joint.clone(),
+                physics: candidate.physics.to_owned(),
+                estimate: -u[k] / information,
+                z2,
+                p_value,
+                p_corrected: (p_value * count as f64).min(1.0),
+                explains: (u[k] * u[k] / information / self.chi2.max(1e-300)).min(1.0),
+            });
+        }
+        Some(out)
+    }
+
+    /// Calls `see` with every sample's whitened rows and the candidates' columns a.
+    fn each_sample(
+        &self,
+        candidates: &[Candidate],
+        work: &mut Workspace,
+        mut see: impl FnMut(&Whitened, &[DVector<f64>]),
+    ) {
+        for sample in 0..self.model.problem.samples {
+            let Some(s) = whitened(
+                &self.model,
+                &self.values,
+                &self.weights,
+                &self.theta,
+                sample,
+                work,
+            ) else {
+                continue;
+            };
+            let columns = self.effect_rows(candidates, sample, &s.blocks, s.w.len(), work);
+            see(&s, &columns);
+        }
+    }
+
+    /// a of equation (1) for every candidate at one sample.
+    fn effect_rows(
+        &self,
+        candidates: &[Candidate],
+        sample: usize,
+        blocks: &[(usize, usize, usize)],
+        rows: usize,
+        work: &Workspace,
+    ) -> Vec<DVector<f64>> {
+        let model = &self.model;
+        let mut out = vec![DVector::zeros(rows); candidates.len()];
+        let mut twists = Vec::new();
+        let mut head = usize::MAX;
+        let mut pose = crate::model::pose::Pose::identity();
+        for &(o, first, count) in blocks {
+            let observation = model.observations[o];
+            if observation.head != head {
+                head = observation.head;
+                pose = model.paths[head].effects(
+                    &model.problem,
+                    &work.cache,
+                    &self.values,
+                    sample,
+                    &mut twists,
+                );
+            }
+            let jacobian = residual(model, &self.values, head, observation.item, &pose);
+            for (k, candidate) in candidates.iter().enumerate() {
+                let twist = match &candidate.effect {
+                    Effect::Joints(parts) => parts
+                        .iter()
+                        .flat_map(|(edge, lateral, values)| {
+                            let which = lateral.map_or(0, |l| l + 1);
+                            twists
+                                .iter()
+                                .filter(move |(e, _)| e == edge)
+                                .map(move |(_, t)| t[which] * values[sample])
+                        })
+                        .sum::<Vector6<f64>>(),
+                    Effect::Drift(axis, values) => {
+                        let mut e = Vector3::zeros();
+                        e[*axis] = values[sample];
+                        let v = pose.r.tr_mul(&e);
+                        Vector6::new(0.0, 0.0, 0.0, v.x, v.y, v.z)
+                    }
+                };
+                for i in 0..count {
+                    out[k][first + i] = dot(&jacobian.m[i], &twist);
+                }
+            }
+        }
+        out
+    }
+}
+
+fn candidates(model: &Model) -> Vec<Candidate> {
+    let mut out = Vec::new();
+    let mut clocks = Vec::new();
+    let used: std::collections::BTreeSet<usize> = model
+        .paths
+        .iter()
+        .flat_map(|p| &p.steps)
+        .filter_map(|s| match s {
+            crate::model::path::Step::Joint { edge, .. } => Some(*edge),
+            _ => None,
+        })
+        .collect();
+    for e in used {
+        let EdgeKind::Joint(joint) = &model.problem.edges[e].kind else {
+            continue;
+        };
+        let name = &model.problem.edges[e].name;
+        let mut add = |kind: FeatureKind, label: String, values: Vec<f64>| {
+            out.push(Candidate {
+                name: label,
+                joint: Some(name.clone()),
+                physics: kind.physics(),
+                effect: Effect::Joints(vec![(e, kind.lateral(), values)]),
+            });
+        };
+        let modelled = |kind: FeatureKind| joint.features.iter().any(|f| f.kind == kind);
+        for kind in [
+            FeatureKind::Gain,
+            FeatureKind::EccentricityCos,
+            FeatureKind::EccentricitySin,
+        ] {
+            let revolute = matches!(joint.axis, crate::graph::edge::Axis::Revolute(_));
+            if modelled(kind) || (kind != FeatureKind::Gain && !revolute) {
+                continue;
+            }
+            let values = match kind {
+                FeatureKind::Gain => joint.q.clone(),
+                FeatureKind::EccentricityCos => joint.q.iter().map(|q| q.cos() - 1.0).collect(),
+                _ => joint.q.iter().map(|q| q.sin()).collect(),
+            };
+            add(kind, format!("{name}.{}", kind.label()), values);
+        }
+        for candidate in &joint.candidates {
+            if candidate.kind == FeatureKind::ClockOffset {
+                clocks.push((e, None, candidate.values.clone()));
+            } else {
+                add(
+                    candidate.kind,
+                    candidate.name.clone(),
+                    candidate.values.clone(),
+                );
+            }
+        }
+    }
+    if !clocks.is_empty() {
+        out.push(Candidate {
+            name: "clock_offset".to_owned(),
+            joint: None,
+            physics: FeatureKind::ClockOffset.physics(),
+            effect: Effect::Joints(clocks),
+        });
+    }
+    if let Some(times) = &model.problem.times {
+        let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
+        let centred: Vec<f64> = times.iter().map(|t| t - mean).collect();
+        for (axis, label) in ["x", "y", "z"].iter().enumerate() {
+            out.push(Candidate {
+                name: format!("drift.{label}"),
+                joint: None,
+                physics: "drift of tracker or base over time (temperature)",
+                effect: Effect::Drift(axis, centred.clone()),
+            });
+        }
+    }
+    out
+}

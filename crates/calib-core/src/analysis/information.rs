@@ -1,0 +1,253 @@
+//! What the data say about the parameters: the whitened Jacobian's triangular factor, its singular
+//! values, and the posterior covariance.
+//!
+//! ```text
+//! A = [V_s^(-½) J_s]_s · S = Q R,   R = U diag(d) Wᵀ,   S = diag(prior σ, or 1°, 1 cm, …)     (1)
+//! C = S (RᵀR + P)⁺ S,   P = S Λ S                                                             (2)
+//! ```
+//!
+//! R comes from QR block by block over the samples: JᵀWJ would lose every direction below 1e-8 of the
+//! strongest, and those are the ones that matter here.
+
+use nalgebra::{DMatrix, DVector};
+
+use calib_geometry::decompose;
+
+use crate::model::layout::{Model, Values};
+use crate::model::path::Derivatives;
+use crate::solve::normal::Workspace;
+
+/// A direction whose singular value is below this fraction of the largest is a gauge: rounding
+/// leaves about 1e-14, the weakest physical effect seen on real robots about 1e-6.
+pub const NULL_TOLERANCE: f64 = 1e-9;
+
+/// Upper-triangular factor, built up by appending rows (row-major n × n).
+#[derive(Debug, Clone)]
+pub(crate) struct StreamedQr {
+    n: usize,
+    r: Vec<f64>,
+    pending: Vec<f64>,
+    rows: usize,
+}
+
+impl StreamedQr {
+    pub(crate) fn new(n: usize) -> Self {
+        Self {
+            n,
+            r: vec![0.0; n * n],
+            pending: Vec::new(),
+            rows: 0,
+        }
+    }
+
+    pub(crate) fn append(&mut self, row: &[f64]) {
+        self.pending.extend_from_slice(row);
+        self.rows += 1;
+        // Blocks of a few n amortise the pass over R.
+        if self.rows >= 2 * self.n.max(8) {
+            self.reduce();
+        }
+    }
+
+    /// Householder reflections that fold the pending rows into R.
+    fn reduce(&mut self) {
+        let (n, m) = (self.n, self.rows);
+        let (r, b) = (&mut self.r, &mut self.pending);
+        let mut dots = vec![0.0; n];
+        for k in 0..n {
+            let mut tail = 0.0;
+            for i in 0..m {
+                tail += b[i * n + k] * b[i * n + k];
+            }
+            if tail == 0.0 {
+                continue;
+            }
+            let pivot = r[k * n + k];
+            let norm = pivot.hypot(tail.sqrt());
+            let alpha = if pivot > 0.0 { -norm } else { norm };
+            // v = [pivot − α; column], reflect every later column by I − 2vvᵀ/vᵀv.
+            let head = pivot - alpha;
+            let scale = 2.0 / (head * head + tail);
+            for c in k + 1..n {
+                dots[c] = head * r[k * n + c];
+            }
+            for i in 0..m {
+                let v = b[i * n + k];
+                if v != 0.0 {
+                    for (d, &x) in dots[k + 1..].iter_mut().zip(&b[i * n + k + 1..(i + 1) * n]) {
+                        *d += v * x;
+                    }
+                }
+            }
+            for c in k + 1..n {
+                dots[c] *= scale;
+                r[k * n + c] -= head * dots[c];
+            }
+            r[k * n + k] = alpha;
+            for i in 0..m {
+                let v = b[i * n + k];
+                if v != 0.0 {
+                    b[i * n + k] = 0.0;
+                    for (x, &d) in b[i * n + k + 1..(i + 1) * n].iter_mut().zip(&dots[k + 1..]) {
+                        *x -= v * d;
+                    }
+                }
+            }
+        }
+        self.pending.clear();
+        self.rows = 0;
+    }
+
+    /// R, n × n upper triangular.
+    pub(crate) fn finish(mut self) -> DMatrix<f64> {
+        self.reduce();
+        DMatrix::from_row_slice(self.n, self.n, &self.r)
+    }
+}
+
+/// Spectrum and covariance at a solution.
+#[derive(Debug, Clone)]
+pub struct Information {
+    /// S of equation (1): one length unit per free parameter.
+    pub scale: DVector<f64>,
+    /// d of equation (1), descending: how many σ of the data one prior σ along each direction is.
+    pub singular_values: DVector<f64>,
+    /// W of equation (1): columns are directions in units of `scale`, in the order of `singular_values`.
+    pub directions: DMatrix<f64>,
+    /// How many directions the data see at all.
+    pub rank: usize,
+    /// C of equation (2), with prior; directions that neither data nor prior see count as 0 here and
+    /// are listed in `indeterminate`.
+    pub covariance: DMatrix<f64>,
+    /// Unit directions (in units of `scale`) that neither data nor prior determine.
+    pub indeterminate: DMatrix<f64>,
+    pub(crate) r: DMatrix<f64>,
+}
+
+impl Information {
+    /// Equations (1) and (2) at `values`; `None` when the model cannot be evaluated there.
+    #[must_use]
+    pub fn at(model: &Model, values: &Values, weights: &[f64], theta: &[f64]) -> Option<Self> {
+        let n = model.free();
+        let mut work = Workspace::new(model);
+        work.cache.update(&model.problem, values);
+        let mut qr = StreamedQr::new(n);
+        let scale = DVector::from_iterator(
+            n,
+            model
+                .columns
+                .iter()
+                .map(|&p| model.problem.parameters[p].scale()),
+        );
+        let rows = &mut work.rows;
+        let mut scaled = vec![0.0; n];
+        for sample in 0..model.problem.samples {
+            if model.of_sample[sample].is_empty() {
+                continue;
+            }
+            rows.fill(
+                model,
+                &work.cache,
+                values,
+                weights,
+                sample,
+                Derivatives::All,
+            );
+            rows.covariance(model, weights, theta);
+            rows.factor()?;
+            rows.whiten(true);
+            for i in 0..rows.m {
+                for c in 0..n {
+                    scaled[c] = rows.j[i * n + c] * scale[c];
+                }
+                qr.append(&scaled);
+            }
+        }
+        let r = qr.finish();
+        if !r.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        Some(Self::from_factor(model, scale, r))
+    }
+
+    fn from_factor(model: &Model, scale: DVector<f64>, r: DMatrix<f64>) -> Self {
+        let n = scale.len();
+        let svd = decompose::svd(&r);
+        let rank = decompose::rank(&svd.s, NULL_TOLERANCE);
+        // [R; P^½]
+        let priors: Vec<(usize, f64)> = model
+            .columns
+            .iter()
+            .enumerate()
+            .filter_map(|(c, &p)| {
+                let sigma = model.problem.parameters[p].prior_sigma?;
+                Some((c, scale[c] / sigma))
+            })
+            .collect();
+        let mut augmented = DMatrix::zeros(n + priors.len(), n);
+        augmented.view_mut((0, 0), (n, n)).copy_from(&r);
+        for (i, &(c, weight)) in priors.iter().enumerate() {
+            augmented[(n + i, c)] = weight;
+        }
+        let posterior = if priors.is_empty() {
+            svd.clone()
+        } else {
+            decompose::svd(&augmented)
+        };
+        let known = decompose::rank(&posterior.s, NULL_TOLERANCE * 1e-3);
+        let known = if priors.is_empty() { rank } else { known };
+        // C = S W d⁻² Wᵀ S
+        let mut half = posterior.v.columns(0, known).into_owned();
+        for i in 0..known {
+            half.column_mut(i).unscale_mut(posterior.s[i]);
+        }
+        for c in 0..n {
+            half.row_mut(c).scale_mut(scale[c]);
+        }
+        let covariance = &half * half.transpose();
+        Self {
+            scale,
+            singular_values: svd.s,
+            directions: svd.v,
+            rank,
+            covariance,
+            indeterminate: posterior.v.columns(known, n - known).into_owned(),
+            r,
+        }
+    }
+
+    /// Directions that the data do not see at all, columns in units of `scale`.
+    #[must_use]
+    pub fn null_space(&self) -> DMatrix<f64> {
+        let n = self.scale.len();
+        self.directions
+            .columns(self.rank, n - self.rank)
+            .into_owned()
+    }
+
+    /// Posterior σ of a free parameter; `None` where nothing determines it.
+    #[must_use]
+    pub fn sigma(&self, column: usize) -> Option<f64> {
+        let leak = self.indeterminate.row(column).norm();
+        (leak < INDETERMINATE).then(|| self.covariance[(column, column)].max(0.0).sqrt())
+    }
+
+    /// Posterior σ along singular direction i, in units of `scale`: `√(w_iᵀ S⁻¹ C S⁻¹ w_i)`.
+    #[must_use]
+    pub fn posterior_along(&self, i: usize) -> f64 {
+        let w = self.directions.column(i).component_div(&self.scale);
+        (&self.covariance * &w).dot(&w).max(0.0).sqrt()
+    }
+
+    /// Largest share of a unit null direction in this column: 0 when the data alone determine it.
+    #[must_use]
+    pub fn null_share(&self, column: usize) -> f64 {
+        let n = self.scale.len();
+        self.directions
+            .view((column, self.rank), (1, n - self.rank))
+            .norm()
+    }
+}
+
+/// A component of a unit null vector under this is rounding.
+pub(crate) const INDETERMINATE: f64 = 1e-5;

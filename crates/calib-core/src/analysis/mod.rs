@@ -1,0 +1,10 @@
+//! What a minimum means: covariance, observability, goodness of fit, prediction of new poses.
+
+pub(crate) mod closure;
+pub(crate) mod compare;
+pub(crate) mod folds;
+pub(crate) mod goodness;
+pub(crate) mod information;
+pub(crate) mod observability;
+pub(crate) mod solution;
+pub(crate) mod validate;

@@ -1,0 +1,255 @@
+//! Prediction errors: each sample left out in turn without refitting, and samples held out.
+//!
+//! ```text
+//! left out:   e₋ = L (I − Q)⁻¹ w,      Cov(e₋) = L (I − Q)⁻¹ Lᵀ,    Q = A C Aᵀ               (1)
+//! held out:   e = predicted ⊟ observed, Cov(e) = V + J C Jᵀ                                 (2)
+//! z² = eᵀ Cov⁻¹ e  ~  χ²(rows)                                                             (3)
+//! ```
+//!
+//! Equation (1) is exact for a linear model and equals refits to second order in the residuals otherwise.
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use crate::analysis::solution::Solution;
+use crate::graph::head::HeadKind;
+use crate::model::layout::Model;
+use crate::solve::noise::{covariance_of, whitened};
+use crate::solve::normal::{NormalEquations, Workspace, accumulate};
+
+/// Prediction of one sample from the others.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SamplePrediction {
+    /// Sample.
+    pub sample: usize,
+    /// Every predicted vector.
+    pub vectors: Vec<VectorError>,
+    /// z² of equation (3) over the whole sample.
+    pub z2: f64,
+    /// Its degrees of freedom.
+    pub rows: usize,
+    /// Logarithm of the predictive density of the sample.
+    pub log_density: f64,
+}
+
+/// One predicted vector.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct VectorError {
+    /// Head.
+    pub head: String,
+    /// Index within the head.
+    pub item: usize,
+    /// Norm of the position part, m (`None` for heads without one).
+    pub position: Option<f64>,
+    /// Norm of the rotation part, rad.
+    pub rotation: Option<f64>,
+    /// Predicted ⊟ observed, in the order of the head's rows.
+    pub error: Vec<f64>,
+    /// √(eᵀ Cov⁻¹ e) of this vector alone.
+    pub z: f64,
+}
+
+/// Mean, rms, 95 % and largest of a set of error norms.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct ErrorSummary {
+    /// How many.
+    pub n: usize,
+    /// Mean.
+    pub mean: f64,
+    /// Root mean square.
+    pub rms: f64,
+    /// 95 % of the errors are at most this.
+    pub p95: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+impl ErrorSummary {
+    /// Summary of norms; all zero when there are none.
+    #[must_use]
+    pub fn of(norms: &[f64]) -> Self {
+        if norms.is_empty() {
+            return Self::default();
+        }
+        let mut sorted = norms.to_vec();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let n = sorted.len();
+        let rank = (0.95 * n as f64).ceil() as usize;
+        Self {
+            n,
+            mean: sorted.iter().sum::<f64>() / n as f64,
+            rms: (sorted.iter().map(|x| x * x).sum::<f64>() / n as f64).sqrt(),
+            p95: sorted[rank.clamp(1, n) - 1],
+            max: sorted[n - 1],
+        }
+    }
+
+    /// Summary of the position errors of predictions.
+    #[must_use]
+    pub fn positions(predictions: &[SamplePrediction]) -> Self {
+        let norms: Vec<f64> = predictions
+            .iter()
+            .flat_map(|p| &p.vectors)
+            .filter_map(|v| v.position)
+            .collect();
+        Self::of(&norms)
+    }
+}
+
+/// Predictions of all samples that could be predicted, and those that could not.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct CrossValidation {
+    /// One per sample.
+    pub samples: Vec<SamplePrediction>,
+    /// Samples without which some parameter would be undetermined.
+    pub indispensable: Vec<usize>,
+}
+
+/// An eigenvalue of I − Q below this means the sample alone determines something.
+const LEVERAGE_LEFT: f64 = 1e-9;
+
+impl Solution {
+    /// Leave-one-sample-out by equation (1). `None` when the model cannot be evaluated.
+    #[must_use]
+    pub fn leave_one_out(&self) -> Option<CrossValidation> {
+        self.each_prediction(&self.weights, true)
+    }
+
+    /// Predictions of the held-out samples by equation (2), whatever their weight in the fit was.
+    #[must_use]
+    pub fn held_out(&self) -> Option<CrossValidation> {
+        let held: Vec<f64> = self
+            .model
+            .observations
+            .iter()
+            .map(|o| f64::from(u8::from(self.model.is_held_out(o.sample))))
+            .collect();
+        self.each_prediction(&held, false)
+    }
+
+    /// Residuals `predicted ⊟ observed` of every observation at the solution, used, rejected and held out
+    /// alike, as (sample, vector); `z` counts measurement noise only. `None` when the model cannot be
+    /// evaluated.
+    #[must_use]
+    pub fn residuals(&self) -> Option<Vec<(usize, VectorError)>> {
+        let model = &self.model;
+        let mut work = Workspace::new(model);
+        work.cache.update(&model.problem, &self.values);
+        let everything = vec![1.0; model.observations.len()];
+        let mut out = Vec::new();
+        for sample in 0..model.problem.samples {
+            let Some(s) = whitened(
+                model,
+                &self.values,
+                &everything,
+                &self.theta,
+                sample,
+                &mut work,
+            ) else {
+                continue;
+            };
+            let e = &s.l * &s.w;
+            let v = &s.l * s.l.transpose();
+            for &(o, first, rows) in &s.blocks {
+                out.push((sample, vector_error(model, o, first, rows, &e, &v)));
+            }
+        }
+        Some(out)
+    }
+
+    fn each_prediction(&self, include: &[f64], left_out: bool) -> Option<CrossValidation> {
+        let model = &self.model;
+        let mut work = Workspace::new(model);
+        let mut system = NormalEquations::new(model.free());
+        if !accumulate(
+            model,
+            &self.values,
+            &self.weights,
+            &self.theta,
+            &mut work,
+            &mut system,
+        ) {
+            return None;
+        }
+        let c = covariance_of(&system)?;
+        let mut out = CrossValidation::default();
+        for sample in 0..model.problem.samples {
+            let Some(s) = whitened(model, &self.values, include, &self.theta, sample, &mut work)
+            else {
+                continue;
+            };
+            let m = s.w.len();
+            let q = &s.a * &c * s.a.transpose();
+            // Covariance of the whitened prediction error and the error itself.
+            let (error, covariance) = if left_out {
+                let eigen =
+                    calib_geometry::decompose::symmetric_eigen(&(DMatrix::identity(m, m) - q));
+                if eigen.values[0] < LEVERAGE_LEFT {
+                    out.indispensable.push(sample);
+                    continue;
+                }
+                let mut scaled = eigen.vectors.clone();
+                for k in 0..m {
+                    scaled.column_mut(k).unscale_mut(eigen.values[k]);
+                }
+                let inverse = scaled * eigen.vectors.transpose();
+                (&inverse * &s.w, inverse)
+            } else {
+                (s.w.clone(), DMatrix::identity(m, m) + q)
+            };
+            let Some(cholesky) = nalgebra::Cholesky::new(covariance.clone()) else {
+                out.indispensable.push(sample);
+                continue;
+            };
+            let half = cholesky.l().solve_lower_triangular(&error)?;
+            let z2 = half.norm_squared();
+            let log_det = s.log_det + 2.0 * cholesky.l().diagonal().map(f64::ln).sum();
+            let e = &s.l * &error;
+            let full = &s.l * covariance * s.l.transpose();
+            out.samples.push(SamplePrediction {
+                sample,
+                vectors: s
+                    .blocks
+                    .iter()
+                    .map(|&(o, first, rows)| vector_error(model, o, first, rows, &e, &full))
+                    .collect(),
+                z2,
+                rows: m,
+                log_density: -0.5 * (z2 + log_det + m as f64 * (2.0 * std::f64::consts::PI).ln()),
+            });
+        }
+        Some(out)
+    }
+}
+
+fn vector_error(
+    model: &Model,
+    observation: usize,
+    first: usize,
+    rows: usize,
+    e: &DVector<f64>,
+    covariance: &DMatrix<f64>,
+) -> VectorError {
+    let o = model.observations[observation];
+    let head = &model.problem.heads[o.head];
+    let error = e.rows(first, rows).into_owned();
+    let block = covariance.view((first, first), (rows, rows)).into_owned();
+    let z = nalgebra::Cholesky::new(block)
+        .and_then(|c| c.l().solve_lower_triangular(&error))
+        .map_or(f64::INFINITY, |y| y.norm());
+    let (rotation, position) = match &head.kind {
+        HeadKind::Poses { .. } | HeadKind::Loop { .. } => {
+            (Some(error.rows(0, 3).norm()), Some(error.rows(3, 3).norm()))
+        }
+        HeadKind::Directions { .. } => (Some(error.norm()), None),
+        _ => (None, Some(error.norm())),
+    };
+    VectorError {
+        head: head.name.clone(),
+        item: o.item,
+        position,
+        rotation,
+        error: error.as_slice().to_vec(),
+        z,
+    }
+}

@@ -1,0 +1,218 @@
+//! Everything that can be wrong with a problem before paths are known: lengths, finite numbers, positive
+//! noise, unique names, frames of points.
+
+use std::collections::BTreeSet;
+
+use nalgebra::Isometry3;
+
+use crate::graph::edge::EdgeKind;
+use crate::graph::error::Error;
+use crate::graph::head::{HeadKind, PoseNoise};
+use crate::graph::problem::Problem;
+use crate::model::layout::covariance_directions;
+
+/// Everything that can be wrong before paths are known.
+pub(crate) fn check(problem: &Problem) -> Result<(), Error> {
+    let length = |what: &str, found: usize| {
+        if found == problem.samples {
+            Ok(())
+        } else {
+            Err(Error::Length {
+                what: what.to_owned(),
+                found,
+                expected: problem.samples,
+            })
+        }
+    };
+    let finite = |what: &str, values: &[f64]| match values.iter().position(|v| !v.is_finite()) {
+        Some(sample) => Err(Error::NotFinite {
+            what: what.to_owned(),
+            sample,
+        }),
+        None => Ok(()),
+    };
+    let pose = |what: &str, sample: usize, x: &Isometry3<f64>| {
+        if x.translation.vector.iter().all(|v| v.is_finite())
+            && x.rotation.coords.iter().all(|v| v.is_finite())
+        {
+            Ok(())
+        } else {
+            Err(Error::NotFinite {
+                what: what.to_owned(),
+                sample,
+            })
+        }
+    };
+    for edge in &problem.edges {
+        match &edge.kind {
+            EdgeKind::Known(x) => pose(&edge.name, 0, x)?,
+            EdgeKind::Unknown(u) => pose(&edge.name, 0, &u.nominal)?,
+            EdgeKind::Measured { poses, covariance } => {
+                length(&edge.name, poses.len())?;
+                for (s, x) in poses.iter().enumerate() {
+                    if let Some(x) = x {
+                        pose(&edge.name, s, x)?;
+                    }
+                }
+                if let Some(c) = covariance
+                    && covariance_directions(c).is_none()
+                {
+                    return Err(Error::NotPositive {
+                        what: format!("{} covariance", edge.name),
+                        value: c.determinant(),
+                    });
+                }
+            }
+            EdgeKind::Joint(joint) => {
+                length(&edge.name, joint.q.len())?;
+                finite(&edge.name, &joint.q)?;
+                for f in &joint.features {
+                    if let Some(v) = &f.values {
+                        let what = format!("{}.{}", edge.name, f.kind.label());
+                        length(&what, v.len())?;
+                        finite(&what, v)?;
+                    }
+                }
+                for c in &joint.candidates {
+                    length(&c.name, c.values.len())?;
+                    finite(&c.name, &c.values)?;
+                }
+            }
+            EdgeKind::Random { directions, .. } => {
+                for d in directions {
+                    finite(&edge.name, d.as_slice())?;
+                }
+            }
+        }
+    }
+    let mut names = BTreeSet::new();
+    for p in &problem.parameters {
+        if !names.insert(p.name.as_str()) {
+            return Err(Error::DuplicateName {
+                name: p.name.clone(),
+            });
+        }
+        finite(&p.name, &[p.nominal, p.start])?;
+        if let Some(sigma) = p.prior_sigma {
+            positive(&format!("{} prior", p.name), sigma)?;
+        }
+        if let Some((lower, upper)) = p.bounds
+            && !(lower <= p.start && p.start <= upper)
+        {
+            return Err(Error::OutOfBounds {
+                name: p.name.clone(),
+                start: p.start,
+                lower,
+                upper,
+            });
+        }
+    }
+    for g in &problem.groups {
+        positive(&g.name, g.sigma)?;
+    }
+    if let Some(t) = &problem.times {
+        length("times", t.len())?;
+        finite("times", t)?;
+    }
+    for head in &problem.heads {
+        for sample in head.kind.samples() {
+            if sample >= problem.samples {
+                return Err(Error::NoSuchSample {
+                    what: head.name.clone(),
+                    sample,
+                    samples: problem.samples,
+                });
+            }
+        }
+        let at_frame = |point: crate::graph::ids::PointId| {
+            let p = &problem.points[point.index()];
+            if p.frame == head.to {
+                Ok(())
+            } else {
+                Err(Error::PointFrame {
+                    head: head.name.clone(),
+                    point: p.name.clone(),
+                    found: problem.frame_name(p.frame).to_owned(),
+                    expected: problem.frame_name(head.to).to_owned(),
+                })
+            }
+        };
+        match &head.kind {
+            HeadKind::Markers { observations, .. } => {
+                for o in observations {
+                    at_frame(o.point)?;
+                    if !o.position.iter().all(|v| v.is_finite()) {
+                        return Err(Error::NotFinite {
+                            what: head.name.clone(),
+                            sample: o.sample,
+                        });
+                    }
+                    if let Some(shape) = o.shape
+                        && nalgebra::Cholesky::new(shape).is_none()
+                    {
+                        return Err(Error::NotPositive {
+                            what: format!("{} covariance", head.name),
+                            value: shape.determinant(),
+                        });
+                    }
+                }
+            }
+            HeadKind::Poses {
+                observations,
+                noise,
+            } => {
+                for o in observations {
+                    pose(&head.name, o.sample, &o.pose)?;
+                }
+                check_noise(&head.name, noise)?;
+            }
+            HeadKind::Loop { noise, .. } => check_noise(&head.name, noise)?,
+            HeadKind::Plane {
+                point,
+                observations,
+                ..
+            }
+            | HeadKind::Distance {
+                point,
+                observations,
+                ..
+            } => {
+                at_frame(*point)?;
+                for &(s, h) in observations {
+                    if !h.is_finite() {
+                        return Err(Error::NotFinite {
+                            what: head.name.clone(),
+                            sample: s,
+                        });
+                    }
+                }
+            }
+            HeadKind::Line { point, .. } => at_frame(*point)?,
+            HeadKind::Directions { .. } => {}
+        }
+    }
+    Ok(())
+}
+
+fn check_noise(head: &str, noise: &PoseNoise) -> Result<(), Error> {
+    if let PoseNoise::Full { shape, .. } = noise
+        && nalgebra::Cholesky::new(*shape).is_none()
+    {
+        return Err(Error::NotPositive {
+            what: format!("{head} covariance"),
+            value: shape.determinant(),
+        });
+    }
+    Ok(())
+}
+
+fn positive(what: &str, value: f64) -> Result<(), Error> {
+    if value > 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(Error::NotPositive {
+            what: what.to_owned(),
+            value,
+        })
+    }
+}

@@ -1,0 +1,11 @@
+//! The statement of a problem: frames, edges, unknowns, measurements and their noise.
+
+pub(crate) mod baseline;
+pub(crate) mod chart;
+pub(crate) mod check;
+pub(crate) mod edge;
+pub(crate) mod error;
+pub(crate) mod head;
+pub(crate) mod ids;
+pub(crate) mod parameter;
+pub(crate) mod problem;

@@ -1,0 +1,300 @@
+//! Quantities that follow from the parameters, with the uncertainty they inherit.
+//!
+//! ```text
+//! T(q; x ⊞ δ) = T · exp(F δ),   Cov(T) = F C Fᵀ   ([ω; v] of the child)                     (1)
+//! estimable  ⇔  F n = 0 for every direction n that the data do not see                       (2)
+//! ```
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Point3};
+
+use calib_geometry::{Twist, so3};
+
+use crate::analysis::solution::Solution;
+use crate::graph::edge::{EdgeKind, FeatureKind};
+use crate::graph::error::Error;
+use crate::graph::ids::{EdgeId, FrameId};
+use crate::model::layout::EdgeCache;
+use crate::model::path::{CompiledPath, Derivatives, PathBuffer, Step};
+
+/// Joint readings (rad, m) and regressors of effects at which something is predicted. What is not
+/// given is 0; gain and eccentricity follow from the reading.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Configuration {
+    /// Reading per joint edge.
+    pub q: BTreeMap<EdgeId, f64>,
+    /// Torque, velocity, approach direction, … per joint edge and effect.
+    pub regressors: BTreeMap<(EdgeId, FeatureKind), f64>,
+}
+
+impl Configuration {
+    /// All joints at 0.
+    #[must_use]
+    pub fn zero() -> Self {
+        Self::default()
+    }
+
+    /// With the reading of one joint set.
+    #[must_use]
+    pub fn with(mut self, joint: EdgeId, q: f64) -> Self {
+        self.q.insert(joint, q);
+        self
+    }
+}
+
+/// A pose between two frames of the solved graph.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DerivedPose {
+    /// `from_from_to`.
+    pub pose: Isometry3<f64>,
+    /// 6×6 in `[ω; v]` of `to` (parameters only, no measurement noise); `None` when a direction is
+    /// determined by nothing.
+    pub covariance: Option<Matrix6<f64>>,
+    /// The data determine all six directions; if not, what is known of `unobservable` is prior.
+    pub estimable: bool,
+    /// Unit twists of `to` (rotation in rad against m as they are) that the data do not see.
+    pub unobservable: Vec<Twist>,
+}
+
+/// A point of one frame seen from another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DerivedPoint {
+    /// In `from`, m.
+    pub position: Point3<f64>,
+    /// 3×3 in `from`, m².
+    pub covariance: Option<Matrix3<f64>>,
+    /// The data determine all three coordinates.
+    pub estimable: bool,
+}
+
+/// F n below this (rad, m, for n of one prior σ) is rounding: prior σ are about 1e-2, null vectors
+/// are accurate to about 1e-9.
+const ESTIMABLE: f64 = 1e-8;
+
+impl Solution {
+    /// Pose of `to` in `from` at a configuration, with covariance.
+    ///
+    /// # Errors
+    /// [`Error::NoPath`], or [`Error::PerSample`] when a measured edge lies between.
+    pub fn relative_pose(
+        &self,
+        from: FrameId,
+        to: FrameId,
+        at: &Configuration,
+    ) -> Result<DerivedPose, Error> {
+        let (pose, path, buffer) = self.evaluate(from, to, at)?;
+        let f = self.expand(&path, &buffer);
+        let covariance = self.inherit(&f).map(|c| {
+            let c = Matrix6::from_iterator(c.iter().copied());
+            crate::solve::rows::symmetric(&c)
+        });
+        let unseen = self.unseen(&f);
+        let unobservable: Vec<Twist> = unseen
+            .column_iter()
+            .map(|c| {
+                Twist::new(
+                    nalgebra::Vector3::new(c[0], c[1], c[2]),
+                    nalgebra::Vector3::new(c[3], c[4], c[5]),
+                )
+            })
+            .collect();
+        Ok(DerivedPose {
+            pose: pose.isometry(),
+            covariance,
+            estimable: unobservable.is_empty(),
+            unobservable,
+        })
+    }
+
+    /// A point given in `to`, as seen from `from`, at a configuration.
+    ///
+    /// # Errors
+    /// As [`Solution::relative_pose`].
+    pub fn predict_point(
+        &self,
+        from: FrameId,
+        to: FrameId,
+        point: &Point3<f64>,
+        at: &Configuration,
+    ) -> Result<DerivedPoint, Error> {
+        let (pose, path, buffer) = self.evaluate(from, to, at)?;
+        let f = self.expand(&path, &buffer);
+        let f = point_rows(&pose, point) * f;
+        Ok(DerivedPoint {
+            position: Point3::from(pose.r * point.coords + pose.t),
+            covariance: self
+                .inherit(&f)
+                .map(|c| Matrix3::from_iterator(c.iter().copied())),
+            estimable: self.unseen(&f).ncols() == 0,
+        })
+    }
+
+    /// Pose of `to` in `from` at a recorded sample, with that sample's readings, regressors and measured
+    /// edges (a measured edge that was lost counts as identity).
+    ///
+    /// # Errors
+    /// [`Error::NoPath`].
+    pub fn pose_at_sample(
+        &self,
+        from: FrameId,
+        to: FrameId,
+        sample: usize,
+    ) -> Result<Isometry3<f64>, Error> {
+        if sample >= self.model.problem.samples {
+            return Err(Error::NoSuchSample {
+                what: "pose at sample".to_owned(),
+                sample,
+                samples: self.model.problem.samples,
+            });
+        }
+        let path = self.model.compile_between(from, to, &self.values)?;
+        let mut cache = EdgeCache::new(&self.model.problem, self.model.trig.clone());
+        cache.update(&self.model.problem, &self.values);
+        let mut buffer = path.buffer();
+        Ok(path
+            .evaluate(
+                &self.model.problem,
+                &cache,
+                &self.values,
+                sample,
+                Derivatives::None,
+                &mut buffer,
+            )
+            .isometry())
+    }
+
+    /// What each weak direction ([`Observability::weak`](crate::Observability::weak), same order) costs at
+    /// a point of `to`: σ of its position in `from`, m, if that direction alone were uncertain.
+    ///
+    /// # Errors
+    /// As [`Solution::relative_pose`].
+    pub fn weak_at_point(
+        &self,
+        from: FrameId,
+        to: FrameId,
+        point: &Point3<f64>,
+        at: &Configuration,
+    ) -> Result<Vec<f64>, Error> {
+        let (pose, path, buffer) = self.evaluate(from, to, at)?;
+        let f = self.scaled(&(point_rows(&pose, point) * self.expand(&path, &buffer)));
+        let first = self.information.rank - self.observability.weak.len();
+        Ok((first..self.information.rank)
+            .map(|i| {
+                let moved = &f * self.information.directions.column(i);
+                let prior = &self.information;
+                // Posterior σ along the direction in units of its scale: data and prior together.
+                moved.norm() * prior.posterior_along(i)
+            })
+            .collect())
+    }
+
+    /// The compiled path and its derivatives at a configuration.
+    fn evaluate(
+        &self,
+        from: FrameId,
+        to: FrameId,
+        at: &Configuration,
+    ) -> Result<(crate::model::pose::Pose, CompiledPath, PathBuffer), Error> {
+        let path = self.model.compile_between(from, to, &self.values)?;
+        let mut problem = crate::graph::problem::Problem::new(1);
+        problem.edges = self
+            .model
+            .problem
+            .edges
+            .iter()
+            .enumerate()
+            .map(|(e, edge)| at_configuration(EdgeId::of(e), edge, at))
+            .collect();
+        for step in &path.steps {
+            if let Step::Measured { edge, .. } = step {
+                return Err(Error::PerSample {
+                    edge: problem.edges[*edge].name.clone(),
+                });
+            }
+        }
+        let mut cache = EdgeCache::new(&problem, std::sync::Arc::default());
+        cache.update(&problem, &self.values);
+        let mut buffer = path.buffer();
+        let pose = path.evaluate(
+            &problem,
+            &cache,
+            &self.values,
+            0,
+            Derivatives::All,
+            &mut buffer,
+        );
+        Ok((pose, path, buffer))
+    }
+
+    /// 6 × n from the path's local columns.
+    fn expand(&self, path: &CompiledPath, buffer: &PathBuffer) -> DMatrix<f64> {
+        let mut f = DMatrix::zeros(6, self.model.free());
+        for (&c, twist) in path.columns.iter().zip(&buffer.columns) {
+            f.column_mut(c).copy_from(twist);
+        }
+        f
+    }
+
+    /// F C Fᵀ, unless F feels a direction that nothing determines.
+    pub(crate) fn inherit(&self, f: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let leak = self.scaled(f) * &self.information.indeterminate;
+        if leak.amax() > ESTIMABLE {
+            return None;
+        }
+        Some(f * &self.information.covariance * f.transpose())
+    }
+
+    /// Orthonormal basis of the directions of F's image that only the prior fixes.
+    pub(crate) fn unseen(&self, f: &DMatrix<f64>) -> DMatrix<f64> {
+        let image = self.scaled(f) * self.information.null_space();
+        if image.ncols() == 0 {
+            return DMatrix::zeros(f.nrows(), 0);
+        }
+        let svd = calib_geometry::decompose::svd(&image);
+        let seen = svd.s.iter().filter(|&&s| s > ESTIMABLE).count();
+        svd.u.columns(0, seen).into_owned()
+    }
+
+    fn scaled(&self, f: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut f = f.clone();
+        for (c, s) in self.information.scale.iter().enumerate() {
+            f.column_mut(c).scale_mut(*s);
+        }
+        f
+    }
+}
+
+/// ∂(R p + t) = R (−[p]ₓ ω + v), 3 × 6
+fn point_rows(pose: &crate::model::pose::Pose, point: &Point3<f64>) -> DMatrix<f64> {
+    let mut a = DMatrix::zeros(3, 6);
+    a.view_mut((0, 0), (3, 3))
+        .copy_from(&(-(pose.r * so3::skew(&point.coords))));
+    a.view_mut((0, 3), (3, 3)).copy_from(&pose.r);
+    a
+}
+
+/// The edge with its per-sample arrays cut to the one configuration.
+fn at_configuration(
+    id: EdgeId,
+    edge: &crate::graph::edge::Edge,
+    at: &Configuration,
+) -> crate::graph::edge::Edge {
+    let mut edge = edge.clone_shallow();
+    if let EdgeKind::Joint(joint) = &mut edge.kind {
+        let q = at.q.get(&id).copied().unwrap_or(0.0);
+        joint.q = vec![q];
+        for f in &mut joint.features {
+            if f.values.is_some() {
+                let value = match f.kind {
+                    FeatureKind::Gain => q,
+                    FeatureKind::EccentricityCos => q.cos() - 1.0,
+                    FeatureKind::EccentricitySin => q.sin(),
+                    kind => at.regressors.get(&(id, kind)).copied().unwrap_or(0.0),
+                };
+                f.values = Some(vec![value]);
+            }
+        }
+    }
+    edge
+}

@@ -1,0 +1,7 @@
+//! A stated problem compiled: which unknown stands where, and the pose of one frame in another at given values.
+
+pub(crate) mod derived;
+pub(crate) mod layout;
+pub(crate) mod null_space;
+pub(crate) mod path;
+pub(crate) mod pose;

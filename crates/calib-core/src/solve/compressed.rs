@@ -1,0 +1,493 @@
+//! The fast way to the normal equations where samples have no random effects: all markers of one body at
+//! one pose become a 6×6 matrix and a 6-vector.
+//!
+//! ```text
+//! G_m = [−[p_m]ₓ, I],   e_m = p_m − Rᵀ(y_m − t)   (body axes; isotropic noise does not mind)
+//! W = Σ_m w_m G_mᵀG_m = Σ_m w_m [ |p|²I − ppᵀ, [p]ₓ ; −[p]ₓ, I ],   b = Σ_m w_m [ p×e ; e ]          (1)
+//! H += JᵀWJ,   g += Jᵀb,   J: 6 × k body twist of the path                                         (2)
+//! ```
+//!
+//! A marker of unknown position adds its own 3 columns: `JᵀG_mᵀ w`, `w I`, `w e`. The result equals the
+//! general way to rounding (a test holds both to it).
+
+use nalgebra::{DMatrix, Dyn, Matrix6, MatrixView, Vector3, Vector6};
+
+use crate::graph::head::HeadKind;
+use crate::model::layout::{Model, Values};
+use crate::model::path::Derivatives;
+use crate::solve::normal::{NormalEquations, Workspace};
+use crate::solve::rows::{add_block, residual};
+
+/// Rows gathered before one matrix product: 64 to 96 rows fill the cache lines of the product's kernel.
+const PANEL: usize = 96;
+
+/// H and g over some columns, and their share of the cost.
+pub(crate) struct Local {
+    k: usize,
+    /// k × k.
+    pub h: DMatrix<f64>,
+    pub g: Vec<f64>,
+    /// k × PANEL: whitened rows of J waiting to be multiplied, one per column.
+    panel: DMatrix<f64>,
+    filled: usize,
+    cost: f64,
+}
+
+impl Local {
+    /// Space for k columns; never more than `most` rows are asked for at once.
+    pub(crate) fn new(k: usize, most: usize) -> Self {
+        let panel = PANEL.max(most);
+        Self {
+            k,
+            h: DMatrix::zeros(k, k),
+            g: vec![0.0; k],
+            panel: DMatrix::zeros(k, panel),
+            filled: 0,
+            cost: 0.0,
+        }
+    }
+
+    /// Space for `m` further rows, each k long, one after the other.
+    pub(crate) fn rows(&mut self, m: usize) -> &mut [f64] {
+        if self.filled + m > self.panel.ncols() {
+            self.multiply();
+        }
+        let start = self.filled * self.k;
+        self.filled += m;
+        &mut self.panel.as_mut_slice()[start..start + m * self.k]
+    }
+
+    /// H += Σ rowᵀ row
+    pub(crate) fn multiply(&mut self) {
+        if self.filled == 0 || self.k == 0 {
+            self.filled = 0;
+            return;
+        }
+        let rows = self.panel.columns(0, self.filled);
+        // The same numbers read along the other way: row stride k, column stride 1.
+        let transposed = MatrixView::<_, _, _, Dyn, Dyn>::from_slice_with_strides_generic(
+            &self.panel.as_slice()[..self.k * self.filled],
+            Dyn(self.filled),
+            Dyn(self.k),
+            Dyn(self.k),
+            Dyn(1),
+        );
+        self.h.gemm(1.0, &rows, &transposed, 1.0);
+        self.filled = 0;
+    }
+}
+
+/// Sum of w Jᵀ over the samples, per point of a body (transposed coupling of pose and point).
+struct PointSums {
+    point: usize,
+    columns: [Option<usize>; 3],
+    /// Σ w J, 6 × k by columns.
+    coupling: Vec<Vector6<f64>>,
+    weight: f64,
+    gradient: Vector3<f64>,
+}
+
+/// Adds the data's share of H, g and cost to `out`; the caller clears it and adds the prior.
+pub(crate) fn accumulate_compressed(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+    out: &mut NormalEquations,
+) -> bool {
+    for head in 0..model.problem.heads.len() {
+        let k = model.paths[head].columns.len();
+        let mut local = Local::new(k, 6);
+        let isotropic = match &model.problem.heads[head].kind {
+            HeadKind::Markers { observations, .. } => {
+                observations.iter().all(|o| o.shape.is_none())
+            }
+            _ => false,
+        };
+        let fine = if isotropic {
+            markers(model, values, weights, theta, head, work, &mut local, out)
+        } else {
+            general(model, values, weights, theta, head, work, &mut local, out)
+        };
+        if !fine {
+            return false;
+        }
+        local.multiply();
+        let columns = &model.paths[head].columns;
+        let n = out.n;
+        for a in 0..k {
+            out.g[columns[a]] += local.g[a];
+            for b in a..k {
+                let (i, j) = (columns[a].min(columns[b]), columns[a].max(columns[b]));
+                out.h[i * n + j] += local.h[(a, b)];
+            }
+        }
+        out.data += local.cost;
+    }
+    out.data.is_finite()
+}
+
+#[expect(
+    clippy::too_many_arguments,
+    reason = "one pass over one head with everything it needs"
+)]
+fn markers(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    head: usize,
+    work: &mut Workspace,
+    local: &mut Local,
+    out: &mut NormalEquations,
+) -> bool {
+    let HeadKind::Markers {
+        noise,
+        observations,
+    } = &model.problem.heads[head].kind
+    else {
+        return false;
+    };
+    let information = 1.0 / theta[noise.index()];
+    let path = &model.paths[head];
+    let k = local.k;
+    let positions: Vec<Vector3<f64>> = (0..model.problem.points.len())
+        .map(|p| model.point_position(p, values).coords)
+        .collect();
+    let mut sums: Vec<PointSums> = Vec::new();
+    let mut buffer = path.buffer();
+    // W and its factor depend only on which markers were seen and their weights: kept while those stay.
+    let mut seen: Vec<(usize, f64)> = Vec::new();
+    let mut now: Vec<(usize, f64)> = Vec::new();
+    let mut factor = [[0.0; 6]; 6];
+    for (sample, range) in &model.of_head[head] {
+        let pose = path.evaluate(
+            &model.problem,
+            &work.cache,
+            values,
+            *sample,
+            Derivatives::All,
+            &mut buffer,
+        );
+        now.clear();
+        let mut moment = Vector3::zeros();
+        let mut force = Vector3::zeros();
+        for o in range.clone() {
+            let w = weights[o] * information;
+            if w <= 0.0 {
+                continue;
+            }
+            let marker = &observations[model.observations[o].item];
+            let point = marker.point.index();
+            let p = positions[point];
+            let e = p - pose.r.tr_mul(&(marker.position.coords - pose.t));
+            let we = e * w;
+            moment += p.cross(&we);
+            force += we;
+            local.cost += we.dot(&e);
+            now.push((point, w));
+            if let Some(ids) = model.problem.points[point].parameters {
+                let i = sums
+                    .iter()
+                    .position(|s| s.point == point)
+                    .unwrap_or_else(|| {
+                        sums.push(PointSums {
+                            point,
+                            columns: ids.map(|id| model.column_of[id.index()]),
+                            coupling: vec![Vector6::zeros(); k],
+                            weight: 0.0,
+                            gradient: Vector3::zeros(),
+                        });
+                        sums.len() - 1
+                    });
+                let s = &mut sums[i];
+                s.weight += w;
+                s.gradient += we;
+                for (sum, column) in s.coupling.iter_mut().zip(&buffer.columns) {
+                    *sum += column * w;
+                }
+            }
+        }
+        if now.is_empty() {
+            continue;
+        }
+        if now != seen {
+            let u = upper_factor(&compressed_weight(&now, &positions));
+            factor = std::array::from_fn(|r| std::array::from_fn(|c| u[(r, c)]));
+            seen.clone_from(&now);
+        }
+        // A = U J with UᵀU = W; g += Jᵀb
+        let b = Vector6::new(moment.x, moment.y, moment.z, force.x, force.y, force.z);
+        for (g, j) in local.g.iter_mut().zip(&buffer.columns) {
+            *g += j.dot(&b);
+        }
+        let rows = local.rows(6);
+        for (c, j) in buffer.columns.iter().enumerate() {
+            let [u0, u1, u2, u3, u4, u5] = &factor;
+            rows[c] = u0[0] * j[0]
+                + u0[1] * j[1]
+                + u0[2] * j[2]
+                + u0[3] * j[3]
+                + u0[4] * j[4]
+                + u0[5] * j[5];
+            rows[k + c] = u1[1] * j[1] + u1[2] * j[2] + u1[3] * j[3] + u1[4] * j[4] + u1[5] * j[5];
+            rows[2 * k + c] = u2[2] * j[2] + u2[3] * j[3] + u2[4] * j[4] + u2[5] * j[5];
+            rows[3 * k + c] = u3[3] * j[3] + u3[4] * j[4] + u3[5] * j[5];
+            rows[4 * k + c] = u4[4] * j[4] + u4[5] * j[5];
+            rows[5 * k + c] = u5[5] * j[5];
+        }
+    }
+    point_blocks(model, head, &positions, &sums, out);
+    true
+}
+
+/// eᵀV⁻¹e without derivatives; infinite where it cannot be computed.
+pub(crate) fn cost_compressed(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+) -> f64 {
+    let positions: Vec<Vector3<f64>> = (0..model.problem.points.len())
+        .map(|p| model.point_position(p, values).coords)
+        .collect();
+    let mut sum = 0.0;
+    for (head, path) in model.paths.iter().enumerate() {
+        let mut buffer = path.buffer();
+        for (sample, range) in &model.of_head[head] {
+            let pose = path.evaluate(
+                &model.problem,
+                &work.cache,
+                values,
+                *sample,
+                Derivatives::None,
+                &mut buffer,
+            );
+            for o in range.clone() {
+                if weights[o] <= 0.0 {
+                    continue;
+                }
+                let observation = model.observations[o];
+                if let HeadKind::Markers {
+                    noise,
+                    observations,
+                } = &model.problem.heads[head].kind
+                {
+                    let marker = &observations[observation.item];
+                    if marker.shape.is_none() {
+                        let p = positions[marker.point.index()];
+                        let e = pose.r * p + pose.t - marker.position.coords;
+                        sum += weights[o] / theta[noise.index()] * e.norm_squared();
+                        continue;
+                    }
+                }
+                let m = observation.rows;
+                let mut e = residual(model, values, head, observation.item, &pose).e;
+                let mut l = [[0.0; 6]; 6];
+                add_block(model, o, |i, j, group, shape| {
+                    l[i][j] += theta[group] * shape / weights[o];
+                });
+                if !cholesky6(&mut l, m) {
+                    return f64::INFINITY;
+                }
+                for i in 0..m {
+                    for b in 0..i {
+                        e[i] -= l[i][b] * e[b];
+                    }
+                    e[i] /= l[i][i];
+                    sum += e[i] * e[i];
+                }
+            }
+        }
+    }
+    sum
+}
+
+/// W of equation (1).
+fn compressed_weight(seen: &[(usize, f64)], positions: &[Vector3<f64>]) -> Matrix6<f64> {
+    let mut weight = Matrix6::zeros();
+    for &(point, w) in seen {
+        let p = positions[point];
+        let pp = p.norm_squared();
+        for i in 0..3 {
+            for j in 0..3 {
+                weight[(i, j)] += w * (if i == j { pp } else { 0.0 } - p[i] * p[j]);
+            }
+            weight[(3 + i, 3 + i)] += w;
+        }
+        let skew = p.cross_matrix() * w;
+        for i in 0..3 {
+            for j in 0..3 {
+                weight[(i, 3 + j)] += skew[(i, j)];
+                weight[(3 + j, i)] += skew[(i, j)];
+            }
+        }
+    }
+    weight
+}
+
+/// U with UᵀU = W for a positive semidefinite W (fewer than three markers leave it singular).
+fn upper_factor(w: &Matrix6<f64>) -> Matrix6<f64> {
+    if let Some(c) = nalgebra::Cholesky::new(*w) {
+        return c.l().transpose();
+    }
+    let eigen = calib_geometry::decompose::symmetric_eigen_small(w);
+    let mut u = eigen.vectors.transpose();
+    for i in 0..6 {
+        u.row_mut(i).scale_mut(eigen.values[i].max(0.0).sqrt());
+    }
+    // Upper triangular form: the caller only reads r ≤ l.
+    u.qr().r()
+}
+
+/// Coupling of pose and points, and the points' own blocks.
+fn point_blocks(
+    model: &Model,
+    head: usize,
+    positions: &[Vector3<f64>],
+    sums: &[PointSums],
+    out: &mut NormalEquations,
+) {
+    let n = out.n;
+    let columns = &model.paths[head].columns;
+    for s in sums {
+        let p = positions[s.point];
+        for axis in 0..3 {
+            let Some(c) = s.columns[axis] else {
+                continue;
+            };
+            out.h[c * n + c] += s.weight;
+            out.g[c] += s.gradient[axis];
+            for (a, j) in s.coupling.iter().enumerate() {
+                // (G_m Σ w J)_axis = (ω × p + v)_axis
+                let omega = Vector3::new(j[0], j[1], j[2]);
+                let value = (omega.cross(&p))[axis] + j[3 + axis];
+                let (i, k) = (columns[a].min(c), columns[a].max(c));
+                out.h[i * n + k] += value;
+            }
+        }
+    }
+}
+
+/// Any head without compression: whitened rows of each observation, over local columns.
+#[expect(
+    clippy::too_many_arguments,
+    reason = "one pass over one head with everything it needs"
+)]
+fn general(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    head: usize,
+    work: &mut Workspace,
+    local: &mut Local,
+    out: &mut NormalEquations,
+) -> bool {
+    let path = &model.paths[head];
+    let (k, n) = (local.k, out.n);
+    let mut buffer = path.buffer();
+    for (sample, range) in &model.of_head[head] {
+        let pose = path.evaluate(
+            &model.problem,
+            &work.cache,
+            values,
+            *sample,
+            Derivatives::All,
+            &mut buffer,
+        );
+        for o in range.clone() {
+            if weights[o] <= 0.0 {
+                continue;
+            }
+            let observation = model.observations[o];
+            let m = observation.rows;
+            let rows = residual(model, values, head, observation.item, &pose);
+            let mut l = [[0.0; 6]; 6];
+            add_block(model, o, |i, j, group, shape| {
+                l[i][j] += theta[group] * shape / weights[o];
+            });
+            if !cholesky6(&mut l, m) {
+                return false;
+            }
+            // Whitened e, M and point columns.
+            let mut e = rows.e;
+            let mut jacobian = rows.m;
+            let mut point = rows.point.map(|(_, j)| j).unwrap_or_default();
+            for i in 0..m {
+                for b in 0..i {
+                    let c = l[i][b];
+                    e[i] -= c * e[b];
+                    for x in 0..6 {
+                        jacobian[i][x] -= c * jacobian[b][x];
+                    }
+                    for x in 0..3 {
+                        point[i][x] -= c * point[b][x];
+                    }
+                }
+                let d = 1.0 / l[i][i];
+                e[i] *= d;
+                jacobian[i].iter_mut().for_each(|x| *x *= d);
+                point[i].iter_mut().for_each(|x| *x *= d);
+            }
+            let Local { g, cost, .. } = local;
+            for i in 0..m {
+                *cost += e[i] * e[i];
+                for (g, twist) in g.iter_mut().zip(&buffer.columns) {
+                    *g += crate::solve::rows::dot(&jacobian[i], twist) * e[i];
+                }
+            }
+            let own = local.rows(m);
+            for i in 0..m {
+                for (c, twist) in buffer.columns.iter().enumerate() {
+                    own[i * k + c] = crate::solve::rows::dot(&jacobian[i], twist);
+                }
+            }
+            let Some((columns, _)) = &rows.point else {
+                continue;
+            };
+            for (axis, c) in columns.iter().enumerate() {
+                let Some(c) = *c else { continue };
+                for i in 0..m {
+                    let d = point[i][axis];
+                    out.g[c] += d * e[i];
+                    for (other, c2) in columns.iter().enumerate() {
+                        if let Some(c2) = *c2
+                            && c2 >= c
+                        {
+                            out.h[c * n + c2] += d * point[i][other];
+                        }
+                    }
+                    for a in 0..k {
+                        let g = path.columns[a];
+                        out.h[g.min(c) * n + g.max(c)] += d * own[i * k + a];
+                    }
+                }
+            }
+        }
+    }
+    true
+}
+
+/// Lower Cholesky factor of the leading m × m block, in place.
+fn cholesky6(l: &mut [[f64; 6]; 6], m: usize) -> bool {
+    for i in 0..m {
+        for j in 0..=i {
+            let mut sum = l[i][j];
+            for k in 0..j {
+                sum -= l[i][k] * l[j][k];
+            }
+            if i == j {
+                if !(sum > 0.0 && sum.is_finite()) {
+                    return false;
+                }
+                l[i][i] = sum.sqrt();
+            } else {
+                l[i][j] = sum / l[j][j];
+            }
+        }
+    }
+    true
+}

@@ -1,0 +1,428 @@
+//! Levenberg–Marquardt with scaled columns and a cost-checked step.
+//!
+//! ```text
+//! (H + λ S⁻²) δ = −g,   x ⊞ δ accepted when F falls;   stop when −gᵀδ (in σ²) vanishes          (1)
+//! ```
+//!
+//! S holds the parameters' natural scales (prior σ, or 1°, 1 cm): what makes a linearisation wrong is the size
+//! of a step in degrees, not in units of the data's precision, so weakly seen directions are held back first.
+//!
+//! Directions that neither data nor prior see have zero gradient and stay where they start.
+//!
+//! Where residuals are large (missing physics) and a direction is held by a weak prior only, the curvature
+//! `Σ e·∂²e` that Gauss–Newton leaves out decides along it, and Gauss–Newton creeps or overshoots. Once
+//! progress is slow, K collects that curvature from the gradients met on the way (symmetric rank-one secant
+//! update) and the step solves `(H + K + λ S⁻²) δ = −g`:
+//!
+//! ```text
+//! v = (g₊ − g) − H₊ δ − K δ,   K ← K + v vᵀ/(vᵀδ)                                              (2)
+//! ```
+
+use serde::{Deserialize, Serialize};
+
+use crate::graph::edge::EdgeKind;
+use crate::model::layout::{Model, Values, coordinates};
+use crate::solve::bounded::bounded_step;
+use crate::solve::normal::{NormalEquations, Workspace, accumulate, cost};
+
+/// How the minimisation ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SolveStatus {
+    /// The gradient vanishes: a further step would change the fit by less than 1e-6 σ.
+    Converged,
+    /// No step lowers the cost although the gradient has not vanished: rounding, or a kink.
+    Stalled,
+    /// The allowed iterations did not suffice.
+    MaxIterations,
+    /// The model could not be evaluated at the start values.
+    NotEvaluable,
+}
+
+impl SolveStatus {
+    /// Whether the values may be used.
+    #[must_use]
+    pub fn is_converged(self) -> bool {
+        self == Self::Converged
+    }
+}
+
+/// Limits of the minimisation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MinimizeSettings {
+    /// Linearisations allowed; a coarse start takes 5–15.
+    pub max_iterations: usize,
+    /// Stop when the decrement −gᵀδ falls below this (units of σ²).
+    pub decrement: f64,
+    /// First damping λ: 1e-3 is a prior of 30 natural scales (30°, 30 cm) on the step.
+    pub damping: f64,
+}
+
+impl Default for MinimizeSettings {
+    fn default() -> Self {
+        Self {
+            max_iterations: 100,
+            decrement: 1e-12,
+            damping: 1e-3,
+        }
+    }
+}
+
+/// Gauss–Newton is slow when the decrement falls by less than this factor per step…
+const SLOW: f64 = 0.1;
+/// …once the fit is within this squared distance (in σ²) of the minimum: farther away the curvature changes
+/// from step to step and a secant of it misleads.
+const NEAR: f64 = 1.0;
+
+/// K of equation (2).
+struct Curvature {
+    n: usize,
+    s: Vec<f64>,
+    slow: bool,
+    known: bool,
+}
+
+impl Curvature {
+    fn new(n: usize) -> Self {
+        Self {
+            n,
+            s: vec![0.0; n * n],
+            slow: false,
+            known: false,
+        }
+    }
+
+    fn learn(&mut self, before: &NormalEquations, after: &NormalEquations, step: &[f64]) {
+        if !self.slow {
+            return;
+        }
+        let n = self.n;
+        let mut v = vec![0.0; n];
+        for i in 0..n {
+            let mut predicted = 0.0;
+            for j in 0..n {
+                predicted += (after.h[i.min(j) * n + i.max(j)] + self.s[i * n + j]) * step[j];
+            }
+            v[i] = after.g[i] - before.g[i] - predicted;
+        }
+        let along = dot(&v, step);
+        // In units of √H_ii, so that metres and radians count alike.
+        let size = |x: &[f64], power: i32| -> f64 {
+            (0..n)
+                .map(|i| {
+                    let d = after.h[i * n + i];
+                    if d > 0.0 {
+                        x[i] * x[i] * d.powi(power)
+                    } else {
+                        0.0
+                    }
+                })
+                .sum::<f64>()
+                .sqrt()
+        };
+        if along.abs() <= 1e-8 * size(&v, -1) * size(step, 1) {
+            return;
+        }
+        for i in 0..n {
+            for j in 0..n {
+                self.s[i * n + j] += v[i] * v[j] / along;
+            }
+        }
+        self.known = true;
+    }
+}
+
+/// What became of a proposed step.
+enum Step {
+    /// Taken, and the minimum is reached with it.
+    Last,
+    Taken,
+    /// However short, it does not lower the cost.
+    None,
+}
+
+/// Relative ridge: keeps the factorisation positive along directions that nothing sees, and is far too
+/// small to slow down the others.
+const RIDGE: f64 = 1e-10;
+/// Least damping.
+const MIN_DAMPING: f64 = 1e-12;
+/// Damping beyond which a step is shorter than rounding.
+const MAX_DAMPING: f64 = 1e16;
+/// A rise of the cost by this fraction is rounding of its sum.
+const COST_ROUNDING: f64 = 1e-13;
+
+/// Where a minimisation ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Minimum {
+    /// Values of all parameters.
+    pub values: Values,
+    /// Why it ended.
+    pub status: SolveStatus,
+    /// Linearisations used.
+    pub iterations: usize,
+    /// eᵀV⁻¹e over the data.
+    pub data_cost: f64,
+    /// Squared prior deviations over their variances.
+    pub prior_cost: f64,
+    /// −gᵀδ of the last step: the squared distance to the minimum in units of σ.
+    pub decrement: f64,
+}
+
+/// Minimises `eᵀV⁻¹e + prior` from `start` with given weights (one per observation) and variances
+/// `theta` (σ² per noise group).
+#[must_use]
+pub fn minimize(
+    model: &Model,
+    start: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    settings: &MinimizeSettings,
+) -> Minimum {
+    let mut work = Workspace::new(model);
+    minimize_in(model, start, weights, theta, settings, &mut work)
+}
+
+pub(crate) fn minimize_in(
+    model: &Model,
+    start: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    settings: &MinimizeSettings,
+    work: &mut Workspace,
+) -> Minimum {
+    let n = model.free();
+    let mut values = start.clone();
+    let mut system = NormalEquations::new(n);
+    let mut next = NormalEquations::new(n);
+    let mut factor = vec![0.0; n * n];
+    let mut step = vec![0.0; n];
+    let mut trial = values.clone();
+    let mut damping = settings.damping;
+    let mut decrement = f64::INFINITY;
+    let bounded = model
+        .columns
+        .iter()
+        .any(|&p| model.problem.parameters[p].bounds.is_some());
+    let mut curvature = Curvature::new(n);
+    let natural: Vec<f64> = model
+        .columns
+        .iter()
+        .map(|&p| model.problem.parameters[p].scale().powi(-2))
+        .collect();
+    // Without random effects V is constant: the next linearisation delivers the cost to check.
+    let constant_noise = model.slots.is_empty();
+    let mut iterations = 1;
+    let mut evaluable = accumulate(model, &values, weights, theta, work, &mut system);
+    let status = loop {
+        if !evaluable {
+            break SolveStatus::NotEvaluable;
+        }
+        let current = system.cost();
+        let before = decrement;
+        let outcome = loop {
+            let solved = damped_step(
+                &system,
+                &mut curvature,
+                &natural,
+                damping,
+                &mut factor,
+                &mut step,
+            ) && (!bounded
+                || bounded_step(
+                    model,
+                    &values,
+                    &system,
+                    curvature.known.then_some(curvature.s.as_slice()),
+                    &natural,
+                    damping,
+                    &mut step,
+                ));
+            if solved {
+                decrement = -dot(&system.g, &step);
+                retract(model, &values, &step, &mut trial);
+                // The decrement falls at least in proportion: is the next one already small enough?
+                let rate = if before.is_finite() {
+                    (decrement / before).min(1.0)
+                } else {
+                    1.0
+                };
+                let expected = decrement * rate;
+                if decrement <= settings.decrement
+                    || (constant_noise && expected <= settings.decrement)
+                {
+                    let fallen = decrement <= settings.decrement
+                        || cost(model, &trial, weights, theta, work)
+                            <= current * (1.0 + COST_ROUNDING);
+                    if fallen {
+                        break Step::Last;
+                    }
+                } else if constant_noise {
+                    iterations += 1;
+                    if accumulate(model, &trial, weights, theta, work, &mut next)
+                        && next.cost() <= current * (1.0 + COST_ROUNDING)
+                    {
+                        break Step::Taken;
+                    }
+                } else if cost(model, &trial, weights, theta, work)
+                    <= current * (1.0 + COST_ROUNDING)
+                {
+                    iterations += 1;
+                    evaluable = accumulate(model, &trial, weights, theta, work, &mut next);
+                    break Step::Taken;
+                }
+            }
+            curvature.slow |= decrement < NEAR;
+            damping = (damping * 10.0).max(1e-3);
+            if damping > MAX_DAMPING {
+                break Step::None;
+            }
+        };
+        match outcome {
+            Step::Last => {
+                std::mem::swap(&mut values, &mut trial);
+                break SolveStatus::Converged;
+            }
+            Step::Taken => {
+                damping = (damping * 0.1).max(MIN_DAMPING);
+                curvature.slow |= decrement < NEAR && decrement > SLOW * before;
+                curvature.learn(&system, &next, &step);
+                std::mem::swap(&mut values, &mut trial);
+                std::mem::swap(&mut system, &mut next);
+            }
+            // At the minimum of a cost that is only rounding (exact data) nothing can fall further.
+            Step::None if decrement <= 1e-6 + current * 1e-9 => break SolveStatus::Converged,
+            Step::None => break SolveStatus::Stalled,
+        }
+        if iterations > settings.max_iterations {
+            break SolveStatus::MaxIterations;
+        }
+    };
+    Minimum {
+        values,
+        status,
+        iterations,
+        data_cost: system.data,
+        prior_cost: system.prior,
+        decrement,
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Solves (1), with (2) where it is known, by Cholesky of the column-scaled system; `false` when it is not
+/// positive definite.
+fn damped_step(
+    system: &NormalEquations,
+    curvature: &mut Curvature,
+    natural: &[f64],
+    damping: f64,
+    factor: &mut [f64],
+    step: &mut [f64],
+) -> bool {
+    let n = system.n;
+    // Scaled to unit diagonal, scales 1/√H_ii.
+    let scale: Vec<f64> = (0..n)
+        .map(|i| {
+            let d = system.h[i * n + i];
+            if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }
+        })
+        .collect();
+    let mut with = curvature.known;
+    loop {
+        for i in 0..n {
+            for j in 0..i {
+                factor[i * n + j] = system.h[j * n + i] * scale[i] * scale[j];
+            }
+            factor[i * n + i] = 1.0 + RIDGE + damping * natural[i] * scale[i] * scale[i];
+            if scale[i] == 0.0 {
+                factor[i * n + i] = 1.0;
+            }
+            if with {
+                for j in 0..=i {
+                    factor[i * n + j] += curvature.s[i * n + j] * scale[i] * scale[j];
+                }
+            }
+        }
+        if cholesky_in_place(factor, n) {
+            break;
+        }
+        if !with {
+            return false;
+        }
+        // A saddle as far as (2) knows: forget it.
+        with = false;
+        curvature.known = false;
+        curvature.s.fill(0.0);
+    }
+    for i in 0..n {
+        step[i] = -system.g[i] * scale[i];
+    }
+    solve_in_place(factor, n, step);
+    for i in 0..n {
+        step[i] *= scale[i];
+    }
+    step.iter().all(|x| x.is_finite())
+}
+
+/// Lower Cholesky factor in place (row-major, lower triangle).
+pub(crate) fn cholesky_in_place(a: &mut [f64], n: usize) -> bool {
+    for i in 0..n {
+        for j in 0..=i {
+            let (ri, rj) = (&a[i * n..i * n + j], &a[j * n..j * n + j]);
+            let sum = a[i * n + j] - dot(ri, rj);
+            if i == j {
+                if !(sum > 0.0 && sum.is_finite()) {
+                    return false;
+                }
+                a[i * n + i] = sum.sqrt();
+            } else {
+                a[i * n + j] = sum / a[j * n + j];
+            }
+        }
+    }
+    true
+}
+
+/// y ← (L Lᵀ)⁻¹ y.
+pub(crate) fn solve_in_place(l: &[f64], n: usize, y: &mut [f64]) {
+    for i in 0..n {
+        let sum = dot(&l[i * n..i * n + i], &y[..i]);
+        y[i] = (y[i] - sum) / l[i * n + i];
+    }
+    for i in (0..n).rev() {
+        y[i] /= l[i * n + i];
+        let yi = y[i];
+        for j in 0..i {
+            y[j] -= l[i * n + j] * yi;
+        }
+    }
+}
+
+/// x ⊞ δ: coordinates add; a rotation vector that passed π is replaced by the shorter one.
+pub(crate) fn retract(model: &Model, values: &Values, step: &[f64], out: &mut Values) {
+    out.0.copy_from_slice(&values.0);
+    for (c, &p) in model.columns.iter().enumerate() {
+        out.0[p] += step[c];
+    }
+    for edge in &model.problem.edges {
+        let EdgeKind::Unknown(u) = &edge.kind else {
+            continue;
+        };
+        if let [Some(a), Some(b), Some(c), ..] = u.parameters {
+            let ids = [a.index(), b.index(), c.index()];
+            if ids.iter().any(|&p| model.column_of[p].is_none()) {
+                continue;
+            }
+            let omega = coordinates(u, out).fixed_rows::<3>(0).into_owned();
+            let angle = omega.norm();
+            if angle > std::f64::consts::PI {
+                let shorter = omega * (1.0 - 2.0 * std::f64::consts::PI / angle);
+                for (i, &p) in ids.iter().enumerate() {
+                    out.0[p] = shorter[i];
+                }
+            }
+        }
+    }
+}

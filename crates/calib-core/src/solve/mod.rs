@@ -1,0 +1,12 @@
+//! The minimum of the stated problem: rows, normal equations, steps, noise, robust weights.
+
+pub(crate) mod bounded;
+pub(crate) mod compressed;
+pub(crate) mod dense;
+pub(crate) mod minimize;
+pub(crate) mod noise;
+pub(crate) mod normal;
+pub(crate) mod relabel;
+pub(crate) mod robust;
+pub(crate) mod rows;
+pub(crate) mod structured;

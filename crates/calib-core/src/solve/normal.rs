@@ -1,0 +1,302 @@
+//! Normal equations, summed sample by sample: the dense Jacobian of all samples never exists.
+//!
+//! ```text
+//! H = Σ_s J_sᵀ V_s⁻¹ J_s + Λ,   g = Σ_s J_sᵀ V_s⁻¹ e_s + Λ (x − x₀),   Λ = diag(1/σ²)        (1)
+//! F = ½ Σ_s e_sᵀ V_s⁻¹ e_s + ½ (x − x₀)ᵀ Λ (x − x₀)                                          (2)
+//! ```
+
+use crate::model::layout::{EdgeCache, Model, Values};
+use crate::model::path::Derivatives;
+use crate::solve::compressed::{Local, accumulate_compressed, cost_compressed};
+use crate::solve::rows::SampleRows;
+use crate::solve::structured::RandomPart;
+
+/// H (upper triangle, row-major n × n), g, and twice F split into data and prior.
+#[derive(Debug, Clone)]
+pub(crate) struct NormalEquations {
+    pub n: usize,
+    pub h: Vec<f64>,
+    pub g: Vec<f64>,
+    pub data: f64,
+    pub prior: f64,
+}
+
+impl NormalEquations {
+    pub(crate) fn new(n: usize) -> Self {
+        Self {
+            n,
+            h: vec![0.0; n * n],
+            g: vec![0.0; n],
+            data: 0.0,
+            prior: 0.0,
+        }
+    }
+
+    pub(crate) fn cost(&self) -> f64 {
+        self.data + self.prior
+    }
+}
+
+/// Everything that the passes over the samples need; allocated once.
+#[derive(Debug, Clone)]
+pub(crate) struct Workspace {
+    pub cache: EdgeCache,
+    pub rows: SampleRows,
+    pub random: RandomPart,
+    /// The random part of every V_s at the last linearisation, where random effects make V_s depend
+    /// on the values: a step is judged by the same V_s that proposed it. (With V_s moving along, the
+    /// cost would reward values that only make the noise look larger.)
+    factors: Vec<f64>,
+}
+
+impl Workspace {
+    pub(crate) fn new(model: &Model) -> Self {
+        Self {
+            cache: EdgeCache::new(&model.problem, model.trig.clone()),
+            rows: SampleRows::new(model),
+            random: RandomPart::default(),
+            factors: Vec::new(),
+        }
+    }
+}
+
+/// Equation (1). `false` when some V_s is not positive definite or a number is not finite.
+pub(crate) fn accumulate(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+    out: &mut NormalEquations,
+) -> bool {
+    out.h.fill(0.0);
+    out.g.fill(0.0);
+    out.data = 0.0;
+    work.cache.update(&model.problem, values);
+    work.factors.clear();
+    let fine = if model.slots.is_empty() {
+        accumulate_compressed(model, values, weights, theta, work, out)
+    } else {
+        accumulate_rows(model, values, weights, theta, work, out)
+    };
+    add_prior(model, values, out);
+    fine && out.cost().is_finite()
+}
+
+/// The general way: every sample's rows, whitened by its V_s.
+pub(crate) fn accumulate_rows(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+    out: &mut NormalEquations,
+) -> bool {
+    let n = out.n;
+    let mut sum = Local::new(n, model.max_rows);
+    let Workspace {
+        cache,
+        rows,
+        random,
+        factors,
+    } = work;
+    for sample in 0..model.problem.samples {
+        if model.of_sample[sample].is_empty() {
+            continue;
+        }
+        rows.fill(model, cache, values, weights, sample, Derivatives::All);
+        if rows
+            .whiten_blocks(model, weights, theta, true)
+            .and_then(|()| rows.random_part(random))
+            .is_none()
+        {
+            return false;
+        }
+        random.store(factors);
+        let m = rows.m;
+        random.whiten(&mut rows.r[..m], 1);
+        random.whiten(&mut rows.j[..m * n], n);
+        out.data += rows.squared_norm();
+        for (row, r) in rows.j[..m * n].chunks_exact(n.max(1)).zip(&rows.r) {
+            out.g.iter_mut().zip(row).for_each(|(g, j)| *g += j * r);
+        }
+        sum.rows(m).copy_from_slice(&rows.j[..m * n]);
+    }
+    sum.multiply();
+    for a in 0..n {
+        for b in a..n {
+            out.h[a * n + b] += sum.h[(a, b)];
+        }
+    }
+    true
+}
+
+pub(crate) fn add_prior(model: &Model, values: &Values, out: &mut NormalEquations) {
+    let n = out.n;
+    out.prior = 0.0;
+    for (c, &p) in model.columns.iter().enumerate() {
+        let parameter = &model.problem.parameters[p];
+        if let Some(sigma) = parameter.prior_sigma {
+            let information = 1.0 / (sigma * sigma);
+            let off = values.0[p] - parameter.nominal;
+            out.h[c * n + c] += information;
+            out.g[c] += information * off;
+            out.prior += information * off * off;
+        }
+    }
+}
+
+/// Equation (2), doubled, at trial values with the V_s of the last [`accumulate`]; infinite where it
+/// cannot be computed.
+pub(crate) fn cost(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+) -> f64 {
+    let mut sum = evaluate_cost(model, values, weights, theta, work, !model.slots.is_empty());
+    for &p in &model.columns {
+        let parameter = &model.problem.parameters[p];
+        if let Some(sigma) = parameter.prior_sigma {
+            let z = (values.0[p] - parameter.nominal) / sigma;
+            sum += z * z;
+        }
+    }
+    if sum.is_finite() { sum } else { f64::INFINITY }
+}
+
+/// eᵀV⁻¹e over all samples with V_s at these values; infinite where it cannot be computed.
+pub(crate) fn data_cost(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+) -> f64 {
+    evaluate_cost(model, values, weights, theta, work, false)
+}
+
+fn evaluate_cost(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+    stored: bool,
+) -> f64 {
+    work.cache.update(&model.problem, values);
+    if model.slots.is_empty() {
+        return cost_compressed(model, values, weights, theta, work);
+    }
+    let Workspace {
+        cache,
+        rows,
+        random,
+        factors,
+    } = work;
+    let wanted = if stored {
+        Derivatives::None
+    } else {
+        Derivatives::Random
+    };
+    let mut sum = 0.0;
+    let mut at = 0;
+    for sample in 0..model.problem.samples {
+        if model.of_sample[sample].is_empty() {
+            continue;
+        }
+        rows.fill(model, cache, values, weights, sample, wanted);
+        if rows.whiten_blocks(model, weights, theta, false).is_none() {
+            return f64::INFINITY;
+        }
+        let m = rows.m;
+        if stored {
+            at += random.load(&factors[at..], m, rows.k);
+        } else if rows.random_part(random).is_none() {
+            return f64::INFINITY;
+        }
+        random.whiten(&mut rows.r[..m], 1);
+        sum += rows.squared_norm();
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::*;
+    use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+
+    /// Two heads on one chain with known, unknown and anisotropic markers, some weights 0.
+    fn problem() -> Problem {
+        let q: Vec<f64> = (0..9).map(|i| f64::from(i) * 0.3 - 1.0).collect();
+        let mut p = Problem::new(q.len());
+        let base = p.frame("base");
+        let a = p.frame("a");
+        let b = p.frame("b");
+        let x = Isometry3::new(Vector3::new(0.3, 0.1, 0.2), Vector3::new(0.2, -0.4, 0.5));
+        p.unknown("first", base, a, x, Chart::full());
+        let joint = p.joint("turn", a, b, Axis::Revolute(Vector3::z_axis()), q.clone());
+        p.free_feature(joint, FeatureKind::ZeroOffset, Some(0.1));
+        p.free_feature(joint, FeatureKind::Gain, None);
+        let noise = p.noise_group("n", NoiseKind::Position, 1e-2, false);
+        let points = [
+            p.known_point("k1", b, Point3::new(0.3, 0.1, 0.0)),
+            p.unknown_point("u1", b, Point3::new(0.1, -0.2, 0.3), None),
+            p.unknown_point("u2", b, Point3::new(-0.1, 0.2, 0.1), Some(0.1)),
+        ];
+        for (name, shape) in [
+            ("isotropic", None),
+            (
+                "depth",
+                Some(Matrix3::from_diagonal(&Vector3::new(1.0, 2.0, 9.0))),
+            ),
+        ] {
+            let seen = (0..q.len() * 3)
+                .map(|i| MarkerObservation {
+                    sample: i / 3,
+                    point: points[i % 3],
+                    position: Point3::new((i as f64).sin(), (i as f64 * 1.7).cos(), 0.1),
+                    shape,
+                })
+                .collect();
+            p.markers(name, base, b, noise, seen);
+        }
+        p
+    }
+
+    #[test]
+    fn both_ways_to_the_normal_equations_agree() {
+        let model = Model::new(&problem()).unwrap();
+        let mut work = Workspace::new(&model);
+        let theta = [1e-4];
+        let weights: Vec<f64> = (0..model.observation_count())
+            .map(|o| [1.0, 0.0, 0.3, 1.0, 2.0][o % 5])
+            .collect();
+        let mut values = model.start();
+        for (i, v) in values.0.iter_mut().enumerate() {
+            *v += 0.05 * (i as f64).sin();
+        }
+        let mut fast = NormalEquations::new(model.free());
+        let mut slow = fast.clone();
+        assert!(accumulate(
+            &model, &values, &weights, &theta, &mut work, &mut fast
+        ));
+        work.cache.update(&model.problem, &values);
+        assert!(accumulate_rows(
+            &model, &values, &weights, &theta, &mut work, &mut slow
+        ));
+        add_prior(&model, &values, &mut slow);
+        let size = slow.h.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        for (a, b) in fast.h.iter().zip(&slow.h) {
+            assert!((a - b).abs() < 1e-12 * size, "{a} {b}");
+        }
+        for (a, b) in fast.g.iter().zip(&slow.g) {
+            assert!((a - b).abs() < 1e-12 * size, "{a} {b}");
+        }
+        assert!((fast.cost() - slow.cost()).abs() < 1e-12 * slow.cost());
+        let trial = cost(&model, &values, &weights, &theta, &mut work);
+        assert!((trial - slow.cost()).abs() < 1e-12 * slow.cost());
+    }
+}

@@ -1,0 +1,353 @@
+//! Outliers: Huber, then graduated non-convexity, then a gate, then a plain fit of what is left.
+//!
+//! ```text
+//! d² = eᵀ V⁻¹ e of one vector (marker, pose), V its own covariance with the joints' noise         (1)
+//! Huber           w = min(1, k/d)                                                            (2)
+//! Geman–McClure   w = ( μc² / (d² + μc²) )²,   μ: large → 1                                   (3)
+//! gate            keep d² ≤ χ²_dim(99.9 %)                                                    (4)
+//! ```
+//!
+//! A whole vector is weighted, never one coordinate, and never a prior. The last fit is unweighted, so
+//! that its covariance means what it says. Where the residuals are larger than the stated noise over
+//! the board (an unmodelled effect), d² is measured against their median: a model that is wrong
+//! everywhere must not declare half of its data outliers.
+
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::graph::head::HeadKind;
+use crate::model::layout::{Model, Values};
+use crate::model::path::Derivatives;
+use crate::solve::minimize::{MinimizeSettings, Minimum, minimize_in};
+use crate::solve::normal::Workspace;
+
+/// Why an observation does not take part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RejectReason {
+    /// It lies where another marker of the same body should be.
+    Swap,
+    /// A measured pose on its path was lost.
+    Occlusion,
+    /// It is off by more than noise explains.
+    Outlier,
+    /// The whole body is off, markers together: the robot had not settled, or the reading is wrong.
+    NotSettled,
+}
+
+/// An observation that does not take part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Rejection {
+    /// Sample.
+    pub sample: usize,
+    /// Head.
+    pub head: String,
+    /// Index within the head.
+    pub item: usize,
+    /// Why.
+    pub reason: RejectReason,
+    /// Mahalanobis distance at the final fit (σ).
+    pub distance: f64,
+}
+
+/// How to treat outliers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RobustSettings {
+    /// Off: every observation counts fully.
+    pub enabled: bool,
+    /// Huber's corner on the norm of a 3-vector: 95 % efficient there. Other sizes get the same tail.
+    pub huber: f64,
+    /// Probability that a good observation passes the gate.
+    pub gate: f64,
+    /// μ shrinks by this factor per step of (3).
+    pub anneal: f64,
+}
+
+impl Default for RobustSettings {
+    fn default() -> Self {
+        Self {
+            enabled: true,
+            huber: 2.8,
+            gate: 0.999,
+            anneal: 1.6,
+        }
+    }
+}
+
+/// χ² quantile; the distributions are valid by construction (freedom ≥ 1).
+fn chi2_quantile(dimension: usize, probability: f64) -> f64 {
+    ChiSquared::new(dimension as f64).map_or(f64::INFINITY, |d| d.inverse_cdf(probability))
+}
+
+/// Limits per dimension 0..=6, looked up once.
+pub(crate) struct Limits {
+    gate: [f64; 7],
+    huber: [f64; 7],
+    median: [f64; 7],
+}
+
+impl Limits {
+    pub(crate) fn new(settings: &RobustSettings) -> Self {
+        let tail = ChiSquared::new(3.0).map_or(0.95, |d| d.cdf(settings.huber * settings.huber));
+        let table =
+            |p: f64| std::array::from_fn(|d| if d == 0 { 0.0 } else { chi2_quantile(d, p) });
+        Self {
+            gate: table(settings.gate),
+            huber: table(tail),
+            median: table(0.5),
+        }
+    }
+}
+
+/// d² of equation (1) for every observation (0 where `mask` is 0).
+pub(crate) fn distances(
+    model: &Model,
+    values: &Values,
+    theta: &[f64],
+    mask: &[f64],
+    work: &mut Workspace,
+) -> Option<Vec<f64>> {
+    let mut out = vec![0.0; model.observations.len()];
+    work.cache.update(&model.problem, values);
+    let wanted = if model.slots.is_empty() {
+        Derivatives::None
+    } else {
+        Derivatives::Random
+    };
+    for sample in 0..model.problem.samples {
+        if model.of_sample[sample].is_empty() {
+            continue;
+        }
+        work.rows
+            .fill(model, &work.cache, values, mask, sample, wanted);
+        work.rows.covariance(model, mask, theta);
+        let (rows, m) = (&work.rows, work.rows.m);
+        for &(o, first, count) in &rows.blocks {
+            let mut l = [0.0; 36];
+            let mut y = [0.0; 6];
+            for i in 0..count {
+                y[i] = rows.r[first + i];
+                for j in 0..=i {
+                    let mut sum = rows.v[(first + i) * m + first + j];
+                    for k in 0..j {
+                        sum -= l[i * 6 + k] * l[j * 6 + k];
+                    }
+                    if i == j {
+                        if sum <= 0.0 || !sum.is_finite() {
+                            return None;
+                        }
+                        l[i * 6 + i] = sum.sqrt();
+                    } else {
+                        l[i * 6 + j] = sum / l[j * 6 + j];
+                    }
+                }
+                for k in 0..i {
+                    y[i] -= l[i * 6 + k] * y[k];
+                }
+                y[i] /= l[i * 6 + i];
+            }
+            out[o] = y[..count].iter().map(|x| x * x).sum();
+        }
+    }
+    Some(out)
+}
+
+/// Factor by which the typical d² exceeds what its noise model says (≥ 1).
+fn inflation(model: &Model, d2: &[f64], mask: &[f64], limits: &Limits) -> f64 {
+    let mut ratio: Vec<f64> = model
+        .observations
+        .iter()
+        .zip(d2)
+        .zip(mask)
+        .filter(|(_, w)| **w > 0.0)
+        .map(|((o, d), _)| d / limits.median[o.rows])
+        .collect();
+    if ratio.is_empty() {
+        return 1.0;
+    }
+    let middle = ratio.len() / 2;
+    let (_, median, _) = ratio.select_nth_unstable_by(middle, f64::total_cmp);
+    median.max(1.0)
+}
+
+/// Huber and GNC from a start; returns values and the set that passed the gate (0/1 weights).
+pub(crate) fn clean(
+    model: &Model,
+    start: &Minimum,
+    mask: &[f64],
+    theta: &[f64],
+    settings: &RobustSettings,
+    work: &mut Workspace,
+) -> Option<(Values, Vec<f64>, usize)> {
+    /// Reweighting rounds of (2): the weights settle to 1 % in fewer than ten.
+    const HUBER_ROUNDS: usize = 12;
+    /// Linearisations between two reweightings.
+    const INNER: MinimizeSettings = MinimizeSettings {
+        max_iterations: 4,
+        decrement: 1e-3,
+        damping: 1e-6,
+    };
+    let limits = Limits::new(settings);
+    let rows = |o: usize| model.observations[o].rows;
+    let mut values = start.values.clone();
+    let mut iterations = 0;
+    let mut weights = mask.to_vec();
+    for _ in 0..HUBER_ROUNDS {
+        let d2 = distances(model, &values, theta, mask, work)?;
+        let scale = inflation(model, &d2, mask, &limits);
+        let mut change: f64 = 0.0;
+        for o in 0..weights.len() {
+            if mask[o] > 0.0 {
+                let w = (limits.huber[rows(o)] * scale / d2[o]).sqrt().min(1.0);
+                change = change.max((w - weights[o]).abs());
+                weights[o] = w;
+            }
+        }
+        if change < 0.01 {
+            break;
+        }
+        let fit = minimize_in(model, &values, &weights, theta, &INNER, work);
+        iterations += fit.iterations;
+        values = fit.values;
+    }
+    let d2 = distances(model, &values, theta, mask, work)?;
+    let scale = inflation(model, &d2, mask, &limits);
+    let worst = (0..d2.len())
+        .filter(|&o| mask[o] > 0.0)
+        .map(|o| d2[o] / (limits.gate[rows(o)] * scale))
+        .fold(0.0, f64::max);
+    if worst > 1.0 {
+        // Huber has brought us near: beyond 1e3 the kernel is flat anyway.
+        let mut mu = (2.0 * worst).min(1e3);
+        loop {
+            let d2 = distances(model, &values, theta, mask, work)?;
+            let scale = inflation(model, &d2, mask, &limits);
+            for o in 0..weights.len() {
+                if mask[o] > 0.0 {
+                    let c2 = mu * limits.gate[rows(o)] * scale;
+                    // Weights under 1e-6 make V badly scaled and change nothing.
+                    weights[o] = (c2 / (d2[o] + c2)).powi(2).max(1e-6);
+                }
+            }
+            let fit = minimize_in(model, &values, &weights, theta, &INNER, work);
+            iterations += fit.iterations;
+            values = fit.values;
+            if mu <= 1.0 {
+                break;
+            }
+            mu = (mu / settings.anneal).max(1.0);
+        }
+    }
+    let kept = gate(model, &values, theta, mask, settings, work)?;
+    Some((values, kept, iterations))
+}
+
+/// Equation (4) at given values.
+pub(crate) fn gate(
+    model: &Model,
+    values: &Values,
+    theta: &[f64],
+    mask: &[f64],
+    settings: &RobustSettings,
+    work: &mut Workspace,
+) -> Option<Vec<f64>> {
+    let limits = Limits::new(settings);
+    let d2 = distances(model, values, theta, mask, work)?;
+    let scale = inflation(model, &d2, mask, &limits);
+    Some(
+        model
+            .observations
+            .iter()
+            .enumerate()
+            .map(|(o, observation)| {
+                if mask[o] > 0.0 && d2[o] <= limits.gate[observation.rows] * scale {
+                    1.0
+                } else {
+                    0.0
+                }
+            })
+            .collect(),
+    )
+}
+
+/// The rejected observations with their reasons.
+pub(crate) fn explain(
+    model: &Model,
+    values: &Values,
+    theta: &[f64],
+    mask: &[f64],
+    kept: &[f64],
+    work: &mut Workspace,
+) -> Vec<Rejection> {
+    let Some(d2) = distances(model, values, theta, mask, work) else {
+        return Vec::new();
+    };
+    let limits = Limits::new(&RobustSettings::default());
+    let mut out = Vec::new();
+    for (o, observation) in model.observations.iter().enumerate() {
+        if mask[o] <= 0.0 || kept[o] > 0.0 {
+            continue;
+        }
+        let head = &model.problem.heads[observation.head];
+        let same_body: Vec<usize> = model.of_sample[observation.sample]
+            .clone()
+            .filter(|&other| {
+                model.observations[other].head == observation.head && mask[other] > 0.0
+            })
+            .collect();
+        let reason = if swapped(model, values, theta, observation, &limits, work) {
+            RejectReason::Swap
+        } else if same_body.len() >= 3 && same_body.iter().all(|&other| kept[other] == 0.0) {
+            RejectReason::NotSettled
+        } else {
+            RejectReason::Outlier
+        };
+        out.push(Rejection {
+            sample: observation.sample,
+            head: head.name.clone(),
+            item: observation.item,
+            reason,
+            distance: d2[o].sqrt(),
+        });
+    }
+    out
+}
+
+/// Does the marker lie, within the gate, where another marker of its body should be?
+fn swapped(
+    model: &Model,
+    values: &Values,
+    theta: &[f64],
+    observation: &crate::model::layout::Observation,
+    limits: &Limits,
+    work: &mut Workspace,
+) -> bool {
+    let HeadKind::Markers {
+        noise,
+        observations,
+    } = &model.problem.heads[observation.head].kind
+    else {
+        return false;
+    };
+    let seen = &observations[observation.item];
+    let path = &model.paths[observation.head];
+    let mut buffer = path.buffer();
+    let pose = path.evaluate(
+        &model.problem,
+        &work.cache,
+        values,
+        observation.sample,
+        Derivatives::None,
+        &mut buffer,
+    );
+    let frame = model.problem.heads[observation.head].to;
+    // Twice the gate: the joints' noise adds to the marker's.
+    let limit = (4.0 * limits.gate[3] * theta[noise.index()]).sqrt();
+    (0..model.problem.points.len()).any(|p| {
+        if p == seen.point.index() || model.problem.points[p].frame != frame {
+            return false;
+        }
+        let at = pose.r * model.point_position(p, values).coords + pose.t;
+        (seen.position.coords - at).norm() < limit
+    })
+}

@@ -1,0 +1,350 @@
+//! Estimators by name: built-in ones and those of plugins in one table.
+
+use std::collections::BTreeMap;
+
+use calib_cor::{InputKind, Pose, Shape as CorShape};
+use calib_plugin::{
+    Answer, AorFit, AxisLine, ByFn, Call, Control, CorFit, Entry, Failure, Host, Kind, Motion,
+    MotionData, Offer, PluginError, SearchPath, Shape, Tables, Value,
+};
+use calib_profile::Profile;
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::error::PipelineError;
+use crate::prepare::readers;
+
+/// A center that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CenterFit {
+    /// In the tracker's frame, m.
+    pub center: Point3<f64>,
+    /// Its covariance, m²; `None` when the estimator gives none.
+    pub covariance: Option<Matrix3<f64>>,
+}
+
+/// An axis that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisFit {
+    /// In the tracker's frame.
+    pub line: calib_geometry::Line,
+    /// Largest variance of the direction, rad²; `None` when the estimator gives none.
+    pub direction_variance: Option<f64>,
+    /// Mean variance of the point across the axis, m².
+    pub point_variance: Option<f64>,
+}
+
+/// All estimators that a profile can name.
+pub struct Estimators {
+    /// The tables, built-in first.
+    pub tables: Tables,
+}
+
+impl std::fmt::Debug for Estimators {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Estimators").finish_non_exhaustive()
+    }
+}
+
+impl Estimators {
+    /// The built-in ones only.
+    ///
+    /// # Errors
+    /// [`PipelineError::Plugin`] when two have one name.
+    pub fn built_in() -> Result<Self, PipelineError> {
+        let mut tables = Tables::default();
+        for info in calib_cor::estimators() {
+            tables.cor.register(built_in_cor(info))?;
+        }
+        for info in calib_aor::estimators() {
+            tables.aor.register(built_in_aor(info))?;
+        }
+        for reader in calib_recording::readers::readers() {
+            tables.reader.register(readers::built_in_reader(reader))?;
+        }
+        for writer in readers::built_in_reports() {
+            tables.report.register(writer)?;
+        }
+        Ok(Self { tables })
+    }
+
+    /// With the plugins that a profile names, found beside it and on the search path.
+    ///
+    /// # Errors
+    /// [`PipelineError::Plugin`] when one cannot be loaded, has another hash, or offers a name that is taken.
+    pub fn of_profile(
+        profile: &Profile,
+        folder: &std::path::Path,
+        plugins: bool,
+    ) -> Result<Self, PipelineError> {
+        let mut estimators = Self::built_in()?;
+        let host = Host::new(SearchPath::from_environment(Some(folder)), plugins);
+        for (name, spec) in &profile.plugins {
+            // Relative paths start from the profile: the search path knows its folder.
+            let place = spec.path.clone().unwrap_or_else(|| name.clone());
+            let loaded = host.load(&place, spec.sha256.as_deref())?;
+            estimators.tables.add(&loaded)?;
+        }
+        Ok(estimators)
+    }
+
+    /// Finds a center; `Ok(Err(reason))` when the data do not determine one.
+    ///
+    /// # Errors
+    /// [`PipelineError::Plugin`] for an unknown name, data that the estimator does not take, and failures.
+    pub fn center(
+        &self,
+        id: &str,
+        parameters: &BTreeMap<String, Value>,
+        motion: &MotionData,
+    ) -> Result<Result<CenterFit, String>, PipelineError> {
+        let bound = self.tables.cor.get(id)?.with(parameters)?;
+        Ok(match bound.fit(&motion.view(), &Control::default())? {
+            Answer::NotObservable(reason) => Err(reason),
+            Answer::Found(CorFit {
+                weak: Some(reason), ..
+            }) => Err(reason),
+            Answer::Found(fit) => Ok(CenterFit {
+                center: Point3::from(fit.center_m),
+                covariance: fit.covariance_m2.map(|c| Matrix3::from_fn(|i, j| c[i][j])),
+            }),
+        })
+    }
+}
+
+impl Estimators {
+    /// Finds an axis; `Ok(Err(reason))` when the data do not determine one.
+    ///
+    /// # Errors
+    /// As [`Estimators::center`].
+    pub fn axis(
+        &self,
+        id: &str,
+        parameters: &BTreeMap<String, Value>,
+        motion: &MotionData,
+    ) -> Result<Result<AxisFit, String>, PipelineError> {
+        let bound = self.tables.aor.get(id)?.with(parameters)?;
+        let fit = match bound.fit(&motion.view(), &Control::default())? {
+            Answer::NotObservable(reason) => return Ok(Err(reason)),
+            Answer::Found(AorFit {
+                weak: Some(reason), ..
+            }) => return Ok(Err(reason)),
+            Answer::Found(fit) => fit,
+        };
+        let line = calib_geometry::Line::new(
+            Point3::from(fit.line.point_m),
+            Vector3::from(fit.line.direction),
+        );
+        let Some(line) = line else {
+            return Ok(Err("the direction vanishes".to_owned()));
+        };
+        let block = |c: &[[f64; 6]; 6], at: usize| Matrix3::from_fn(|i, j| c[at + i][at + j]);
+        Ok(Ok(AxisFit {
+            line,
+            direction_variance: fit.covariance.map(|c| {
+                let eigen = calib_geometry::decompose::symmetric_eigen_small(&block(&c, 0));
+                eigen.values[2].max(0.0)
+            }),
+            // Two directions across the axis share the trace; the third has none.
+            point_variance: fit.covariance.map(|c| block(&c, 3).trace().max(0.0) / 2.0),
+        }))
+    }
+
+    /// JSON Schema of the parameters of everything that a profile can name, by kind and name.
+    #[must_use]
+    pub fn parameter_schemas(&self) -> serde_json::Value {
+        fn of<T: ?Sized>(registry: &calib_plugin::Registry<T>) -> serde_json::Value {
+            let entry = |e: &Entry<T>| {
+                (
+                    e.offer().name.clone(),
+                    calib_plugin::schema(&e.offer().parameters),
+                )
+            };
+            serde_json::Value::Object(registry.iter().map(entry).collect())
+        }
+        serde_json::json!({
+            Kind::Cor.id(): of(&self.tables.cor),
+            Kind::Aor.id(): of(&self.tables.aor),
+            Kind::Reader.id(): of(&self.tables.reader),
+            Kind::Report.id(): of(&self.tables.report),
+        })
+    }
+}
+
+/// Values of a profile as values of the contract.
+#[must_use]
+pub fn values(given: &BTreeMap<String, calib_profile::ParameterValue>) -> BTreeMap<String, Value> {
+    use calib_profile::ParameterValue as Given;
+    let value = |v: &Given| match v {
+        Given::Bool(b) => Value::Bool(*b),
+        Given::Integer(i) => Value::Integer(*i),
+        Given::Number(x) => Value::Number(*x),
+        Given::Text(t) => Value::Text(t.clone()),
+    };
+    given
+        .iter()
+        .map(|(name, v)| (name.clone(), value(v)))
+        .collect()
+}
+
+impl From<PluginError> for PipelineError {
+    fn from(error: PluginError) -> Self {
+        let mut text = error.to_string();
+        let mut source = std::error::Error::source(&error);
+        while let Some(cause) = source {
+            text.push_str(&format!(": {cause}"));
+            source = cause.source();
+        }
+        let code = match error.exit_code() {
+            2 => crate::ExitCode::Usage,
+            3 => crate::ExitCode::Data,
+            _ => crate::ExitCode::Plugin,
+        };
+        Self::Plugin { text, code }
+    }
+}
+
+fn shapes(input: InputKind) -> &'static [Shape] {
+    match input {
+        InputKind::Points | InputKind::PointsOrPoses => {
+            &[Shape::Points, Shape::Markers, Shape::Poses]
+        }
+        InputKind::Markers => &[Shape::Markers],
+        InputKind::Poses => &[Shape::Poses],
+        InputKind::TwoBodies => &[Shape::TwoBodies],
+    }
+}
+
+fn tracks(motion: &Motion<'_>) -> Vec<Vec<Option<Point3<f64>>>> {
+    (0..motion.tracks)
+        .map(|k| motion.points(k).map(|p| p.map(Point3::from)).collect())
+        .collect()
+}
+
+fn poses(motion: &Motion<'_>, track: usize) -> Vec<Option<Pose>> {
+    let pose = |p: calib_plugin::BodyPose| Pose {
+        rotation: Matrix3::from_fn(|i, j| p.rotation[i][j]),
+        translation: Vector3::from(p.translation_m),
+    };
+    motion.poses(track).map(|p| p.map(pose)).collect()
+}
+
+fn built_in_cor(info: &'static calib_cor::EstimatorInfo) -> Entry<dyn calib_plugin::Cor> {
+    let offer = Offer::new(Kind::Cor, info.id, info.summary)
+        .from_source(info.source)
+        .takes(shapes(info.input));
+    Entry::built_in_cor(ByFn::new(
+        offer,
+        move |motion: &Motion<'_>, _: &Call<'_>| {
+            let options = calib_cor::Options {
+                sigma_t: motion.sigma_t_m,
+                sigma_r: motion.sigma_r_rad,
+                significance: motion.significance,
+                seed: motion.seed,
+                ..calib_cor::Options::default()
+            };
+            let (tracks, first, second) = (tracks(motion), poses(motion, 0), poses(motion, 1));
+            let input = match motion.shape {
+                Shape::Points => calib_cor::Input::Points(&tracks),
+                Shape::Markers => calib_cor::Input::Markers(&tracks),
+                Shape::Poses => calib_cor::Input::Poses(&first),
+                Shape::TwoBodies => calib_cor::Input::TwoBodies {
+                    first: &first,
+                    second: &second,
+                },
+            };
+            let outcome =
+                (info.fit)(&input, &options).map_err(|e| Failure::BadInput(e.to_string()))?;
+            let Some(e) = outcome.estimate() else {
+                return Ok(Answer::NotObservable(format!(
+                    "{}: {}",
+                    outcome.verdict().as_str(),
+                    outcome.reason().unwrap_or("")
+                )));
+            };
+            let (radii_m, body_points_m) = match &e.shape {
+                CorShape::Radii { radii, .. } => (radii.clone(), Vec::new()),
+                CorShape::BodyPoint { body_point, .. } => {
+                    (Vec::new(), vec![body_point.coords.into()])
+                }
+                CorShape::BodyPoints {
+                    in_first,
+                    in_second,
+                    ..
+                } => (
+                    Vec::new(),
+                    vec![in_first.coords.into(), in_second.coords.into()],
+                ),
+            };
+            Ok(Answer::Found(CorFit {
+                center_m: e.center.coords.into(),
+                covariance_m2: Some(std::array::from_fn(|i| {
+                    std::array::from_fn(|j| e.covariance[(i, j)])
+                })),
+                body_points_m,
+                radii_m,
+                rms_m: e.rms,
+                used: e.used,
+                rejected: e.rejected.iter().map(|r| [r.marker, r.row]).collect(),
+                weak: (!outcome.is_observable()).then(|| e.reason.clone().unwrap_or_default()),
+            }))
+        },
+    ))
+}
+
+fn built_in_aor(info: &'static calib_aor::EstimatorInfo) -> Entry<dyn calib_plugin::Aor> {
+    let takes: &[Shape] = match info.input {
+        calib_aor::InputKind::Points => &[Shape::Points, Shape::Markers, Shape::Poses],
+        calib_aor::InputKind::Markers => &[Shape::Markers],
+        calib_aor::InputKind::Poses => &[Shape::Poses, Shape::TwoBodies],
+    };
+    let offer = Offer::new(Kind::Aor, info.id, info.summary)
+        .from_source(info.source)
+        .takes(takes);
+    Entry::built_in_aor(ByFn::new(
+        offer,
+        move |motion: &Motion<'_>, _: &Call<'_>| {
+            let options = calib_aor::Options {
+                sigma_t: motion.sigma_t_m,
+                sigma_r: motion.sigma_r_rad,
+                center: motion.center_m.map(Point3::from),
+                angles: motion.angles_rad.map_or_else(Vec::new, <[f64]>::to_vec),
+                significance: motion.significance,
+                ..calib_aor::Options::default()
+            };
+            let (tracks, parent, child) = (tracks(motion), poses(motion, 0), poses(motion, 1));
+            let input = match motion.shape {
+                Shape::Points => calib_aor::Input::Points(&tracks),
+                Shape::Markers => calib_aor::Input::Markers(&tracks),
+                Shape::Poses => calib_aor::Input::Poses(&parent),
+                Shape::TwoBodies => calib_aor::Input::TwoBodies {
+                    parent: &parent,
+                    child: &child,
+                },
+            };
+            let outcome =
+                (info.fit)(&input, &options).map_err(|e| Failure::BadInput(e.to_string()))?;
+            let Some(e) = outcome.estimate() else {
+                return Ok(Answer::NotObservable(format!(
+                    "{}: {}",
+                    outcome.verdict().as_str(),
+                    outcome.reason().unwrap_or("")
+                )));
+            };
+            let line = |l: &calib_geometry::Line| AxisLine {
+                point_m: l.point.coords.into(),
+                direction: l.direction.into_inner().into(),
+            };
+            Ok(Answer::Found(AorFit {
+                line: line(&e.line),
+                covariance: Some(std::array::from_fn(|i| {
+                    std::array::from_fn(|j| e.covariance[(i, j)])
+                })),
+                in_child: e.in_child.as_ref().map(line),
+                rms_m: e.rms,
+                used: e.used,
+                rejected: e.rejected.iter().map(|row| [0, *row]).collect(),
+                weak: (!outcome.is_observable()).then(|| e.reason.clone().unwrap_or_default()),
+            }))
+        },
+    ))
+}

@@ -1,0 +1,265 @@
+//! Where the robot stands and how the bodies sit, from closed forms with the nominal robot: start values for the
+//! solver, and the "nominal" baseline.
+//!
+//! A body whose mount is known gives `tracker_from_root` by averaging. Otherwise every tracked point p of an unknown
+//! place on its link obeys, with the nominal `root_from_link = (R_i, t_i)`,
+//!
+//! ```text
+//! z_i = R (R_i p + t_i) + t          linear in R, t and B_jkl = R_jk p_l                      (1)
+//! ```
+//!
+//! Three small least-squares problems (one per coordinate of z) give R (projected onto SO(3)), t and p.
+
+use std::collections::BTreeMap;
+
+use calib_geometry::decompose::solve_least_squares;
+use calib_geometry::{mean, so3};
+use calib_profile::{BodyKind, Usage};
+use nalgebra::{
+    DMatrix, DVector, Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3,
+};
+
+use crate::prepare::load::Inputs;
+use crate::prepare::tracks::BodyTrack;
+
+/// Start values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Start {
+    /// `tracker_from_root`.
+    pub tracker_from_root: Isometry3<f64>,
+    /// `link_from_body` of bodies with a frame.
+    pub mounts: BTreeMap<String, Isometry3<f64>>,
+    /// Points on their link, of bodies without a frame, by body and marker.
+    pub points: BTreeMap<String, BTreeMap<String, Point3<f64>>>,
+}
+
+/// A tracked point: its track against the motion of its link.
+struct Tracked {
+    /// (root_from_link, position in the tracker) per row.
+    rows: Vec<(Isometry3<f64>, Point3<f64>)>,
+}
+
+/// Relative singular value under which (1) leaves a direction open; LM decides about it later.
+const RANK: f64 = 1e-8;
+
+/// Start values from all fitted recordings.
+#[must_use]
+pub fn start(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Start {
+    let tracker_from_root =
+        from_known_mounts(inputs, tracks).unwrap_or_else(|| from_points(inputs, tracks));
+    let mut start = Start {
+        tracker_from_root,
+        mounts: BTreeMap::new(),
+        points: BTreeMap::new(),
+    };
+    for (name, body) in &inputs.robot.profile.bodies {
+        if let Some(mount) = body.mount {
+            start.mounts.insert(name.clone(), mount);
+            continue;
+        }
+        let poses: Vec<Isometry3<f64>> = body_rows(inputs, &tracks[name], body.link)
+            .map(|(root_from_link, tracker_from_body)| {
+                (tracker_from_root * root_from_link).inverse() * tracker_from_body
+            })
+            .collect();
+        if let Some(mount) = mean_pose(&poses) {
+            start.mounts.insert(name.clone(), mount);
+        }
+        if let BodyKind::Markers { names, .. } = &body.kind
+            && tracks[name].template.is_none()
+        {
+            let points = names.iter().filter_map(|marker| {
+                let rows = marker_rows(inputs, marker, body.link).rows;
+                let n = rows.len() as f64;
+                let on_link = rows.iter().map(|(root_from_link, z)| {
+                    (tracker_from_root * root_from_link)
+                        .inverse_transform_point(z)
+                        .coords
+                });
+                let sum: Vector3<f64> = on_link.sum();
+                (n > 0.0).then(|| (marker.clone(), Point3::from(sum / n)))
+            });
+            start.points.insert(name.clone(), points.collect());
+        }
+    }
+    start
+}
+
+/// Mean of poses: position average and chordal rotation mean; `None` for no or contradicting rotations.
+#[must_use]
+pub fn mean_pose(poses: &[Isometry3<f64>]) -> Option<Isometry3<f64>> {
+    let rotations: Vec<UnitQuaternion<f64>> = poses.iter().map(|p| p.rotation).collect();
+    let rotation = mean::chordal_mean(&rotations).ok()?;
+    let position = poses
+        .iter()
+        .map(|p| p.translation.vector)
+        .sum::<Vector3<f64>>()
+        / poses.len() as f64;
+    Some(Isometry3::from_parts(
+        Translation3::from(position),
+        rotation,
+    ))
+}
+
+/// (root_from_link, tracker_from_body) of every fitted row that shows the body.
+fn body_rows<'a>(
+    inputs: &'a Inputs,
+    track: &'a BodyTrack,
+    link: calib_urdf::LinkId,
+) -> impl Iterator<Item = (Isometry3<f64>, Isometry3<f64>)> + 'a {
+    let fitted = inputs
+        .recordings
+        .values()
+        .filter(|r| r.spec.usage != Usage::Validation);
+    fitted.flat_map(move |r| {
+        let poses = track.in_recording(&r.name);
+        r.q.iter().zip(poses).filter_map(move |(q, pose)| {
+            let root_from_link = inputs.robot.model.root_from_link(q.as_ref()?, link);
+            Some((root_from_link, (*pose)?))
+        })
+    })
+}
+
+fn marker_rows(inputs: &Inputs, marker: &str, link: calib_urdf::LinkId) -> Tracked {
+    let mut rows = Vec::new();
+    for r in inputs
+        .recordings
+        .values()
+        .filter(|r| r.spec.usage != Usage::Validation)
+    {
+        let Some(track) = r.poses.markers.get(marker) else {
+            continue;
+        };
+        for (q, z) in r.q.iter().zip(track) {
+            if let (Some(q), Some(z)) = (q, z) {
+                rows.push((inputs.robot.model.root_from_link(q, link), *z));
+            }
+        }
+    }
+    Tracked { rows }
+}
+
+fn from_known_mounts(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+) -> Option<Isometry3<f64>> {
+    let mut poses = Vec::new();
+    for (name, body) in &inputs.robot.profile.bodies {
+        let Some(mount) = body.mount else { continue };
+        poses.extend(body_rows(inputs, &tracks[name], body.link).map(
+            |(root_from_link, tracker_from_body)| {
+                tracker_from_body * (root_from_link * mount).inverse()
+            },
+        ));
+    }
+    mean_pose(&poses)
+}
+
+fn from_points(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Isometry3<f64> {
+    let mut tracked = Vec::new();
+    for (name, body) in &inputs.robot.profile.bodies {
+        match &body.kind {
+            BodyKind::Markers { names, .. } if tracks[name].template.is_none() => {
+                tracked.extend(
+                    names
+                        .iter()
+                        .map(|marker| marker_rows(inputs, marker, body.link)),
+                );
+            }
+            _ => {
+                let rows =
+                    body_rows(inputs, &tracks[name], body.link).map(|(root_from_link, body)| {
+                        (root_from_link, Point3::from(body.translation.vector))
+                    });
+                tracked.push(Tracked {
+                    rows: rows.collect(),
+                });
+            }
+        }
+    }
+    solve_points(&tracked).unwrap_or_else(Isometry3::identity)
+}
+
+/// Eq. (1) over all tracked points, which share R and t.
+fn solve_points(tracked: &[Tracked]) -> Option<Isometry3<f64>> {
+    let rows: usize = tracked.iter().map(|t| t.rows.len()).sum();
+    // Per coordinate j: R_j1..3, t_j, and B_jkl (9) per point.
+    let columns = 4 + 9 * tracked.len();
+    if rows == 0 {
+        return None;
+    }
+    // Relative to the mean position, so that t does not swamp the rest.
+    let mean_z = tracked
+        .iter()
+        .flat_map(|t| &t.rows)
+        .map(|(_, z)| z.coords)
+        .sum::<Vector3<f64>>()
+        / rows as f64;
+    let mut a = DMatrix::zeros(rows, columns);
+    let mut z = [
+        DVector::zeros(rows),
+        DVector::zeros(rows),
+        DVector::zeros(rows),
+    ];
+    let mut row = 0;
+    for (k, point) in tracked.iter().enumerate() {
+        for (root_from_link, seen) in &point.rows {
+            let r = root_from_link.rotation.to_rotation_matrix();
+            for c in 0..3 {
+                a[(row, c)] = root_from_link.translation.vector[c];
+                for l in 0..3 {
+                    a[(row, 4 + 9 * k + 3 * c + l)] = r[(c, l)];
+                }
+                z[c][row] = seen[c] - mean_z[c];
+            }
+            a[(row, 3)] = 1.0;
+            row += 1;
+        }
+    }
+    let solutions: Vec<DVector<f64>> = z
+        .iter()
+        .map(|z| solve_least_squares(&a, z, RANK).x)
+        .collect();
+    let linear = Matrix3::from_fn(|j, k| solutions[j][k]);
+    // Points far from the robot's root carry R in B as well: B_jkl = R_jk p_l.
+    let mut evidence = linear;
+    for point in 0..tracked.len() {
+        let b = |j: usize, k: usize, l: usize| solutions[j][4 + 9 * point + 3 * k + l];
+        // p_l up to the scale of R: project on the current guess of R where there is one.
+        if let Some(r) = so3::nearest_rotation(&evidence) {
+            let r = r.to_rotation_matrix();
+            let p = Vector3::from_fn(|l, _| {
+                (0..9)
+                    .map(|i| r[(i / 3, i % 3)] * b(i / 3, i % 3, l))
+                    .sum::<f64>()
+                    / 3.0
+            });
+            evidence += Matrix3::from_fn(|j, k| (0..3).map(|l| b(j, k, l) * p[l]).sum());
+        }
+    }
+    let rotation = so3::nearest_rotation(&evidence)?;
+    let r = rotation.to_rotation_matrix();
+    // With R known the rest is linear: z − R t_i = (R R_i) p + t.
+    let mut a = DMatrix::zeros(3 * rows, 3 + 3 * tracked.len());
+    let mut b = DVector::zeros(3 * rows);
+    let mut row = 0;
+    for (k, point) in tracked.iter().enumerate() {
+        for (root_from_link, seen) in &point.rows {
+            let turned = r.matrix() * root_from_link.rotation.to_rotation_matrix().matrix();
+            let rest = seen.coords - rotation * root_from_link.translation.vector;
+            for j in 0..3 {
+                a[(row, j)] = 1.0;
+                for l in 0..3 {
+                    a[(row, 3 + 3 * k + l)] = turned[(j, l)];
+                }
+                b[row] = rest[j];
+                row += 1;
+            }
+        }
+    }
+    let x = solve_least_squares(&a, &b, RANK).x;
+    Some(Isometry3::from_parts(
+        Translation3::new(x[0], x[1], x[2]),
+        rotation,
+    ))
+}

@@ -1,0 +1,155 @@
+//! Touches: loops that close through a plane, a line, a point or a ball bar instead of through the tracker.
+//!
+//! The touched thing has a frame of its own with z along its normal or direction. With p the touching point in it,
+//!
+//! ```text
+//! plane p_z = 0     line p_x = p_y = 0     point p = 0     distance |p| = ℓ                 (1)
+//! ```
+//!
+//! Its place and the point are unknowns where the profile gives them a prior.
+
+use calib_core::{Chart, Head, HeadKind, MarkerObservation, NoiseKind, Role};
+use calib_profile::{Contact, ContactBase, Touched};
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::formulate::kinematics::Calibration;
+use crate::formulate::ml::Stated;
+use crate::prepare::load::Inputs;
+
+/// Adds every contact of the profile to the problem.
+pub fn add_contacts(stated: &mut Stated, inputs: &Inputs) {
+    let profile = &inputs.robot.profile;
+    for (name, tip) in &profile.points {
+        let Some(link) = stated.links[tip.link.index()] else {
+            continue;
+        };
+        let point = match tip.sigma {
+            Some(sigma) => stated
+                .problem
+                .unknown_point(name, link, tip.at, Some(sigma)),
+            None => stated.problem.known_point(name, link, tip.at),
+        };
+        stated.tips.insert(name.clone(), point);
+    }
+    for (name, contact) in &profile.contacts {
+        let base = match contact.on {
+            ContactBase::Tracker => Some(stated.tracker),
+            ContactBase::Link(link) => stated.links[link.index()],
+        };
+        let Some(&point) = stated.tips.get(&contact.point) else {
+            continue;
+        };
+        let carrier = profile.points[&contact.point].link;
+        let (Some(base), Some(link)) = (base, stated.links[carrier.index()]) else {
+            continue;
+        };
+        let touches: Vec<usize> = stated
+            .samples
+            .iter()
+            .enumerate()
+            .filter(|(_, (recording, _))| contact.recordings.contains(recording))
+            .map(|(sample, _)| sample)
+            .collect();
+        let problem = &mut stated.problem;
+        let place_frame = problem.frame(&format!("{name}.place"));
+        let place = problem.unknown(
+            &format!("{name}.place"),
+            base,
+            place_frame,
+            contact.base_from_place,
+            place_chart(contact),
+        );
+        problem.set_role(place, Role::World, None);
+        problem.set_prior(place, contact.place_sigma_rad, contact.place_sigma);
+        let noise = problem.noise_group(
+            &format!("contact {name}"),
+            NoiseKind::Position,
+            contact.sigma,
+            !profile.solve.noise.known,
+        );
+        let kind = match contact.touched {
+            Touched::Plane => HeadKind::Plane {
+                point,
+                normal: Vector3::z_axis(),
+                noise,
+                observations: touches.into_iter().map(|s| (s, 0.0)).collect(),
+            },
+            Touched::Line => HeadKind::Line {
+                point,
+                through: Point3::origin(),
+                direction: Vector3::z_axis(),
+                noise,
+                samples: touches,
+            },
+            Touched::Point => HeadKind::Markers {
+                noise,
+                observations: touches
+                    .into_iter()
+                    .map(|sample| MarkerObservation {
+                        sample,
+                        point,
+                        position: Point3::origin(),
+                        shape: None,
+                    })
+                    .collect(),
+            },
+            Touched::Distance(distance) => HeadKind::Distance {
+                point,
+                anchor: Point3::origin(),
+                noise,
+                observations: touches.into_iter().map(|s| (s, distance)).collect(),
+            },
+        };
+        problem.add_head(Head {
+            name: name.clone(),
+            from: place_frame,
+            to: link,
+            path: None,
+            kind,
+        });
+        stated.contacts.insert(name.clone(), place);
+    }
+}
+
+/// The directions of the touched thing that equation (1) can tell, where the profile frees them.
+fn place_chart(contact: &Contact) -> Chart {
+    let (shift, turn) = (
+        contact.place_sigma.is_some(),
+        contact.place_sigma_rad.is_some(),
+    );
+    Chart::of(match contact.touched {
+        Touched::Plane => [turn, turn, false, false, false, shift],
+        Touched::Line => [turn, turn, false, shift, shift, false],
+        Touched::Point | Touched::Distance(_) => [false, false, false, shift, shift, shift],
+    })
+}
+
+/// How far a touch misses, by equation (1): predicted − touched, tracker frame, m; `None` where the robot knows no
+/// such contact.
+#[must_use]
+pub fn miss(
+    inputs: &Inputs,
+    name: &str,
+    robot: &Calibration,
+    root_from_link: &[Isometry3<f64>],
+) -> Option<Vector3<f64>> {
+    let profile = &inputs.robot.profile;
+    let contact = profile.contacts.get(name)?;
+    let carrier = profile.points.get(&contact.point)?.link;
+    let tracker_from_base = match contact.on {
+        ContactBase::Tracker => Isometry3::identity(),
+        ContactBase::Link(link) => robot.tracker_from_root * root_from_link[link.index()],
+    };
+    let tracker_from_place = tracker_from_base * robot.places.get(name)?;
+    let tip = robot.tips.get(&contact.point)?;
+    let touching = robot.tracker_from_root * root_from_link[carrier.index()] * tip;
+    let p = tracker_from_place.inverse_transform_point(&touching).coords;
+    let off = match contact.touched {
+        Touched::Plane => Vector3::new(0.0, 0.0, p.z),
+        Touched::Line => Vector3::new(p.x, p.y, 0.0),
+        Touched::Point => p,
+        Touched::Distance(distance) if p.norm() > 0.0 => p * (1.0 - distance / p.norm()),
+        Touched::Distance(distance) => Vector3::new(0.0, 0.0, -distance),
+    };
+    Some(tracker_from_place.rotation * off)
+}

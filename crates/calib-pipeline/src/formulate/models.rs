@@ -1,0 +1,146 @@
+//! `calib run --compare-models`: which physics the recordings support, by leave-one-pose-out.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use calib_core::{RankedVariant, Settings, compare_with};
+use calib_profile::Free;
+use serde_json::json;
+
+use crate::error::PipelineError;
+use crate::estimate::start::start;
+use crate::formulate::kinematics::Loads;
+use crate::formulate::ml::{Freedom, state};
+use crate::prepare::checks;
+use crate::prepare::load::{Inputs, load_recordings, load_robot};
+use crate::prepare::tracks::body_tracks;
+
+/// Models in order of growth; each adds to the one before.
+const STEPS: [(&str, &[Free]); 8] = [
+    ("registration only", &[]),
+    ("+ joint offsets", &[Free::JointOffsets]),
+    ("+ joint axes", &[Free::JointAxes]),
+    ("+ compliance", &[Free::Compliance]),
+    ("+ lateral compliance", &[Free::LateralCompliance]),
+    ("+ backlash", &[Free::Backlash]),
+    ("+ eccentricity", &[Free::Eccentricity]),
+    ("+ gains", &[Free::JointGains]),
+];
+
+/// Ranks the models on the fitted recordings alone; validation recordings are not looked at. `progress(stage, done, all)`
+/// is told what is done next, and how many of all models are fitted; `all` is 0 until they are stated.
+///
+/// # Errors
+/// [`PipelineError`] as for a run; data errors stop unless `force`.
+pub fn compare_models(
+    profile: &Path,
+    force: bool,
+    progress: &mut dyn FnMut(&str, usize, usize),
+) -> Result<Vec<RankedVariant>, PipelineError> {
+    let mut inputs = load_recordings(load_robot(profile)?, true)?;
+    let mut findings = inputs.findings.clone();
+    if inputs.robot.profile.solve.robust {
+        findings.extend(crate::prepare::relabel::relabel(&mut inputs));
+    }
+    findings.extend(checks::check(&inputs));
+    if checks::stops(&findings) && !force {
+        return Err(crate::run::stopped(&inputs, &findings));
+    }
+    inputs
+        .recordings
+        .retain(|_, r| r.spec.usage != calib_profile::Usage::Validation);
+    let tracks = body_tracks(&inputs, &mut findings)?;
+    let start = start(&inputs, &tracks);
+    let loaded = is_loaded(&inputs);
+    let mut free: BTreeSet<Free> = [Free::Bodies, Free::Tracker].into();
+    let mut variants = Vec::new();
+    for (name, added) in STEPS {
+        let needs_load = added
+            .iter()
+            .any(|f| matches!(f, Free::Compliance | Free::LateralCompliance));
+        if needs_load && !loaded {
+            continue;
+        }
+        free.extend(added.iter().copied());
+        inputs.robot.profile.solve.free.clone_from(&free);
+        let freedom = if added.is_empty() {
+            Freedom::RegistrationOnly
+        } else {
+            Freedom::Profile
+        };
+        progress(&format!("state model: {name}"), 0, 0);
+        variants.push((
+            name.to_owned(),
+            state(&inputs, &tracks, &start, freedom).problem,
+        ));
+    }
+    let all = variants.len();
+    let stage = |done: usize| match variants.get(done) {
+        Some((name, _)) => format!("fit and predict each pose from the others: {name}"),
+        None => "rank".to_owned(),
+    };
+    progress(&stage(0), 0, all);
+    Ok(compare_with(
+        &variants,
+        &Settings::default(),
+        calib_core::Criterion::LogDensity,
+        &mut |done| progress(&stage(done), done, all),
+    )?)
+}
+
+/// Whether gravity loads any joint in any fitted pose.
+fn is_loaded(inputs: &Inputs) -> bool {
+    let poses = inputs
+        .recordings
+        .values()
+        .flat_map(|r| r.q.iter().flatten());
+    poses.take(1).any(|q| {
+        Loads::at(&inputs.robot.model, q)
+            .about_axis
+            .iter()
+            .any(|t| *t != 0.0)
+    })
+}
+
+/// The ranking for people.
+#[must_use]
+pub fn table(ranked: &[RankedVariant]) -> String {
+    let mut text = String::from(
+        "model                   known  left-out rms   worse by ± s.e. [nats per pose]\n",
+    );
+    for r in ranked {
+        let _ = writeln!(
+            text,
+            "{} {:<21} {:>5}  {:>9.3} mm   {:>7.3} ± {:.3}",
+            if r.chosen { "*" } else { " " },
+            r.name,
+            r.parameters,
+            r.loo_rms * 1e3,
+            r.worse_by,
+            r.standard_error
+        );
+    }
+    if let Some(chosen) = ranked.iter().find(|r| r.chosen) {
+        let _ = writeln!(
+            text,
+            "\n* the smallest model within one standard error of the best: {}",
+            chosen.name
+        );
+        if !chosen.noise_parameters.is_empty() {
+            let _ = writeln!(
+                text,
+                "  {} parameters are not told from zero (under two sigma); --json names them",
+                chosen.noise_parameters.len()
+            );
+        }
+    }
+    text
+}
+
+/// The ranking for machines.
+#[must_use]
+pub fn json(ranked: &[RankedVariant]) -> String {
+    let value = json!({ "models": ranked });
+    calib_report::json::pretty(&calib_report::json::rounded(value)) + "\n"
+}

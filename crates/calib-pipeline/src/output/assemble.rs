@@ -1,0 +1,641 @@
+//! Everything that was found, as the report's data. Renderers compute nothing; this does.
+
+use std::collections::BTreeMap;
+
+use calib_core::{Gauge, RejectReason};
+use calib_profile::{Limits, Method, Usage};
+use calib_recording::Finding;
+use calib_report::{
+    EstimatorResult, FitSummary, HeldOut, Input, JointCoverage, Limit, LoopClosure, Lost, Meaning,
+    NotObservable, Output, Parameter, RecordingSummary, RecordingUse, Rejected, Report,
+    ResidualRow, Residuals, Term, Transform, Unit, Verdict, Verification, judge, number,
+};
+
+use crate::estimate::paper::OriginEstimate;
+use crate::formulate::kinematics::Calibration;
+use crate::formulate::ml::MlFit;
+use crate::output::export::{Found, PatchedUrdf};
+use crate::output::write::OutputFile;
+use crate::prepare::load::Inputs;
+use crate::prepare::tracks::BodyTrack;
+use crate::verify::accuracy::{accuracy_limits, workspace};
+use crate::verify::residuals::subject;
+
+/// What the report is made of.
+#[derive(Debug)]
+pub struct Evidence<'a> {
+    /// Profile, robot, recordings.
+    pub inputs: &'a Inputs,
+    /// Body tracks.
+    pub tracks: &'a BTreeMap<String, BodyTrack>,
+    /// How it was solved.
+    pub method: Method,
+    /// Data checks and what the stages noticed.
+    pub findings: &'a [Finding],
+    /// Closed forms.
+    pub origins: &'a BTreeMap<String, OriginEstimate>,
+    /// Transforms found.
+    pub found: &'a [Found],
+    /// The fit, with `method: ml`.
+    pub fit: Option<&'a MlFit>,
+    /// The calibrated robot.
+    pub robot: &'a Calibration,
+    /// Loop closures.
+    pub loops: Vec<LoopClosure>,
+    /// Held-out errors.
+    pub held_out: Option<HeldOut>,
+    /// The patched description.
+    pub urdf: &'a PatchedUrdf,
+    /// Files that do not depend on the report, and what they are.
+    pub written: &'a [(OutputFile, String)],
+    /// Residuals of the fit.
+    pub residuals: &'a [ResidualRow],
+}
+
+/// The report of a run.
+#[must_use]
+pub fn assemble(e: &Evidence<'_>) -> Report {
+    let profile = &e.inputs.robot.profile;
+    let file = &e.inputs.robot.file;
+    let limits = limits(&profile.solve.limits, e);
+    let mut verdict = judge(&limits);
+    // What decided: with an exceeded limit the others do not matter.
+    let decided = |l: &&Limit| match verdict {
+        Verdict::Accepted => true,
+        Verdict::Rejected => l.outcome == calib_report::Outcome::Exceeded,
+        Verdict::NotEvaluated => l.outcome == calib_report::Outcome::NotEvaluated,
+    };
+    let mut reasons: Vec<String> = limits.iter().filter(decided).map(reason).collect();
+    if limits.is_empty() {
+        reasons.push(
+            "the profile names no limits (`solve.limits`), so nothing could be accepted".to_owned(),
+        );
+    }
+    for (name, origin) in e.origins {
+        if origin.pose.is_none() && e.method == Method::Paper {
+            verdict = Verdict::Rejected;
+            reasons.insert(0, format!("origin `{name}` is not observable in its sweep"));
+        }
+    }
+    if let Some(fit) = e.fit
+        && !fit.solution.status.is_converged()
+    {
+        verdict = Verdict::Rejected;
+        reasons.insert(
+            0,
+            format!("the solver did not converge: {}", status_words(fit)),
+        );
+    }
+    let goodness = e.fit.and_then(|fit| fit.solution.goodness_of_fit());
+    let missing = goodness.map(|g| g.missing).unwrap_or_default();
+    let workspace = e.fit.and_then(|fit| workspace(e.inputs, fit));
+    let findings = findings(e, &missing);
+    Report {
+        profile: file.clone(),
+        robot: profile.robot.clone(),
+        method: match e.method {
+            Method::Paper => calib_report::Method::Paper,
+            Method::Ml => calib_report::Method::Ml,
+        },
+        verdict,
+        reasons,
+        scope: scope(e),
+        limits,
+        next_steps: next_steps(e, verdict, &missing),
+        transforms: e.found.iter().map(transform).collect(),
+        parameters: e.fit.map_or_else(Vec::new, parameters),
+        changes: e.urdf.changes.clone(),
+        urdf_diff: e.urdf.diff.clone(),
+        not_observable: e.fit.map_or_else(Vec::new, not_observable),
+        loops: e.loops.clone(),
+        verification: Verification {
+            held_out: e.held_out.clone(),
+            outcome: match (&e.held_out, verdict) {
+                (None, _) | (_, Verdict::NotEvaluated) => calib_report::Outcome::NotEvaluated,
+                (_, Verdict::Accepted) => calib_report::Outcome::Met,
+                (_, Verdict::Rejected) => calib_report::Outcome::Exceeded,
+            },
+            reason: if e.held_out.is_none() {
+                "the profile names no validation recording".to_owned()
+            } else {
+                String::new()
+            },
+        },
+        estimators: estimators(e),
+        fit: e.fit.map(fit_summary),
+        residuals: Residuals::from_rows(e.residuals),
+        noise: e.fit.map_or_else(Vec::new, |fit| noise(e, fit)),
+        clocks: crate::prepare::clock::clocks(e.inputs, e.fit),
+        recordings: recordings(e),
+        coverage: coverage(e.inputs),
+        rejected: rejected(e.inputs, e.fit),
+        accuracy_limits: e
+            .fit
+            .map_or_else(Vec::new, |fit| accuracy_limits(e, fit, workspace.as_ref())),
+        workspace,
+        findings,
+        inputs: e
+            .inputs
+            .digests
+            .iter()
+            .map(|d| Input {
+                path: d.path.clone(),
+                sha256: d.sha256.clone(),
+            })
+            .collect(),
+        outputs: outputs(e),
+        reproduce: vec![reproduce(e)],
+        undo: vec![format!(
+            "calib revert {} --out original.urdf",
+            profile.outputs.urdf
+        )],
+        seed: 0,
+        data_information: e
+            .fit
+            .map(|fit| crate::verify::information::data_information(e.inputs, fit)),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        ..Report::default()
+    }
+}
+
+/// The command that gives this report again, with the method where it is not the profile's.
+fn reproduce(e: &Evidence<'_>) -> String {
+    let file = &e.inputs.robot.file;
+    match e.method {
+        method if method == e.inputs.robot.profile.solve.method => format!("calib run {file}"),
+        Method::Paper => format!("calib run {file} --method paper"),
+        Method::Ml => format!("calib run {file} --method ml"),
+    }
+}
+
+fn reason(limit: &Limit) -> String {
+    match (limit.outcome, limit.value) {
+        (calib_report::Outcome::NotEvaluated, _) | (_, None) => {
+            format!("{}: not evaluated: {}", limit.quantity, limit.reason)
+        }
+        (outcome, Some(value)) => format!(
+            "{}: {}, limit {} ({})",
+            limit.quantity,
+            number::plain(value, limit.unit),
+            number::plain(limit.limit, limit.unit),
+            outcome.word()
+        ),
+    }
+}
+
+fn limits(limits: &Limits, e: &Evidence<'_>) -> Vec<Limit> {
+    let calibrated = e.held_out.as_ref().and_then(|h| h.calibrated);
+    let mut out = Vec::new();
+    let mut held_out = |name: &str, quantity: &str, limit: Option<f64>, value: Option<f64>| {
+        let Some(limit) = limit else { return };
+        out.push(match value {
+            Some(value) => Limit::evaluated(name, quantity, Unit::Metre, limit, value),
+            None => Limit::not_evaluated(name, quantity, Unit::Metre, limit, "no validation poses"),
+        });
+    };
+    held_out(
+        "held_out_rms_mm",
+        "rms position error on held-out poses",
+        limits.held_out_rms,
+        calibrated.map(|c| c.rms_m),
+    );
+    held_out(
+        "held_out_max_mm",
+        "largest position error on held-out poses",
+        limits.held_out_max,
+        calibrated.map(|c| c.max_m),
+    );
+    for (name, limit) in &limits.loop_mean {
+        let closed = e.loops.iter().find(|l| l.name == *name);
+        held_out(
+            &format!("loop_mean_mm.{name}"),
+            &format!("mean translation error of loop `{name}`"),
+            Some(*limit),
+            closed.map(|l| l.translation_m.mean),
+        );
+    }
+    if let Some(limit) = limits.origin_sigma {
+        for f in e.found {
+            let sigma = f
+                .covariance
+                .map(|c| c.fixed_view::<3, 3>(3, 3).trace().max(0.0).sqrt());
+            held_out(
+                "origin_sigma_mm",
+                &format!("standard deviation of the position of `{}`", f.name),
+                Some(limit),
+                sigma,
+            );
+        }
+    }
+    out
+}
+
+fn scope(e: &Evidence<'_>) -> Vec<String> {
+    let profile = &e.inputs.robot.profile;
+    let what = if profile.bodies.is_empty() {
+        "what was touched".to_owned()
+    } else {
+        format!(
+            "positions of the tracked bodies in the tracker's frame `{}`",
+            profile.tracker.frame
+        )
+    };
+    let mut scope = vec![format!(
+        "{what}, in the joint ranges and at the load of the recordings"
+    )];
+    if e.robot.effects.iter().any(|j| !j.fits_into_urdf()) {
+        scope.push(format!(
+            "only with the joint effects of `{}` applied as well; the URDF alone cannot hold them",
+            crate::output::export::calibration_name(&e.inputs.robot.profile.outputs.urdf)
+        ));
+    }
+    if e.method == Method::Paper {
+        scope.push("origins are estimated one by one (method: paper); the robot's own geometry is taken as described".to_owned());
+    }
+    scope
+}
+
+fn next_steps(e: &Evidence<'_>, verdict: Verdict, missing: &[String]) -> Vec<String> {
+    let mut steps = Vec::new();
+    match verdict {
+        Verdict::Accepted => steps.push(format!(
+            "use `{}`; keep this folder: it holds what is needed to take it back",
+            e.inputs.robot.profile.outputs.urdf
+        )),
+        Verdict::Rejected => {
+            steps.push("do not use the result before the reasons above are gone".to_owned())
+        }
+        Verdict::NotEvaluated => {
+            steps.push("record validation poses and name limits, then run again".to_owned())
+        }
+    }
+    if let Some(first) = missing.first() {
+        steps.push(format!("free in the profile what is missing: {first}"));
+    }
+    if let Some(worst) = e
+        .findings
+        .iter()
+        .filter(|f| f.severity >= calib_recording::Severity::Warning)
+        .max_by_key(|f| f.severity)
+    {
+        steps.push(format!(
+            "{} ({}): {}",
+            worst.subject, worst.id, worst.remedy
+        ));
+    }
+    if e.method == Method::Paper {
+        steps.push("solve with `method: ml` to use all recordings at once".to_owned());
+    }
+    steps
+}
+
+fn transform(found: &Found) -> Transform {
+    Transform::new(
+        &found.name,
+        &found.parent,
+        &found.child,
+        &found.pose,
+        found.covariance.as_ref(),
+        found.status,
+    )
+    .with_unobservable(found.unobservable.clone())
+}
+
+fn unit(unit: calib_core::Unit) -> Unit {
+    match unit {
+        calib_core::Unit::Metre => Unit::Metre,
+        calib_core::Unit::Radian => Unit::Radian,
+        calib_core::Unit::Second => Unit::Second,
+        calib_core::Unit::One => Unit::One,
+        calib_core::Unit::RadianPerNewtonMetre => Unit::RadianPerNewtonMetre,
+        calib_core::Unit::MetrePerNewton => Unit::MetrePerNewton,
+    }
+}
+
+fn parameters(fit: &MlFit) -> Vec<Parameter> {
+    let held = |i: usize| fit.stated.problem.parameters()[i].fixed;
+    let all = fit
+        .solution
+        .parameters
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| !held(*i));
+    all.map(|(_, p)| Parameter {
+        name: p.name.clone(),
+        joint: p.joint.clone(),
+        kind: serde_json::to_value(p.kind)
+            .ok()
+            .and_then(|v| v.as_str().map(str::to_owned))
+            .unwrap_or_default(),
+        unit: unit(p.unit),
+        nominal: p.nominal,
+        value: p.value,
+        sigma: p.sigma,
+        data_share: Some(p.data_share),
+        class: match p.class {
+            calib_core::ParameterClass::Solid => calib_report::Class::Solid,
+            calib_core::ParameterClass::Weak => calib_report::Class::Weak,
+            calib_core::ParameterClass::Prior => calib_report::Class::Prior,
+            calib_core::ParameterClass::NotObservable => calib_report::Class::NotObservable,
+        },
+    })
+    .collect()
+}
+
+fn not_observable(fit: &MlFit) -> Vec<NotObservable> {
+    let mut out: Vec<NotObservable> = fit
+        .solution
+        .observability
+        .null
+        .iter()
+        .map(|d| NotObservable {
+            meaning: match d.gauge {
+                Gauge::WorldAgainstBase
+                | Gauge::OffsetAgainstOwnOrigin
+                | Gauge::OffsetAgainstNeighbour
+                | Gauge::SlideAlongAxis
+                | Gauge::TurnAboutAxis
+                | Gauge::ParallelAxes
+                | Gauge::ToolAgainstLastOrigin
+                | Gauge::MarkersAgainstMount => Meaning::Convention,
+                // With other motion or another mark it would show.
+                _ => Meaning::NotMeasured,
+            },
+            subject: d.terms.first().map_or_else(String::new, |t| t.name.clone()),
+            direction: d
+                .terms
+                .iter()
+                .map(|t| Term {
+                    parameter: t.name.clone(),
+                    coefficient: t.amount,
+                })
+                .collect(),
+            text: d.text.clone(),
+            remedy: d.remedy.clone(),
+        })
+        .collect();
+    for joint in &fit.solution.observability.unmoved {
+        out.push(NotObservable {
+            meaning: Meaning::NotMeasured,
+            subject: joint.clone(),
+            direction: Vec::new(),
+            text: format!(
+                "joint `{joint}` never moved in the fitted recordings: it is held as described"
+            ),
+            remedy: "move it in a sweep or in static poses".to_owned(),
+        });
+    }
+    out
+}
+
+fn status_words(fit: &MlFit) -> String {
+    let iterations = match fit.solution.iterations {
+        1 => "1 iteration".to_owned(),
+        n => format!("{n} iterations"),
+    };
+    if fit.solution.status.is_converged() {
+        format!("converged after {iterations}")
+    } else {
+        format!("{:?} after {iterations}", fit.solution.status)
+    }
+}
+
+fn fit_summary(fit: &MlFit) -> FitSummary {
+    let s = &fit.solution;
+    FitSummary {
+        status: status_words(fit),
+        converged: s.status.is_converged(),
+        iterations: s.iterations,
+        observations: s.weights.iter().filter(|w| **w > 0.0).count(),
+        unknowns: s.model.free(),
+        chi2_per_dof: Some(s.chi2_stated / s.degrees_of_freedom.max(1.0)),
+    }
+}
+
+fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
+    let profile = &e.inputs.robot.profile;
+    let stated = |name: &str| match name {
+        "marker" => profile.tracker.marker_sigma,
+        "body position" => profile.tracker.body_sigma,
+        "body orientation" => profile.tracker.body_sigma_rad,
+        _ => profile.solve.noise.joint,
+    };
+    fit.solution
+        .noise
+        .iter()
+        .map(|n| calib_report::Noise {
+            group: n.name.clone(),
+            unit: match n.kind {
+                calib_core::NoiseKind::Position => Unit::Metre,
+                _ => Unit::Radian,
+            },
+            sigma: Some(n.sigma),
+            stated: stated(&n.name),
+            samples: fit.solution.weights.iter().filter(|w| **w > 0.0).count(),
+            text: if n.estimated {
+                "variance components (REML)".to_owned()
+            } else {
+                "as stated".to_owned()
+            },
+        })
+        .collect()
+}
+
+fn recordings(e: &Evidence<'_>) -> Vec<RecordingSummary> {
+    let mut out = Vec::new();
+    for (name, r) in &e.inputs.recordings {
+        let mut lost = Vec::new();
+        for (marker, track) in &r.poses.markers {
+            lost.push(Lost {
+                subject: marker.clone(),
+                lost: track.iter().filter(|p| p.is_none()).count(),
+                of: track.len(),
+            });
+        }
+        for (body, track) in &r.poses.bodies {
+            lost.push(Lost {
+                subject: body.clone(),
+                lost: track.iter().filter(|p| p.is_none()).count(),
+                of: track.len(),
+            });
+        }
+        lost.retain(|l| l.lost > 0);
+        let whole_rows = r.q.iter().filter(|q| q.is_none()).count();
+        out.push(RecordingSummary {
+            name: name.clone(),
+            path: r.spec.file.clone(),
+            used_for: match r.spec.usage {
+                Usage::Sweep => RecordingUse::Sweep,
+                Usage::Static => RecordingUse::Static,
+                Usage::Validation => RecordingUse::Validation,
+            },
+            rows: r.poses.len(),
+            used: r.poses.len() - whole_rows,
+            rejected: whole_rows,
+            lost,
+            conversions: r.meta.conversions.clone(),
+            up_axis: r.meta.up_axis.clone(),
+        });
+    }
+    out
+}
+
+fn coverage(inputs: &Inputs) -> Vec<JointCoverage> {
+    let model = &inputs.robot.model;
+    let mut out = Vec::new();
+    for id in model.independent_joints() {
+        let joint = model.joint(id);
+        let fitted = inputs
+            .recordings
+            .values()
+            .filter(|r| r.spec.usage != Usage::Validation);
+        let recorded = fitted.filter(|r| r.poses.joints.contains_key(&joint.name));
+        let positions: Vec<f64> = recorded
+            .flat_map(|r| r.q.iter().flatten().map(|q| q[id.index()]))
+            .collect();
+        let unit = if joint.kind.turns() {
+            Unit::Radian
+        } else {
+            Unit::Metre
+        };
+        let continuous = matches!(joint.kind, calib_urdf::JointKind::Continuous { .. });
+        let range = joint.limits.range().filter(|_| !continuous);
+        out.extend(JointCoverage::of(&joint.name, unit, range, &positions));
+    }
+    out
+}
+
+fn rejected(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Rejected> {
+    let mut groups: BTreeMap<(String, String, &str), Vec<u64>> = BTreeMap::new();
+    for out in &inputs.excluded {
+        let row = inputs.recordings.get(&out.recording);
+        if let Some(row) = row.and_then(|r| r.poses.rows.get(out.row)) {
+            groups
+                .entry((out.recording.clone(), out.body.clone(), &out.reason))
+                .or_default()
+                .push(*row);
+        }
+    }
+    for (fit, r) in fit
+        .into_iter()
+        .flat_map(|fit| fit.solution.rejected.iter().map(move |r| (fit, r)))
+    {
+        let (recording, row) = &fit.stated.samples[r.sample];
+        let reason = match r.reason {
+            RejectReason::Swap => "swap: it lies where another marker of the body should be",
+            RejectReason::Occlusion => "occlusion: a measured pose on its way was lost",
+            RejectReason::Outlier => "outlier: further off than noise explains",
+            RejectReason::NotSettled => "not settled: the whole body is off, or a wrong reading",
+        };
+        let row = inputs.recordings[recording].poses.rows[*row];
+        groups
+            .entry((recording.clone(), subject(fit, &r.head, r.item), reason))
+            .or_default()
+            .push(row);
+    }
+    groups
+        .into_iter()
+        .map(|((recording, subject, reason), rows)| Rejected {
+            recording,
+            subject,
+            rows,
+            reason: reason.to_owned(),
+        })
+        .collect()
+}
+
+fn findings(e: &Evidence<'_>, missing: &[String]) -> Vec<calib_report::Finding> {
+    let mut findings: Vec<calib_report::Finding> = e
+        .findings
+        .iter()
+        .map(|f| calib_report::Finding {
+            id: f.id.to_owned(),
+            severity: match f.severity {
+                calib_recording::Severity::Info => calib_report::Severity::Info,
+                calib_recording::Severity::Warning => calib_report::Severity::Warning,
+                calib_recording::Severity::Error => calib_report::Severity::Error,
+            },
+            subject: f.subject.clone(),
+            rows: f.rows.clone(),
+            text: f.text.clone(),
+            remedy: f.remedy.clone(),
+        })
+        .collect();
+    for missing in missing {
+        findings.push(calib_report::Finding {
+                id: "missing-physics".to_owned(),
+                severity: calib_report::Severity::Warning,
+                subject: "fit".to_owned(),
+                rows: Vec::new(),
+                text: missing.clone(),
+                remedy: "free the effect under `solve.free` or `solve.joints`, and compare the held-out errors".to_owned(),
+            });
+    }
+    findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
+    findings
+}
+
+/// The closed forms against the result, and against each other.
+fn estimators(e: &Evidence<'_>) -> Vec<EstimatorResult> {
+    let mut out = Vec::new();
+    for (name, origin) in e.origins {
+        out.extend(origin.estimators.iter().cloned());
+        let Some(pose) = origin.pose.filter(|_| e.method == Method::Ml) else {
+            continue;
+        };
+        let body = &e.inputs.robot.profile.origins[name].body;
+        let Some(found) = e
+            .found
+            .iter()
+            .find(|f| f.name == format!("{body}_from_{name}"))
+        else {
+            continue;
+        };
+        let difference = crate::estimate::paper::difference(&found.pose, &pose);
+        let combined = found.covariance.zip(origin.covariance).map(|(a, b)| a + b);
+        /// Squared Mahalanobis distance that two estimates of one pose stay under in 99.9 % (χ² with 6 degrees).
+        const AGREES: f64 = 22.46;
+        let z2 = combined
+            .and_then(nalgebra::Cholesky::new)
+            .map(|c| difference.0.dot(&c.solve(&difference.0)));
+        out.push(EstimatorResult {
+            quantity: format!("{body}_from_{name}"),
+            estimator: "paper (closed forms)".to_owned(),
+            value: Some(pose.translation.vector.as_slice().to_vec()),
+            sigma: origin
+                .covariance
+                .map(|c| (3..6).map(|i| c[(i, i)].max(0.0).sqrt()).collect()),
+            agrees: z2.is_some_and(|z2| z2 <= AGREES),
+            unit: Unit::Metre,
+            distance: Some((pose.translation.vector - found.pose.translation.vector).norm()),
+            text: format!(
+                "orientation {} apart",
+                number::plain(difference.angular().norm(), Unit::Radian)
+            ),
+        });
+    }
+    out
+}
+
+/// The files of a run: what they are, and their digests where they do not depend on the report itself.
+fn outputs(e: &Evidence<'_>) -> Vec<Output> {
+    let urdf = &e.inputs.robot.profile.urdf;
+    let written = e.written.iter().map(|(file, what)| Output {
+        path: file.name.clone(),
+        what: (*what).to_owned(),
+        sha256: Some(calib_urdf::sha256_hex(&file.bytes)),
+        changes: (file.name == e.inputs.robot.profile.outputs.urdf).then(|| urdf.clone()),
+    });
+    let own = [
+        ("report.md", "this report as Markdown"),
+        ("report.json", "this report as data"),
+        ("report.html", "this report as a page"),
+    ];
+    let own = own.map(|(path, what)| Output {
+        path: path.to_owned(),
+        what: what.to_owned(),
+        sha256: None,
+        changes: None,
+    });
+    written.chain(own).collect()
+}

@@ -1,0 +1,100 @@
+//! Data checks before anything is fitted: what the recordings say against what the profile asks.
+
+use std::collections::BTreeMap;
+
+use calib_profile::{BodyKind, Usage};
+use calib_recording::checks::{Expectations, checks, held_out_in_training};
+use calib_recording::rigid_body::Template;
+use calib_recording::{Finding, Severity};
+
+use crate::prepare::conditions::missing_torques;
+use crate::prepare::load::{Inputs, Loaded};
+
+/// Fewest rows of a recording that a fit can use: a sphere has four unknowns, and one row must check it.
+const MIN_POSES: usize = 5;
+
+/// All findings of all recordings, recordings in order, the subject led by the recording's name.
+#[must_use]
+pub fn check(inputs: &Inputs) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (name, loaded) in &inputs.recordings {
+        for mut finding in checks(&loaded.poses, &expectations(inputs, loaded)) {
+            let said = |earlier: &&mut Finding| {
+                earlier.id == "missing-marker"
+                    && earlier.text == finding.text
+                    && earlier.subject.ends_with(&format!(": {}", finding.subject))
+            };
+            // A name that is wrong in the profile is wrong for every recording: it is said once.
+            if let Some(earlier) = findings.iter_mut().find(said) {
+                let body = format!(": {}", finding.subject);
+                let of = earlier.subject.trim_end_matches(&body).to_owned();
+                earlier.subject = format!("{of}, {name}{body}");
+                continue;
+            }
+            finding.subject = format!("{name}: {}", finding.subject);
+            findings.push(finding);
+        }
+    }
+    let is = |r: &&Loaded, validation: bool| (r.spec.usage == Usage::Validation) == validation;
+    for held_out in inputs.recordings.values().filter(|r| is(r, true)) {
+        for training in inputs.recordings.values().filter(|r| is(r, false)) {
+            if let Some(mut finding) = held_out_in_training(&held_out.poses, &training.poses) {
+                finding.subject = format!("{} in {}", held_out.name, training.name);
+                findings.push(finding);
+            }
+        }
+    }
+    findings.extend(missing_torques(inputs));
+    findings
+}
+
+/// Whether a finding forbids to go on.
+#[must_use]
+pub fn stops(findings: &[Finding]) -> bool {
+    findings.iter().any(|f| f.severity == Severity::Error)
+}
+
+fn expectations(inputs: &Inputs, loaded: &Loaded) -> Expectations {
+    let model = &inputs.robot.model;
+    let profile = &inputs.robot.profile;
+    let name = |id: &calib_urdf::JointId| model.joint(*id).name.clone();
+    let mut bodies = BTreeMap::new();
+    let mut templates = BTreeMap::new();
+    for (body, spec) in &profile.bodies {
+        if let BodyKind::Markers { names, template } = &spec.kind
+            && names.iter().any(|m| loaded.poses.markers.contains_key(m))
+        {
+            bodies.insert(body.clone(), names.clone());
+            if let Some(points) = template {
+                templates.insert(
+                    body.clone(),
+                    Template {
+                        names: names.clone(),
+                        points: points.clone(),
+                    },
+                );
+            }
+        }
+    }
+    Expectations {
+        bodies,
+        templates,
+        limits: model
+            .joint_ids()
+            .filter_map(|id| Some((name(&id), model.joint(id).limits.range()?)))
+            .collect(),
+        asked: loaded
+            .spec
+            .ranges
+            .iter()
+            .map(|(id, range)| (name(id), *range))
+            .collect(),
+        reach: None,
+        min_poses: if loaded.spec.usage == Usage::Validation {
+            1
+        } else {
+            MIN_POSES
+        },
+        marker_sigma: profile.tracker.marker_sigma,
+    }
+}

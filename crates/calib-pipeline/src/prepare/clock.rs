@@ -1,0 +1,256 @@
+//! What is left of the clocks' offset after the alignment, estimated with everything else.
+//!
+//! A row of a motion has joint values of the time τ that the alignment gives. If the true time is τ + c₀ + c₁ u, u from −1
+//! at the recording's first row to 1 at its last, every joint was at
+//!
+//! ```text
+//! φ = q(τ) + q̇(τ) (c₀ + c₁ u)                                                                        (1)
+//! ```
+//!
+//! so one c₀ and one c₁ are shared by all joints of a recording ([`calib_core::FeatureKind::ClockOffset`]).
+
+use calib_core::{FeatureKind, Parameter, ParameterId, ParameterKind, Unit};
+use calib_profile::Usage;
+use calib_report::Clock;
+
+use crate::formulate::ml::{Freedom, MlFit, Stated};
+use crate::prepare::align::ClockState;
+use crate::prepare::load::{Inputs, Loaded};
+
+/// Prior σ of c₀ and c₁, s: ten times what the alignment leaves on a bad recording.
+const PRIOR: f64 = 5e-3;
+
+/// The clocks of one recording as the whole fit sees them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClockEstimate {
+    /// Tracker minus robot in the middle of the recording, s.
+    pub offset: f64,
+    /// Its standard deviation, s.
+    pub sigma: Option<f64>,
+    /// How much faster the tracker's clock runs, 1 (5e-5 = 50 ppm).
+    pub drift: f64,
+    /// Its standard deviation.
+    pub drift_sigma: Option<f64>,
+}
+
+fn offset_name(recording: &str) -> String {
+    format!("{recording}.clock_offset")
+}
+
+fn drift_name(recording: &str) -> String {
+    format!("{recording}.clock_drift")
+}
+
+/// First and last time, s, of the rows; `None` without time or with one row.
+fn span(loaded: &Loaded) -> Option<(f64, f64)> {
+    let t = loaded.poses.t.as_ref()?;
+    let (first, last) = (*t.first()?, *t.last()?);
+    (last > first).then_some((first, last))
+}
+
+/// u of equation (1).
+fn position(loaded: &Loaded, row: usize) -> Option<f64> {
+    let (first, last) = span(loaded)?;
+    let t = *loaded.poses.t.as_ref()?.get(row)?;
+    Some((2.0 * t - first - last) / (last - first))
+}
+
+/// Frees c₀ and c₁ of every fitted recording whose clocks were found from its motion; where the clocks are one, or
+/// declared so, the offset is only offered to the test for missing physics.
+pub fn add_clocks(stated: &mut Stated, inputs: &Inputs, freedom: Freedom) {
+    for (name, loaded) in &inputs.recordings {
+        if loaded.spec.usage == Usage::Validation || loaded.velocities.is_empty() {
+            continue;
+        }
+        let Some(alignment) = &loaded.alignment else {
+            continue;
+        };
+        let found = matches!(alignment.clocks, ClockState::Found { .. });
+        let mut parameters: Option<[ParameterId; 2]> = None;
+        for (joint, speeds) in &loaded.velocities {
+            let Some(edge) = inputs
+                .robot
+                .model
+                .joint_id(joint)
+                .ok()
+                .and_then(|id| stated.joints[id.index()])
+            else {
+                continue;
+            };
+            let regressor = |weight: &dyn Fn(usize) -> f64| -> Vec<f64> {
+                let value = |(recording, row): &(String, usize)| {
+                    if recording != name {
+                        return 0.0;
+                    }
+                    speeds.get(*row).copied().flatten().unwrap_or(0.0) * weight(*row)
+                };
+                stated.samples.iter().map(value).collect()
+            };
+            let constant = regressor(&|_| 1.0);
+            if !found || freedom == Freedom::RegistrationOnly {
+                let problem = &mut stated.problem;
+                problem.candidate(edge, FeatureKind::ClockOffset, constant);
+                continue;
+            }
+            let linear = regressor(&|row| position(loaded, row).unwrap_or(0.0));
+            let problem = &mut stated.problem;
+            let [offset, drift] = *parameters.get_or_insert_with(|| {
+                [offset_name(name), drift_name(name)].map(|name| {
+                    problem.parameter(Parameter {
+                        name,
+                        joint: None,
+                        kind: ParameterKind::ClockOffset,
+                        unit: Unit::Second,
+                        nominal: 0.0,
+                        start: 0.0,
+                        prior_sigma: Some(PRIOR),
+                        bounds: None,
+                        fixed: false,
+                    })
+                })
+            });
+            problem.share_feature(edge, FeatureKind::ClockOffset, Some(constant), offset);
+            problem.share_feature(edge, FeatureKind::ClockOffset, Some(linear), drift);
+        }
+    }
+}
+
+/// Value and σ of a parameter.
+fn estimate(fit: &MlFit, name: &str) -> Option<(f64, Option<f64>)> {
+    let found = fit.solution.parameters.iter().find(|p| p.name == name)?;
+    Some((found.value, found.sigma))
+}
+
+/// The clocks of a recording: from the fit where it estimates them, else from the alignment; `None` where nothing was
+/// estimated.
+#[must_use]
+pub fn clock_estimate(loaded: &Loaded, fit: Option<&MlFit>) -> Option<ClockEstimate> {
+    let ClockState::Found { map, .. } = &loaded.alignment.as_ref()?.clocks else {
+        return None;
+    };
+    let aligned = ClockEstimate {
+        offset: map.offset,
+        sigma: Some(map.offset_sigma),
+        drift: map.drift,
+        drift_sigma: Some(map.drift_sigma),
+    };
+    let (Some(fit), Some((first, last))) = (fit, span(loaded)) else {
+        return Some(aligned);
+    };
+    let both = (
+        estimate(fit, &offset_name(&loaded.name)),
+        estimate(fit, &drift_name(&loaded.name)),
+    );
+    let (Some((c0, sigma)), Some((c1, drift_sigma))) = both else {
+        return Some(aligned);
+    };
+    let (middle, half) = (0.5 * (first + last), 0.5 * (last - first));
+    Some(ClockEstimate {
+        offset: middle - map.to_b(middle) - c0,
+        sigma,
+        drift: map.drift - c1 / half,
+        drift_sigma: drift_sigma.map(|s| s / half),
+    })
+}
+
+/// The inputs with joint values at the times that the fit found, for residuals and predictions.
+#[must_use]
+pub fn corrected(inputs: &Inputs, fit: &MlFit) -> Inputs {
+    let mut inputs = inputs.clone();
+    let model = &inputs.robot.model;
+    for (name, loaded) in &mut inputs.recordings {
+        let (Some((c0, _)), Some((c1, _))) = (
+            estimate(fit, &offset_name(name)),
+            estimate(fit, &drift_name(name)),
+        ) else {
+            continue;
+        };
+        let places: Vec<Option<f64>> = (0..loaded.q.len())
+            .map(|row| position(loaded, row))
+            .collect();
+        for (joint, speeds) in &loaded.velocities {
+            let Ok(id) = model.joint_id(joint) else {
+                continue;
+            };
+            for (row, q) in loaded.q.iter_mut().enumerate() {
+                let (Some(q), Some(speed), Some(u)) =
+                    (q, speeds.get(row).copied().flatten(), places[row])
+                else {
+                    continue;
+                };
+                q[id.index()] += speed * (c0 + c1 * u);
+            }
+        }
+    }
+    inputs
+}
+
+/// The report's answer to "did the clocks agree?", recording by recording.
+#[must_use]
+pub fn clocks(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Clock> {
+    let untimed = inputs
+        .recordings
+        .values()
+        .all(|r| r.poses.t.is_none() && r.alignment.is_none());
+    if untimed {
+        return vec![Clock {
+            recording: "all".to_owned(),
+            clock: "tracker".to_owned(),
+            against: "joints".to_owned(),
+            agrees: Some(true),
+            text: "static poses, joints and tracker in one row: the clocks do not matter"
+                .to_owned(),
+            ..Clock::default()
+        }];
+    }
+    inputs
+        .recordings
+        .values()
+        .map(|r| {
+            aligned_clock(r, fit).unwrap_or_else(|| Clock {
+                recording: r.name.clone(),
+                clock: "tracker".to_owned(),
+                against: "joints".to_owned(),
+                agrees: r.poses.t.is_none().then_some(true),
+                text: if r.poses.t.is_none() {
+                    "static poses: the clocks do not matter".to_owned()
+                } else {
+                    "joints and tracker share the rows of one table; their offset was not tested"
+                        .to_owned()
+                },
+                ..Clock::default()
+            })
+        })
+        .collect()
+}
+
+/// The clocks of a recording whose rows were made from streams.
+fn aligned_clock(r: &Loaded, fit: Option<&MlFit>) -> Option<Clock> {
+    let alignment = r.alignment.as_ref()?;
+    let estimate = clock_estimate(r, fit);
+    let mut text = alignment.text();
+    if let Some(clock) = estimate.filter(|_| alignment.holds.is_none()) {
+        text += &format!(
+            "; with all loops {:+.4} s ± {:.2} ms in the middle, {:+.0} ± {:.0} ppm: taken into account",
+            clock.offset,
+            clock.sigma.unwrap_or_default() * 1e3,
+            clock.drift * 1e6,
+            clock.drift_sigma.unwrap_or_default() * 1e6
+        );
+    } else if estimate.is_some() {
+        text += "; in a hold the rest of the offset does not matter"
+            .to_owned()
+            .as_str();
+    }
+    Some(Clock {
+        recording: r.name.clone(),
+        clock: alignment.tracker_clock.clone(),
+        against: alignment.robot_clock.clone(),
+        offset_s: estimate.map(|c| c.offset),
+        sigma_s: estimate.and_then(|c| c.sigma),
+        drift: estimate.map(|c| c.drift),
+        drift_sigma: estimate.and_then(|c| c.drift_sigma),
+        agrees: Some(true),
+        text,
+    })
+}

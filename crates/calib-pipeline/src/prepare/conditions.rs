@@ -1,0 +1,91 @@
+//! What a joint reading alone does not say: from which side each joint came, and which torques were measured.
+
+use calib_profile::Load;
+use calib_recording::{Finding, Severity};
+use calib_urdf::RobotModel;
+
+use crate::prepare::load::{Inputs, Loaded};
+
+/// A joint that moves less than this from one row to the next keeps its direction of approach, rad or m.
+const STILL: f64 = 1e-5;
+
+/// The circumstances of one row. The default knows nothing: the middle of all play, loads by gravity.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Conditions {
+    /// Direction in which each joint moved last, by joint index: +1, −1, or 0 where no row before tells.
+    pub approach: Vec<f64>,
+    /// Measured torque about each joint's axis, N m, by joint index; `None`: gravity on the description's masses.
+    pub torque: Option<Vec<f64>>,
+}
+
+impl Conditions {
+    /// Direction of approach of one joint.
+    #[must_use]
+    pub fn approach_of(&self, joint: usize) -> f64 {
+        self.approach.get(joint).copied().unwrap_or(0.0)
+    }
+}
+
+/// Joints that moved in a recording whose load is to be measured, and was not.
+#[must_use]
+pub fn missing_torques(inputs: &Inputs) -> Vec<Finding> {
+    if inputs.robot.profile.solve.load != Load::Measured {
+        return Vec::new();
+    }
+    let mut findings = Vec::new();
+    for (name, loaded) in &inputs.recordings {
+        let recorded = loaded.poses.joints.keys();
+        let without: Vec<&str> = recorded
+            .filter(|j| !loaded.poses.torques.contains_key(*j))
+            .map(String::as_str)
+            .collect();
+        if !without.is_empty() {
+            findings.push(Finding::new(
+                "torque-missing",
+                Severity::Warning,
+                name,
+                format!(
+                    "`load: measured`, but the recording has no torque of {}: taken as no load",
+                    without.join(", ")
+                ),
+                "record a column `<joint>_nm`, map one under `columns`, or use `load: gravity`",
+            ));
+        }
+    }
+    findings
+}
+
+/// Circumstances of every row of a recording, whose rows are taken in the order in which they were recorded.
+#[must_use]
+pub fn conditions(loaded: &Loaded, model: &RobotModel, load: Load) -> Vec<Conditions> {
+    let n = model.joints().len();
+    let mut approach = vec![0.0; n];
+    let mut before: Option<&Vec<f64>> = None;
+    let mut out = Vec::with_capacity(loaded.q.len());
+    for (row, q) in loaded.q.iter().enumerate() {
+        if let (Some(q), Some(before)) = (q, before) {
+            for (direction, (now, then)) in approach.iter_mut().zip(q.iter().zip(before)) {
+                if (now - then).abs() > STILL {
+                    *direction = (now - then).signum();
+                }
+            }
+        }
+        if let Some(q) = q {
+            before = Some(q);
+        }
+        let torque = (load == Load::Measured).then(|| {
+            let mut torque = vec![0.0; n];
+            for (joint, column) in &loaded.poses.torques {
+                if let (Ok(id), Some(Some(value))) = (model.joint_id(joint), column.get(row)) {
+                    torque[id.index()] = *value;
+                }
+            }
+            torque
+        });
+        out.push(Conditions {
+            approach: approach.clone(),
+            torque,
+        });
+    }
+    out
+}

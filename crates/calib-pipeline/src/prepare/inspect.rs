@@ -1,0 +1,184 @@
+//! `calib check`, the schemas, and the renderings that the command line prints.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use calib_recording::{Finding, Severity};
+use calib_report::Report;
+
+use crate::error::{ExitCode, PipelineError};
+use crate::estimate::estimators::Estimators;
+use crate::estimate::start::start;
+use crate::prepare::checks;
+use crate::prepare::load::{Inputs, load_recordings, load_robot};
+use crate::prepare::model_checks;
+use crate::prepare::relabel::relabel;
+use crate::prepare::tracks::body_tracks;
+
+/// What `calib check` found.
+#[derive(Debug, Clone)]
+pub struct Checked {
+    /// Robot name.
+    pub robot: String,
+    /// One line per recording.
+    pub recordings: Vec<String>,
+    /// Findings, worst first.
+    pub findings: Vec<Finding>,
+}
+
+/// Checks a profile, its robot and its recordings; solves nothing.
+///
+/// # Errors
+/// [`PipelineError`] for what cannot be read at all.
+pub fn check(profile: &Path) -> Result<Checked, PipelineError> {
+    let mut inputs = load_recordings(load_robot(profile)?, true)?;
+    let mut findings = inputs.findings.clone();
+    if inputs.robot.profile.solve.robust {
+        findings.extend(relabel(&mut inputs));
+    }
+    let of_data = checks::check(&inputs);
+    // A column written twice does not keep the others from being compared with the robot, row by row.
+    let wrong = of_data
+        .iter()
+        .any(|f| f.severity == Severity::Error && f.id != "duplicate-column");
+    findings.extend(of_data);
+    match body_tracks(&inputs, &mut findings) {
+        Ok(tracks) => {
+            let start = start(&inputs, &tracks);
+            let of_model = model_checks::before_the_fit(&inputs, &tracks, &start);
+            let wrong = wrong || checks::stops(&of_model);
+            findings.extend(of_model);
+            if !wrong && inputs.robot.profile.solve.robust {
+                findings.extend(model_checks::bad_rows_of_inputs(&inputs, &tracks)?.findings);
+            }
+        }
+        // What the data checks found is the reason.
+        Err(_) if wrong => {}
+        Err(error) => return Err(error),
+    }
+    findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
+    Ok(Checked {
+        robot: inputs.robot.profile.robot.clone(),
+        recordings: lines(&inputs),
+        findings,
+    })
+}
+
+fn lines(inputs: &Inputs) -> Vec<String> {
+    let line = |r: &crate::prepare::load::Loaded| {
+        let usage = match r.spec.usage {
+            calib_profile::Usage::Sweep => "sweep",
+            calib_profile::Usage::Static => "static poses",
+            calib_profile::Usage::Validation => "validation",
+        };
+        let mut line = format!(
+            "{} ({usage}): {} rows, {} joints, {} bodies, {} markers",
+            r.name,
+            r.poses.len(),
+            r.poses.joints.len(),
+            r.poses.bodies.len(),
+            r.poses.markers.len()
+        );
+        if let Some(alignment) = &r.alignment {
+            line += "\n    ";
+            line += &alignment.text();
+        }
+        line
+    };
+    inputs.recordings.values().map(line).collect()
+}
+
+impl Checked {
+    /// For people.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = format!("{}\n", self.robot);
+        for line in &self.recordings {
+            let _ = writeln!(text, "  {line}");
+        }
+        if self.findings.is_empty() {
+            text.push_str("no findings\n");
+        }
+        for f in &self.findings {
+            let severity = match f.severity {
+                Severity::Info => "info",
+                Severity::Warning => "warning",
+                Severity::Error => "error",
+            };
+            let _ = write!(text, "{severity}[{}] {}", f.id, f.subject);
+            if !f.rows.is_empty() {
+                let shown: Vec<String> = f.rows.iter().take(8).map(u64::to_string).collect();
+                let more = if f.rows.len() > 8 {
+                    format!(" and {} more", f.rows.len() - 8)
+                } else {
+                    String::new()
+                };
+                let _ = write!(text, " (rows {}{more})", shown.join(", "));
+            }
+            let _ = writeln!(text, "\n  {}\n  help: {}", f.text, f.remedy);
+        }
+        text
+    }
+
+    /// For machines.
+    ///
+    /// # Errors
+    /// [`PipelineError::Report`] when a number has no JSON form.
+    pub fn json(&self) -> Result<String, PipelineError> {
+        let value = serde_json::json!({ "robot": self.robot, "recordings": self.recordings, "findings": self.findings });
+        let mut text = calib_report::json::pretty(&value);
+        text.push('\n');
+        Ok(text)
+    }
+
+    /// 3 with an error among the findings, else 0.
+    #[must_use]
+    pub fn exit_code(&self) -> ExitCode {
+        if checks::stops(&self.findings) {
+            ExitCode::Data
+        } else {
+            ExitCode::Accepted
+        }
+    }
+}
+
+/// `report.json` of a report.
+///
+/// # Errors
+/// [`PipelineError::Report`].
+pub fn report_json(report: &Report) -> Result<String, PipelineError> {
+    Ok(calib_report::json::report_json(report)?)
+}
+
+/// The summary that `calib run` prints.
+#[must_use]
+pub fn summary(report: &Report, colour: bool) -> String {
+    calib_report::terminal::summary(report, colour)
+}
+
+/// JSON Schema of `report.json`.
+#[must_use]
+pub fn report_schema() -> String {
+    calib_report::json::pretty(&calib_report::report_schema()) + "\n"
+}
+
+/// JSON Schema of the scene.
+#[must_use]
+pub fn scene_schema() -> String {
+    calib_report::json::pretty(&calib_report::scene_schema()) + "\n"
+}
+
+/// JSON Schemas of all parameters, by kind and name; with a profile, its plugins too.
+///
+/// # Errors
+/// [`PipelineError`] when the profile cannot be read or a plugin cannot be loaded.
+pub fn parameter_schemas(profile: Option<&Path>) -> Result<String, PipelineError> {
+    let estimators = match profile {
+        Some(path) => {
+            let robot = load_robot(path)?;
+            Estimators::of_profile(&robot.profile, &robot.folder, true)?
+        }
+        None => Estimators::built_in()?,
+    };
+    Ok(calib_report::json::pretty(&estimators.parameter_schemas()) + "\n")
+}

@@ -1,0 +1,679 @@
+//! Data checks that need the robot's model: before the fit its nominal motion, after it the rows that it cannot explain.
+//!
+//! Before: a body's motion against that of its link ([`calib_recording::checks::model`]), and where they disagree, which
+//! single mistake would explain it: the sign or the order of joint columns, their unit, another link, joint values
+//! of other rows, the order of a quaternion. After: a row that the robust fit left out is compared with the motion to
+//! its neighbours,
+//!
+//! ```text
+//! e(q_i + f (q_k − q_i)),   k = i ± 1,   f minimises |e|                                              (1)
+//! ```
+//!
+//! If a fraction f of the way to another row makes the row right, joints and tracker were read at different times, or the
+//! robot had not settled. e is the body's pose error, rotation and position in units of what is usual.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use calib_geometry::so3;
+use calib_profile::{BodyKind, UpAxis, Usage};
+use calib_recording::checks::model::{
+    GOOD_ENOUGH, Prediction, better_explanation, disagreement, quaternion_order, spoiled_rows,
+    up_axis,
+};
+use calib_recording::{Finding, Severity};
+use calib_urdf::{JointId, LinkId};
+use nalgebra::{Isometry3, Vector6};
+
+use crate::error::PipelineError;
+use crate::estimate::start::{Start, start};
+use crate::formulate::ml::{self, Freedom, MlFit};
+use crate::prepare::conditions::{Conditions, conditions};
+use crate::prepare::load::{Excluded, Inputs, Loaded};
+use crate::prepare::tracks::BodyTrack;
+
+/// A joint that moves less than this, rad or m, has no sign and no order.
+const MOVED: f64 = 0.02;
+/// Tilt of a robot's base that its feet explain, rad (20°).
+const BASE_TILT: f64 = 0.35;
+/// Median disagreement, rad (11°), that no error of a robot's description reaches.
+const NOT_ITS_MOTION: f64 = 0.2;
+/// Rows of a body from which its motion says anything.
+const ENOUGH_ROWS: usize = 8;
+/// Rows by which joint values may lag in a table.
+const LAGS: [isize; 4] = [-2, -1, 1, 2];
+/// What (1) may leave of a row's squared error: by chance a direction of six takes that much in 1 of 150 rows.
+const LEFT: f64 = 0.2;
+/// Largest part of the way to a neighbour: beyond it the row would belong to the other posture.
+const LARGEST_FRACTION: f64 = 0.5;
+/// A row that is off by this many times the usual is named although no motion explains it.
+const FAR_OFF: f64 = 3.0;
+/// One joint alone explains a row when it leaves no more than this of the squared error.
+const ONE_JOINT_LEFT: f64 = 0.3;
+/// Median and σ of the length of a Gaussian 3-vector: √χ²₃(½).
+const MEDIAN_OF_THREE: f64 = 1.538;
+
+/// What the nominal robot says of each recording.
+#[must_use]
+pub fn before_the_fit(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    start: &Start,
+) -> Vec<Finding> {
+    let mut findings: Vec<Finding> = Vec::new();
+    let mut known: BTreeSet<(String, &str)> = BTreeSet::new();
+    for (name, body) in &inputs.robot.profile.bodies {
+        // Recording by recording: in a sweep of other joints a mistake does not show.
+        for loaded in inputs.recordings.values() {
+            let motion = Motion::of(loaded, &tracks[name]);
+            if motion.seen.iter().flatten().count() < ENOUGH_ROWS {
+                continue;
+            }
+            let nominal = motion.poses_of(inputs, body.link, &|q| q);
+            let off = disagreement(&motion.seen, &nominal);
+            let explained = off.filter(|off| *off > GOOD_ENOUGH).and_then(|off| {
+                explain(inputs, name, body.link, &motion, &nominal)
+                    .or_else(|| moves_alone(inputs, name, body.link, off))
+            });
+            match explained {
+                // One mistake shows in several recordings; it is said once.
+                Some(mut finding) => {
+                    if known.insert((name.clone(), finding.id)) {
+                        finding.subject = format!("{}: {name}", loaded.name);
+                        findings.push(finding);
+                    }
+                }
+                None => findings.extend(spoiled(inputs, name, body.link, loaded, &tracks[name])),
+            }
+        }
+    }
+    wrong_joint_values(&mut findings, inputs);
+    for (name, loaded) in &inputs.recordings {
+        // What the person says counts more than what the exporter wrote.
+        let stated = inputs.robot.profile.tracker.up_axis.map(UpAxis::name);
+        let declared = stated.or(loaded.meta.up_axis.as_deref());
+        let tilted = declared.and_then(|axis| up_axis(axis, &start.tracker_from_root, BASE_TILT));
+        findings.extend(tilted.map(|mut finding| {
+            finding.subject.clone_from(name);
+            finding
+        }));
+    }
+    findings
+}
+
+/// Rows in which several bodies seem to flip at once: not the bodies are wrong there, but what the joints are said to be.
+fn wrong_joint_values(findings: &mut Vec<Finding>, inputs: &Inputs) {
+    for recording in inputs.recordings.keys() {
+        let of_flip = |f: &Finding| {
+            f.id == "body-flip" && f.subject.split(':').next() == Some(recording.as_str())
+        };
+        let mut count: BTreeMap<u64, usize> = BTreeMap::new();
+        for row in findings.iter().filter(|f| of_flip(f)).flat_map(|f| &f.rows) {
+            *count.entry(*row).or_default() += 1;
+        }
+        count.retain(|_, bodies| *bodies > 1);
+        if count.is_empty() {
+            continue;
+        }
+        for finding in findings.iter_mut().filter(|f| of_flip(f)) {
+            finding.rows.retain(|row| !count.contains_key(row));
+        }
+        findings.retain(|f| !of_flip(f) || !f.rows.is_empty());
+        let text = format!(
+            "in {} rows several bodies disagree with the robot's model at once",
+            count.len()
+        );
+        let remedy = "the joint values of these rows are wrong: correct or drop them";
+        let finding = Finding::new("row-outlier", Severity::Error, recording, text, remedy);
+        findings.push(finding.at_rows(count.into_keys()));
+    }
+}
+
+/// A body whose motion has nothing to do with its link's.
+fn moves_alone(inputs: &Inputs, name: &str, link: LinkId, off: f64) -> Option<Finding> {
+    (off > NOT_ITS_MOTION).then(|| {
+        let text = format!(
+            "it does not move with link `{}`: the motions disagree by {:.0}°, and no single mistake explains it",
+            inputs.robot.model.link(link).name,
+            off.to_degrees()
+        );
+        let remedy = "check the body's link, that its name is on the right body, and that joints and tracker recorded the same motion";
+        Finding::new("wrong-mount", Severity::Error, name, text, remedy)
+    })
+}
+
+/// One body in one recording.
+struct Motion<'a> {
+    loaded: &'a Loaded,
+    /// Row and joint positions.
+    rows: Vec<(usize, &'a Vec<f64>)>,
+    /// `tracker_from_body` per row.
+    seen: Vec<Option<Isometry3<f64>>>,
+}
+
+impl<'a> Motion<'a> {
+    fn of(loaded: &'a Loaded, track: &BodyTrack) -> Self {
+        let mut motion = Self {
+            loaded,
+            rows: Vec::new(),
+            seen: Vec::new(),
+        };
+        let poses = track.in_recording(&loaded.name);
+        for (row, q) in loaded.q.iter().enumerate() {
+            if let (Some(q), Some(seen)) = (q, poses.get(row)) {
+                motion.rows.push((row, q));
+                motion.seen.push(*seen);
+            }
+        }
+        motion
+    }
+
+    fn poses_of(
+        &self,
+        inputs: &Inputs,
+        link: LinkId,
+        change: &dyn Fn(Vec<f64>) -> Vec<f64>,
+    ) -> Vec<Isometry3<f64>> {
+        let model = &inputs.robot.model;
+        let pose = |q: &Vec<f64>| model.root_from_link(&change(q.clone()), link);
+        self.rows.iter().map(|(_, q)| pose(q)).collect()
+    }
+
+    /// The link at the joint values `by` rows later.
+    fn shifted(&self, inputs: &Inputs, link: LinkId, by: isize) -> Vec<Isometry3<f64>> {
+        let at = |(row, q): &(usize, &Vec<f64>)| {
+            let other = row
+                .checked_add_signed(by)
+                .and_then(|k| self.loaded.q.get(k)?.as_ref());
+            let model = &inputs.robot.model;
+            model.root_from_link(other.unwrap_or(q), link)
+        };
+        self.rows.iter().map(at).collect()
+    }
+
+    fn moved(&self, joint: JointId) -> bool {
+        let values = self.rows.iter().map(|(_, q)| q[joint.index()]);
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
+            (l.min(q), h.max(q))
+        });
+        high - low > MOVED
+    }
+}
+
+fn fitted(inputs: &Inputs) -> impl Iterator<Item = &Loaded> {
+    inputs
+        .recordings
+        .values()
+        .filter(|r| r.spec.usage != Usage::Validation)
+}
+
+/// The one mistake that explains a body's motion, if there is one.
+fn explain(
+    inputs: &Inputs,
+    name: &str,
+    link: LinkId,
+    motion: &Motion<'_>,
+    nominal: &[Isometry3<f64>],
+) -> Option<Finding> {
+    let model = &inputs.robot.model;
+    if inputs.robot.profile.bodies[name].kind == BodyKind::Pose
+        && let Some(finding) = quaternion_order(name, &motion.seen, nominal)
+    {
+        return Some(finding);
+    }
+    let moved: Vec<JointId> = model
+        .independent_joints()
+        .filter(|joint| motion.moved(*joint))
+        .collect();
+    let mut alternatives = Vec::new();
+    let mut add = |id, assumption: String, base_from_link| {
+        alternatives.push(Prediction {
+            assumption,
+            id,
+            base_from_link,
+        });
+    };
+    for joint in &moved {
+        let flip = |mut q: Vec<f64>| {
+            q[joint.index()] = -q[joint.index()];
+            q
+        };
+        let text = format!("joint `{}` with the other sign", model.joint(*joint).name);
+        add("joint-sign", text, motion.poses_of(inputs, link, &flip));
+    }
+    for (i, a) in moved.iter().enumerate() {
+        for b in &moved[..i] {
+            let (a_joint, b_joint) = (model.joint(*a), model.joint(*b));
+            if a_joint.kind.turns() == b_joint.kind.turns() {
+                let exchange = |mut q: Vec<f64>| {
+                    q.swap(a.index(), b.index());
+                    q
+                };
+                let text = format!("`{}` and `{}` exchanged", b_joint.name, a_joint.name);
+                add(
+                    "joint-order",
+                    text,
+                    motion.poses_of(inputs, link, &exchange),
+                );
+            }
+        }
+    }
+    for (factor, text) in [
+        (std::f64::consts::PI / 180.0, "all joint angles in degrees"),
+        (180.0 / std::f64::consts::PI, "all joint angles in radians"),
+    ] {
+        let scale = |mut q: Vec<f64>| {
+            for joint in moved.iter().filter(|j| model.joint(**j).kind.turns()) {
+                q[joint.index()] *= factor;
+            }
+            q
+        };
+        add(
+            "unit-mismatch",
+            text.to_owned(),
+            motion.poses_of(inputs, link, &scale),
+        );
+    }
+    for (factor, text) in [
+        (1e3, "the tracker's lengths a thousand times smaller"),
+        (1e-3, "the tracker's lengths a thousand times larger"),
+    ] {
+        let scaled = nominal.iter().map(|pose| {
+            let mut pose = *pose;
+            pose.translation.vector *= factor;
+            pose
+        });
+        add("unit-mismatch", text.to_owned(), scaled.collect());
+    }
+    for other in model.link_ids().filter(|other| *other != link) {
+        let rigid = |joint: &JointId| !moved.contains(joint);
+        // Links between which nothing moves cannot be told apart.
+        if model
+            .chain(link, other)
+            .iter()
+            .all(|step| rigid(&step.joint))
+        {
+            continue;
+        }
+        let text = format!("link `{}`", model.link(other).name);
+        add("wrong-mount", text, motion.poses_of(inputs, other, &|q| q));
+    }
+    for by in LAGS {
+        let side = if by < 0 { "before" } else { "after" };
+        let text = match by.abs() {
+            1 => format!("the joint values of the row {side}"),
+            rows => format!("the joint values {rows} rows {side}"),
+        };
+        add("clock-lag", text, motion.shifted(inputs, link, by));
+    }
+    let as_claimed = Prediction {
+        assumption: format!("link `{}`", model.link(link).name),
+        id: "",
+        base_from_link: nominal.to_vec(),
+    };
+    better_explanation(name, &motion.seen, &as_claimed, &alternatives)
+}
+
+/// Rows in which one body disagrees with the nominal robot.
+fn spoiled(
+    inputs: &Inputs,
+    name: &str,
+    link: LinkId,
+    loaded: &Loaded,
+    track: &BodyTrack,
+) -> Vec<Finding> {
+    let seen = track.in_recording(&loaded.name);
+    if seen.is_empty() || loaded.q.iter().any(Option::is_none) {
+        return Vec::new();
+    }
+    let model = &inputs.robot.model;
+    let poses: Vec<_> = loaded
+        .q
+        .iter()
+        .flatten()
+        .map(|q| model.root_from_link(q, link))
+        .collect();
+    let mut findings = spoiled_rows(&loaded.poses, name, seen, &poses);
+    for finding in &mut findings {
+        finding.subject = format!("{}: {name}", loaded.name);
+    }
+    findings
+}
+
+/// Rows that a fit cannot explain, and what is wrong with them.
+#[derive(Debug, Clone, Default)]
+pub struct BadRows {
+    /// For the report and for `calib check`.
+    pub findings: Vec<Finding>,
+    /// Rows that lie on the way to a neighbour: joints and tracker were not read at the same time.
+    pub unsettled: Vec<Excluded>,
+}
+
+/// The rows that a robust fit of the profile's model leaves out, for a check without a run.
+///
+/// # Errors
+/// [`PipelineError::Solve`] when the problem cannot be stated.
+pub fn bad_rows_of_inputs(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+) -> Result<BadRows, PipelineError> {
+    let start = start(inputs, tracks);
+    let stated = ml::state(inputs, tracks, &start, Freedom::Profile);
+    let fit = ml::fit(stated, inputs, &calib_core::Settings::default())?;
+    Ok(bad_rows(inputs, tracks, &fit))
+}
+
+/// What is wrong with the rows that `fit` left out.
+#[must_use]
+pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlFit) -> BadRows {
+    let mut bad = BadRows::default();
+    if !fit.solution.status.is_converged() {
+        return bad;
+    }
+    let rejected = rejected_bodies(fit);
+    let (model, load) = (&inputs.robot.model, inputs.robot.profile.solve.load);
+    let recordings = inputs.recordings.iter();
+    let conditions = recordings
+        .map(|(name, r)| (name.as_str(), conditions(r, model, load)))
+        .collect();
+    for name in inputs.robot.profile.bodies.keys() {
+        let off = BodyError {
+            inputs,
+            fit,
+            name,
+            track: &tracks[name],
+            conditions: &conditions,
+        };
+        let Some(usual) = off.usual(&rejected) else {
+            continue;
+        };
+        for (recording, loaded) in inputs
+            .recordings
+            .iter()
+            // Where rows follow each other in time, a lag is the clock's, and every row has one.
+            .filter(|(_, r)| r.spec.usage != Usage::Validation && r.alignment.is_none())
+        {
+            let (mut moving, mut others) = (Vec::new(), Vec::new());
+            for row in 0..loaded.q.len() {
+                if !rejected.contains(&(recording.clone(), row, name.clone())) {
+                    continue;
+                }
+                match off.between_rows(loaded, row, usual) {
+                    Some(on_the_way) => moving.push((row, on_the_way)),
+                    None => others.extend(off.far_off(loaded, row, usual).map(|w| (row, w))),
+                }
+            }
+            bad.findings
+                .extend(unsettled_finding(recording, name, loaded, &moving));
+            bad.findings
+                .extend(outlier_finding(recording, name, loaded, &others));
+            bad.unsettled.extend(moving.iter().map(|(row, _)| Excluded {
+                recording: recording.clone(),
+                row: *row,
+                body: name.clone(),
+                reason: "not settled: it lies on the way to a neighbouring row".to_owned(),
+            }));
+        }
+    }
+    bad
+}
+
+/// Recording, row and body where nothing that was seen of the body takes part.
+fn rejected_bodies(fit: &MlFit) -> BTreeSet<(String, usize, String)> {
+    let mut left_out: BTreeMap<(usize, &str), usize> = BTreeMap::new();
+    for r in &fit.solution.rejected {
+        *left_out.entry((r.sample, &r.head)).or_default() += 1;
+    }
+    let mut seen: BTreeMap<(usize, &str), usize> = BTreeMap::new();
+    for head in fit.stated.problem.heads() {
+        if let calib_core::HeadKind::Markers { observations, .. } = &head.kind {
+            for o in observations {
+                *seen.entry((o.sample, &head.name)).or_default() += 1;
+            }
+        }
+    }
+    left_out
+        .into_iter()
+        .filter(|(key, count)| seen.get(key).is_none_or(|all| count >= all))
+        .map(|((sample, head), _)| {
+            let (recording, row) = &fit.stated.samples[sample];
+            (recording.clone(), *row, head.to_owned())
+        })
+        .collect()
+}
+
+fn unsettled_finding(
+    recording: &str,
+    body: &str,
+    loaded: &Loaded,
+    moving: &[(usize, OnTheWay)],
+) -> Option<Finding> {
+    let (_, worst) = moving
+        .iter()
+        .max_by(|a, b| a.1.position.total_cmp(&b.1.position))?;
+    let text = format!(
+        "{} rows are off by up to {:.1} mm, {:.2}° and are right a part of the way to a neighbouring row ({:.1} % in the worst)",
+        moving.len(),
+        worst.position * 1e3,
+        moving
+            .iter()
+            .map(|(_, w)| w.angle)
+            .fold(0.0, f64::max)
+            .to_degrees(),
+        100.0 * worst.fraction.abs()
+    );
+    let remedy = "joints and tracker were read at different times, or the robot had not settled: these rows are left out; record again, in holds of a second";
+    let finding = Finding::new(
+        "unsettled-rows",
+        Severity::Warning,
+        format!("{recording}: {body}"),
+        text,
+        remedy,
+    );
+    Some(finding.at_rows(moving.iter().map(|(row, _)| loaded.poses.rows[*row])))
+}
+
+fn outlier_finding(
+    recording: &str,
+    body: &str,
+    loaded: &Loaded,
+    rows: &[(usize, FarOff)],
+) -> Option<Finding> {
+    let (_, worst) = rows.iter().max_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio))?;
+    let mut text = format!(
+        "{} rows are off by up to {:.1} mm, {:.2}°, {:.1} times what is usual; no motion between rows explains it",
+        rows.len(),
+        worst.position * 1e3,
+        worst.angle.to_degrees(),
+        worst.ratio
+    );
+    let joints: BTreeSet<&str> = rows
+        .iter()
+        .filter_map(|(_, w)| w.joint.as_deref())
+        .collect();
+    if !joints.is_empty() {
+        let joints: Vec<&str> = joints.into_iter().collect();
+        text += &format!("; joint {} alone would", joints.join(" or "));
+    }
+    let remedy =
+        "a wrong reading, or play of that joint: look at these rows; a robust fit leaves them out";
+    let finding = Finding::new(
+        "row-outlier",
+        Severity::Warning,
+        format!("{recording}: {body}"),
+        text,
+        remedy,
+    );
+    Some(finding.at_rows(rows.iter().map(|(row, _)| loaded.poses.rows[*row])))
+}
+
+/// A row that is right a part of the way to a neighbour.
+struct OnTheWay {
+    fraction: f64,
+    position: f64,
+    angle: f64,
+}
+
+/// A row that is far off.
+struct FarOff {
+    /// In units of the usual.
+    ratio: f64,
+    position: f64,
+    angle: f64,
+    /// The joint whose error alone would explain it.
+    joint: Option<String>,
+}
+
+/// Usual size of rotation, rad, and position, m, errors per component.
+type Usual = (f64, f64);
+
+/// What one row says of a body and of the joints.
+struct SeenRow<'a> {
+    seen: &'a Isometry3<f64>,
+    q: &'a [f64],
+    under: &'a Conditions,
+}
+
+/// The pose error of one body under a fit.
+struct BodyError<'a> {
+    inputs: &'a Inputs,
+    fit: &'a MlFit,
+    name: &'a str,
+    track: &'a BodyTrack,
+    /// From which side the joints came and what they held, by recording and row.
+    conditions: &'a BTreeMap<&'a str, Vec<Conditions>>,
+}
+
+impl<'a> BodyError<'a> {
+    /// Predicted ⊟ seen in body axes, `[rad; m]`, at joint positions `q`.
+    fn at(&self, row: &SeenRow<'_>, q: &[f64]) -> Option<Vector6<f64>> {
+        let robot = &self.fit.calibration;
+        let link = self.inputs.robot.profile.bodies[self.name].link;
+        let mount = robot.mounts.get(self.name)?;
+        let predicted = robot.tracker_from_root
+            * robot.root_from_link_under(q, row.under)[link.index()]
+            * mount;
+        let seen_from_predicted = row.seen.inverse() * predicted;
+        let w = so3::log(&seen_from_predicted.rotation);
+        let t = seen_from_predicted.translation.vector;
+        Some(Vector6::new(w.x, w.y, w.z, t.x, t.y, t.z))
+    }
+
+    fn weighted(&self, row: &SeenRow<'_>, q: &[f64], usual: Usual) -> Option<Vector6<f64>> {
+        let mut e = self.at(row, q)?;
+        for i in 0..3 {
+            e[i] /= usual.0;
+            e[i + 3] /= usual.1;
+        }
+        Some(e)
+    }
+
+    fn seen(&self, loaded: &'a Loaded, row: usize) -> Option<SeenRow<'a>> {
+        Some(SeenRow {
+            seen: self.track.in_recording(&loaded.name).get(row)?.as_ref()?,
+            q: loaded.q.get(row)?.as_ref()?,
+            under: self.conditions.get(loaded.name.as_str())?.get(row)?,
+        })
+    }
+
+    /// Robust size of the errors of the rows that take part; `None` below eight of them, or without a body frame.
+    fn usual(&self, rejected: &BTreeSet<(String, usize, String)>) -> Option<Usual> {
+        let (mut turns, mut shifts) = (Vec::new(), Vec::new());
+        for loaded in fitted(self.inputs) {
+            for row in 0..loaded.q.len() {
+                let key = (loaded.name.clone(), row, self.name.to_owned());
+                if rejected.contains(&key) {
+                    continue;
+                }
+                if let Some(e) = self
+                    .seen(loaded, row)
+                    .and_then(|seen| self.at(&seen, seen.q))
+                {
+                    turns.push(e.fixed_rows::<3>(0).norm());
+                    shifts.push(e.fixed_rows::<3>(3).norm());
+                }
+            }
+        }
+        /// Rows from which a median is worth something.
+        const ENOUGH: usize = 8;
+        let middle = |all: &mut Vec<f64>| {
+            all.sort_by(f64::total_cmp);
+            let median = all.get(all.len() / 2).copied()?;
+            (all.len() >= ENOUGH && median > 0.0).then_some(median / MEDIAN_OF_THREE)
+        };
+        Some((middle(&mut turns)?, middle(&mut shifts)?))
+    }
+
+    /// Part of the squared error that a step along `direction` leaves, with the step.
+    fn explained(&self, row: &SeenRow<'_>, direction: &[f64], usual: Usual) -> Option<(f64, f64)> {
+        /// Step of the difference quotient: a thousandth of the way.
+        const STEP: f64 = 1e-3;
+        let moved = |f: f64| -> Vec<f64> {
+            row.q
+                .iter()
+                .zip(direction)
+                .map(|(q, d)| q + f * d)
+                .collect()
+        };
+        let e = self.weighted(row, row.q, usual)?;
+        let slope = (self.weighted(row, &moved(STEP), usual)? - e) / STEP;
+        let size = slope.norm_squared();
+        if size <= 0.0 || e.norm_squared() <= 0.0 {
+            return None;
+        }
+        let step = -slope.dot(&e) / size;
+        let left = self.weighted(row, &moved(step), usual)?;
+        Some((step, left.norm_squared() / e.norm_squared()))
+    }
+
+    /// Equation (1).
+    fn between_rows(&self, loaded: &'a Loaded, row: usize, usual: Usual) -> Option<OnTheWay> {
+        let seen = self.seen(loaded, row)?;
+        let neighbours = [row.checked_sub(1), row.checked_add(1)];
+        let best = neighbours
+            .into_iter()
+            .flatten()
+            .filter_map(|k| loaded.q.get(k)?.as_ref())
+            .filter_map(|other| {
+                let way: Vec<f64> = other.iter().zip(seen.q).map(|(o, q)| o - q).collect();
+                self.explained(&seen, &way, usual)
+            })
+            .filter(|(fraction, left)| *left < LEFT && fraction.abs() < LARGEST_FRACTION)
+            .min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let e = self.at(&seen, seen.q)?;
+        Some(OnTheWay {
+            fraction: best.0,
+            position: e.fixed_rows::<3>(3).norm(),
+            angle: e.fixed_rows::<3>(0).norm(),
+        })
+    }
+
+    fn far_off(&self, loaded: &'a Loaded, row: usize, usual: Usual) -> Option<FarOff> {
+        let seen = self.seen(loaded, row)?;
+        let e = self.at(&seen, seen.q)?;
+        // √χ²₆(½) is what is usual.
+        let ratio = self.weighted(&seen, seen.q, usual)?.norm() / 2.313;
+        if ratio < FAR_OFF {
+            return None;
+        }
+        let model = &self.inputs.robot.model;
+        let link = self.inputs.robot.profile.bodies[self.name].link;
+        let joint = model
+            .chain_to_root(link)
+            .into_iter()
+            .filter(|joint| model.joint(*joint).kind.axis().is_some())
+            .filter_map(|joint| {
+                let mut only = vec![0.0; seen.q.len()];
+                only[joint.index()] = 1.0;
+                let (_, left) = self.explained(&seen, &only, usual)?;
+                Some((left, joint))
+            })
+            .filter(|(left, _)| *left < ONE_JOINT_LEFT)
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        Some(FarOff {
+            ratio,
+            position: e.fixed_rows::<3>(3).norm(),
+            angle: e.fixed_rows::<3>(0).norm(),
+            joint: joint.map(|(_, joint)| model.joint(joint).name.clone()),
+        })
+    }
+}

@@ -1,0 +1,193 @@
+//! Exchanged marker labels, put right in the recordings before anything else looks at them.
+//!
+//! The distances `d_ij` between the markers of a body do not depend on where it is. Over all recordings their medians are
+//! the reference; a row that disagrees with it, and agrees with exactly one other arrangement of its labels, gets that
+//! arrangement ([`calib_core::relabel`]). What is put right is said, row by row; what cannot be, is left to the data
+//! checks.
+
+use std::collections::BTreeMap;
+
+use calib_core::{HeadKind, MarkerObservation, NoiseKind, PointId, Problem};
+use calib_profile::BodyKind;
+use calib_recording::{Finding, Severity};
+use nalgebra::Point3;
+
+use crate::prepare::load::{Inputs, Loaded};
+
+/// Distances stay within this many σ: one Gaussian value in 10¹⁵ does not.
+const SIGMAS: f64 = 8.0;
+/// Smallest deviation of a distance that is called a fault, m.
+const SMALLEST_FAULT: f64 = 4e-4;
+
+/// Puts exchanged labels right in all recordings; one finding per recording and body with the rows.
+#[must_use]
+pub fn relabel(inputs: &mut Inputs) -> Vec<Finding> {
+    let bodies: Vec<(String, Vec<String>)> = inputs
+        .robot
+        .profile
+        .bodies
+        .iter()
+        .filter_map(|(name, body)| match &body.kind {
+            BodyKind::Markers { names, .. } if names.len() >= 3 => {
+                Some((name.clone(), names.clone()))
+            }
+            _ => None,
+        })
+        .collect();
+    let stated = inputs.robot.profile.tracker.marker_sigma;
+    let mut findings = Vec::new();
+    for (body, markers) in bodies {
+        findings.extend(relabel_body(
+            &mut inputs.recordings,
+            &body,
+            &markers,
+            stated,
+        ));
+    }
+    findings
+}
+
+fn relabel_body(
+    recordings: &mut BTreeMap<String, Loaded>,
+    body: &str,
+    markers: &[String],
+    stated: Option<f64>,
+) -> Vec<Finding> {
+    let rows: Vec<(String, usize)> = recordings
+        .iter()
+        .flat_map(|(name, r)| (0..r.poses.len()).map(|row| (name.clone(), row)))
+        .collect();
+    let mut problem = Problem::new(rows.len());
+    let (tracker, frame) = (problem.frame("tracker"), problem.frame(body));
+    let noise = problem.noise_group("marker", NoiseKind::Position, 1.0, false);
+    let points: Vec<PointId> = markers
+        .iter()
+        .map(|marker| problem.known_point(marker, frame, Point3::origin()))
+        .collect();
+    let mut observations = Vec::new();
+    // Marker of each observation, as the file has it.
+    let mut labels = Vec::new();
+    for (sample, (recording, row)) in rows.iter().enumerate() {
+        for (k, marker) in markers.iter().enumerate() {
+            let track = recordings[recording].poses.markers.get(marker);
+            if let Some(position) = track.and_then(|track| track[*row]) {
+                observations.push(MarkerObservation {
+                    sample,
+                    point: points[k],
+                    position,
+                    shape: None,
+                });
+                labels.push(k);
+            }
+        }
+    }
+    let Some(tolerance) = tolerance(&observations, &labels, markers.len(), stated) else {
+        return Vec::new();
+    };
+    problem.markers(body, tracker, frame, noise, observations);
+    let changed = calib_core::relabel(&mut problem, tolerance);
+    let Some(HeadKind::Markers { observations, .. }) = problem.heads().first().map(|h| &h.kind)
+    else {
+        return Vec::new();
+    };
+    // Recording → rows with the markers that were exchanged.
+    let mut found: BTreeMap<String, Vec<(u64, String)>> = BTreeMap::new();
+    for sample in changed {
+        let (recording, row) = &rows[sample.sample];
+        let Some(loaded) = recordings.get_mut(recording) else {
+            continue;
+        };
+        let mut exchanged: Vec<&str> = Vec::new();
+        for (item, point) in &sample.changes {
+            if let Some(k) = points.iter().position(|p| p == point)
+                && let Some(track) = loaded.poses.markers.get_mut(&markers[k])
+            {
+                track[*row] = Some(observations[*item].position);
+                exchanged.push(&markers[k]);
+            }
+        }
+        exchanged.sort_unstable();
+        let row = loaded.poses.rows[*row];
+        let entry = found.entry(recording.clone()).or_default();
+        entry.push((row, exchanged.join(" ↔ ")));
+    }
+    found
+        .into_iter()
+        .map(|(recording, rows)| finding(&recording, body, &rows))
+        .collect()
+}
+
+fn finding(recording: &str, body: &str, rows: &[(u64, String)]) -> Finding {
+    let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
+    for (_, exchanged) in rows {
+        *kinds.entry(exchanged).or_default() += 1;
+    }
+    let kinds: Vec<String> = kinds
+        .into_iter()
+        .map(|(exchanged, count)| format!("{exchanged} in {count}"))
+        .collect();
+    let text = format!(
+        "{} rows had exchanged labels, put right by the distances between the markers: {}",
+        rows.len(),
+        kinds.join(", ")
+    );
+    let remedy =
+        "nothing to do; a layout with clearly different distances keeps the tracker from it";
+    let finding = Finding::new(
+        "marker-swap-repaired",
+        Severity::Warning,
+        format!("{recording}: {body}"),
+        text,
+        remedy,
+    );
+    finding.at_rows(rows.iter().map(|(row, _)| *row))
+}
+
+/// Largest deviation of a distance that noise explains, m; `None` where no pair is seen often enough.
+fn tolerance(
+    observations: &[MarkerObservation],
+    labels: &[usize],
+    markers: usize,
+    stated: Option<f64>,
+) -> Option<f64> {
+    /// Rows from which a median deviation is worth something.
+    const ENOUGH: usize = 5;
+    /// σ of a Gaussian per median absolute deviation, 1 / Φ⁻¹(3/4).
+    const SIGMA_PER_MAD: f64 = 1.4826;
+    let mut distances: Vec<Vec<f64>> = vec![Vec::new(); markers * markers];
+    let mut start = 0;
+    for end in 1..=observations.len() {
+        if end < observations.len() && observations[end].sample == observations[start].sample {
+            continue;
+        }
+        for i in start..end {
+            for j in i + 1..end {
+                let distance = (observations[i].position - observations[j].position).norm();
+                distances[labels[i] * markers + labels[j]].push(distance);
+            }
+        }
+        start = end;
+    }
+    let mut sigmas: Vec<f64> = distances
+        .iter_mut()
+        .filter(|all| all.len() >= ENOUGH)
+        .map(|all| {
+            let middle = median(all);
+            let mut off: Vec<f64> = all.iter().map(|d| (d - middle).abs()).collect();
+            SIGMA_PER_MAD * median(&mut off)
+        })
+        .collect();
+    if sigmas.is_empty() {
+        return None;
+    }
+    sigmas.sort_by(f64::total_cmp);
+    // The quieter pairs tell the noise, even when one marker is loose.
+    let quiet = sigmas[(sigmas.len() - 1) / 4];
+    let stated = stated.map_or(0.0, |sigma| sigma * std::f64::consts::SQRT_2);
+    Some((SIGMAS * quiet.max(stated)).max(SMALLEST_FAULT))
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,200 @@
+//! Where each tracking body was in every row: its markers, and its pose where it has a frame.
+
+use std::collections::BTreeMap;
+
+use calib_profile::{Body, BodyKind, Usage};
+use calib_recording::Finding;
+use calib_recording::rigid_body::{NotABody, Template, body_poses};
+use calib_urdf::nearest::nearest;
+use nalgebra::{Isometry3, Point3};
+
+use crate::error::PipelineError;
+use crate::prepare::load::{Inputs, Loaded};
+
+/// One body over all recordings.
+#[derive(Debug, Clone)]
+pub struct BodyTrack {
+    /// Its name.
+    pub name: String,
+    /// Markers in the body frame, m; `None` for bodies recorded as poses and for one or two markers.
+    pub template: Option<Template>,
+    /// Whether the template was learned from these recordings rather than given.
+    pub learned: bool,
+    /// Standard deviation of a marker coordinate about the rigid body, m, where it can be told.
+    pub marker_sigma: Option<f64>,
+    /// `tracker_from_body` per recording and row; absent recordings do not show the body.
+    pub poses: BTreeMap<String, Vec<Option<Isometry3<f64>>>>,
+}
+
+/// Markers that keep their distances to better than this were computed from a fitted body, not measured, m.
+const COMPUTED: f64 = 2e-6;
+
+impl BodyTrack {
+    /// Whether the markers are points of one fitted body: then they are one 6-DoF measurement, not several.
+    #[must_use]
+    pub fn is_computed(&self) -> bool {
+        self.template.is_some() && self.marker_sigma.is_some_and(|s| s < COMPUTED)
+    }
+
+    /// Poses in one recording; empty where the body is not in it.
+    #[must_use]
+    pub fn in_recording(&self, recording: &str) -> &[Option<Isometry3<f64>>] {
+        self.poses.get(recording).map_or(&[], Vec::as_slice)
+    }
+}
+
+/// Tracks of all bodies. Templates are learned from the recordings that are fitted, never from validation.
+///
+/// # Errors
+/// [`PipelineError::Data`] for a body that no fitted recording shows, or whose markers span no frame.
+pub fn body_tracks(
+    inputs: &Inputs,
+    findings: &mut Vec<Finding>,
+) -> Result<BTreeMap<String, BodyTrack>, PipelineError> {
+    let mut tracks = BTreeMap::new();
+    for (name, body) in &inputs.robot.profile.bodies {
+        tracks.insert(name.clone(), body_track(inputs, name, body, findings)?);
+    }
+    Ok(tracks)
+}
+
+/// Marker tracks of one body over some recordings, one vector per marker, rows one after the other.
+fn gather(names: &[String], recordings: &[&Loaded]) -> Vec<Vec<Option<Point3<f64>>>> {
+    names
+        .iter()
+        .map(|marker| {
+            recordings
+                .iter()
+                .flat_map(|r| match r.poses.markers.get(marker) {
+                    Some(track) => track.clone(),
+                    None => vec![None; r.poses.len()],
+                })
+                .collect()
+        })
+        .collect()
+}
+
+fn slices(tracks: &[Vec<Option<Point3<f64>>>]) -> Vec<&[Option<Point3<f64>>]> {
+    tracks.iter().map(Vec::as_slice).collect()
+}
+
+/// What the recordings have that is called almost like the body, or like its first marker.
+fn recorded_as(inputs: &Inputs, name: &str, body: &Body) -> String {
+    let recordings = || inputs.recordings.values();
+    let near = match &body.kind {
+        BodyKind::Pose => {
+            let bodies = recordings().flat_map(|r| r.poses.bodies.keys());
+            let strangers = bodies.filter(|b| !inputs.robot.profile.bodies.contains_key(*b));
+            nearest(name, strangers.map(String::as_str))
+        }
+        BodyKind::Markers { names, .. } => names.first().and_then(|first| {
+            let markers = recordings().flat_map(|r| r.poses.markers.keys());
+            nearest(first, markers.map(String::as_str))
+        }),
+    };
+    near.map_or_else(String::new, |near| format!("did you mean `{near}`? "))
+}
+
+fn body_track(
+    inputs: &Inputs,
+    name: &str,
+    body: &Body,
+    findings: &mut Vec<Finding>,
+) -> Result<BodyTrack, PipelineError> {
+    let mut track = BodyTrack {
+        name: name.to_owned(),
+        template: None,
+        learned: false,
+        marker_sigma: None,
+        poses: BTreeMap::new(),
+    };
+    let not_seen = || PipelineError::Data {
+        file: inputs.robot.file.clone(),
+        finding: format!("no recording that is fitted shows body `{name}`"),
+        remedy: format!(
+            "{}record it, check the column names, or remove it from the profile",
+            recorded_as(inputs, name, body)
+        ),
+    };
+    let names = match &body.kind {
+        BodyKind::Pose => {
+            for (recording, loaded) in &inputs.recordings {
+                if let Some(poses) = loaded.poses.bodies.get(name) {
+                    track.poses.insert(recording.clone(), poses.clone());
+                }
+            }
+            let fitted = inputs
+                .recordings
+                .values()
+                .filter(|r| r.spec.usage != Usage::Validation);
+            let seen = fitted
+                .filter_map(|r| track.poses.get(&r.name))
+                .flatten()
+                .flatten()
+                .count();
+            return if seen == 0 {
+                Err(not_seen())
+            } else {
+                Ok(track)
+            };
+        }
+        BodyKind::Markers { names, .. } => names,
+    };
+    let fitted: Vec<&Loaded> = inputs
+        .recordings
+        .values()
+        .filter(|r| {
+            r.spec.usage != Usage::Validation
+                && names.iter().any(|m| r.poses.markers.contains_key(m))
+        })
+        .collect();
+    if fitted.is_empty() {
+        return Err(not_seen());
+    }
+    if names.len() < 3 {
+        return Ok(track);
+    }
+    let fail = |error: NotABody| PipelineError::Data {
+        file: fitted[0].spec.file.clone(),
+        finding: format!("body `{name}`: {error}"),
+        remedy: "mount at least three markers that span a plane, and check their names".to_owned(),
+    };
+    let given = match &body.kind {
+        BodyKind::Markers {
+            template: Some(points),
+            ..
+        } => Some(Template::given(names.clone(), points.clone()).map_err(fail)?),
+        _ => None,
+    };
+    let stated = inputs.robot.profile.tracker.marker_sigma;
+    let gathered = gather(names, &fitted);
+    let all = body_poses(names, &slices(&gathered), given.clone(), None).map_err(fail)?;
+    // A marker that wanders on its body by more than this is loose or mislabelled.
+    let limit = (8.0 * stated.unwrap_or(0.0005)).max(0.003);
+    if let Some((fit, wander)) = all.moving_marker(limit) {
+        findings.push(Finding::new(
+            "body-not-rigid",
+            calib_recording::Severity::Warning,
+            format!("{name}: {}", fit.name),
+            format!(
+                "marker `{}` wanders on its body by {:.1} mm (limit {:.1} mm)",
+                fit.name,
+                wander * 1e3,
+                limit * 1e3
+            ),
+            "fix the marker, correct its label, or remove it from the body",
+        ));
+    }
+    for (recording, loaded) in &inputs.recordings {
+        if names.iter().any(|m| loaded.poses.markers.contains_key(m)) {
+            let tracks = gather(names, &[loaded]);
+            let poses = body_poses(names, &slices(&tracks), Some(all.template.clone()), stated)
+                .map_err(fail)?;
+            track.poses.insert(recording.clone(), poses.track());
+        }
+    }
+    track.learned = given.is_none();
+    track.marker_sigma = all.sigma;
+    track.template = Some(all.template);
+    Ok(track)
+}

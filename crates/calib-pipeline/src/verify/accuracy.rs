@@ -1,0 +1,217 @@
+//! How exact the result is: the tool's uncertainty over the workspace, and what an error on a new pose is made of.
+
+use calib_core::{Configuration, FeatureKind};
+use calib_geometry::so3;
+use calib_profile::Usage;
+use calib_report::{AccuracyLimit, Workspace, WorkspacePoint};
+use calib_urdf::LinkId;
+use nalgebra::Matrix6;
+
+use crate::formulate::kinematics::Loads;
+use crate::formulate::ml::MlFit;
+use crate::output::assemble::Evidence;
+use crate::prepare::load::Inputs;
+
+/// Indicated joint positions of a sample as a prediction's configuration, loads included.
+pub(crate) fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configuration {
+    let model = &inputs.robot.model;
+    let mut at = Configuration::zero();
+    let loads = fit.stated.loaded.then(|| Loads::at(model, q));
+    for joint in model.joint_ids() {
+        let Some(edge) = fit.stated.joints[joint.index()] else {
+            continue;
+        };
+        at = at.with(edge, model.position(q, joint));
+        if let Some(loads) = &loads {
+            let index = joint.index();
+            at.regressors.insert(
+                (edge, FeatureKind::TorqueCompliance),
+                loads.about_axis[index],
+            );
+            at.regressors
+                .insert((edge, FeatureKind::Lateral1), loads.across[index][0]);
+            at.regressors
+                .insert((edge, FeatureKind::Lateral2), loads.across[index][1]);
+        }
+    }
+    at
+}
+
+/// The link that the longest chain of joints carries a body on.
+fn tool_link(inputs: &Inputs) -> Option<LinkId> {
+    let model = &inputs.robot.model;
+    inputs
+        .robot
+        .profile
+        .bodies
+        .values()
+        .map(|b| b.link)
+        .max_by_key(|l| {
+            model
+                .chain(model.root(), *l)
+                .iter()
+                .filter(|s| model.joint(s.joint).kind.axis().is_some())
+                .count()
+        })
+}
+
+/// Postures at which the workspace is sampled at most.
+const WORKSPACE_POSES: usize = 60;
+
+pub(crate) fn workspace(inputs: &Inputs, fit: &MlFit) -> Option<Workspace> {
+    let model = &inputs.robot.model;
+    let tool = tool_link(inputs)?;
+    let root = fit.stated.links[model.root().index()]?;
+    let link = fit.stated.links[tool.index()]?;
+    let body = fit
+        .stated
+        .bodies
+        .iter()
+        .find(|(name, _)| inputs.robot.profile.bodies[*name].link == tool);
+    // The body, not the link: a zero offset against a mount is a convention that a link frame would show as error.
+    let (name, target) = body.map_or((&model.link(tool).name, link), |(n, frame)| (n, *frame));
+    let rows: Vec<&Vec<f64>> = inputs
+        .recordings
+        .values()
+        .filter(|r| r.spec.usage != Usage::Sweep)
+        .flat_map(|r| r.q.iter().flatten())
+        .collect();
+    let step = rows.len().div_ceil(WORKSPACE_POSES).max(1);
+    let mut points = Vec::new();
+    for q in rows.iter().step_by(step) {
+        let at = configuration(inputs, fit, q);
+        let place = fit.solution.relative_pose(root, target, &at).ok()?;
+        // Seen from the tracker, as everything that was verified: where the robot's base begins is another convention.
+        let seen = fit
+            .solution
+            .relative_pose(fit.stated.tracker, target, &at)
+            .ok()?;
+        points.push(WorkspacePoint {
+            position_m: place.pose.translation.vector.into(),
+            sigma_m: seen
+                .covariance?
+                .fixed_view::<3, 3>(3, 3)
+                .trace()
+                .max(0.0)
+                .sqrt(),
+        });
+    }
+    Workspace::of(name, &model.link(model.root()).name, points)
+        .map(|w| w.relative_to(&inputs.robot.profile.tracker.frame))
+}
+
+/// What a tool error on a new pose is made of: rms over the held-out poses, in metres.
+pub(crate) fn accuracy_limits(
+    e: &Evidence<'_>,
+    fit: &MlFit,
+    workspace: Option<&Workspace>,
+) -> Vec<AccuracyLimit> {
+    let Some(measured) = e.held_out.as_ref().and_then(|h| h.calibrated) else {
+        return Vec::new();
+    };
+    let sigma_of = |name: &str| {
+        fit.solution
+            .noise
+            .iter()
+            .find(|n| n.name == name)
+            .map(|n| n.sigma)
+    };
+    let parameters = workspace.map_or(0.0, |w| w.rms_sigma_m);
+    let tracker = tracker_sigma(e, sigma_of("marker"), sigma_of("body position"));
+    let joints = sigma_of("joint").unwrap_or(0.0) * joint_lever(e.inputs);
+    let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
+    let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
+    let total = explained + rest.powi(2);
+    let limit = |source: &str, sigma: f64, text: &str, remedy: &str| AccuracyLimit {
+        source: source.to_owned(),
+        sigma_m: Some(sigma),
+        share: Some(if total > 0.0 {
+            sigma.powi(2) / total
+        } else {
+            0.0
+        }),
+        text: text.to_owned(),
+        remedy: remedy.to_owned(),
+    };
+    let mut limits = vec![
+        limit(
+            "tracker noise",
+            tracker,
+            "one measurement of the body on a held-out pose",
+            "average several frames per pose",
+        ),
+        limit(
+            "joint noise",
+            joints,
+            "the joints do not stop where their encoders say, differently at each pose",
+            "let the robot settle; warm it up",
+        ),
+        limit(
+            "parameters",
+            parameters,
+            "what the recordings leave open about the geometry",
+            "record more poses, spread over the range of motion",
+        ),
+        limit(
+            "not modelled",
+            rest,
+            "what neither noise nor uncertainty explains",
+            "see the missing physics among the findings",
+        ),
+    ];
+    limits.sort_by(|a, b| b.share.unwrap_or(0.0).total_cmp(&a.share.unwrap_or(0.0)));
+    limits
+}
+
+/// σ of one measured position, as the held-out errors count it (m): of a body by its origin, otherwise of a marker.
+fn tracker_sigma(e: &Evidence<'_>, marker: Option<f64>, body: Option<f64>) -> f64 {
+    let of_template = tool_link(e.inputs).and_then(|tool| {
+        let bodies = &e.inputs.robot.profile.bodies;
+        let (name, _) = bodies.iter().find(|(_, b)| b.link == tool)?;
+        let template = e.tracks.get(name)?.template.as_ref()?;
+        // Fit of a pose to n markers: information JᵀJ/σ² with J_i = [−[p_i]ₓ, 1], and the part of the origin.
+        let information: Matrix6<f64> = template
+            .points
+            .iter()
+            .map(|p| {
+                let mut j = nalgebra::Matrix3x6::zeros();
+                j.fixed_view_mut::<3, 3>(0, 0)
+                    .copy_from(&-so3::skew(&p.coords));
+                j.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
+                j.transpose() * j
+            })
+            .sum();
+        let covariance = nalgebra::Cholesky::new(information)?.inverse();
+        Some(covariance.fixed_view::<3, 3>(3, 3).trace().max(0.0).sqrt())
+    });
+    match (marker, of_template) {
+        (Some(sigma), Some(factor)) => sigma * factor,
+        (sigma, _) => sigma.or(body).unwrap_or(0.0) * 3.0_f64.sqrt(),
+    }
+}
+
+/// Root sum of squares over the joints of how far the tool moves per radian, rms over held-out poses, m.
+fn joint_lever(inputs: &Inputs) -> f64 {
+    let model = &inputs.robot.model;
+    let Some(tool) = tool_link(inputs) else {
+        return 0.0;
+    };
+    let rows: Vec<&Vec<f64>> = inputs
+        .recordings
+        .values()
+        .filter(|r| r.spec.usage == Usage::Validation)
+        .flat_map(|r| r.q.iter().flatten())
+        .collect();
+    let squares: f64 = rows
+        .iter()
+        .map(|q| {
+            let columns = model.jacobian(q, tool);
+            columns
+                .iter()
+                .filter(|(id, _)| model.joint(*id).kind.turns())
+                .map(|(_, c)| c.fixed_rows::<3>(3).norm_squared())
+                .sum::<f64>()
+        })
+        .sum();
+    (squares / rows.len().max(1) as f64).sqrt()
+}

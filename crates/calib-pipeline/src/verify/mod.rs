@@ -1,0 +1,9 @@
+//! What a solution is worth: held-out errors, loops, residuals, accuracy over the workspace.
+
+pub(crate) mod accuracy;
+pub mod closure;
+pub mod held_out;
+pub mod information;
+pub mod invariants;
+pub mod known;
+pub mod residuals;
