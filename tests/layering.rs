@@ -9,20 +9,28 @@ use std::path::{Path, PathBuf};
 /// The layer of every crate. `calib-sim` stands above `calib-profile` because it reads the checked profile
 /// (book/src/decisions/simulation-layer.md).
 const LAYERS: &[(&str, u8)] = &[
+    ("calib-finding", 0),
+    ("calib-files", 0),
     ("calib-geometry", 0),
-    ("calib-core", 1),
-    ("calib-cor", 1),
-    ("calib-aor", 1),
-    ("calib-recording", 1),
     ("calib-urdf", 1),
-    ("calib-capture", 2),
-    ("calib-profile", 2),
-    ("calib-plugin", 2),
-    ("calib-report", 2),
-    ("calib-study", 2),
-    ("calib-sim", 3),
-    ("calib-pipeline", 4),
-    ("calib-cli", 5),
+    ("calib-estimator", 1),
+    ("calib-recording", 1),
+    ("calib-cor", 2),
+    ("calib-aor", 2),
+    ("calib-handeye", 2),
+    ("calib-checks", 2),
+    ("calib-core", 2),
+    ("calib-capture", 3),
+    ("calib-plugin", 3),
+    ("calib-profile", 3),
+    ("calib-report", 3),
+    ("calib-sim", 4),
+    ("calib-pipeline", 5),
+    ("calib-apply", 5),
+    ("calib-drift", 5),
+    ("calib-fit", 5),
+    ("calib-study", 6),
+    ("calib-cli", 7),
 ];
 
 fn root() -> PathBuf {
@@ -146,19 +154,19 @@ fn plugins_know_the_contract_and_no_estimator() {
 fn the_rule_finds_what_it_is_for() {
     let sibling = "[dependencies]\ncalib-aor.workspace = true\n";
     assert_eq!(
-        faults("calib-cor", 1, sibling),
-        ["calib-cor depends on its sibling calib-aor (both layer 1)"]
+        faults("calib-cor", 2, sibling),
+        ["calib-cor depends on its sibling calib-aor (both layer 2)"]
     );
     let upward = "[target.'cfg(unix)'.dev-dependencies]\nx = { package = \"calib-cli\", path = \"../calib-cli\" }\n";
     assert_eq!(
-        faults("calib-core", 1, upward),
-        ["calib-core (layer 1) depends on calib-cli (layer 5)"]
+        faults("calib-core", 2, upward),
+        ["calib-core (layer 2) depends on calib-cli (layer 7)"]
     );
     let table = "[build-dependencies.calib-pipeline]\nworkspace = true\n";
     assert_eq!(
-        faults("calib-report", 2, table),
-        ["calib-report (layer 2) depends on calib-pipeline (layer 4)"]
+        faults("calib-report", 3, table),
+        ["calib-report (layer 3) depends on calib-pipeline (layer 5)"]
     );
     let down = "[package]\nname = \"calib-core\"\n[dependencies]\ncalib-geometry.workspace = true # calib-cli\n";
-    assert_eq!(faults("calib-core", 1, down), Vec::<String>::new());
+    assert_eq!(faults("calib-core", 2, down), Vec::<String>::new());
 }

@@ -1,0 +1,1 @@
+//! Checks of recordings: what is wrong with the data before anything is fitted.

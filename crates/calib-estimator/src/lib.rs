@@ -1,0 +1,1 @@
+//! What the estimators of centers, axes, frames and hand-eye transforms share.

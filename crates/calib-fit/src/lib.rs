@@ -1,0 +1,1 @@
+//! One estimator on one table of measurements, without a profile.
