@@ -15,7 +15,7 @@
 //!
 //! so a positive semidefinite H proves that no other pair of rotations is better. The closed form starts from
 //! the linear problem and projects onto SO(3); Gauss–Newton on (1) finishes. Statistical weighting with
-//! body-frame noise is the business of [`Problem`](crate::Problem) (one pose head per measurement); (1) is the
+//! body-frame noise is the business of [`Problem`](crate::Problem) (one pose measurement kind per tracker); (1) is the
 //! quadratic cost that can be certified.
 
 use nalgebra::{

@@ -14,7 +14,7 @@
 //! V_s = D_s + G_s diag(σ_u²) G_sᵀ,   H = Σ_s J_sᵀ V_s⁻¹ J_s + Λ,   C = H⁻¹               (4)
 //! ```
 //!
-//! The joint features `F_j` (zero offset, gain, gear eccentricity, compliance under a given torque,
+//! The joint effects `F_j` (zero offset, gain, gear eccentricity, compliance under a given torque,
 //! lateral compliance, backlash, clock offset, coupling) are all linear in their unknown `c_j`.
 //! Perturbations act on the right, twists are `[ω; v]`, lengths m, angles rad, σ and not σ².
 //!
@@ -24,8 +24,8 @@
 //! # How to use it
 //!
 //! 1. State a [`Problem`]: [`Problem::frame`], one edge method per kind ([`Problem::known`],
-//!    [`Problem::unknown`] with a [`Chart`], [`Problem::joint`] with [`Problem::free_feature`],
-//!    [`Problem::measured`], [`Problem::random`]), points, noise groups, heads.
+//!    [`Problem::unknown`] with a [`Chart`], [`Problem::joint`] with [`Problem::free_effect`],
+//!    [`Problem::measured`], [`Problem::random`]), points, noise groups, measurements.
 //!    [`Problem::set_role`] says what an unknown pose is; the words of the report depend on it.
 //!    Priors are per parameter: [`Problem::set_prior`], [`Problem::parameter_mut`].
 //! 2. [`solve`] it. Bad input is an [`Error`]; what the data cannot answer is in the [`Solution`].
@@ -77,7 +77,7 @@
 //! let origin = problem.unknown("elbow.origin", link1, elbow_frame, upper, Chart::none());
 //! problem.set_role(origin, Role::JointOrigin, Some("elbow"));
 //! let elbow = problem.joint("elbow", elbow_frame, link2, Axis::Revolute(Vector3::y_axis()), q2.to_vec());
-//! problem.free_feature(elbow, FeatureKind::ZeroOffset, Some(0.05));
+//! problem.free_effect(elbow, EffectKind::ZeroOffset, Some(0.05));
 //!
 //! // Where the body sits on the last link is known to 1 cm across, but its turn is not.
 //! let mount = problem.unknown("body_mount", link2, body, link_from_body, Chart::full());
@@ -144,13 +144,14 @@ pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, Ve
 pub use graph::baseline::Baseline;
 pub use graph::chart::Chart;
 pub use graph::edge::{
-    Axis, Candidate, Edge, EdgeKind, Feature, FeatureKind, Joint, Role, UnknownPose,
+    Axis, Candidate, Edge, EdgeKind, EffectKind, Joint, JointEffect, Role, UnknownPose,
 };
 pub use graph::error::Error;
-pub use graph::head::{
-    DirectionObservation, Head, HeadKind, MarkerObservation, PoseNoise, PoseObservation,
-};
 pub use graph::ids::{EdgeId, FrameId, GroupId, ParameterId, PointId};
+pub use graph::measurement::{
+    DirectionObservation, MarkerObservation, Measurement, MeasurementKind, PoseNoise,
+    PoseObservation,
+};
 pub use graph::parameter::{
     DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA, Parameter, ParameterKind, Unit,
 };

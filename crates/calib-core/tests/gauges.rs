@@ -4,8 +4,8 @@
 mod common;
 
 use calib_core::{
-    Chart, FeatureKind, Gauge, Head, HeadKind, NoiseKind, ParameterClass, PoseNoise, Settings,
-    Solution, solve,
+    Chart, EffectKind, Gauge, Measurement, MeasurementKind, NoiseKind, ParameterClass, PoseNoise,
+    Settings, Solution, solve,
 };
 use common::{Chain, Free, Link, axis, pose, prismatic, revolute, rng, six_r};
 use nalgebra::{Isometry3, Point3};
@@ -238,7 +238,7 @@ fn cases() -> Vec<Case> {
             .offset(4)
             .offset(5),
         c("known frames, all offsets", six_r()).offsets(),
-        c("pose head, frames and inner offsets", six_r())
+        c("pose measurement, frames and inner offsets", six_r())
             .poses()
             .world()
             .mount()
@@ -667,12 +667,12 @@ fn a_table_and_a_contact_offset_are_one_number() {
             )
         })
         .collect();
-    p.add_head(Head {
+    p.add_measurement(Measurement {
         name: "contact".into(),
         from: surface,
         to: tcp,
         path: None,
-        kind: HeadKind::Plane {
+        kind: MeasurementKind::Plane {
             point: tip,
             normal: along(Z),
             noise: group,
@@ -689,7 +689,7 @@ fn a_table_and_a_contact_offset_are_one_number() {
 
 #[test]
 fn a_gain_and_a_size_are_one_number_when_no_length_is_known() {
-    // One slide of unknown gain seen along a line of unknown scale: the distance head sees gain·q only.
+    // One slide of unknown gain seen along a line of unknown scale: the distance measurement sees gain·q only.
     let mut p = calib_core::Problem::new(10);
     let base = p.frame("base");
     let link = p.frame("link");
@@ -702,8 +702,8 @@ fn a_gain_and_a_size_are_one_number_when_no_length_is_known() {
         calib_core::Axis::Prismatic(along(X)),
         q.clone(),
     );
-    p.free_feature(j, FeatureKind::Gain, None);
-    p.free_feature_with(j, FeatureKind::Coupling, q.clone(), None);
+    p.free_effect(j, EffectKind::Gain, None);
+    p.free_effect_with(j, EffectKind::Coupling, q.clone(), None);
     p.known("tip", link, tip_frame, Isometry3::identity());
     let o = p.noise_group("o", NoiseKind::Orientation, 1e-3, false);
     let t = p.noise_group("t", NoiseKind::Position, 1e-4, false);

@@ -2,7 +2,7 @@
 
 mod common;
 
-use calib_core::{Criterion, FeatureKind, NoiseKind, Settings, Solution, compare, k_fold, solve};
+use calib_core::{Criterion, EffectKind, NoiseKind, Settings, Solution, compare, k_fold, solve};
 use common::{Chain, Free, Handles, rng, six_r};
 use rand::RngExt;
 
@@ -67,11 +67,11 @@ fn rig(seed: u64, physics: Physics, stated: bool) -> Rig {
     chain.observe_moved(&mut noise, &mut h, SIGMA, extra);
     for (j, edge) in h.joints.clone().into_iter().enumerate() {
         h.problem
-            .candidate(edge, FeatureKind::TorqueCompliance, torque[j].clone());
+            .candidate(edge, EffectKind::TorqueCompliance, torque[j].clone());
         h.problem
-            .candidate(edge, FeatureKind::Backlash, approach[j].clone());
+            .candidate(edge, EffectKind::Backlash, approach[j].clone());
         h.problem
-            .candidate(edge, FeatureKind::ClockOffset, velocity[j].clone());
+            .candidate(edge, EffectKind::ClockOffset, velocity[j].clone());
     }
     h.problem.times = Some((0..n).map(|s| s as f64).collect());
     Rig {
@@ -151,9 +151,9 @@ fn score_tests_have_the_size_they_claim() {
 fn the_finding_disappears_when_the_effect_is_freed() {
     let mut r = rig(3, Physics::Compliance, true);
     let edge = r.h.joints[1];
-    let p = r.h.problem.free_feature_with(
+    let p = r.h.problem.free_effect_with(
         edge,
-        FeatureKind::TorqueCompliance,
+        EffectKind::TorqueCompliance,
         r.torque[1].clone(),
         None,
     );
@@ -172,12 +172,12 @@ fn one_clock_for_all_joints_is_recovered() {
     let first = r.h.joints[0];
     let p =
         r.h.problem
-            .free_feature_with(first, FeatureKind::ClockOffset, r.velocity[0].clone(), None);
+            .free_effect_with(first, EffectKind::ClockOffset, r.velocity[0].clone(), None);
     for j in 1..6 {
         let edge = r.h.joints[j];
-        r.h.problem.share_feature(
+        r.h.problem.share_effect(
             edge,
-            FeatureKind::ClockOffset,
+            EffectKind::ClockOffset,
             Some(r.velocity[j].clone()),
             p,
         );
@@ -191,8 +191,8 @@ fn one_clock_for_all_joints_is_recovered() {
 #[test]
 fn drift_of_the_tracker_is_seen() {
     let mut r = rig(6, Physics::None, true);
-    for head in r.h.problem.heads_mut() {
-        if let calib_core::HeadKind::Markers { observations, .. } = &mut head.kind {
+    for measurement in r.h.problem.measurements_mut() {
+        if let calib_core::MeasurementKind::Markers { observations, .. } = &mut measurement.kind {
             for o in observations {
                 o.position.x += 1e-5 * o.sample as f64;
             }
@@ -210,17 +210,17 @@ fn the_comparison_chooses_the_smallest_model_that_predicts_as_well() {
     let r = rig(3, Physics::Compliance, false);
     let offsets_only = r.h.problem.clone();
     let mut compliance = r.h.problem.clone();
-    compliance.free_feature_with(
+    compliance.free_effect_with(
         r.h.joints[1],
-        FeatureKind::TorqueCompliance,
+        EffectKind::TorqueCompliance,
         r.torque[1].clone(),
         None,
     );
     let mut everything = compliance.clone();
     for (j, edge) in r.h.joints.iter().enumerate() {
-        everything.free_feature_with(*edge, FeatureKind::Backlash, r.approach[j].clone(), None);
-        everything.free_feature(*edge, FeatureKind::EccentricitySin, None);
-        everything.free_feature(*edge, FeatureKind::EccentricityCos, None);
+        everything.free_effect_with(*edge, EffectKind::Backlash, r.approach[j].clone(), None);
+        everything.free_effect(*edge, EffectKind::EccentricitySin, None);
+        everything.free_effect(*edge, EffectKind::EccentricityCos, None);
     }
     let variants = [
         ("offsets".to_owned(), offsets_only),

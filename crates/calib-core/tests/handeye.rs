@@ -140,7 +140,7 @@ fn moving_and_relative_motions_agree() {
 
 #[test]
 fn the_frame_graph_states_the_same_problem() {
-    // tracker –Z– base –A(measured)– flange –X– body, one pose head: same transforms as the closed problem.
+    // tracker –Z– base –A(measured)– flange –X– body, one pose measurement: same transforms as the closed problem.
     let c = case(21, 20, 1e-3, 1e-3);
     let s = solve_ax_zb(&c.a, &c.b, HandEyeWeights::default()).unwrap();
     let mut p = Problem::new(c.a.len());

@@ -1,10 +1,10 @@
-//! Every edge and every head against central differences through the same coordinates.
+//! Every edge and every measurement against central differences through the same coordinates.
 
 mod common;
 
 use calib_core::{
-    Axis, Chart, DirectionObservation, FeatureKind, Head, HeadKind, MarkerObservation, Model,
-    NoiseKind, PoseNoise, PoseObservation, Problem, Values,
+    Axis, Chart, DirectionObservation, EffectKind, MarkerObservation, Measurement, MeasurementKind,
+    Model, NoiseKind, PoseNoise, PoseObservation, Problem, Values,
 };
 use common::{axis, central, jitter, normal, normal3, pose, rng};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector6};
@@ -72,25 +72,25 @@ fn rig(samples: usize, seed: u64) -> Rig {
     let q1 = array();
     let e1 = p.joint("turn", a, b, Axis::Revolute(axis(0.3, -0.5, 0.8)), q1);
     for kind in [
-        FeatureKind::ZeroOffset,
-        FeatureKind::Gain,
-        FeatureKind::EccentricityCos,
-        FeatureKind::EccentricitySin,
+        EffectKind::ZeroOffset,
+        EffectKind::Gain,
+        EffectKind::EccentricityCos,
+        EffectKind::EccentricitySin,
     ] {
-        p.free_feature(e1, kind, None);
+        p.free_effect(e1, kind, None);
     }
     for kind in [
-        FeatureKind::TorqueCompliance,
-        FeatureKind::Lateral1,
-        FeatureKind::Lateral2,
-        FeatureKind::Backlash,
-        FeatureKind::Coupling,
+        EffectKind::TorqueCompliance,
+        EffectKind::Lateral1,
+        EffectKind::Lateral2,
+        EffectKind::Backlash,
+        EffectKind::Coupling,
     ] {
         let v = array();
-        p.free_feature_with(e1, kind, v, None);
+        p.free_effect_with(e1, kind, v, None);
     }
     let v = array();
-    let clock = p.free_feature_with(e1, FeatureKind::ClockOffset, v, None);
+    let clock = p.free_effect_with(e1, EffectKind::ClockOffset, v, None);
     let e2 = p.unknown(
         "second",
         b,
@@ -100,10 +100,10 @@ fn rig(samples: usize, seed: u64) -> Rig {
     );
     let q3 = array();
     let e3 = p.joint("slide", c, end, Axis::Prismatic(axis(0.1, 0.7, 0.2)), q3);
-    p.free_feature(e3, FeatureKind::ZeroOffset, None);
+    p.free_effect(e3, EffectKind::ZeroOffset, None);
     let v = array();
     // One clock for both joints: the contributions must add.
-    p.share_feature(e3, FeatureKind::ClockOffset, Some(v), clock);
+    p.share_effect(e3, EffectKind::ClockOffset, Some(v), clock);
     let group = p.noise_group("n", NoiseKind::Position, 1e-3, false);
     Rig {
         problem: p,
@@ -132,8 +132,8 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
         orientation: noise,
         position: noise,
     };
-    let mut add = |name: &str, kind: HeadKind| {
-        rig.problem.add_head(Head {
+    let mut add = |name: &str, kind: MeasurementKind| {
+        rig.problem.add_measurement(Measurement {
             name: name.to_owned(),
             from,
             to,
@@ -159,7 +159,7 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
     }
     add(
         "markers",
-        HeadKind::Markers {
+        MeasurementKind::Markers {
             noise,
             observations: markers,
         },
@@ -172,7 +172,7 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
         .collect();
     add(
         "poses",
-        HeadKind::Poses {
+        MeasurementKind::Poses {
             noise: split,
             observations,
         },
@@ -186,7 +186,7 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
             .collect();
         add(
             "directions",
-            HeadKind::Directions {
+            MeasurementKind::Directions {
                 direction: axis(0.2, 0.4, -0.9),
                 noise,
                 observations,
@@ -197,7 +197,7 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
     for point in [known, unknown] {
         add(
             "plane",
-            HeadKind::Plane {
+            MeasurementKind::Plane {
                 point,
                 normal: axis(0.1, 0.2, 0.9),
                 noise,
@@ -206,7 +206,7 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
         );
         add(
             "line",
-            HeadKind::Line {
+            MeasurementKind::Line {
                 point,
                 through: Point3::new(0.1, 0.2, 0.3),
                 direction: axis(0.5, 0.2, 0.9),
@@ -216,7 +216,7 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
         );
         add(
             "distance",
-            HeadKind::Distance {
+            MeasurementKind::Distance {
                 point,
                 anchor: Point3::new(1.1, 0.2, 0.3),
                 noise,
@@ -257,12 +257,12 @@ fn a_block_that_occurs_twice_contributes_twice() {
     let b = rig.problem.find_frame("b").unwrap();
     let home = rig.problem.known("home", b, a, Isometry3::identity());
     let noise = rig.group;
-    rig.problem.add_head(Head {
+    rig.problem.add_measurement(Measurement {
         name: "conjugate".into(),
         from: rig.base,
         to: rig.base,
         path: Some(vec![(e0, false), (e1, false), (home, false), (e0, true)]),
-        kind: HeadKind::Poses {
+        kind: MeasurementKind::Poses {
             noise: PoseNoise::Split {
                 orientation: noise,
                 position: noise,

@@ -4,7 +4,7 @@
 mod common;
 
 use calib_core::{
-    Axis, Chart, EdgeId, ErrorSummary, FeatureKind, FrameId, MarkerObservation, NoiseKind, Problem,
+    Axis, Chart, EdgeId, EffectKind, ErrorSummary, FrameId, MarkerObservation, NoiseKind, Problem,
     RobustSettings, Role, Settings, k_fold, solve,
 };
 use common::{axis, motion};
@@ -209,12 +209,12 @@ fn problem(postures: &[Posture], level: Level) -> Problem {
             postures.iter().map(|p| p.q[j]).collect(),
         );
         if level >= Level::Offsets {
-            p.free_feature(joint, FeatureKind::ZeroOffset, Some(0.05));
+            p.free_effect(joint, EffectKind::ZeroOffset, Some(0.05));
         }
         let kinds = [
-            FeatureKind::TorqueCompliance,
-            FeatureKind::Lateral1,
-            FeatureKind::Lateral2,
+            EffectKind::TorqueCompliance,
+            EffectKind::Lateral1,
+            EffectKind::Lateral2,
         ];
         let a = Axis::Revolute(axis(row.axis.x, row.axis.y, row.axis.z));
         let across = a.across();
@@ -225,11 +225,11 @@ fn problem(postures: &[Posture], level: Level) -> Problem {
         {
             let values: Vec<f64> = torques[j].iter().map(|t| t.dot(&along)).collect();
             let modelled = match kind {
-                FeatureKind::TorqueCompliance => level >= Level::Compliance,
+                EffectKind::TorqueCompliance => level >= Level::Compliance,
                 _ => level >= Level::Lateral,
             };
             if modelled {
-                p.free_feature_with(joint, kind, values, Some(2e-4));
+                p.free_effect_with(joint, kind, values, Some(2e-4));
             } else {
                 p.candidate(joint, kind, values);
             }

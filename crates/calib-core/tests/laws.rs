@@ -2,7 +2,7 @@
 
 mod common;
 
-use calib_core::{Configuration, HeadKind, Problem, Settings, Solution, solve};
+use calib_core::{Configuration, MeasurementKind, Problem, Settings, Solution, solve};
 use common::{Chain, Free, Handles, jitter, rng, six_r};
 use nalgebra::{Isometry3, Point3};
 use proptest::prelude::*;
@@ -52,8 +52,8 @@ proptest! {
     fn the_order_of_observations_does_not_matter(seed in 0u64..1000) {
         let (_, mut h) = rig(seed, 20);
         let before = fit(&h.problem);
-        for head in h.problem.heads_mut() {
-            if let HeadKind::Markers { observations, .. } = &mut head.kind {
+        for measurement in h.problem.measurements_mut() {
+            if let MeasurementKind::Markers { observations, .. } = &mut measurement.kind {
                 observations.reverse();
             }
         }
@@ -68,8 +68,8 @@ proptest! {
         let (_, mut h) = rig(seed, 20);
         let before = fit(&h.problem);
         let new_from_old: Isometry3<f64> = jitter(&mut rng(seed + 1), 0.3, 0.5);
-        for head in h.problem.heads_mut() {
-            if let HeadKind::Markers { observations, .. } = &mut head.kind {
+        for measurement in h.problem.measurements_mut() {
+            if let MeasurementKind::Markers { observations, .. } = &mut measurement.kind {
                 for o in observations {
                     o.position = new_from_old * o.position;
                 }

@@ -3,9 +3,9 @@
 mod common;
 
 use calib_core::{
-    Axis, Chart, ClosureStatistics, Configuration, Error, FeatureKind, Head, HeadKind,
-    MarkerObservation, NoiseKind, PoseNoise, PoseObservation, Problem, Settings, SolveStatus,
-    Spread, solve,
+    Axis, Chart, ClosureStatistics, Configuration, EffectKind, Error, MarkerObservation,
+    Measurement, MeasurementKind, NoiseKind, PoseNoise, PoseObservation, Problem, Settings,
+    SolveStatus, Spread, solve,
 };
 use common::{Chain, Free, axis, normal3, pose, rng, six_r};
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
@@ -159,7 +159,7 @@ fn what_cannot_be_stated_is_refused_by_name() {
     );
     assert_eq!(
         refused(&p),
-        "point `m` is fixed in frame `a`, the head `h` measures frame `b`"
+        "point `m` is fixed in frame `a`, measurement `h` is of frame `b`"
     );
 
     let (mut p, a, b, g) = tiny();
@@ -235,12 +235,12 @@ fn what_cannot_be_stated_is_refused_by_name() {
     let (mut p, a, b, g) = tiny();
     let c = p.frame("c");
     let e = p.known("y", b, c, Isometry3::identity());
-    p.add_head(Head {
+    p.add_measurement(Measurement {
         name: "h".into(),
         from: a,
         to: c,
         path: Some(vec![(e, false)]),
-        kind: HeadKind::Poses {
+        kind: MeasurementKind::Poses {
             noise: PoseNoise::Split {
                 orientation: g,
                 position: g,
@@ -341,7 +341,7 @@ fn lost_measurements_drop_their_observations_with_a_reason() {
 
 #[test]
 fn a_measured_edge_with_covariance_weighs_like_noise_of_the_head() {
-    // base –Z(noisy)– x: the noise may be stated on the edge or on the head.
+    // base –Z(noisy)– x: the noise may be stated on the edge or on the measurement.
     let mut r = rng(3);
     let n = 12;
     let truth = pose(0.2, 0.1, 0.3, 0.3, -0.2, 0.5);
@@ -465,7 +465,7 @@ fn several_arms_share_their_torso() {
         Axis::Revolute(axis(0.0, 0.0, 1.0)),
         q.clone(),
     );
-    p.free_feature(t, FeatureKind::ZeroOffset, None);
+    p.free_effect(t, EffectKind::ZeroOffset, None);
     let g = p.noise_group("m", NoiseKind::Position, 1e-3, false);
     let mut sigma = Vec::new();
     for arm in 0..2 {

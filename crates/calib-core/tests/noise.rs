@@ -38,8 +38,9 @@ fn draw(seed: u64, poses: usize, joint_noise: f64, model_joint: bool, outliers: 
     chain.observe(&mut r, &mut h, MARKER, joint_noise);
     if outliers > 0.0 {
         use rand::RngExt;
-        for head in h.problem.heads_mut() {
-            if let calib_core::HeadKind::Markers { observations, .. } = &mut head.kind {
+        for measurement in h.problem.measurements_mut() {
+            if let calib_core::MeasurementKind::Markers { observations, .. } = &mut measurement.kind
+            {
                 for o in observations {
                     if r.random_bool(outliers) {
                         o.position += common::normal3(&mut r) * 0.05;

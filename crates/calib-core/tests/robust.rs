@@ -3,8 +3,8 @@
 mod common;
 
 use calib_core::{
-    Configuration, HeadKind, MarkerObservation, PointId, RejectReason, RobustSettings, Settings,
-    Solution, relabel, solve,
+    Configuration, MarkerObservation, MeasurementKind, PointId, RejectReason, RobustSettings,
+    Settings, Solution, relabel, solve,
 };
 use common::{Chain, Free, Handles, normal3, rng, six_r};
 use nalgebra::Point3;
@@ -33,9 +33,9 @@ fn case_with(seed: u64, poses: usize, free: &Free) -> Case {
 }
 
 fn seen(h: &mut Handles) -> &mut Vec<MarkerObservation> {
-    match &mut h.problem.heads_mut()[0].kind {
-        HeadKind::Markers { observations, .. } => observations,
-        _ => unreachable!("the chain has one marker head"),
+    match &mut h.problem.measurements_mut()[0].kind {
+        MeasurementKind::Markers { observations, .. } => observations,
+        _ => unreachable!("the chain has one marker measurement"),
     }
 }
 

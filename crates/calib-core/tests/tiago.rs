@@ -5,7 +5,7 @@
 mod common;
 
 use calib_core::{
-    Axis, Chart, Criterion, ErrorSummary, FeatureKind, MarkerObservation, NoiseKind, Problem,
+    Axis, Chart, Criterion, EffectKind, ErrorSummary, MarkerObservation, NoiseKind, Problem,
     RobustSettings, Role, Settings, Solution, compare, solve,
 };
 use common::{axis, motion, pose};
@@ -163,9 +163,9 @@ fn problem(train: &[Posture], test: &[Posture], v: Variant) -> Problem {
             owned.iter().map(|s| s.q[j]).collect(),
         );
         if v.offsets {
-            p.free_feature(
+            p.free_effect(
                 joint,
-                FeatureKind::ZeroOffset,
+                EffectKind::ZeroOffset,
                 Some(if j == 0 { 0.01 } else { 0.03 }),
             );
         }
@@ -173,14 +173,14 @@ fn problem(train: &[Posture], test: &[Posture], v: Variant) -> Problem {
             let along: Vec<f64> = torque[j].iter().map(|t| t.z).collect();
             let play: Vec<f64> = along.iter().map(|t| (t / 0.05).tanh()).collect();
             if v.compliance {
-                p.free_feature_with(joint, FeatureKind::TorqueCompliance, along, Some(1e-3));
+                p.free_effect_with(joint, EffectKind::TorqueCompliance, along, Some(1e-3));
             } else {
-                p.candidate(joint, FeatureKind::TorqueCompliance, along);
+                p.candidate(joint, EffectKind::TorqueCompliance, along);
             }
             if v.play {
-                p.free_feature_with(joint, FeatureKind::Backlash, play, Some(0.02));
+                p.free_effect_with(joint, EffectKind::Backlash, play, Some(0.02));
             } else {
-                p.candidate(joint, FeatureKind::Backlash, play);
+                p.candidate(joint, EffectKind::Backlash, play);
             }
         }
         last = link;

@@ -15,7 +15,7 @@ use crate::estimate::estimators::values;
 use crate::estimate::paper::{self, OriginEstimate};
 use crate::estimate::start::{Start, mean_pose, start};
 use crate::formulate::kinematics::Calibration;
-use crate::formulate::ml::{self, Freedom, MlFit};
+use crate::formulate::ml::{self, FreeSet, MlFit};
 use crate::output::assemble::{Evidence, assemble};
 use crate::output::export::{Found, calibration_yaml, patch_urdf, scene};
 use crate::output::shapes;
@@ -112,13 +112,13 @@ pub fn run_on(
             only_a_cross_check(&mut findings);
             progress("fit registration only");
             // The baseline is plain least squares: what is left then is the geometry's fault, not noise to be estimated.
-            let baseline = ml::state(&inputs, &tracks, &start, Freedom::RegistrationOnly);
+            let baseline = ml::state(&inputs, &tracks, &start, FreeSet::RegistrationOnly);
             let registered = ml::fit(baseline, &inputs, &Settings::plain())?;
             progress("fit all loops");
             let mut settings = Settings::default();
             settings.robust.enabled = inputs.robot.profile.solve.robust;
             let mut fit = ml::fit(
-                ml::state(&inputs, &tracks, &start, Freedom::Profile),
+                ml::state(&inputs, &tracks, &start, FreeSet::Profile),
                 &inputs,
                 &settings,
             )?;
@@ -129,7 +129,7 @@ pub fn run_on(
                     progress("fit again without the unsettled rows");
                     inputs.exclude(bad.unsettled);
                     tracks = body_tracks(&inputs, &mut Vec::new())?;
-                    let stated = ml::state(&inputs, &tracks, &start, Freedom::Profile);
+                    let stated = ml::state(&inputs, &tracks, &start, FreeSet::Profile);
                     fit = ml::fit(stated, &inputs, &settings)?;
                 }
             }
@@ -263,7 +263,7 @@ fn paper_assumptions() -> Finding {
 
 /// Numbers that a physical limit of the profile stopped.
 fn on_their_limit(fit: &MlFit) -> Vec<Finding> {
-    let stated = fit.stated.problem.parameters();
+    let stated = fit.formulation.problem.parameters();
     let stopped = fit.solution.parameters.iter().zip(stated);
     stopped
         .filter(|(found, _)| found.at_bound)
@@ -304,7 +304,7 @@ fn nominal(inputs: &Inputs, start: &Start) -> Calibration {
     robot.points = start.points.clone();
     let profile = &inputs.robot.profile;
     let tips = profile.points.iter();
-    robot.tips = tips.map(|(name, tip)| (name.clone(), tip.at)).collect();
+    robot.contact_points = tips.map(|(name, tip)| (name.clone(), tip.at)).collect();
     let contacts = profile.contacts.iter();
     robot.places = contacts
         .map(|(name, contact)| (name.clone(), contact.base_from_place))
@@ -467,8 +467,8 @@ fn ml_result(
         };
     for (name, origin) in &profile.origins {
         if let (Some(body), Some(link)) = (
-            fit.stated.bodies.get(&origin.body),
-            fit.stated.links[origin.link.index()],
+            fit.formulation.bodies.get(&origin.body),
+            fit.formulation.links[origin.link.index()],
         ) {
             push(
                 format!("{}_from_{name}", origin.body),
@@ -481,8 +481,8 @@ fn ml_result(
     }
     for (name, t) in &profile.transforms {
         if let (Some(parent), Some(child)) = (
-            fit.stated.links[t.parent.index()],
-            fit.stated.links[t.child.index()],
+            fit.formulation.links[t.parent.index()],
+            fit.formulation.links[t.child.index()],
         ) {
             push(
                 name.clone(),
@@ -493,11 +493,11 @@ fn ml_result(
             )?;
         }
     }
-    let root = fit.stated.links[model.root().index()];
+    let root = fit.formulation.links[model.root().index()];
     let root_covariance = match root {
         Some(root) => {
             fit.solution
-                .relative_pose(fit.stated.tracker, root, &at_zero)?
+                .relative_pose(fit.formulation.tracker, root, &at_zero)?
                 .covariance
         }
         None => None,

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use calib_core::{Configuration, FeatureKind, Settings};
+use calib_core::{Configuration, EffectKind, Settings};
 use calib_pipeline::estimate::start::start;
 use calib_pipeline::formulate::kinematics::Loads;
-use calib_pipeline::formulate::ml::{Freedom, fit, state};
+use calib_pipeline::formulate::ml::{FreeSet, fit, state};
 use calib_pipeline::prepare::load::{load_recordings, load_robot};
 use calib_pipeline::prepare::tracks::body_tracks;
 use calib_profile::Free;
@@ -28,7 +28,7 @@ fn the_calibrated_robot_is_the_solution() {
         let mut findings = Vec::new();
         let tracks = body_tracks(&inputs, &mut findings).expect("bodies");
         let start = start(&inputs, &tracks);
-        let stated = state(&inputs, &tracks, &start, Freedom::Profile);
+        let stated = state(&inputs, &tracks, &start, FreeSet::Profile);
         let fit = fit(stated, &inputs, &Settings::plain()).expect("a problem");
         let model = &inputs.robot.model;
         let effects = fit
@@ -43,27 +43,27 @@ fn the_calibrated_robot_is_the_solution() {
             let loads = Loads::at(model, q);
             let mut at = Configuration::zero();
             for joint in model.joint_ids() {
-                let Some(edge) = fit.stated.joints[joint.index()] else {
+                let Some(edge) = fit.formulation.joints[joint.index()] else {
                     continue;
                 };
                 at = at.with(edge, model.position(q, joint));
                 let i = joint.index();
                 at.regressors
-                    .insert((edge, FeatureKind::TorqueCompliance), loads.about_axis[i]);
+                    .insert((edge, EffectKind::TorqueCompliance), loads.about_axis[i]);
                 at.regressors
-                    .insert((edge, FeatureKind::Lateral1), loads.across[i][0]);
+                    .insert((edge, EffectKind::Lateral1), loads.across[i][0]);
                 at.regressors
-                    .insert((edge, FeatureKind::Lateral2), loads.across[i][1]);
+                    .insert((edge, EffectKind::Lateral2), loads.across[i][1]);
             }
             let root_from_link = fit.calibration.root_from_link(q);
-            for (name, frame) in &fit.stated.bodies {
+            for (name, frame) in &fit.formulation.bodies {
                 let body = &inputs.robot.profile.bodies[name];
                 let predicted = fit.calibration.tracker_from_root
                     * root_from_link[body.link.index()]
                     * fit.calibration.mounts[name];
                 let solved = fit
                     .solution
-                    .relative_pose(fit.stated.tracker, *frame, &at)
+                    .relative_pose(fit.formulation.tracker, *frame, &at)
                     .expect("a path")
                     .pose;
                 let difference =

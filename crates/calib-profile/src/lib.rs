@@ -24,8 +24,8 @@ pub use error::{Problem, ProfileError};
 pub use locate::Place;
 pub use profile::{
     Body, BodyKind, Clocks, Contact, ContactBase, Error3, Free, JointException, JointFree,
-    JointFreedom, Limits, LinkTransform, Load, Loop, Method, Noise, Orientation, Origin,
-    OriginFreedom, Outputs, ParameterValue, Plugin, PointChoice, Prior, Profile, Protocol,
+    JointFreeSet, Limits, LinkTransform, Load, Loop, Method, Noise, Orientation, Origin,
+    OriginFreeSet, Outputs, ParameterValue, Plugin, PointChoice, Prior, Profile, Protocol,
     RecordingSpec, RobotLog, SimErrors, SimMount, SimNoise, Simulation, Solve, Steps, SweptAxis,
     TimedPoses, Timing, Tip, Touched, Tracker, UpAxis, Usage,
 };

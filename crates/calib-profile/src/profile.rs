@@ -308,7 +308,7 @@ pub struct JointException {
 
 /// How much of a joint origin is free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OriginFreedom {
+pub enum OriginFreeSet {
     /// Held at the URDF's value.
     Held,
     /// The axis line: two tilts, two shifts.
@@ -319,9 +319,9 @@ pub enum OriginFreedom {
 
 /// What is free of one joint, with its priors.
 #[derive(Debug, Clone, PartialEq)]
-pub struct JointFreedom {
+pub struct JointFreeSet {
     /// Its origin.
-    pub origin: OriginFreedom,
+    pub origin: OriginFreeSet,
     /// Zero offset.
     pub offset: bool,
     /// Gain.
@@ -350,12 +350,12 @@ pub struct JointFreedom {
     pub angle_within: Option<f64>,
 }
 
-impl JointFreedom {
+impl JointFreeSet {
     /// The same joint with nothing free.
     #[must_use]
     pub fn held(self) -> Self {
         Self {
-            origin: OriginFreedom::Held,
+            origin: OriginFreeSet::Held,
             offset: false,
             gain: false,
             eccentricity: false,
@@ -371,7 +371,7 @@ impl JointFreedom {
 impl Solve {
     /// What is free of `joint`; `moved` tells whether the fitted recordings move it, `slides` whether it is prismatic.
     #[must_use]
-    pub fn freedom(&self, joint: JointId, moved: bool, slides: bool) -> JointFreedom {
+    pub fn free_set(&self, joint: JointId, moved: bool, slides: bool) -> JointFreeSet {
         let exception = self.joints.get(&joint).cloned().unwrap_or_default();
         let general = |free: Free| moved && self.free.contains(&free);
         let has = |own: JointFree, all: Free| match &exception.free {
@@ -379,18 +379,18 @@ impl Solve {
             None => general(all),
         };
         let origin = if has(JointFree::Origin, Free::JointOrigins) {
-            OriginFreedom::Full
+            OriginFreeSet::Full
         } else if has(JointFree::Axis, Free::JointAxes) {
-            OriginFreedom::Axis
+            OriginFreeSet::Axis
         } else {
-            OriginFreedom::Held
+            OriginFreeSet::Held
         };
         let offset_prior = if slides {
             self.prior.offset_m
         } else {
             self.prior.offset_rad
         };
-        JointFreedom {
+        JointFreeSet {
             origin,
             offset: has(JointFree::Offset, Free::JointOffsets),
             gain: has(JointFree::Gain, Free::JointGains),

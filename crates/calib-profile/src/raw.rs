@@ -482,7 +482,7 @@ pub enum RawFree {
     Backlash,
 }
 
-/// Extra freedom or prior width of one joint (fixed joints included).
+/// Extra effects or prior width of one joint (fixed joints included).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawJointSolve {

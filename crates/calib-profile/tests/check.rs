@@ -1,6 +1,6 @@
 //! The checked profile: units, references, places, and what is free of a joint.
 
-use calib_profile::{OriginFreedom, Profile, check, parse};
+use calib_profile::{OriginFreeSet, Profile, check, parse};
 use calib_urdf::RobotModel;
 
 const URDF: &str = r#"<robot name="arm">
@@ -178,11 +178,11 @@ fn joints_that_do_not_move_are_held_unless_the_profile_says_otherwise() {
         robot.joint_id("pan").expect("known"),
         robot.joint_id("rail").expect("known"),
     );
-    let moved = profile.solve.freedom(pan, true, false);
-    assert!(moved.offset && moved.origin == OriginFreedom::Axis);
-    let still = profile.solve.freedom(pan, false, false);
-    assert!(!still.offset && still.origin == OriginFreedom::Held);
-    let named = profile.solve.freedom(rail, false, true);
-    assert!(named.offset && named.origin == OriginFreedom::Held && named.offset_sigma == 3e-3);
+    let moved = profile.solve.free_set(pan, true, false);
+    assert!(moved.offset && moved.origin == OriginFreeSet::Axis);
+    let still = profile.solve.free_set(pan, false, false);
+    assert!(!still.offset && still.origin == OriginFreeSet::Held);
+    let named = profile.solve.free_set(rail, false, true);
+    assert!(named.offset && named.origin == OriginFreeSet::Held && named.offset_sigma == 3e-3);
     assert!(!named.held().offset);
 }

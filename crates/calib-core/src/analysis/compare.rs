@@ -141,14 +141,18 @@ pub fn compare_with(
     Ok(ranked)
 }
 
-/// (sample, head, item) that every variant kept and could predict.
+/// (sample, measurement, item) that every variant kept and could predict.
 fn common_vectors(
     solved: &[(&String, Solution, CrossValidation)],
 ) -> std::collections::BTreeSet<(usize, String, usize)> {
     let mut sets = solved.iter().map(|(_, _, loo)| {
         loo.samples
             .iter()
-            .flat_map(|s| s.vectors.iter().map(|v| (s.sample, v.head.clone(), v.item)))
+            .flat_map(|s| {
+                s.vectors
+                    .iter()
+                    .map(|v| (s.sample, v.measurement.clone(), v.item))
+            })
             .collect::<std::collections::BTreeSet<_>>()
     });
     let first = sets.next().unwrap_or_default();
@@ -164,7 +168,7 @@ fn sample_scores(
         let squares: Vec<f64> = s
             .vectors
             .iter()
-            .filter(|v| common.contains(&(s.sample, v.head.clone(), v.item)))
+            .filter(|v| common.contains(&(s.sample, v.measurement.clone(), v.item)))
             .map(|v| v.position.or(v.rotation).unwrap_or(0.0).powi(2))
             .collect();
         (!squares.is_empty()).then(|| squares.iter().sum::<f64>() / squares.len() as f64)

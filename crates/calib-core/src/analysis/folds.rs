@@ -10,7 +10,7 @@ use crate::graph::problem::Problem;
 #[must_use]
 pub fn folds(problem: &Problem, k: usize) -> Vec<Vec<usize>> {
     let mut used: Vec<usize> = problem
-        .heads
+        .measurements
         .iter()
         .flat_map(|h| h.kind.samples())
         .filter(|s| !problem.held_out.contains(s))

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::analysis::solution::Solution;
-use crate::graph::edge::{EdgeKind, FeatureKind};
+use crate::graph::edge::{EdgeKind, EffectKind};
 use crate::model::layout::Model;
 use crate::solve::noise::{Whitened, covariance_of, whitened};
 use crate::solve::normal::{NormalEquations, Workspace, accumulate};
@@ -214,13 +214,13 @@ impl Solution {
         let model = &self.model;
         let mut out = vec![DVector::zeros(rows); candidates.len()];
         let mut twists = Vec::new();
-        let mut head = usize::MAX;
+        let mut measurement = usize::MAX;
         let mut pose = crate::model::pose::Pose::identity();
         for &(o, first, count) in blocks {
             let observation = model.observations[o];
-            if observation.head != head {
-                head = observation.head;
-                pose = model.paths[head].effects(
+            if observation.measurement != measurement {
+                measurement = observation.measurement;
+                pose = model.paths[measurement].effects(
                     &model.problem,
                     &work.cache,
                     &self.values,
@@ -228,7 +228,7 @@ impl Solution {
                     &mut twists,
                 );
             }
-            let jacobian = residual(model, &self.values, head, observation.item, &pose);
+            let jacobian = residual(model, &self.values, measurement, observation.item, &pose);
             for (k, candidate) in candidates.iter().enumerate() {
                 let twist = match &candidate.effect {
                     Effect::Joints(parts) => parts
@@ -274,7 +274,7 @@ fn candidates(model: &Model) -> Vec<Candidate> {
             continue;
         };
         let name = &model.problem.edges[e].name;
-        let mut add = |kind: FeatureKind, label: String, values: Vec<f64>| {
+        let mut add = |kind: EffectKind, label: String, values: Vec<f64>| {
             out.push(Candidate {
                 name: label,
                 joint: Some(name.clone()),
@@ -282,25 +282,25 @@ fn candidates(model: &Model) -> Vec<Candidate> {
                 effect: Effect::Joints(vec![(e, kind.lateral(), values)]),
             });
         };
-        let modelled = |kind: FeatureKind| joint.features.iter().any(|f| f.kind == kind);
+        let modelled = |kind: EffectKind| joint.effects.iter().any(|f| f.kind == kind);
         for kind in [
-            FeatureKind::Gain,
-            FeatureKind::EccentricityCos,
-            FeatureKind::EccentricitySin,
+            EffectKind::Gain,
+            EffectKind::EccentricityCos,
+            EffectKind::EccentricitySin,
         ] {
             let revolute = matches!(joint.axis, crate::graph::edge::Axis::Revolute(_));
-            if modelled(kind) || (kind != FeatureKind::Gain && !revolute) {
+            if modelled(kind) || (kind != EffectKind::Gain && !revolute) {
                 continue;
             }
             let values = match kind {
-                FeatureKind::Gain => joint.q.clone(),
-                FeatureKind::EccentricityCos => joint.q.iter().map(|q| q.cos() - 1.0).collect(),
+                EffectKind::Gain => joint.q.clone(),
+                EffectKind::EccentricityCos => joint.q.iter().map(|q| q.cos() - 1.0).collect(),
                 _ => joint.q.iter().map(|q| q.sin()).collect(),
             };
             add(kind, format!("{name}.{}", kind.label()), values);
         }
         for candidate in &joint.candidates {
-            if candidate.kind == FeatureKind::ClockOffset {
+            if candidate.kind == EffectKind::ClockOffset {
                 clocks.push((e, None, candidate.values.clone()));
             } else {
                 add(
@@ -315,7 +315,7 @@ fn candidates(model: &Model) -> Vec<Candidate> {
         out.push(Candidate {
             name: "clock_offset".to_owned(),
             joint: None,
-            physics: FeatureKind::ClockOffset.physics(),
+            physics: EffectKind::ClockOffset.physics(),
             effect: Effect::Joints(clocks),
         });
     }

@@ -165,7 +165,7 @@ fn places(model: &Model) -> Vec<Place> {
                 }
             }
             EdgeKind::Joint(j) => {
-                for f in &j.features {
+                for f in &j.effects {
                     place[f.parameter.index()] = Place::Effects(e);
                 }
             }

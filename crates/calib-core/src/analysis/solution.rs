@@ -359,10 +359,10 @@ fn finish(model: Model, minimum: Minimum, outcome: Outcome) -> Result<Solution, 
         .filter(|(_, w)| **w > 0.0)
         .map(|(o, _)| o.rows)
         .sum();
-    for (head, sample, item) in model.lost() {
+    for (measurement, sample, item) in model.lost() {
         rejected.push(Rejection {
             sample,
-            head,
+            measurement,
             item,
             reason: RejectReason::Occlusion,
             distance: 0.0,

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::analysis::solution::Solution;
-use crate::graph::head::HeadKind;
+use crate::graph::measurement::MeasurementKind;
 use crate::model::layout::Model;
 use crate::solve::noise::{covariance_of, whitened};
 use crate::solve::normal::{NormalEquations, Workspace, accumulate};
@@ -35,15 +35,15 @@ pub struct SamplePrediction {
 /// One predicted vector.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct VectorError {
-    /// Head.
-    pub head: String,
-    /// Index within the head.
+    /// Measurement.
+    pub measurement: String,
+    /// Index within the measurement.
     pub item: usize,
-    /// Norm of the position part, m (`None` for heads without one).
+    /// Norm of the position part, m (`None` for measurements without one).
     pub position: Option<f64>,
     /// Norm of the rotation part, rad.
     pub rotation: Option<f64>,
-    /// Predicted ⊟ observed, in the order of the head's rows.
+    /// Predicted ⊟ observed, in the order of the measurement's rows.
     pub error: Vec<f64>,
     /// √(eᵀ Cov⁻¹ e) of this vector alone.
     pub z: f64,
@@ -231,21 +231,21 @@ fn vector_error(
     covariance: &DMatrix<f64>,
 ) -> VectorError {
     let o = model.observations[observation];
-    let head = &model.problem.heads[o.head];
+    let measurement = &model.problem.measurements[o.measurement];
     let error = e.rows(first, rows).into_owned();
     let block = covariance.view((first, first), (rows, rows)).into_owned();
     let z = nalgebra::Cholesky::new(block)
         .and_then(|c| c.l().solve_lower_triangular(&error))
         .map_or(f64::INFINITY, |y| y.norm());
-    let (rotation, position) = match &head.kind {
-        HeadKind::Poses { .. } | HeadKind::Loop { .. } => {
+    let (rotation, position) = match &measurement.kind {
+        MeasurementKind::Poses { .. } | MeasurementKind::Loop { .. } => {
             (Some(error.rows(0, 3).norm()), Some(error.rows(3, 3).norm()))
         }
-        HeadKind::Directions { .. } => (Some(error.norm()), None),
+        MeasurementKind::Directions { .. } => (Some(error.norm()), None),
         _ => (None, Some(error.norm())),
     };
     VectorError {
-        head: head.name.clone(),
+        measurement: measurement.name.clone(),
         item: o.item,
         position,
         rotation,

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::graph::edge::{EdgeKind, FeatureKind, Role};
+use crate::graph::edge::{EdgeKind, EffectKind, Role};
 use crate::graph::parameter::{DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA};
 use crate::graph::problem::Problem;
 
@@ -67,9 +67,9 @@ impl Problem {
                     }
                 }
                 EdgeKind::Joint(j) => {
-                    for f in &j.features {
+                    for f in &j.effects {
                         // A clock has no nominal offset unless the recording says so.
-                        if f.kind != FeatureKind::ClockOffset {
+                        if f.kind != EffectKind::ClockOffset {
                             let p = &self.parameters[f.parameter.index()];
                             sigmas.push((f.parameter, p.kind.typical_deviation(p.unit)));
                         }

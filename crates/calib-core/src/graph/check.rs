@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 
 use crate::graph::edge::EdgeKind;
 use crate::graph::error::Error;
-use crate::graph::head::{HeadKind, PoseNoise};
+use crate::graph::measurement::{MeasurementKind, PoseNoise};
 use crate::graph::problem::Problem;
 use crate::model::layout::covariance_directions;
 
@@ -66,7 +66,7 @@ pub(crate) fn check(problem: &Problem) -> Result<(), Error> {
             EdgeKind::Joint(joint) => {
                 length(&edge.name, joint.q.len())?;
                 finite(&edge.name, &joint.q)?;
-                for f in &joint.features {
+                for f in &joint.effects {
                     if let Some(v) = &f.values {
                         let what = format!("{}.{}", edge.name, f.kind.label());
                         length(&what, v.len())?;
@@ -114,11 +114,11 @@ pub(crate) fn check(problem: &Problem) -> Result<(), Error> {
         length("times", t.len())?;
         finite("times", t)?;
     }
-    for head in &problem.heads {
-        for sample in head.kind.samples() {
+    for measurement in &problem.measurements {
+        for sample in measurement.kind.samples() {
             if sample >= problem.samples {
                 return Err(Error::NoSuchSample {
-                    what: head.name.clone(),
+                    what: measurement.name.clone(),
                     sample,
                     samples: problem.samples,
                 });
@@ -126,24 +126,24 @@ pub(crate) fn check(problem: &Problem) -> Result<(), Error> {
         }
         let at_frame = |point: crate::graph::ids::PointId| {
             let p = &problem.points[point.index()];
-            if p.frame == head.to {
+            if p.frame == measurement.to {
                 Ok(())
             } else {
                 Err(Error::PointFrame {
-                    head: head.name.clone(),
+                    measurement: measurement.name.clone(),
                     point: p.name.clone(),
                     found: problem.frame_name(p.frame).to_owned(),
-                    expected: problem.frame_name(head.to).to_owned(),
+                    expected: problem.frame_name(measurement.to).to_owned(),
                 })
             }
         };
-        match &head.kind {
-            HeadKind::Markers { observations, .. } => {
+        match &measurement.kind {
+            MeasurementKind::Markers { observations, .. } => {
                 for o in observations {
                     at_frame(o.point)?;
                     if !o.position.iter().all(|v| v.is_finite()) {
                         return Err(Error::NotFinite {
-                            what: head.name.clone(),
+                            what: measurement.name.clone(),
                             sample: o.sample,
                         });
                     }
@@ -151,28 +151,28 @@ pub(crate) fn check(problem: &Problem) -> Result<(), Error> {
                         && nalgebra::Cholesky::new(shape).is_none()
                     {
                         return Err(Error::NotPositive {
-                            what: format!("{} covariance", head.name),
+                            what: format!("{} covariance", measurement.name),
                             value: shape.determinant(),
                         });
                     }
                 }
             }
-            HeadKind::Poses {
+            MeasurementKind::Poses {
                 observations,
                 noise,
             } => {
                 for o in observations {
-                    pose(&head.name, o.sample, &o.pose)?;
+                    pose(&measurement.name, o.sample, &o.pose)?;
                 }
-                check_noise(&head.name, noise)?;
+                check_noise(&measurement.name, noise)?;
             }
-            HeadKind::Loop { noise, .. } => check_noise(&head.name, noise)?,
-            HeadKind::Plane {
+            MeasurementKind::Loop { noise, .. } => check_noise(&measurement.name, noise)?,
+            MeasurementKind::Plane {
                 point,
                 observations,
                 ..
             }
-            | HeadKind::Distance {
+            | MeasurementKind::Distance {
                 point,
                 observations,
                 ..
@@ -181,25 +181,25 @@ pub(crate) fn check(problem: &Problem) -> Result<(), Error> {
                 for &(s, h) in observations {
                     if !h.is_finite() {
                         return Err(Error::NotFinite {
-                            what: head.name.clone(),
+                            what: measurement.name.clone(),
                             sample: s,
                         });
                     }
                 }
             }
-            HeadKind::Line { point, .. } => at_frame(*point)?,
-            HeadKind::Directions { .. } => {}
+            MeasurementKind::Line { point, .. } => at_frame(*point)?,
+            MeasurementKind::Directions { .. } => {}
         }
     }
     Ok(())
 }
 
-fn check_noise(head: &str, noise: &PoseNoise) -> Result<(), Error> {
+fn check_noise(measurement: &str, noise: &PoseNoise) -> Result<(), Error> {
     if let PoseNoise::Full { shape, .. } = noise
         && nalgebra::Cholesky::new(*shape).is_none()
     {
         return Err(Error::NotPositive {
-            what: format!("{head} covariance"),
+            what: format!("{measurement} covariance"),
             value: shape.determinant(),
         });
     }

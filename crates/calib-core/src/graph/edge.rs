@@ -20,16 +20,16 @@ pub struct Edge {
 }
 
 impl Edge {
-    /// A copy whose per-sample arrays are empty (features keep whether they have one).
+    /// A copy whose per-sample arrays are empty (effects keep whether they have one).
     pub(crate) fn clone_shallow(&self) -> Self {
         let kind = match &self.kind {
             EdgeKind::Joint(j) => EdgeKind::Joint(Joint {
                 axis: j.axis,
                 q: Vec::new(),
-                features: j
-                    .features
+                effects: j
+                    .effects
                     .iter()
-                    .map(|f| Feature {
+                    .map(|f| JointEffect {
                         kind: f.kind,
                         values: f.values.as_ref().map(|_| Vec::new()),
                         parameter: f.parameter,
@@ -149,7 +149,7 @@ pub struct Joint {
     /// Reading per sample, rad or m.
     pub q: Vec<f64>,
     /// Effects whose coefficients are parameters.
-    pub features: Vec<Feature>,
+    pub effects: Vec<JointEffect>,
     /// Effects that are not in the model; the goodness-of-fit test asks whether they should be.
     pub candidates: Vec<Candidate>,
     /// Noise of the reading itself, drawn anew for every sample.
@@ -159,7 +159,7 @@ pub struct Joint {
 /// Effect of a joint: linear in its coefficient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum FeatureKind {
+pub enum EffectKind {
     /// F = 1.
     ZeroOffset,
     /// F = q.
@@ -184,7 +184,7 @@ pub enum FeatureKind {
     Other,
 }
 
-impl FeatureKind {
+impl EffectKind {
     /// The rotation axis across the joint axis that it drives, if it is a lateral effect.
     pub(crate) fn lateral(self) -> Option<usize> {
         match self {
@@ -231,16 +231,16 @@ impl FeatureKind {
 
 /// An effect in the model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Feature {
+pub struct JointEffect {
     /// Which.
-    pub kind: FeatureKind,
+    pub kind: EffectKind,
     /// Regressor per sample; `None` means 1 everywhere.
     pub values: Option<Vec<f64>>,
-    /// Its coefficient; several features may share one (one clock offset for all joints).
+    /// Its coefficient; several effects may share one (one clock offset for all joints).
     pub parameter: ParameterId,
 }
 
-impl Feature {
+impl JointEffect {
     pub(crate) fn value(&self, sample: usize) -> f64 {
         self.values.as_ref().map_or(1.0, |v| v[sample])
     }
@@ -250,7 +250,7 @@ impl Feature {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// Which.
-    pub kind: FeatureKind,
+    pub kind: EffectKind,
     /// What a person calls it, for instance `elbow.compliance`.
     pub name: String,
     /// Regressor per sample.

@@ -15,11 +15,11 @@ pub enum Error {
     },
     /// A path was given edge by edge and its frames do not meet.
     #[error(
-        "path of `{head}`: edge `{edge}` begins at frame `{found}` where `{expected}` was reached"
+        "path of `{measurement}`: edge `{edge}` begins at frame `{found}` where `{expected}` was reached"
     )]
     BrokenPath {
-        /// The head.
-        head: String,
+        /// The measurement.
+        measurement: String,
         /// The edge.
         edge: String,
         /// Where the edge begins.
@@ -48,25 +48,25 @@ pub enum Error {
     /// A sample index is past the end.
     #[error("`{what}` names sample {sample} of {samples}")]
     NoSuchSample {
-        /// The head.
+        /// The measurement.
         what: String,
         /// The index.
         sample: usize,
         /// Number of samples.
         samples: usize,
     },
-    /// A marker belongs to another frame than the head measures.
+    /// A marker belongs to another frame than the one measured.
     #[error(
-        "point `{point}` is fixed in frame `{found}`, the head `{head}` measures frame `{expected}`"
+        "point `{point}` is fixed in frame `{found}`, measurement `{measurement}` is of frame `{expected}`"
     )]
     PointFrame {
-        /// The head.
-        head: String,
+        /// The measurement.
+        measurement: String,
         /// The point.
         point: String,
         /// Its frame.
         found: String,
-        /// The head's frame.
+        /// The measurement's frame.
         expected: String,
     },
     /// A σ, scale or covariance that is not positive.

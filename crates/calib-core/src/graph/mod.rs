@@ -5,7 +5,7 @@ pub(crate) mod chart;
 pub(crate) mod check;
 pub(crate) mod edge;
 pub(crate) mod error;
-pub(crate) mod head;
 pub(crate) mod ids;
+pub(crate) mod measurement;
 pub(crate) mod parameter;
 pub(crate) mod problem;

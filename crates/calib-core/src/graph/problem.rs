@@ -1,15 +1,17 @@
-//! The problem as the caller states it: frames, edges, points, noise groups, heads.
+//! The problem as the caller states it: frames, edges, points, noise groups, measurements.
 
 use nalgebra::{Isometry3, Matrix6, Point3, Unit as UnitVec, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::graph::chart::Chart;
 use crate::graph::edge::{
-    Axis, Candidate, Edge, EdgeKind, Feature, FeatureKind, Joint, Role, UnknownPose,
+    Axis, Candidate, Edge, EdgeKind, EffectKind, Joint, JointEffect, Role, UnknownPose,
 };
 use crate::graph::error::Error;
-use crate::graph::head::{Head, HeadKind, MarkerObservation, PoseNoise, PoseObservation};
 use crate::graph::ids::{EdgeId, FrameId, GroupId, ParameterId, PointId};
+use crate::graph::measurement::{
+    MarkerObservation, Measurement, MeasurementKind, PoseNoise, PoseObservation,
+};
 use crate::graph::parameter::{Parameter, ParameterKind, Unit};
 
 /// A point that is fixed in a frame.
@@ -62,7 +64,7 @@ pub struct Problem {
     pub(crate) points: Vec<Point>,
     pub(crate) parameters: Vec<Parameter>,
     pub(crate) groups: Vec<NoiseGroup>,
-    pub(crate) heads: Vec<Head>,
+    pub(crate) measurements: Vec<Measurement>,
     /// Time of each sample, s (optional; the goodness-of-fit test looks for drift along it).
     pub times: Option<Vec<f64>>,
     /// Samples that are predicted but not fitted to.
@@ -252,7 +254,7 @@ impl Problem {
             EdgeKind::Joint(Joint {
                 axis,
                 q,
-                features: Vec::new(),
+                effects: Vec::new(),
                 candidates: Vec::new(),
                 noise: None,
             }),
@@ -266,47 +268,47 @@ impl Problem {
         }
     }
 
-    /// Regressor of a feature that follows from the reading alone.
-    fn own_values(&self, edge: EdgeId, kind: FeatureKind) -> Option<Vec<f64>> {
+    /// Regressor of an effect that follows from the reading alone.
+    fn own_values(&self, edge: EdgeId, kind: EffectKind) -> Option<Vec<f64>> {
         let EdgeKind::Joint(joint) = &self.edges.get(edge.index())?.kind else {
             return None;
         };
         match kind {
-            FeatureKind::Gain => Some(joint.q.clone()),
-            FeatureKind::EccentricityCos => Some(joint.q.iter().map(|q| q.cos() - 1.0).collect()),
-            FeatureKind::EccentricitySin => Some(joint.q.iter().map(|q| q.sin()).collect()),
+            EffectKind::Gain => Some(joint.q.clone()),
+            EffectKind::EccentricityCos => Some(joint.q.iter().map(|q| q.cos() - 1.0).collect()),
+            EffectKind::EccentricitySin => Some(joint.q.iter().map(|q| q.sin()).collect()),
             _ => None,
         }
     }
 
-    /// Frees an effect of a joint whose regressor follows from the reading: [`FeatureKind::ZeroOffset`],
+    /// Frees an effect of a joint whose regressor follows from the reading: [`EffectKind::ZeroOffset`],
     /// `Gain`, `EccentricityCos`, `EccentricitySin`. The parameter is called `<joint>.<effect>`.
-    pub fn free_feature(
+    pub fn free_effect(
         &mut self,
         edge: EdgeId,
-        kind: FeatureKind,
+        kind: EffectKind,
         prior_sigma: Option<f64>,
     ) -> ParameterId {
         let values = self.own_values(edge, kind);
-        self.push_feature(edge, kind, values, prior_sigma)
+        self.push_effect(edge, kind, values, prior_sigma)
     }
 
     /// Frees an effect with its regressor per sample (torque, velocity, direction of approach,
     /// another joint's reading).
-    pub fn free_feature_with(
+    pub fn free_effect_with(
         &mut self,
         edge: EdgeId,
-        kind: FeatureKind,
+        kind: EffectKind,
         values: Vec<f64>,
         prior_sigma: Option<f64>,
     ) -> ParameterId {
-        self.push_feature(edge, kind, Some(values), prior_sigma)
+        self.push_effect(edge, kind, Some(values), prior_sigma)
     }
 
-    fn push_feature(
+    fn push_effect(
         &mut self,
         edge: EdgeId,
-        kind: FeatureKind,
+        kind: EffectKind,
         values: Option<Vec<f64>>,
         prior_sigma: Option<f64>,
     ) -> ParameterId {
@@ -319,11 +321,11 @@ impl Problem {
         };
         let angle = if prismatic { Unit::Metre } else { Unit::Radian };
         let (parameter_kind, unit) = match kind {
-            FeatureKind::ZeroOffset => (ParameterKind::ZeroOffset, angle),
-            FeatureKind::Gain => (ParameterKind::Gain, Unit::One),
-            FeatureKind::EccentricityCos => (ParameterKind::EccentricityCos, angle),
-            FeatureKind::EccentricitySin => (ParameterKind::EccentricitySin, angle),
-            FeatureKind::TorqueCompliance => (
+            EffectKind::ZeroOffset => (ParameterKind::ZeroOffset, angle),
+            EffectKind::Gain => (ParameterKind::Gain, Unit::One),
+            EffectKind::EccentricityCos => (ParameterKind::EccentricityCos, angle),
+            EffectKind::EccentricitySin => (ParameterKind::EccentricitySin, angle),
+            EffectKind::TorqueCompliance => (
                 ParameterKind::TorqueCompliance,
                 if prismatic {
                     Unit::MetrePerNewton
@@ -331,16 +333,16 @@ impl Problem {
                     Unit::RadianPerNewtonMetre
                 },
             ),
-            FeatureKind::Lateral1 | FeatureKind::Lateral2 => {
+            EffectKind::Lateral1 | EffectKind::Lateral2 => {
                 (ParameterKind::LateralCompliance, Unit::RadianPerNewtonMetre)
             }
-            FeatureKind::Backlash => (ParameterKind::Backlash, angle),
-            FeatureKind::ClockOffset => (ParameterKind::ClockOffset, Unit::Second),
-            FeatureKind::Coupling => (ParameterKind::Coupling, Unit::One),
-            FeatureKind::Other => (ParameterKind::Other, Unit::One),
+            EffectKind::Backlash => (ParameterKind::Backlash, angle),
+            EffectKind::ClockOffset => (ParameterKind::ClockOffset, Unit::Second),
+            EffectKind::Coupling => (ParameterKind::Coupling, Unit::One),
+            EffectKind::Other => (ParameterKind::Other, Unit::One),
         };
         let repeats = match self.edges.get(edge.index()).map(|e| &e.kind) {
-            Some(EdgeKind::Joint(j)) => j.features.iter().filter(|f| f.kind == kind).count(),
+            Some(EdgeKind::Joint(j)) => j.effects.iter().filter(|f| f.kind == kind).count(),
             _ => 0,
         };
         let suffix = if repeats == 0 {
@@ -359,21 +361,21 @@ impl Problem {
             bounds: None,
             fixed: false,
         });
-        self.share_feature(edge, kind, values, parameter);
+        self.share_effect(edge, kind, values, parameter);
         parameter
     }
 
     /// Adds an effect whose coefficient is an existing parameter (one clock offset for all joints,
     /// one compliance for both arms). `values: None` means 1 for every sample.
-    pub fn share_feature(
+    pub fn share_effect(
         &mut self,
         edge: EdgeId,
-        kind: FeatureKind,
+        kind: EffectKind,
         values: Option<Vec<f64>>,
         parameter: ParameterId,
     ) {
         if let Some(joint) = self.joint_mut(edge) {
-            joint.features.push(Feature {
+            joint.effects.push(JointEffect {
                 kind,
                 values,
                 parameter,
@@ -382,7 +384,7 @@ impl Problem {
     }
 
     /// Declares an effect that is not modelled, for the goodness-of-fit test.
-    pub fn candidate(&mut self, edge: EdgeId, kind: FeatureKind, values: Vec<f64>) {
+    pub fn candidate(&mut self, edge: EdgeId, kind: EffectKind, values: Vec<f64>) {
         let name = self.edge_name(edge).to_owned();
         if let Some(joint) = self.joint_mut(edge) {
             joint.candidates.push(Candidate {
@@ -477,9 +479,9 @@ impl Problem {
         GroupId::of(self.groups.len() - 1)
     }
 
-    /// Adds a residual head.
-    pub fn add_head(&mut self, head: Head) {
-        self.heads.push(head);
+    /// Adds a measurement.
+    pub fn add_measurement(&mut self, measurement: Measurement) {
+        self.measurements.push(measurement);
     }
 
     /// Markers of frame `to` seen from frame `from`, along the shortest path.
@@ -491,12 +493,12 @@ impl Problem {
         noise: GroupId,
         observations: Vec<MarkerObservation>,
     ) {
-        self.add_head(Head {
+        self.add_measurement(Measurement {
             name: name.to_owned(),
             from,
             to,
             path: None,
-            kind: HeadKind::Markers {
+            kind: MeasurementKind::Markers {
                 noise,
                 observations,
             },
@@ -512,12 +514,12 @@ impl Problem {
         noise: PoseNoise,
         observations: Vec<PoseObservation>,
     ) {
-        self.add_head(Head {
+        self.add_measurement(Measurement {
             name: name.to_owned(),
             from,
             to,
             path: None,
-            kind: HeadKind::Poses {
+            kind: MeasurementKind::Poses {
                 noise,
                 observations,
             },
@@ -538,12 +540,12 @@ impl Problem {
         // closed path from the end: back⁻¹ · there
         let mut path: Vec<(EdgeId, bool)> = back.iter().rev().map(|&(e, inv)| (e, !inv)).collect();
         path.extend_from_slice(there);
-        self.add_head(Head {
+        self.add_measurement(Measurement {
             name: name.to_owned(),
             from: end,
             to: end,
             path: Some(path),
-            kind: HeadKind::Loop { noise, samples },
+            kind: MeasurementKind::Loop { noise, samples },
         });
     }
 
@@ -607,15 +609,15 @@ impl Problem {
         &mut self.groups[id.index()]
     }
 
-    /// All heads.
+    /// All measurements.
     #[must_use]
-    pub fn heads(&self) -> &[Head] {
-        &self.heads
+    pub fn measurements(&self) -> &[Measurement] {
+        &self.measurements
     }
 
-    /// One head, to edit its observations.
-    pub fn heads_mut(&mut self) -> &mut [Head] {
-        &mut self.heads
+    /// One measurement, to edit its observations.
+    pub fn measurements_mut(&mut self) -> &mut [Measurement] {
+        &mut self.measurements
     }
 
     /// The edges from one frame to another by the shortest way (fewest edges, first created wins).

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Point3};
 use calib_geometry::{Twist, so3};
 
 use crate::analysis::solution::Solution;
-use crate::graph::edge::{EdgeKind, FeatureKind};
+use crate::graph::edge::{EdgeKind, EffectKind};
 use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId};
 use crate::model::layout::EdgeCache;
@@ -25,7 +25,7 @@ pub struct Configuration {
     /// Reading per joint edge.
     pub q: BTreeMap<EdgeId, f64>,
     /// Torque, velocity, approach direction, … per joint edge and effect.
-    pub regressors: BTreeMap<(EdgeId, FeatureKind), f64>,
+    pub regressors: BTreeMap<(EdgeId, EffectKind), f64>,
 }
 
 impl Configuration {
@@ -284,12 +284,12 @@ fn at_configuration(
     if let EdgeKind::Joint(joint) = &mut edge.kind {
         let q = at.q.get(&id).copied().unwrap_or(0.0);
         joint.q = vec![q];
-        for f in &mut joint.features {
+        for f in &mut joint.effects {
             if f.values.is_some() {
                 let value = match f.kind {
-                    FeatureKind::Gain => q,
-                    FeatureKind::EccentricityCos => q.cos() - 1.0,
-                    FeatureKind::EccentricitySin => q.sin(),
+                    EffectKind::Gain => q,
+                    EffectKind::EccentricityCos => q.cos() - 1.0,
+                    EffectKind::EccentricitySin => q.sin(),
                     kind => at.regressors.get(&(id, kind)).copied().unwrap_or(0.0),
                 };
                 f.values = Some(vec![value]);

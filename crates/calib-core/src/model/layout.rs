@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use crate::graph::edge::{Axis, EdgeKind, FeatureKind};
+use crate::graph::edge::{Axis, EdgeKind, EffectKind};
 use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId};
 use crate::graph::problem::Problem;
@@ -25,14 +25,14 @@ pub struct Model {
     pub(crate) columns: Vec<usize>,
     /// Parameter → column.
     pub(crate) column_of: Vec<Option<usize>>,
-    /// One per head.
+    /// One per measurement.
     pub(crate) paths: Vec<CompiledPath>,
-    /// Sorted by (sample, head, order given).
+    /// Sorted by (sample, measurement, order given).
     pub(crate) observations: Vec<Observation>,
     /// Observations of each sample.
     pub(crate) of_sample: Vec<Range<usize>>,
-    /// The same, by head: (sample, observations).
-    pub(crate) of_head: Vec<Vec<(usize, Range<usize>)>>,
+    /// The same, by measurement: (sample, observations).
+    pub(crate) of_measurement: Vec<Vec<(usize, Range<usize>)>>,
     pub(crate) trig: Trig,
     /// Random effects of a sample.
     pub(crate) slots: Vec<Slot>,
@@ -41,16 +41,16 @@ pub struct Model {
     /// Largest number of rows in one sample.
     pub(crate) max_rows: usize,
     unmoved: Vec<EdgeId>,
-    /// (head, sample, item) of observations whose path has no measurement at their sample.
+    /// (measurement, sample, item) of observations whose path has no measurement at their sample.
     lost: Vec<(usize, usize, usize)>,
 }
 
-/// One observation (vector-valued) of one head.
+/// One observation (vector-valued) of one measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Observation {
     pub sample: usize,
-    pub head: usize,
-    /// Index into the head's own list.
+    pub measurement: usize,
+    /// Index into the measurement's own list.
     pub item: usize,
     pub rows: usize,
 }
@@ -76,22 +76,22 @@ impl Model {
     pub fn new(problem: &Problem) -> Result<Self, Error> {
         crate::graph::check::check(problem)?;
         let mut problem = problem.clone();
-        let mut walks = Vec::with_capacity(problem.heads.len());
-        for head in &problem.heads {
+        let mut walks = Vec::with_capacity(problem.measurements.len());
+        for measurement in &problem.measurements {
             walks.push(walk(
                 &problem,
-                head.from,
-                head.to,
-                head.path.as_deref(),
-                &head.name,
+                measurement.from,
+                measurement.to,
+                measurement.path.as_deref(),
+                &measurement.name,
             )?);
         }
 
         let mut observations = Vec::new();
         let mut lost_items = Vec::new();
-        for (h, head) in problem.heads.iter().enumerate() {
-            let rows = head.kind.rows();
-            for (item, sample) in head.kind.samples().into_iter().enumerate() {
+        for (h, measurement) in problem.measurements.iter().enumerate() {
+            let rows = measurement.kind.rows();
+            for (item, sample) in measurement.kind.samples().into_iter().enumerate() {
                 let lost = walks[h].iter().any(|&(e, _)| {
                     matches!(&problem.edges[e.index()].kind,
                         EdgeKind::Measured { poses, .. } if poses[sample].is_none())
@@ -101,7 +101,7 @@ impl Model {
                 } else {
                     observations.push(Observation {
                         sample,
-                        head: h,
+                        measurement: h,
                         item,
                         rows,
                     });
@@ -114,7 +114,7 @@ impl Model {
         {
             return Err(Error::NoObservations);
         }
-        observations.sort_by_key(|o| (o.sample, o.head, o.item));
+        observations.sort_by_key(|o| (o.sample, o.measurement, o.item));
         let mut of_sample = Vec::with_capacity(problem.samples);
         let mut start = 0;
         for s in 0..problem.samples {
@@ -126,11 +126,12 @@ impl Model {
             start = end;
         }
 
-        let mut of_head: Vec<Vec<(usize, Range<usize>)>> = vec![Vec::new(); problem.heads.len()];
+        let mut of_measurement: Vec<Vec<(usize, Range<usize>)>> =
+            vec![Vec::new(); problem.measurements.len()];
         for (i, o) in observations.iter().enumerate() {
-            match of_head[o.head].last_mut() {
+            match of_measurement[o.measurement].last_mut() {
                 Some((sample, range)) if *sample == o.sample => range.end = i + 1,
-                _ => of_head[o.head].push((o.sample, i..i + 1)),
+                _ => of_measurement[o.measurement].push((o.sample, i..i + 1)),
             }
         }
 
@@ -164,7 +165,7 @@ impl Model {
             paths,
             observations,
             of_sample,
-            of_head,
+            of_measurement,
             trig: tabulate(&problem),
             slots,
             rows,
@@ -187,13 +188,13 @@ impl Model {
         &self.unmoved
     }
 
-    /// (head, sample, index within the head) of observations whose path has a measured edge that was
+    /// (measurement, sample, index within the measurement) of observations whose path has a measured edge that was
     /// lost at their sample.
     #[must_use]
     pub fn lost(&self) -> Vec<(String, usize, usize)> {
         self.lost
             .iter()
-            .map(|&(h, sample, item)| (self.problem.heads[h].name.clone(), sample, item))
+            .map(|&(h, sample, item)| (self.problem.measurements[h].name.clone(), sample, item))
             .collect()
     }
 
@@ -233,11 +234,15 @@ impl Model {
         self.observations.len()
     }
 
-    /// Sample, head name and index within the head of an observation.
+    /// Sample, measurement name and index within the measurement of an observation.
     #[must_use]
     pub fn describe(&self, observation: usize) -> (usize, &str, usize) {
         let o = self.observations[observation];
-        (o.sample, &self.problem.heads[o.head].name, o.item)
+        (
+            o.sample,
+            &self.problem.measurements[o.measurement].name,
+            o.item,
+        )
     }
 
     /// Current `parent_from_child` of a constant edge (known or unknown); `None` for the others.
@@ -299,7 +304,7 @@ fn walk(
     from: FrameId,
     to: FrameId,
     given: Option<&[(EdgeId, bool)]>,
-    head: &str,
+    measurement: &str,
 ) -> Result<Vec<(EdgeId, bool)>, Error> {
     let Some(given) = given else {
         return problem.path(from, to);
@@ -314,7 +319,7 @@ fn walk(
         };
         if begin != here {
             return Err(Error::BrokenPath {
-                head: head.to_owned(),
+                measurement: measurement.to_owned(),
                 edge: edge.name.clone(),
                 found: problem.frame_name(begin).to_owned(),
                 expected: problem.frame_name(here).to_owned(),
@@ -359,18 +364,18 @@ fn contract_unmoved(
         let reading = |s: usize| {
             joint.q[s]
                 + joint
-                    .features
+                    .effects
                     .iter()
                     .filter(|f| f.kind.lateral().is_none())
                     .map(|f| f.value(s) * problem.parameters[f.parameter.index()].start)
                     .sum::<f64>()
         };
-        let driven = joint.features.iter().any(|f| {
-            matches!(f.kind, FeatureKind::Coupling | FeatureKind::Other)
+        let driven = joint.effects.iter().any(|f| {
+            matches!(f.kind, EffectKind::Coupling | EffectKind::Other)
                 && !problem.parameters[f.parameter.index()].fixed
                 && range_of(&|s| f.value(s)) > MIN_JOINT_RANGE
         });
-        let own: Vec<usize> = joint.features.iter().map(|f| f.parameter.index()).collect();
+        let own: Vec<usize> = joint.effects.iter().map(|f| f.parameter.index()).collect();
         if driven || range_of(&reading) > MIN_JOINT_RANGE {
             moving_parameters.extend(own);
         } else {
@@ -485,11 +490,11 @@ impl EdgeCache {
             }
             if let EdgeKind::Joint(j) = &edge.kind {
                 let constant = matches!(j.axis, Axis::Revolute(_))
-                    && j.features
+                    && j.effects
                         .iter()
                         .all(|f| f.values.is_none() && f.kind.lateral().is_none());
                 self.offset[e] = constant.then(|| {
-                    j.features
+                    j.effects
                         .iter()
                         .map(|f| values.0[f.parameter.index()])
                         .sum::<f64>()

@@ -37,7 +37,7 @@ pub(crate) enum Step {
         inverse: bool,
         columns: Vec<(usize, usize)>,
     },
-    /// (feature, local column) of the free features; local slot of the joint's noise.
+    /// (effect, local column) of the free effects; local slot of the joint's noise.
     Joint {
         edge: usize,
         inverse: bool,
@@ -129,11 +129,11 @@ impl CompiledPath {
                     edge: e,
                     inverse,
                     columns: j
-                        .features
+                        .effects
                         .iter()
                         .enumerate()
-                        .filter_map(|(f, feature)| {
-                            let column = column_of[feature.parameter.index()]?;
+                        .filter_map(|(f, effect)| {
+                            let column = column_of[effect.parameter.index()]?;
                             Some((f, local(&mut path.columns, column)))
                         })
                         .collect(),
@@ -353,7 +353,7 @@ impl Motion {
         }
         let mut phi = joint.q[sample];
         let mut theta: Option<Vector3<f64>> = None;
-        for f in &joint.features {
+        for f in &joint.effects {
             let amount = f.value(sample) * values.0[f.parameter.index()];
             match f.kind.lateral() {
                 None => phi += amount,
@@ -454,9 +454,9 @@ fn joint_step(
         let column = suffix.pull_back(&s) * sign;
         if all {
             for &(f, c) in columns {
-                let feature = &joint.features[f];
-                if feature.kind.lateral().is_none() {
-                    out.columns[c] += column * feature.value(sample);
+                let effect = &joint.effects[f];
+                if effect.kind.lateral().is_none() {
+                    out.columns[c] += column * effect.value(sample);
                 }
             }
         }
@@ -467,9 +467,9 @@ fn joint_step(
     let across = |suffix: &Pose, out: &mut PathBuffer, map: &Matrix3<f64>, sign: f64| {
         if all {
             for &(f, c) in columns {
-                let feature = &joint.features[f];
-                if let Some(k) = feature.kind.lateral() {
-                    let w = map * joint.axis.across()[k] * (sign * feature.value(sample));
+                let effect = &joint.effects[f];
+                if let Some(k) = effect.kind.lateral() {
+                    let w = map * joint.axis.across()[k] * (sign * effect.value(sample));
                     out.columns[c] += suffix.pull_back(&Vector6::new(w.x, w.y, w.z, 0.0, 0.0, 0.0));
                 }
             }

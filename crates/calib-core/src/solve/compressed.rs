@@ -12,7 +12,7 @@
 
 use nalgebra::{DMatrix, Dyn, Matrix6, MatrixView, Vector3, Vector6};
 
-use crate::graph::head::HeadKind;
+use crate::graph::measurement::MeasurementKind;
 use crate::model::layout::{Model, Values};
 use crate::model::path::Derivatives;
 use crate::solve::normal::{NormalEquations, Workspace};
@@ -96,25 +96,43 @@ pub(crate) fn accumulate_compressed(
     work: &mut Workspace,
     out: &mut NormalEquations,
 ) -> bool {
-    for head in 0..model.problem.heads.len() {
-        let k = model.paths[head].columns.len();
+    for measurement in 0..model.problem.measurements.len() {
+        let k = model.paths[measurement].columns.len();
         let mut local = Local::new(k, 6);
-        let isotropic = match &model.problem.heads[head].kind {
-            HeadKind::Markers { observations, .. } => {
+        let isotropic = match &model.problem.measurements[measurement].kind {
+            MeasurementKind::Markers { observations, .. } => {
                 observations.iter().all(|o| o.shape.is_none())
             }
             _ => false,
         };
         let fine = if isotropic {
-            markers(model, values, weights, theta, head, work, &mut local, out)
+            markers(
+                model,
+                values,
+                weights,
+                theta,
+                measurement,
+                work,
+                &mut local,
+                out,
+            )
         } else {
-            general(model, values, weights, theta, head, work, &mut local, out)
+            general(
+                model,
+                values,
+                weights,
+                theta,
+                measurement,
+                work,
+                &mut local,
+                out,
+            )
         };
         if !fine {
             return false;
         }
         local.multiply();
-        let columns = &model.paths[head].columns;
+        let columns = &model.paths[measurement].columns;
         let n = out.n;
         for a in 0..k {
             out.g[columns[a]] += local.g[a];
@@ -130,27 +148,27 @@ pub(crate) fn accumulate_compressed(
 
 #[expect(
     clippy::too_many_arguments,
-    reason = "one pass over one head with everything it needs"
+    reason = "one pass over one measurement with everything it needs"
 )]
 fn markers(
     model: &Model,
     values: &Values,
     weights: &[f64],
     theta: &[f64],
-    head: usize,
+    measurement: usize,
     work: &mut Workspace,
     local: &mut Local,
     out: &mut NormalEquations,
 ) -> bool {
-    let HeadKind::Markers {
+    let MeasurementKind::Markers {
         noise,
         observations,
-    } = &model.problem.heads[head].kind
+    } = &model.problem.measurements[measurement].kind
     else {
         return false;
     };
     let information = 1.0 / theta[noise.index()];
-    let path = &model.paths[head];
+    let path = &model.paths[measurement];
     let k = local.k;
     let positions: Vec<Vector3<f64>> = (0..model.problem.points.len())
         .map(|p| model.point_position(p, values).coords)
@@ -161,7 +179,7 @@ fn markers(
     let mut seen: Vec<(usize, f64)> = Vec::new();
     let mut now: Vec<(usize, f64)> = Vec::new();
     let mut factor = [[0.0; 6]; 6];
-    for (sample, range) in &model.of_head[head] {
+    for (sample, range) in &model.of_measurement[measurement] {
         let pose = path.evaluate(
             &model.problem,
             &work.cache,
@@ -238,7 +256,7 @@ fn markers(
             rows[5 * k + c] = u5[5] * j[5];
         }
     }
-    point_blocks(model, head, &positions, &sums, out);
+    point_blocks(model, measurement, &positions, &sums, out);
     true
 }
 
@@ -254,9 +272,9 @@ pub(crate) fn cost_compressed(
         .map(|p| model.point_position(p, values).coords)
         .collect();
     let mut sum = 0.0;
-    for (head, path) in model.paths.iter().enumerate() {
+    for (measurement, path) in model.paths.iter().enumerate() {
         let mut buffer = path.buffer();
-        for (sample, range) in &model.of_head[head] {
+        for (sample, range) in &model.of_measurement[measurement] {
             let pose = path.evaluate(
                 &model.problem,
                 &work.cache,
@@ -270,10 +288,10 @@ pub(crate) fn cost_compressed(
                     continue;
                 }
                 let observation = model.observations[o];
-                if let HeadKind::Markers {
+                if let MeasurementKind::Markers {
                     noise,
                     observations,
-                } = &model.problem.heads[head].kind
+                } = &model.problem.measurements[measurement].kind
                 {
                     let marker = &observations[observation.item];
                     if marker.shape.is_none() {
@@ -284,7 +302,7 @@ pub(crate) fn cost_compressed(
                     }
                 }
                 let m = observation.rows;
-                let mut e = residual(model, values, head, observation.item, &pose).e;
+                let mut e = residual(model, values, measurement, observation.item, &pose).e;
                 let mut l = [[0.0; 6]; 6];
                 add_block(model, o, |i, j, group, shape| {
                     l[i][j] += theta[group] * shape / weights[o];
@@ -345,13 +363,13 @@ fn upper_factor(w: &Matrix6<f64>) -> Matrix6<f64> {
 /// Coupling of pose and points, and the points' own blocks.
 fn point_blocks(
     model: &Model,
-    head: usize,
+    measurement: usize,
     positions: &[Vector3<f64>],
     sums: &[PointSums],
     out: &mut NormalEquations,
 ) {
     let n = out.n;
-    let columns = &model.paths[head].columns;
+    let columns = &model.paths[measurement].columns;
     for s in sums {
         let p = positions[s.point];
         for axis in 0..3 {
@@ -371,25 +389,25 @@ fn point_blocks(
     }
 }
 
-/// Any head without compression: whitened rows of each observation, over local columns.
+/// Any measurement without compression: whitened rows of each observation, over local columns.
 #[expect(
     clippy::too_many_arguments,
-    reason = "one pass over one head with everything it needs"
+    reason = "one pass over one measurement with everything it needs"
 )]
 fn general(
     model: &Model,
     values: &Values,
     weights: &[f64],
     theta: &[f64],
-    head: usize,
+    measurement: usize,
     work: &mut Workspace,
     local: &mut Local,
     out: &mut NormalEquations,
 ) -> bool {
-    let path = &model.paths[head];
+    let path = &model.paths[measurement];
     let (k, n) = (local.k, out.n);
     let mut buffer = path.buffer();
-    for (sample, range) in &model.of_head[head] {
+    for (sample, range) in &model.of_measurement[measurement] {
         let pose = path.evaluate(
             &model.problem,
             &work.cache,
@@ -404,7 +422,7 @@ fn general(
             }
             let observation = model.observations[o];
             let m = observation.rows;
-            let rows = residual(model, values, head, observation.item, &pose);
+            let rows = residual(model, values, measurement, observation.item, &pose);
             let mut l = [[0.0; 6]; 6];
             add_block(model, o, |i, j, group, shape| {
                 l[i][j] += theta[group] * shape / weights[o];

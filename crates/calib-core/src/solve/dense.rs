@@ -8,7 +8,7 @@ use crate::solve::normal::Workspace;
 use crate::solve::rows::SampleRows;
 
 impl Model {
-    /// Residuals `predicted ⊟ observed` of all observations, stacked in the order (sample, head, item);
+    /// Residuals `predicted ⊟ observed` of all observations, stacked in the order (sample, measurement, item);
     /// rad and m, not whitened.
     #[must_use]
     pub fn residuals(&self, values: &Values) -> DVector<f64> {

@@ -457,7 +457,7 @@ mod tests {
         let turn = p.joint("turn", a, b, Axis::Revolute(Vector3::z_axis()), q(0.9));
         p.known("elbow", b, c, x);
         let tilt = p.joint("tilt", c, d, Axis::Revolute(Vector3::x_axis()), q(0.53));
-        p.free_feature(turn, FeatureKind::ZeroOffset, Some(0.1));
+        p.free_effect(turn, EffectKind::ZeroOffset, Some(0.1));
         let joint = p.noise_group("joint", NoiseKind::Joint, 4e-3, true);
         p.joint_noise(turn, joint);
         p.joint_noise(tilt, joint);

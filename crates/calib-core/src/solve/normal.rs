@@ -228,7 +228,7 @@ mod tests {
     use crate::*;
     use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
-    /// Two heads on one chain with known, unknown and anisotropic markers, some weights 0.
+    /// Two measurements on one chain with known, unknown and anisotropic markers, some weights 0.
     fn problem() -> Problem {
         let q: Vec<f64> = (0..9).map(|i| f64::from(i) * 0.3 - 1.0).collect();
         let mut p = Problem::new(q.len());
@@ -238,8 +238,8 @@ mod tests {
         let x = Isometry3::new(Vector3::new(0.3, 0.1, 0.2), Vector3::new(0.2, -0.4, 0.5));
         p.unknown("first", base, a, x, Chart::full());
         let joint = p.joint("turn", a, b, Axis::Revolute(Vector3::z_axis()), q.clone());
-        p.free_feature(joint, FeatureKind::ZeroOffset, Some(0.1));
-        p.free_feature(joint, FeatureKind::Gain, None);
+        p.free_effect(joint, EffectKind::ZeroOffset, Some(0.1));
+        p.free_effect(joint, EffectKind::Gain, None);
         let noise = p.noise_group("n", NoiseKind::Position, 1e-2, false);
         let points = [
             p.known_point("k1", b, Point3::new(0.3, 0.1, 0.0)),

@@ -7,8 +7,8 @@
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
-use crate::graph::head::HeadKind;
 use crate::graph::ids::PointId;
+use crate::graph::measurement::MeasurementKind;
 use crate::graph::problem::Problem;
 
 /// Bodies with more markers than this are only searched by exchanging two (7! is 5040).
@@ -21,9 +21,9 @@ const UNAMBIGUOUS: f64 = 3.0;
 pub struct Relabelled {
     /// Sample.
     pub sample: usize,
-    /// Head.
-    pub head: String,
-    /// (index of the observation within the head, its new point).
+    /// Measurement.
+    pub measurement: String,
+    /// (index of the observation within the measurement, its new point).
     pub changes: Vec<(usize, PointId)>,
 }
 
@@ -32,9 +32,9 @@ pub struct Relabelled {
 pub fn relabel(problem: &mut Problem, tolerance: f64) -> Vec<Relabelled> {
     let mut out = Vec::new();
     let samples = problem.samples;
-    for head in &mut problem.heads {
-        let name = head.name.clone();
-        if let HeadKind::Markers { observations, .. } = &mut head.kind {
+    for measurement in &mut problem.measurements {
+        let name = measurement.name.clone();
+        if let MeasurementKind::Markers { observations, .. } = &mut measurement.kind {
             let mut by_sample: Vec<Vec<usize>> = vec![Vec::new(); samples];
             for (i, o) in observations.iter().enumerate() {
                 if o.sample < samples {
@@ -66,7 +66,7 @@ pub fn relabel(problem: &mut Problem, tolerance: f64) -> Vec<Relabelled> {
                     }
                     out.push(Relabelled {
                         sample,
-                        head: name.clone(),
+                        measurement: name.clone(),
                         changes,
                     });
                 }

@@ -15,7 +15,7 @@
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::graph::head::HeadKind;
+use crate::graph::measurement::MeasurementKind;
 use crate::model::layout::{Model, Values};
 use crate::model::path::Derivatives;
 use crate::solve::minimize::{MinimizeSettings, Minimum, minimize_in};
@@ -40,9 +40,9 @@ pub enum RejectReason {
 pub struct Rejection {
     /// Sample.
     pub sample: usize,
-    /// Head.
-    pub head: String,
-    /// Index within the head.
+    /// Measurement.
+    pub measurement: String,
+    /// Index within the measurement.
     pub item: usize,
     /// Why.
     pub reason: RejectReason,
@@ -288,11 +288,12 @@ pub(crate) fn explain(
         if mask[o] <= 0.0 || kept[o] > 0.0 {
             continue;
         }
-        let head = &model.problem.heads[observation.head];
+        let measurement = &model.problem.measurements[observation.measurement];
         let same_body: Vec<usize> = model.of_sample[observation.sample]
             .clone()
             .filter(|&other| {
-                model.observations[other].head == observation.head && mask[other] > 0.0
+                model.observations[other].measurement == observation.measurement
+                    && mask[other] > 0.0
             })
             .collect();
         let reason = if swapped(model, values, theta, observation, &limits, work) {
@@ -304,7 +305,7 @@ pub(crate) fn explain(
         };
         out.push(Rejection {
             sample: observation.sample,
-            head: head.name.clone(),
+            measurement: measurement.name.clone(),
             item: observation.item,
             reason,
             distance: d2[o].sqrt(),
@@ -322,15 +323,15 @@ fn swapped(
     limits: &Limits,
     work: &mut Workspace,
 ) -> bool {
-    let HeadKind::Markers {
+    let MeasurementKind::Markers {
         noise,
         observations,
-    } = &model.problem.heads[observation.head].kind
+    } = &model.problem.measurements[observation.measurement].kind
     else {
         return false;
     };
     let seen = &observations[observation.item];
-    let path = &model.paths[observation.head];
+    let path = &model.paths[observation.measurement];
     let mut buffer = path.buffer();
     let pose = path.evaluate(
         &model.problem,
@@ -340,7 +341,7 @@ fn swapped(
         Derivatives::None,
         &mut buffer,
     );
-    let frame = model.problem.heads[observation.head].to;
+    let frame = model.problem.measurements[observation.measurement].to;
     // Twice the gate: the joints' noise adds to the marker's.
     let limit = (4.0 * limits.gate[3] * theta[noise.index()]).sqrt();
     (0..model.problem.points.len()).any(|p| {

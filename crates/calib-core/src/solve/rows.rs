@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use calib_geometry::so3;
 
-use crate::graph::head::{HeadKind, PoseNoise};
+use crate::graph::measurement::{MeasurementKind, PoseNoise};
 use crate::model::layout::{EdgeCache, Model, Values};
 use crate::model::path::{Derivatives, PathBuffer};
 use crate::model::pose::Pose;
@@ -39,7 +39,7 @@ pub(crate) struct SampleRows {
 type PointRows = ([Option<usize>; 3], [[f64; 3]; 6]);
 
 /// Rows of one observation against the body twist, before the chain rule.
-pub(crate) struct HeadRows {
+pub(crate) struct MeasurementRows {
     pub e: [f64; 6],
     pub m: [[f64; 6]; 6],
     /// ∂e/∂(point coordinates), rows × 3.
@@ -80,31 +80,37 @@ impl SampleRows {
         self.blocks.clear();
         let (n, k) = (self.n, self.k);
         let range = model.of_sample[sample].clone();
-        let mut head = usize::MAX;
+        let mut measurement = usize::MAX;
         let mut pose = Pose::identity();
         for o in range {
             if weights[o] <= 0.0 {
                 continue;
             }
             let observation = model.observations[o];
-            if observation.head != head {
-                head = observation.head;
-                pose = model.paths[head].evaluate(
+            if observation.measurement != measurement {
+                measurement = observation.measurement;
+                pose = model.paths[measurement].evaluate(
                     &model.problem,
                     cache,
                     values,
                     sample,
                     wanted,
-                    &mut self.buffers[head],
+                    &mut self.buffers[measurement],
                 );
             }
-            let rows = residual(model, values, observation.head, observation.item, &pose);
+            let rows = residual(
+                model,
+                values,
+                observation.measurement,
+                observation.item,
+                &pose,
+            );
             let first = self.m;
             let count = observation.rows;
             self.blocks.push((o, first, count));
             self.m += count;
-            let path = &model.paths[head];
-            let buffer = &self.buffers[head];
+            let path = &model.paths[measurement];
+            let buffer = &self.buffers[measurement];
             for i in 0..count {
                 let row = first + i;
                 self.r[row] = rows.e[i];
@@ -233,8 +239,8 @@ pub(crate) fn add_block(
             f(i, i, group, 1.0);
         }
     };
-    match &model.problem.heads[o.head].kind {
-        HeadKind::Markers {
+    match &model.problem.measurements[o.measurement].kind {
+        MeasurementKind::Markers {
             noise,
             observations,
         } => match observations[o.item].shape {
@@ -247,7 +253,7 @@ pub(crate) fn add_block(
                 }
             }
         },
-        HeadKind::Poses { noise, .. } | HeadKind::Loop { noise, .. } => match noise {
+        MeasurementKind::Poses { noise, .. } | MeasurementKind::Loop { noise, .. } => match noise {
             PoseNoise::Split {
                 orientation,
                 position,
@@ -263,10 +269,10 @@ pub(crate) fn add_block(
                 }
             }
         },
-        HeadKind::Directions { noise, .. } | HeadKind::Line { noise, .. } => {
+        MeasurementKind::Directions { noise, .. } | MeasurementKind::Line { noise, .. } => {
             isotropic(noise.index(), 0..2);
         }
-        HeadKind::Plane { noise, .. } | HeadKind::Distance { noise, .. } => {
+        MeasurementKind::Plane { noise, .. } | MeasurementKind::Distance { noise, .. } => {
             isotropic(noise.index(), 0..1);
         }
     }
@@ -281,21 +287,21 @@ pub(crate) fn tangent_basis(d: &Vector3<f64>) -> [Vector3<f64>; 2] {
     [e1, d.cross(&e1)]
 }
 
-/// Equations (1)–(7) of the heads at the path's pose.
+/// Equations (1)–(7) of the measurements at the path's pose.
 pub(crate) fn residual(
     model: &Model,
     values: &Values,
-    head: usize,
+    measurement: usize,
     item: usize,
     pose: &Pose,
-) -> HeadRows {
-    let mut out = HeadRows {
+) -> MeasurementRows {
+    let mut out = MeasurementRows {
         e: [0.0; 6],
         m: [[0.0; 6]; 6],
         point: None,
     };
-    match &model.problem.heads[head].kind {
-        HeadKind::Markers { observations, .. } => {
+    match &model.problem.measurements[measurement].kind {
+        MeasurementKind::Markers { observations, .. } => {
             let o = &observations[item];
             let p = model.point_position(o.point.index(), values).coords;
             // e = R p + t − y; de = R (−[p]ₓ ω + v + dp). Never −[Rᵀ(y − t)]ₓ, which is as good a
@@ -305,11 +311,11 @@ pub(crate) fn residual(
             set_point_rows(&mut out, &pose.r, &p, &e);
             out.point = point_columns(model, o.point.index(), &pose.r, 3);
         }
-        HeadKind::Poses { observations, .. } => {
+        MeasurementKind::Poses { observations, .. } => {
             pose_rows(&mut out, &Pose::of(&observations[item].pose), pose);
         }
-        HeadKind::Loop { .. } => pose_rows(&mut out, &Pose::identity(), pose),
-        HeadKind::Directions {
+        MeasurementKind::Loop { .. } => pose_rows(&mut out, &Pose::identity(), pose),
+        MeasurementKind::Directions {
             direction,
             observations,
             sign_free,
@@ -330,7 +336,7 @@ pub(crate) fn residual(
                 out.m[i][..3].copy_from_slice(row.as_slice());
             }
         }
-        HeadKind::Plane {
+        MeasurementKind::Plane {
             point,
             normal,
             observations,
@@ -340,7 +346,7 @@ pub(crate) fn residual(
             let e = normal.dot(&(pose.r * p + pose.t)) - observations[item].1;
             project(&mut out, model, point.index(), pose, &p, 0, normal, e);
         }
-        HeadKind::Line {
+        MeasurementKind::Line {
             point,
             through,
             direction,
@@ -352,7 +358,7 @@ pub(crate) fn residual(
                 project(&mut out, model, point.index(), pose, &p, i, b, b.dot(&off));
             }
         }
-        HeadKind::Distance {
+        MeasurementKind::Distance {
             point,
             anchor,
             observations,
@@ -375,7 +381,7 @@ pub(crate) fn residual(
 }
 
 /// Rows of `A (ω × p + v)` with residual e.
-fn set_point_rows(out: &mut HeadRows, a: &Matrix3<f64>, p: &Vector3<f64>, e: &Vector3<f64>) {
+fn set_point_rows(out: &mut MeasurementRows, a: &Matrix3<f64>, p: &Vector3<f64>, e: &Vector3<f64>) {
     let rotation = -(a * so3::skew(p));
     for i in 0..3 {
         out.e[i] = e[i];
@@ -387,9 +393,9 @@ fn set_point_rows(out: &mut HeadRows, a: &Matrix3<f64>, p: &Vector3<f64>, e: &Ve
 }
 
 /// One row `bᵀ (R p + t)`.
-#[expect(clippy::too_many_arguments, reason = "one row of one head")]
+#[expect(clippy::too_many_arguments, reason = "one row of one measurement")]
 fn project(
-    out: &mut HeadRows,
+    out: &mut MeasurementRows,
     model: &Model,
     point: usize,
     pose: &Pose,
@@ -428,7 +434,7 @@ fn point_columns(model: &Model, point: usize, a: &Matrix3<f64>, rows: usize) -> 
 }
 
 /// e = [Log(R_zᵀR); R_zᵀ(t − t_z)], de = [Jr⁻¹ ω; R_zᵀR v]
-fn pose_rows(out: &mut HeadRows, measured: &Pose, pose: &Pose) {
+fn pose_rows(out: &mut MeasurementRows, measured: &Pose, pose: &Pose) {
     let relative = measured.r.tr_mul(&pose.r);
     let log = so3::log(&so3::quaternion_of(
         &nalgebra::Rotation3::from_matrix_unchecked(relative),

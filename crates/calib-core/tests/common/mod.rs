@@ -3,7 +3,7 @@
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 use calib_core::{
-    Axis, Chart, EdgeId, FeatureKind, FrameId, GroupId, MarkerObservation, NoiseKind, PointId,
+    Axis, Chart, EdgeId, EffectKind, FrameId, GroupId, MarkerObservation, NoiseKind, PointId,
     PoseNoise, PoseObservation, Problem, Role,
 };
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -291,7 +291,7 @@ impl Chain {
                     Axis::Revolute(_) => r,
                     Axis::Prismatic(_) => t,
                 });
-                p.free_feature(joint, FeatureKind::ZeroOffset, prior);
+                p.free_effect(joint, EffectKind::ZeroOffset, prior);
             }
             origins.push(origin);
             joints.push(joint);

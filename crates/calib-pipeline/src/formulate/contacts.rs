@@ -8,49 +8,49 @@
 //!
 //! Its place and the point are unknowns where the profile gives them a prior.
 
-use calib_core::{Chart, Head, HeadKind, MarkerObservation, NoiseKind, Role};
+use calib_core::{Chart, MarkerObservation, Measurement, MeasurementKind, NoiseKind, Role};
 use calib_profile::{Contact, ContactBase, Touched};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::formulate::kinematics::Calibration;
-use crate::formulate::ml::Stated;
+use crate::formulate::ml::Formulation;
 use crate::prepare::load::Inputs;
 
 /// Adds every contact of the profile to the problem.
-pub fn add_contacts(stated: &mut Stated, inputs: &Inputs) {
+pub fn add_contacts(formulation: &mut Formulation, inputs: &Inputs) {
     let profile = &inputs.robot.profile;
     for (name, tip) in &profile.points {
-        let Some(link) = stated.links[tip.link.index()] else {
+        let Some(link) = formulation.links[tip.link.index()] else {
             continue;
         };
         let point = match tip.sigma {
-            Some(sigma) => stated
+            Some(sigma) => formulation
                 .problem
                 .unknown_point(name, link, tip.at, Some(sigma)),
-            None => stated.problem.known_point(name, link, tip.at),
+            None => formulation.problem.known_point(name, link, tip.at),
         };
-        stated.tips.insert(name.clone(), point);
+        formulation.contact_points.insert(name.clone(), point);
     }
     for (name, contact) in &profile.contacts {
         let base = match contact.on {
-            ContactBase::Tracker => Some(stated.tracker),
-            ContactBase::Link(link) => stated.links[link.index()],
+            ContactBase::Tracker => Some(formulation.tracker),
+            ContactBase::Link(link) => formulation.links[link.index()],
         };
-        let Some(&point) = stated.tips.get(&contact.point) else {
+        let Some(&point) = formulation.contact_points.get(&contact.point) else {
             continue;
         };
         let carrier = profile.points[&contact.point].link;
-        let (Some(base), Some(link)) = (base, stated.links[carrier.index()]) else {
+        let (Some(base), Some(link)) = (base, formulation.links[carrier.index()]) else {
             continue;
         };
-        let touches: Vec<usize> = stated
+        let touches: Vec<usize> = formulation
             .samples
             .iter()
             .enumerate()
             .filter(|(_, (recording, _))| contact.recordings.contains(recording))
             .map(|(sample, _)| sample)
             .collect();
-        let problem = &mut stated.problem;
+        let problem = &mut formulation.problem;
         let place_frame = problem.frame(&format!("{name}.place"));
         let place = problem.unknown(
             &format!("{name}.place"),
@@ -68,20 +68,20 @@ pub fn add_contacts(stated: &mut Stated, inputs: &Inputs) {
             !profile.solve.noise.known,
         );
         let kind = match contact.touched {
-            Touched::Plane => HeadKind::Plane {
+            Touched::Plane => MeasurementKind::Plane {
                 point,
                 normal: Vector3::z_axis(),
                 noise,
                 observations: touches.into_iter().map(|s| (s, 0.0)).collect(),
             },
-            Touched::Line => HeadKind::Line {
+            Touched::Line => MeasurementKind::Line {
                 point,
                 through: Point3::origin(),
                 direction: Vector3::z_axis(),
                 noise,
                 samples: touches,
             },
-            Touched::Point => HeadKind::Markers {
+            Touched::Point => MeasurementKind::Markers {
                 noise,
                 observations: touches
                     .into_iter()
@@ -93,21 +93,21 @@ pub fn add_contacts(stated: &mut Stated, inputs: &Inputs) {
                     })
                     .collect(),
             },
-            Touched::Distance(distance) => HeadKind::Distance {
+            Touched::Distance(distance) => MeasurementKind::Distance {
                 point,
                 anchor: Point3::origin(),
                 noise,
                 observations: touches.into_iter().map(|s| (s, distance)).collect(),
             },
         };
-        problem.add_head(Head {
+        problem.add_measurement(Measurement {
             name: name.clone(),
             from: place_frame,
             to: link,
             path: None,
             kind,
         });
-        stated.contacts.insert(name.clone(), place);
+        formulation.contacts.insert(name.clone(), place);
     }
 }
 
@@ -141,7 +141,7 @@ pub fn miss(
         ContactBase::Link(link) => robot.tracker_from_root * root_from_link[link.index()],
     };
     let tracker_from_place = tracker_from_base * robot.places.get(name)?;
-    let tip = robot.tips.get(&contact.point)?;
+    let tip = robot.contact_points.get(&contact.point)?;
     let touching = robot.tracker_from_root * root_from_link[carrier.index()] * tip;
     let p = tracker_from_place.inverse_transform_point(&touching).coords;
     let off = match contact.touched {

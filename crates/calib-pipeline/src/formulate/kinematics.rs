@@ -67,7 +67,7 @@ pub struct Calibration {
     /// Markers on their link, m, by body then marker, where they are known.
     pub points: BTreeMap<String, BTreeMap<String, Point3<f64>>>,
     /// Touching points in their links' frames, m, by name.
-    pub tips: BTreeMap<String, Point3<f64>>,
+    pub contact_points: BTreeMap<String, Point3<f64>>,
     /// Frames of touched things (z along normal or direction) in what they are fixed to, by contact.
     pub places: BTreeMap<String, Isometry3<f64>>,
 }
@@ -83,7 +83,7 @@ impl Calibration {
             tracker_from_root,
             mounts: BTreeMap::new(),
             points: BTreeMap::new(),
-            tips: BTreeMap::new(),
+            contact_points: BTreeMap::new(),
             places: BTreeMap::new(),
         }
     }

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use calib_core::{
-    Axis, Chart, EdgeId, FeatureKind, FrameId, GroupId, MarkerObservation, NoiseKind, PointId,
+    Axis, Chart, EdgeId, EffectKind, FrameId, GroupId, MarkerObservation, NoiseKind, PointId,
     PoseNoise, PoseObservation, Problem, Role, Settings, Solution,
 };
-use calib_profile::{BodyKind, ContactBase, Free, JointFreedom, OriginFreedom, Profile, Usage};
+use calib_profile::{BodyKind, ContactBase, Free, JointFreeSet, OriginFreeSet, Profile, Usage};
 use calib_urdf::{JointId, JointKind, RobotModel};
 use nalgebra::{Isometry3, Point3};
 
@@ -20,7 +20,7 @@ use crate::prepare::tracks::BodyTrack;
 
 /// What to free in a solve: the profile's choice, or the bodies and the robot's place only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Freedom {
+pub enum FreeSet {
     /// What the profile says.
     Profile,
     /// Mounts and `tracker_from_root` only: the baseline.
@@ -40,7 +40,7 @@ const MOVED: f64 = 1e-3;
 
 /// A stated problem, and how its parts are called there.
 #[derive(Debug, Clone)]
-pub struct Stated {
+pub struct Formulation {
     /// The problem.
     pub problem: Problem,
     /// Recording and row of each sample.
@@ -62,7 +62,7 @@ pub struct Stated {
     /// Points by body and marker.
     pub points: BTreeMap<String, BTreeMap<String, PointId>>,
     /// Touching points by name.
-    pub tips: BTreeMap<String, PointId>,
+    pub contact_points: BTreeMap<String, PointId>,
     /// Places of what is touched, by contact.
     pub contacts: BTreeMap<String, EdgeId>,
     /// Regressors are needed at predictions (compliance or coupling is free).
@@ -73,7 +73,7 @@ pub struct Stated {
 #[derive(Debug, Clone)]
 pub struct MlFit {
     /// The problem's names.
-    pub stated: Stated,
+    pub formulation: Formulation,
     /// What was found.
     pub solution: Solution,
     /// The robot that follows.
@@ -86,8 +86,8 @@ pub fn state(
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
     start: &Start,
-    freedom: Freedom,
-) -> Stated {
+    free_set: FreeSet,
+) -> Formulation {
     let profile = &inputs.robot.profile;
     let model = &inputs.robot.model;
     let samples = samples(inputs);
@@ -117,7 +117,7 @@ pub fn state(
     let tracker = problem.frame(&profile.tracker.frame);
     let root_frame = problem.frame(&model.link(model.root()).name);
     let tracker_free = !profile.bodies.is_empty()
-        && (profile.solve.free.contains(&Free::Tracker) || freedom == Freedom::RegistrationOnly);
+        && (profile.solve.free.contains(&Free::Tracker) || free_set == FreeSet::RegistrationOnly);
     let chart = if tracker_free {
         Chart::full()
     } else {
@@ -131,7 +131,7 @@ pub fn state(
         chart,
     );
     problem.set_role(root, Role::World, None);
-    let mut stated = Stated {
+    let mut formulation = Formulation {
         problem,
         tracker,
         links: vec![None; model.links().len()],
@@ -141,20 +141,27 @@ pub fn state(
         root,
         mounts: BTreeMap::new(),
         points: BTreeMap::new(),
-        tips: BTreeMap::new(),
+        contact_points: BTreeMap::new(),
         contacts: BTreeMap::new(),
         loaded: false,
         samples,
     };
-    stated.links[model.root().index()] = Some(root_frame);
-    let joint_noise = joint_noise_group(&mut stated.problem, profile);
+    formulation.links[model.root().index()] = Some(root_frame);
+    let joint_noise = joint_noise_group(&mut formulation.problem, profile);
     for joint in used_joints(inputs, model) {
-        add_joint(&mut stated, inputs, joint, &rows, joint_noise, freedom);
+        add_joint(
+            &mut formulation,
+            inputs,
+            joint,
+            &rows,
+            joint_noise,
+            free_set,
+        );
     }
-    add_bodies(&mut stated, inputs, tracks, start);
-    add_contacts(&mut stated, inputs);
-    crate::prepare::clock::add_clocks(&mut stated, inputs, freedom);
-    stated
+    add_bodies(&mut formulation, inputs, tracks, start);
+    add_contacts(&mut formulation, inputs);
+    crate::prepare::clock::add_clocks(&mut formulation, inputs, free_set);
+    formulation
 }
 
 /// One sample: indicated positions, and what else is known of it.
@@ -168,11 +175,15 @@ struct Row<'a> {
 ///
 /// # Errors
 /// [`PipelineError::Solve`] when the problem cannot be stated so.
-pub fn fit(stated: Stated, inputs: &Inputs, settings: &Settings) -> Result<MlFit, PipelineError> {
-    let solution = calib_core::solve(&stated.problem, settings)?;
-    let calibration = calibration(&stated, &solution, inputs);
+pub fn fit(
+    formulation: Formulation,
+    inputs: &Inputs,
+    settings: &Settings,
+) -> Result<MlFit, PipelineError> {
+    let solution = calib_core::solve(&formulation.problem, settings)?;
+    let calibration = calibration(&formulation, &solution, inputs);
     Ok(MlFit {
-        stated,
+        formulation,
         solution,
         calibration,
     })
@@ -237,39 +248,39 @@ fn joint_noise_group(problem: &mut Problem, profile: &Profile) -> Option<GroupId
 }
 
 fn add_joint(
-    stated: &mut Stated,
+    formulation: &mut Formulation,
     inputs: &Inputs,
     joint: JointId,
     rows: &[Row<'_>],
     noise: Option<GroupId>,
-    freedom: Freedom,
+    free_set: FreeSet,
 ) {
     let profile = &inputs.robot.profile;
     let model = &inputs.robot.model;
     let j = model.joint(joint);
-    let Some(parent) = stated.links[j.parent.index()] else {
+    let Some(parent) = formulation.links[j.parent.index()] else {
         return;
     };
     let readings: Vec<f64> = rows.iter().map(|r| model.position(r.q, joint)).collect();
     let fitted = readings
         .iter()
         .enumerate()
-        .filter(|(i, _)| !stated.problem.held_out.contains(i))
+        .filter(|(i, _)| !formulation.problem.held_out.contains(i))
         .map(|(_, q)| *q);
     let (low, high) = fitted.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
         (l.min(q), h.max(q))
     });
     let moved = high - low > MOVED;
     let slides = matches!(j.kind, JointKind::Prismatic { .. });
-    let free = match freedom {
-        Freedom::Profile => profile.solve.freedom(joint, moved, slides),
-        Freedom::RegistrationOnly => profile.solve.freedom(joint, false, slides).held(),
+    let free = match free_set {
+        FreeSet::Profile => profile.solve.free_set(joint, moved, slides),
+        FreeSet::RegistrationOnly => profile.solve.free_set(joint, false, slides).held(),
     };
-    let problem = &mut stated.problem;
+    let problem = &mut formulation.problem;
     let chart = match (free.origin, j.kind.axis()) {
-        (OriginFreedom::Held, _) | (OriginFreedom::Axis, None) => Chart::none(),
-        (OriginFreedom::Axis, Some(axis)) => Chart::axis_line(&axis),
-        (OriginFreedom::Full, _) => Chart::full(),
+        (OriginFreeSet::Held, _) | (OriginFreeSet::Axis, None) => Chart::none(),
+        (OriginFreeSet::Axis, Some(axis)) => Chart::axis_line(&axis),
+        (OriginFreeSet::Full, _) => Chart::full(),
     };
     let fixed = j.kind == JointKind::Fixed;
     let child = problem.frame(&model.link(j.child).name);
@@ -281,7 +292,7 @@ fn add_joint(
     let name = format!("{}.origin", j.name);
     let origin = problem.unknown(&name, parent, origin_child, j.parent_link_from_joint, chart);
     problem.set_role(origin, Role::JointOrigin, Some(&j.name));
-    if free.origin != OriginFreedom::Held {
+    if free.origin != OriginFreeSet::Held {
         problem.set_prior(origin, Some(free.angle_sigma), Some(free.position_sigma));
     }
     for (coordinate, parameter) in problem.edge_parameters(origin) {
@@ -292,8 +303,8 @@ fn add_joint(
         };
         problem.parameter_mut(parameter).bounds = within.map(|w| (-w, w));
     }
-    stated.origins[joint.index()] = Some(origin);
-    stated.links[j.child.index()] = Some(child);
+    formulation.origins[joint.index()] = Some(origin);
+    formulation.links[j.child.index()] = Some(child);
     let Some(axis) = j.kind.axis() else { return };
     let motion = if slides {
         Axis::Prismatic(axis)
@@ -301,8 +312,8 @@ fn add_joint(
         Axis::Revolute(axis)
     };
     let edge = problem.joint(&j.name, origin_child, child, motion, readings);
-    stated.joints[joint.index()] = Some(edge);
-    stated.loaded |= add_features(problem, profile, model, joint, edge, &free, rows);
+    formulation.joints[joint.index()] = Some(edge);
+    formulation.loaded |= add_effects(problem, profile, model, joint, edge, &free, rows);
     if let Some(group) = noise
         && moved
         && !slides
@@ -312,20 +323,20 @@ fn add_joint(
 }
 
 /// Frees the effects of a joint; returns whether a prediction needs its load or another joint's reading.
-fn add_features(
+fn add_effects(
     problem: &mut Problem,
     profile: &Profile,
     model: &RobotModel,
     joint: JointId,
     edge: EdgeId,
-    free: &JointFreedom,
+    free: &JointFreeSet,
     rows: &[Row<'_>],
 ) -> bool {
     let prior = &profile.solve.prior;
     let index = joint.index();
     let mut loaded = false;
     if free.offset {
-        let offset = problem.free_feature(edge, FeatureKind::ZeroOffset, Some(free.offset_sigma));
+        let offset = problem.free_effect(edge, EffectKind::ZeroOffset, Some(free.offset_sigma));
         let within = if model.joint(joint).kind.turns() {
             free.angle_within
         } else {
@@ -334,49 +345,49 @@ fn add_features(
         problem.parameter_mut(offset).bounds = within.map(|w| (-w, w));
     }
     if free.gain {
-        problem.free_feature(edge, FeatureKind::Gain, Some(prior.gain));
+        problem.free_effect(edge, EffectKind::Gain, Some(prior.gain));
     }
     if free.eccentricity {
-        problem.free_feature(edge, FeatureKind::EccentricityCos, Some(prior.eccentricity));
-        problem.free_feature(edge, FeatureKind::EccentricitySin, Some(prior.eccentricity));
+        problem.free_effect(edge, EffectKind::EccentricityCos, Some(prior.eccentricity));
+        problem.free_effect(edge, EffectKind::EccentricitySin, Some(prior.eccentricity));
     }
     let about: Vec<f64> = rows.iter().map(|r| r.loads.about_axis[index]).collect();
     if about.iter().any(|t| t.abs() > 0.0) {
         if free.compliance {
             loaded = true;
-            problem.free_feature_with(
+            problem.free_effect_with(
                 edge,
-                FeatureKind::TorqueCompliance,
+                EffectKind::TorqueCompliance,
                 about,
                 Some(prior.compliance),
             );
         } else {
-            problem.candidate(edge, FeatureKind::TorqueCompliance, about);
+            problem.candidate(edge, EffectKind::TorqueCompliance, about);
         }
         if free.lateral_compliance {
             loaded = true;
-            for (k, kind) in [FeatureKind::Lateral1, FeatureKind::Lateral2]
+            for (k, kind) in [EffectKind::Lateral1, EffectKind::Lateral2]
                 .into_iter()
                 .enumerate()
             {
                 let across = rows.iter().map(|r| r.loads.across[index][k]).collect();
-                problem.free_feature_with(edge, kind, across, Some(prior.compliance));
+                problem.free_effect_with(edge, kind, across, Some(prior.compliance));
             }
         }
     }
     let approach: Vec<f64> = rows.iter().map(|r| r.under.approach_of(index)).collect();
     if free.backlash {
         let sigma = Some(free.backlash_sigma);
-        problem.free_feature_with(edge, FeatureKind::Backlash, approach, sigma);
+        problem.free_effect_with(edge, EffectKind::Backlash, approach, sigma);
     } else if approach.contains(&1.0) && approach.contains(&-1.0) {
-        problem.candidate(edge, FeatureKind::Backlash, approach);
+        problem.candidate(edge, EffectKind::Backlash, approach);
     }
     for other in &free.coupled_to {
         loaded = true;
         let values = rows.iter().map(|r| model.position(r.q, *other)).collect();
-        problem.free_feature_with(
+        problem.free_effect_with(
             edge,
-            FeatureKind::Coupling,
+            EffectKind::Coupling,
             values,
             Some(prior.gain.max(1.0)),
         );
@@ -385,7 +396,7 @@ fn add_features(
 }
 
 fn add_bodies(
-    stated: &mut Stated,
+    formulation: &mut Formulation,
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
     start: &Start,
@@ -396,7 +407,7 @@ fn add_bodies(
     let as_pose =
         |name: &String| profile.bodies[name].kind == BodyKind::Pose || tracks[name].is_computed();
     let uses = |pose: bool| profile.bodies.keys().any(|name| as_pose(name) == pose);
-    let problem = &mut stated.problem;
+    let problem = &mut formulation.problem;
     let marker_noise = uses(false).then(|| {
         problem.noise_group(
             "marker",
@@ -420,13 +431,13 @@ fn add_bodies(
         ),
     });
     for (name, body) in &profile.bodies {
-        let Some(link) = stated.links[body.link.index()] else {
+        let Some(link) = formulation.links[body.link.index()] else {
             continue;
         };
         let track = &tracks[name];
         let has_frame = body.kind == BodyKind::Pose || track.template.is_some();
         let frame = if has_frame {
-            let frame = stated.problem.frame(name);
+            let frame = formulation.problem.frame(name);
             let (value, chart) = match body.mount {
                 Some(mount) => (mount, Chart::none()),
                 None => (
@@ -438,36 +449,34 @@ fn add_bodies(
                     Chart::full(),
                 ),
             };
-            let mount = stated
-                .problem
-                .unknown(&format!("{name}.mount"), link, frame, value, chart);
-            stated.problem.set_role(mount, Role::Mount, None);
-            stated.mounts.insert(name.clone(), mount);
-            stated.bodies.insert(name.clone(), frame);
+            let mount =
+                formulation
+                    .problem
+                    .unknown(&format!("{name}.mount"), link, frame, value, chart);
+            formulation.problem.set_role(mount, Role::Mount, None);
+            formulation.mounts.insert(name.clone(), mount);
+            formulation.bodies.insert(name.clone(), frame);
             frame
         } else {
             link
         };
         match (&body.kind, marker_noise, body_noise) {
             (_, _, Some(noise)) if as_pose(name) => {
-                let seen =
-                    stated
-                        .samples
-                        .iter()
-                        .enumerate()
-                        .filter_map(|(sample, (recording, row))| {
-                            let pose = (*track.in_recording(recording).get(*row)?)?;
-                            Some(PoseObservation { sample, pose })
-                        });
+                let seen = formulation.samples.iter().enumerate().filter_map(
+                    |(sample, (recording, row))| {
+                        let pose = (*track.in_recording(recording).get(*row)?)?;
+                        Some(PoseObservation { sample, pose })
+                    },
+                );
                 let seen = seen.collect();
-                stated
+                formulation
                     .problem
-                    .poses(name, stated.tracker, frame, noise, seen);
+                    .poses(name, formulation.tracker, frame, noise, seen);
             }
             (BodyKind::Markers { names, .. }, Some(noise), _) => {
-                let points = add_points(&mut stated.problem, names, track, start, name, frame);
+                let points = add_points(&mut formulation.problem, names, track, start, name, frame);
                 let mut seen = Vec::new();
-                for (sample, (recording, row)) in stated.samples.iter().enumerate() {
+                for (sample, (recording, row)) in formulation.samples.iter().enumerate() {
                     for (marker, point) in &points {
                         let loaded = &inputs.recordings[recording];
                         let track = loaded.poses.markers.get(marker);
@@ -482,10 +491,10 @@ fn add_bodies(
                         }
                     }
                 }
-                stated
+                formulation
                     .problem
-                    .markers(name, stated.tracker, frame, noise, seen);
-                stated
+                    .markers(name, formulation.tracker, frame, noise, seen);
+                formulation
                     .points
                     .insert(name.clone(), points.into_iter().collect());
             }
@@ -548,13 +557,13 @@ fn add_points(
 }
 
 /// The robot that a solution describes.
-fn calibration(stated: &Stated, solution: &Solution, inputs: &Inputs) -> Calibration {
-    calibration_at(stated, &solution.model, &solution.values, inputs)
+fn calibration(formulation: &Formulation, solution: &Solution, inputs: &Inputs) -> Calibration {
+    calibration_at(formulation, &solution.model, &solution.values, inputs)
 }
 
 /// The robot that any values of the parameters describe.
 pub(crate) fn calibration_at(
-    stated: &Stated,
+    formulation: &Formulation,
     solved: &calib_core::Model,
     values: &calib_core::Values,
     inputs: &Inputs,
@@ -565,21 +574,21 @@ pub(crate) fn calibration_at(
             .edge_pose(edge, values)
             .unwrap_or_else(Isometry3::identity)
     };
-    let mut robot = Calibration::nominal(model, pose(stated.root));
+    let mut robot = Calibration::nominal(model, pose(formulation.root));
     for joint in model.joint_ids() {
-        if let Some(edge) = stated.origins[joint.index()] {
+        if let Some(edge) = formulation.origins[joint.index()] {
             robot.model = robot.model.with_origin(joint, pose(edge));
         }
-        if let Some(edge) = stated.joints[joint.index()] {
-            robot.effects[joint.index()] = effects(stated, values, inputs, joint, edge);
+        if let Some(edge) = formulation.joints[joint.index()] {
+            robot.effects[joint.index()] = effects(formulation, values, inputs, joint, edge);
         }
     }
-    robot.mounts = stated
+    robot.mounts = formulation
         .mounts
         .iter()
         .map(|(name, edge)| (name.clone(), pose(*edge)))
         .collect();
-    for (body, points) in &stated.points {
+    for (body, points) in &formulation.points {
         let link_from_body = robot
             .mounts
             .get(body)
@@ -591,25 +600,25 @@ pub(crate) fn calibration_at(
         });
         robot.points.insert(body.clone(), on_link.collect());
     }
-    for (name, point) in &stated.tips {
+    for (name, point) in &formulation.contact_points {
         let at = solved.point_position(point.index(), values);
-        robot.tips.insert(name.clone(), at);
+        robot.contact_points.insert(name.clone(), at);
     }
-    for (name, place) in &stated.contacts {
+    for (name, place) in &formulation.contacts {
         robot.places.insert(name.clone(), pose(*place));
     }
     robot
 }
 
 fn effects(
-    stated: &Stated,
+    formulation: &Formulation,
     values: &calib_core::Values,
     inputs: &Inputs,
     joint: JointId,
     edge: EdgeId,
 ) -> JointEffects {
     let mut effects = JointEffects::default();
-    let calib_core::EdgeKind::Joint(j) = &stated.problem.edges()[edge.index()].kind else {
+    let calib_core::EdgeKind::Joint(j) = &formulation.problem.edges()[edge.index()].kind else {
         return effects;
     };
     let mut coupled = inputs
@@ -620,23 +629,23 @@ fn effects(
         .get(&joint)
         .map_or(&[][..], |e| &e.coupled_to)
         .iter();
-    for feature in &j.features {
-        let c = values.0[feature.parameter.index()];
-        match feature.kind {
-            FeatureKind::ZeroOffset => effects.offset = c,
-            FeatureKind::Gain => effects.gain = c,
-            FeatureKind::EccentricityCos => effects.eccentricity_cos = c,
-            FeatureKind::EccentricitySin => effects.eccentricity_sin = c,
-            FeatureKind::TorqueCompliance => effects.compliance = c,
-            FeatureKind::Lateral1 => effects.lateral[0] = c,
-            FeatureKind::Lateral2 => effects.lateral[1] = c,
-            FeatureKind::Coupling => {
+    for effect in &j.effects {
+        let c = values.0[effect.parameter.index()];
+        match effect.kind {
+            EffectKind::ZeroOffset => effects.offset = c,
+            EffectKind::Gain => effects.gain = c,
+            EffectKind::EccentricityCos => effects.eccentricity_cos = c,
+            EffectKind::EccentricitySin => effects.eccentricity_sin = c,
+            EffectKind::TorqueCompliance => effects.compliance = c,
+            EffectKind::Lateral1 => effects.lateral[0] = c,
+            EffectKind::Lateral2 => effects.lateral[1] = c,
+            EffectKind::Coupling => {
                 if let Some(other) = coupled.next() {
                     effects.coupling.insert(other.index(), c);
                 }
             }
-            FeatureKind::Backlash => effects.backlash = c,
-            FeatureKind::ClockOffset | FeatureKind::Other => {}
+            EffectKind::Backlash => effects.backlash = c,
+            EffectKind::ClockOffset | EffectKind::Other => {}
         }
     }
     effects

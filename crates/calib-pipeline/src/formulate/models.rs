@@ -11,7 +11,7 @@ use serde_json::json;
 use crate::error::PipelineError;
 use crate::estimate::start::start;
 use crate::formulate::kinematics::Loads;
-use crate::formulate::ml::{Freedom, state};
+use crate::formulate::ml::{FreeSet, state};
 use crate::prepare::checks;
 use crate::prepare::load::{Inputs, load_recordings, load_robot};
 use crate::prepare::tracks::body_tracks;
@@ -64,15 +64,15 @@ pub fn compare_models(
         }
         free.extend(added.iter().copied());
         inputs.robot.profile.solve.free.clone_from(&free);
-        let freedom = if added.is_empty() {
-            Freedom::RegistrationOnly
+        let free_set = if added.is_empty() {
+            FreeSet::RegistrationOnly
         } else {
-            Freedom::Profile
+            FreeSet::Profile
         };
         progress(&format!("state model: {name}"), 0, 0);
         variants.push((
             name.to_owned(),
-            state(&inputs, &tracks, &start, freedom).problem,
+            state(&inputs, &tracks, &start, free_set).problem,
         ));
     }
     let all = variants.len();

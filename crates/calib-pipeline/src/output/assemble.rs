@@ -313,7 +313,7 @@ fn unit(unit: calib_core::Unit) -> Unit {
 }
 
 fn parameters(fit: &MlFit) -> Vec<Parameter> {
-    let held = |i: usize| fit.stated.problem.parameters()[i].fixed;
+    let held = |i: usize| fit.formulation.problem.parameters()[i].fixed;
     let all = fit
         .solution
         .parameters
@@ -520,7 +520,7 @@ fn rejected(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Rejected> {
         .into_iter()
         .flat_map(|fit| fit.solution.rejected.iter().map(move |r| (fit, r)))
     {
-        let (recording, row) = &fit.stated.samples[r.sample];
+        let (recording, row) = &fit.formulation.samples[r.sample];
         let reason = match r.reason {
             RejectReason::Swap => "swap: it lies where another marker of the body should be",
             RejectReason::Occlusion => "occlusion: a measured pose on its way was lost",
@@ -529,7 +529,11 @@ fn rejected(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Rejected> {
         };
         let row = inputs.recordings[recording].poses.rows[*row];
         groups
-            .entry((recording.clone(), subject(fit, &r.head, r.item), reason))
+            .entry((
+                recording.clone(),
+                subject(fit, &r.measurement, r.item),
+                reason,
+            ))
             .or_default()
             .push(row);
     }

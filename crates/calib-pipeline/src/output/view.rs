@@ -166,12 +166,14 @@ fn joint_axes(inputs: &Inputs, fit: &MlFit) -> Vec<Axis> {
     for id in model.independent_joints() {
         let joint = model.joint(id);
         let moved = !fit.solution.observability.unmoved.contains(&joint.name);
-        let frame = fit.stated.links[joint.child.index()].filter(|_| moved);
+        let frame = fit.formulation.links[joint.child.index()].filter(|_| moved);
         let (Some(frame), true, Some(direction)) = (frame, joint.kind.turns(), joint.kind.axis())
         else {
             continue;
         };
-        let derived = fit.solution.relative_pose(fit.stated.tracker, frame, &at);
+        let derived = fit
+            .solution
+            .relative_pose(fit.formulation.tracker, frame, &at);
         let covariance = derived.ok().and_then(|d| d.covariance);
         // A line does not change when it turns about itself or slides along itself: what is left is two numbers each.
         let across = Matrix3::identity() - direction.into_inner() * direction.transpose();

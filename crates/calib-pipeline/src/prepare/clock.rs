@@ -7,13 +7,13 @@
 //! φ = q(τ) + q̇(τ) (c₀ + c₁ u)                                                                        (1)
 //! ```
 //!
-//! so one c₀ and one c₁ are shared by all joints of a recording ([`calib_core::FeatureKind::ClockOffset`]).
+//! so one c₀ and one c₁ are shared by all joints of a recording ([`calib_core::EffectKind::ClockOffset`]).
 
-use calib_core::{FeatureKind, Parameter, ParameterId, ParameterKind, Unit};
+use calib_core::{EffectKind, Parameter, ParameterId, ParameterKind, Unit};
 use calib_profile::Usage;
 use calib_report::Clock;
 
-use crate::formulate::ml::{Freedom, MlFit, Stated};
+use crate::formulate::ml::{Formulation, FreeSet, MlFit};
 use crate::prepare::align::ClockState;
 use crate::prepare::load::{Inputs, Loaded};
 
@@ -57,7 +57,7 @@ fn position(loaded: &Loaded, row: usize) -> Option<f64> {
 
 /// Frees c₀ and c₁ of every fitted recording whose clocks were found from its motion; where the clocks are one, or
 /// declared so, the offset is only offered to the test for missing physics.
-pub fn add_clocks(stated: &mut Stated, inputs: &Inputs, freedom: Freedom) {
+pub fn add_clocks(formulation: &mut Formulation, inputs: &Inputs, free_set: FreeSet) {
     for (name, loaded) in &inputs.recordings {
         if loaded.spec.usage == Usage::Validation || loaded.velocities.is_empty() {
             continue;
@@ -73,7 +73,7 @@ pub fn add_clocks(stated: &mut Stated, inputs: &Inputs, freedom: Freedom) {
                 .model
                 .joint_id(joint)
                 .ok()
-                .and_then(|id| stated.joints[id.index()])
+                .and_then(|id| formulation.joints[id.index()])
             else {
                 continue;
             };
@@ -84,16 +84,16 @@ pub fn add_clocks(stated: &mut Stated, inputs: &Inputs, freedom: Freedom) {
                     }
                     speeds.get(*row).copied().flatten().unwrap_or(0.0) * weight(*row)
                 };
-                stated.samples.iter().map(value).collect()
+                formulation.samples.iter().map(value).collect()
             };
             let constant = regressor(&|_| 1.0);
-            if !found || freedom == Freedom::RegistrationOnly {
-                let problem = &mut stated.problem;
-                problem.candidate(edge, FeatureKind::ClockOffset, constant);
+            if !found || free_set == FreeSet::RegistrationOnly {
+                let problem = &mut formulation.problem;
+                problem.candidate(edge, EffectKind::ClockOffset, constant);
                 continue;
             }
             let linear = regressor(&|row| position(loaded, row).unwrap_or(0.0));
-            let problem = &mut stated.problem;
+            let problem = &mut formulation.problem;
             let [offset, drift] = *parameters.get_or_insert_with(|| {
                 [offset_name(name), drift_name(name)].map(|name| {
                     problem.parameter(Parameter {
@@ -109,8 +109,8 @@ pub fn add_clocks(stated: &mut Stated, inputs: &Inputs, freedom: Freedom) {
                     })
                 })
             });
-            problem.share_feature(edge, FeatureKind::ClockOffset, Some(constant), offset);
-            problem.share_feature(edge, FeatureKind::ClockOffset, Some(linear), drift);
+            problem.share_effect(edge, EffectKind::ClockOffset, Some(constant), offset);
+            problem.share_effect(edge, EffectKind::ClockOffset, Some(linear), drift);
         }
     }
 }

@@ -26,7 +26,7 @@ use nalgebra::{Isometry3, Vector6};
 
 use crate::error::PipelineError;
 use crate::estimate::start::{Start, start};
-use crate::formulate::ml::{self, Freedom, MlFit};
+use crate::formulate::ml::{self, FreeSet, MlFit};
 use crate::prepare::conditions::{Conditions, conditions};
 use crate::prepare::load::{Excluded, Inputs, Loaded};
 use crate::prepare::tracks::BodyTrack;
@@ -357,7 +357,7 @@ pub fn bad_rows_of_inputs(
     tracks: &BTreeMap<String, BodyTrack>,
 ) -> Result<BadRows, PipelineError> {
     let start = start(inputs, tracks);
-    let stated = ml::state(inputs, tracks, &start, Freedom::Profile);
+    let stated = ml::state(inputs, tracks, &start, FreeSet::Profile);
     let fit = ml::fit(stated, inputs, &calib_core::Settings::default())?;
     Ok(bad_rows(inputs, tracks, &fit))
 }
@@ -421,22 +421,22 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
 fn rejected_bodies(fit: &MlFit) -> BTreeSet<(String, usize, String)> {
     let mut left_out: BTreeMap<(usize, &str), usize> = BTreeMap::new();
     for r in &fit.solution.rejected {
-        *left_out.entry((r.sample, &r.head)).or_default() += 1;
+        *left_out.entry((r.sample, &r.measurement)).or_default() += 1;
     }
     let mut seen: BTreeMap<(usize, &str), usize> = BTreeMap::new();
-    for head in fit.stated.problem.heads() {
-        if let calib_core::HeadKind::Markers { observations, .. } = &head.kind {
+    for measurement in fit.formulation.problem.measurements() {
+        if let calib_core::MeasurementKind::Markers { observations, .. } = &measurement.kind {
             for o in observations {
-                *seen.entry((o.sample, &head.name)).or_default() += 1;
+                *seen.entry((o.sample, &measurement.name)).or_default() += 1;
             }
         }
     }
     left_out
         .into_iter()
         .filter(|(key, count)| seen.get(key).is_none_or(|all| count >= all))
-        .map(|((sample, head), _)| {
-            let (recording, row) = &fit.stated.samples[sample];
-            (recording.clone(), *row, head.to_owned())
+        .map(|((sample, measurement), _)| {
+            let (recording, row) = &fit.formulation.samples[sample];
+            (recording.clone(), *row, measurement.to_owned())
         })
         .collect()
 }

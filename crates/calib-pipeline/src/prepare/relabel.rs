@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::{HeadKind, MarkerObservation, NoiseKind, PointId, Problem};
+use calib_core::{MarkerObservation, MeasurementKind, NoiseKind, PointId, Problem};
 use calib_profile::BodyKind;
 use calib_recording::{Finding, Severity};
 use nalgebra::Point3;
@@ -86,7 +86,8 @@ fn relabel_body(
     };
     problem.markers(body, tracker, frame, noise, observations);
     let changed = calib_core::relabel(&mut problem, tolerance);
-    let Some(HeadKind::Markers { observations, .. }) = problem.heads().first().map(|h| &h.kind)
+    let Some(MeasurementKind::Markers { observations, .. }) =
+        problem.measurements().first().map(|h| &h.kind)
     else {
         return Vec::new();
     };

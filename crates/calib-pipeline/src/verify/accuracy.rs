@@ -1,6 +1,6 @@
 //! How exact the result is: the tool's uncertainty over the workspace, and what an error on a new pose is made of.
 
-use calib_core::{Configuration, FeatureKind};
+use calib_core::{Configuration, EffectKind};
 use calib_geometry::so3;
 use calib_profile::Usage;
 use calib_report::{AccuracyLimit, Workspace, WorkspacePoint};
@@ -16,22 +16,22 @@ use crate::prepare::load::Inputs;
 pub(crate) fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configuration {
     let model = &inputs.robot.model;
     let mut at = Configuration::zero();
-    let loads = fit.stated.loaded.then(|| Loads::at(model, q));
+    let loads = fit.formulation.loaded.then(|| Loads::at(model, q));
     for joint in model.joint_ids() {
-        let Some(edge) = fit.stated.joints[joint.index()] else {
+        let Some(edge) = fit.formulation.joints[joint.index()] else {
             continue;
         };
         at = at.with(edge, model.position(q, joint));
         if let Some(loads) = &loads {
             let index = joint.index();
             at.regressors.insert(
-                (edge, FeatureKind::TorqueCompliance),
+                (edge, EffectKind::TorqueCompliance),
                 loads.about_axis[index],
             );
             at.regressors
-                .insert((edge, FeatureKind::Lateral1), loads.across[index][0]);
+                .insert((edge, EffectKind::Lateral1), loads.across[index][0]);
             at.regressors
-                .insert((edge, FeatureKind::Lateral2), loads.across[index][1]);
+                .insert((edge, EffectKind::Lateral2), loads.across[index][1]);
         }
     }
     at
@@ -61,10 +61,10 @@ const WORKSPACE_POSES: usize = 60;
 pub(crate) fn workspace(inputs: &Inputs, fit: &MlFit) -> Option<Workspace> {
     let model = &inputs.robot.model;
     let tool = tool_link(inputs)?;
-    let root = fit.stated.links[model.root().index()]?;
-    let link = fit.stated.links[tool.index()]?;
+    let root = fit.formulation.links[model.root().index()]?;
+    let link = fit.formulation.links[tool.index()]?;
     let body = fit
-        .stated
+        .formulation
         .bodies
         .iter()
         .find(|(name, _)| inputs.robot.profile.bodies[*name].link == tool);
@@ -84,7 +84,7 @@ pub(crate) fn workspace(inputs: &Inputs, fit: &MlFit) -> Option<Workspace> {
         // Seen from the tracker, as everything that was verified: where the robot's base begins is another convention.
         let seen = fit
             .solution
-            .relative_pose(fit.stated.tracker, target, &at)
+            .relative_pose(fit.formulation.tracker, target, &at)
             .ok()?;
         points.push(WorkspacePoint {
             position_m: place.pose.translation.vector.into(),

@@ -37,7 +37,7 @@ pub fn data_information(inputs: &Inputs, fit: &MlFit) -> DataInformation {
             root.row_mut(r).neg_mut();
         }
     }
-    let of_problem = fit.stated.problem.parameters();
+    let of_problem = fit.formulation.problem.parameters();
     DataInformation {
         parameters: free
             .iter()
@@ -59,7 +59,7 @@ fn quantities(inputs: &Inputs, fit: &MlFit) -> Vec<Quantity> {
     let solution = &fit.solution;
     let at = |values: &calib_core::Values| {
         let robot =
-            crate::formulate::ml::calibration_at(&fit.stated, &solution.model, values, inputs);
+            crate::formulate::ml::calibration_at(&fit.formulation, &solution.model, values, inputs);
         invariants(&robot.urdf_model())
     };
     let found = at(&solution.values);

@@ -27,8 +27,8 @@ pub fn known_numbers(inputs: &Inputs, fit: &MlFit) -> BTreeMap<String, Known> {
     let mut known = BTreeMap::new();
     for joint in model.joints() {
         let (Some(parent), Some(child)) = (
-            fit.stated.links[joint.parent.index()],
-            fit.stated.links[joint.child.index()],
+            fit.formulation.links[joint.parent.index()],
+            fit.formulation.links[joint.child.index()],
         ) else {
             continue;
         };
@@ -51,9 +51,9 @@ pub fn known_numbers(inputs: &Inputs, fit: &MlFit) -> BTreeMap<String, Known> {
             );
         }
     }
-    for (name, body) in &fit.stated.bodies {
+    for (name, body) in &fit.formulation.bodies {
         let link = inputs.robot.profile.bodies[name].link;
-        let Some(link) = fit.stated.links[link.index()] else {
+        let Some(link) = fit.formulation.links[link.index()] else {
             continue;
         };
         let derived = fit.solution.relative_pose(link, *body, &zero);
@@ -111,7 +111,7 @@ fn number_variances(pose: &Isometry3<f64>, covariance: &Matrix6<f64>) -> [f64; 6
 /// zero offset as a turn about the axis.
 fn prior(fit: &MlFit, joint: &Joint) -> Matrix6<f64> {
     let variance = |name: &str| {
-        fit.stated
+        fit.formulation
             .problem
             .parameters()
             .iter()

@@ -21,25 +21,34 @@ pub fn left_out(fit: &MlFit) -> BTreeSet<(String, usize, String)> {
         .rejected
         .iter()
         .map(|r| {
-            let (recording, row) = &fit.stated.samples[r.sample];
-            (recording.clone(), *row, subject(fit, &r.head, r.item))
+            let (recording, row) = &fit.formulation.samples[r.sample];
+            (
+                recording.clone(),
+                *row,
+                subject(fit, &r.measurement, r.item),
+            )
         })
         .collect()
 }
 
 /// The marker of an observation, or its body where poses are observed.
 #[must_use]
-pub fn subject(fit: &MlFit, head: &str, item: usize) -> String {
-    let observed = fit.stated.problem.heads().iter().find(|h| h.name == head);
+pub fn subject(fit: &MlFit, measurement: &str, item: usize) -> String {
+    let observed = fit
+        .formulation
+        .problem
+        .measurements()
+        .iter()
+        .find(|h| h.name == measurement);
     match observed.map(|h| &h.kind) {
-        Some(calib_core::HeadKind::Markers { observations, .. }) => {
+        Some(calib_core::MeasurementKind::Markers { observations, .. }) => {
             let point = observations.get(item).map(|o| o.point);
             let name = point
-                .and_then(|p| fit.stated.problem.points().get(p.index()))
+                .and_then(|p| fit.formulation.problem.points().get(p.index()))
                 .map(|p| p.name.clone());
-            name.unwrap_or_else(|| head.to_owned())
+            name.unwrap_or_else(|| measurement.to_owned())
         }
-        _ => head.to_owned(),
+        _ => measurement.to_owned(),
     }
 }
 

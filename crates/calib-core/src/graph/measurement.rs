@@ -1,4 +1,4 @@
-//! Residual heads: what the tracker says about the frames at the two ends of a path.
+//! Measurements: what the tracker says about the frames at the two ends of a path.
 //!
 //! With `T = from_from_to(s; x)` along the path, residual = predicted ⊟ observed:
 //!
@@ -12,7 +12,7 @@
 //! loop        (2) with T the closed path and T_z = identity            6                    (7)
 //! ```
 //!
-//! An unknown plane or line is a frame with an unknown edge: give the head that frame as `from`.
+//! An unknown plane or line is a frame with an unknown edge: give the measurement that frame as `from`.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Unit, Vector3};
 
@@ -20,7 +20,7 @@ use crate::graph::ids::{EdgeId, FrameId, GroupId, PointId};
 
 /// One kind of measurement along one path.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Head {
+pub struct Measurement {
     /// Name, for findings (`hand`, `table contact`).
     pub name: String,
     /// Frame in which the measurement is stated.
@@ -31,12 +31,12 @@ pub struct Head {
     /// `None`: the shortest way through the graph.
     pub path: Option<Vec<(EdgeId, bool)>>,
     /// What is measured.
-    pub kind: HeadKind,
+    pub kind: MeasurementKind,
 }
 
 /// Equations (1) to (7).
 #[derive(Debug, Clone, PartialEq)]
-pub enum HeadKind {
+pub enum MeasurementKind {
     /// Marker points, one vector each.
     Markers {
         /// σ per coordinate.
@@ -107,12 +107,12 @@ pub enum HeadKind {
     },
 }
 
-/// Marker seen at `position` in the head's `from` frame.
+/// Marker seen at `position` in the measurement's `from` frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MarkerObservation {
     /// Sample index.
     pub sample: usize,
-    /// The marker, a point of the head's `to` frame.
+    /// The marker, a point of the measurement's `to` frame.
     pub point: PointId,
     /// Where it was seen, m.
     pub position: Point3<f64>,
@@ -142,7 +142,7 @@ pub struct DirectionObservation {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(
     clippy::large_enum_variant,
-    reason = "one per head, not per observation; a box would cost Copy"
+    reason = "one per measurement, not per observation; a box would cost Copy"
 )]
 pub enum PoseNoise {
     /// Isotropic in orientation and position.
@@ -161,7 +161,7 @@ pub enum PoseNoise {
     },
 }
 
-impl HeadKind {
+impl MeasurementKind {
     /// Samples of the observations, in their order.
     pub(crate) fn samples(&self) -> Vec<usize> {
         match self {
