@@ -17,18 +17,6 @@ pub enum Severity {
     Error,
 }
 
-impl Severity {
-    /// The word for people.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Info => "info",
-            Self::Warning => "warning",
-            Self::Error => "error",
-        }
-    }
-}
-
 /// What a check found in the data or the result.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Finding {
@@ -79,18 +67,6 @@ pub enum RecordingUse {
     Static,
     /// Held out.
     Validation,
-}
-
-impl RecordingUse {
-    /// The word for people.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Sweep => "sweep",
-            Self::Static => "static poses",
-            Self::Validation => "validation",
-        }
-    }
 }
 
 /// One recording.

@@ -20,7 +20,6 @@
 //! What this crate does **not** protect against: a report that was filled wrongly. It holds no clock and takes no
 //! absolute path: whoever fills it passes paths relative to the profile. Same report, same bytes.
 
-mod answers;
 pub mod csv;
 mod data;
 mod error;
@@ -42,8 +41,8 @@ mod table;
 pub mod terminal;
 mod verification;
 pub mod view3d;
+mod words;
 
-pub use answers::{Answer, answers};
 pub use data::{
     AccuracyLimit, Clock, Finding, FitSummary, Input, JointCoverage, Lost, Noise, Output,
     RecordingSummary, RecordingUse, Rejected, Severity, Workspace, WorkspacePoint,
@@ -63,3 +62,4 @@ pub use verification::{
     PoseError, Stats, Verification,
 };
 pub use view3d::View3d;
+pub use words::answers::{Answer, answers};

@@ -147,18 +147,6 @@ pub enum Verdict {
     NotEvaluated,
 }
 
-impl Verdict {
-    /// The word for people.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Accepted => "accepted",
-            Self::Rejected => "rejected",
-            Self::NotEvaluated => "not evaluated",
-        }
-    }
-}
-
 /// A limit of the profile.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Limit {
@@ -238,18 +226,6 @@ pub enum Outcome {
     /// No data to evaluate it on. Never a pass.
     #[default]
     NotEvaluated,
-}
-
-impl Outcome {
-    /// The word for people.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Met => "met",
-            Self::Exceeded => "exceeded",
-            Self::NotEvaluated => "not evaluated",
-        }
-    }
 }
 
 /// The verdict that the limits alone give: exceeded beats not evaluated beats met, and no limit at all is not evaluated.

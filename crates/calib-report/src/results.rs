@@ -101,18 +101,6 @@ pub enum Status {
     Assumed,
 }
 
-impl Status {
-    /// The word for people and files.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Measured => "measured",
-            Self::Calibrated => "calibrated",
-            Self::Assumed => "assumed",
-        }
-    }
-}
-
 /// A direction of one transform that the data cannot give.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unobservable {
@@ -160,30 +148,6 @@ pub struct NotObservable {
     pub remedy: String,
 }
 
-impl NotObservable {
-    /// Its text, with the subject in front where the text does not name it.
-    pub(crate) fn words(&self) -> String {
-        if self.text.contains(&format!("`{}`", self.subject)) {
-            self.text.clone()
-        } else {
-            format!("`{}`: {}", self.subject, self.text)
-        }
-    }
-
-    /// The same without the parameters that it trades against: those stand in the long report.
-    pub(crate) fn in_short(&self) -> String {
-        match self.text.rsplit_once(": ") {
-            Some((trade, reason)) if trade.contains(Self::TRADES) => {
-                format!("`{}`: {reason}", self.subject)
-            }
-            _ => self.words(),
-        }
-    }
-
-    /// Between a parameter and those that it cannot be told from.
-    pub(crate) const TRADES: &str = " trades against ";
-}
-
 /// How well a parameter is known.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -197,19 +161,6 @@ pub enum Class {
     /// Nothing.
     #[default]
     NotObservable,
-}
-
-impl Class {
-    /// The word for people.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Solid => "solid",
-            Self::Weak => "weak",
-            Self::Prior => "prior only",
-            Self::NotObservable => "not observable",
-        }
-    }
 }
 
 /// One scalar unknown.

@@ -1,7 +1,8 @@
 //! The summary for a terminal: the verdict, the numbers that carry it, what is open. At most 80 columns.
 
-use crate::answers::{answers_in, full_stop, sentence};
 use crate::table::{Table, wrap};
+use crate::words::answers::answers_in;
+use crate::words::prose::{full_stop, sentence};
 use crate::{Class, Outcome, Report, Severity, Unit, Verdict, number};
 use anstyle::{AnsiColor, Style};
 

@@ -1,9 +1,11 @@
 //! The verdict, the error on new poses, what is open.
 
 use super::{Block, Page, code, mm};
-use crate::answers::{full_stop, held_out_of, sentence};
 use crate::table::Table;
-use crate::{Meaning, NotObservable, Report, Unit, Verdict, answers, number};
+use crate::words::held_out::held_out_of;
+use crate::words::observability::grouped;
+use crate::words::prose::{full_stop, sentence};
+use crate::{Meaning, Report, Unit, Verdict, answers, number};
 
 /// Held-out poses in the table; all of them stand in `report.json`.
 const POSES: usize = 10;
@@ -218,37 +220,6 @@ pub(super) fn open_ends(page: &mut Page, report: &Report) {
         page.section("next-steps", "What to do next");
         page.list(report.next_steps.iter().map(|step| sentence(step)));
     }
-}
-
-/// Combinations with one reason and one remedy as one item; everything else as it is.
-fn grouped(items: &[&NotObservable]) -> Vec<(String, String)> {
-    let mut out: Vec<(String, String)> = Vec::new();
-    let mut groups: Vec<(&str, &str, Vec<String>)> = Vec::new();
-    for item in items {
-        let Some((trade, reason)) = item
-            .text
-            .rsplit_once(": ")
-            .filter(|(trade, _)| trade.contains(NotObservable::TRADES))
-        else {
-            out.push((item.words(), item.remedy.clone()));
-            continue;
-        };
-        let trade = trade.replacen(NotObservable::TRADES, " against ", 1);
-        match groups
-            .iter_mut()
-            .find(|(r, remedy, _)| *r == reason && *remedy == item.remedy)
-        {
-            Some((_, _, trades)) => trades.push(trade),
-            None => groups.push((reason, &item.remedy, vec![trade])),
-        }
-    }
-    out.extend(groups.into_iter().map(|(reason, remedy, trades)| {
-        (
-            format!("{reason}: {}", trades.join("; ")),
-            remedy.to_owned(),
-        )
-    }));
-    out
 }
 
 /// A remedy that the next item repeats stands once, at the last.

@@ -1,0 +1,16 @@
+//! The one place where the data of a result become sentences: one file per notion.
+//!
+//! The report's data carry facts: ids, enums, values with their SI unit. What a person reads about a fact is made here and
+//! nowhere else; renderers only lay it out, and no code reads a sentence back. A new fact gets its words in the file of its
+//! notion, or a new file and one line below.
+
+pub(crate) mod answers;
+pub(crate) mod clock;
+pub(crate) mod files;
+pub(crate) mod held_out;
+pub(crate) mod noise;
+pub(crate) mod observability;
+pub(crate) mod prose;
+pub(crate) mod rejection;
+mod terms;
+pub(crate) mod verdict;
