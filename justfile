@@ -37,6 +37,10 @@ studies:
 snapshots:
     cargo insta review --workspace
 
+# What would be published of the libraries (`publish = true`): each package built from its archive, against the others' archives
+package:
+    cargo publish --dry-run --workspace
+
 # Licences and sources of the dependencies
 deny:
     cargo deny --offline check licenses bans sources

@@ -131,6 +131,8 @@ pub mod handeye;
 mod model;
 mod solve;
 
+pub use nalgebra;
+
 pub use analysis::closure::{ClosureStatistics, Spread};
 pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};
 pub use analysis::folds::{folds, k_fold};
@@ -162,3 +164,8 @@ pub use solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize};
 pub use solve::noise::sandwich;
 pub use solve::relabel::{Relabelled, relabel};
 pub use solve::robust::{RejectReason, Rejection, RobustSettings};
+
+/// The README's example is a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -35,6 +35,13 @@ pub mod se3;
 pub mod so3;
 pub mod verdict;
 
+pub use nalgebra;
+
 pub use line::{Line, ScrewAxis};
 pub use se3::Twist;
 pub use verdict::Verdict;
+
+/// The README's example is a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
