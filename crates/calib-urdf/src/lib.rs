@@ -20,43 +20,31 @@
 //! What this crate does **not** do: it opens no mesh (`package://` stays a text), expands no xacro,
 //! and knows no closed kinematic loops.
 
-pub mod axes;
-pub mod companions;
-pub mod decimal;
-pub mod diff;
 pub mod edit;
 pub mod error;
-mod expression;
-mod insert;
 pub mod kinematics;
 pub mod model;
 pub mod nearest;
-mod numbers;
-pub mod patch;
 pub mod read;
-pub mod revert;
-pub mod rpy;
-pub mod source;
-pub mod verify;
-pub mod visual;
-mod xacro;
-mod xacro_origins;
-mod xacro_value;
-mod yaml;
-mod yaml_origins;
+pub mod xacro;
+pub mod yaml;
 
-pub use axes::{AxisPair, AxisRelation};
-pub use companions::{Companion, Companions, Reads, Reference, references};
-pub use diff::{Changed, JointDiff, ModelDiff, diff, diff_models, diff_origins, unified};
-pub use edit::{Change, EditError, UrdfEdit};
-pub use patch::{Patched, PatchedFiles, patch, patch_with};
-pub use revert::{ChangeRecord, Replacement, RevertError, revert, sha256_hex};
-pub use verify::{SecondReader, Verification, verify};
-pub use xacro_origins::{is_xacro, xacro_origins};
-pub use yaml_origins::{YamlOrigin, patch_yaml, ur_key, yaml_origins};
-
+pub use edit::change::{Change, UrdfEdit};
+pub use edit::decimal;
+pub use edit::diff::{Changed, JointDiff, ModelDiff, diff, diff_models, diff_origins, unified};
+pub use edit::error::{EditError, SharedValue};
+pub use edit::patch::{Patched, PatchedFiles, patch, patch_with};
+pub use edit::revert::{ChangeRecord, Replacement, RevertError, revert, sha256_hex};
+pub use edit::verify::{SecondReader, Verification, verify};
 pub use error::{Place, Problem, ReadError, ReadProblem};
+pub use kinematics::axes::{AxisPair, AxisRelation};
+pub use kinematics::rpy;
 pub use model::{
     Inertial, Joint, JointId, JointKind, JointLimits, Link, LinkId, Mimic, MimicLaw, RobotModel,
     UnknownName,
 };
+pub use nalgebra;
+pub use read::{source, visual};
+pub use xacro::companions::{Companion, Companions, Reads, Reference, references};
+pub use xacro::origins::{is_xacro, xacro_origins};
+pub use yaml::origins::{YamlOrigin, patch_yaml, ur_key, yaml_origins};

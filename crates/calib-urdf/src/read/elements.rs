@@ -2,11 +2,11 @@
 
 use super::{JOINT_TYPES, RawJoint, Reader, UNSUPPORTED_TYPES};
 use crate::error::{Hint, Problem};
+use crate::kinematics::rpy::rotation_from_rpy;
 use crate::model::{Inertial, JointKind, JointLimits};
 use crate::nearest::nearest;
-use crate::numbers::parse_numbers;
-use crate::rpy::rotation_from_rpy;
-use crate::source::{is_element, value_start};
+use crate::read::numbers::parse_numbers;
+use crate::read::source::{is_element, value_start};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 use roxmltree::Node;
 

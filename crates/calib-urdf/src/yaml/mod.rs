@@ -2,7 +2,9 @@
 //!
 //! Read with the event parser behind the profile's YAML reader; comments, order and quoting never pass through here.
 
-use crate::edit::EditError;
+pub mod origins;
+
+use crate::edit::error::EditError;
 use crate::error::Place;
 use granit_parser::{Event, Parser, ScalarStyle, Span};
 use std::ops::Range;

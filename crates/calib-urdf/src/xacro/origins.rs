@@ -1,13 +1,13 @@
 //! The origins that a xacro's text shows without expanding it.
 
-use crate::companions::Companions;
-use crate::edit::EditError;
+use crate::edit::error::EditError;
 use crate::error::ReadError;
-use crate::numbers::parse_numbers;
-use crate::rpy::rotation_from_rpy;
-use crate::source::{child, parse, value_range, xacro_evidence};
+use crate::kinematics::rpy::rotation_from_rpy;
+use crate::read::numbers::parse_numbers;
+use crate::read::source::{child, parse, value_range, xacro_evidence};
+use crate::xacro::companions::Companions;
+use crate::xacro::value::{Context, cells};
 use crate::xacro::{is_expression, is_joint};
-use crate::xacro_value::{Context, cells};
 use crate::yaml;
 use nalgebra::{Isometry3, Translation3, Vector3};
 use roxmltree::Node;

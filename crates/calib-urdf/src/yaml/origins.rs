@@ -12,13 +12,15 @@
 //! Lengths m, angles rad, `parent_link_from_joint` as in a URDF's `<origin>`. A key counts as a joint where its value has
 //! any of these numbers; a number that is not there is 0.
 
-use crate::decimal::{Splice, decimal, same_number};
-use crate::edit::{Change, EditError, UrdfEdit};
+use crate::edit::change::{Change, UrdfEdit};
+use crate::edit::decimal::{Splice, decimal, same_number};
+use crate::edit::error::EditError;
+use crate::edit::patch::{Patched, PatchedFiles};
+use crate::edit::rotation::rpy_for;
 use crate::error::{Hint, Place};
+use crate::kinematics::rpy::rotation_from_rpy;
 use crate::nearest::nearest;
-use crate::numbers::parse_numbers;
-use crate::patch::{Patched, PatchedFiles, rpy_for};
-use crate::rpy::rotation_from_rpy;
+use crate::read::numbers::parse_numbers;
 use crate::yaml::{YamlKind, YamlNode, parse};
 use nalgebra::{Isometry3, Translation3, Vector3};
 use std::collections::BTreeMap;
@@ -191,8 +193,8 @@ fn reread(text: &str, file: &str, edits: &[UrdfEdit]) -> Result<(), EditError> {
         let off = found.inverse() * wanted;
         let (far, turned) = (off.translation.vector.norm(), off.rotation.angle());
         let size = wanted.translation.vector.norm().max(1.0);
-        if !(far <= crate::verify::POSITION_TOLERANCE * size
-            && turned <= crate::verify::ROTATION_TOLERANCE)
+        if !(far <= crate::edit::verify::POSITION_TOLERANCE * size
+            && turned <= crate::edit::verify::ROTATION_TOLERANCE)
         {
             return Err(EditError::StructureChanged {
                 file: file.to_owned(),

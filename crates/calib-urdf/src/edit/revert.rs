@@ -4,8 +4,9 @@
 //! both texts and every replaced byte range with its old text. [`revert`] undoes the ranges if, and only if, the
 //! file is still the one that the record describes, and hands out nothing whose hash is not the original's.
 
-use crate::edit::Change;
-use crate::patch::Patched;
+use crate::edit::change::Change;
+use crate::edit::decimal::Splice;
+use crate::edit::patch::Patched;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
@@ -78,6 +79,29 @@ pub fn sha256_hex(bytes: &[u8]) -> String {
 }
 
 impl Patched {
+    /// The patch that a record tells of; `patched_text` is the text that the record belongs to.
+    #[must_use]
+    pub fn from_record(patched_text: &str, record: &ChangeRecord) -> Self {
+        let mut grown: isize = 0;
+        let splices = record
+            .replacements
+            .iter()
+            .map(|r| {
+                let start = r.at.saturating_add_signed(-grown);
+                grown += r.new.len() as isize - r.old.len() as isize;
+                Splice {
+                    range: start..start + r.old.len(),
+                    new: r.new.clone(),
+                }
+            })
+            .collect();
+        Self {
+            text: patched_text.to_owned(),
+            changes: record.changes.clone(),
+            splices,
+        }
+    }
+
     /// The record that [`revert`] needs; `original` is the text that was given to [`crate::patch()`].
     #[must_use]
     pub fn record(&self, original: &str) -> ChangeRecord {

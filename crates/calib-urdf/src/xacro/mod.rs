@@ -4,10 +4,15 @@
 //! (see `xacro_value`), and stands for one joint. It may not where xacro computes it, where a macro is used more than
 //! once, and where branches give several texts.
 
-use crate::edit::EditError;
+pub mod companions;
+mod expression;
+pub mod origins;
+pub(crate) mod value;
+
+use crate::edit::error::EditError;
 use crate::error::Place;
 use crate::model::UnknownName;
-use crate::source::is_element;
+use crate::read::source::is_element;
 use roxmltree::{Document, Node};
 
 /// Does xacro compute this text?

@@ -9,14 +9,14 @@
 //!
 //! A look-up may pass through several properties. A value that something else reads too is not replaced.
 
-use crate::companions::{Companions, loaded, unseen};
-use crate::edit::EditError;
+use crate::edit::error::EditError;
 use crate::error::Place;
-use crate::expression::{
+use crate::read::numbers::parse_numbers;
+use crate::read::source::value_range;
+use crate::xacro::companions::{Companions, loaded, unseen};
+use crate::xacro::expression::{
     Access, Root, constant, expressions, look_ups, whole, words as value_words,
 };
-use crate::numbers::parse_numbers;
-use crate::source::value_range;
 use crate::xacro::{enclosing_macro, is_xacro, words};
 use crate::yaml::{YamlKind, YamlNode};
 use roxmltree::{Document, Node};
@@ -315,13 +315,12 @@ pub(crate) fn readers(context: &Context<'_, '_>, leaf: &Leaf) -> Readers {
     }
     let included = context.companions.included.iter().filter(|file| {
         let loads = match leaf.base {
-            Base::Yaml(yaml) => {
-                crate::companions::references(&file.text, &file.name).is_ok_and(|found| {
+            Base::Yaml(yaml) => crate::xacro::companions::references(&file.text, &file.name)
+                .is_ok_and(|found| {
                     found
                         .iter()
                         .any(|r| r.argument == context.companions.yaml[yaml].argument)
-                })
-            }
+                }),
             _ => false,
         };
         loads

@@ -4,8 +4,8 @@
 //! translation is given in the parent link's axes, as the `xyz` of the file is, its rotation as one angle.
 
 use crate::error::ReadError;
+use crate::kinematics::rpy::angle_between;
 use crate::model::{Joint, JointLimits, Mimic, RobotModel};
-use crate::rpy::angle_between;
 use nalgebra::Isometry3;
 use serde::Serialize;
 use std::fmt::{self, Write};

@@ -4,8 +4,8 @@
 //! [`crate::patch_with`] gets their texts.
 
 use crate::error::{Place, ReadError};
-use crate::expression::{Access, Root};
-use crate::source::parse;
+use crate::read::source::parse;
+use crate::xacro::expression::{Access, Root};
 use crate::xacro::is_xacro;
 use roxmltree::{Document, Node};
 
@@ -79,7 +79,7 @@ pub fn references(text: &str, name_for_errors: &str) -> Result<Vec<Reference>, R
             );
         }
         for attribute in node.attributes() {
-            for expression in crate::expression::expressions(attribute.value()) {
+            for expression in crate::xacro::expression::expressions(attribute.value()) {
                 if let Some(Access {
                     root: Root::Load(argument),
                     ..

@@ -1,71 +1,8 @@
-//! What may be changed in a URDF, what was changed, and why a change was refused.
+//! Why a change is refused.
 
 use crate::error::{Hint, Place, ReadError};
 use crate::model::UnknownName;
-use nalgebra::{Isometry3, Unit, Vector3};
-use serde::{Deserialize, Serialize};
 use thiserror::Error;
-
-/// One change of a URDF. Lengths m, angles rad.
-#[derive(Debug, Clone, PartialEq)]
-pub enum UrdfEdit {
-    /// A joint's `<origin>`.
-    SetOrigin {
-        /// Which joint.
-        joint: String,
-        /// The new origin.
-        parent_link_from_joint: Isometry3<f64>,
-    },
-    /// A joint's `<axis>`.
-    SetAxis {
-        /// Which joint; it must not be fixed.
-        joint: String,
-        /// In the joint's frame.
-        axis: Unit<Vector3<f64>>,
-    },
-    /// The position limits of a joint's `<limit>`.
-    SetLimits {
-        /// Which joint, revolute or prismatic; it must have a `<limit>`, since a URDF wants effort and velocity there too.
-        joint: String,
-        /// rad or m.
-        lower: f64,
-        /// rad or m.
-        upper: f64,
-    },
-    /// A new link on a new fixed joint: a tracking body, a table, a camera.
-    AddFixedFrame {
-        /// The new link.
-        name: String,
-        /// The link that carries it; an earlier edit may have added it.
-        parent_link: String,
-        /// The new joint.
-        joint_name: String,
-        /// Its origin.
-        parent_from_frame: Isometry3<f64>,
-        /// Written above the link.
-        comment: Option<String>,
-    },
-    /// An XML comment above `<robot>`: where the numbers come from.
-    AddProvenance {
-        /// What it says.
-        text: String,
-    },
-}
-
-/// One attribute that a patch changed, or one element that it added (`old` is then empty).
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Change {
-    /// Line in the original text, from 1.
-    pub line: usize,
-    /// The joint, empty for a comment above `<robot>`.
-    pub joint: String,
-    /// `origin xyz`, `axis xyz`, `limit upper`, …, or `<link>` for an added frame.
-    pub attribute: String,
-    /// The value before, as written.
-    pub old: String,
-    /// The value after, as written.
-    pub new: String,
-}
 
 /// Why a text is not patched. Nothing is changed then.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -148,13 +85,13 @@ pub enum EditError {
     #[error(
         "{file}:{place}: the origin or axis of joint `{joint}` takes {value}, which is {}: a new value would change more than this joint\n  help: give this origin a {} of its own, or patch the expanded URDF",
         value_uses(lines, included),
-        if value.starts_with('`') { "value" } else { "property" }
+        value.noun()
     )]
     XacroShared {
         file: String,
         place: Place,
         joint: String,
-        value: String,
+        value: Box<SharedValue>,
         lines: Box<[usize]>,
         included: Box<[String]>,
     },
@@ -248,6 +185,42 @@ pub enum EditError {
     },
     #[error("{file}: after the patch, {what}")]
     StructureChanged { file: String, what: String },
+}
+
+/// A value that several expressions of a xacro read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SharedValue {
+    /// The value of a `<xacro:property>`.
+    Property {
+        /// The property.
+        name: String,
+    },
+    /// A value of a YAML file that the xacro loads.
+    Yaml {
+        /// Its keys, separated by points.
+        keys: String,
+        /// The file, as named in messages.
+        file: String,
+    },
+}
+
+impl SharedValue {
+    fn noun(&self) -> &'static str {
+        match self {
+            Self::Property { .. } => "property",
+            Self::Yaml { .. } => "value",
+        }
+    }
+}
+
+impl std::fmt::Display for SharedValue {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Property { name } => write!(f, "the property `{name}`"),
+            Self::Yaml { keys, file } => write!(f, "`{keys}` of {file}"),
+        }
+    }
 }
 
 /// A number in a message.

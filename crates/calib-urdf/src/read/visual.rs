@@ -4,9 +4,9 @@
 //! [`RobotModel`](crate::RobotModel) does not depend on any of it. Meshes are named, not opened.
 
 use crate::error::{Place, ReadError};
-use crate::numbers::parse_numbers;
-use crate::rpy::rotation_from_rpy;
-use crate::source::{parse, top_level};
+use crate::kinematics::rpy::rotation_from_rpy;
+use crate::read::numbers::parse_numbers;
+use crate::read::source::{parse, top_level};
 use nalgebra::{Isometry3, Translation3, Vector3};
 use roxmltree::Node;
 

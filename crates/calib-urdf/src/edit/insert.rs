@@ -1,9 +1,9 @@
 //! New elements and attributes in the hand of the file: its indentation, line ending and quotes.
 
-use crate::decimal::{decimals, tidy_angle};
-use crate::edit::EditError;
-use crate::rpy::rpy_from_rotation;
-use crate::source::top_level;
+use crate::edit::decimal::{decimals, tidy_angle};
+use crate::edit::error::EditError;
+use crate::kinematics::rpy::rpy_from_rotation;
+use crate::read::source::top_level;
 use nalgebra::Isometry3;
 use roxmltree::{Document, Node};
 
@@ -93,6 +93,17 @@ pub(crate) fn prefix<'t>(text: &'t str, node: Node<'_, '_>) -> &'t str {
     name.find(':').map_or("", |colon| &name[..=colon])
 }
 
+/// A link on a fixed joint, to be added.
+pub(crate) struct FixedFrame<'a> {
+    pub(crate) link: &'a str,
+    pub(crate) parent_link: &'a str,
+    pub(crate) joint: &'a str,
+    /// The joint's origin.
+    pub(crate) parent_from_frame: &'a Isometry3<f64>,
+    /// Written above the link.
+    pub(crate) comment: Option<&'a str>,
+}
+
 /// How a file is written.
 pub(crate) struct Style<'t> {
     /// `urdf:` where the elements are written with a prefix.
@@ -131,14 +142,7 @@ impl<'t> Style<'t> {
     }
 
     /// A link on a fixed joint, beginning with a line ending.
-    pub(crate) fn fixed_frame(
-        &self,
-        name: &str,
-        parent_link: &str,
-        joint_name: &str,
-        parent_from_frame: &Isometry3<f64>,
-        comment_text: Option<&str>,
-    ) -> String {
+    pub(crate) fn fixed_frame(&self, frame: &FixedFrame<'_>) -> String {
         let outer = format!("{}{}", self.line_ending, self.indent);
         // Where the children stand no deeper than the joint, they are set below it all the same.
         let inner = if self.inner.len() > self.indent.len() {
@@ -151,12 +155,12 @@ impl<'t> Style<'t> {
         } else {
             &inner
         };
-        let above = comment_text.map_or_else(String::new, |words| {
+        let above = frame.comment.map_or_else(String::new, |words| {
             format!("{outer}{}", comment(words, self.line_ending))
         });
-        let xyz = decimals(parent_from_frame.translation.vector.as_slice());
+        let xyz = decimals(frame.parent_from_frame.translation.vector.as_slice());
         let rpy = decimals(
-            rpy_from_rotation(&parent_from_frame.rotation)
+            rpy_from_rotation(&frame.parent_from_frame.rotation)
                 .map(tidy_angle)
                 .as_slice(),
         );
@@ -164,10 +168,10 @@ impl<'t> Style<'t> {
         format!(
             "{above}{outer}<{p}link name=\"{}\"/>{outer}<{p}joint name=\"{}\" type=\"fixed\">{inner}<{p}parent link=\"{}\"/>\
              {inner}<{p}child link=\"{}\"/>{inner}<{p}origin xyz=\"{xyz}\" rpy=\"{rpy}\"/>{outer}</{p}joint>",
-            escaped(name),
-            escaped(joint_name),
-            escaped(parent_link),
-            escaped(name),
+            escaped(frame.link),
+            escaped(frame.joint),
+            escaped(frame.parent_link),
+            escaped(frame.link),
         )
     }
 }

@@ -9,14 +9,17 @@
 //! see [`crate::visual`].
 
 mod elements;
+pub(crate) mod numbers;
+pub mod source;
 mod tree;
+pub mod visual;
 
 use crate::error::{Hint, Place, Problem, ReadError, ReadProblem};
 use crate::model::{
     Joint, JointId, JointKind, JointLimits, Link, LinkId, Mimic, MimicLaw, RobotModel,
 };
 use crate::nearest::nearest;
-use crate::source::{
+use crate::read::source::{
     decode, has_quaternions, parse, read_text, top_level, value_start, xacro_evidence,
 };
 use nalgebra::Isometry3;

@@ -1,6 +1,6 @@
 //! Numbers as a URDF's reader takes them: the shortest decimals that give the same `f64` back.
 
-use crate::numbers::tokens;
+use crate::read::numbers::tokens;
 use std::ops::Range;
 
 /// Rounding noise of rotations and products of poses (m, rad): a text number this near to the new one is the new one.

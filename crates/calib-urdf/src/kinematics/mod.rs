@@ -3,6 +3,9 @@
 //! Joint positions are a slice with one entry for each joint of the model, at [`JointId::index`], rad
 //! or m. Entries of fixed and of mimicking joints are not looked at; entries that are missing at the end count as 0.
 
+pub mod axes;
+pub mod rpy;
+
 use crate::model::{JointId, JointKind, LinkId, RobotModel, UnknownName};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use std::collections::BTreeMap;

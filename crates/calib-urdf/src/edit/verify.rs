@@ -4,11 +4,12 @@
 //! at zero and at positions that bend every joint, to [`POSITION_TOLERANCE`]. urdf-rs reads the same text as the second,
 //! independent reader (also the one of urdf-viz), with the matrices of [`matrix_from_rpy`] instead of quaternions.
 
-use crate::decimal::same_number;
-use crate::edit::{EditError, Rounded, UrdfEdit};
+use crate::edit::change::UrdfEdit;
+use crate::edit::decimal::same_number;
+use crate::edit::error::{EditError, Rounded};
+use crate::kinematics::rpy::{angle_between, matrix_from_rpy};
 use crate::model::{Joint, JointId, JointKind, JointLimits, Link, LinkId, MimicLaw, RobotModel};
-use crate::rpy::{angle_between, matrix_from_rpy};
-use crate::source::{has_quaternions, parse};
+use crate::read::source::{has_quaternions, parse};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// m. A hundredth of a nanometre: what decimals and rounding may cost, and nothing else.
