@@ -3,7 +3,8 @@
 //! All at the truth, for isotropic position noise σ. The 6 × 6 results are over `[direction; point]` (rad,
 //! unit of length) and have rank four: nothing moves along the axis.
 
-use calib_geometry::{Line, measured::Cloud};
+use calib_estimator::measured::Cloud;
+use calib_geometry::Line;
 use nalgebra::{Matrix6, Point3, Vector3};
 
 pub use crate::frame_ml::bound as frame;

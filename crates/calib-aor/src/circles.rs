@@ -9,8 +9,8 @@
 //! The planar part does not depend on c and the radial part only on c across n. One marker with c free is the
 //! orthogonal-distance circle; several markers share n and c (one line), or n alone.
 
-use calib_geometry::{
-    levenberg::{Problem, Stop, minimise},
+use calib_estimator::{
+    levenberg::{Problem, Stop, minimize},
     measured::Cloud,
 };
 use nalgebra::{Matrix2, Matrix4, Matrix6, Vector2, Vector3, Vector4};
@@ -34,7 +34,7 @@ pub(crate) struct Normal {
     pub cost: f64,
 }
 
-/// Linearises f for the samples of one marker, with their weights.
+/// Linearizes f for the samples of one marker, with their weights.
 pub(crate) fn linearize_marker(
     samples: impl Iterator<Item = (Vector3<f64>, f64)> + Clone,
     axis: &Axis,
@@ -89,7 +89,7 @@ pub(crate) fn linearize_marker(
     }
 }
 
-/// Linearises f for all markers around one line.
+/// Linearizes f for all markers around one line.
 pub(crate) fn linearize(cloud: &Cloud, axis: &Axis) -> Normal {
     let mut total = Normal {
         hessian: Matrix4::zeros(),
@@ -208,14 +208,14 @@ impl Problem for CommonLine<'_> {
 }
 
 /// The line (or the direction through a held point) of least f from `start`; `None` where it runs away.
-pub(crate) fn minimise_line(
+pub(crate) fn minimize_line(
     cloud: &Cloud,
     start: Axis,
     free: Free,
     size: f64,
 ) -> Option<(Axis, Normal)> {
     let problem = CommonLine { cloud, free, size };
-    let end = minimise(&problem, start, MAX_STEPS);
+    let end = minimize(&problem, start, MAX_STEPS);
     let far = (end.x.point - start.point).norm() > 1e4 * size;
     if end.stop == Stop::Broken || !end.normal.cost.is_finite() || far {
         return None;
@@ -285,7 +285,7 @@ impl CommonLine<'_> {
 
 /// The axis along a held direction whose circles are nearest to the samples; `start` where it runs away.
 pub(crate) fn placed(cloud: &Cloud, start: Axis, size: f64) -> Axis {
-    minimise_line(cloud, start, Free::Point, size).map_or(start, |(axis, _)| axis)
+    minimize_line(cloud, start, Free::Point, size).map_or(start, |(axis, _)| axis)
 }
 
 /// The direction that several markers share, each with its own center.
@@ -387,8 +387,8 @@ impl OwnCenters<'_> {
         Some((h, g, own))
     }
 
-    pub fn minimise(&self, start: Centers) -> Option<(Centers, Vec<Normal>)> {
-        let end = minimise(self, start, MAX_STEPS);
+    pub fn minimize(&self, start: Centers) -> Option<(Centers, Vec<Normal>)> {
+        let end = minimize(self, start, MAX_STEPS);
         let cost = self.cost(&end.normal);
         (end.stop != Stop::Broken && cost.is_finite()).then_some((end.x, end.normal))
     }

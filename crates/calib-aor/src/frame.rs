@@ -9,7 +9,8 @@
 //! still in the body, which sits on the distal side. `world_from_joint` at α = β = 0 is the reference configuration.
 //! [`crate::frame_planes`] is the paper's Algorithm 1, [`crate::frame_ml`] its maximum-likelihood counterpart.
 
-use calib_geometry::{Line, Verdict, measured::Pose, so3};
+use calib_estimator::{Verdict, measured::Pose};
+use calib_geometry::{Line, so3};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 

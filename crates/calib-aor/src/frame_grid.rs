@@ -1,6 +1,6 @@
 //! The grid of a frame's recording: which rows form a circle around which axis, and the circles' axes.
 
-use calib_geometry::Verdict;
+use calib_estimator::Verdict;
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 use crate::{

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! predicted_i = W · Rot(proximal, α_i) · Rot(distal, β_i) · Y,   W = world_from_joint, Y = joint_from_body
-//! minimise Σ |t_i − t̂_i|² / σ_t² + |log(R̂_iᵀ R_i)|² / σ_r²         over W, Y (12 unknowns)        (1)
+//! minimize Σ |t_i − t̂_i|² / σ_t² + |log(R̂_iᵀ R_i)|² / σ_r²         over W, Y (12 unknowns)        (1)
 //! start: R_W A_i = R_i R_Yᵀ linear in 18 entries, projected; then R_W A_i p + O = t_i linear         (2)
 //! ```
 //!
@@ -10,11 +10,13 @@
 //! The two axes are orthogonal and meet by assumption. Noise levels that are not stated are estimated with the
 //! degrees of freedom each kind of residual loses to the unknowns. The angles count as exact.
 
-use calib_geometry::{
+use calib_estimator::{
     Verdict,
-    decompose::{svd, symmetric_eigen_small},
-    levenberg::{Problem, Stop, minimise},
+    levenberg::{Problem, Stop, minimize},
     measured::Pose,
+};
+use calib_geometry::{
+    decompose::{svd, symmetric_eigen_small},
     se3::{self, Twist},
     so3,
 };
@@ -126,7 +128,7 @@ pub fn fit(
     let mut end;
     let mut round = 0;
     loop {
-        end = minimise(&problem, state, MAX_STEPS);
+        end = minimize(&problem, state, MAX_STEPS);
         state = end.x.clone();
         round += 1;
         if end.stop == Stop::Broken {

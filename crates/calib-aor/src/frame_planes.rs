@@ -13,10 +13,9 @@
 //! The signs of the axes follow from the joint angles. Samples that form no planes are refused:
 //! [`crate::frame_ml`] needs none. The covariance is first order in the measured poses, the center's estimator included.
 
+use calib_estimator::{Verdict, measured::Pose};
 use calib_geometry::{
-    Verdict,
     mean::{axis_mean, weighted_chordal_mean},
-    measured::Pose,
     se3, so3,
 };
 use nalgebra::{

@@ -1,6 +1,6 @@
 //! Settings of both frame estimators, what they refuse to read, and when a frame is weak.
 
-use calib_geometry::{Verdict, measured::RowWeights};
+use calib_estimator::{Verdict, measured::RowWeights};
 use nalgebra::Matrix6;
 
 use crate::{

@@ -14,7 +14,7 @@ use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3};
 
 use crate::{
     axis_frame::AxisFrame,
-    circles::{Axis, Free, information, linearize, minimise_line, placed, spread_out},
+    circles::{Axis, Free, information, linearize, minimize_line, placed, spread_out},
     input::{Input, cloud_of},
     judge::{Candidate, inverse_or_zero, judge, prepare},
     options::Options,
@@ -69,7 +69,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
     if pairs < 2 || eigen.s[1] <= 1e-9 * eigen.s[0] {
         return Ok(Outcome::none(
             "halvorsen_line",
-            calib_geometry::Verdict::TooFew,
+            calib_estimator::Verdict::TooFew,
             format!("{pairs} pairs of samples, whose displacements span no plane"),
             crate::outcome::Known::Nothing,
         ));
@@ -99,7 +99,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
     // Noise lengthens every displacement, and pulls the point towards the samples (1): that too is an error of the point.
     let pulled = point - placed(&cloud, axis, factor.s[0]).point;
     // The pairs weigh samples unevenly: the noise level comes from the best line, not from this one.
-    let cost = minimise_line(&cloud, axis, Free::Line, factor.s[0])
+    let cost = minimize_line(&cloud, axis, Free::Line, factor.s[0])
         .map_or(normal.cost, |(_, best)| best.cost);
     let candidate = Candidate {
         estimator: "halvorsen_line",

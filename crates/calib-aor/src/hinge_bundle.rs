@@ -11,17 +11,17 @@
 //! the body is rigid, and the angle of a frame is one number for all its markers. Where the noise of such an angle is a
 //! part of the arc itself (20° at 5 mm and 100 mm) nobody reaches it who treats all frames alike: see `tests/short_arcs.rs`.
 
-use calib_geometry::{
+use calib_estimator::{
     Verdict,
-    levenberg::{Problem, Stop, minimise},
+    levenberg::{Problem, Stop, minimize},
     measured::Cloud,
-    so3,
 };
+use calib_geometry::so3;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Rotation3, SMatrix, Vector2, Vector3, Vector4};
 
 use crate::{
     axis_frame::AxisFrame,
-    circles::{Axis, Free, minimise_line, spread_out},
+    circles::{Axis, Free, minimize_line, spread_out},
     input::{Input, InputKind, cloud_of},
     judge::{Candidate, judge, prepare},
     options::Options,
@@ -55,7 +55,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
     let start = plane::start(&cloud, &factor, &Options::default());
     // A common line is a better start than the plane's normal, where it exists.
     let start =
-        minimise_line(&cloud, start, Free::Line, factor.s[0]).map_or(start, |(axis, _)| axis);
+        minimize_line(&cloud, start, Free::Line, factor.s[0]).map_or(start, |(axis, _)| axis);
     let problem = Bundle::of(&cloud, &options.angles, factor.s[0])?;
     let Some(state) = problem.start(start) else {
         return Ok(Outcome::none(
@@ -65,7 +65,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
             Known::Nothing,
         ));
     };
-    let end = minimise(&problem, state, MAX_STEPS);
+    let end = minimize(&problem, state, MAX_STEPS);
     let inverse = problem
         .information(&end.x)
         .and_then(DMatrix::cholesky)
@@ -135,7 +135,7 @@ impl Bundle {
         let rows = cloud.labels.iter().map(|l| l.1 + 1).max().unwrap_or(0);
         if !angles.is_empty() && angles.len() < rows {
             return Err(AorError::Data(
-                calib_geometry::measured::DataError::Lengths {
+                calib_estimator::measured::DataError::Lengths {
                     what: "joint angles and frames",
                     left: angles.len(),
                     right: rows,
@@ -583,7 +583,7 @@ mod tests {
                 });
                 for start in everywhere.chain([truth]) {
                     let state = bundle.start(start).expect("linked frames");
-                    let other = minimise(&bundle, state, MAX_STEPS).normal.cost;
+                    let other = minimize(&bundle, state, MAX_STEPS).normal.cost;
                     assert!(
                         cost <= other * (1.0 + 1e-9),
                         "{frames} frames, seed {seed}: {cost:e} above {other:e}"

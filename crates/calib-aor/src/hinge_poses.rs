@@ -12,12 +12,12 @@
 //! near it by its orientations, and (1) takes both for what they are worth. σ_r and σ_t are stated, or estimated by restricted
 //! maximum likelihood; two bodies are taken to be measured alike. It starts from [`crate::shared_axis`] and shares its verdicts.
 
-use calib_geometry::{
-    Line, Verdict,
-    levenberg::{Problem, Stop, minimise},
+use calib_estimator::{
+    Verdict,
+    levenberg::{Problem, Stop, minimize},
     measured::{Pose, RowWeights},
-    se3, so3,
 };
+use calib_geometry::{Line, se3, so3};
 use nalgebra::{
     Isometry3, Matrix3, Matrix6, Point3, Rotation3, SMatrix, SVector, Translation3, Unit,
     UnitQuaternion, Vector3, Vector6,
@@ -111,7 +111,7 @@ fn refine(
         let fixed = options.sigma_r.is_some() && options.sigma_t.is_some();
         // While the noise levels still move, a few steps for each round are enough.
         let steps = if fixed || change < 1e-6 { MAX_STEPS } else { 4 };
-        let end = minimise(&problem, state.clone(), steps);
+        let end = minimize(&problem, state.clone(), steps);
         if end.stop == Stop::Broken {
             return diverged("no minimum of the likelihood");
         }

@@ -12,12 +12,9 @@
 //! κ = (cost of straight motion − cost of the hinge) / 2 / σ̂²  ~  F(2, ν)    if the body does not turn    (3)
 //! ```
 
-use calib_geometry::{
-    Line, Verdict, chance,
-    decompose::symmetric_eigen_small,
-    factor::{Factor, rank_verdict},
-    measured::Cloud,
-};
+use calib_estimator::factor::{Factor, rank_verdict};
+use calib_estimator::{Verdict, chance, measured::Cloud};
+use calib_geometry::{Line, decompose::symmetric_eigen_small};
 use nalgebra::{Matrix2, Matrix3, Matrix6, Point3, Unit, Vector3};
 
 use crate::{

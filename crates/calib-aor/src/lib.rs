@@ -53,7 +53,7 @@ mod registry;
 pub mod shared_axis;
 mod straight;
 
-pub use calib_geometry::measured::{DataError, Pose, Tracks};
+pub use calib_estimator::measured::{DataError, Pose, Tracks};
 pub use frame::{
     FrameAxes, FrameEstimate, FrameFromAxes, FrameOutcome, FrameSample, Letter, frame_from_axes,
 };

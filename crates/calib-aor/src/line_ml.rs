@@ -12,13 +12,14 @@
 //! The common-line fit starts from the plane normal and one center for all markers; starting from each
 //! circle's own center diverges on short arcs.
 
-use calib_geometry::{Verdict, factor::Factor, measured::Cloud};
+use calib_estimator::factor::Factor;
+use calib_estimator::{Verdict, measured::Cloud};
 use nalgebra::{Matrix4, Matrix6};
 
 use crate::{
     circles::{
         Axis, Centers, Free, Normal, OwnCenters, flat_center, information, information_of_marker,
-        minimise_line, placed, spread_out,
+        minimize_line, placed, spread_out,
     },
     input::{Input, cloud_of},
     judge::{Candidate, OwnCenter, inverse_or_zero, judge, prepare},
@@ -82,7 +83,7 @@ fn run(
 
 fn common_line(estimator: &'static str, cloud: &Cloud, factor: &Factor) -> Option<Candidate> {
     let start = plane::start(cloud, factor, &Options::default());
-    let (axis, normal) = minimise_line(cloud, start, Free::Line, factor.s[0])?;
+    let (axis, normal) = minimize_line(cloud, start, Free::Line, factor.s[0])?;
     let unit = information(cloud, &axis).try_inverse()?;
     let (n, markers) = (cloud.points.len(), cloud.markers());
     Some(Candidate {
@@ -107,7 +108,7 @@ fn own_centers(estimator: &'static str, cloud: &Cloud, factor: &Factor) -> Optio
         cloud,
         size: factor.s[0],
     };
-    let (end, normals) = problem.minimise(Centers {
+    let (end, normals) = problem.minimize(Centers {
         frame: start.frame,
         points,
     })?;

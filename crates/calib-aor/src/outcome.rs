@@ -1,6 +1,7 @@
 //! What an estimator answers: an axis with its uncertainty, or why there is none.
 
-use calib_geometry::{Line, Verdict, measured::DataError};
+use calib_estimator::{Verdict, measured::DataError};
+use calib_geometry::Line;
 use nalgebra::{Matrix6, Point3, Unit, Vector3};
 use serde::Serialize;
 

@@ -13,11 +13,11 @@ use argmin::{
     core::{CostFunction, Executor},
     solver::neldermead::NelderMead,
 };
-use calib_geometry::{Verdict, measured::Cloud};
+use calib_estimator::{Verdict, measured::Cloud};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix4};
 
 use crate::{
-    circles::{Axis, Free, information, linearize, minimise_line, spread_out},
+    circles::{Axis, Free, information, linearize, minimize_line, spread_out},
     input::{Input, cloud_of},
     judge::{Candidate, inverse_or_zero, judge, prepare},
     options::Options,
@@ -51,7 +51,7 @@ pub fn gauss_newton(input: &Input<'_>, options: &Options) -> Result<Outcome, Aor
         "planar_radial_gn",
         input,
         options,
-        |cloud, start, free, size| minimise_line(cloud, start, free, size).map(|(axis, _)| axis),
+        |cloud, start, free, size| minimize_line(cloud, start, free, size).map(|(axis, _)| axis),
     )
 }
 

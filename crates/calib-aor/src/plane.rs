@@ -7,7 +7,8 @@
 //! Gamage & Lasenby 2002, Cerveri et al. 2005. For one clean circle it is as good as any (errors of second
 //! order apart); on short arcs of several markers a common line tells more.
 
-use calib_geometry::{factor::Factor, measured::Cloud};
+use calib_estimator::factor::Factor;
+use calib_estimator::measured::Cloud;
 use nalgebra::{Matrix2, Matrix4};
 
 use crate::{

@@ -9,11 +9,12 @@
 //! Noise of the orientations, seen in the spread about the other axes, gives the covariance of the direction.
 //! A ball joint has no such axis: its second direction is as weak as the first, and the verdict is `not_unique`.
 
-use calib_geometry::{
-    Line, Verdict, chance,
+use calib_estimator::pose_sums::PoseSums;
+use calib_estimator::{
+    Verdict, chance,
     measured::{DataError, Pose, RowWeights},
-    pose_sums::PoseSums,
 };
+use calib_geometry::Line;
 use nalgebra::{Matrix3, Matrix6, Point3, Unit, Vector3};
 
 use crate::{

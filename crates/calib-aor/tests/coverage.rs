@@ -3,7 +3,8 @@
 mod common;
 
 use calib_aor::{Input, InputKind, Options, estimators, fit};
-use calib_geometry::{Line, Verdict};
+use calib_estimator::Verdict;
+use calib_geometry::Line;
 use common::{Hinge, Noise, steps};
 use nalgebra::{Isometry3, Matrix2, Matrix3, SMatrix, Vector3};
 

@@ -8,7 +8,7 @@ use calib_aor::{
     frame_ml::{self, Residuals},
     frame_planes,
 };
-use calib_geometry::Verdict;
+use calib_estimator::Verdict;
 use common::{Hinge, Joint, Noise, Track, steps};
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 

@@ -6,7 +6,8 @@ use calib_aor::{
     AorEstimate, Center, FrameOptions, FrameOutcome, FrameSample, Input, Letter, Options, Outcome,
     PlaneFit, Pose, fit, frame_from_axes, frame_ml, frame_planes,
 };
-use calib_geometry::{Verdict, mean, so3};
+use calib_estimator::Verdict;
+use calib_geometry::{mean, so3};
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, Vector3};
 use serde_json::Value;
 

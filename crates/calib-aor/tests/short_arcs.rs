@@ -15,7 +15,8 @@
 mod common;
 
 use calib_aor::{Input, Options, bounds, fit};
-use calib_geometry::{Line, Verdict};
+use calib_estimator::Verdict;
+use calib_geometry::Line;
 use common::{Hinge, Noise, Tally, steps};
 use nalgebra::{DMatrix, Rotation3, Vector3};
 

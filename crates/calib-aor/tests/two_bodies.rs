@@ -10,7 +10,8 @@
 mod common;
 
 use calib_aor::{Input, Options, Pose, fit};
-use calib_geometry::{Line, Verdict, se3};
+use calib_estimator::Verdict;
+use calib_geometry::{Line, se3};
 use common::{Noise, Tally, steps};
 use nalgebra::{
     DMatrix, Isometry3, Matrix6, Point3, SMatrix, Translation3, Unit, UnitQuaternion, Vector3,

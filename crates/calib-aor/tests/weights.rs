@@ -183,7 +183,7 @@ fn weights_reach_what_the_good_rows_allow() {
         .map(|k| if k % 2 == 0 { 1.0 } else { 0.04 })
         .collect();
     for info in estimators() {
-        // The simplex minimises what Gauss–Newton minimises, a hundred times slower.
+        // The simplex minimizes what Gauss–Newton minimizes, a hundred times slower.
         if info.id == "planar_radial" {
             continue;
         }

@@ -1,12 +1,12 @@
 //! Closed-form spheres: Kåsa, Taubin, Pratt (SFE) and Hyper as one family.
 //!
 //! ```text
-//! minimise u'Su  subject to  u'Cu = 1,      u = (a, b, e_p),   a|x|² + b·x + e_p = 0           (1)
+//! minimize u'Su  subject to  u'Cu = 1,      u = (a, b, e_p),   a|x|² + b·x + e_p = 0           (1)
 //! Kåsa: a = 1.   Taubin: C_T = Σ ∇∇ᵀ.   Pratt: u'C_P u = |b|² − 4ae.   C = C_T + β (C_P − C_T)
 //! ```
 //!
 //! (Sums and means are weighted where samples have weights.) With the centroid as origin, b and e can be eliminated and one scalar equation is left for the
-//! multiplier λ, in the factor of [`calib_geometry::factor`] (all sums divided by n):
+//! multiplier λ, in the factor of [`calib_estimator::factor`] (all sums divided by n):
 //!
 //! ```text
 //! ρ² = λ ( 4w̄ + 4β²λ + Σ_k c_k² / (s_k² − λ) ),      0 ≤ λ < s₃²                             (2)
@@ -17,7 +17,8 @@
 //! the eigenvector with `u'Cu > 0` of least cost (the paper's rule as corrected); exact data have λ = 0.
 //! Pratt 1987, Taubin 1991, Al-Sharadqah & Chernov 2009, Chang & Pollard 2007.
 
-use calib_geometry::{factor::Factor, measured::Cloud};
+use calib_estimator::factor::Factor;
+use calib_estimator::measured::Cloud;
 use nalgebra::Vector3;
 
 use crate::{

@@ -1,7 +1,7 @@
 //! Ball bundle: the center, the markers' places in the body and the body's orientation in every frame, jointly.
 //!
 //! ```text
-//! minimise Σ_i Σ_p |o + R_i b_p − v_ip|²        over o, b_p, R_i            (seen samples only)    (1)
+//! minimize Σ_i Σ_p |o + R_i b_p − v_ip|²        over o, b_p, R_i            (seen samples only)    (1)
 //! e = b_p + y,  y = R_iᵀ(o − v_ip),   R_i ← R_i exp(δ_i):   de = db_p + R_iᵀ do + [y]ₓ δ_i          (2)
 //! ```
 //!
@@ -10,13 +10,12 @@
 //! line to the center; that direction is left out. It uses all that raw markers say: a fitted pose per frame and
 //! then a hot spot reach 0.88–1.0 of it, the centroid's sphere as little as 0.07.
 
-use calib_geometry::{
+use calib_estimator::{
     Verdict,
-    decompose::symmetric_eigen_small,
-    levenberg::{Problem, Stop, minimise},
+    levenberg::{Problem, Stop, minimize},
     measured::Cloud,
-    so3,
 };
+use calib_geometry::{decompose::symmetric_eigen_small, so3};
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, UnitQuaternion, Vector3};
 
 use crate::{
@@ -59,7 +58,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
             known: Known::Nothing,
         }));
     };
-    let end = minimise(&problem, start, MAX_STEPS);
+    let end = minimize(&problem, start, MAX_STEPS);
     let dof = problem.degrees_of_freedom(&end.x);
     let sigma = options
         .sigma_t

@@ -20,7 +20,7 @@
 //! of a sample's information that no displacement of its foot along the bent sphere imitates. (5) is no bound but what the best estimator has
 //! to second order that reads direction and weight of a sample off the sample. λ and E: see [`crate::bend`].
 
-use calib_geometry::measured::Pose;
+use calib_estimator::measured::Pose;
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 use crate::{

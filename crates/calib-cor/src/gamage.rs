@@ -1,7 +1,7 @@
 //! Several markers around one center: Gamage & Lasenby 2002, and Halvorsen's 2003 bias compensation.
 //!
 //! ```text
-//! minimise Σ_p (1/n_p) Σ_k (|x_pk − m|² − r_p²)²                                        (1)
+//! minimize Σ_p (1/n_p) Σ_k (|x_pk − m|² − r_p²)²                                        (1)
 //! noise adds  σ² I  to each marker's covariance and  2σ² x̄_p  to its correlation with |x|²:
 //! (Σ_p Cov_p − P σ² I) m = ½ Σ_p cov_p(x, |x|²) − σ² Σ_p x̄_p                             (2)
 //! σ² = (1/N) Σ_p Σ_k (|x_pk − m|² − r_p²)² / (4 r_p²)                                     (3)
@@ -9,7 +9,8 @@
 //!
 //! For equally many samples (1) is Kåsa's fit of several markers; for one marker (2) with (3) is Taubin's.
 
-use calib_geometry::{Verdict, factor::Factor, measured::Cloud};
+use calib_estimator::factor::Factor;
+use calib_estimator::{Verdict, measured::Cloud};
 use nalgebra::Vector3;
 
 use crate::{

@@ -13,11 +13,12 @@
 //! noise lengthens M = Σ(R_i − R̄)ᵀ(R_i − R̄) by 2(n − 1)σ_r²:   δp = −Σ_k v_k (v_k·p) shift/(λ_k − shift)      (6)
 //! ```
 
-use calib_geometry::{
-    Line, Verdict,
+use calib_estimator::pose_sums::PoseSums;
+use calib_estimator::{
+    Verdict,
     measured::{Pose, RowWeights},
-    pose_sums::PoseSums,
 };
+use calib_geometry::Line;
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::{

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! q_i = R_iᵀ (o − t_i)      where sample i sees the center in the body
-//! minimise Σ (|q_i| − |p|)² / σ_t² + ∠(q_i, p)² / (σ_r² + σ_t² / (|q_i||p|))              (1)
+//! minimize Σ (|q_i| − |p|)² / σ_t² + ∠(q_i, p)² / (σ_r² + σ_t² / (|q_i||p|))              (1)
 //! ```
 //!
 //! The distance from body to center carries position noise alone, the direction mostly orientation noise.
@@ -12,9 +12,9 @@
 //! σ_t² + |p|² σ_r² = Σ∠²|q||p|/(2n−4).
 //! Without the test of one axis it runs away along the axis; the test is part of it.
 
-use calib_geometry::{
+use calib_estimator::{
     Verdict,
-    levenberg::{Problem, Stop, minimise},
+    levenberg::{Problem, Stop, minimize},
     measured::Pose,
 };
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
@@ -129,7 +129,7 @@ fn maximise(
         };
         // While the noise levels still move, a few steps for each round are enough.
         let steps = if fixed || change < 1e-7 { MAX_STEPS } else { 2 };
-        let end = minimise(&problem, x, steps);
+        let end = minimize(&problem, x, steps);
         if end.stop == Stop::Broken {
             x.fill(f64::NAN);
         } else {

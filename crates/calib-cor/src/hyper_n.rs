@@ -9,11 +9,9 @@
 //! M⁻ inverts M but for its weakest direction, so the fit depends on the unit: points are centered and divided by their
 //! rms distance first. Rangarajan & Kanatani 2009 (HyperLS), here in three dimensions and for several markers.
 
-use calib_geometry::{
-    decompose::{pencil_eigen, symmetric_eigen},
-    factor::Factor,
-    measured::Cloud,
-};
+use calib_estimator::factor::Factor;
+use calib_estimator::measured::Cloud;
+use calib_geometry::decompose::{pencil_eigen, symmetric_eigen};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::{

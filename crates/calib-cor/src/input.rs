@@ -1,6 +1,6 @@
 //! What an estimator is given, and which estimators it serves.
 
-use calib_geometry::measured::{Cloud, Pose, RowWeights, Tracks};
+use calib_estimator::measured::{Cloud, Pose, RowWeights, Tracks};
 use serde::{Deserialize, Serialize};
 
 use crate::{options::Options, outcome::CorError};

@@ -53,7 +53,7 @@ mod sphere;
 pub mod sphere_eiv;
 pub mod sphere_ml;
 
-pub use calib_geometry::measured::{DataError, Pose, Tracks};
+pub use calib_estimator::measured::{DataError, Pose, Tracks};
 pub use input::{Input, InputKind};
 pub use options::Options;
 pub use outcome::{

@@ -21,12 +21,12 @@
 //! less planar by chance: the test of one axis is therefore made at `significance / C(n, h)`.
 //! Torr & Zisserman 2000 (MSAC); Moisan & Stival 2004 (a threshold from the data); Dempster et al. 1977.
 
-use calib_geometry::{
+use calib_estimator::{
     Verdict,
     chance::chi2_tail,
-    decompose::symmetric_eigen_small,
     measured::{Cloud, Pose, RowWeights},
 };
+use calib_geometry::decompose::symmetric_eigen_small;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use crate::{

@@ -7,12 +7,11 @@
 //! Least squares over both local centers at once. Ehrig et al. 2006, J. Biomech. 39(15), 2798–2809. Seen from
 //! the second body it is the hot spot of the relative motion, so the same tests tell a hinge from a ball.
 
-use calib_geometry::{
-    Line, Verdict,
-    decompose::svd_small,
+use calib_estimator::{
+    Verdict,
     measured::{DataError, Pose, RowWeights},
-    row_qr::RowQr,
 };
+use calib_geometry::{Line, decompose::svd_small, row_qr::RowQr};
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::{

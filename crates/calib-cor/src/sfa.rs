@@ -1,14 +1,14 @@
 //! SFA: Pratt's constrained problem by constrained linear approximation (COBYLA), ten seeded starts.
 //!
 //! ```text
-//! minimise u'Su  subject to  u'Cu = 1,      u = (a, b, c, d, e)              (paper §3.2.2, Eq. 7)
+//! minimize u'Su  subject to  u'Cu = 1,      u = (a, b, c, d, e)              (paper §3.2.2, Eq. 7)
 //! ```
 //!
 //! The points are centered and scaled to unit mean square first; in raw millimetres the entries of S
 //! span 10¹² and the method stops anywhere. On centered data it equals the closed form to its own
 //! tolerance. It is here because the paper compares it; [`crate::algebraic`] is faster and exact.
 
-use calib_geometry::measured::Cloud;
+use calib_estimator::measured::Cloud;
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use crate::{
@@ -44,7 +44,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
     };
     let scale = factor.mean_square.sqrt();
     let scaled: Vec<Vector3<f64>> = cloud.points.iter().map(|x| x / scale).collect();
-    let (a, b) = minimise_algebraic(&cloud, &scaled, options.seed);
+    let (a, b) = minimize_algebraic(&cloud, &scaled, options.seed);
     let center = b * (-0.5 / a) * scale;
     let radii = crate::sphere::mean_radii(&cloud, &center);
     let candidate = Candidate {
@@ -62,7 +62,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
 
 /// (a, b) of least cost over all starts. The offsets e_p follow from (a, b) in closed form for all
 /// markers but enter the constraint through their mean, which is the fifth unknown.
-fn minimise_algebraic(cloud: &Cloud, points: &[Vector3<f64>], seed: u64) -> (f64, Vector3<f64>) {
+fn minimize_algebraic(cloud: &Cloud, points: &[Vector3<f64>], seed: u64) -> (f64, Vector3<f64>) {
     // S/n over (w, x, y, z, 1) with each marker's mean taken out of the first four, and the mean offset back in.
     let n = cloud.total(0..points.len());
     let mut s = SMatrix::<f64, 5, 5>::zeros();

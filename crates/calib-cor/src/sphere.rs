@@ -7,15 +7,15 @@
 //! ```
 //!
 //! b is a bias that the estimator is known to have (Kåsa's). With noise J has full rank even for a sweep about one axis, and (3) alone would look trustworthy; the test
-//! (2) compares the spread across the best planes (s₃, [`calib_geometry::factor`]) with the noise.
+//! (2) compares the spread across the best planes (s₃, [`calib_estimator::factor`]) with the noise.
 
-use calib_geometry::{
-    Line, Verdict,
+use calib_estimator::factor::{Factor, rank_verdict};
+use calib_estimator::{
+    Verdict,
     chance::{chi2_tail, f_tail},
-    decompose::symmetric_eigen_small,
-    factor::{Factor, rank_verdict},
     measured::Cloud,
 };
+use calib_geometry::{Line, decompose::symmetric_eigen_small};
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 use crate::{

@@ -1,7 +1,7 @@
 //! Sphere by errors in variables: foot points in the metric of each sample, and the bias of the center taken off.
 //!
 //! ```text
-//! minimise Σ (x_k − f_k)ᵀ Σ_k⁻¹ (x_k − f_k)   over the center m, the radii and feet |f_k − m| = r_p          (1)
+//! minimize Σ (x_k − f_k)ᵀ Σ_k⁻¹ (x_k − f_k)   over the center m, the radii and feet |f_k − m| = r_p          (1)
 //! foot:    (I + μ Σ_k)(f − m) = x − m,  |f − m| = r;   ν = (f − m)/r,  v = νᵀ Σ_k ν,  h = ν·(x − m) − r        (2)
 //! (1) = Σ h_k²/v_k,   ∂/∂m = −2 Σ h ν/v,   ∂/∂r = −2 Σ h/v                                                 (3)
 //! bias:    E[m̂ − m] = ½ C Σ (ν_k − ν̄_p)/v_k · tr((I − ν_k ν_kᵀ) C)/r_p,     C = covariance of m̂             (4)
@@ -24,11 +24,11 @@
 //! where the correction is as uncertain as the estimate. What of it is left stands in the covariance. Information that the bend takes away, no estimator gets back:
 //! [`crate::bounds::sphere_center_weighted`].
 
-use calib_geometry::{
-    decompose::symmetric_eigen_small,
-    levenberg::{Problem, Stop, minimise},
+use calib_estimator::{
+    levenberg::{Problem, Stop, minimize},
     measured::Cloud,
 };
+use calib_geometry::decompose::symmetric_eigen_small;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::{
@@ -76,7 +76,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
             center: start,
             radii: mean_radii(&cloud, &start),
         };
-        let end = minimise(&problem, begin, MAX_STEPS);
+        let end = minimize(&problem, begin, MAX_STEPS);
         center = if end.stop == Stop::Broken {
             Vector3::repeat(f64::NAN)
         } else {

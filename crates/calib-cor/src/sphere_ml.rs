@@ -1,7 +1,7 @@
 //! Maximum likelihood sphere: a common center, own radii, optionally a noise of each marker or sample.
 //!
 //! ```text
-//! minimise Σ_p Σ_k (|x_pk − m| − r_p)² / σ_pk²,      r_p = weighted mean of |x_pk − m|            (1)
+//! minimize Σ_p Σ_k (|x_pk − m| − r_p)² / σ_pk²,      r_p = weighted mean of |x_pk − m|            (1)
 //! σ_pk² = uᵀ Σ_pk u,   u = (x_pk − m)/|x_pk − m|     for samples with a 3 × 3 covariance           (2)
 //! ```
 //!
@@ -9,8 +9,8 @@
 //! are not differentiated: a center must not be drawn to where its samples look noisier. The noise of a marker is
 //! re-estimated with its share of the degrees of freedom (restricted maximum likelihood).
 
-use calib_geometry::{
-    levenberg::{Problem, Stop, minimise},
+use calib_estimator::{
+    levenberg::{Problem, Stop, minimize},
     measured::Cloud,
 };
 use nalgebra::{Matrix3, Vector3};
@@ -85,7 +85,7 @@ pub(crate) fn fit_cloud(
 /// Center of least weighted radial squares; the radii are eliminated.
 pub(crate) fn isotropic(cloud: &Cloud, start: Vector3<f64>, weights: &[f64]) -> Vector3<f64> {
     let problem = Radial { cloud, weights };
-    let end = minimise(&problem, start, MAX_STEPS);
+    let end = minimize(&problem, start, MAX_STEPS);
     if end.stop == Stop::Broken {
         Vector3::repeat(f64::NAN)
     } else {

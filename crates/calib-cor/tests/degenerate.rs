@@ -3,7 +3,7 @@
 mod common;
 
 use calib_cor::{Input, InputKind, Known, Options, Outcome, Pose, estimators, fit};
-use calib_geometry::Verdict;
+use calib_estimator::Verdict;
 use common::{Noise, grid, marker, poses, sweep};
 use nalgebra::{Matrix3, Point3, Vector3};
 

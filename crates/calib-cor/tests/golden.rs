@@ -189,7 +189,7 @@ fn hot_spots() {
         if case["expect"]["verdict"] == "not_rotation" {
             let error = fit("hse", &input, &unknown).expect_err("a scaled matrix");
             assert_eq!(
-                error.verdict().map(calib_geometry::Verdict::as_str),
+                error.verdict().map(calib_estimator::Verdict::as_str),
                 Some("not_rotation")
             );
             continue;

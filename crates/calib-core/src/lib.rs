@@ -44,7 +44,6 @@
 //! | which model | [`compare()`] |
 //! | can I trust the intervals if the noise model is wrong | [`sandwich`] |
 //! | how well does a loop close | [`ClosureStatistics`], [`Solution::pose_at_sample`] |
-//! | hand–eye with a proof of optimality | [`handeye`] |
 //!
 //! # Example: two joints, seen by a tracker
 //!
@@ -127,7 +126,6 @@
 
 mod analysis;
 mod graph;
-pub mod handeye;
 mod model;
 mod solve;
 

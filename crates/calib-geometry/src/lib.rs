@@ -14,32 +14,23 @@
 //! * [`mean`]: the chordal mean of rotations and the sign-free mean of axes.
 //! * [`decompose`]: the singular value and eigenvalue decompositions used for estimation.
 //! * [`registration`]: the rigid motion between two corresponding point sets.
-//! * [`measured`], [`mod@factor`], [`pose_sums`]: samples with gaps, and the sums that planes, spheres and shared axes need.
 //! * [`row_qr`]: the triangular factor of tall matrices, row by row.
-//! * [`levenberg`]: the minimiser of the estimators' small problems. [`chance`]: tail probabilities.
 //!
 //! What this crate does not do: it never decides whether data suffice for an estimate; it returns
 //! spectra and named degeneracies, and the estimators judge them.
 
-pub mod chance;
 pub mod decompose;
-pub mod factor;
-pub mod levenberg;
 pub mod line;
 pub mod mean;
-pub mod measured;
-pub mod pose_sums;
 pub mod registration;
 pub mod row_qr;
 pub mod se3;
 pub mod so3;
-pub mod verdict;
 
 pub use nalgebra;
 
 pub use line::{Line, ScrewAxis};
 pub use se3::Twist;
-pub use verdict::Verdict;
 
 /// The README's example is a test.
 #[cfg(doctest)]

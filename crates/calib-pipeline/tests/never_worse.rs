@@ -6,7 +6,7 @@
 
 use calib_cor::{Input, Options, fit};
 use calib_core::{Axis, Chart, NoiseKind, PoseNoise, PoseObservation, Problem, Settings, solve};
-use calib_geometry::measured::Pose;
+use calib_estimator::measured::Pose;
 use calib_geometry::so3;
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::SeedableRng;

@@ -1,6 +1,7 @@
 //! The tests: everything at once, and number by number.
 
-use calib_geometry::{chance, decompose};
+use calib_estimator::chance;
+use calib_geometry::decompose;
 use calib_report::Unit;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;

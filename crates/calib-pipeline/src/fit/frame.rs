@@ -107,7 +107,7 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, PipelineError> {
             ));
         }
     };
-    let observable = f.verdict == calib_geometry::Verdict::Ok;
+    let observable = f.verdict == calib_estimator::Verdict::Ok;
     let value = json!({
         "estimator": request.estimator,
         "observable": observable,

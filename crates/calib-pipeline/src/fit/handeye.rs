@@ -51,15 +51,12 @@ pub fn handeye(file: &Path, robot: &str, measured: &str) -> Result<Answer, Pipel
         .filter_map(|(a, b)| Some(((*a)?, (*b)?)))
         .collect();
     let (a, b): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
-    let solved = match calib_core::handeye::solve_ax_zb(
-        &a,
-        &b,
-        calib_core::handeye::HandEyeWeights::default(),
-    ) {
+    let solved = match calib_handeye::solve_ax_zb(&a, &b, calib_handeye::HandEyeWeights::default())
+    {
         Ok(solved) => solved,
         Err(
-            error @ (calib_core::handeye::HandEyeError::OneAxis { .. }
-            | calib_core::handeye::HandEyeError::TooFew { .. }),
+            error @ (calib_handeye::HandEyeError::OneAxis { .. }
+            | calib_handeye::HandEyeError::TooFew { .. }),
         ) => {
             return Ok(not_observable("handeye", "single_axis", &error.to_string()));
         }

@@ -8,7 +8,8 @@ use calib_aor::{
     frame_ml::{self, Residuals},
     frame_planes,
 };
-use calib_geometry::{Verdict, so3};
+use calib_estimator::Verdict;
+use calib_geometry::so3;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
 use super::literal::algorithm1_as_printed;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! x_k = m + r u_k + ε_k, and with probability p also + U_k,  U uniform in a cube of the reach a     h_k = |x_k − m| − r   (1)
-//! minimise −Σ ln( (1 − p) N(h_k; 0, σ²) + p g_k(h_k) ),   g_k: the density of h where sample k is an outlier              (2)
+//! minimize −Σ ln( (1 − p) N(h_k; 0, σ²) + p g_k(h_k) ),   g_k: the density of h where sample k is an outlier              (2)
 //! ```
 //!
 //! σ, p, a and each direction u_k are known, and the search starts at the truth: no one has this, and nobody who has less is expected to do better.

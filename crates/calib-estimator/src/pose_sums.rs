@@ -8,13 +8,15 @@
 //!
 //! The weakest direction of M is the axis that all rotations share, seen from the body; `R̄` carries it to the world.
 
+use calib_geometry::{
+    decompose::{svd_small, symmetric_eigen_small},
+    row_qr::RowQr,
+};
 use nalgebra::{Matrix3, Unit, Vector3};
 
 use crate::{
     chance::{chi2_tail, f_tail},
-    decompose::{svd_small, symmetric_eigen_small},
     measured::{DataError, Pose, RowWeights},
-    row_qr::RowQr,
     verdict::Verdict,
 };
 

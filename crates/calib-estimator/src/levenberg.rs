@@ -1,10 +1,10 @@
 //! Levenberg–Marquardt for a handful of unknowns on a manifold.
 //!
 //! ```text
-//! minimise c(x) = Σ rᵢ(x)²,   (H + λ diag H) δ = −g,   x ← x ⊞ δ,   H = JᵀJ, g = Jᵀr      (1)
+//! minimize c(x) = Σ rᵢ(x)²,   (H + λ diag H) δ = −g,   x ← x ⊞ δ,   H = JᵀJ, g = Jᵀr      (1)
 //! ```
 //!
-//! The problem says how to linearise, solve and step, so that an estimator may eliminate its own
+//! The problem says how to linearize, solve and step, so that an estimator may eliminate its own
 //! nuisance unknowns (a radius, an angle for each frame); the loop here only decides how bold to be.
 //! Nielsen 1999 (damping by gain ratio). It finds the nearest minimum and does not prove that it is the global one.
 
@@ -17,7 +17,7 @@ pub trait Problem {
     /// A tangent step.
     type Step;
 
-    /// Linearises at `x`.
+    /// Linearizes at `x`.
     fn linearize(&self, x: &Self::Point) -> Self::Normal;
     /// c(x); not finite where x is outside the domain.
     fn cost(&self, normal: &Self::Normal) -> f64;
@@ -61,7 +61,7 @@ const ROUNDING: f64 = 1e-13;
 const HARMLESS: f64 = 1e-12;
 
 /// Runs the loop from `start`.
-pub fn minimise<P: Problem>(problem: &P, start: P::Point, max_iterations: usize) -> Minimum<P> {
+pub fn minimize<P: Problem>(problem: &P, start: P::Point, max_iterations: usize) -> Minimum<P> {
     let mut x = start;
     let mut normal = problem.linearize(&x);
     let mut damping = FIRST_DAMPING;
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn it_walks_down_rosenbrocks_valley() {
-        let end = minimise(&Valley, [-1.2, 1.0], 100);
+        let end = minimize(&Valley, [-1.2, 1.0], 100);
         assert_eq!(
             end.stop,
             Stop::Converged,
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn a_point_that_is_not_finite_does_not_loop_for_ever() {
-        let end = minimise(&Valley, [f64::NAN, 1.0], 100);
+        let end = minimize(&Valley, [f64::NAN, 1.0], 100);
         assert_ne!(end.stop, Stop::Converged);
     }
 }

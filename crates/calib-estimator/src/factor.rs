@@ -11,7 +11,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::{decompose::svd_small, measured::Cloud, row_qr::RowQr, verdict::Verdict};
+use calib_geometry::{decompose::svd_small, row_qr::RowQr};
+
+use crate::{measured::Cloud, verdict::Verdict};
 
 /// Relative singular value of exact data: below it rounding decides.
 const RANK: f64 = 1e-9;
