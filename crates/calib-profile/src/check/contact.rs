@@ -83,7 +83,30 @@ impl Checker<'_> {
                 self.positive(&["contacts", name, key], value);
             }
         }
-        let (at, along, touched) = match raw.touches {
+        let (base_from_place, touched) = self.touched(name, &raw.touches);
+        if raw.place_sigma_deg.is_some() && matches!(touched, Touched::Point | Touched::Distance(_))
+        {
+            self.problem(
+                &["contacts", name, "place_sigma_deg"],
+                "a point has no orientation",
+                "remove the key",
+            );
+        }
+        Some(Contact {
+            recordings: raw.recordings.clone(),
+            point: raw.point.clone(),
+            on: on?,
+            touched,
+            base_from_place,
+            place_sigma: raw.place_sigma_mm.map(|s| s * MM),
+            place_sigma_rad: raw.place_sigma_deg.map(|s| s * DEG),
+            sigma: raw.sigma_mm * MM,
+        })
+    }
+
+    /// What is touched, and the pose of its frame in what carries it.
+    fn touched(&mut self, name: &str, touches: &RawTouched) -> (Isometry3<f64>, Touched) {
+        let (at, along, touched) = match *touches {
             RawTouched::Plane { through_mm, normal } => (
                 through_mm,
                 self.direction_of(name, "normal", normal),
@@ -113,27 +136,8 @@ impl Checker<'_> {
                 (from_mm, UnitQuaternion::identity(), touched)
             }
         };
-        if raw.place_sigma_deg.is_some() && matches!(touched, Touched::Point | Touched::Distance(_))
-        {
-            self.problem(
-                &["contacts", name, "place_sigma_deg"],
-                "a point has no orientation",
-                "remove the key",
-            );
-        }
-        Some(Contact {
-            recordings: raw.recordings.clone(),
-            point: raw.point.clone(),
-            on: on?,
-            touched,
-            base_from_place: Isometry3::from_parts(
-                Translation3::from(Vector3::from(at) * MM),
-                along,
-            ),
-            place_sigma: raw.place_sigma_mm.map(|s| s * MM),
-            place_sigma_rad: raw.place_sigma_deg.map(|s| s * DEG),
-            sigma: raw.sigma_mm * MM,
-        })
+        let place = Translation3::from(Vector3::from(at) * MM);
+        (Isometry3::from_parts(place, along), touched)
     }
 
     /// Rotation whose z axis is along `v`.

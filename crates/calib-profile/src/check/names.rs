@@ -4,6 +4,30 @@ use calib_urdf::nearest::nearest;
 
 use super::*;
 
+/// A list of points by marker.
+#[derive(Clone, Copy)]
+pub(super) enum MarkerList {
+    /// `template_mm` of a body.
+    Template,
+    /// `markers_mm` of a simulated mount.
+    Simulated,
+}
+
+impl MarkerList {
+    /// What to do where a marker is missing.
+    fn remedy(self) -> &'static str {
+        match self {
+            Self::Template => "give all markers of the body or none",
+            Self::Simulated => "give it under `markers_mm`",
+        }
+    }
+
+    /// Whether names that are not markers of the body are a problem.
+    fn forbids_others(self) -> bool {
+        matches!(self, Self::Template)
+    }
+}
+
 impl Checker<'_> {
     /// Notes that nothing `what` is called `name`; its place is the key that is the name, or else the value.
     fn unknown(&mut self, path: &[&str], name: &str, finding: String, remedy: String) {
@@ -55,14 +79,13 @@ impl Checker<'_> {
     }
 
     /// Each marker of a body has its place in a list of points; a marker without a place is not named where a
-    /// misspelled place is its. Further points are a problem where they are `forbidden`.
+    /// misspelled place is its. The list says whether further points are a problem.
     pub(super) fn marker_places(
         &mut self,
         path: &[&str],
         body: &str,
         points: &BTreeMap<String, [f64; 3]>,
-        remedy: &str,
-        forbidden: bool,
+        list: MarkerList,
     ) {
         let Some(markers) = self.raw.bodies.get(body).map(|b| &b.markers) else {
             return;
@@ -77,7 +100,9 @@ impl Checker<'_> {
             meant.extend(near);
             let help = match near {
                 Some(near) => format!("did you mean `{near}`?"),
-                None if forbidden => expected(stranger, markers.iter().map(String::as_str)),
+                None if list.forbids_others() => {
+                    expected(stranger, markers.iter().map(String::as_str))
+                }
                 None => continue,
             };
             let mut at = path.to_vec();
@@ -87,7 +112,7 @@ impl Checker<'_> {
         }
         for marker in missing().filter(|m| !meant.contains(m)) {
             let finding = format!("marker `{marker}` of `{body}` has no place here");
-            self.key_problem(path, finding, remedy);
+            self.key_problem(path, finding, list.remedy());
         }
     }
 

@@ -1,6 +1,8 @@
 //! Origins: the joint, the body that moves with it, the swept axes, and what is assumed.
 
 use super::*;
+use crate::profile::{Orientation, Origin, PointChoice, SweptAxis};
+use crate::raw::{RawOrientation, RawOrigin, RawPoint, RawUse};
 
 impl Checker<'_> {
     pub(super) fn origin(&mut self, name: &str, raw: &RawOrigin) -> Option<Origin> {
@@ -101,62 +103,11 @@ impl Checker<'_> {
         origin_joint: Option<JointId>,
     ) -> Vec<SweptAxis> {
         let child = origin_joint.map(|joint| self.robot.joint(joint).child);
-        let zero = self.robot.forward_kinematics(&self.robot.zero_positions());
-        let mut axes = Vec::new();
-        for (label, joint_name) in &raw.axes {
-            let path = ["origins", name, "axes", label];
-            let Some(stated) = axis_label(label) else {
-                self.key_problem(
-                    &path,
-                    format!("`{label}` is no axis"),
-                    "axes are x, y, z, -x, -y or -z of the joint frame",
-                );
-                continue;
-            };
-            let Some(joint) = self.joint(&path, joint_name) else {
-                continue;
-            };
-            let Some(axis) = self
-                .robot
-                .joint(joint)
-                .kind
-                .axis()
-                .filter(|_| self.robot.joint(joint).kind.turns())
-            else {
-                self.problem(
-                    &path,
-                    format!("joint `{joint_name}` does not turn"),
-                    "name a revolute joint",
-                );
-                continue;
-            };
-            let Some(child) = child else {
-                continue;
-            };
-            if !self.robot.carries(joint, child) {
-                self.problem(
-                    &path,
-                    format!(
-                        "joint `{joint_name}` does not move `{}`",
-                        self.robot.link(child).name
-                    ),
-                    "name joints between the root and the origin's joint",
-                );
-                continue;
-            }
-            // child_from_joint · axis, at the zero position
-            let at = self.robot.joint(joint).child;
-            let in_child =
-                zero[child.index()].rotation.inverse() * zero[at.index()].rotation * axis;
-            if in_child.dot(&stated) < SAME_DIRECTION {
-                let found = format!("[{:.3}, {:.3}, {:.3}]", in_child.x, in_child.y, in_child.z);
-                self.problem(&path, format!("`{joint_name}` turns about {found} of the frame of `{}` at zero, not about `{label}`", raw.joint), "correct the label, or the URDF");
-            }
-            axes.push(SweptAxis {
-                joint,
-                direction: Unit::new_normalize(in_child.into_inner()),
-            });
-        }
+        let mut axes: Vec<SweptAxis> = raw
+            .axes
+            .iter()
+            .filter_map(|(label, joint)| self.axis(name, raw, (label, joint), child))
+            .collect();
         if raw.axes.len() > 2 {
             self.problem(
                 &["origins", name, "axes"],
@@ -179,6 +130,64 @@ impl Checker<'_> {
             );
         }
         axes
+    }
+
+    /// One swept axis; `child` is the link that the origin's joint carries.
+    fn axis(
+        &mut self,
+        name: &str,
+        raw: &RawOrigin,
+        (label, joint_name): (&str, &str),
+        child: Option<LinkId>,
+    ) -> Option<SweptAxis> {
+        let path = ["origins", name, "axes", label];
+        let Some(stated) = axis_label(label) else {
+            self.key_problem(
+                &path,
+                format!("`{label}` is no axis"),
+                "axes are x, y, z, -x, -y or -z of the joint frame",
+            );
+            return None;
+        };
+        let joint = self.joint(&path, joint_name)?;
+        let Some(axis) = self
+            .robot
+            .joint(joint)
+            .kind
+            .axis()
+            .filter(|_| self.robot.joint(joint).kind.turns())
+        else {
+            self.problem(
+                &path,
+                format!("joint `{joint_name}` does not turn"),
+                "name a revolute joint",
+            );
+            return None;
+        };
+        let child = child?;
+        if !self.robot.carries(joint, child) {
+            self.problem(
+                &path,
+                format!(
+                    "joint `{joint_name}` does not move `{}`",
+                    self.robot.link(child).name
+                ),
+                "name joints between the root and the origin's joint",
+            );
+            return None;
+        }
+        let zero = self.robot.forward_kinematics(&self.robot.zero_positions());
+        // child_from_joint · axis, at the zero position
+        let at = self.robot.joint(joint).child;
+        let in_child = zero[child.index()].rotation.inverse() * zero[at.index()].rotation * axis;
+        if in_child.dot(&stated) < SAME_DIRECTION {
+            let found = format!("[{:.3}, {:.3}, {:.3}]", in_child.x, in_child.y, in_child.z);
+            self.problem(&path, format!("`{joint_name}` turns about {found} of the frame of `{}` at zero, not about `{label}`", raw.joint), "correct the label, or the URDF");
+        }
+        Some(SweptAxis {
+            joint,
+            direction: Unit::new_normalize(in_child.into_inner()),
+        })
     }
 
     fn orientation(&mut self, name: &str, raw: &RawOrigin) -> Orientation {

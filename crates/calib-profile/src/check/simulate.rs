@@ -2,67 +2,15 @@
 
 use calib_urdf::nearest::nearest;
 
+use super::names::MarkerList;
 use super::*;
+use crate::profile::{Error3, Protocol, SimErrors, SimMount, SimNoise, Simulation, Steps};
+use crate::raw::{RawProtocol, RawSimErrors, RawSimulate, RawSteps};
 
 impl Checker<'_> {
     pub(super) fn simulation(&mut self, raw: &RawSimulate) -> Simulation {
-        let mut mounts = BTreeMap::new();
-        for (name, mount) in &raw.mounts {
-            let path = ["simulate", "mounts", name];
-            self.known("body", &path, name, self.raw.bodies.keys());
-            self.marker_places(
-                &["simulate", "mounts", name, "markers_mm"],
-                name,
-                &mount.markers_mm,
-                "give it under `markers_mm`",
-                false,
-            );
-            let rigid = pose(&crate::raw::RawPose {
-                xyz_mm: mount.xyz_mm,
-                rpy_deg: mount.rpy_deg,
-            });
-            let markers = mount
-                .markers_mm
-                .iter()
-                .map(|(m, p)| (m.clone(), Point3::from(Vector3::from(*p) * MM)))
-                .collect();
-            mounts.insert(
-                name.clone(),
-                SimMount {
-                    link_from_body: rigid,
-                    markers,
-                },
-            );
-        }
-        let bodies = &self.raw.bodies;
-        let without = || bodies.keys().filter(|name| !raw.mounts.contains_key(*name));
-        // A mount whose body nobody knows is the mount of the body that it almost names.
-        let strangers = raw.mounts.keys().filter(|name| !bodies.contains_key(*name));
-        let meant: BTreeSet<&str> = strangers
-            .filter_map(|name| nearest(name, without().map(String::as_str)))
-            .collect();
-        for name in without().filter(|name| !meant.contains(name.as_str())) {
-            self.key_problem(
-                &["simulate", "mounts"],
-                format!("body `{name}` has no simulated mount"),
-                format!("add `{name}: {{xyz_mm: […], rpy_deg: […]}}`"),
-            );
-        }
-        let mut fixed: BTreeMap<JointId, Isometry3<f64>> = BTreeMap::new();
-        for (joint, change) in &raw.errors.fixed {
-            if let Some(id) = self.joint(&["simulate", "errors", "fixed", joint], joint) {
-                fixed.insert(id, pose(change));
-            }
-        }
-        let mut compliance = BTreeMap::new();
-        for (joint, value) in &raw.errors.compliance_deg_per_nm {
-            if let Some(id) = self.joint(
-                &["simulate", "errors", "compliance_deg_per_nm", joint],
-                joint,
-            ) {
-                compliance.insert(id, value * DEG);
-            }
-        }
+        let mounts = self.mounts(raw);
+        let (fixed, compliance) = self.exact_errors(&raw.errors);
         if !(0.0..1.0).contains(&raw.noise.occluded) && !self.named_already(raw.noise.occluded) {
             self.problem(
                 &["simulate", "noise", "occluded"],
@@ -110,10 +58,78 @@ impl Checker<'_> {
         }
     }
 
-    pub(super) fn protocol(&mut self, name: &str, raw: &RawProtocol) -> Protocol {
-        let at = |key: &'static str| ["simulate", "recordings", name, key];
+    /// The nominal mounts; every body needs one.
+    fn mounts(&mut self, raw: &RawSimulate) -> BTreeMap<String, SimMount> {
+        let mut mounts = BTreeMap::new();
+        for (name, mount) in &raw.mounts {
+            let path = ["simulate", "mounts", name];
+            self.known("body", &path, name, self.raw.bodies.keys());
+            self.marker_places(
+                &["simulate", "mounts", name, "markers_mm"],
+                name,
+                &mount.markers_mm,
+                MarkerList::Simulated,
+            );
+            let rigid = pose(&crate::raw::RawPose {
+                xyz_mm: mount.xyz_mm,
+                rpy_deg: mount.rpy_deg,
+            });
+            let markers = mount
+                .markers_mm
+                .iter()
+                .map(|(m, p)| (m.clone(), Point3::from(Vector3::from(*p) * MM)))
+                .collect();
+            mounts.insert(
+                name.clone(),
+                SimMount {
+                    link_from_body: rigid,
+                    markers,
+                },
+            );
+        }
+        let bodies = &self.raw.bodies;
+        let without = || bodies.keys().filter(|name| !raw.mounts.contains_key(*name));
+        // A mount whose body nobody knows is the mount of the body that it almost names.
+        let strangers = raw.mounts.keys().filter(|name| !bodies.contains_key(*name));
+        let meant: BTreeSet<&str> = strangers
+            .filter_map(|name| nearest(name, without().map(String::as_str)))
+            .collect();
+        for name in without().filter(|name| !meant.contains(name.as_str())) {
+            self.key_problem(
+                &["simulate", "mounts"],
+                format!("body `{name}` has no simulated mount"),
+                format!("add `{name}: {{xyz_mm: […], rpy_deg: […]}}`"),
+            );
+        }
+        mounts
+    }
+
+    /// Differences that are stated exactly: origins of fixed joints, and compliances.
+    fn exact_errors(
+        &mut self,
+        raw: &RawSimErrors,
+    ) -> (BTreeMap<JointId, Isometry3<f64>>, BTreeMap<JointId, f64>) {
+        let mut fixed: BTreeMap<JointId, Isometry3<f64>> = BTreeMap::new();
+        for (joint, change) in &raw.fixed {
+            if let Some(id) = self.joint(&["simulate", "errors", "fixed", joint], joint) {
+                fixed.insert(id, pose(change));
+            }
+        }
+        let mut compliance = BTreeMap::new();
+        for (joint, value) in &raw.compliance_deg_per_nm {
+            if let Some(id) = self.joint(
+                &["simulate", "errors", "compliance_deg_per_nm", joint],
+                joint,
+            ) {
+                compliance.insert(id, value * DEG);
+            }
+        }
+        (fixed, compliance)
+    }
+
+    fn grid(&mut self, name: &str, raw: &[RawSteps]) -> Vec<(JointId, Steps)> {
         let mut grid = Vec::new();
-        for (i, steps) in raw.grid.iter().enumerate() {
+        for (i, steps) in raw.iter().enumerate() {
             let path = [
                 "simulate",
                 "recordings",
@@ -142,8 +158,16 @@ impl Checker<'_> {
                 self.problem(&path, "a grid of no poses", "give `poses: 1` or more");
             }
         }
+        grid
+    }
+
+    fn random(
+        &mut self,
+        name: &str,
+        raw: &BTreeMap<String, [f64; 2]>,
+    ) -> BTreeMap<JointId, (f64, f64)> {
         let mut random = BTreeMap::new();
-        for (key, range) in &raw.random {
+        for (key, range) in raw {
             let path = ["simulate", "recordings", name, "random", key];
             if let Some((joint, factor)) = self.joint_key(&path, key) {
                 let (low, high) = (
@@ -154,6 +178,13 @@ impl Checker<'_> {
                 random.insert(joint, (low, high));
             }
         }
+        random
+    }
+
+    pub(super) fn protocol(&mut self, name: &str, raw: &RawProtocol) -> Protocol {
+        let at = |key: &'static str| ["simulate", "recordings", name, key];
+        let grid = self.grid(name, &raw.grid);
+        let random = self.random(name, &raw.random);
         if raw.random.is_empty() != (raw.poses == 0) {
             self.problem(
                 &at("poses"),

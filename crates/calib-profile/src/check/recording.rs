@@ -1,0 +1,85 @@
+//! Recordings.
+
+use super::*;
+use crate::profile::{RecordingSpec, RobotLog, Timing};
+use crate::raw::{RawRecording, RawTiming, RawUse};
+
+impl Checker<'_> {
+    pub(super) fn recording(&mut self, name: &str, raw: &RawRecording) -> RecordingSpec {
+        let mut ranges = BTreeMap::new();
+        for (key, range) in &raw.joints {
+            let path = ["recordings", name, "joints", key];
+            if let Some((joint, factor)) = self.joint_key(&path, key) {
+                let (low, high) = (
+                    range[0].min(range[1]) * factor,
+                    range[0].max(range[1]) * factor,
+                );
+                self.within_limits(&path, joint, low, high);
+                ranges.insert(joint, (low, high));
+            }
+        }
+        let hold = self.joint_values(&["recordings", name, "hold"], &raw.hold);
+        for joint in hold.keys().filter(|j| ranges.contains_key(j)) {
+            let joint = self.robot.joint(*joint).name.clone();
+            self.problem(
+                &["recordings", name, "hold"],
+                format!("`{joint}` cannot both move and be held"),
+                "keep it under `joints` or under `hold`",
+            );
+        }
+        if raw.usage == RawUse::Sweep && raw.joints.is_empty() {
+            self.key_problem(
+                &["recordings", name],
+                format!("sweep `{name}` names no joint that moves"),
+                "add `joints: {<joint>_deg: [from, to]}`",
+            );
+        }
+        if raw.robot_log.is_some() && raw.timing.is_none() {
+            self.key_problem(
+                &["recordings", name, "robot_log"],
+                "two files have two sets of rows",
+                "add `timing: {}`: holds become poses, and the clocks are brought together",
+            );
+        }
+        let timing = raw.timing.as_ref().map(|timing| self.timing(name, timing));
+        RecordingSpec {
+            file: raw.file.clone(),
+            usage: raw.usage,
+            ranges,
+            hold,
+            group: raw.group.clone(),
+            reader: raw.reader.clone(),
+            reader_parameters: raw.reader_parameters.clone(),
+            columns: raw.columns.clone(),
+            robot_log: raw.robot_log.as_ref().map(|log| RobotLog {
+                file: log.file.clone(),
+                reader: log.reader.clone(),
+                columns: log.columns.clone(),
+            }),
+            timing,
+        }
+    }
+
+    fn timing(&mut self, name: &str, raw: &RawTiming) -> Timing {
+        for (key, value) in [
+            ("hold_s", raw.hold_s),
+            ("rate_hz", raw.rate_hz),
+            ("max_offset_s", raw.max_offset_s),
+        ] {
+            if !(value > 0.0 || self.named_already(value)) {
+                self.problem(
+                    &["recordings", name, "timing", key],
+                    format!("{value} is not above 0"),
+                    "give a number above 0",
+                );
+            }
+        }
+        Timing {
+            poses: raw.poses,
+            clock: raw.clock,
+            hold: raw.hold_s,
+            rate: raw.rate_hz,
+            max_offset: raw.max_offset_s,
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! What is estimated, priors, noise levels and limits.
+
+use super::*;
+use crate::profile::{JointException, Limits, Noise, Prior, Solve};
+use crate::raw::{RawJointSolve, RawLimits, RawPrior, RawSolve};
+
+impl Checker<'_> {
+    pub(super) fn solve(&mut self, raw: &RawSolve) -> Solve {
+        let mut joints = BTreeMap::new();
+        for (name, exception) in &raw.joints {
+            let path = ["solve", "joints", name.as_str()];
+            let Some(joint) = self.joint(&path, name) else {
+                continue;
+            };
+            let exception = self.exception(name, exception);
+            joints.insert(joint, exception);
+        }
+        let prior = self.prior(&raw.prior);
+        if let Some(sigma) = raw.noise.joint_deg {
+            self.not_negative(&["solve", "noise", "joint_deg"], sigma);
+        }
+        let limits = self.limits(&raw.limits);
+        Solve {
+            method: raw.method,
+            free: raw.free.iter().copied().collect(),
+            joints,
+            prior,
+            noise: Noise {
+                joint: raw.noise.joint_deg.map(|s| s * DEG),
+                known: raw.noise.known,
+            },
+            load: raw.load,
+            robust: raw.robust,
+            limits,
+        }
+    }
+
+    fn exception(&mut self, name: &str, raw: &RawJointSolve) -> JointException {
+        let mut coupled_to = Vec::new();
+        for (i, other) in raw.coupled_to.iter().enumerate() {
+            let at = i.to_string();
+            coupled_to.extend(self.joint(&["solve", "joints", name, "coupled_to", &at], other));
+        }
+        for (key, value) in [
+            ("sigma_mm", raw.sigma_mm),
+            ("sigma_deg", raw.sigma_deg),
+            ("within_mm", raw.within_mm),
+            ("within_deg", raw.within_deg),
+        ] {
+            if let Some(value) = value {
+                self.positive(&["solve", "joints", name, key], value);
+            }
+        }
+        JointException {
+            free: raw.free.as_ref().map(|list| list.iter().copied().collect()),
+            sigma_m: raw.sigma_mm.map(|s| s * MM),
+            sigma_rad: raw.sigma_deg.map(|s| s * DEG),
+            within_m: raw.within_mm.map(|w| w * MM),
+            within_rad: raw.within_deg.map(|w| w * DEG),
+            coupled_to,
+        }
+    }
+
+    fn prior(&mut self, raw: &RawPrior) -> Prior {
+        for (key, value) in [
+            ("position_mm", raw.position_mm),
+            ("angle_deg", raw.angle_deg),
+            ("offset_deg", raw.offset_deg),
+            ("offset_mm", raw.offset_mm),
+            ("gain_percent", raw.gain_percent),
+            ("eccentricity_deg", raw.eccentricity_deg),
+            ("compliance_deg_per_nm", raw.compliance_deg_per_nm),
+            ("backlash_deg", raw.backlash_deg),
+            ("backlash_mm", raw.backlash_mm),
+        ] {
+            self.positive(&["solve", "prior", key], value);
+        }
+        Prior {
+            position: raw.position_mm * MM,
+            angle: raw.angle_deg * DEG,
+            offset_rad: raw.offset_deg * DEG,
+            offset_m: raw.offset_mm * MM,
+            gain: raw.gain_percent / 100.0,
+            eccentricity: raw.eccentricity_deg * DEG,
+            compliance: raw.compliance_deg_per_nm * DEG,
+            backlash_rad: raw.backlash_deg * DEG,
+            backlash_m: raw.backlash_mm * MM,
+        }
+    }
+
+    fn limits(&mut self, raw: &RawLimits) -> Limits {
+        for loop_name in raw.loop_mean_mm.keys() {
+            self.known(
+                "loop",
+                &["solve", "limits", "loop_mean_mm", loop_name],
+                loop_name,
+                self.raw.loops.keys(),
+            );
+        }
+        Limits {
+            held_out_rms: raw.held_out_rms_mm.map(|l| l * MM),
+            held_out_max: raw.held_out_max_mm.map(|l| l * MM),
+            loop_mean: raw
+                .loop_mean_mm
+                .iter()
+                .map(|(name, l)| (name.clone(), l * MM))
+                .collect(),
+            origin_sigma: raw.origin_sigma_mm.map(|l| l * MM),
+        }
+    }
+}

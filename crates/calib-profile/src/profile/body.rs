@@ -1,0 +1,30 @@
+//! Tracking bodies.
+
+use calib_urdf::LinkId;
+use nalgebra::Isometry3;
+use nalgebra::Point3;
+
+/// A tracking body on a link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Body {
+    /// The link that carries it.
+    pub link: LinkId,
+    /// What is recorded of it.
+    pub kind: BodyKind,
+    /// `link_from_body` where known by construction.
+    pub mount: Option<Isometry3<f64>>,
+}
+
+/// What is recorded of a tracking body.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BodyKind {
+    /// Markers, in the order that defines the body frame; with their positions in it (m) where known.
+    Markers {
+        /// Names as in the recordings.
+        names: Vec<String>,
+        /// Positions in the body frame, one per name, m.
+        template: Option<Vec<Point3<f64>>>,
+    },
+    /// Poses of the body.
+    Pose,
+}

@@ -1,0 +1,86 @@
+//! The profile as the program needs it: SI, ids, every reference resolved.
+
+mod body;
+mod contact;
+mod origin;
+mod recording;
+mod simulate;
+mod solve;
+
+pub use body::{Body, BodyKind};
+pub use contact::{Contact, ContactBase, Tip, Touched};
+pub use origin::{LinkTransform, Loop, Orientation, Origin, PointChoice, SweptAxis};
+pub use recording::{RecordingSpec, RobotLog, Timing};
+pub use simulate::{Error3, Protocol, SimErrors, SimMount, SimNoise, Simulation, Steps};
+pub use solve::{JointException, JointFreeSet, Limits, Noise, OriginFreeSet, Prior, Solve};
+
+pub use crate::raw::{
+    RawClocks as Clocks, RawFree as Free, RawJointFree as JointFree, RawLoad as Load,
+    RawMethod as Method, RawTimedPoses as TimedPoses, RawUpAxis as UpAxis, RawUse as Usage,
+};
+pub use crate::raw::{RawPlugin as Plugin, RawValue as ParameterValue};
+
+use std::collections::BTreeMap;
+
+/// A checked profile. Lengths m, angles rad, torques N m.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// Name of the robot in reports.
+    pub robot: String,
+    /// URDF file, relative to the profile.
+    pub urdf: String,
+    /// Folders of packages with meshes, relative to the profile, by name.
+    pub packages: BTreeMap<String, String>,
+    /// The tracker.
+    pub tracker: Tracker,
+    /// Tracking bodies by name.
+    pub bodies: BTreeMap<String, Body>,
+    /// Recordings by name.
+    pub recordings: BTreeMap<String, RecordingSpec>,
+    /// Plugins to load, by name.
+    pub plugins: BTreeMap<String, Plugin>,
+    /// Unknown transforms by name.
+    pub origins: BTreeMap<String, Origin>,
+    /// Transforms between links to report, by name.
+    pub transforms: BTreeMap<String, LinkTransform>,
+    /// Loop closures by name.
+    pub loops: BTreeMap<String, Loop>,
+    /// Touching points by name.
+    pub points: BTreeMap<String, Tip>,
+    /// Touches by name.
+    pub contacts: BTreeMap<String, Contact>,
+    /// How to solve.
+    pub solve: Solve,
+    /// What is written.
+    pub outputs: Outputs,
+    /// How to simulate, when the profile says.
+    pub simulate: Option<Simulation>,
+}
+
+/// The tracker and what its maker states about its noise (standard deviations).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tracker {
+    /// Name of its world frame.
+    pub frame: String,
+    /// One marker coordinate, m.
+    pub marker_sigma: Option<f64>,
+    /// One coordinate of a body's position, m.
+    pub body_sigma: Option<f64>,
+    /// A body's orientation about each axis, rad.
+    pub body_sigma_rad: Option<f64>,
+    /// Axis of the tracker's frame along which the robot's root has its z, where it was said.
+    pub up_axis: Option<UpAxis>,
+}
+
+/// What is written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outputs {
+    /// Patched URDF.
+    pub urdf: String,
+    /// Scene.
+    pub scene: String,
+    /// Bodies added to the patched URDF.
+    pub add_bodies: Vec<String>,
+    /// Report writers to run too, with their parameters.
+    pub reports: BTreeMap<String, BTreeMap<String, ParameterValue>>,
+}

@@ -1,0 +1,73 @@
+//! Contact points and contacts.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A point of a link, e.g. the tip of a stylus or the center of a ball.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawTip {
+    /// The link that carries it.
+    pub link: String,
+    /// Where it is in the frame of that link, mm.
+    #[serde(default)]
+    pub at_mm: [f64; 3],
+    /// Prior standard deviation of each of its coordinates, mm: it is estimated; exact when absent.
+    #[serde(default)]
+    pub sigma_mm: Option<f64>,
+}
+
+/// Poses in which a point of the robot touches something.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawContact {
+    /// The recordings; every row of them is a touch. They may have joint positions only.
+    pub recordings: Vec<String>,
+    /// The touching point, by its name under `points`.
+    pub point: String,
+    /// What is touched is fixed to this link, or to the tracker's frame by its name; the robot's root when absent.
+    #[serde(default)]
+    pub on: Option<String>,
+    /// What is touched.
+    pub touches: RawTouched,
+    /// Prior standard deviation of where it is, mm: its place is estimated; exact when absent.
+    #[serde(default)]
+    pub place_sigma_mm: Option<f64>,
+    /// Prior standard deviation of how it is turned (planes and lines), deg: estimated; exact when absent.
+    #[serde(default)]
+    pub place_sigma_deg: Option<f64>,
+    /// Standard deviation of one touch, mm.
+    pub sigma_mm: f64,
+}
+
+/// What a point touches, in the frame of what it is fixed to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum RawTouched {
+    /// A plane, e.g. a table.
+    Plane {
+        /// Any point of the plane, mm.
+        through_mm: [f64; 3],
+        /// Its normal; any length.
+        normal: [f64; 3],
+    },
+    /// A line, e.g. an edge or a taut wire.
+    Line {
+        /// Any point of the line, mm.
+        through_mm: [f64; 3],
+        /// Its direction; any length.
+        direction: [f64; 3],
+    },
+    /// A point, e.g. a cone or a socket.
+    Point {
+        /// Where it is, mm.
+        at_mm: [f64; 3],
+    },
+    /// A point at a known distance, e.g. the far ball of a ball bar.
+    Distance {
+        /// Where the far point is, mm.
+        from_mm: [f64; 3],
+        /// How far away, mm.
+        distance_mm: f64,
+    },
+}

@@ -1,0 +1,179 @@
+//! The profile as a person writes it: units in key names, no logic, unknown keys refused.
+//!
+//! Field documentation here is the source of the profile reference in the book and of the JSON Schema
+//! that editors use.
+
+mod body;
+mod contact;
+mod origin;
+mod recording;
+mod simulate;
+mod solve;
+
+pub use body::{RawBody, RawPose};
+pub use contact::{RawContact, RawTip, RawTouched};
+pub use origin::{RawLoop, RawOrientation, RawOrigin, RawPoint, RawTransform};
+pub use recording::{RawClocks, RawRecording, RawRobotLog, RawTimedPoses, RawTiming, RawUse};
+pub use simulate::{RawProtocol, RawSimErrors, RawSimMount, RawSimNoise, RawSimulate, RawSteps};
+pub use solve::{
+    RawFree, RawJointFree, RawJointSolve, RawLimits, RawLoad, RawMethod, RawNoise, RawPrior,
+    RawSolve,
+};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A robot calibration profile, version 1.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawProfile {
+    /// Version of this format: 1.
+    pub calib: u32,
+    /// The robot and its description.
+    pub robot: RawRobot,
+    /// The optical tracker.
+    pub tracker: RawTracker,
+    /// What the tracker sees, by name, and which link each body is bolted to.
+    pub bodies: BTreeMap<String, RawBody>,
+    /// The recordings, by name.
+    pub recordings: BTreeMap<String, RawRecording>,
+    /// Plugins to load, by name; found beside the profile in `plugins/` or on the search path.
+    #[serde(default)]
+    pub plugins: BTreeMap<String, RawPlugin>,
+    /// The unknown transforms: joint origins relative to tracking bodies, by name.
+    #[serde(default)]
+    pub origins: BTreeMap<String, RawOrigin>,
+    /// Transforms between links to report beside the origins, by name.
+    #[serde(default)]
+    pub transforms: BTreeMap<String, RawTransform>,
+    /// Loop closures: two origins measured by the tracker against forward kinematics, by name.
+    #[serde(default)]
+    pub loops: BTreeMap<String, RawLoop>,
+    /// Points of links that touch things, by name.
+    #[serde(default)]
+    pub points: BTreeMap<String, RawTip>,
+    /// Touches: a point of one link on a plane, line, point or at a distance fixed to another link, by name.
+    #[serde(default)]
+    pub contacts: BTreeMap<String, RawContact>,
+    /// How to solve, and what counts as good enough.
+    #[serde(default)]
+    pub solve: RawSolve,
+    /// What is written.
+    #[serde(default)]
+    pub outputs: RawOutputs,
+    /// How `calib simulate` makes recordings with known truth for this robot.
+    #[serde(default)]
+    pub simulate: Option<RawSimulate>,
+}
+
+/// The robot and its description.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawRobot {
+    /// Name of the robot in reports.
+    pub name: String,
+    /// URDF file, relative to the profile.
+    pub urdf: String,
+    /// Folders of the packages that the URDF's meshes name (`package://<name>/…`), relative to the profile, by name. Only for
+    /// the picture; packages that lie around the URDF are found without it.
+    #[serde(default)]
+    pub packages: BTreeMap<String, String>,
+}
+
+/// The optical tracker.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawTracker {
+    /// Name of the tracker's world frame in reports and scenes.
+    pub frame: String,
+    /// Stated standard deviation of one marker coordinate, mm; estimated from the data when absent.
+    #[serde(default)]
+    pub marker_sigma_mm: Option<f64>,
+    /// Stated standard deviation of one coordinate of a body's position, mm.
+    #[serde(default)]
+    pub body_sigma_mm: Option<f64>,
+    /// Stated standard deviation of a body's orientation about each axis, deg.
+    #[serde(default)]
+    pub body_sigma_deg: Option<f64>,
+    /// The axis of the tracker's world frame along which the robot's root frame has its z: `+Z` for a robot that stands
+    /// upright before a tracker whose z is up. Only compared with what the recordings show, never assumed.
+    #[serde(default)]
+    pub up_axis: Option<RawUpAxis>,
+}
+
+/// An axis of the tracker's world frame, with its sign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum RawUpAxis {
+    /// Along x.
+    #[serde(rename = "+X")]
+    PlusX,
+    /// Along y.
+    #[serde(rename = "+Y")]
+    PlusY,
+    /// Along z.
+    #[serde(rename = "+Z")]
+    PlusZ,
+    /// Against x.
+    #[serde(rename = "-X")]
+    MinusX,
+    /// Against y.
+    #[serde(rename = "-Y")]
+    MinusY,
+    /// Against z.
+    #[serde(rename = "-Z")]
+    MinusZ,
+}
+
+impl RawUpAxis {
+    /// As in the profile: `+Z`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PlusX => "+X",
+            Self::PlusY => "+Y",
+            Self::PlusZ => "+Z",
+            Self::MinusX => "-X",
+            Self::MinusY => "-Y",
+            Self::MinusZ => "-Z",
+        }
+    }
+}
+
+/// A plugin to load.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawPlugin {
+    /// The library, relative to the profile; found by its name when absent.
+    pub path: Option<String>,
+    /// SHA-256 of the library: another file is refused.
+    pub sha256: Option<String>,
+}
+
+/// A value of an estimator's parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum RawValue {
+    /// Yes or no.
+    Bool(bool),
+    /// A whole number.
+    Integer(i64),
+    /// A number.
+    Number(f64),
+    /// A text.
+    Text(String),
+}
+
+/// What is written, relative to the output folder.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawOutputs {
+    /// Name of the patched URDF; `<robot>.calibrated.urdf` when absent.
+    pub urdf: Option<String>,
+    /// Name of the scene; `<robot>.scene.json` when absent.
+    pub scene: Option<String>,
+    /// Tracking bodies to add to the patched URDF as fixed joints and links.
+    pub add_bodies: Vec<String>,
+    /// Report writers to run too, built-in or of a plugin, each with its parameters.
+    pub reports: BTreeMap<String, BTreeMap<String, RawValue>>,
+}

@@ -1,0 +1,118 @@
+//! Recordings: what each is for, and how its rows become poses.
+
+use super::RawValue;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What a recording is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawUse {
+    /// One or two joints turned over their range of motion.
+    Sweep,
+    /// Any static poses, used to fit.
+    Static,
+    /// Held out: never used to fit, only to verify.
+    Validation,
+}
+
+/// One recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawRecording {
+    /// File, relative to the profile.
+    pub file: String,
+    /// What it is for.
+    #[serde(rename = "use")]
+    pub usage: RawUse,
+    /// Joints moved and the range asked of each: `<joint>_deg|_rad|_mm|_m: [from, to]`.
+    #[serde(default)]
+    pub joints: BTreeMap<String, [f64; 2]>,
+    /// Joints that the file does not list and that stood still: `<joint>_deg|_rad|_mm|_m: value`.
+    #[serde(default)]
+    pub hold: BTreeMap<String, f64>,
+    /// Text column whose values group the poses in the report (e.g. the torso position).
+    #[serde(default)]
+    pub group: Option<String>,
+    /// Reader to use, built-in or of a plugin; found from the content when absent (see `calib plugins`).
+    #[serde(default)]
+    pub reader: Option<String>,
+    /// Parameters of the reader, by name.
+    #[serde(default)]
+    pub reader_parameters: BTreeMap<String, RawValue>,
+    /// How to read columns that do not name their unit.
+    #[serde(default)]
+    pub columns: Option<calib_recording::ColumnMap>,
+    /// The robot's own log of its joints, where it is another file than the tracker's.
+    #[serde(default)]
+    pub robot_log: Option<RawRobotLog>,
+    /// How rows with a time become poses, and how the clocks of tracker and robot go together. Without it every row is
+    /// a pose, and tracker and joints must share their rows.
+    #[serde(default)]
+    pub timing: Option<RawTiming>,
+}
+
+/// The robot's own log of its joints.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawRobotLog {
+    /// File, relative to the profile.
+    pub file: String,
+    /// Reader to use; found from the content when absent.
+    #[serde(default)]
+    pub reader: Option<String>,
+    /// How to read columns that do not name their unit.
+    #[serde(default)]
+    pub columns: Option<calib_recording::ColumnMap>,
+}
+
+/// Where poses come from in a recording with time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawTimedPoses {
+    /// Every hold gives one static pose: robust mean, weighted by its scatter.
+    #[default]
+    Settle,
+    /// Rows of the motion itself, at `rate_hz`; the fit estimates what is left of the clocks' offset.
+    Continuous,
+}
+
+/// What is known of the clocks of tracker and robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawClocks {
+    /// Two clocks: offset and drift are found from the motion.
+    #[default]
+    Estimate,
+    /// One clock (synchronised machines): the times are taken as they are.
+    Shared,
+}
+
+/// Time in a recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawTiming {
+    /// Where the poses come from: `settle` (default) or `continuous`.
+    pub poses: RawTimedPoses,
+    /// What is known of the clocks: `estimate` (default) or `shared`.
+    pub clock: RawClocks,
+    /// Shortest hold, s.
+    pub hold_s: f64,
+    /// Rows taken from a motion, per s.
+    pub rate_hz: f64,
+    /// Largest offset between the clocks that is looked for, s.
+    pub max_offset_s: f64,
+}
+
+impl Default for RawTiming {
+    fn default() -> Self {
+        Self {
+            poses: RawTimedPoses::Settle,
+            clock: RawClocks::Estimate,
+            hold_s: 0.5,
+            rate_hz: 10.0,
+            max_offset_s: 10.0,
+        }
+    }
+}
