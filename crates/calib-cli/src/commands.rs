@@ -4,12 +4,13 @@ use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use calib_fit::{self as fit, FitError};
 use calib_pipeline::apply::{self, ApplyRequest, Destination};
 use calib_pipeline::formulate::models;
 use calib_pipeline::output::write;
 use calib_pipeline::prepare::{inspect, load};
 use calib_pipeline::run::{RunOptions, run as run_profile};
-use calib_pipeline::{ExitCode, PipelineError, cases, convert, drift, fit, simulate, take_back};
+use calib_pipeline::{ExitCode, PipelineError, cases, convert, drift, simulate, take_back};
 use calib_study::{Study, StudyOptions};
 use clap::CommandFactory as _;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -46,28 +47,18 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
             Ok(ExitCode::Accepted)
         }
         Command::Fit { what } => {
-            let answer = match what {
-                Fit::Cor(table) => fit::cor(&fit_table(table))?,
-                Fit::Aor(table) => fit::aor(&fit_table(table))?,
-                Fit::Frame(f) => fit::frame(&fit::FrameRequest {
-                    file: f.file.clone(),
-                    proximal: f.proximal.clone(),
-                    distal: f.distal.clone(),
-                    body: f.body.clone(),
-                    estimator: f.estimator.clone(),
-                    sigma_m: f.sigma_mm.map(|s| s * 1e-3),
-                    sigma_rad: f.sigma_deg.map(f64::to_radians),
-                    weights: f.weights.clone(),
-                })?,
-                Fit::Handeye(f) => fit::handeye(&f.file, &f.robot, &f.measured)?,
-            };
+            let answer = fit_answer(what).map_err(fit_error)?;
             let json = match what {
                 Fit::Cor(t) | Fit::Aor(t) => t.json,
                 Fit::Frame(f) => f.json,
                 Fit::Handeye(f) => f.json,
             };
             emit(if json { &answer.json } else { &answer.text });
-            Ok(answer.exit)
+            Ok(if answer.observable {
+                ExitCode::Accepted
+            } else {
+                ExitCode::NotObservable
+            })
         }
         Command::Diff { a, b, format } => {
             let text = match format {
@@ -143,6 +134,45 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, PipelineError> {
             );
             Ok(ExitCode::Accepted)
         }
+    }
+}
+
+fn fit_answer(what: &Fit) -> Result<fit::Answer, FitError> {
+    match what {
+        Fit::Cor(table) => fit::cor(&fit_table(table)),
+        Fit::Aor(table) => fit::aor(&fit_table(table)),
+        Fit::Frame(f) => fit::frame(&fit::FrameRequest {
+            file: f.file.clone(),
+            proximal: f.proximal.clone(),
+            distal: f.distal.clone(),
+            body: f.body.clone(),
+            estimator: f.estimator.clone(),
+            sigma_m: f.sigma_mm.map(|s| s * 1e-3),
+            sigma_rad: f.sigma_deg.map(f64::to_radians),
+            weights: f.weights.clone(),
+        }),
+        Fit::Handeye(f) => fit::handeye(&f.file, &f.robot, &f.measured),
+    }
+}
+
+/// The same finding with the program's exit codes.
+fn fit_error(error: FitError) -> PipelineError {
+    match error {
+        FitError::Data {
+            file,
+            finding,
+            remedy,
+        } => PipelineError::Data {
+            file,
+            finding,
+            remedy,
+        },
+        FitError::Recording(error) => PipelineError::Recording(error),
+        FitError::Usage { finding, remedy } => PipelineError::Usage { finding, remedy },
+        error => PipelineError::Usage {
+            finding: error.to_string(),
+            remedy: "`calib fit --help` shows what it takes".to_owned(),
+        },
     }
 }
 

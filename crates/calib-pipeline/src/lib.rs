@@ -17,7 +17,6 @@ pub mod convert;
 pub mod drift;
 pub mod error;
 pub mod estimate;
-pub mod fit;
 pub mod formulate;
 pub mod output;
 pub mod prepare;

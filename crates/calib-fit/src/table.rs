@@ -7,14 +7,14 @@ use calib_recording::rigid_body::{Template, body_poses, rigid_groups};
 use calib_recording::{Filled, Poses, ReadOptions, read_path};
 use nalgebra::{Isometry3, Matrix3, Point3};
 
-use super::{TableRequest, data, noise, usage};
-use crate::error::PipelineError;
+use crate::error::FitError;
+use crate::{TableRequest, data, noise, usage};
 
 /// Markers of one name and its samples, row by row.
-pub(super) type Track = (String, Vec<Option<Point3<f64>>>);
+pub(crate) type Track = (String, Vec<Option<Point3<f64>>>);
 
 /// What the estimators are given.
-pub(super) struct Table {
+pub(crate) struct Table {
     pub file: PathBuf,
     /// Row numbers of the file, for messages.
     pub rows: Vec<u64>,
@@ -37,7 +37,7 @@ pub(super) struct Table {
 }
 
 impl Table {
-    pub fn read(request: &TableRequest) -> Result<Self, PipelineError> {
+    pub fn read(request: &TableRequest) -> Result<Self, FitError> {
         let Some(file) = &request.file else {
             return Err(usage(
                 "no table was given",
@@ -125,12 +125,7 @@ impl Table {
     }
 
     /// Why an estimator cannot take these data.
-    pub fn wrong_input(
-        &self,
-        id: &str,
-        error: &dyn std::error::Error,
-        list: &str,
-    ) -> PipelineError {
+    pub fn wrong_input(&self, id: &str, error: &dyn std::error::Error, list: &str) -> FitError {
         if self.rigid {
             return usage(
                 format!("`{id}`: {error}"),
@@ -155,7 +150,7 @@ fn keep_rows_with(
     poses: &mut Poses,
     weights: &mut Vec<f64>,
     joint: &str,
-) -> Result<Vec<f64>, PipelineError> {
+) -> Result<Vec<f64>, FitError> {
     let column = poses.joints.get(joint).cloned().ok_or_else(|| {
         data(
             file,
@@ -184,7 +179,7 @@ fn rigid(markers: &[Track]) -> Vec<Vec<usize>> {
 }
 
 /// Refuses the table, and names the group that moves most: most likely the one that was meant.
-fn several_bodies(file: &Path, markers: &[Track], groups: &[Vec<usize>]) -> PipelineError {
+fn several_bodies(file: &Path, markers: &[Track], groups: &[Vec<usize>]) -> FitError {
     let names = |group: &[usize]| -> String {
         let names: Vec<&str> = group.iter().map(|&m| markers[m].0.as_str()).collect();
         names.join(",")
@@ -224,7 +219,7 @@ fn travel(markers: &[Track], group: &[usize]) -> f64 {
 }
 
 /// What a table has instead of what was asked for.
-pub(super) fn it_has<'a>(names: impl Iterator<Item = &'a String>) -> String {
+pub(crate) fn it_has<'a>(names: impl Iterator<Item = &'a String>) -> String {
     let names: Vec<String> = names.map(|n| format!("`{n}`")).collect();
     if names.is_empty() {
         "it has none".to_owned()
@@ -233,7 +228,7 @@ pub(super) fn it_has<'a>(names: impl Iterator<Item = &'a String>) -> String {
     }
 }
 
-pub(super) fn read_poses(file: &Path, options: &ReadOptions) -> Result<Poses, PipelineError> {
+pub(crate) fn read_poses(file: &Path, options: &ReadOptions) -> Result<Poses, FitError> {
     let recording = read_path(file, options)?;
     recording
         .poses(Filled::Exclude)
@@ -244,7 +239,7 @@ fn as_poses(track: &[Option<Isometry3<f64>>]) -> Vec<Option<Pose>> {
     track.iter().map(|p| p.map(Pose::from)).collect()
 }
 
-fn poses_of_markers(file: &Path, markers: &[Track]) -> Result<Vec<Option<Pose>>, PipelineError> {
+fn poses_of_markers(file: &Path, markers: &[Track]) -> Result<Vec<Option<Pose>>, FitError> {
     let names: Vec<String> = markers.iter().map(|(n, _)| n.clone()).collect();
     let tracks: Vec<&[Option<Point3<f64>>]> = markers.iter().map(|(_, t)| t.as_slice()).collect();
     let no_body = |error: calib_recording::rigid_body::NotABody| {
@@ -260,7 +255,7 @@ fn poses_of_markers(file: &Path, markers: &[Track]) -> Result<Vec<Option<Pose>>,
 }
 
 /// One side of a joint: a body of the table, or its markers as one.
-fn side(file: &Path, poses: &Poses, names: &[String]) -> Result<Vec<Option<Pose>>, PipelineError> {
+fn side(file: &Path, poses: &Poses, names: &[String]) -> Result<Vec<Option<Pose>>, FitError> {
     if let [body] = names
         && let Some(track) = poses.bodies.get(body)
     {

@@ -4,14 +4,14 @@
 //! Σ = σ² (I − u uᵀ) + σ_s² u uᵀ,      u = (x − camera) / |x − camera|                                  (1)
 //! ```
 //!
-//! A stereo tracker knows a point three to five times worse along its sight than across; [`super::cor`] weighs by it where the estimator can.
+//! A stereo tracker knows a point three to five times worse along its sight than across; [`crate::cor`] weighs by it where the estimator can.
 
 use std::path::Path;
 
 use nalgebra::{Matrix3, Point3};
 
-use super::{TableRequest, data, table::Track, usage};
-use crate::error::PipelineError;
+use crate::error::FitError;
+use crate::{TableRequest, data, table::Track, usage};
 
 /// The entries of a symmetric matrix in a file of covariances.
 const ENTRIES: [(&str, usize, usize); 6] = [
@@ -25,11 +25,11 @@ const ENTRIES: [(&str, usize, usize); 6] = [
 const MM2: f64 = 1e-6;
 
 /// Marker × row, m²; empty where nothing was stated.
-pub(super) fn covariances(
+pub(crate) fn covariances(
     request: &TableRequest,
     markers: &[Track],
     rows: &[u64],
-) -> Result<Vec<Vec<Matrix3<f64>>>, PipelineError> {
+) -> Result<Vec<Vec<Matrix3<f64>>>, FitError> {
     match (&request.covariances, request.sight_m) {
         (None, None) => Ok(Vec::new()),
         (Some(_), Some(_)) => Err(usage(
@@ -66,7 +66,7 @@ pub(super) fn covariances(
 }
 
 /// How many readings each row is worth, from the column `weight` of a CSV; empty where no file was given.
-pub(super) fn weights(file: Option<&Path>, rows: usize) -> Result<Vec<f64>, PipelineError> {
+pub(crate) fn weights(file: Option<&Path>, rows: usize) -> Result<Vec<f64>, FitError> {
     const COLUMN: &str = "weight";
     let Some(file) = file else {
         return Ok(Vec::new());
@@ -98,7 +98,7 @@ pub(super) fn weights(file: Option<&Path>, rows: usize) -> Result<Vec<f64>, Pipe
 fn read(
     file: &Path,
     remedy: &str,
-) -> Result<(csv::StringRecord, Vec<csv::StringRecord>), PipelineError> {
+) -> Result<(csv::StringRecord, Vec<csv::StringRecord>), FitError> {
     let unreadable = |error: csv::Error| data(file, error.to_string(), format!("give {remedy}"));
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
@@ -117,14 +117,14 @@ fn column(
     header: &csv::StringRecord,
     name: &str,
     remedy: &str,
-) -> Result<usize, PipelineError> {
+) -> Result<usize, FitError> {
     header
         .iter()
         .position(|h| h == name)
         .ok_or_else(|| data(file, format!("has no column `{name}`"), remedy))
 }
 
-fn same_rows(file: &Path, lines: usize, rows: usize) -> Result<(), PipelineError> {
+fn same_rows(file: &Path, lines: usize, rows: usize) -> Result<(), FitError> {
     if lines == rows {
         return Ok(());
     }
@@ -146,7 +146,7 @@ fn from_file(
     file: &Path,
     markers: &[Track],
     rows: usize,
-) -> Result<Vec<Vec<Matrix3<f64>>>, PipelineError> {
+) -> Result<Vec<Vec<Matrix3<f64>>>, FitError> {
     let (header, records) = read(
         file,
         "a CSV with the columns <marker>.xx_mm2, xy, xz, yy, yz, zz",

@@ -6,19 +6,19 @@ use calib_aor::AorError;
 use nalgebra::Unit;
 use serde_json::json;
 
-use super::comparison::comparison;
-use super::table::Table;
-use super::{
+use crate::comparison::comparison;
+use crate::error::FitError;
+use crate::table::Table;
+use crate::{
     Answer, TableRequest, answer, coordinates, data, doubt, listed, matrix, not_observable,
     unknown, usage,
 };
-use crate::error::PipelineError;
 
 /// `calib fit aor`.
 ///
 /// # Errors
-/// As [`super::cor`].
-pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
+/// As [`crate::cor`].
+pub fn aor(request: &TableRequest) -> Result<Answer, FitError> {
     if request.list {
         let rows = calib_aor::estimators()
             .iter()
@@ -143,7 +143,7 @@ pub fn aor(request: &TableRequest) -> Result<Answer, PipelineError> {
     Ok(answer(text, &value, outcome.is_observable()))
 }
 
-fn aor_error(table: &Table, id: &str, error: &AorError) -> PipelineError {
+fn aor_error(table: &Table, id: &str, error: &AorError) -> FitError {
     const LIST: &str = "calib fit aor";
     match error {
         AorError::Unknown { id, known } => unknown(id, known, LIST),

@@ -6,15 +6,15 @@ use calib_recording::{BodyColumns, ColumnMap, ReadOptions};
 use nalgebra::Isometry3;
 use serde_json::{Value, json};
 
-use super::table::read_poses;
-use super::{Answer, answer, data, not_observable, pose_text, pose_value};
-use crate::error::PipelineError;
+use crate::error::FitError;
+use crate::table::read_poses;
+use crate::{Answer, answer, data, not_observable, pose_text, pose_value};
 
 /// `calib fit handeye`: `robot_i · X = Z · measured_i`.
 ///
 /// # Errors
-/// As [`super::cor`].
-pub fn handeye(file: &Path, robot: &str, measured: &str) -> Result<Answer, PipelineError> {
+/// As [`crate::cor`].
+pub fn handeye(file: &Path, robot: &str, measured: &str) -> Result<Answer, FitError> {
     let columns = |prefix: &str| BodyColumns {
         position: ["x", "y", "z"].map(|a| format!("{prefix}_{a}")),
         quaternion_xyzw: Some(["qx", "qy", "qz", "qw"].map(|a| format!("{prefix}_{a}"))),
@@ -38,7 +38,7 @@ pub fn handeye(file: &Path, robot: &str, measured: &str) -> Result<Answer, Pipel
                 columns: Some(map),
                 ..ReadOptions::default()
             };
-            read_poses(file, &options).map_err(|error| PipelineError::Data {
+            read_poses(file, &options).map_err(|error| FitError::Data {
                 file: file.display().to_string(),
                 finding: format!("does not hold two poses per row, `{robot}` and `{measured}`: {error}"),
                 remedy: "name the columns <prefix>_x, _y, _z, _qx, _qy, _qz, _qw and give the prefixes with --robot and --measured".to_owned(),

@@ -5,18 +5,18 @@ use calib_cor::Pose;
 use calib_recording::ReadOptions;
 use serde_json::json;
 
-use super::table::{it_has, read_poses};
-use super::{
+use crate::error::FitError;
+use crate::table::{it_has, read_poses};
+use crate::{
     Answer, FrameRequest, answer, data, doubt, matrix, noise, not_observable, pose_text,
     pose_value, unknown, usage,
 };
-use crate::error::PipelineError;
 
 /// `calib fit frame`.
 ///
 /// # Errors
-/// As [`super::cor`]; also for joints that the table does not have.
-pub fn frame(request: &FrameRequest) -> Result<Answer, PipelineError> {
+/// As [`crate::cor`]; also for joints that the table does not have.
+pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
     let file = &request.file;
     let poses = read_poses(file, &ReadOptions::default())?;
     let (proximal_letter, proximal) = axis_of(&request.proximal)?;
@@ -140,7 +140,7 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, PipelineError> {
     Ok(answer(text, &value, observable))
 }
 
-fn axis_of(text: &str) -> Result<(Letter, &str), PipelineError> {
+fn axis_of(text: &str) -> Result<(Letter, &str), FitError> {
     let wrong = || {
         usage(
             format!("`{text}` is no axis and joint"),

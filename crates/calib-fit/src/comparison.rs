@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use super::{Answer, answer, coordinates};
+use crate::{Answer, answer, coordinates};
 
 /// Verdict, reason and estimate (value, σ) of each estimator.
-pub(super) type Line<'a> = (
+pub(crate) type Line<'a> = (
     &'a str,
     &'a str,
     String,
@@ -15,7 +15,7 @@ pub(super) type Line<'a> = (
 );
 
 /// A table of estimates with the distance of each from the first that is observable.
-pub(super) fn comparison(what: &str, lines: &[Line<'_>]) -> Answer {
+pub(crate) fn comparison(what: &str, lines: &[Line<'_>]) -> Answer {
     let lengths = what == "center_m";
     let reference = lines.iter().find(|l| l.1 == "ok").and_then(|l| l.3);
     let mut text = String::new();

@@ -5,13 +5,13 @@ use std::fmt::Write as _;
 use calib_cor::{CorError, InputKind, Shape};
 use serde_json::json;
 
-use super::comparison::comparison;
-use super::table::Table;
-use super::{
+use crate::comparison::comparison;
+use crate::error::FitError;
+use crate::table::Table;
+use crate::{
     Answer, TableRequest, answer, coordinates, data, doubt, listed, matrix, not_observable,
     unknown, usage,
 };
-use crate::error::PipelineError;
 
 /// The estimators that weigh samples by their covariance, or markers by a noise of their own.
 const WEIGHING: [&str; 2] = ["sphere_eiv", "ml_sphere"];
@@ -22,8 +22,8 @@ const GROSS: f64 = 3.0;
 /// `calib fit cor`.
 ///
 /// # Errors
-/// [`PipelineError`] for tables that cannot be read and estimators that do not fit them.
-pub fn cor(request: &TableRequest) -> Result<Answer, PipelineError> {
+/// [`FitError`] for tables that cannot be read and estimators that do not fit them.
+pub fn cor(request: &TableRequest) -> Result<Answer, FitError> {
     if request.list {
         let rows = calib_cor::estimators()
             .iter()
@@ -115,7 +115,7 @@ pub fn cor(request: &TableRequest) -> Result<Answer, PipelineError> {
     Ok(cor_answer(&table, id, &outcome))
 }
 
-fn cor_error(table: &Table, id: &str, error: &CorError) -> PipelineError {
+fn cor_error(table: &Table, id: &str, error: &CorError) -> FitError {
     const LIST: &str = "calib fit cor";
     match error {
         CorError::Unknown { id, known } => unknown(id, known, LIST),
