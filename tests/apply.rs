@@ -3,8 +3,6 @@
 
 mod scratch;
 
-use std::path::PathBuf;
-
 use calib_urdf::rpy::rotation_from_rpy;
 use calib_urdf::{RobotModel, UrdfEdit, patch};
 use nalgebra::{Isometry3, Translation3, Vector3};
@@ -57,12 +55,8 @@ fn without_numbers(text: &str) -> String {
 /// Every URDF and xacro at hand: (name, text, text of the expanded URDF).
 fn robots() -> Vec<(String, String, Option<String>)> {
     let mut files = Vec::new();
-    let real = std::env::var_os("CALIB_REAL_DATA")
-        .map_or_else(|| root().join("../shared/data"), PathBuf::from);
-    if !real.is_dir() {
-        println!("skipped: no descriptions of real robots (CALIB_REAL_DATA)");
-    }
-    for folder in [root().join("robots"), real] {
+    let real = skipped_tests::real_data("");
+    for folder in [root().join("robots")].into_iter().chain(real) {
         for (name, bytes) in files_below(&folder) {
             if name.ends_with(".urdf") || name.ends_with(".xacro") {
                 files.push((name, String::from_utf8(bytes).expect("text")));

@@ -4,21 +4,12 @@
 
 mod scratch;
 
-use std::path::PathBuf;
-
 use scratch::{Scratch, root};
 use serde_json::Value;
 
-/// The folder of real measurements; says so when there is none.
+/// A file or folder of real measurements; `None`, counted as skipped, where it is not there.
 fn real(file: &str) -> Option<String> {
-    let folder = std::env::var_os("CALIB_REAL_DATA")
-        .map_or_else(|| root().join("../shared/data"), PathBuf::from);
-    let path = folder.join(file);
-    if !path.exists() {
-        println!("skipped: no {file} (set CALIB_REAL_DATA)");
-        return None;
-    }
-    Some(path.display().to_string())
+    Some(skipped_tests::real_data(file)?.display().to_string())
 }
 
 fn numbers(value: &Value) -> Vec<f64> {

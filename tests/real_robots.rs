@@ -6,7 +6,7 @@ mod scratch;
 
 use std::path::PathBuf;
 
-use scratch::{Scratch, root};
+use scratch::Scratch;
 
 /// Position error of the body on the other day that the field's best published fit leaves, m (norm, rms).
 const FIELD: f64 = 3.07e-3;
@@ -31,13 +31,9 @@ solve:
 ";
 
 fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("CALIB_REAL_DATA")
-        .map_or_else(|| root().join("../shared/data"), PathBuf::from);
-    if folder.join("tiago_frozen").is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: no measurements of real robots (CALIB_REAL_DATA)");
-    None
+    skipped_tests::real_data("tiago_frozen")?
+        .parent()
+        .map(Into::into)
 }
 
 #[test]

@@ -256,7 +256,7 @@ fn the_page_answers_on_its_first_screen() {
         for size in [[1280, 800], [400, 800]] {
             let script = browser::first_screen(&QUESTIONS);
             let Some(seen) = browser::open(robot, &page, size, &script) else {
-                println!("skipped: no Chromium is installed");
+                skipped_tests::skip(skipped_tests::NO_BROWSER);
                 return;
             };
             let at = format!("{robot} at {size:?}: {}", seen.told);

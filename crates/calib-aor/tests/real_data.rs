@@ -10,14 +10,8 @@ use nalgebra::{Point3, Vector3};
 
 /// A mechanical hinge with five markers on each side and two on its pin.
 fn hinge() -> Option<BTreeMap<String, Vec<Option<Point3<f64>>>>> {
-    let root = std::env::var("CALIB_REAL_DATA").map_or_else(
-        |_| std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        Into::into,
-    );
-    let Ok(mut reader) = csv::Reader::from_path(root.join("hinge/hinge_markers.csv")) else {
-        println!("skipped: no hinge (set CALIB_REAL_DATA to the folder of real measurements)");
-        return None;
-    };
+    let file = skipped_tests::real_data("hinge/hinge_markers.csv")?;
+    let mut reader = csv::Reader::from_path(file).expect("readable");
     let names: Vec<String> = reader
         .headers()
         .expect("header")

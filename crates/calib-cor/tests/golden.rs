@@ -13,14 +13,10 @@ const COVARIANCE: f64 = 0.015;
 const COBYLA_MM: f64 = 0.01;
 
 fn cases(kind: &str) -> Vec<Value> {
-    let folder = std::env::var("CALIB_GOLDEN").map_or_else(
-        |_| std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/golden"),
-        Into::into,
-    );
-    let Ok(text) = std::fs::read_to_string(folder.join("estimators.json")) else {
-        println!("skipped: no golden cases (set CALIB_GOLDEN to their folder)");
+    let Some(file) = skipped_tests::golden("estimators.json") else {
         return Vec::new();
     };
+    let text = std::fs::read_to_string(file).expect("the golden file is readable");
     let all: Value = serde_json::from_str(&text).expect("golden file is JSON");
     let found: Vec<Value> = all["cases"]
         .as_array()

@@ -9,16 +9,7 @@ use calib_geometry::registration::rigid_registration;
 use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
 
 fn folder(name: &str) -> Option<PathBuf> {
-    let root = std::env::var("CALIB_REAL_DATA").map_or_else(
-        |_| std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        Into::into,
-    );
-    let path = root.join(name);
-    if !path.exists() {
-        println!("skipped: no {name} (set CALIB_REAL_DATA to the folder of real measurements)");
-        return None;
-    }
-    Some(path)
+    skipped_tests::real_data(name)
 }
 
 /// A table by column name.

@@ -17,7 +17,7 @@ struct Posture {
 }
 
 fn postures() -> Option<Vec<Posture>> {
-    let folder = common::real_data("agile_justin")?;
+    let folder = skipped_tests::real_data("agile_justin")?;
     let text = std::fs::read_to_string(folder.join("postures.csv")).unwrap();
     Some(
         text.lines()

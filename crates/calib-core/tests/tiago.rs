@@ -19,7 +19,8 @@ struct Posture {
 }
 
 fn read(file: &str) -> Option<Vec<Posture>> {
-    let text = std::fs::read_to_string(common::real_data("tiago_frozen")?.join(file)).ok()?;
+    let text =
+        std::fs::read_to_string(skipped_tests::real_data("tiago_frozen")?.join(file)).ok()?;
     let header: Vec<&str> = text.lines().next()?.split(',').map(str::trim).collect();
     let at = |name: &str| header.iter().position(|h| *h == name).unwrap();
     let start = at("t_start_robot");

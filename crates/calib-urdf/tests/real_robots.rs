@@ -8,23 +8,13 @@ use calib_urdf::{
     EditError, JointKind, RobotModel, SecondReader, UrdfEdit, diff, patch, revert, verify,
 };
 use nalgebra::{Isometry3, Translation3, Vector3};
-use std::path::{Path, PathBuf};
-
-fn real_data() -> Option<PathBuf> {
-    let named = std::env::var_os("CALIB_REAL_DATA").map(PathBuf::from);
-    let folder =
-        named.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"));
-    folder.is_dir().then_some(folder)
-}
+use std::path::Path;
 
 /// The texts of all files with one of these endings, with their names: the project's own robots and the real ones.
 fn texts(endings: &[&str]) -> Vec<(String, String)> {
     let mut found = Vec::new();
     let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots")];
-    match real_data() {
-        Some(folder) => folders.push(folder),
-        None => println!("skipped: no real data (set CALIB_REAL_DATA)"),
-    }
+    folders.extend(skipped_tests::real_data(""));
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
             let path = entry.path();

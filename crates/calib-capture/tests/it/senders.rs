@@ -1,7 +1,6 @@
 //! Senders of our own: DTrack datagrams and a VRPN server.
 
 use nalgebra::Isometry3;
-use std::path::PathBuf;
 
 /// One DTrack datagram; `bodies` as (id, `room_from_body`).
 pub fn dtrack(frame: u64, ts: Option<f64>, bodies: &[(u32, Isometry3<f64>)]) -> Vec<u8> {
@@ -68,13 +67,9 @@ pub fn greeting(device: &str) -> Vec<u8> {
     .concat()
 }
 
-/// A file of `CALIB_REAL_DATA/formats`, or `None`, saying so.
+/// A file of `CALIB_REAL_DATA/formats`; `None`, counted as skipped, where it is not there.
 pub fn real(path: &str) -> Option<Vec<u8>> {
-    let Some(folder) = std::env::var_os("CALIB_REAL_DATA") else {
-        eprintln!("skipped: CALIB_REAL_DATA does not name the folder of real recordings");
-        return None;
-    };
-    let path = PathBuf::from(folder).join("formats").join(path);
+    let path = skipped_tests::real_data("formats")?.join(path);
     Some(std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())))
 }
 

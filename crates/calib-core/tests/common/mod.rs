@@ -433,18 +433,3 @@ pub fn central(
         .collect();
     nalgebra::DMatrix::from_columns(&columns)
 }
-
-/// A folder of real recordings; says so and gives `None` where they are not installed.
-pub fn real_data(name: &str) -> Option<std::path::PathBuf> {
-    let root = std::env::var_os("CALIB_REAL_DATA").map_or_else(
-        || std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        std::path::PathBuf::from,
-    );
-    let folder = root.join(name);
-    if folder.is_dir() {
-        Some(folder)
-    } else {
-        println!("skipped: no real data `{name}` (set CALIB_REAL_DATA)");
-        None
-    }
-}

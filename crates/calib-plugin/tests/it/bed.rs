@@ -12,7 +12,7 @@ pub fn compiler(program: &str, arguments: &[&str]) -> Option<()> {
     let output = match Command::new(program).args(arguments).output() {
         Ok(output) => output,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            println!("skipped: there is no compiler `{program}`");
+            skipped_tests::skip(&format!("no compiler `{program}`"));
             return None;
         }
         Err(error) => panic!("{program}: {error}"),

@@ -117,7 +117,7 @@ fn a_c_project_is_complete() {
         let output = match make.output() {
             Ok(output) => output,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                println!("skipped: there is no `make`");
+                skipped_tests::skip("no `make`");
                 return;
             }
             Err(error) => panic!("make: {error}"),

@@ -10,16 +10,9 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// The folder of real measurements, or `None` (said on stderr).
+/// The folder of real measurements; `None`, counted as skipped, where there is none.
 pub fn real_data() -> Option<PathBuf> {
-    let folder = std::env::var_os("CALIB_REAL_DATA")
-        .map(PathBuf::from)
-        .unwrap_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"));
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("skipped: no real data (CALIB_REAL_DATA)");
-    None
+    skipped_tests::real_data("")
 }
 
 fn table(path: &str, columns: Option<ColumnMap>) -> Option<Poses> {

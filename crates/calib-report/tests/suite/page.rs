@@ -141,7 +141,7 @@ fn the_view_is_moved_by_keys_and_slider() {
         document.body.dataset.heard = heard.join(' | ');
     </script></body>";
     let Some((dom, log)) = in_browser("keys", &page.replace("</body>", script)) else {
-        println!("skipped: no Chromium is installed");
+        skipped_tests::skip(skipped_tests::NO_BROWSER);
         return;
     };
     assert!(!log.contains("CONSOLE"), "{log}");
@@ -205,7 +205,7 @@ fn in_browser(name: &str, text: &str) -> Option<(String, String)> {
 fn a_browser_finds_the_twelve_answers_by_their_headings() {
     for (name, report, text) in pages() {
         let Some((dom, log)) = in_browser(name, &text) else {
-            println!("skipped: no Chromium is installed");
+            skipped_tests::skip(skipped_tests::NO_BROWSER);
             return;
         };
         let console: Vec<&str> = log
@@ -250,7 +250,7 @@ fn the_first_screen_shows_or_leads_to_every_answer() {
         let ids: Vec<&str> = answers.iter().map(|answer| answer.id).collect();
         for size in SIZES {
             let Some(seen) = browser::open(name, &text, size, &browser::first_screen(&ids)) else {
-                println!("skipped: no Chromium is installed");
+                skipped_tests::skip(skipped_tests::NO_BROWSER);
                 return;
             };
             let at = format!("{name} at {size:?}: {}", seen.told);
@@ -294,7 +294,7 @@ fn every_layer_draws_something_and_errors_grow_with_their_slider() {
         told.grows = before !== picture();
         return told;";
     let Some(seen) = browser::open("layers", &page, SIZES[0], script) else {
-        println!("skipped: no Chromium is installed");
+        skipped_tests::skip(skipped_tests::NO_BROWSER);
         return;
     };
     assert!(seen.console.is_empty(), "{:?}", seen.console);

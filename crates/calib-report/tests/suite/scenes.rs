@@ -102,7 +102,7 @@ for call in calls:
             .stderr(std::process::Stdio::piped())
             .spawn();
         let Ok(mut child) = child else {
-            println!("skipped: python3 is not installed");
+            skipped_tests::skip("no python3");
             return;
         };
         let mut stdin = child.stdin.take().expect("a pipe");
