@@ -2,9 +2,9 @@
 
 mod arguments;
 mod commands;
-mod plugins;
-mod record;
+mod error;
 mod remaining;
+mod terminal;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -18,8 +18,8 @@ fn main() -> ExitCode {
         Err(error) => {
             let said = with_causes(&error);
             eprintln!("error: {said}");
-            if !said.contains("\n  help: ") {
-                eprintln!("  help: {}", error.remedy());
+            if let (Some(remedy), false) = (error.remedy(), said.contains("\n  help: ")) {
+                eprintln!("  help: {remedy}");
             }
             ExitCode::from(error.exit_code() as u8)
         }

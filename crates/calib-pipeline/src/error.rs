@@ -76,14 +76,6 @@ pub enum PipelineError {
         /// What to do.
         remedy: String,
     },
-    /// The simulation cannot be made.
-    #[error("{file}: {source}")]
-    Simulation {
-        /// The profile.
-        file: String,
-        /// Why.
-        source: Box<calib_sim::SimError>,
-    },
     /// The solver refused the problem.
     #[error("the estimation problem cannot be stated: {0}")]
     Solve(#[from] calib_core::Error),
@@ -105,24 +97,6 @@ pub enum PipelineError {
         finding: String,
         /// What to do.
         remedy: String,
-    },
-    /// The output could not be written; nothing was left half-written.
-    #[error("{path}: cannot be written: {source}\n  help: {remedy}")]
-    Write {
-        /// The file or folder.
-        path: String,
-        /// Why.
-        source: std::io::Error,
-        /// What to do.
-        remedy: String,
-    },
-    /// Something that is there already would be overwritten.
-    #[error("{path} exists already\n  help: {remedy}")]
-    Exists {
-        /// The file.
-        path: String,
-        /// What to do.
-        remedy: &'static str,
     },
     /// A plugin or an estimator failed, or is not what the profile needs.
     #[error("{text}")]
@@ -153,17 +127,12 @@ impl PipelineError {
             | Self::NotText { .. }
             | Self::Profile(_)
             | Self::Urdf(_)
-            | Self::Usage { .. }
-            | Self::Simulation { .. } => ExitCode::Usage,
+            | Self::Usage { .. } => ExitCode::Usage,
             Self::Recording(_) | Self::Data { .. } => ExitCode::Data,
             Self::Refused { .. } => ExitCode::VerdictFail,
             Self::Solve(_) => ExitCode::NotConverged,
             Self::Plugin { code, .. } => *code,
-            Self::Edit(_)
-            | Self::Patch { .. }
-            | Self::Write { .. }
-            | Self::Exists { .. }
-            | Self::Report(_) => ExitCode::NotWritten,
+            Self::Edit(_) | Self::Patch { .. } | Self::Report(_) => ExitCode::NotWritten,
         }
     }
 
@@ -182,14 +151,6 @@ impl PipelineError {
                 "look at what `calib check` says; the results are not finite or not whole"
             }
             _ => "`calib help` shows the commands and what they take",
-        }
-    }
-
-    pub(crate) fn write(path: &Path, source: std::io::Error) -> Self {
-        Self::Write {
-            remedy: paths::writing(path, &source),
-            path: path.display().to_string(),
-            source,
         }
     }
 

@@ -8,21 +8,15 @@
 //! Calibration ─ export ─► patched URDF, scene        everything ─ assemble ─► Report
 //! ```
 //!
-//! Stages are functions of plain values. Only [`prepare::load`] reads files and only [`mod@output::write`] writes them; [`apply`],
-//! [`take_back`] begin where a run has ended.
+//! Stages are functions of plain values. Only [`prepare::load`] reads files, and no stage writes any: a run returns the files
+//! to write.
 
-pub mod apply;
-pub mod cases;
-pub mod convert;
-pub mod drift;
 pub mod error;
 pub mod estimate;
 pub mod formulate;
 pub mod output;
 pub mod prepare;
 pub mod run;
-pub mod simulate;
-pub mod take_back;
 pub mod verify;
 
 pub use error::{ExitCode, PipelineError};

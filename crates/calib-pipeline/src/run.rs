@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use calib_core::Settings;
+use calib_files::OutputFile;
 use calib_profile::{BodyKind, Method};
 use calib_recording::Finding;
 use calib_report::{Report, ResidualRow, Status, Unobservable, Verdict};
@@ -20,7 +21,6 @@ use crate::output::assemble::{Evidence, assemble};
 use crate::output::export::{Found, calibration_yaml, patch_urdf, scene};
 use crate::output::shapes;
 use crate::output::view::{Shown, view};
-use crate::output::write::OutputFile;
 use crate::prepare::checks;
 use crate::prepare::clock;
 use crate::prepare::load::{Inputs, load_recordings, load_robot};

@@ -30,6 +30,7 @@ pub mod markdown;
 pub mod number;
 pub mod plots;
 mod quantity;
+mod read;
 mod report;
 mod residuals;
 mod results;
@@ -49,6 +50,7 @@ pub use data::{
 };
 pub use error::ReportError;
 pub use quantity::{JointValue, Unit};
+pub use read::{NotAReport, REPORT, read_report, report_path};
 pub use report::{FormatVersion, Limit, Method, Outcome, Report, Verdict, judge};
 pub use residuals::{JointResiduals, ResidualBin, ResidualGroup, ResidualRow, Residuals};
 pub use results::{

@@ -24,6 +24,7 @@
 //! What a study does not say: how a real tracker errs. Its noise is normal, independent and as stated.
 
 mod aor;
+pub mod cases;
 mod cell;
 mod claims;
 mod cor;

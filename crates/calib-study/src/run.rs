@@ -66,7 +66,7 @@ pub struct StudyOptions {
     pub threads: Option<usize>,
     /// Folder of the state file `<study>.state.jsonl`, where finished scenes are kept; `None`: nothing is written.
     pub out: Option<PathBuf>,
-    /// Keep the finished scenes of an earlier run with the same settings; otherwise start anew.
+    /// Keep the finished scenes of an earlier run with the same settings; otherwise start over.
     pub resume: bool,
 }
 
@@ -100,17 +100,13 @@ pub enum StudyError {
         source: rayon::ThreadPoolBuildError,
     },
     /// A file cannot be read or written.
-    #[error("{}: cannot {action}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What was tried.
-        action: &'static str,
-        /// Why.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] calib_files::FileError),
+    /// A result has no JSON form.
+    #[error("a result cannot be written: {0}")]
+    Unwritable(#[from] serde_json::Error),
     /// The state file belongs to another study or other settings.
-    #[error("{}: holds {found}, this run is {expected}: finish that one, or start anew without resuming", path.display())]
+    #[error("{}: holds {found}, this run is {expected}: finish that one, or start over without resuming", path.display())]
     OtherState {
         /// The file.
         path: PathBuf,

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_core::{Gauge, RejectReason};
+use calib_files::OutputFile;
 use calib_profile::{Limits, Method, Usage};
 use calib_recording::Finding;
 use calib_report::{
@@ -15,7 +16,6 @@ use crate::estimate::paper::OriginEstimate;
 use crate::formulate::kinematics::Calibration;
 use crate::formulate::ml::MlFit;
 use crate::output::export::{Found, PatchedUrdf};
-use crate::output::write::OutputFile;
 use crate::prepare::load::Inputs;
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::accuracy::{accuracy_limits, workspace};

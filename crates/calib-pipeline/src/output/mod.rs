@@ -4,4 +4,3 @@ pub mod assemble;
 pub mod export;
 pub mod shapes;
 pub mod view;
-pub mod write;

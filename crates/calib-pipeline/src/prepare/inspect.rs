@@ -1,13 +1,11 @@
-//! `calib check`, the schemas, and the renderings that the command line prints.
+//! `calib check`.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
 use calib_recording::{Finding, Severity};
-use calib_report::Report;
 
 use crate::error::{ExitCode, PipelineError};
-use crate::estimate::estimators::Estimators;
 use crate::estimate::start::start;
 use crate::prepare::checks;
 use crate::prepare::load::{Inputs, load_recordings, load_robot};
@@ -140,45 +138,4 @@ impl Checked {
             ExitCode::Accepted
         }
     }
-}
-
-/// `report.json` of a report.
-///
-/// # Errors
-/// [`PipelineError::Report`].
-pub fn report_json(report: &Report) -> Result<String, PipelineError> {
-    Ok(calib_report::json::report_json(report)?)
-}
-
-/// The summary that `calib run` prints.
-#[must_use]
-pub fn summary(report: &Report, colour: bool) -> String {
-    calib_report::terminal::summary(report, colour)
-}
-
-/// JSON Schema of `report.json`.
-#[must_use]
-pub fn report_schema() -> String {
-    calib_report::json::pretty(&calib_report::report_schema()) + "\n"
-}
-
-/// JSON Schema of the scene.
-#[must_use]
-pub fn scene_schema() -> String {
-    calib_report::json::pretty(&calib_report::scene_schema()) + "\n"
-}
-
-/// JSON Schemas of all parameters, by kind and name; with a profile, its plugins too.
-///
-/// # Errors
-/// [`PipelineError`] when the profile cannot be read or a plugin cannot be loaded.
-pub fn parameter_schemas(profile: Option<&Path>) -> Result<String, PipelineError> {
-    let estimators = match profile {
-        Some(path) => {
-            let robot = load_robot(path)?;
-            Estimators::of_profile(&robot.profile, &robot.folder, true)?
-        }
-        None => Estimators::built_in()?,
-    };
-    Ok(calib_report::json::pretty(&estimators.parameter_schemas()) + "\n")
 }

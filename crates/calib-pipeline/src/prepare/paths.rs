@@ -1,45 +1,27 @@
-//! What to do about a file that cannot be read or written.
+//! What to do about a file that cannot be read.
 
 use std::io::{Error, ErrorKind};
 use std::path::Path;
 
 use calib_urdf::nearest::nearest;
 
-/// The remedy for a file that cannot be read; a missing one may have a neighbour that was meant.
+/// The remedy for a file that cannot be read; a missing one may have a neighbor that was meant.
 pub(crate) fn reading(path: &Path, source: &Error) -> String {
     if path.is_dir() {
         return "name a file in it.".to_owned();
     }
     match source.kind() {
-        ErrorKind::NotFound => match neighbour(path) {
+        ErrorKind::NotFound => match neighbor(path) {
             Some(near) => format!("did you mean `{near}`?"),
             None => "correct the path.".to_owned(),
         },
-        ErrorKind::PermissionDenied => "give yourself the right to read it.".to_owned(),
+        ErrorKind::PermissionDenied => "grant read permission.".to_owned(),
         _ => "name another file, or look at the disk it is on.".to_owned(),
     }
 }
 
-/// The remedy for a file or folder that cannot be written.
-pub(crate) fn writing(path: &Path, source: &Error) -> String {
-    if path.is_dir() {
-        return "it is a folder: name a file in it".to_owned();
-    }
-    match source.kind() {
-        ErrorKind::NotFound => "make its folder first, or correct the path".to_owned(),
-        ErrorKind::PermissionDenied => {
-            "choose a folder that you may write to, or change its rights".to_owned()
-        }
-        ErrorKind::AlreadyExists | ErrorKind::NotADirectory => {
-            "a file stands where a folder is needed: choose another folder".to_owned()
-        }
-        ErrorKind::StorageFull => "make room, or choose another disk".to_owned(),
-        _ => "choose another place".to_owned(),
-    }
-}
-
 /// The file of the same folder whose name is nearest, as it would have to be written.
-fn neighbour(path: &Path) -> Option<String> {
+fn neighbor(path: &Path) -> Option<String> {
     let wrong = path.file_name()?.to_str()?;
     let folder = path.parent()?;
     let listed = if folder.as_os_str().is_empty() {
@@ -67,15 +49,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_missing_file_has_the_neighbour_that_was_meant() {
+    fn a_missing_file_has_the_neighbor_that_was_meant() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/ripley");
         let near = |name: &str| {
-            let path = neighbour(&folder.join(name))?;
+            let path = neighbor(&folder.join(name))?;
             Some(path.rsplit('/').next().unwrap_or_default().to_owned())
         };
         assert_eq!(near("base_swep.csv").as_deref(), Some("base_sweep.csv"));
         assert_eq!(near("r17.rudf").as_deref(), Some("r17.urdf"));
         assert_eq!(near("wrst_sweep.tsv").as_deref(), Some("wrist_sweep.csv"));
-        assert_eq!(near("torso_tests.csv"), None, "no neighbour was meant");
+        assert_eq!(near("torso_tests.csv"), None, "no neighbor was meant");
     }
 }

@@ -5,15 +5,11 @@ mod markdown;
 mod svg;
 pub(crate) mod text;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-use crate::{
-    run::{StudyError, StudyResult},
-    state::{failed, write_whole},
-};
+use calib_files::{FileError, replace};
+
+use crate::run::{StudyError, StudyResult};
 
 pub use csv::csv;
 pub use markdown::markdown;
@@ -33,7 +29,10 @@ pub fn json(result: &StudyResult) -> String {
 /// # Errors
 /// [`StudyError::File`] where the folder or a file cannot be written.
 pub fn write(result: &StudyResult, folder: &Path) -> Result<Vec<PathBuf>, StudyError> {
-    fs::create_dir_all(folder).map_err(failed(folder, "create the folder"))?;
+    std::fs::create_dir_all(folder).map_err(|source| FileError::Write {
+        path: folder.to_path_buf(),
+        source,
+    })?;
     let word = result.study.word();
     let mut files = vec![
         (format!("{word}.csv"), csv(result)),
@@ -46,7 +45,7 @@ pub fn write(result: &StudyResult, folder: &Path) -> Result<Vec<PathBuf>, StudyE
     let mut written = Vec::new();
     for (name, text) in files {
         let path = folder.join(name);
-        write_whole(&path, &text)?;
+        replace(&path, text.as_bytes())?;
         written.push(path);
     }
     Ok(written)

@@ -1,0 +1,192 @@
+//! Applies a result to a target: nothing is written unless every joint was found, held what the calibration started from,
+//! and stands in a number of its own.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use calib_urdf::{ChangeRecord, ModelDiff, Patched, UrdfEdit, diff_origins};
+use nalgebra::Isometry3;
+
+use crate::error::{ApplyError, OriginDifference};
+use crate::files;
+use crate::result::{self, Calibrated};
+use crate::target::{Kind, Target};
+
+/// Where the changed files go.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Destination {
+    /// Nowhere: a dry run.
+    Nowhere,
+    /// Over the target and the YAML that it loads.
+    InPlace,
+    /// A new file; a folder where more than one file changes.
+    To(PathBuf),
+}
+
+/// What to apply to what.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ApplyRequest {
+    /// A folder of results, its `report.json`, the calibrated URDF, its change record or its `calibration.yaml`.
+    pub result: PathBuf,
+    /// A URDF, a xacro, or a YAML with origins of joints.
+    pub target: PathBuf,
+    /// The YAML that the xacro loads, where its own path cannot be followed.
+    pub yaml: Option<PathBuf>,
+    /// Where to.
+    pub destination: Destination,
+    /// Also a result that was not accepted.
+    pub force: bool,
+}
+
+/// One file that changes.
+#[derive(Debug, Clone)]
+pub struct FileChange {
+    /// The file, as the caller named it or as it was found from there.
+    pub path: PathBuf,
+    /// Its text before.
+    pub original: String,
+    /// Its text after, and what differs.
+    pub patched: Patched,
+    /// What reverts it.
+    pub record: ChangeRecord,
+    /// Where it was written.
+    pub written: Option<PathBuf>,
+}
+
+/// What was applied.
+#[derive(Debug, Clone)]
+pub struct Applied {
+    /// The calibrated URDF that the numbers come from.
+    pub from: PathBuf,
+    /// The target.
+    pub target: PathBuf,
+    /// What it is.
+    pub kind: Kind,
+    /// What moved.
+    pub moved: ModelDiff,
+    /// Files that change; empty where the target already holds the result.
+    pub files: Vec<FileChange>,
+    /// What the reader should know.
+    pub notes: Vec<String>,
+    /// Where it went.
+    pub destination: Destination,
+}
+
+/// The origin of a joint in a target and in the result's robot agree to this, or they are different robots (m, rad):
+/// expanded files have six decimals at least, and no calibration moves a joint by as little.
+const SAME_ROBOT: f64 = 1e-6;
+
+/// Applies a result to a target.
+///
+/// # Errors
+/// [`ApplyError`] with place, finding and remedy; nothing is written then.
+pub fn apply(request: &ApplyRequest) -> Result<Applied, ApplyError> {
+    let result = result::find(&request.result, request.force)?;
+    let target = Target::read(&request.target, request.yaml.as_deref())?;
+    let mut notes = result.notes.clone();
+    let edits = result.edits(target.kind, &mut notes);
+    let patched = target.patch(&result, &edits)?;
+    let state = compare(&result, &patched.before, &request.target)?;
+    let mut moved = diff_origins(
+        &result.changed(&result.before),
+        &result.changed(&result.after),
+    );
+    for edit in &edits {
+        if let UrdfEdit::AddFixedFrame {
+            name, joint_name, ..
+        } = edit
+        {
+            moved.added_links.push(name.clone());
+            moved.added_joints.push(joint_name.clone());
+        }
+    }
+    let mut files = Vec::new();
+    if state == State::Before || patched.adds_frames {
+        for (path, original, patched) in patched.files {
+            if patched.splices.is_empty() {
+                continue;
+            }
+            let record = patched.record(&original);
+            files.push(FileChange {
+                path,
+                original,
+                patched,
+                record,
+                written: None,
+            });
+        }
+    }
+    target.add_notes(&files, &mut notes);
+    let mut applied = Applied {
+        from: result.urdf.clone(),
+        target: request.target.clone(),
+        kind: target.kind,
+        moved,
+        files,
+        notes,
+        destination: request.destination.clone(),
+    };
+    files::write(&mut applied.files, &request.destination)?;
+    Ok(applied)
+}
+
+/// How a target stands to a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// It holds what the calibration started from.
+    Before,
+    /// It holds the result already.
+    After,
+}
+
+/// Are the target's origins those that the calibration started from, or those that it found?
+fn compare(
+    result: &Calibrated,
+    there: &BTreeMap<String, Isometry3<f64>>,
+    target: &Path,
+) -> Result<State, ApplyError> {
+    let far = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
+        let off = a.inverse() * b;
+        (off.translation.vector.norm(), off.rotation.angle())
+    };
+    let same = |(m, rad): (f64, f64)| m <= SAME_ROBOT && rad <= SAME_ROBOT;
+    let mut others = Vec::new();
+    let mut applied = 0;
+    let mut joints = 0;
+    for (joint, found) in there {
+        let (Some(before), Some(after)) = (result.before(joint), result.after(joint)) else {
+            continue;
+        };
+        joints += 1;
+        if same(far(found, &before)) {
+            continue;
+        }
+        if same(far(found, &after)) {
+            applied += 1;
+            continue;
+        }
+        let (translation, rotation) = far(found, &before);
+        others.push(OriginDifference {
+            joint: joint.clone(),
+            translation,
+            rotation,
+        });
+    }
+    if others.is_empty() && applied == joints && joints > 0 {
+        return Ok(State::After);
+    }
+    if others.is_empty() && applied == 0 {
+        return Ok(State::Before);
+    }
+    if others.is_empty() {
+        return Err(ApplyError::PartlyApplied {
+            target: target.to_path_buf(),
+            applied,
+            joints,
+        });
+    }
+    Err(ApplyError::OtherOrigins {
+        target: target.to_path_buf(),
+        others,
+    })
+}

@@ -1,0 +1,84 @@
+//! The difference of two robots, or of two files.
+
+use std::path::Path;
+
+use calib_urdf::source;
+
+use crate::error::ApplyError;
+use crate::target::{Kind, origins};
+
+fn text(path: &Path) -> Result<String, ApplyError> {
+    Ok(source::read_text(path, &path.display().to_string())?)
+}
+
+/// The difference of two robots as a table: URDFs, xacros, kinematics YAMLs, or one of each.
+///
+/// # Errors
+/// [`ApplyError::Read`] with file and place.
+pub fn diff_table(a: &Path, b: &Path) -> Result<String, ApplyError> {
+    Ok(format!("{}\n", model_diff(a, b)?).trim_end().to_owned() + "\n")
+}
+
+/// The difference of two robots as JSON.
+///
+/// # Errors
+/// [`ApplyError::Read`] with file and place.
+pub fn diff_json(a: &Path, b: &Path) -> Result<String, ApplyError> {
+    Ok(calib_report::json::exact_json(&model_diff(a, b)?)?)
+}
+
+/// The difference of two files, line by line.
+///
+/// # Errors
+/// [`ApplyError::Read`] when a file cannot be read as text.
+pub fn diff_unified(a: &Path, b: &Path) -> Result<String, ApplyError> {
+    Ok(calib_urdf::unified(
+        &text(a)?,
+        &a.display().to_string(),
+        &text(b)?,
+        &b.display().to_string(),
+    ))
+}
+
+fn model_diff(a: &Path, b: &Path) -> Result<calib_urdf::ModelDiff, ApplyError> {
+    let (of_a, of_b) = (origins(a)?, origins(b)?);
+    if (of_a.kind, of_b.kind) == (Kind::Urdf, Kind::Urdf) {
+        return Ok(calib_urdf::diff(
+            &text(a)?,
+            &a.display().to_string(),
+            &text(b)?,
+            &b.display().to_string(),
+        )?);
+    }
+    let mut from = of_a.found;
+    // A UR arm's YAML calls `shoulder` what its URDF calls `shoulder_pan_joint`.
+    let to: Vec<_> = of_b
+        .found
+        .into_iter()
+        .map(|(name, pose)| {
+            let known = from.iter().find(|(other, _)| same_joint(other, &name));
+            (known.map_or(name, |(other, _)| other.clone()), pose)
+        })
+        .collect();
+    let computed = |name: &String| {
+        let found = of_a.computed.iter().chain(&of_b.computed);
+        found.into_iter().any(|other| other == name)
+    };
+    let mut not_compared: Vec<String> = of_a
+        .computed
+        .iter()
+        .chain(&of_b.computed)
+        .cloned()
+        .collect();
+    not_compared.sort();
+    not_compared.dedup();
+    from.retain(|(name, _)| !computed(name));
+    let to: Vec<_> = to.into_iter().filter(|(name, _)| !computed(name)).collect();
+    let mut diff = calib_urdf::diff_origins(&from, &to);
+    diff.not_compared = not_compared;
+    Ok(diff)
+}
+
+fn same_joint(a: &str, b: &str) -> bool {
+    a == b || calib_urdf::ur_key(a) == Some(b) || calib_urdf::ur_key(b) == Some(a)
+}

@@ -1,0 +1,108 @@
+//! `calib convert`.
+
+use std::path::{Path, PathBuf};
+
+use calib_files::{OutputFile, write_new};
+use calib_pipeline::ExitCode;
+use calib_recording::{ReadOptions, WriteOptions, read_path_with, write_recording};
+use clap::Args;
+
+use crate::error::CliError;
+use crate::terminal::{byte_bar, emit_paths};
+
+/// Arguments of `calib convert`.
+#[derive(Debug, Args)]
+pub struct Convert {
+    /// The recording
+    input: PathBuf,
+    /// The CSV to write; it must not exist
+    output: PathBuf,
+    /// Reader to use [default: detected from the content]
+    #[arg(long)]
+    format: Option<String>,
+}
+
+/// Converts, and prints the names of the tables.
+pub fn run(quiet: bool, options: &Convert) -> Result<ExitCode, CliError> {
+    let bar = byte_bar(quiet);
+    let progress = &mut |read, all| {
+        bar.set_length(all);
+        bar.set_position(read);
+    };
+    let converted = convert(options, progress);
+    bar.finish_and_clear();
+    let converted = converted?;
+    for note in &converted.notes {
+        eprintln!("calib: {note}");
+    }
+    emit_paths(&write_new(&converted.folder, &converted.files)?);
+    Ok(ExitCode::Accepted)
+}
+
+/// What a conversion gives.
+struct Converted {
+    /// Folder to write to.
+    folder: PathBuf,
+    /// One table per clock; the first has the name asked for.
+    files: Vec<OutputFile>,
+    /// Conversions and findings, one line each.
+    notes: Vec<String>,
+}
+
+/// Reads a recording of any known format and renders it as canonical CSV; `progress(bytes read, bytes in all)` is told
+/// how far the reading is.
+fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Converted, CliError> {
+    let Convert {
+        input,
+        output,
+        format,
+    } = options;
+    let options = ReadOptions {
+        format: format.clone(),
+        ..ReadOptions::default()
+    };
+    let recording = read_path_with(input, &options, progress)?;
+    let mut notes = vec![format!("read as {}", recording.meta.format)];
+    notes.extend(recording.meta.conversions.iter().cloned());
+    notes.extend(
+        recording
+            .meta
+            .findings
+            .iter()
+            .map(|f| format!("{}: {}", f.id, f.text)),
+    );
+    let tables = write_recording(&recording, &WriteOptions::default()).map_err(|source| {
+        CliError::Table {
+            file: input.display().to_string(),
+            source,
+            remedy: "rename the columns that a table cannot hold",
+            code: ExitCode::Data,
+        }
+    })?;
+    let name = output.file_name().map_or_else(
+        || "recording.csv".to_owned(),
+        |n| n.to_string_lossy().into_owned(),
+    );
+    let stem = name.trim_end_matches(".csv").to_owned();
+    let files = tables
+        .into_iter()
+        .enumerate()
+        .map(|(i, (_, table))| {
+            let name = if i == 0 {
+                name.clone()
+            } else {
+                format!("{stem}.{}.csv", i + 1)
+            };
+            OutputFile::text(name, table)
+        })
+        .collect();
+    let folder = output
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .map_or_else(|| PathBuf::from("."), Path::to_path_buf);
+    Ok(Converted {
+        folder,
+        files,
+        notes,
+    })
+}

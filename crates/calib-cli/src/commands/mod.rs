@@ -1,0 +1,41 @@
+//! One file for each command: its arguments, and what it does with them.
+
+pub mod apply;
+pub mod check;
+pub mod completions;
+pub mod convert;
+pub mod diff;
+pub mod drift;
+pub mod fit;
+pub mod plugins;
+pub mod record;
+pub mod revert;
+pub mod run;
+pub mod schema;
+pub mod simulate;
+pub mod study;
+
+use calib_pipeline::ExitCode;
+
+use crate::arguments::{Arguments, Command};
+use crate::error::CliError;
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
+    match &arguments.command {
+        Command::Run(options) => run::run(arguments, options),
+        Command::Check(options) => check::run(options),
+        Command::Simulate(options) => simulate::run(options),
+        Command::Fit(options) => fit::run(options),
+        Command::Apply(options) => apply::run(options),
+        Command::Diff(options) => diff::run(options),
+        Command::Drift(options) => drift::run(options),
+        Command::Revert(options) => revert::run(options),
+        Command::Study(options) => study::run(arguments.quiet, options),
+        Command::Record(options) => record::run(arguments.quiet, options),
+        Command::Convert(options) => convert::run(arguments.quiet, options),
+        Command::Plugins(options) => plugins::run(options),
+        Command::Schema(options) => schema::run(options),
+        Command::Completions(options) => Ok(completions::run(options)),
+    }
+}

@@ -1,0 +1,251 @@
+//! `calib record`: from the profile to a capture session.
+
+mod bodies;
+mod error;
+mod plan;
+
+use std::io::{BufRead as _, IsTerminal as _};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Instant, SystemTime};
+
+use calib_capture::{
+    Address, CaptureError, JointListener, JointSource, Key, Lines, Plan, Screen, Session, Source,
+    SourceError, Table, TableError, Terminal, survey,
+};
+use calib_pipeline::ExitCode;
+use calib_pipeline::prepare::load::{RobotProfile, load_robot};
+use calib_profile::RecordingSpec;
+use clap::Args;
+
+use crate::error::CliError;
+pub use error::RecordError;
+use plan::{guide_ranges, plan};
+
+/// How long the tracker is listened to before the columns are decided, s.
+const SURVEY: f64 = 1.0;
+
+/// Arguments of `calib record`.
+#[derive(Debug, Args)]
+pub struct Record {
+    /// The robot's profile
+    pub(super) profile: PathBuf,
+    /// `dtrack:PORT` (DTrack sends to this port), `vrpn:HOST[:PORT]` or `vrpn:DEVICE@HOST[:PORT]`
+    #[arg(long)]
+    pub(super) source: String,
+    /// Recording of the profile; required if it has several
+    #[arg(long)]
+    pub(super) recording: Option<String>,
+    /// The CSV to write, which must not exist [default: the recording's file]
+    #[arg(long)]
+    pub(super) out: Option<PathBuf>,
+    /// Append to an existing file
+    #[arg(long)]
+    pub(super) append: bool,
+    /// Source of joint values: `targets` (the requested poses) or `udp:PORT` (the robot sends `name_deg=value`)
+    #[arg(long, default_value = "targets")]
+    pub(super) joints: String,
+    /// Value of a joint that does not move, as `waist_deg=20`
+    #[arg(long, value_delimiter = ',')]
+    pub(super) at: Vec<String>,
+    /// Body or marker of the profile and the tracker's name for it, as `gripM=body_0`
+    #[arg(long, value_delimiter = ',')]
+    pub(super) map: Vec<String>,
+    /// Number of values of each swept joint [default: 11 for one joint, 6 for several]
+    #[arg(long)]
+    pub(super) poses: Option<usize>,
+    /// Duration of the recording of each pose, s
+    #[arg(long, default_value_t = 1.0)]
+    pub(super) hold: f64,
+    /// Also write rows while the robot moves
+    #[arg(long)]
+    pub(super) all: bool,
+    /// Stop if no data arrive from the tracker for this long, s
+    #[arg(long, default_value_t = 30.0)]
+    pub(super) patience: f64,
+    /// Stop after this long, s
+    #[arg(long)]
+    pub(super) seconds: Option<f64>,
+}
+
+/// Records.
+pub fn run(quiet: bool, options: &Record) -> Result<ExitCode, CliError> {
+    let robot = load_robot(&options.profile)?;
+    record(&robot, options, screen(quiet).as_mut())
+}
+
+fn screen(quiet: bool) -> Box<dyn Screen> {
+    if quiet {
+        Box::new(Lines::new(std::io::sink()))
+    } else if std::io::stderr().is_terminal() {
+        Box::new(Terminal::new(std::io::stderr()))
+    } else {
+        Box::new(Lines::new(std::io::stderr()))
+    }
+}
+
+fn record(
+    robot: &RobotProfile,
+    options: &Record,
+    screen: &mut dyn Screen,
+) -> Result<ExitCode, CliError> {
+    let (name, spec) = choose(robot, options)?;
+    let address: Address = options.source.parse().map_err(RecordError::Source)?;
+    let joints: JointSource = options.joints.parse().map_err(RecordError::Joints)?;
+    if guide_ranges(robot, spec).is_empty() && joints == JointSource::Targets {
+        let recording = name.to_owned();
+        return Err(RecordError::NoJoints { recording }.into());
+    }
+    if !options.append && out_path(robot, spec, options).exists() {
+        let path = out_path(robot, spec, options).display().to_string();
+        return Err(CaptureError::from(TableError::Exists { path }).into());
+    }
+    let clock = clock();
+    let mut source = Source::open(&address).map_err(CaptureError::from)?;
+    let mut listener = listener(joints)?;
+    screen.line(&format!(
+        "recording `{name}` from {address}; joint values: {}",
+        match joints {
+            JointSource::Targets => "the requested poses (commanded, not measured)".to_string(),
+            JointSource::Udp(port) => format!("from the robot, UDP port {port}"),
+        }
+    ));
+    let heard = survey(
+        &mut source,
+        &mut listener,
+        &clock,
+        SURVEY,
+        options.patience,
+        screen,
+    )
+    .map_err(CaptureError::from)?;
+    let heard = match heard {
+        Ok(heard) => heard,
+        Err(ended) => {
+            screen.line(&format!("ended: {ended}"));
+            return Ok(ExitCode::Data);
+        }
+    };
+    let plan = plan(robot, spec, options, (joints, &heard), screen)?;
+    let path = out_path(robot, spec, options);
+    let header = plan.header();
+    let table = if options.append && path.exists() {
+        Table::append(&path, &header)
+    } else {
+        let comments = comments(robot, name, &address, joints, &plan);
+        Table::create(&path, &comments, &header)
+    };
+    let table = table.map_err(CaptureError::from)?;
+    let mut session = Session::new(plan, table);
+    let keys = keys();
+    let ended = session.record(&mut source, &mut listener, &keys, &clock, screen)?;
+    screen.line(&format!("ended: {ended}"));
+    session.report(screen);
+    println!("{}", path.display());
+    Ok(if ended.is_good() {
+        ExitCode::Accepted
+    } else {
+        ExitCode::Data
+    })
+}
+
+/// The recording that is made: the named one, or the only one.
+fn choose<'a>(
+    robot: &'a RobotProfile,
+    options: &'a Record,
+) -> Result<(&'a str, &'a RecordingSpec), RecordError> {
+    let recordings = &robot.profile.recordings;
+    let known = || recordings.keys().cloned().collect();
+    let found = match &options.recording {
+        Some(wanted) => {
+            recordings
+                .get_key_value(wanted)
+                .ok_or_else(|| RecordError::UnknownRecording {
+                    wanted: wanted.clone(),
+                    known: known(),
+                })?
+        }
+        None if recordings.len() > 1 => {
+            return Err(RecordError::WhichRecording { known: known() });
+        }
+        None => recordings.iter().next().ok_or(RecordError::NoRecordings)?,
+    };
+    Ok((found.0.as_str(), found.1))
+}
+
+fn out_path(robot: &RobotProfile, spec: &RecordingSpec, options: &Record) -> PathBuf {
+    let own = || robot.folder.join(&spec.file);
+    options.out.clone().unwrap_or_else(own)
+}
+
+fn listener(joints: JointSource) -> Result<Option<JointListener>, CaptureError> {
+    match joints {
+        JointSource::Targets => Ok(None),
+        JointSource::Udp(port) => JointListener::open(port)
+            .map(Some)
+            .map_err(|source| SourceError::Port { port, source }.into()),
+    }
+}
+
+fn comments(
+    robot: &RobotProfile,
+    name: &str,
+    address: &Address,
+    joints: JointSource,
+    plan: &Plan,
+) -> Vec<String> {
+    let kind = match address {
+        Address::Dtrack { .. } => "dtrack",
+        Address::Vrpn { .. } => "vrpn",
+    };
+    let mut comments = vec![
+        format!(
+            "calib record: robot {}, recording {name}, source {kind}",
+            robot.profile.robot
+        ),
+        "t_s: the tracker's clock; host_s: this computer's clock when the frame arrived, s since 1970".to_string(),
+        "hold: the pose, counted from 1".to_string(),
+    ];
+    comments.push(match joints {
+        JointSource::Targets => "joints: the requested poses; commanded, not measured".to_string(),
+        JointSource::Udp(_) => {
+            "joints: as the robot sent them, the last value not older than 0.5 s".to_string()
+        }
+    });
+    for watched in plan.watched.iter().filter(|w| w.name != w.from) {
+        comments.push(format!(
+            "{} is the tracker's {}",
+            watched.name, watched.from
+        ));
+    }
+    comments
+}
+
+/// Seconds since 1970; never falls, whatever happens to the computer's date.
+fn clock() -> impl Fn() -> f64 {
+    let began = Instant::now();
+    let offset = SystemTime::now()
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .map_or(0.0, |since| since.as_secs_f64());
+    move || offset + began.elapsed().as_secs_f64()
+}
+
+/// Lines of standard input as keys; the channel closes when it ends.
+fn keys() -> Receiver<Key> {
+    let (send, receive) = channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines() {
+            let Ok(line) = line else { return };
+            let key = match line.trim() {
+                "" => Key::There,
+                "s" => Key::Skip,
+                "q" => Key::Quit,
+                _ => continue,
+            };
+            if send.send(key).is_err() {
+                return;
+            }
+        }
+    });
+    receive
+}

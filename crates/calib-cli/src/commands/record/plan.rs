@@ -1,0 +1,157 @@
+//! What a capture session is asked for: columns, poses and bodies.
+
+use calib_capture::{
+    Guide, JointColumn, JointSource, Plan, Screen, Survey, Unit, grid, parse_joints,
+};
+use calib_pipeline::prepare::load::RobotProfile;
+use calib_profile::RecordingSpec;
+
+use super::bodies::watched;
+use super::{Record, RecordError};
+
+/// How near a measured joint must come to its target: 1°, 2 mm.
+const NEAR: (f64, f64) = (0.017_453_292_519_943_295, 2e-3);
+/// More poses than this are a typo in `--poses`: nobody records them.
+const MOST_POSES: usize = 100_000;
+
+/// Columns, poses and bodies.
+pub(super) fn plan(
+    robot: &RobotProfile,
+    spec: &RecordingSpec,
+    options: &Record,
+    (joints, heard): (JointSource, &Survey),
+    screen: &mut dyn Screen,
+) -> Result<Plan, RecordError> {
+    let (swept, ranges): (Vec<JointColumn>, Vec<(f64, f64)>) =
+        guide_ranges(robot, spec).into_iter().unzip();
+    let poses = checked(options, swept.len())?;
+    let guide = Guide {
+        joints: (0..swept.len()).collect(),
+        steps: grid(&ranges, poses),
+        ranges,
+    };
+    let columns = columns(robot, spec, (swept, &options.at), heard, screen)?;
+    let unheard: Vec<&str> = columns
+        .iter()
+        .filter(|c| c.fixed.is_none() && !heard.joints.contains(&c.name))
+        .map(|c| c.name.as_str())
+        .collect();
+    if joints != JointSource::Targets && !unheard.is_empty() {
+        screen.line(&format!(
+            "not heard from the robot so far: {}",
+            unheard.join(", ")
+        ));
+    }
+    let watched = watched(robot, &options.map, heard, screen)?;
+    if !guide.steps.is_empty() {
+        screen.line(&format!(
+            "{} poses of {}; keys: Enter = I am there, s = leave out, q = end (then Enter)",
+            guide.steps.len(),
+            guide.shown_ranges(&columns)
+        ));
+    }
+    Ok(Plan {
+        columns,
+        joints,
+        guide,
+        watched,
+        hold: options.hold,
+        near: NEAR,
+        all: options.all,
+        patience: options.patience,
+        longest: options.seconds,
+    })
+}
+
+/// Values of each joint and durations that make sense.
+fn checked(options: &Record, joints: usize) -> Result<usize, RecordError> {
+    let poses = options.poses.unwrap_or(if joints == 1 { 11 } else { 6 });
+    let count = poses.checked_pow(joints as u32).unwrap_or(usize::MAX);
+    if poses == 0 || count > MOST_POSES {
+        return Err(RecordError::Poses { poses, count });
+    }
+    for (option, value) in [
+        ("--hold", options.hold),
+        ("--patience", options.patience),
+        ("--seconds", options.seconds.unwrap_or(1.0)),
+    ] {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(RecordError::Duration { option, value });
+        }
+    }
+    Ok(poses)
+}
+
+/// Columns of the joints: swept ones, those held by `--at`, and those that the robot sends.
+fn columns(
+    robot: &RobotProfile,
+    spec: &RecordingSpec,
+    (swept, at): (Vec<JointColumn>, &[String]),
+    heard: &Survey,
+    screen: &mut dyn Screen,
+) -> Result<Vec<JointColumn>, RecordError> {
+    let mut columns = swept;
+    let fixed = parse_at(robot, at)?;
+    for (name, turns, value) in &fixed {
+        if columns.iter().any(|c| c.name == *name) {
+            return Err(RecordError::HoldsSwept {
+                joint: name.clone(),
+            });
+        }
+        columns.push(column(name, *turns, Some(*value)));
+    }
+    for name in &heard.joints {
+        match robot.model.joint_id(name) {
+            Ok(id) if !columns.iter().any(|c| c.name == *name) && !spec.hold.contains_key(&id) => {
+                columns.push(column(name, robot.model.joint(id).kind.turns(), None));
+            }
+            Ok(_) => {}
+            Err(unknown) => screen.line(&format!("not recorded: the robot sends {unknown}")),
+        }
+    }
+    Ok(columns)
+}
+
+/// Swept joints with unit and range, rad or m.
+pub(super) fn guide_ranges(
+    robot: &RobotProfile,
+    spec: &RecordingSpec,
+) -> Vec<(JointColumn, (f64, f64))> {
+    spec.ranges
+        .iter()
+        .map(|(&id, &range)| {
+            let joint = robot.model.joint(id);
+            (column(&joint.name, joint.kind.turns(), None), range)
+        })
+        .collect()
+}
+
+fn column(name: &str, turns: bool, fixed: Option<f64>) -> JointColumn {
+    JointColumn {
+        name: name.to_string(),
+        unit: if turns { Unit::Angle } else { Unit::Length },
+        fixed,
+    }
+}
+
+/// `waist_deg=20` as (joint, turns, SI).
+fn parse_at(robot: &RobotProfile, at: &[String]) -> Result<Vec<(String, bool, f64)>, RecordError> {
+    let mut fixed = Vec::new();
+    for text in at {
+        let joints = parse_joints(text.as_bytes()).map_err(RecordError::At)?;
+        for (name, value) in joints {
+            let id = robot.model.joint_id(&name)?;
+            let turns = robot.model.joint(id).kind.turns();
+            let unit = text.split('=').next().unwrap_or("");
+            if turns != (unit.ends_with("_deg") || unit.ends_with("_rad")) {
+                return Err(RecordError::JointUnit {
+                    given: text.clone(),
+                    kind: robot.model.joint(id).kind.name(),
+                    joint: name,
+                });
+            }
+            fixed.push((name, turns, value));
+        }
+    }
+    Ok(fixed)
+}

@@ -1,0 +1,32 @@
+//! `calib revert`.
+
+use std::path::PathBuf;
+
+use calib_pipeline::ExitCode;
+use clap::Args;
+
+use crate::error::CliError;
+use crate::terminal::emit_paths;
+
+/// Arguments of `calib revert`.
+#[derive(Debug, Args)]
+pub struct Revert {
+    /// The changed file, with its change record `<file>.changes.json` beside it
+    file: PathBuf,
+    /// Where to write the original
+    #[arg(long, required_unless_present = "in_place")]
+    out: Option<PathBuf>,
+    /// Overwrite the changed file and remove the record
+    #[arg(long, conflicts_with = "out")]
+    in_place: bool,
+}
+
+/// Restores the original.
+pub fn run(options: &Revert) -> Result<ExitCode, CliError> {
+    let written = match &options.out {
+        Some(out) => calib_apply::revert(&options.file, out)?,
+        None => calib_apply::revert_in_place(&options.file)?,
+    };
+    emit_paths(&[written]);
+    Ok(ExitCode::Accepted)
+}

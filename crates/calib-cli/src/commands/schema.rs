@@ -1,0 +1,59 @@
+//! `calib schema`.
+
+use std::path::PathBuf;
+
+use calib_pipeline::ExitCode;
+use calib_pipeline::estimate::estimators::Estimators;
+use calib_pipeline::prepare::load::load_robot;
+use clap::{Args, ValueEnum};
+
+use crate::error::CliError;
+use crate::terminal::emit;
+
+/// Arguments of `calib schema`.
+#[derive(Debug, Args)]
+pub struct Schema {
+    /// What the schema describes
+    #[arg(value_enum, default_value_t = SchemaOf::Profile)]
+    of: SchemaOf,
+    /// Include the plugins that this profile names (only for `parameters`)
+    #[arg(long)]
+    profile: Option<PathBuf>,
+}
+
+/// What has a schema.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SchemaOf {
+    /// The profile
+    Profile,
+    /// report.json
+    Report,
+    /// The scene
+    Scene,
+    /// Parameters of estimators, readers and report writers, by kind and name
+    Parameters,
+}
+
+/// Prints a JSON Schema.
+pub fn run(options: &Schema) -> Result<ExitCode, CliError> {
+    let schema = match options.of {
+        SchemaOf::Profile => {
+            emit(&calib_profile::json_schema());
+            return Ok(ExitCode::Accepted);
+        }
+        SchemaOf::Report => calib_report::report_schema(),
+        SchemaOf::Scene => calib_report::scene_schema(),
+        SchemaOf::Parameters => estimators(options)?.parameter_schemas(),
+    };
+    emit(&(calib_report::json::pretty(&schema) + "\n"));
+    Ok(ExitCode::Accepted)
+}
+
+/// The built-in estimators, or those that a profile can name.
+fn estimators(options: &Schema) -> Result<Estimators, CliError> {
+    let Some(profile) = &options.profile else {
+        return Ok(Estimators::built_in()?);
+    };
+    let robot = load_robot(profile)?;
+    Ok(Estimators::of_profile(&robot.profile, &robot.folder, true)?)
+}

@@ -1,0 +1,80 @@
+//! `calib simulate`.
+
+use std::path::PathBuf;
+
+use calib_files::{OutputFile, write_results};
+use calib_pipeline::ExitCode;
+use calib_pipeline::prepare::load::{RobotProfile, load_robot};
+use calib_recording::WriteOptions;
+use clap::Args;
+
+use crate::error::CliError;
+use crate::terminal::emit_paths;
+
+/// Arguments of `calib simulate`.
+#[derive(Debug, Args)]
+pub struct Simulate {
+    /// The robot's profile
+    profile: PathBuf,
+    /// Seed of the random numbers [default: the profile's]
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Folder to write to
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// Simulates, and prints the names of the files.
+pub fn run(options: &Simulate) -> Result<ExitCode, CliError> {
+    let robot = load_robot(&options.profile)?;
+    let files = simulate(&robot, options.seed)?;
+    emit_paths(&write_results(&options.out, &files)?);
+    Ok(ExitCode::Accepted)
+}
+
+/// The files of a simulation: every recording under its profile path's file name, and `truth.json`.
+fn simulate(robot: &RobotProfile, seed: Option<u64>) -> Result<Vec<OutputFile>, CliError> {
+    let simulated = calib_sim::simulate(&robot.profile, &robot.model, seed).map_err(|source| {
+        CliError::Simulation {
+            file: robot.file.clone(),
+            source: Box::new(source),
+        }
+    })?;
+    let mut files = Vec::new();
+    for (name, poses) in &simulated.recordings {
+        let options = WriteOptions {
+            comments: vec![
+                format!(
+                    "simulated by `calib simulate {}` with seed {}; the truth is in truth.json",
+                    robot.file, simulated.truth.seed
+                ),
+                format!("recording {name} of {}", robot.profile.robot),
+            ],
+            degrees: true,
+            ..WriteOptions::micro()
+        };
+        let text =
+            calib_recording::write_poses(poses, &options).map_err(|source| CliError::Table {
+                file: format!("recording `{name}`"),
+                source,
+                remedy: "use names without commas, quotes and line breaks",
+                code: ExitCode::Usage,
+            })?;
+        files.push(OutputFile::text(file_name(robot, name), text));
+    }
+    let mut truth =
+        serde_json::to_string_pretty(&simulated.truth).map_err(|source| CliError::Json {
+            what: "the truth",
+            source,
+            remedy: "check the numbers of the `simulate` section",
+        })?;
+    truth.push('\n');
+    files.push(OutputFile::text("truth.json", truth));
+    Ok(files)
+}
+
+fn file_name(robot: &RobotProfile, recording: &str) -> String {
+    let spec = robot.profile.recordings.get(recording);
+    let path = spec.map_or_else(|| format!("{recording}.csv"), |s| s.file.clone());
+    path.rsplit(['/', '\\']).next().unwrap_or(&path).to_owned()
+}

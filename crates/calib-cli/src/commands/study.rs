@@ -1,0 +1,131 @@
+//! `calib study`.
+
+use std::path::PathBuf;
+
+use calib_files::{OutputFile, write_results};
+use calib_pipeline::ExitCode;
+use calib_study::{Study, StudyOptions, cases};
+use clap::{Args, ValueEnum};
+
+use crate::error::CliError;
+use crate::terminal::{count_bar, emit};
+
+/// Arguments of `calib study`.
+#[derive(Debug, Args)]
+pub struct StudyRun {
+    /// Which study
+    #[arg(value_enum)]
+    study: StudyName,
+    /// Trials of an ordinary cell [cor, aor: 1500], or robots drawn [justin, ripley: 100]
+    #[arg(long)]
+    trials: Option<u64>,
+    /// Seed of the random numbers
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Number of threads [default: one for each processor]
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Folder for the tables and figures; an interrupted study continues there
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Profile for a case study [default: robots/justin.yaml or robots/ripley.yaml]
+    #[arg(long)]
+    profile: Option<PathBuf>,
+    /// Start over instead of continuing
+    #[arg(long)]
+    restart: bool,
+    /// Print JSON instead of Markdown
+    #[arg(long)]
+    json: bool,
+}
+
+/// Simulation studies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum StudyName {
+    /// Centers of rotation, paper §3.3
+    Cor,
+    /// Axes of rotation and frames, paper §4 and §5.2
+    Aor,
+    /// Case study over many simulated robots, paper §5: Table 1
+    Justin,
+    /// Case study over many simulated robots, paper §6: Table 2
+    Ripley,
+}
+
+/// Runs a study.
+pub fn run(quiet: bool, study: &StudyRun) -> Result<ExitCode, CliError> {
+    match study.study {
+        StudyName::Cor => estimators(quiet, study, Study::Cor),
+        StudyName::Aor => estimators(quiet, study, Study::Aor),
+        StudyName::Justin => robots(quiet, study, "justin"),
+        StudyName::Ripley => robots(quiet, study, "ripley"),
+    }
+}
+
+/// A study of estimators.
+fn estimators(quiet: bool, study: &StudyRun, which: Study) -> Result<ExitCode, CliError> {
+    let default = StudyOptions::default();
+    let options = StudyOptions {
+        trials: study.trials.unwrap_or(default.trials),
+        seed: study.seed.unwrap_or(default.seed),
+        threads: study.threads,
+        out: study.out.clone(),
+        resume: !study.restart,
+    };
+    let bar = count_bar(quiet, "trials");
+    let result = calib_study::run(which, &options, &|done, total| {
+        bar.set_length(total);
+        bar.set_position(done);
+    })?;
+    bar.finish_and_clear();
+    emit(&if study.json {
+        calib_study::json(&result)
+    } else {
+        calib_study::markdown(&result)
+    });
+    if let Some(out) = &study.out {
+        for path in calib_study::write(&result, out)? {
+            eprintln!("wrote {}", path.display());
+        }
+    }
+    Ok(ExitCode::Accepted)
+}
+
+/// A case study over many simulated robots.
+fn robots(quiet: bool, study: &StudyRun, name: &str) -> Result<ExitCode, CliError> {
+    let default_profile = || PathBuf::from(format!("robots/{name}.yaml"));
+    let options = cases::CaseOptions {
+        profile: study.profile.clone().unwrap_or_else(default_profile),
+        name: name.to_owned(),
+        robots: study.trials.unwrap_or(100),
+        seed: study.seed.unwrap_or(1),
+        threads: study.threads,
+        out: study.out.clone(),
+        resume: !study.restart,
+    };
+    let bar = count_bar(quiet, "robots");
+    let result = cases::run_cases(&options, &|done, total| {
+        bar.set_length(total);
+        bar.set_position(done);
+    })?;
+    bar.finish_and_clear();
+    let json = cases::json(&result).map_err(|source| CliError::Json {
+        what: "the study",
+        source,
+        remedy: "leave out --json",
+    })?;
+    let text = cases::markdown(&result);
+    emit(if study.json { &json } else { &text });
+    if let Some(out) = &study.out {
+        let files = [
+            OutputFile::text(format!("{name}.csv"), cases::csv(&result)),
+            OutputFile::text(format!("{name}.json"), json),
+            OutputFile::text(format!("{name}.md"), text),
+            OutputFile::text(format!("{name}.svg"), cases::svg(&result)),
+        ];
+        for path in write_results(out, &files)? {
+            eprintln!("wrote {}", path.display());
+        }
+    }
+    Ok(ExitCode::Accepted)
+}

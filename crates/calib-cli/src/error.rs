@@ -1,0 +1,147 @@
+//! What a command ends with: an error of one of the libraries, its exit code and its remedy.
+
+use calib_apply::ApplyError;
+use calib_capture::{CaptureError, SourceError};
+use calib_drift::DriftError;
+use calib_files::FileError;
+use calib_fit::FitError;
+use calib_pipeline::{ExitCode, PipelineError};
+use calib_plugin::NewProjectError;
+use calib_study::StudyError;
+use calib_study::cases::CaseError;
+
+use crate::commands::record::RecordError;
+
+/// Why a command failed.
+#[derive(Debug, thiserror::Error)]
+pub enum CliError {
+    /// Of a stage of the calibration.
+    #[error(transparent)]
+    Pipeline(#[from] PipelineError),
+    /// Of `calib apply`, `diff` and `revert`.
+    #[error(transparent)]
+    Apply(#[from] ApplyError),
+    /// Of `calib drift`.
+    #[error(transparent)]
+    Drift(#[from] DriftError),
+    /// Of `calib fit`.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// A file was not written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] calib_recording::Error),
+    /// A recording cannot be written as a table.
+    #[error("{file}: {source}\n  help: {remedy}")]
+    Table {
+        /// The recording.
+        file: String,
+        /// Why.
+        source: calib_recording::NotWritten,
+        /// What to do.
+        remedy: &'static str,
+        /// Whether the data or the call are at fault.
+        code: ExitCode,
+    },
+    /// The profile cannot be simulated.
+    #[error("{file}: {source}")]
+    Simulation {
+        /// The profile.
+        file: String,
+        /// Why.
+        source: Box<calib_sim::SimError>,
+    },
+    /// Something has no JSON form.
+    #[error("{what} cannot be written: {source}\n  help: {remedy}")]
+    Json {
+        /// What.
+        what: &'static str,
+        /// Why.
+        source: serde_json::Error,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A report has no text or JSON form.
+    #[error("the report cannot be written: {0}")]
+    Report(#[from] calib_report::ReportError),
+    /// Of `calib study cor` and `aor`.
+    #[error("{0}\n  help: choose another folder with --out, or start over with --restart")]
+    Study(#[from] StudyError),
+    /// Of `calib study justin` and `ripley`.
+    #[error(transparent)]
+    Cases(#[from] CaseError),
+    /// `calib record` was asked for what does not go together.
+    #[error("{0}")]
+    Record(#[from] RecordError),
+    /// A capture was stopped by its source or its file.
+    #[error("{0}")]
+    Capture(#[from] CaptureError),
+    /// A plugin project cannot be made.
+    #[error("{0}\n  help: calib plugins new NAME --lang rust|c --out FOLDER")]
+    NewPlugin(#[from] NewProjectError),
+}
+
+impl CliError {
+    /// The exit code of this error.
+    #[must_use]
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Pipeline(error) => error.exit_code(),
+            Self::Apply(error) => of_apply(error),
+            Self::Drift(error) if error.is_refusal() => ExitCode::VerdictFail,
+            Self::Drift(DriftError::Unwritable(_)) | Self::Report(_) => ExitCode::NotWritten,
+            Self::Drift(_)
+            | Self::Recording(_)
+            | Self::Fit(FitError::Data { .. } | FitError::Recording(_)) => ExitCode::Data,
+            Self::File(error) => of_file(error),
+            Self::Table { code, .. } => *code,
+            Self::Cases(CaseError::Profile(error)) => error.exit_code(),
+            Self::Capture(CaptureError::Source(SourceError::Port { .. })) => ExitCode::Usage,
+            Self::Capture(CaptureError::Source(_)) => ExitCode::Data,
+            Self::Capture(CaptureError::Table(_)) => ExitCode::NotWritten,
+            Self::Simulation { .. }
+            | Self::Json { .. }
+            | Self::Fit(_)
+            | Self::Study(_)
+            | Self::Cases(_)
+            | Self::Record(_)
+            | Self::NewPlugin(_) => ExitCode::Usage,
+        }
+    }
+
+    /// What to do, for an error whose text does not say it in a `help:` line of its own.
+    #[must_use]
+    pub fn remedy(&self) -> Option<&'static str> {
+        match self {
+            Self::Pipeline(error) => Some(error.remedy()),
+            Self::Apply(ApplyError::Read(_)) => {
+                Some("correct it there, or export the description again")
+            }
+            Self::Apply(ApplyError::Edit(_)) => Some("nothing was written; give the expanded URDF"),
+            Self::Report(_) => {
+                Some("look at what `calib check` says; the results are not finite or not whole")
+            }
+            Self::Capture(_) => None,
+            _ => Some("`calib help` shows the commands and what they take"),
+        }
+    }
+}
+
+fn of_apply(error: &ApplyError) -> ExitCode {
+    match error {
+        ApplyError::Read(_) | ApplyError::YamlUnused { .. } => ExitCode::Usage,
+        ApplyError::NotAccepted { .. } => ExitCode::VerdictFail,
+        ApplyError::File(error) => of_file(error),
+        ApplyError::Edit(_) | ApplyError::Unwritable(_) => ExitCode::NotWritten,
+        _ => ExitCode::Data,
+    }
+}
+
+fn of_file(error: &FileError) -> ExitCode {
+    match error {
+        FileError::SameName { .. } => ExitCode::Usage,
+        _ => ExitCode::NotWritten,
+    }
+}

@@ -1,0 +1,318 @@
+//! The tests: everything at once, and number by number.
+
+use calib_estimator::chance;
+use calib_geometry::decompose;
+use calib_report::Unit;
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use crate::FALSE_ALARMS;
+use crate::error::DriftError;
+use crate::evidence::{Evidence, NULL, Number, Side};
+
+/// A number that both calibrations know.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Changed {
+    /// Stable name: `distance.shoulder.elbow`, `elbow.compliance`.
+    pub name: String,
+    /// In words.
+    pub text: String,
+    /// Of the numbers.
+    pub unit: Unit,
+    /// By the old data alone.
+    pub old: f64,
+    /// By the new data alone.
+    pub new: f64,
+    /// new − old; angles by the shorter way round.
+    pub change: f64,
+    /// σ of the change.
+    pub sigma: f64,
+    /// Probability of such a change where nothing changed, for this number alone.
+    pub p_value: f64,
+    /// The same for the whole list (Holm).
+    pub p_adjusted: f64,
+    /// Said to have changed.
+    pub significant: bool,
+    /// Free of any choice of frames.
+    pub gauge_free: bool,
+}
+
+/// The test of everything at once.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Joint {
+    /// Squared Mahalanobis distance, eq. (1).
+    pub statistic: f64,
+    /// How many directions both data see.
+    pub degrees_of_freedom: usize,
+    /// Of the noise levels.
+    pub noise_degrees_of_freedom: f64,
+    /// Probability of such a distance where nothing changed.
+    pub p_value: f64,
+    /// Said to have changed.
+    pub significant: bool,
+}
+
+/// What two calibrations say together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Drift {
+    /// Version of these keys: 1.
+    pub calib_drift: u32,
+    /// The robot.
+    pub robot: String,
+    /// The old report.
+    pub old: String,
+    /// The new one.
+    pub new: String,
+    /// The probability that an unchanged robot is said to have changed in anything.
+    pub false_alarms: f64,
+    /// Anything changed.
+    pub changed: bool,
+    /// Everything at once.
+    pub joint: Joint,
+    /// Number by number, most certain first.
+    pub numbers: Vec<Changed>,
+    /// Numbers of both that only one of the two data determine.
+    pub known_in_one: Vec<String>,
+    /// Numbers that neither determines without a convention.
+    pub known_in_neither: Vec<String>,
+    /// Parameters that only the old calibration had.
+    pub only_old: Vec<String>,
+    /// Parameters that only the new one has.
+    pub only_new: Vec<String>,
+}
+
+/// Compares two calibrations of one robot.
+///
+/// # Errors
+/// [`DriftError`] for two robots, two nominal URDFs of one, or no common parameter.
+pub fn compare(old: &Evidence, new: &Evidence) -> Result<Drift, DriftError> {
+    same_robot(old, new)?;
+    let named = |of: &Evidence, other: &Evidence| -> Vec<String> {
+        of.parameters
+            .iter()
+            .zip(&of.of_robot)
+            .filter(|(name, robot)| **robot && !other.parameters.contains(name))
+            .map(|(name, _)| name.clone())
+            .collect()
+    };
+    let dof = old.degrees_of_freedom.min(new.degrees_of_freedom).max(1.0);
+    let joint = joint(old, new, old.degrees_of_freedom + new.degrees_of_freedom)?;
+    let (mut numbers, mut known_in_one, mut known_in_neither) =
+        (Vec::new(), Vec::new(), Vec::new());
+    for number in &old.numbers {
+        let Some(other) = new.numbers.iter().find(|n| n.name == number.name) else {
+            continue;
+        };
+        match (old.determines(number), new.determines(other)) {
+            (true, true) => numbers.extend(change(old, number, new, other, dof)),
+            (false, false) => known_in_neither.push(number.name.clone()),
+            _ => known_in_one.push(number.name.clone()),
+        }
+    }
+    holm(&mut numbers);
+    let changed = joint.significant || numbers.iter().any(|n| n.significant);
+    Ok(Drift {
+        calib_drift: 1,
+        robot: new.robot.clone(),
+        old: old.file.clone(),
+        new: new.file.clone(),
+        false_alarms: FALSE_ALARMS,
+        changed,
+        joint,
+        numbers,
+        known_in_one,
+        known_in_neither,
+        only_old: named(old, new),
+        only_new: named(new, old),
+    })
+}
+
+fn same_robot(old: &Evidence, new: &Evidence) -> Result<(), DriftError> {
+    if old.robot != new.robot {
+        return Err(DriftError::OtherRobot {
+            old: (old.file.clone(), old.robot.clone()),
+            new: (new.file.clone(), new.robot.clone()),
+        });
+    }
+    if old.description != new.description || old.description.is_empty() {
+        return Err(DriftError::OtherNominal {
+            old: old.file.clone(),
+            new: new.file.clone(),
+            robot: old.robot.clone(),
+        });
+    }
+    Ok(())
+}
+
+/// Equation (1).
+fn joint(old: &Evidence, new: &Evidence, dof: f64) -> Result<Joint, DriftError> {
+    let shared: Vec<&str> = old
+        .parameters
+        .iter()
+        .zip(&old.of_robot)
+        .filter(|(name, robot)| **robot && new.has_of_robot(name))
+        .map(|(name, _)| name.as_str())
+        .collect();
+    if shared.is_empty() {
+        return Err(DriftError::NothingInCommon {
+            old: old.file.clone(),
+            new: new.file.clone(),
+        });
+    }
+    let reference = 0.5 * (old.found(&shared) + new.found(&shared));
+    let mut sides = [
+        old.of_robot(&shared, &reference),
+        new.of_robot(&shared, &reference),
+    ];
+    let largest = sides
+        .iter()
+        .map(|side| decompose::singular_values(&side.a).max())
+        .fold(0.0, f64::max);
+    // One tolerance for all ranks: a direction counts in the sum if it counts in a part.
+    let limit = NULL * largest;
+    forget_common_gauges(&mut sides, limit);
+    let rank_of = |a: &DMatrix<f64>| {
+        let values = decompose::singular_values(a);
+        values.iter().filter(|s| **s > limit).count()
+    };
+    let [Side { a: a1, y: y1, .. }, Side { a: a2, y: y2, .. }] = &sides;
+    let mut a = DMatrix::zeros(a1.nrows() + a2.nrows(), shared.len());
+    a.rows_mut(0, a1.nrows()).copy_from(a1);
+    a.rows_mut(a1.nrows(), a2.nrows()).copy_from(a2);
+    let mut y = DVector::zeros(a.nrows());
+    // Only what lies in the range of each A says anything about the robot.
+    y.rows_mut(0, a1.nrows())
+        .copy_from(&in_range(a1, y1, limit));
+    y.rows_mut(a1.nrows(), a2.nrows())
+        .copy_from(&in_range(a2, y2, limit));
+    let together = in_range(&a, &y, limit);
+    let statistic = (&y - together).norm_squared();
+    let degrees = (rank_of(a1) + rank_of(a2)).saturating_sub(rank_of(&a));
+    let p_value = if degrees == 0 {
+        1.0
+    } else {
+        chance::f_tail(statistic / degrees as f64, degrees as f64, dof.max(1.0))
+    };
+    Ok(Joint {
+        statistic,
+        degrees_of_freedom: degrees,
+        noise_degrees_of_freedom: dof,
+        p_value,
+        significant: p_value < 0.5 * FALSE_ALARMS,
+    })
+}
+
+/// A gauge of one calibration is treated as a gauge of both where that moves no whitened residual by more than this.
+const GAUGE_TILT: f64 = 0.1;
+
+/// Takes the directions out of both sides that neither sees, but for how they bend from one estimate to the other.
+///
+/// A gauge is a curve; the two null spaces are its tangents at two places, and each side seems to see the other's a little.
+/// Left alone, every such pair would cost a direction that both do see.
+fn forget_common_gauges(sides: &mut [Side; 2], limit: f64) {
+    let null = |a: &DMatrix<f64>| {
+        let svd = decompose::svd(a);
+        let unseen: Vec<usize> = (0..svd.v.ncols())
+            .filter(|i| svd.s.get(*i).is_none_or(|s| *s <= limit))
+            .collect();
+        svd.v.select_columns(&unseen)
+    };
+    let (n1, n2) = (null(&sides[0].a), null(&sides[1].a));
+    if n1.ncols() == 0 || n2.ncols() == 0 {
+        return;
+    }
+    // Principal vectors, nearest pairs first.
+    let svd = decompose::svd(&(n1.transpose() * &n2));
+    let mut taken: Vec<DVector<f64>> = Vec::new();
+    for i in 0..svd.s.len() {
+        let mut middle = &n1 * svd.u.column(i) + &n2 * svd.v.column(i);
+        for other in &taken {
+            middle -= other * other.dot(&middle);
+        }
+        let norm = middle.norm();
+        // Half of what two unit vectors at a right angle have: these are no pair.
+        if norm < std::f64::consts::FRAC_1_SQRT_2 {
+            continue;
+        }
+        middle /= norm;
+        let moves =
+            |side: &Side| (&side.a * &middle).norm() * side.from_reference.dot(&middle).abs();
+        if sides.iter().all(|side| moves(side) <= GAUGE_TILT) {
+            taken.push(middle);
+        }
+    }
+    for side in sides {
+        for gauge in &taken {
+            let seen = &side.a * gauge;
+            side.y -= &seen * gauge.dot(&side.from_reference);
+            side.a -= &seen * gauge.transpose();
+        }
+    }
+}
+
+/// The part of y in the range of A.
+fn in_range(a: &DMatrix<f64>, y: &DVector<f64>, limit: f64) -> DVector<f64> {
+    let svd = decompose::svd(a);
+    let mut part = DVector::zeros(y.len());
+    for i in 0..svd.s.len() {
+        if svd.s[i] > limit {
+            part += svd.u.column(i) * svd.u.column(i).dot(y);
+        }
+    }
+    part
+}
+
+/// Equation (2).
+fn change(
+    old: &Evidence,
+    old_number: &Number,
+    new: &Evidence,
+    new_number: &Number,
+    dof: f64,
+) -> Option<Changed> {
+    let (from, old_variance) = old.estimate(old_number);
+    let (to, new_variance) = new.estimate(new_number);
+    let plain = to - from;
+    let change = if old_number.unit == Unit::Radian {
+        plain.sin().atan2(plain.cos())
+    } else {
+        plain
+    };
+    let sigma = (old_variance + new_variance).sqrt();
+    if !(sigma > 0.0 && change.is_finite() && sigma.is_finite()) {
+        return None;
+    }
+    // t² is F(1, dof); Satterthwaite's degrees lie between the smaller and the sum, the smaller is safe.
+    let p_value = chance::f_tail((change / sigma).powi(2), 1.0, dof);
+    Some(Changed {
+        name: old_number.name.clone(),
+        text: old_number.text.clone(),
+        unit: old_number.unit,
+        old: from,
+        new: to,
+        change,
+        sigma,
+        p_value,
+        p_adjusted: 1.0,
+        significant: false,
+        gauge_free: old_number.gauge_free,
+    })
+}
+
+/// Holm 1979: the i-th smallest of m probabilities counts m − i times, and none less than one before it.
+fn holm(numbers: &mut [Changed]) {
+    numbers.sort_by(|a, b| {
+        a.p_value.total_cmp(&b.p_value).then(
+            (b.change / b.sigma)
+                .abs()
+                .total_cmp(&(a.change / a.sigma).abs()),
+        )
+    });
+    let m = numbers.len();
+    let mut least = 0.0_f64;
+    for (i, number) in numbers.iter_mut().enumerate() {
+        least = least.max(number.p_value * (m - i) as f64).min(1.0);
+        number.p_adjusted = least;
+        number.significant = least < 0.5 * FALSE_ALARMS;
+    }
+}

@@ -1,0 +1,73 @@
+//! Why two calibrations cannot be compared.
+
+use calib_report::{NotAReport, ReportError};
+
+/// Why two calibrations cannot be compared.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DriftError {
+    /// A report cannot be read.
+    #[error(transparent)]
+    Report(#[from] NotAReport),
+    /// A report holds no information matrix.
+    #[error(
+        "{file}: it has no `data_information`, so the covariance of its parameters is not known\n  help: run the calibration again with `--method ml` and this version of calib"
+    )]
+    NoInformation {
+        /// The report.
+        file: String,
+    },
+    /// The tables of a report contradict each other.
+    #[error("{file}: its `data_information` is inconsistent\n  help: run the calibration again")]
+    Inconsistent {
+        /// The report.
+        file: String,
+    },
+    /// The reports are of two robots.
+    #[error(
+        "{} is of robot `{}`, {} of robot `{}`\n  help: compare two calibrations of one robot",
+        old.0, old.1, new.0, new.1
+    )]
+    OtherRobot {
+        /// The old report and its robot.
+        old: (String, String),
+        /// The new report and its robot.
+        new: (String, String),
+    },
+    /// The calibrations start from two nominal URDFs: their parameters are displacements from different places.
+    #[error(
+        "{old} and {new} start from different nominal URDFs of `{robot}`: their parameters are displacements from different places\n  help: run both recordings with the same URDF, for example the one before the first calibration"
+    )]
+    OtherNominal {
+        /// The old report.
+        old: String,
+        /// The new report.
+        new: String,
+        /// The robot.
+        robot: String,
+    },
+    /// No parameter of the robot is estimated in both.
+    #[error(
+        "{old} and {new} have no parameter of the robot in common\n  help: estimate the same parameters in both calibrations"
+    )]
+    NothingInCommon {
+        /// The old report.
+        old: String,
+        /// The new report.
+        new: String,
+    },
+    /// The comparison has no JSON form.
+    #[error("the comparison cannot be written: {0}")]
+    Unwritable(#[from] ReportError),
+}
+
+impl DriftError {
+    /// Whether the reports can be read but should not be compared.
+    #[must_use]
+    pub fn is_refusal(&self) -> bool {
+        matches!(
+            self,
+            Self::OtherRobot { .. } | Self::OtherNominal { .. } | Self::NothingInCommon { .. }
+        )
+    }
+}

@@ -1,0 +1,311 @@
+//! One calibration's side of the comparison: U, x̃, and the numbers to be compared.
+
+use std::collections::BTreeMap;
+
+use calib_geometry::decompose;
+use calib_report::{Report, Unit};
+use nalgebra::{DMatrix, DVector};
+
+use crate::error::DriftError;
+
+/// A number whose change is of interest: gradient in the evidence's parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Number {
+    /// Stable name.
+    pub name: String,
+    /// In words.
+    pub text: String,
+    /// Its unit.
+    pub unit: Unit,
+    /// Value at the estimate, with the prior.
+    pub value: f64,
+    /// Derivative by the parameters, scaled as the columns of [`Evidence::root`].
+    pub gradient: DVector<f64>,
+    /// Free of any choice of frames.
+    pub gauge_free: bool,
+}
+
+/// What one calibration knows.
+#[derive(Debug, Clone)]
+pub struct Evidence {
+    /// Its file, for messages.
+    pub file: String,
+    /// The robot's name.
+    pub robot: String,
+    /// SHA-256 of the description that it started from.
+    pub description: String,
+    /// Parameters, by column.
+    pub parameters: Vec<String>,
+    /// Whether a parameter belongs to the robot and not to where tracker and bodies stood.
+    pub of_robot: Vec<bool>,
+    /// U with its columns scaled to 1°, 1 cm and the like.
+    pub root: DMatrix<f64>,
+    /// The scales: parameter = scaled · scale.
+    pub scale: DVector<f64>,
+    /// U x̃, whitened.
+    pub seen: DVector<f64>,
+    /// x̂, scaled.
+    pub found: DVector<f64>,
+    /// x̃ − x̂, scaled, of least norm.
+    pub without_prior: DVector<f64>,
+    /// Singular values and directions of `root`.
+    pub singular: DVector<f64>,
+    /// Columns are directions.
+    pub directions: DMatrix<f64>,
+    /// How many the data see.
+    pub rank: usize,
+    /// Degrees of freedom of the noise.
+    pub degrees_of_freedom: f64,
+    /// What can be compared.
+    pub numbers: Vec<Number>,
+}
+
+/// As in `calib-core`: a direction below this share of the strongest is a gauge.
+pub(super) const NULL: f64 = calib_core::NULL_TOLERANCE;
+
+fn scale(unit: Unit) -> f64 {
+    match unit {
+        Unit::Metre => 0.01,
+        Unit::Radian => 1_f64.to_radians(),
+        Unit::Second | Unit::One => 0.01,
+        Unit::RadianPerNewtonMetre | Unit::MetrePerNewton => 1e-4,
+    }
+}
+
+impl Evidence {
+    /// From a report.
+    ///
+    /// # Errors
+    /// [`DriftError`] for a report without `data_information`, or one whose tables do not fit together.
+    pub fn of(report: &Report, file: &str) -> Result<Self, DriftError> {
+        let Some(info) = &report.data_information else {
+            return Err(DriftError::NoInformation {
+                file: file.to_owned(),
+            });
+        };
+        let damaged = || DriftError::Inconsistent {
+            file: file.to_owned(),
+        };
+        let n = info.parameters.len();
+        let fits = n > 0
+            && info.prior_sigma.len() == n
+            && info.root.len() == n
+            && info
+                .root
+                .iter()
+                .enumerate()
+                .all(|(r, row)| row.len() == n - r);
+        if !fits {
+            return Err(damaged());
+        }
+        let known: BTreeMap<&str, &calib_report::Parameter> = report
+            .parameters
+            .iter()
+            .map(|p| (p.name.as_str(), p))
+            .collect();
+        let parameters: Option<Vec<_>> = info
+            .parameters
+            .iter()
+            .map(|name| known.get(name.as_str()).copied())
+            .collect();
+        let parameters = parameters.ok_or_else(damaged)?;
+        let scale = DVector::from_iterator(n, parameters.iter().map(|p| scale(p.unit)));
+        let mut root = DMatrix::zeros(n, n);
+        for (r, row) in info.root.iter().enumerate() {
+            for (k, x) in row.iter().enumerate() {
+                root[(r, r + k)] = x * scale[r + k];
+            }
+        }
+        // P (x̂ − x₀), scaled
+        let pull = DVector::from_iterator(
+            n,
+            parameters.iter().enumerate().map(|(i, p)| {
+                info.prior_sigma[i].map_or(0.0, |sigma| {
+                    (p.value - p.nominal) / (sigma * sigma) * scale[i]
+                })
+            }),
+        );
+        let svd = decompose::svd(&root);
+        let rank = decompose::rank(&svd.s, NULL);
+        // Uᵀ r = P (x̂ − x₀),  U (x̃ − x̂) = r
+        let mut r = DVector::zeros(n);
+        let mut without_prior = DVector::zeros(n);
+        for i in 0..rank {
+            let along = svd.v.column(i).dot(&pull) / svd.s[i];
+            r += svd.u.column(i) * along;
+            without_prior += svd.v.column(i) * (along / svd.s[i]);
+        }
+        let found = DVector::from_iterator(
+            n,
+            parameters
+                .iter()
+                .enumerate()
+                .map(|(i, p)| p.value / scale[i]),
+        );
+        let seen = &root * &found + r;
+        let finite = [&seen, &without_prior, &pull]
+            .iter()
+            .all(|v| v.iter().all(|x| x.is_finite()));
+        if !finite {
+            return Err(damaged());
+        }
+        let description = report
+            .outputs
+            .iter()
+            .find_map(|o| o.changes.clone())
+            .and_then(|path| report.inputs.iter().find(|i| i.path == path))
+            .map(|i| i.sha256.clone())
+            .unwrap_or_default();
+        let mut evidence = Self {
+            file: file.to_owned(),
+            robot: report.robot.clone(),
+            description,
+            of_robot: parameters.iter().map(|p| p.joint.is_some()).collect(),
+            parameters: info.parameters.clone(),
+            root,
+            scale,
+            seen,
+            found,
+            without_prior,
+            singular: svd.s,
+            directions: svd.v,
+            rank,
+            degrees_of_freedom: info.degrees_of_freedom,
+            numbers: Vec::new(),
+        };
+        evidence.numbers = numbers(info, &parameters, &evidence.scale);
+        Ok(evidence)
+    }
+
+    /// Is there a parameter of the robot with this name?
+    #[must_use]
+    pub fn has_of_robot(&self, name: &str) -> bool {
+        let mut all = self.parameters.iter().zip(&self.of_robot);
+        all.any(|(other, robot)| *robot && other == name)
+    }
+
+    /// Does the data alone determine this number?
+    #[must_use]
+    pub fn determines(&self, number: &Number) -> bool {
+        /// A share in the null space below this is rounding; as in `calib-core`.
+        const INDETERMINATE: f64 = 1e-5;
+        let n = self.parameters.len();
+        let norm = number.gradient.norm();
+        let leak = (self.rank..n)
+            .map(|i| self.directions.column(i).dot(&number.gradient).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        norm > 0.0 && leak <= INDETERMINATE * norm
+    }
+
+    /// Value and variance of a number by the data alone.
+    #[must_use]
+    pub fn estimate(&self, number: &Number) -> (f64, f64) {
+        let variance = (0..self.rank)
+            .map(|i| (self.directions.column(i).dot(&number.gradient) / self.singular[i]).powi(2))
+            .sum();
+        (
+            number.value + number.gradient.dot(&self.without_prior),
+            variance,
+        )
+    }
+
+    /// A, A x̃ − A x_ref and x̃ − x_ref of the robot's own parameters, in the order of `names`: what is left when tracker and
+    /// bodies may stand anywhere. `reference` is x_ref by name, scaled.
+    #[must_use]
+    pub(super) fn of_robot(&self, names: &[&str], reference: &DVector<f64>) -> Side {
+        let column = |name: &&str| self.parameters.iter().position(|p| p == name);
+        let shared: Vec<usize> = names.iter().filter_map(column).collect();
+        let rest: Vec<usize> = (0..self.parameters.len())
+            .filter(|i| !shared.contains(i))
+            .collect();
+        let mut a = self.root.select_columns(&shared);
+        let mut y = &self.seen - &a * reference;
+        if !rest.is_empty() {
+            let svd = decompose::svd(&self.root.select_columns(&rest));
+            let q = svd.u.columns(0, decompose::rank(&svd.s, NULL)).into_owned();
+            a -= &q * (q.transpose() * &a);
+            y -= &q * (q.transpose() * &y);
+        }
+        let from_reference = DVector::from_iterator(
+            shared.len(),
+            shared
+                .iter()
+                .enumerate()
+                .map(|(k, &i)| self.found[i] + self.without_prior[i] - reference[k]),
+        );
+        Side {
+            a,
+            y,
+            from_reference,
+        }
+    }
+
+    /// x̂ of some parameters, scaled.
+    #[must_use]
+    pub(super) fn found(&self, names: &[&str]) -> DVector<f64> {
+        let place = |name: &&str| self.parameters.iter().position(|p| p == name);
+        DVector::from_iterator(
+            names.len(),
+            names
+                .iter()
+                .map(|name| place(name).map_or(0.0, |i| self.found[i])),
+        )
+    }
+}
+
+/// One calibration's part of equation (1), tracker and bodies projected out.
+#[derive(Debug, Clone)]
+pub(super) struct Side {
+    /// A, whitened rows by shared parameters.
+    pub a: DMatrix<f64>,
+    /// What the data say, A (x̃ − x_ref).
+    pub y: DVector<f64>,
+    /// x̃ − x_ref.
+    pub from_reference: DVector<f64>,
+}
+
+/// The invariants, and every parameter of the robot by itself.
+fn numbers(
+    info: &calib_report::DataInformation,
+    parameters: &[&calib_report::Parameter],
+    scale: &DVector<f64>,
+) -> Vec<Number> {
+    let n = parameters.len();
+    let mut numbers: Vec<Number> = info
+        .quantities
+        .iter()
+        .map(|q| {
+            let mut gradient = DVector::zeros(n);
+            for term in &q.gradient {
+                if let Some(i) = info.parameters.iter().position(|p| *p == term.parameter) {
+                    gradient[i] = term.coefficient * scale[i];
+                }
+            }
+            Number {
+                name: q.name.clone(),
+                text: q.text.clone(),
+                unit: q.unit,
+                value: q.value,
+                gradient,
+                gauge_free: true,
+            }
+        })
+        .collect();
+    for (i, p) in parameters.iter().enumerate() {
+        if p.joint.is_none() {
+            continue;
+        }
+        let mut gradient = DVector::zeros(n);
+        gradient[i] = scale[i];
+        numbers.push(Number {
+            name: p.name.clone(),
+            text: p.name.clone(),
+            unit: p.unit,
+            value: p.value,
+            gradient,
+            gauge_free: false,
+        });
+    }
+    numbers
+}

@@ -1,0 +1,136 @@
+//! What a person and a program read of a drift.
+
+use std::fmt::Write as _;
+
+use calib_report::{number, terminal};
+
+use crate::compare::{Changed, Drift};
+use crate::error::DriftError;
+
+/// For a terminal, at most 80 columns: the answer first, then what moved and by how much.
+#[must_use]
+pub fn text(drift: &Drift) -> String {
+    let mut out = String::new();
+    // Writing to a String does not fail.
+    let _ = writeln!(out, "{} → {} · {}", drift.old, drift.new, drift.robot);
+    let significant: Vec<&Changed> = drift.numbers.iter().filter(|n| n.significant).collect();
+    let (free, entangled): (Vec<&Changed>, Vec<&Changed>) =
+        significant.iter().partition(|n| n.gauge_free);
+    out += match (drift.changed, significant.is_empty()) {
+        (false, _) => "NO CHANGE that the data show\n",
+        (true, false) => "CHANGED\n",
+        (true, true) => "CHANGED, and no single number shows where\n",
+    };
+    out += &terminal::wrapped(
+        &format!(
+            "all at once: squared distance {:.1}, p {} ({} directions that both recordings see)",
+            drift.joint.statistic,
+            probability(drift.joint.p_value),
+            drift.joint.degrees_of_freedom
+        ),
+        "- ",
+        "  ",
+    );
+    out += &terminal::wrapped(
+        &format!(
+            "one by one: {} of {} numbers changed (Holm); {} % false alarms for everything said here",
+            significant.len(),
+            drift.numbers.len(),
+            number::fixed(100.0 * drift.false_alarms, 0)
+        ),
+        "- ",
+        "  ",
+    );
+    section(&mut out, "What moved", &free);
+    section(
+        &mut out,
+        if free.is_empty() {
+            "What moved"
+        } else {
+            "The same in the parameters' own frames"
+        },
+        &entangled,
+    );
+    let still: Vec<&Changed> = drift
+        .numbers
+        .iter()
+        .filter(|n| !n.significant && n.gauge_free)
+        .collect();
+    if drift.changed || !still.is_empty() {
+        section(&mut out, "Within its uncertainty", &still);
+    }
+    let mut list = |what: &str, names: &[String]| {
+        if !names.is_empty() {
+            out.push('\n');
+            out += &terminal::wrapped(&format!("{what}: {}", names.join(", ")), "", "  ");
+        }
+    };
+    list("only in the old calibration", &drift.only_old);
+    list("only in the new calibration", &drift.only_new);
+    list(
+        "determined by one of the two recordings only",
+        &drift.known_in_one,
+    );
+    if !drift.known_in_neither.is_empty() {
+        out.push('\n');
+        out += &terminal::wrapped(
+            &format!(
+                "{} parameters are conventions or not seen by either recording; what both see of their combinations is in the \
+                 test of all at once",
+                drift.known_in_neither.len()
+            ),
+            "",
+            "  ",
+        );
+    }
+    out
+}
+
+fn section(out: &mut String, heading: &str, rows: &[&Changed]) {
+    if rows.is_empty() {
+        return;
+    }
+    let _ = writeln!(out, "\n{heading}");
+    let width = rows
+        .iter()
+        .map(|r| r.text.chars().count())
+        .max()
+        .unwrap_or(0)
+        .min(48);
+    for row in rows {
+        let change = number::change(row.change, Some(row.sigma), row.unit);
+        let sigmas = (row.change / row.sigma).abs();
+        if row.text.chars().count() > width {
+            let _ = writeln!(out, "  {}", row.text);
+            let _ = writeln!(out, "  {:width$}  {change}  ({sigmas:.1} σ)", "");
+        } else {
+            let _ = writeln!(out, "  {:width$}  {change}  ({sigmas:.1} σ)", row.text);
+        }
+    }
+}
+
+fn probability(p: f64) -> String {
+    /// Below this the tail of any distribution is a matter of faith.
+    const SMALLEST: f64 = 1e-6;
+    if p < SMALLEST {
+        format!("< {SMALLEST:e}")
+    } else if p < 1e-3 {
+        format!("= {p:.1e}")
+    } else {
+        format!("= {p:.3}")
+    }
+}
+
+/// For a program: SI, floats with twelve digits.
+///
+/// # Errors
+/// [`DriftError::Unwritable`] when it has no JSON form.
+pub fn json(drift: &Drift) -> Result<String, DriftError> {
+    let exact = calib_report::json::exact_json(drift)?;
+    match serde_json::from_str(&exact) {
+        Ok(value) => Ok(calib_report::json::pretty(&calib_report::json::rounded(
+            value,
+        ))),
+        Err(_) => Ok(exact),
+    }
+}

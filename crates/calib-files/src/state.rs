@@ -1,0 +1,94 @@
+//! A file that a long computation resumes from.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use crate::error::FileError;
+use crate::output::replace;
+
+/// One line for the settings, then one for each finished part, appended as parts finish, in any order.
+///
+/// [`StateFile::close`] writes the lines in the order of the plan, so that an interrupted computation leaves the same bytes
+/// as one that was not interrupted.
+#[derive(Debug)]
+pub struct StateFile {
+    path: PathBuf,
+    header: String,
+    file: File,
+}
+
+impl StateFile {
+    /// Opens the file, makes its folder, and returns the finished lines: those for which `is_whole` holds (the last line of
+    /// an interrupted computation may be cut off). With `resume` unset, or with no file there, nothing is finished.
+    ///
+    /// `header` is one line that names everything that must be the same for finished parts to be kept.
+    ///
+    /// # Errors
+    /// [`FileError::OtherState`] when the file has another header; [`FileError::Read`], [`FileError::Write`].
+    pub fn open(
+        path: &Path,
+        header: &str,
+        resume: bool,
+        is_whole: impl Fn(&str) -> bool,
+    ) -> Result<(Self, Vec<String>), FileError> {
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(FileError::write(folder))?;
+        }
+        let mut finished = Vec::new();
+        if resume && path.exists() {
+            let text = fs::read_to_string(path).map_err(|source| FileError::Read {
+                path: path.to_path_buf(),
+                source,
+            })?;
+            let mut lines = text.lines();
+            let found = lines.next().unwrap_or_default();
+            if found != header {
+                return Err(FileError::OtherState {
+                    path: path.to_path_buf(),
+                    found: found.to_owned(),
+                    expected: header.to_owned(),
+                });
+            }
+            finished = lines.filter(|l| is_whole(l)).map(str::to_owned).collect();
+        }
+        rewrite(path, header, &finished)?;
+        let file = OpenOptions::new()
+            .append(true)
+            .open(path)
+            .map_err(FileError::write(path))?;
+        let state = Self {
+            path: path.to_path_buf(),
+            header: header.to_owned(),
+            file,
+        };
+        Ok((state, finished))
+    }
+
+    /// Appends the line of a finished part.
+    ///
+    /// # Errors
+    /// [`FileError::Write`].
+    pub fn append(&mut self, line: &str) -> Result<(), FileError> {
+        self.file
+            .write_all(format!("{line}\n").as_bytes())
+            .map_err(FileError::write(&self.path))
+    }
+
+    /// Writes all lines in the order of the plan.
+    ///
+    /// # Errors
+    /// [`FileError::Write`]; the appended lines are still there then.
+    pub fn close(self, lines: &[String]) -> Result<(), FileError> {
+        rewrite(&self.path, &self.header, lines)
+    }
+}
+
+fn rewrite(path: &Path, header: &str, lines: &[String]) -> Result<(), FileError> {
+    let mut text = format!("{header}\n");
+    for line in lines {
+        text.push_str(line);
+        text.push('\n');
+    }
+    replace(path, text.as_bytes())
+}

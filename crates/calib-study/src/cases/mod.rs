@@ -1,0 +1,212 @@
+//! `calib study justin|ripley`: a case study over many simulated robots, in the layout of the paper's Tables 1 and 2.
+//!
+//! Each robot is another draw of the profile's `simulate` section (its own errors, its own noise), calibrated by both methods as
+//! `calib run` does it. What the paper could only compare with the robot's own kinematics is compared with the truth beside it.
+//! Robot k has the seed `seed + k`: the result does not depend on the number of threads, nor on where the study was interrupted.
+
+mod error;
+mod render;
+mod state;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use calib_pipeline::prepare::load::{RobotProfile, load_robot, of_tables};
+use calib_pipeline::run::{RunOptions, run_on};
+use calib_profile::Method;
+use calib_report::{LoopClosure, Report, Stats};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+pub use error::CaseError;
+pub use render::{csv, json, markdown, svg};
+use state::State;
+
+/// Both ways of solving.
+const METHODS: [(Method, &str); 2] = [(Method::Paper, "paper"), (Method::Ml, "ml")];
+
+/// Settings of a case study.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CaseOptions {
+    /// The robot's profile, with a `simulate` section.
+    pub profile: PathBuf,
+    /// Name of the study, the stem of its files: `justin`.
+    pub name: String,
+    /// Robots drawn.
+    pub robots: u64,
+    /// Seed of the first.
+    pub seed: u64,
+    /// Threads; `None`: as many as there are processors.
+    pub threads: Option<usize>,
+    /// Folder of the state file, where finished robots are kept; `None`: nothing is written.
+    pub out: Option<PathBuf>,
+    /// Keep the finished robots of an earlier run with the same settings.
+    pub resume: bool,
+}
+
+/// Error of one found transform against the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Off {
+    /// Distance of the origins, m.
+    pub translation_m: f64,
+    /// Angle between the frames, rad.
+    pub rotation_rad: f64,
+}
+
+/// One robot, one method.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RobotResult {
+    /// Its seed.
+    pub seed: u64,
+    /// `paper` or `ml`.
+    pub method: String,
+    /// Why there is no result.
+    pub failure: Option<String>,
+    /// The loops, as in the report.
+    pub loops: Vec<LoopClosure>,
+    /// Found transforms against the truth, by the report's names.
+    pub off: BTreeMap<String, Off>,
+}
+
+/// A finished case study.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CaseResult {
+    /// Name.
+    pub study: String,
+    /// Robots drawn.
+    pub robots: u64,
+    /// Seed of the first.
+    pub seed: u64,
+    /// Robot by robot, method by method.
+    pub results: Vec<RobotResult>,
+}
+
+/// Runs the study. `progress(done, total)` counts robots and is called from any thread.
+///
+/// # Errors
+/// [`CaseError`] for a profile that cannot be read or simulated, for no robots, and for a state file that cannot be used. A robot that
+/// cannot be calibrated is a result, not an error.
+pub fn run_cases(
+    options: &CaseOptions,
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<CaseResult, CaseError> {
+    if options.robots == 0 {
+        return Err(CaseError::NoRobots);
+    }
+    let robot = load_robot(&options.profile)?;
+    let state = Mutex::new(State::open(options, &robot)?);
+    let threads = options.threads.unwrap_or(0);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|source| CaseError::Threads { threads, source })?;
+    let done = AtomicU64::new(0);
+    let lock = || state.lock().unwrap_or_else(PoisonError::into_inner);
+    let numbers: Vec<u64> = (0..options.robots).collect();
+    let results: Vec<Vec<RobotResult>> = pool.install(|| {
+        numbers
+            .par_iter()
+            .with_max_len(1)
+            .map(|&k| {
+                let seed = options.seed.wrapping_add(k);
+                let known = lock().finished(seed);
+                let both = match known {
+                    Some(both) => both,
+                    None => {
+                        let both = one_robot(&robot, seed)?;
+                        lock().append(&both)?;
+                        both
+                    }
+                };
+                progress(done.fetch_add(1, Ordering::Relaxed) + 1, options.robots);
+                Ok(both)
+            })
+            .collect::<Result<_, CaseError>>()
+    })?;
+    Ok(CaseResult {
+        study: options.name.clone(),
+        robots: options.robots,
+        seed: options.seed,
+        results: results.into_iter().flatten().collect(),
+    })
+}
+
+/// Draws a robot and calibrates it by both methods.
+fn one_robot(robot: &RobotProfile, seed: u64) -> Result<Vec<RobotResult>, CaseError> {
+    let simulated =
+        calib_sim::simulate(&robot.profile, &robot.model, Some(seed)).map_err(|source| {
+            CaseError::Simulation {
+                file: robot.file.clone(),
+                source: Box::new(source),
+            }
+        })?;
+    let mut out = Vec::new();
+    for (method, word) in METHODS {
+        let options = RunOptions {
+            method: Some(method),
+            force: true,
+            no_plugins: false,
+        };
+        let ran = of_tables(robot.clone(), simulated.recordings.clone())
+            .and_then(|inputs| run_on(inputs, &options, &mut |_| {}));
+        out.push(match ran {
+            Ok(output) => RobotResult {
+                seed,
+                method: word.to_owned(),
+                failure: None,
+                off: against(&output.report, &simulated.truth),
+                loops: output.report.loops,
+            },
+            Err(e) => RobotResult {
+                seed,
+                method: word.to_owned(),
+                failure: Some(e.to_string()),
+                loops: Vec::new(),
+                off: BTreeMap::new(),
+            },
+        });
+    }
+    Ok(out)
+}
+
+fn against(report: &Report, truth: &calib_sim::Truth) -> BTreeMap<String, Off> {
+    report
+        .transforms
+        .iter()
+        .filter_map(|found| {
+            let name = &found.name;
+            let truth = truth.transforms.get(name)?.isometry();
+            let [x, y, z, w] = found.rotation_xyzw;
+            let turn = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+            let [x, y, z] = found.translation_m;
+            let at = Isometry3::from_parts(Translation3::new(x, y, z), turn);
+            let off = Off {
+                translation_m: (at.translation.vector - truth.translation.vector).norm(),
+                rotation_rad: at.rotation.angle_to(&truth.rotation),
+            };
+            Some((name.clone(), off))
+        })
+        .collect()
+}
+
+/// Mean and spread over robots of one number of each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Over {
+    pub mean: f64,
+    pub spread: f64,
+    pub largest: f64,
+}
+
+impl Over {
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let stats = Stats::of(values)?;
+        Some(Self {
+            mean: stats.mean,
+            spread: stats.std,
+            largest: stats.max,
+        })
+    }
+}
