@@ -143,9 +143,8 @@ pub use analysis::solution::{
 pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
 pub use graph::baseline::Baseline;
 pub use graph::chart::Chart;
-pub use graph::edge::{
-    Axis, Candidate, Edge, EdgeKind, EffectKind, Joint, JointEffect, Role, UnknownPose,
-};
+pub use graph::edge::{Axis, Candidate, Edge, EdgeKind, Joint, JointEffect, Role, UnknownPose};
+pub use graph::effect::{self, EFFECTS, Effect, EffectKind, JointState};
 pub use graph::error::Error;
 pub use graph::ids::{EdgeId, FrameId, GroupId, ParameterId, PointId};
 pub use graph::measurement::{
@@ -157,7 +156,10 @@ pub use graph::parameter::{
 };
 pub use graph::problem::{NoiseGroup, NoiseKind, Point, Problem};
 pub use model::derived::{Configuration, DerivedPoint, DerivedPose};
-pub use model::layout::{MIN_JOINT_RANGE, Model, Values};
+pub use model::joint::JointMotion;
+pub use model::layout::Model;
+pub use model::values::Values;
+pub use model::walk::MIN_JOINT_RANGE;
 pub use solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize};
 pub use solve::noise::sandwich;
 pub use solve::relabel::{Relabelled, relabel};

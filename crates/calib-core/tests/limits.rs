@@ -505,3 +505,62 @@ fn several_arms_share_their_torso() {
     }
     assert!(sigma[1] < 0.8 * sigma[0]);
 }
+
+#[test]
+fn a_builder_call_on_the_wrong_kind_of_edge_is_an_error() {
+    let calls: [(
+        &str,
+        fn(&mut Problem, calib_core::EdgeId, calib_core::EdgeId),
+    ); 8] = [
+        ("set_role", |p, _, joint| {
+            p.set_role(joint, calib_core::Role::Mount, None);
+        }),
+        ("set_prior", |p, _, joint| {
+            p.set_prior(joint, Some(0.1), None);
+        }),
+        ("set_start", |p, _, joint| {
+            p.set_start(joint, &Isometry3::identity());
+        }),
+        ("free_effect", |p, pose, _| {
+            p.free_effect(pose, EffectKind::Gain, None);
+        }),
+        ("free_effect", |p, pose, _| {
+            p.free_effect_with(pose, EffectKind::Backlash, vec![1.0, -1.0], None);
+        }),
+        ("candidate", |p, pose, _| {
+            p.candidate(pose, EffectKind::Backlash, vec![1.0, -1.0]);
+        }),
+        ("joint_noise", |p, pose, _| {
+            let group = p.noise_group("joint", NoiseKind::Joint, 1e-3, false);
+            p.joint_noise(pose, group);
+        }),
+        ("share_effect", |p, pose, joint| {
+            let shared = p.free_effect(joint, EffectKind::Gain, None);
+            p.share_effect(pose, EffectKind::Gain, Some(vec![0.1, 0.2]), shared);
+        }),
+    ];
+    for (name, call) in calls {
+        let mut p = Problem::new(2);
+        let (a, b, c) = (p.frame("a"), p.frame("b"), p.frame("c"));
+        let pose = p.unknown("pose", a, b, Isometry3::identity(), Chart::full());
+        let axis = Axis::Revolute(nalgebra::Vector3::z_axis());
+        let joint = p.joint("joint", b, c, axis, vec![0.1, 0.2]);
+        call(&mut p, pose, joint);
+        let error = calib_core::Model::new(&p).expect_err(name);
+        assert!(
+            matches!(&error, Error::WrongEdge { call, .. } if *call == name),
+            "{name}: {error}"
+        );
+    }
+}
+
+#[test]
+fn an_effect_that_needs_its_regressor_is_not_freed_without_it() {
+    let mut p = Problem::new(2);
+    let (a, b) = (p.frame("a"), p.frame("b"));
+    let axis = Axis::Revolute(nalgebra::Vector3::z_axis());
+    let joint = p.joint("joint", a, b, axis, vec![0.1, 0.2]);
+    p.free_effect(joint, EffectKind::TorqueCompliance, None);
+    let error = calib_core::Model::new(&p).expect_err("no torque");
+    assert!(error.to_string().contains("joint.compliance"), "{error}");
+}

@@ -16,7 +16,8 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::analysis::solution::Solution;
-use crate::graph::edge::{EdgeKind, EffectKind};
+use crate::graph::edge::EdgeKind;
+use crate::graph::effect::{EFFECTS, EffectKind, Source};
 use crate::model::layout::Model;
 use crate::solve::noise::{Whitened, covariance_of, whitened};
 use crate::solve::normal::{NormalEquations, Workspace, accumulate};
@@ -283,24 +284,16 @@ fn candidates(model: &Model) -> Vec<Candidate> {
             });
         };
         let modelled = |kind: EffectKind| joint.effects.iter().any(|f| f.kind == kind);
-        for kind in [
-            EffectKind::Gain,
-            EffectKind::EccentricityCos,
-            EffectKind::EccentricitySin,
-        ] {
-            let revolute = matches!(joint.axis, crate::graph::edge::Axis::Revolute(_));
-            if modelled(kind) || (kind != EffectKind::Gain && !revolute) {
-                continue;
+        for effect in EFFECTS.iter().filter(|e| e.testable.is_some()) {
+            for term in effect.terms.iter().filter(|t| t.source == Source::Reading) {
+                if !modelled(term.kind) && effect.applies_to(&joint.axis) {
+                    let values = joint.q.iter().filter_map(|q| term.kind.from_reading(*q));
+                    add(term.kind, format!("{name}.{}", term.name), values.collect());
+                }
             }
-            let values = match kind {
-                EffectKind::Gain => joint.q.clone(),
-                EffectKind::EccentricityCos => joint.q.iter().map(|q| q.cos() - 1.0).collect(),
-                _ => joint.q.iter().map(|q| q.sin()).collect(),
-            };
-            add(kind, format!("{name}.{}", kind.label()), values);
         }
         for candidate in &joint.candidates {
-            if candidate.kind == EffectKind::ClockOffset {
+            if candidate.kind.term().source == Source::Velocity {
                 clocks.push((e, None, candidate.values.clone()));
             } else {
                 add(

@@ -13,8 +13,9 @@ use nalgebra::{DMatrix, DVector};
 
 use calib_geometry::decompose;
 
-use crate::model::layout::{Model, Values};
+use crate::model::layout::Model;
 use crate::model::path::Derivatives;
+use crate::model::values::Values;
 use crate::solve::normal::Workspace;
 
 /// A direction whose singular value is below this fraction of the largest is a gauge: rounding

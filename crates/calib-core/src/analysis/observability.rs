@@ -6,9 +6,11 @@ use serde::{Deserialize, Serialize};
 use crate::analysis::information::Information;
 use crate::graph::edge::{Axis, EdgeKind, Role};
 use crate::graph::parameter::ParameterKind;
-use crate::model::layout::{EdgeCache, Model, Values};
+use crate::model::cache::EdgeCache;
+use crate::model::layout::Model;
 use crate::model::null_space::{TERM, sparse_basis};
 use crate::model::path::{Derivatives, Step};
+use crate::model::values::Values;
 
 /// A family of directions that measurements cannot see.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -366,9 +368,7 @@ fn classify(model: &Model, places: &[Place], axes: &Axes, columns: &[usize]) -> 
             list.push(id);
         }
     }
-    let scale = columns
-        .iter()
-        .any(|&c| matches!(kind(c), ParameterKind::Gain | ParameterKind::Coupling));
+    let scale = columns.iter().any(|&c| kind(c).is_scale());
     let rotates = columns.iter().any(|&c| kind(c) == ParameterKind::Rotation);
     if columns.len() == 1 && points.is_empty() && mounts.is_empty() {
         return Gauge::NotSeen;

@@ -3,7 +3,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::graph::edge::{EdgeKind, EffectKind, Role};
+use crate::graph::edge::{EdgeKind, Role};
+use crate::graph::effect::EffectKind;
 use crate::graph::parameter::{DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA};
 use crate::graph::problem::Problem;
 
@@ -71,7 +72,7 @@ impl Problem {
                         // A clock has no nominal offset unless the recording says so.
                         if f.kind != EffectKind::ClockOffset {
                             let p = &self.parameters[f.parameter.index()];
-                            sigmas.push((f.parameter, p.kind.typical_deviation(p.unit)));
+                            sigmas.push((f.parameter, p.unit.typical_deviation()));
                         }
                     }
                 }

@@ -9,10 +9,13 @@ use crate::graph::edge::EdgeKind;
 use crate::graph::error::Error;
 use crate::graph::measurement::{MeasurementKind, PoseNoise};
 use crate::graph::problem::Problem;
-use crate::model::layout::covariance_directions;
+use crate::model::values::covariance_directions;
 
 /// Everything that can be wrong before paths are known.
 pub(crate) fn check(problem: &Problem) -> Result<(), Error> {
+    if let Some(fault) = problem.faults.first() {
+        return Err(fault.clone());
+    }
     let length = |what: &str, found: usize| {
         if found == problem.samples {
             Ok(())

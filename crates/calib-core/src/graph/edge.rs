@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix6, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::graph::chart::Chart;
+use crate::graph::effect::EffectKind;
 use crate::graph::ids::{FrameId, GroupId, ParameterId};
 
 /// `parent_from_child(s)` for every sample s.
@@ -29,10 +30,8 @@ impl Edge {
                 effects: j
                     .effects
                     .iter()
-                    .map(|f| JointEffect {
-                        kind: f.kind,
-                        values: f.values.as_ref().map(|_| Vec::new()),
-                        parameter: f.parameter,
+                    .map(|f| {
+                        JointEffect::new(f.kind, f.values.as_ref().map(|_| Vec::new()), f.parameter)
                     })
                     .collect(),
                 candidates: Vec::new(),
@@ -70,7 +69,7 @@ pub enum EdgeKind {
     Joint(Joint),
     /// A constant that is estimated.
     Unknown(UnknownPose),
-    /// `exp(G u_s)`, `u_s ~ N(0, σ² I)`, drawn anew for every sample and marginalised.
+    /// `exp(G u_s)`, `u_s ~ N(0, σ² I)`, drawn anew for every sample and marginalized.
     Random {
         /// Columns of G, twists `[ω; v]`.
         directions: Vec<nalgebra::Vector6<f64>>,
@@ -96,7 +95,7 @@ pub enum Role {
 /// An unknown constant pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnknownPose {
-    /// Centre of the prior and origin of the chart.
+    /// Center of the prior and origin of the chart.
     pub nominal: Isometry3<f64>,
     /// Which directions are free.
     pub chart: Chart,
@@ -113,7 +112,7 @@ pub struct UnknownPose {
 pub enum Axis {
     /// Rotation about this direction through the joint frame's origin (q in rad).
     Revolute(Unit<Vector3<f64>>),
-    /// Shift along this direction (q in m).
+    /// Translation along this direction (q in m).
     Prismatic(Unit<Vector3<f64>>),
 }
 
@@ -127,11 +126,11 @@ impl Axis {
     }
 
     /// Two unit vectors that complete the axis to a right-handed basis (a, e₁, e₂): the axes of
-    /// lateral give. For a coordinate axis they are coordinate axes (z: x and y).
+    /// lateral compliance. For a coordinate axis they are coordinate axes (z: x and y).
     #[must_use]
     pub fn across(&self) -> [Vector3<f64>; 2] {
         let a = self.direction().into_inner();
-        // The coordinate axis after the dominant one, orthogonalised.
+        // The coordinate axis after the dominant one, orthogonalized.
         let k = a.iamax();
         let mut seed = Vector3::zeros();
         seed[(k + 1) % 3] = 1.0;
@@ -156,79 +155,6 @@ pub struct Joint {
     pub noise: Option<GroupId>,
 }
 
-/// Effect of a joint: linear in its coefficient.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum EffectKind {
-    /// F = 1.
-    ZeroOffset,
-    /// F = q.
-    Gain,
-    /// F = cos q − 1.
-    EccentricityCos,
-    /// F = sin q.
-    EccentricitySin,
-    /// F = torque about (force along) the axis, N·m (N).
-    TorqueCompliance,
-    /// Rotation about the first axis across, F = torque about it, N·m.
-    Lateral1,
-    /// Rotation about the second axis across, F = torque about it, N·m.
-    Lateral2,
-    /// F = ±1 by the direction of approach (or tanh τ/ε).
-    Backlash,
-    /// F = joint velocity, rad/s (m/s); the coefficient is a time.
-    ClockOffset,
-    /// F = another joint's reading.
-    Coupling,
-    /// F = whatever the caller supplies.
-    Other,
-}
-
-impl EffectKind {
-    /// The rotation axis across the joint axis that it drives, if it is a lateral effect.
-    pub(crate) fn lateral(self) -> Option<usize> {
-        match self {
-            Self::Lateral1 => Some(0),
-            Self::Lateral2 => Some(1),
-            _ => None,
-        }
-    }
-
-    /// Ending of the parameter's name.
-    #[must_use]
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::ZeroOffset => "offset",
-            Self::Gain => "gain",
-            Self::EccentricityCos => "eccentricity_cos",
-            Self::EccentricitySin => "eccentricity_sin",
-            Self::TorqueCompliance => "compliance",
-            Self::Lateral1 => "lateral_1",
-            Self::Lateral2 => "lateral_2",
-            Self::Backlash => "backlash",
-            Self::ClockOffset => "clock_offset",
-            Self::Coupling => "coupling",
-            Self::Other => "effect",
-        }
-    }
-
-    /// The physics, in words, for the goodness-of-fit finding.
-    #[must_use]
-    pub fn physics(self) -> &'static str {
-        match self {
-            Self::ZeroOffset => "zero offset of the encoder",
-            Self::Gain => "encoder gain",
-            Self::EccentricityCos | Self::EccentricitySin => "gear eccentricity",
-            Self::TorqueCompliance => "compliance under gravity",
-            Self::Lateral1 | Self::Lateral2 => "lateral compliance",
-            Self::Backlash => "backlash (hysteresis)",
-            Self::ClockOffset => "clock offset between tracker and encoders",
-            Self::Coupling => "coupling with another joint",
-            Self::Other => "an effect that the caller named",
-        }
-    }
-}
-
 /// An effect in the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointEffect {
@@ -238,9 +164,20 @@ pub struct JointEffect {
     pub values: Option<Vec<f64>>,
     /// Its coefficient; several effects may share one (one clock offset for all joints).
     pub parameter: ParameterId,
+    /// [`EffectKind::lateral`], looked up once.
+    pub(crate) lateral: Option<usize>,
 }
 
 impl JointEffect {
+    pub(crate) fn new(kind: EffectKind, values: Option<Vec<f64>>, parameter: ParameterId) -> Self {
+        Self {
+            kind,
+            values,
+            parameter,
+            lateral: kind.lateral(),
+        }
+    }
+
     pub(crate) fn value(&self, sample: usize) -> f64 {
         self.values.as_ref().map_or(1.0, |v| v[sample])
     }

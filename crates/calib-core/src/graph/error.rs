@@ -4,6 +4,7 @@ use thiserror::Error;
 
 /// A problem that cannot be stated. "The data cannot answer" is not here: that is a result.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum Error {
     /// No chain of edges joins the two frames.
     #[error("no path from frame `{from}` to frame `{to}`")]
@@ -101,6 +102,24 @@ pub enum Error {
     /// There is nothing to fit to.
     #[error("the problem has no observations")]
     NoObservations,
+    /// A builder call on an edge of another kind.
+    #[error("`Problem::{call}` was called on edge `{edge}`, which is not {expected}")]
+    WrongEdge {
+        /// The method.
+        call: &'static str,
+        /// The edge.
+        edge: String,
+        /// What the edge must be.
+        expected: &'static str,
+    },
+    /// An effect was freed without the regressor that it needs.
+    #[error(
+        "`{what}` needs its regressor for every sample: free it with `Problem::free_effect_with`"
+    )]
+    NoRegressor {
+        /// Joint and effect.
+        what: String,
+    },
     /// Two parameters have one name.
     #[error("two parameters are called `{name}`")]
     DuplicateName {

@@ -4,6 +4,7 @@ pub(crate) mod baseline;
 pub(crate) mod chart;
 pub(crate) mod check;
 pub(crate) mod edge;
+pub mod effect;
 pub(crate) mod error;
 pub(crate) mod ids;
 pub(crate) mod measurement;

@@ -1,6 +1,9 @@
 //! Scalar unknowns: their names, units, priors and bounds.
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::graph::effect::{Confounded, EffectKind};
 
 /// 1°: how far a rotation is expected from nominal unless the caller says otherwise (rad).
 pub const DEFAULT_ROTATION_SIGMA: f64 = std::f64::consts::PI / 180.0;
@@ -38,11 +41,40 @@ impl Unit {
             Self::One => "1",
         }
     }
+
+    /// Ending of a key that holds a number in this unit: `_rad`, `_m`, `_rad_per_nm`, `_m_per_n`, `_s`, or nothing.
+    #[must_use]
+    pub fn key_ending(self) -> &'static str {
+        match self {
+            Self::Radian => "_rad",
+            Self::Metre => "_m",
+            Self::RadianPerNewtonMetre => "_rad_per_nm",
+            Self::MetrePerNewton => "_m_per_n",
+            Self::Second => "_s",
+            Self::One => "",
+        }
+    }
+
+    /// Size of a typical deviation from nominal: the unit of length of the observability analysis where a parameter
+    /// has no prior.
+    #[must_use]
+    pub fn typical_deviation(self) -> f64 {
+        match self {
+            Self::Radian => DEFAULT_ROTATION_SIGMA,
+            Self::Metre => DEFAULT_TRANSLATION_SIGMA,
+            // 1e-4 rad/Nm: an arm joint that yields 5 mrad under 50 Nm.
+            Self::RadianPerNewtonMetre | Self::MetrePerNewton => 1e-4,
+            // 10 ms: a tracker frame at 100 Hz.
+            Self::Second => 0.01,
+            // 1 %: the reading error of an encoder with a wrong gear ratio.
+            Self::One => 0.01,
+        }
+    }
 }
 
-/// What a parameter describes; decides its default scale and the words about it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+/// What a parameter describes; decides the words about it. Written as one word: `rotation`, `gain`, ….
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum ParameterKind {
     /// A rotation component of an unknown pose.
     Rotation,
@@ -50,45 +82,43 @@ pub enum ParameterKind {
     Translation,
     /// A coordinate of a point in its frame.
     Point,
-    /// Constant added to a joint's reading.
-    ZeroOffset,
-    /// Relative error of a joint's reading.
-    Gain,
-    /// Gear eccentricity, coefficient of cos q − 1.
-    EccentricityCos,
-    /// Gear eccentricity, coefficient of sin q.
-    EccentricitySin,
-    /// Give of a joint under the torque about its axis.
-    TorqueCompliance,
-    /// Give of a joint under a torque across its axis.
-    LateralCompliance,
-    /// Half the play, by the direction of approach.
-    Backlash,
-    /// Tracker clock minus encoder clock.
-    ClockOffset,
-    /// Share of another joint's motion that this joint makes.
-    Coupling,
-    /// Any other regressor that the caller supplied.
-    Other,
+    /// Coefficient of a joint effect.
+    Effect(EffectKind),
 }
 
 impl ParameterKind {
-    /// Size of a typical deviation from nominal, in the parameter's unit: the length unit of the
-    /// observability analysis where a parameter has no prior.
+    /// The word for it.
     #[must_use]
-    pub fn typical_deviation(self, unit: Unit) -> f64 {
-        match (self, unit) {
-            // 1e-4 rad/Nm: an arm joint that gives 5 mrad under 50 Nm.
-            (Self::TorqueCompliance | Self::LateralCompliance, _) => 1e-4,
-            // 10 ms: a tracker frame at 100 Hz.
-            (Self::ClockOffset, _) => 0.01,
-            (_, Unit::Radian) => DEFAULT_ROTATION_SIGMA,
-            (_, Unit::Metre) => DEFAULT_TRANSLATION_SIGMA,
-            (_, Unit::RadianPerNewtonMetre | Unit::MetrePerNewton) => 1e-4,
-            (_, Unit::Second) => 0.01,
-            // 1 %: the reading error of an encoder with a wrong gear ratio.
-            (_, Unit::One) => 0.01,
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rotation => "rotation",
+            Self::Translation => "translation",
+            Self::Point => "point",
+            Self::Effect(kind) => kind.term().class,
         }
+    }
+
+    /// Whether it acts like a change of all lengths.
+    #[must_use]
+    pub fn is_scale(self) -> bool {
+        matches!(self, Self::Effect(kind) if kind.effect().confounded == Confounded::Scale)
+    }
+}
+
+impl Serialize for ParameterKind {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for ParameterKind {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(from)?;
+        [Self::Rotation, Self::Translation, Self::Point]
+            .into_iter()
+            .chain(EffectKind::all().map(Self::Effect))
+            .find(|kind| kind.name() == name)
+            .ok_or_else(|| D::Error::custom(format!("unknown parameter kind `{name}`")))
     }
 }
 
@@ -103,7 +133,7 @@ pub struct Parameter {
     pub kind: ParameterKind,
     /// Its unit.
     pub unit: Unit,
-    /// Centre of the prior.
+    /// Center of the prior.
     pub nominal: f64,
     /// Where the solver starts.
     pub start: f64,
@@ -117,10 +147,10 @@ pub struct Parameter {
 
 impl Parameter {
     /// Unit of length of this parameter in the observability analysis: its prior σ, else
-    /// [`ParameterKind::typical_deviation`].
+    /// [`Unit::typical_deviation`].
     #[must_use]
     pub fn scale(&self) -> f64 {
         self.prior_sigma
-            .unwrap_or_else(|| self.kind.typical_deviation(self.unit))
+            .unwrap_or_else(|| self.unit.typical_deviation())
     }
 }

@@ -12,14 +12,15 @@ use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Point3};
 use calib_geometry::{Twist, so3};
 
 use crate::analysis::solution::Solution;
-use crate::graph::edge::{EdgeKind, EffectKind};
+use crate::graph::edge::EdgeKind;
+use crate::graph::effect::{EffectKind, JointState};
 use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId};
-use crate::model::layout::EdgeCache;
+use crate::model::cache::EdgeCache;
 use crate::model::path::{CompiledPath, Derivatives, PathBuffer, Step};
 
 /// Joint readings (rad, m) and regressors of effects at which something is predicted. What is not
-/// given is 0; gain and eccentricity follow from the reading.
+/// given is 0; what follows from the reading alone need not be given.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Configuration {
     /// Reading per joint edge.
@@ -39,6 +40,17 @@ impl Configuration {
     #[must_use]
     pub fn with(mut self, joint: EdgeId, q: f64) -> Self {
         self.q.insert(joint, q);
+        self
+    }
+
+    /// With the reading of one joint and the regressors of all its effects.
+    #[must_use]
+    pub fn at(mut self, joint: EdgeId, state: &JointState) -> Self {
+        self.q.insert(joint, state.q);
+        for kind in EffectKind::all() {
+            let value = (kind.term().regressor)(state);
+            self.regressors.insert((joint, kind), value);
+        }
         self
     }
 }
@@ -286,12 +298,9 @@ fn at_configuration(
         joint.q = vec![q];
         for f in &mut joint.effects {
             if f.values.is_some() {
-                let value = match f.kind {
-                    EffectKind::Gain => q,
-                    EffectKind::EccentricityCos => q.cos() - 1.0,
-                    EffectKind::EccentricitySin => q.sin(),
-                    kind => at.regressors.get(&(id, kind)).copied().unwrap_or(0.0),
-                };
+                let own = f.kind.from_reading(q);
+                let given = || at.regressors.get(&(id, f.kind)).copied().unwrap_or(0.0);
+                let value = own.unwrap_or_else(given);
                 f.values = Some(vec![value]);
             }
         }

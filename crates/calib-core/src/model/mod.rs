@@ -1,7 +1,11 @@
 //! A stated problem compiled: which unknown stands where, and the pose of one frame in another at given values.
 
+pub(crate) mod cache;
 pub(crate) mod derived;
+pub(crate) mod joint;
 pub(crate) mod layout;
 pub(crate) mod null_space;
 pub(crate) mod path;
 pub(crate) mod pose;
+pub(crate) mod values;
+pub(crate) mod walk;

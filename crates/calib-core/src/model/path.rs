@@ -8,15 +8,15 @@
 //!
 //! A parameter that occurs several times contributes several times: columns add.
 
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::Vector6;
 
-use calib_geometry::so3;
-
-use crate::graph::edge::{Axis, EdgeKind, Joint};
+use crate::graph::edge::EdgeKind;
 use crate::graph::ids::EdgeId;
 use crate::graph::problem::Problem;
-use crate::model::layout::{EdgeCache, Slot, Values, coordinates, covariance_directions};
+use crate::model::cache::EdgeCache;
+use crate::model::joint::{JointDerivatives, JointPass};
 use crate::model::pose::Pose;
+use crate::model::values::{Slot, Values, coordinates, covariance_directions};
 
 #[derive(Debug, Clone)]
 pub(crate) struct CompiledPath {
@@ -106,7 +106,7 @@ impl CompiledPath {
                     .collect::<Vec<_>>()
             };
             let step = match &problem.edges[e].kind {
-                EdgeKind::Known(x) => Step::Constant(oriented(Pose::of(x), inverse)),
+                EdgeKind::Known(x) => Step::Constant(Pose::of(x).oriented(inverse)),
                 EdgeKind::Unknown(u) => {
                     let columns: Vec<(usize, usize)> = (0..6)
                         .filter_map(|i| {
@@ -116,7 +116,7 @@ impl CompiledPath {
                         .collect();
                     if columns.is_empty() {
                         let x = u.nominal * u.chart.displacement(&coordinates(u, values));
-                        Step::Constant(oriented(Pose::of(&x), inverse))
+                        Step::Constant(Pose::of(&x).oriented(inverse))
                     } else {
                         Step::Unknown {
                             edge: e,
@@ -219,7 +219,7 @@ impl CompiledPath {
                             };
                         }
                     }
-                    suffix = oriented(cache.pose[*edge], *inverse).then(&suffix);
+                    suffix = cache.pose[*edge].oriented(*inverse).then(&suffix);
                 }
                 Step::Joint {
                     edge,
@@ -230,10 +230,19 @@ impl CompiledPath {
                     let EdgeKind::Joint(joint) = &problem.edges[*edge].kind else {
                         continue;
                     };
-                    suffix = joint_step(
-                        joint, *edge, cache, values, sample, *inverse, columns, *slot, wanted,
-                        suffix, out,
-                    );
+                    let pass = JointPass {
+                        joint,
+                        motion: cache.motion(joint, *edge, values, sample),
+                        inverse: *inverse,
+                        sample,
+                        columns,
+                        slot: *slot,
+                    };
+                    let derivatives = random.then_some(JointDerivatives {
+                        columns: all.then_some(out.columns.as_mut_slice()),
+                        slots: &mut out.slots,
+                    });
+                    suffix = pass.then(suffix, derivatives);
                 }
                 Step::Measured {
                     edge,
@@ -254,7 +263,7 @@ impl CompiledPath {
                             out.slots[*s] += suffix.pull_back(&twist);
                         }
                     }
-                    suffix = oriented(x, *inverse).then(&suffix);
+                    suffix = x.oriented(*inverse).then(&suffix);
                 }
                 Step::Random { inverse, noise } => {
                     if random {
@@ -286,241 +295,35 @@ impl CompiledPath {
             suffix = match step {
                 Step::Constant(x) => x.then(&suffix),
                 Step::Unknown { edge, inverse, .. } => {
-                    oriented(cache.pose[*edge], *inverse).then(&suffix)
+                    cache.pose[*edge].oriented(*inverse).then(&suffix)
                 }
                 Step::Joint { edge, inverse, .. } => {
                     let EdgeKind::Joint(joint) = &problem.edges[*edge].kind else {
                         continue;
                     };
-                    let motion = Motion::of(joint, *edge, cache, values, sample);
-                    out.push((
-                        *edge,
-                        [None, Some(0), Some(1)].map(|lateral| {
-                            joint_direction(joint, &motion, *inverse, lateral, &suffix)
-                        }),
-                    ));
-                    joint_pose(joint, &motion, *inverse).then(&suffix)
+                    let motion = cache.motion(joint, *edge, values, sample);
+                    let pass = JointPass {
+                        joint,
+                        motion,
+                        inverse: *inverse,
+                        sample,
+                        columns: &[],
+                        slot: None,
+                    };
+                    let lateral = [None, Some(0), Some(1)];
+                    out.push((*edge, lateral.map(|k| pass.twist(k, &suffix))));
+                    motion.pose(*inverse).then(&suffix)
                 }
                 Step::Measured { edge, inverse, .. } => {
                     let EdgeKind::Measured { poses, .. } = &problem.edges[*edge].kind else {
                         continue;
                     };
                     let x = poses[sample].as_ref().map_or_else(Pose::identity, Pose::of);
-                    oriented(x, *inverse).then(&suffix)
+                    x.oriented(*inverse).then(&suffix)
                 }
                 Step::Random { .. } => suffix,
             };
         }
         suffix
-    }
-}
-
-/// The joint's transform at a sample, in the direction of walking.
-fn joint_pose(joint: &Joint, motion: &Motion, inverse: bool) -> Pose {
-    let mut x = motion.screw_motion(&joint.axis, false);
-    if let Some(theta) = motion.theta {
-        x.r *= so3::exp(&theta).to_rotation_matrix().matrix();
-    }
-    oriented(x, inverse)
-}
-
-fn oriented(x: Pose, inverse: bool) -> Pose {
-    if inverse { x.inverse() } else { x }
-}
-
-/// A joint's motion at a sample: sine and cosine of φ (revolute) or φ itself (prismatic), and the
-/// lateral rotation vector θ.
-struct Motion {
-    phi: f64,
-    sin: f64,
-    cos: f64,
-    theta: Option<Vector3<f64>>,
-}
-
-impl Motion {
-    #[inline]
-    fn of(joint: &Joint, edge: usize, cache: &EdgeCache, values: &Values, sample: usize) -> Self {
-        // Only a constant is added to the reading: the addition theorem saves a sine and a cosine.
-        if let (Some((sin_c, cos_c)), Some(table)) = (cache.offset[edge], cache.trig.get(edge))
-            && let Some(&(sin_q, cos_q)) = table.get(sample)
-        {
-            return Self {
-                phi: 0.0,
-                sin: sin_q * cos_c + cos_q * sin_c,
-                cos: cos_q * cos_c - sin_q * sin_c,
-                theta: None,
-            };
-        }
-        let mut phi = joint.q[sample];
-        let mut theta: Option<Vector3<f64>> = None;
-        for f in &joint.effects {
-            let amount = f.value(sample) * values.0[f.parameter.index()];
-            match f.kind.lateral() {
-                None => phi += amount,
-                Some(k) => {
-                    *theta.get_or_insert_with(Vector3::zeros) += joint.axis.across()[k] * amount;
-                }
-            }
-        }
-        let (sin, cos) = match joint.axis {
-            Axis::Revolute(_) => phi.sin_cos(),
-            Axis::Prismatic(_) => (0.0, 1.0),
-        };
-        Self {
-            phi,
-            sin,
-            cos,
-            theta,
-        }
-    }
-
-    /// exp(S φ), or exp(−S φ).
-    #[inline]
-    fn screw_motion(&self, axis: &Axis, inverse: bool) -> Pose {
-        let sign = if inverse { -1.0 } else { 1.0 };
-        match axis {
-            Axis::Revolute(a) => {
-                // R = cos φ I + sin φ [a]ₓ + (1 − cos φ) a aᵀ
-                let (s, c) = (self.sin * sign, self.cos);
-                let k = 1.0 - c;
-                let (x, y, z) = (a.x, a.y, a.z);
-                Pose {
-                    r: Matrix3::new(
-                        c + k * x * x,
-                        k * x * y - s * z,
-                        k * x * z + s * y,
-                        k * x * y + s * z,
-                        c + k * y * y,
-                        k * y * z - s * x,
-                        k * x * z - s * y,
-                        k * y * z + s * x,
-                        c + k * z * z,
-                    ),
-                    t: Vector3::zeros(),
-                }
-            }
-            Axis::Prismatic(a) => Pose {
-                r: Matrix3::identity(),
-                t: a.into_inner() * (self.phi * sign),
-            },
-        }
-    }
-}
-
-fn screw(axis: &Axis) -> Vector6<f64> {
-    let a = axis.direction();
-    match axis {
-        Axis::Revolute(_) => Vector6::new(a.x, a.y, a.z, 0.0, 0.0, 0.0),
-        Axis::Prismatic(_) => Vector6::new(0.0, 0.0, 0.0, a.x, a.y, a.z),
-    }
-}
-
-/// One joint: `exp(Sφ)·Exp(θ)` forward, `Exp(−θ)·exp(−Sφ)` backward.
-#[expect(
-    clippy::too_many_arguments,
-    reason = "the inner loop's whole context, called once"
-)]
-#[inline]
-fn joint_step(
-    joint: &Joint,
-    edge: usize,
-    cache: &EdgeCache,
-    values: &Values,
-    sample: usize,
-    inverse: bool,
-    columns: &[(usize, usize)],
-    slot: Option<usize>,
-    wanted: Derivatives,
-    suffix: Pose,
-    out: &mut PathBuffer,
-) -> Pose {
-    let all = wanted == Derivatives::All;
-    let motion = Motion::of(joint, edge, cache, values, sample);
-    let s = screw(&joint.axis);
-    let swing = motion.theta.map(|theta| {
-        (
-            Pose {
-                r: *so3::exp(&theta).to_rotation_matrix().matrix(),
-                t: Vector3::zeros(),
-            },
-            so3::right_jacobian(&theta),
-        )
-    });
-    let along = |suffix: &Pose, out: &mut PathBuffer, sign: f64| {
-        if wanted == Derivatives::None {
-            return;
-        }
-        // S commutes with exp(Sφ): the same twist on either side of it.
-        let column = suffix.pull_back(&s) * sign;
-        if all {
-            for &(f, c) in columns {
-                let effect = &joint.effects[f];
-                if effect.kind.lateral().is_none() {
-                    out.columns[c] += column * effect.value(sample);
-                }
-            }
-        }
-        if let Some(k) = slot {
-            out.slots[k] += column;
-        }
-    };
-    let across = |suffix: &Pose, out: &mut PathBuffer, map: &Matrix3<f64>, sign: f64| {
-        if all {
-            for &(f, c) in columns {
-                let effect = &joint.effects[f];
-                if let Some(k) = effect.kind.lateral() {
-                    let w = map * joint.axis.across()[k] * (sign * effect.value(sample));
-                    out.columns[c] += suffix.pull_back(&Vector6::new(w.x, w.y, w.z, 0.0, 0.0, 0.0));
-                }
-            }
-        }
-    };
-    if inverse {
-        along(&suffix, out, -1.0);
-        let suffix = motion.screw_motion(&joint.axis, true).then(&suffix);
-        match swing {
-            None => suffix,
-            Some((r, jr)) => {
-                // Exp(−θ)·P, θ ← θ + dθ: −Ad(P⁻¹) Exp(θ) Jr(θ) dθ
-                across(&suffix, out, &(r.r * jr), -1.0);
-                r.inverse().then(&suffix)
-            }
-        }
-    } else {
-        let suffix = match swing {
-            None => suffix,
-            Some((r, jr)) => {
-                across(&suffix, out, &jr, 1.0);
-                r.then(&suffix)
-            }
-        };
-        along(&suffix, out, 1.0);
-        motion.screw_motion(&joint.axis, false).then(&suffix)
-    }
-}
-
-/// Body twist at the path's end per unit of φ (or of a lateral angle) of one joint.
-fn joint_direction(
-    joint: &Joint,
-    motion: &Motion,
-    inverse: bool,
-    lateral: Option<usize>,
-    suffix: &Pose,
-) -> Vector6<f64> {
-    let theta = motion.theta.unwrap_or_else(Vector3::zeros);
-    let swing = Pose {
-        r: *so3::exp(&theta).to_rotation_matrix().matrix(),
-        t: Vector3::zeros(),
-    };
-    let jr = so3::right_jacobian(&theta);
-    let twist_of = |w: Vector3<f64>| Vector6::new(w.x, w.y, w.z, 0.0, 0.0, 0.0);
-    match (inverse, lateral) {
-        (false, None) => swing.then(suffix).pull_back(&screw(&joint.axis)),
-        (true, None) => -suffix.pull_back(&screw(&joint.axis)),
-        (false, Some(k)) => suffix.pull_back(&twist_of(jr * joint.axis.across()[k])),
-        (true, Some(k)) => -motion
-            .screw_motion(&joint.axis, true)
-            .then(suffix)
-            .pull_back(&twist_of(swing.r * jr * joint.axis.across()[k])),
     }
 }

@@ -48,6 +48,11 @@ impl Pose {
         }
     }
 
+    /// Itself, or its inverse.
+    pub(crate) fn oriented(self, inverse: bool) -> Self {
+        if inverse { self.inverse() } else { self }
+    }
+
     /// Ad(self⁻¹) [ω; v] = [Rᵀω; Rᵀ(v + ω × t)]
     #[inline]
     pub(crate) fn pull_back(&self, xi: &Vector6<f64>) -> Vector6<f64> {

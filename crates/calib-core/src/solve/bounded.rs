@@ -11,7 +11,8 @@ use clarabel::solver::{
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use crate::model::layout::{Model, Values};
+use crate::model::layout::Model;
+use crate::model::values::Values;
 use crate::solve::normal::NormalEquations;
 
 /// Replaces `step` by the solution of (1) when it leaves the box; `false` when the program fails.

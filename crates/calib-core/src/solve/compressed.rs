@@ -13,8 +13,9 @@
 use nalgebra::{DMatrix, Dyn, Matrix6, MatrixView, Vector3, Vector6};
 
 use crate::graph::measurement::MeasurementKind;
-use crate::model::layout::{Model, Values};
+use crate::model::layout::Model;
 use crate::model::path::Derivatives;
+use crate::model::values::Values;
 use crate::solve::normal::{NormalEquations, Workspace};
 use crate::solve::rows::{add_block, residual};
 

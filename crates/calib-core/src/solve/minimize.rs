@@ -21,7 +21,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::graph::edge::EdgeKind;
-use crate::model::layout::{Model, Values, coordinates};
+use crate::model::layout::Model;
+use crate::model::values::{Values, coordinates};
 use crate::solve::bounded::bounded_step;
 use crate::solve::normal::{NormalEquations, Workspace, accumulate, cost};
 

@@ -15,8 +15,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::layout::{Model, Values};
+use crate::model::layout::Model;
 use crate::model::path::Derivatives;
+use crate::model::values::Values;
 use crate::solve::compressed::Local;
 use crate::solve::minimize::{cholesky_in_place, solve_in_place};
 use crate::solve::normal::{NormalEquations, Workspace, accumulate, add_prior};

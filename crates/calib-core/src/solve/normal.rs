@@ -5,8 +5,10 @@
 //! F = ½ Σ_s e_sᵀ V_s⁻¹ e_s + ½ (x − x₀)ᵀ Λ (x − x₀)                                          (2)
 //! ```
 
-use crate::model::layout::{EdgeCache, Model, Values};
+use crate::model::cache::EdgeCache;
+use crate::model::layout::Model;
 use crate::model::path::Derivatives;
+use crate::model::values::Values;
 use crate::solve::compressed::{Local, accumulate_compressed, cost_compressed};
 use crate::solve::rows::SampleRows;
 use crate::solve::structured::RandomPart;

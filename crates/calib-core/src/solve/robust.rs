@@ -16,8 +16,9 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::graph::measurement::MeasurementKind;
-use crate::model::layout::{Model, Values};
+use crate::model::layout::Model;
 use crate::model::path::Derivatives;
+use crate::model::values::Values;
 use crate::solve::minimize::{MinimizeSettings, Minimum, minimize_in};
 use crate::solve::normal::Workspace;
 

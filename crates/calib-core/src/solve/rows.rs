@@ -12,9 +12,11 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use calib_geometry::so3;
 
 use crate::graph::measurement::{MeasurementKind, PoseNoise};
-use crate::model::layout::{EdgeCache, Model, Values};
+use crate::model::cache::EdgeCache;
+use crate::model::layout::Model;
 use crate::model::path::{Derivatives, PathBuffer};
 use crate::model::pose::Pose;
+use crate::model::values::Values;
 
 /// Scratch and result of [`SampleRows::fill`]; all matrices row-major.
 #[derive(Debug, Clone)]

@@ -99,7 +99,7 @@ pub fn add_clocks(formulation: &mut Formulation, inputs: &Inputs, free_set: Free
                     problem.parameter(Parameter {
                         name,
                         joint: None,
-                        kind: ParameterKind::ClockOffset,
+                        kind: ParameterKind::Effect(EffectKind::ClockOffset),
                         unit: Unit::Second,
                         nominal: 0.0,
                         start: 0.0,

@@ -1,0 +1,57 @@
+//! Backlash: the joint stops half of its clearance short of where its motor is, on the side that it came from.
+
+use super::{
+    Confounded, DEG, Drives, Effect, EffectKind, JointState, MM, Prior, PriorKey, ProfileKeys,
+    Quantity, Source, Term, always,
+};
+
+/// Approached from both sides: otherwise backlash and zero offset are one number.
+fn from_both_sides(states: &[JointState]) -> bool {
+    [1.0, -1.0]
+        .iter()
+        .all(|side| states.iter().any(|s| s.approach == *side))
+}
+
+/// F = ±1 by the direction of approach.
+pub static EFFECT: Effect = Effect {
+    id: "backlash",
+    physics: "backlash (hysteresis)",
+    ladder: Some((5, "backlash")),
+    profile: Some(ProfileKeys {
+        all: "backlash",
+        all_text: "Backlash of the moved joints: half of it to either side by the direction of approach from the row before.",
+        own: "backlash",
+        own_text: "Backlash, by the direction of approach.",
+    }),
+    prior: Some(Prior {
+        revolute: &PriorKey {
+            key: "backlash_deg",
+            text: "Half of a joint's backlash, deg.",
+            default: 0.2,
+            si: DEG,
+        },
+        prismatic: &PriorKey {
+            key: "backlash_mm",
+            text: "Half of a prismatic joint's backlash, mm.",
+            default: 0.5,
+            si: MM,
+        },
+        least: 0.0,
+    }),
+    geometric: false,
+    revolute_only: false,
+    estimable: always,
+    testable: Some(from_both_sides),
+    confounded: Confounded::Nothing,
+    page: "mathematics.md",
+    terms: &[Term {
+        kind: EffectKind::Backlash,
+        name: "backlash",
+        class: "backlash",
+        formula: "backlash*approach",
+        quantity: Quantity::Position,
+        drives: Drives::About,
+        source: Source::Approach,
+        regressor: |s| s.approach,
+    }],
+};

@@ -1,0 +1,28 @@
+//! Clock offset: the tracker's time is not the encoders' time, so a moving joint is read early or late.
+
+use super::{Confounded, Drives, Effect, EffectKind, Quantity, Source, Term, always};
+
+/// F = joint velocity; one coefficient for all joints of a recording.
+pub static EFFECT: Effect = Effect {
+    id: "clock_offset",
+    physics: "clock offset between tracker and encoders",
+    ladder: None,
+    profile: None,
+    prior: None,
+    geometric: false,
+    revolute_only: false,
+    estimable: always,
+    testable: Some(always),
+    confounded: Confounded::Nothing,
+    page: "recording-a-sweep.md",
+    terms: &[Term {
+        kind: EffectKind::ClockOffset,
+        name: "clock_offset",
+        class: "clock_offset",
+        formula: "clock_offset*velocity",
+        quantity: Quantity::Time,
+        drives: Drives::About,
+        source: Source::Velocity,
+        regressor: |s| s.velocity,
+    }],
+};

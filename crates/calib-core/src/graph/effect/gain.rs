@@ -1,0 +1,48 @@
+//! Gain: the joint moves by more or less than its encoder says, in proportion.
+
+use super::{
+    Confounded, Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Source, Term,
+    always,
+};
+
+/// Prior of gains, shared by couplings.
+pub(super) static PRIOR: PriorKey = PriorKey {
+    key: "gain_percent",
+    text: "Gains and couplings, per cent.",
+    default: 1.0,
+    si: 0.01,
+};
+
+/// F = q.
+pub static EFFECT: Effect = Effect {
+    id: "gain",
+    physics: "encoder gain",
+    ladder: Some((7, "gains")),
+    profile: Some(ProfileKeys {
+        all: "joint_gains",
+        all_text: "Gains of the moved joints: true angle per indicated angle.",
+        own: "gain",
+        own_text: "Gain.",
+    }),
+    prior: Some(Prior {
+        revolute: &PRIOR,
+        prismatic: &PRIOR,
+        least: 0.0,
+    }),
+    geometric: false,
+    revolute_only: false,
+    estimable: always,
+    testable: Some(always),
+    confounded: Confounded::Scale,
+    page: "mathematics.md",
+    terms: &[Term {
+        kind: EffectKind::Gain,
+        name: "gain",
+        class: "gain",
+        formula: "gain*q",
+        quantity: Quantity::Ratio,
+        drives: Drives::About,
+        source: Source::Reading,
+        regressor: |s| s.q,
+    }],
+};

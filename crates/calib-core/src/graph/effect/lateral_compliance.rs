@@ -1,0 +1,53 @@
+//! Lateral compliance: the joint's bearing yields under the torques across its axis.
+
+use super::{
+    Confounded, Drives, Effect, EffectKind, Prior, ProfileKeys, Quantity, Source, Term, compliance,
+    loaded,
+};
+
+/// F = torque about each of the two axes across.
+pub static EFFECT: Effect = Effect {
+    id: "lateral_compliance",
+    physics: "lateral compliance",
+    ladder: Some((4, "lateral compliance")),
+    profile: Some(ProfileKeys {
+        all: "lateral_compliance",
+        all_text: "Tilt of the moved joints' axes per gravity torque across them.",
+        own: "lateral_compliance",
+        own_text: "Compliance across the axis.",
+    }),
+    prior: Some(Prior {
+        revolute: &compliance::PRIOR,
+        prismatic: &compliance::PRIOR,
+        least: 0.0,
+    }),
+    geometric: false,
+    revolute_only: false,
+    // Only joints that hold a load about their axis: a joint with a vertical axis shows none of it.
+    estimable: loaded,
+    testable: None,
+    confounded: Confounded::Nothing,
+    page: "mathematics.md",
+    terms: &[
+        Term {
+            kind: EffectKind::Lateral1,
+            name: "lateral_1",
+            class: "lateral_compliance",
+            formula: "lateral_1*torque_across_1",
+            quantity: Quantity::LateralCompliance,
+            drives: Drives::Across(0),
+            source: Source::Load,
+            regressor: |s| s.across[0],
+        },
+        Term {
+            kind: EffectKind::Lateral2,
+            name: "lateral_2",
+            class: "lateral_compliance",
+            formula: "lateral_2*torque_across_2",
+            quantity: Quantity::LateralCompliance,
+            drives: Drives::Across(1),
+            source: Source::Load,
+            regressor: |s| s.across[1],
+        },
+    ],
+};

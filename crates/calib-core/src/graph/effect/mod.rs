@@ -1,0 +1,384 @@
+//! Joint effects: what the motion of a real joint adds to its reading. One file and one entry of [`EFFECTS`] each.
+//!
+//! ```text
+//! φ = q + Σ_j F_j c_j,   θ = Σ_j e_j F_j c_j,   joint_from_child = exp(S φ) · Exp(θ)        (1)
+//! ```
+//!
+//! F_j, the regressor of a term, follows from the [`JointState`]; c_j is its coefficient. Everything that depends on
+//! the set of effects (formulation, simulation, prediction, score tests, profile keys, export, report) reads the
+//! table. To add an effect: write its file, name its terms in [`EffectKind`] and list it in [`EFFECTS`].
+
+use serde::{Deserialize, Serialize};
+
+use crate::graph::edge::Axis;
+use crate::graph::parameter::Unit;
+
+pub mod backlash;
+pub mod clock_offset;
+pub mod compliance;
+pub mod coupling;
+pub mod eccentricity;
+pub mod gain;
+pub mod lateral_compliance;
+pub mod offset;
+pub mod other;
+
+/// All joint effects, in the order in which their parameters are created.
+pub static EFFECTS: &[&Effect] = &[
+    &offset::EFFECT,
+    &gain::EFFECT,
+    &eccentricity::EFFECT,
+    &compliance::EFFECT,
+    &lateral_compliance::EFFECT,
+    &backlash::EFFECT,
+    &coupling::EFFECT,
+    &clock_offset::EFFECT,
+    &other::EFFECT,
+];
+
+/// Identity of a [`Term`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum EffectKind {
+    /// F = 1.
+    ZeroOffset,
+    /// F = q.
+    Gain,
+    /// F = cos q − 1.
+    EccentricityCos,
+    /// F = sin q.
+    EccentricitySin,
+    /// F = torque about (force along) the axis, N·m (N).
+    TorqueCompliance,
+    /// Rotation about the first axis across, F = torque about it, N·m.
+    Lateral1,
+    /// Rotation about the second axis across, F = torque about it, N·m.
+    Lateral2,
+    /// F = ±1 by the direction of approach (or tanh τ/ε).
+    Backlash,
+    /// F = another joint's reading.
+    Coupling,
+    /// F = joint velocity, rad/s (m/s); the coefficient is a time.
+    ClockOffset,
+    /// F = whatever the caller supplies.
+    Other,
+}
+
+/// All that a regressor may depend on, at one joint and one sample. What is not known is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct JointState {
+    /// Reading, rad or m.
+    pub q: f64,
+    /// Rate of the reading, rad/s or m/s.
+    pub velocity: f64,
+    /// Torque that the joint holds about (force along) its axis, N·m (N).
+    pub torque: f64,
+    /// Torques about the two axes across ([`Axis::across`]), N·m.
+    pub across: [f64; 2],
+    /// Direction of approach: +1, −1, or 0 where it is not known.
+    pub approach: f64,
+    /// Reading of the joint that this one is coupled to, rad or m.
+    pub other: f64,
+    /// Regressor that the caller supplies.
+    pub given: f64,
+}
+
+/// What a regressor depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Source {
+    /// Nothing: it is 1.
+    Constant,
+    /// The reading alone.
+    Reading,
+    /// The torques that the joint holds.
+    Load,
+    /// The direction of approach.
+    Approach,
+    /// Another joint's reading.
+    OtherJoint,
+    /// The joint's velocity.
+    Velocity,
+    /// The caller.
+    Caller,
+}
+
+/// What a term adds to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Drives {
+    /// φ of equation (1): the motion about (along) the axis.
+    About,
+    /// θ of equation (1): the rotation about this axis across ([`Axis::across`]).
+    Across(usize),
+}
+
+/// What a coefficient measures; its unit follows with the joint's kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Same as the reading: rad or m.
+    Position,
+    /// A ratio.
+    Ratio,
+    /// Motion along the axis per load along it: rad/(N·m) or m/N.
+    Compliance,
+    /// Rotation across the axis per torque across it: rad/(N·m).
+    LateralCompliance,
+    /// A time, s.
+    Time,
+}
+
+impl Quantity {
+    /// Unit of the coefficient at a joint.
+    #[must_use]
+    pub fn unit(self, prismatic: bool) -> Unit {
+        match (self, prismatic) {
+            (Self::Position, false) => Unit::Radian,
+            (Self::Position, true) => Unit::Metre,
+            (Self::Ratio, _) => Unit::One,
+            (Self::Compliance, true) => Unit::MetrePerNewton,
+            (Self::Compliance, false) | (Self::LateralCompliance, _) => Unit::RadianPerNewtonMetre,
+            (Self::Time, _) => Unit::Second,
+        }
+    }
+}
+
+/// One regressor with one coefficient.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Term {
+    /// Identity.
+    pub kind: EffectKind,
+    /// Ending of the parameter's name and stem of the export key.
+    pub name: &'static str,
+    /// `kind` of the parameter in a report.
+    pub class: &'static str,
+    /// The summand in the header of an exported calibration.
+    pub formula: &'static str,
+    /// What the coefficient measures.
+    pub quantity: Quantity,
+    /// What the term adds to.
+    pub drives: Drives,
+    /// What the regressor depends on.
+    pub source: Source,
+    /// F of equation (1).
+    pub regressor: fn(&JointState) -> f64,
+}
+
+/// Where a profile frees an effect.
+#[derive(Debug)]
+pub struct ProfileKeys {
+    /// Key under `solve.free`, for all moved joints.
+    pub all: &'static str,
+    /// What it frees there.
+    pub all_text: &'static str,
+    /// Key under `solve.joints.<joint>.free`.
+    pub own: &'static str,
+    /// What it frees there.
+    pub own_text: &'static str,
+}
+
+/// A prior standard deviation that a profile can change.
+#[derive(Debug)]
+pub struct PriorKey {
+    /// Key under `solve.prior`, unit included.
+    pub key: &'static str,
+    /// What it is, with its unit.
+    pub text: &'static str,
+    /// Default, in the unit of the key.
+    pub default: f64,
+    /// SI per unit of the key.
+    pub si: f64,
+}
+
+/// Prior of an effect's coefficients: the same key for both kinds of joint where there is only one.
+#[derive(Debug)]
+pub struct Prior {
+    /// At revolute joints.
+    pub revolute: &'static PriorKey,
+    /// At prismatic joints.
+    pub prismatic: &'static PriorKey,
+    /// σ is never below this (SI).
+    pub least: f64,
+}
+
+/// Which other parameters an effect can be confounded with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Confounded {
+    /// None by construction.
+    Nothing,
+    /// The rotation (translation) of a neighboring frame about (along) the joint axis.
+    AxisMotion,
+    /// The scale of all lengths.
+    Scale,
+}
+
+/// One physical effect at a joint: all that the program knows of it.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Effect {
+    /// Stable identity.
+    pub id: &'static str,
+    /// The physics, in words.
+    pub physics: &'static str,
+    /// Name in a ladder of models (`+ <label>`), and its place there.
+    pub ladder: Option<(u8, &'static str)>,
+    /// Where a profile frees it; `None`: by other means.
+    pub profile: Option<ProfileKeys>,
+    /// Its prior; `None`: whoever frees it decides.
+    pub prior: Option<Prior>,
+    /// A geometric number: the `sigma_*` and `within_*` of a joint apply, and a URDF can hold it.
+    pub geometric: bool,
+    /// Defined for an angle only.
+    pub revolute_only: bool,
+    /// Whether the states of the samples let the effect be estimated.
+    pub estimable: fn(&[JointState]) -> bool,
+    /// Whether a score test is worth making where it is not estimated; `None`: never.
+    pub testable: Option<fn(&[JointState]) -> bool>,
+    /// What it is confounded with.
+    pub confounded: Confounded,
+    /// Section of the book.
+    pub page: &'static str,
+    /// Its terms.
+    pub terms: &'static [Term],
+}
+
+/// Radians per degree: priors in profiles are in degrees.
+pub(crate) const DEG: f64 = std::f64::consts::PI / 180.0;
+/// Meters per millimeter.
+pub(crate) const MM: f64 = 1e-3;
+
+/// At any samples.
+pub(crate) fn always(_: &[JointState]) -> bool {
+    true
+}
+
+/// Where the joint holds a load about its axis in some sample.
+pub(crate) fn loaded(states: &[JointState]) -> bool {
+    states.iter().any(|s| s.torque.abs() > 0.0)
+}
+
+impl PartialEq for Effect {
+    fn eq(&self, other: &Self) -> bool {
+        self.id == other.id
+    }
+}
+
+impl Eq for Effect {}
+
+impl PartialOrd for Effect {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Effect {
+    /// By place in the table.
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        let place = |of: &Self| EFFECTS.iter().position(|e| e.id == of.id);
+        place(self).cmp(&place(other))
+    }
+}
+
+impl Effect {
+    /// Whether a joint with this axis can have it.
+    #[must_use]
+    pub fn applies_to(&self, axis: &Axis) -> bool {
+        !self.revolute_only || matches!(axis, Axis::Revolute(_))
+    }
+
+    /// What must be written into a profile to estimate it, as YAML.
+    #[must_use]
+    pub fn enable(&self) -> Option<String> {
+        let keys = self.profile.as_ref()?;
+        Some(format!("solve: {{free: [..., {}]}}", keys.all))
+    }
+}
+
+impl EffectKind {
+    /// Every term of the table.
+    pub fn all() -> impl Iterator<Item = Self> {
+        EFFECTS.iter().flat_map(|e| e.terms).map(|t| t.kind)
+    }
+
+    /// The effect and its term.
+    fn entry(self) -> (&'static Effect, &'static Term) {
+        EFFECTS
+            .iter()
+            .find_map(|e| Some((*e, e.terms.iter().find(|t| t.kind == self)?)))
+            .unwrap_or((&other::EFFECT, &other::EFFECT.terms[0]))
+    }
+
+    /// The physical effect that the term belongs to.
+    #[must_use]
+    pub fn effect(self) -> &'static Effect {
+        self.entry().0
+    }
+
+    /// Regressor, unit and names.
+    #[must_use]
+    pub fn term(self) -> &'static Term {
+        self.entry().1
+    }
+
+    /// Ending of the parameter's name.
+    #[must_use]
+    pub fn label(self) -> &'static str {
+        self.term().name
+    }
+
+    /// The physics, in words, for the goodness-of-fit finding.
+    #[must_use]
+    pub fn physics(self) -> &'static str {
+        self.effect().physics
+    }
+
+    /// The rotation axis across the joint axis that the term drives, if it is lateral.
+    #[must_use]
+    pub fn lateral(self) -> Option<usize> {
+        match self.term().drives {
+            Drives::About => None,
+            Drives::Across(k) => Some(k),
+        }
+    }
+
+    /// F of equation (1) at every state; `None` where it is 1 everywhere.
+    #[must_use]
+    pub fn regressors(self, states: &[JointState]) -> Option<Vec<f64>> {
+        let term = self.term();
+        (term.source != Source::Constant).then(|| states.iter().map(term.regressor).collect())
+    }
+
+    /// F of equation (1) from the reading alone; `None` where it needs more.
+    pub(crate) fn from_reading(self, q: f64) -> Option<f64> {
+        let term = self.term();
+        let state = JointState {
+            q,
+            ..JointState::default()
+        };
+        matches!(term.source, Source::Constant | Source::Reading).then(|| (term.regressor)(&state))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_term_is_listed_once_and_every_name_is_its_own() {
+        let kinds: Vec<EffectKind> = EffectKind::all().collect();
+        for (i, kind) in kinds.iter().enumerate() {
+            assert_eq!(kind.term().kind, *kind);
+            assert_eq!(kinds.iter().filter(|k| *k == kind).count(), 1);
+            let same = kinds.iter().filter(|k| k.label() == kind.label());
+            assert_eq!(same.count(), 1, "{}", kind.label());
+            // The order of creation is the order of the enumeration: maps by kind are in table order.
+            assert!(i == 0 || kinds[i - 1] < *kind);
+        }
+        let mut ids: Vec<_> = EFFECTS.iter().map(|e| e.id).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        assert_eq!(ids.len(), EFFECTS.len());
+    }
+}

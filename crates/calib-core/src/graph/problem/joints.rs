@@ -1,0 +1,162 @@
+//! Joints and their effects.
+
+use crate::graph::edge::{Axis, Candidate, EdgeKind, Joint, JointEffect};
+use crate::graph::effect::{EffectKind, JointState, Source};
+use crate::graph::error::Error;
+use crate::graph::ids::{EdgeId, FrameId, GroupId, ParameterId};
+use crate::graph::parameter::{Parameter, ParameterKind};
+use crate::graph::problem::Problem;
+
+impl Problem {
+    /// A joint with its reading per sample (rad or m).
+    pub fn joint(
+        &mut self,
+        name: &str,
+        parent: FrameId,
+        child: FrameId,
+        axis: Axis,
+        q: Vec<f64>,
+    ) -> EdgeId {
+        self.edge_of(
+            name,
+            parent,
+            child,
+            EdgeKind::Joint(Joint {
+                axis,
+                q,
+                effects: Vec::new(),
+                candidates: Vec::new(),
+                noise: None,
+            }),
+        )
+    }
+
+    /// The joint of an edge; where it is none, a fault that [`Model::new`](crate::Model::new) reports.
+    fn joint_mut(&mut self, edge: EdgeId, call: &'static str) -> Option<&mut Joint> {
+        if !matches!(
+            self.edges.get(edge.index()).map(|e| &e.kind),
+            Some(EdgeKind::Joint(_))
+        ) {
+            self.wrong_edge(edge, call, "a joint");
+        }
+        match self.edges.get_mut(edge.index()).map(|e| &mut e.kind) {
+            Some(EdgeKind::Joint(j)) => Some(j),
+            _ => None,
+        }
+    }
+
+    /// Frees a term whose regressor follows from the reading (zero offset, gain, eccentricity). The parameter is
+    /// called `<joint>.<term>`. A term that needs more ([`Problem::free_effect_with`]) or an edge that is no joint is
+    /// reported by [`Model::new`](crate::Model::new).
+    pub fn free_effect(
+        &mut self,
+        edge: EdgeId,
+        kind: EffectKind,
+        prior_sigma: Option<f64>,
+    ) -> ParameterId {
+        let values = match self.joint_mut(edge, "free_effect") {
+            Some(joint) if kind.term().source != Source::Constant => {
+                joint.q.iter().map(|q| kind.from_reading(*q)).collect()
+            }
+            _ => None,
+        };
+        if values.is_none() && kind.term().source != Source::Constant {
+            let what = format!("{}.{}", self.edge_name(edge), kind.label());
+            self.faults.push(Error::NoRegressor { what });
+        }
+        self.push_effect(edge, kind, values, prior_sigma)
+    }
+
+    /// Frees a term with its regressor per sample (torque, velocity, direction of approach, another joint's
+    /// reading): see [`EffectKind::regressors`].
+    pub fn free_effect_with(
+        &mut self,
+        edge: EdgeId,
+        kind: EffectKind,
+        values: Vec<f64>,
+        prior_sigma: Option<f64>,
+    ) -> ParameterId {
+        self.push_effect(edge, kind, Some(values), prior_sigma)
+    }
+
+    /// Frees a term at the states of the samples.
+    pub fn free_effect_at(
+        &mut self,
+        edge: EdgeId,
+        kind: EffectKind,
+        states: &[JointState],
+        prior_sigma: Option<f64>,
+    ) -> ParameterId {
+        self.push_effect(edge, kind, kind.regressors(states), prior_sigma)
+    }
+
+    fn push_effect(
+        &mut self,
+        edge: EdgeId,
+        kind: EffectKind,
+        values: Option<Vec<f64>>,
+        prior_sigma: Option<f64>,
+    ) -> ParameterId {
+        let name = self.edge_name(edge).to_owned();
+        let (prismatic, repeats) = match self.joint_mut(edge, "free_effect") {
+            Some(j) => (
+                matches!(j.axis, Axis::Prismatic(_)),
+                j.effects.iter().filter(|f| f.kind == kind).count(),
+            ),
+            None => (false, 0),
+        };
+        let suffix = if repeats == 0 {
+            String::new()
+        } else {
+            format!("_{}", repeats + 1)
+        };
+        let parameter = self.parameter(Parameter {
+            name: format!("{name}.{}{suffix}", kind.label()),
+            joint: Some(name),
+            kind: ParameterKind::Effect(kind),
+            unit: kind.term().quantity.unit(prismatic),
+            nominal: 0.0,
+            start: 0.0,
+            prior_sigma,
+            bounds: None,
+            fixed: false,
+        });
+        self.share_effect(edge, kind, values, parameter);
+        parameter
+    }
+
+    /// Adds an effect whose coefficient is an existing parameter (one clock offset for all joints,
+    /// one compliance for both arms). `values: None` means 1 for every sample.
+    pub fn share_effect(
+        &mut self,
+        edge: EdgeId,
+        kind: EffectKind,
+        values: Option<Vec<f64>>,
+        parameter: ParameterId,
+    ) {
+        if let Some(joint) = self.joint_mut(edge, "share_effect") {
+            joint
+                .effects
+                .push(JointEffect::new(kind, values, parameter));
+        }
+    }
+
+    /// Declares an effect that is not modelled, for the goodness-of-fit test.
+    pub fn candidate(&mut self, edge: EdgeId, kind: EffectKind, values: Vec<f64>) {
+        let name = self.edge_name(edge).to_owned();
+        if let Some(joint) = self.joint_mut(edge, "candidate") {
+            joint.candidates.push(Candidate {
+                kind,
+                name: format!("{name}.{}", kind.label()),
+                values,
+            });
+        }
+    }
+
+    /// Gives a joint's reading its own noise, drawn anew for every sample and marginalized.
+    pub fn joint_noise(&mut self, edge: EdgeId, group: GroupId) {
+        if let Some(joint) = self.joint_mut(edge, "joint_noise") {
+            joint.noise = Some(group);
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Points and measurements.
+
+use nalgebra::Point3;
+
+use crate::graph::ids::{EdgeId, FrameId, GroupId, PointId};
+use crate::graph::measurement::{
+    MarkerObservation, Measurement, MeasurementKind, PoseNoise, PoseObservation,
+};
+use crate::graph::parameter::{Parameter, ParameterKind, Unit};
+use crate::graph::problem::{Point, Problem};
+
+impl Problem {
+    /// A point of known coordinates in `frame`.
+    pub fn known_point(&mut self, name: &str, frame: FrameId, position: Point3<f64>) -> PointId {
+        self.points.push(Point {
+            name: name.to_owned(),
+            frame,
+            position,
+            parameters: None,
+        });
+        PointId::of(self.points.len() - 1)
+    }
+
+    /// A point of unknown coordinates near `position`: parameters `<name>.x`, `.y`, `.z`.
+    pub fn unknown_point(
+        &mut self,
+        name: &str,
+        frame: FrameId,
+        position: Point3<f64>,
+        prior_sigma: Option<f64>,
+    ) -> PointId {
+        let coordinate = |axis: &str, value: f64| Parameter {
+            name: format!("{name}.{axis}"),
+            joint: None,
+            kind: ParameterKind::Point,
+            unit: Unit::Metre,
+            nominal: value,
+            start: value,
+            prior_sigma,
+            bounds: None,
+            fixed: false,
+        };
+        let x = self.parameter(coordinate("x", position.x));
+        let y = self.parameter(coordinate("y", position.y));
+        let z = self.parameter(coordinate("z", position.z));
+        self.points.push(Point {
+            name: name.to_owned(),
+            frame,
+            position,
+            parameters: Some([x, y, z]),
+        });
+        PointId::of(self.points.len() - 1)
+    }
+
+    /// Adds a measurement.
+    pub fn add_measurement(&mut self, measurement: Measurement) {
+        self.measurements.push(measurement);
+    }
+
+    /// Markers of frame `to` seen from frame `from`, along the shortest path.
+    pub fn markers(
+        &mut self,
+        name: &str,
+        from: FrameId,
+        to: FrameId,
+        noise: GroupId,
+        observations: Vec<MarkerObservation>,
+    ) {
+        self.add_measurement(Measurement {
+            name: name.to_owned(),
+            from,
+            to,
+            path: None,
+            kind: MeasurementKind::Markers {
+                noise,
+                observations,
+            },
+        });
+    }
+
+    /// Poses of frame `to` seen from frame `from`, along the shortest path.
+    pub fn poses(
+        &mut self,
+        name: &str,
+        from: FrameId,
+        to: FrameId,
+        noise: PoseNoise,
+        observations: Vec<PoseObservation>,
+    ) {
+        self.add_measurement(Measurement {
+            name: name.to_owned(),
+            from,
+            to,
+            path: None,
+            kind: MeasurementKind::Poses {
+                noise,
+                observations,
+            },
+        });
+    }
+
+    /// Two paths between the same frames that must agree at `samples`: out along `there`, home
+    /// against `back` (both given from the common start to the common end).
+    pub fn add_loop(
+        &mut self,
+        name: &str,
+        end: FrameId,
+        there: &[(EdgeId, bool)],
+        back: &[(EdgeId, bool)],
+        noise: PoseNoise,
+        samples: Vec<usize>,
+    ) {
+        // closed path from the end: back⁻¹ · there
+        let mut path: Vec<(EdgeId, bool)> = back.iter().rev().map(|&(e, inv)| (e, !inv)).collect();
+        path.extend_from_slice(there);
+        self.add_measurement(Measurement {
+            name: name.to_owned(),
+            from: end,
+            to: end,
+            path: Some(path),
+            kind: MeasurementKind::Loop { noise, samples },
+        });
+    }
+}
