@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use calib_core::{Configuration, EffectKind, Settings};
+use calib_core::{Configuration, EffectKind, Settings, effect};
 use calib_pipeline::estimate::start::start;
-use calib_pipeline::formulate::kinematics::Loads;
+use calib_pipeline::formulate::kinematics::{Loads, joint_state};
 use calib_pipeline::formulate::ml::{FreeSet, fit, state};
+use calib_pipeline::prepare::conditions::Conditions;
 use calib_pipeline::prepare::load::{load_recordings, load_robot};
 use calib_pipeline::prepare::tracks::body_tracks;
 use calib_profile::Free;
@@ -20,9 +21,9 @@ fn the_calibrated_robot_is_the_solution() {
         let mut profile = load_robot(&path).expect("shipped");
         // Every effect that exists, so that every term of the prediction is exercised.
         profile.profile.solve.free.extend([
-            Free::JointGains,
-            Free::Eccentricity,
-            Free::LateralCompliance,
+            Free::Effect(&effect::gain::EFFECT),
+            Free::Effect(&effect::eccentricity::EFFECT),
+            Free::Effect(&effect::lateral_compliance::EFFECT),
         ]);
         let inputs = load_recordings(profile, false).expect("shipped");
         let mut findings = Vec::new();
@@ -35,25 +36,19 @@ fn the_calibrated_robot_is_the_solution() {
             .calibration
             .effects
             .iter()
-            .filter(|e| e.gain != 0.0)
+            .filter(|e| e.of(EffectKind::Gain) != 0.0)
             .count();
         assert!(effects >= 4, "{robot}: {effects} joints with a gain");
         for loaded in inputs.recordings.values() {
             let q = loaded.q[loaded.q.len() / 2].as_ref().expect("recorded");
             let loads = Loads::at(model, q);
+            let unknown = Conditions::default();
             let mut at = Configuration::zero();
             for joint in model.joint_ids() {
                 let Some(edge) = fit.formulation.joints[joint.index()] else {
                     continue;
                 };
-                at = at.with(edge, model.position(q, joint));
-                let i = joint.index();
-                at.regressors
-                    .insert((edge, EffectKind::TorqueCompliance), loads.about_axis[i]);
-                at.regressors
-                    .insert((edge, EffectKind::Lateral1), loads.across[i][0]);
-                at.regressors
-                    .insert((edge, EffectKind::Lateral2), loads.across[i][1]);
+                at = at.at(edge, &joint_state(model, joint, q, &loads, &unknown));
             }
             let root_from_link = fit.calibration.root_from_link(q);
             for (name, frame) in &fit.formulation.bodies {

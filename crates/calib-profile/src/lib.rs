@@ -23,8 +23,8 @@ pub use check::check;
 pub use error::{Problem, ProfileError};
 pub use locate::Place;
 pub use profile::{
-    Body, BodyKind, Clocks, Contact, ContactBase, Error3, Free, JointException, JointFree,
-    JointFreeSet, Limits, LinkTransform, Load, Loop, Method, Noise, Orientation, Origin,
+    Body, BodyKind, Clocks, Contact, ContactBase, Error3, Free, FreeEffect, JointException,
+    JointFree, JointFreeSet, Limits, LinkTransform, Load, Loop, Method, Noise, Orientation, Origin,
     OriginFreeSet, Outputs, ParameterValue, Plugin, PointChoice, Prior, Profile, Protocol,
     RecordingSpec, RobotLog, SimErrors, SimMount, SimNoise, Simulation, Solve, Steps, SweptAxis,
     TimedPoses, Timing, Tip, Touched, Tracker, UpAxis, Usage,

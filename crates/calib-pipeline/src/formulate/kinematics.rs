@@ -2,37 +2,20 @@
 
 use std::collections::BTreeMap;
 
-use calib_geometry::so3;
-use calib_urdf::{JointId, JointKind, LinkId, RobotModel};
-use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use calib_core::{Axis, EffectKind, JointMotion, JointState};
+use calib_urdf::{JointId, JointKind, RobotModel};
+use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::prepare::conditions::Conditions;
 use crate::prepare::loads::{gravity_moments, has_masses};
 
-/// What the reading of one joint leaves out.
-///
-/// ```text
-/// φ = q + offset + gain·q + c·(cos q − 1) + s·sin q + compliance·τ + backlash·a + Σ_k coupling_k·q_k   (1)
-/// joint_from_child = exp(axis φ) · Exp(lateral₁ τ₁ e₁ + lateral₂ τ₂ e₂)                            (2)
-/// ```
+/// What the reading of one joint leaves out: equation (1) of [`calib_core::effect`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct JointEffects {
-    /// Zero offset, rad or m.
-    pub offset: f64,
-    /// Gain error, 1.
-    pub gain: f64,
-    /// Eccentricity, cosine part, rad.
-    pub eccentricity_cos: f64,
-    /// Eccentricity, sine part, rad.
-    pub eccentricity_sin: f64,
-    /// Turn per holding torque about the axis, rad per N m.
-    pub compliance: f64,
-    /// Turn per holding torque about the two axes across, rad per N m.
-    pub lateral: [f64; 2],
-    /// Half of the play, rad or m; a of equation (1) is the direction of approach, ±1.
-    pub backlash: f64,
-    /// Share of other joints' readings.
+    /// Coefficients by term, SI; terms that are not named are 0.
+    pub coefficients: BTreeMap<EffectKind, f64>,
+    /// Coefficients of couplings, by the other joint.
     pub coupling: BTreeMap<JointIndex, f64>,
 }
 
@@ -40,14 +23,21 @@ pub struct JointEffects {
 pub type JointIndex = usize;
 
 impl JointEffects {
-    /// Whether a URDF can hold them: only a zero offset can be put into an origin.
+    /// Coefficient of a term.
+    #[must_use]
+    pub fn of(&self, kind: EffectKind) -> f64 {
+        self.coefficients.get(&kind).copied().unwrap_or(0.0)
+    }
+
+    /// Whether a URDF can hold them: only geometric ones (the zero offset) can be put into an origin.
     #[must_use]
     pub fn fits_into_urdf(&self) -> bool {
-        let rest = Self {
-            offset: 0.0,
-            ..self.clone()
-        };
-        rest == Self::default()
+        let geometric = |kind: &EffectKind| kind.effect().geometric;
+        let rest = self
+            .coefficients
+            .iter()
+            .filter(|(kind, _)| !geometric(kind));
+        self.coupling.is_empty() && rest.into_iter().all(|(_, c)| *c == 0.0)
     }
 }
 
@@ -99,25 +89,11 @@ impl Calibration {
     #[must_use]
     pub fn root_from_link_under(&self, q: &[f64], under: &Conditions) -> Vec<Isometry3<f64>> {
         let loads = Loads::under(&self.described, q, under);
-        let mut poses = vec![Isometry3::identity(); self.model.links().len()];
-        // Links in an order in which every parent comes before its children.
-        let mut order: Vec<LinkId> = vec![self.model.root()];
-        let mut next = 0;
-        while next < order.len() {
-            let link = order[next];
-            next += 1;
-            for &joint in &self.model.link(link).child_joints {
-                let j = self.model.joint(joint);
-                poses[j.child.index()] = poses[link.index()]
-                    * j.parent_link_from_joint
-                    * self.motion(joint, q, &loads, under);
-                order.push(j.child);
-            }
-        }
-        poses
+        self.model
+            .forward_kinematics_with(|joint| self.motion(joint, q, &loads, under))
     }
 
-    /// Eq. (2) of [`JointEffects`] for one joint.
+    /// `joint_from_child` of one joint with its effects.
     fn motion(
         &self,
         joint: JointId,
@@ -125,34 +101,22 @@ impl Calibration {
         loads: &Loads,
         under: &Conditions,
     ) -> Isometry3<f64> {
-        let j = self.model.joint(joint);
-        let Some(axis) = j.kind.axis() else {
+        let Some(axis) = motion_axis(&self.model, joint) else {
             return Isometry3::identity();
         };
-        let e = &self.effects[joint.index()];
-        let reading = self.model.position(q, joint);
-        let coupled: f64 = e.coupling.iter().map(|(k, c)| c * q[*k]).sum();
-        let phi = reading
-            + e.offset
-            + e.gain * reading
-            + e.eccentricity_cos * (reading.cos() - 1.0)
-            + e.eccentricity_sin * reading.sin()
-            + e.compliance * loads.about_axis[joint.index()]
-            + e.backlash * under.approach_of(joint.index())
-            + coupled;
-        if matches!(j.kind, JointKind::Prismatic { .. }) {
-            return Isometry3::from_parts(
-                Translation3::from(axis.into_inner() * phi),
-                UnitQuaternion::identity(),
-            );
-        }
-        let mut turn = UnitQuaternion::from_axis_angle(&axis, phi);
-        if e.lateral != [0.0, 0.0] {
-            let [e1, e2] = across(&axis);
-            let across = loads.across[joint.index()];
-            turn *= so3::exp(&(e1 * (e.lateral[0] * across[0]) + e2 * (e.lateral[1] * across[1])));
-        }
-        Isometry3::from_parts(Translation3::identity(), turn)
+        let effects = &self.effects[joint.index()];
+        let state = joint_state(&self.model, joint, q, loads, under);
+        let own = effects.coefficients.iter();
+        let own = own.map(|(kind, c)| (*kind, c * (kind.term().regressor)(&state)));
+        let coupled = effects.coupling.iter().map(|(other, c)| {
+            let other = q.get(*other).copied().unwrap_or(0.0);
+            let regressor = EffectKind::Coupling.term().regressor;
+            (
+                EffectKind::Coupling,
+                c * regressor(&JointState { other, ..state }),
+            )
+        });
+        JointMotion::new(axis, state.q, own.chain(coupled)).joint_from_child()
     }
 
     /// The geometry with zero offsets put into the origins: what a URDF can hold.
@@ -160,25 +124,46 @@ impl Calibration {
     pub fn urdf_model(&self) -> RobotModel {
         let mut model = self.model.clone();
         for joint in self.model.joint_ids() {
-            let offset = self.effects[joint.index()].offset;
+            let offset = self.effects[joint.index()].of(EffectKind::ZeroOffset);
             let j = self.model.joint(joint);
-            let Some(axis) = j.kind.axis().filter(|_| offset != 0.0) else {
+            let Some(axis) = motion_axis(&model, joint).filter(|_| offset != 0.0) else {
                 continue;
             };
-            let moved = if j.kind.turns() {
-                Isometry3::from_parts(
-                    Translation3::identity(),
-                    UnitQuaternion::from_axis_angle(&axis, offset),
-                )
-            } else {
-                Isometry3::from_parts(
-                    Translation3::from(axis.into_inner() * offset),
-                    UnitQuaternion::identity(),
-                )
-            };
+            let amount = [(EffectKind::ZeroOffset, offset)];
+            let moved = JointMotion::new(axis, 0.0, amount).joint_from_child();
             model = model.with_origin(joint, j.parent_link_from_joint * moved);
         }
         model
+    }
+}
+
+/// Axis of a joint's motion; `None` for a fixed joint.
+#[must_use]
+pub fn motion_axis(model: &RobotModel, joint: JointId) -> Option<Axis> {
+    let kind = &model.joint(joint).kind;
+    let axis = kind.axis()?;
+    Some(match kind {
+        JointKind::Prismatic { .. } => Axis::Prismatic(axis),
+        _ => Axis::Revolute(axis),
+    })
+}
+
+/// What the regressors of a joint's effects depend on.
+#[must_use]
+pub fn joint_state(
+    model: &RobotModel,
+    joint: JointId,
+    q: &[f64],
+    loads: &Loads,
+    under: &Conditions,
+) -> JointState {
+    let index = joint.index();
+    JointState {
+        q: model.position(q, joint),
+        torque: loads.about_axis[index],
+        across: loads.across[index],
+        approach: under.approach_of(index),
+        ..JointState::default()
     }
 }
 
@@ -236,5 +221,5 @@ impl Loads {
 }
 
 fn across(axis: &Unit<Vector3<f64>>) -> [Vector3<f64>; 2] {
-    calib_core::Axis::Revolute(*axis).across()
+    Axis::Revolute(*axis).across()
 }

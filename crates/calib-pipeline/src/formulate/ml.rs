@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use calib_core::effect::Source;
 use calib_core::{
-    Axis, Chart, EdgeId, EffectKind, FrameId, GroupId, MarkerObservation, NoiseKind, PointId,
-    PoseNoise, PoseObservation, Problem, Role, Settings, Solution,
+    Axis, Chart, EFFECTS, EdgeId, EffectKind, FrameId, GroupId, JointState, MarkerObservation,
+    NoiseKind, PointId, PoseNoise, PoseObservation, Problem, Role, Settings, Solution,
 };
 use calib_profile::{BodyKind, ContactBase, Free, JointFreeSet, OriginFreeSet, Profile, Usage};
 use calib_urdf::{JointId, JointKind, RobotModel};
@@ -13,7 +14,7 @@ use nalgebra::{Isometry3, Point3};
 use crate::error::PipelineError;
 use crate::estimate::start::Start;
 use crate::formulate::contacts::add_contacts;
-use crate::formulate::kinematics::{Calibration, JointEffects, Loads};
+use crate::formulate::kinematics::{Calibration, JointEffects, Loads, joint_state};
 use crate::prepare::conditions::{Conditions, conditions};
 use crate::prepare::load::Inputs;
 use crate::prepare::tracks::BodyTrack;
@@ -322,7 +323,8 @@ fn add_joint(
     }
 }
 
-/// Frees the effects of a joint; returns whether a prediction needs its load or another joint's reading.
+/// Frees the effects of a joint and offers the others to the test for missing physics; returns whether a prediction
+/// needs its load or another joint's reading.
 fn add_effects(
     problem: &mut Problem,
     profile: &Profile,
@@ -332,65 +334,43 @@ fn add_effects(
     free: &JointFreeSet,
     rows: &[Row<'_>],
 ) -> bool {
-    let prior = &profile.solve.prior;
-    let index = joint.index();
+    let states: Vec<JointState> = rows
+        .iter()
+        .map(|r| joint_state(model, joint, r.q, &r.loads, r.under))
+        .collect();
     let mut loaded = false;
-    if free.offset {
-        let offset = problem.free_effect(edge, EffectKind::ZeroOffset, Some(free.offset_sigma));
-        let within = if model.joint(joint).kind.turns() {
-            free.angle_within
-        } else {
-            free.position_within
-        };
-        problem.parameter_mut(offset).bounds = within.map(|w| (-w, w));
-    }
-    if free.gain {
-        problem.free_effect(edge, EffectKind::Gain, Some(prior.gain));
-    }
-    if free.eccentricity {
-        problem.free_effect(edge, EffectKind::EccentricityCos, Some(prior.eccentricity));
-        problem.free_effect(edge, EffectKind::EccentricitySin, Some(prior.eccentricity));
-    }
-    let about: Vec<f64> = rows.iter().map(|r| r.loads.about_axis[index]).collect();
-    if about.iter().any(|t| t.abs() > 0.0) {
-        if free.compliance {
-            loaded = true;
-            problem.free_effect_with(
-                edge,
-                EffectKind::TorqueCompliance,
-                about,
-                Some(prior.compliance),
-            );
-        } else {
-            problem.candidate(edge, EffectKind::TorqueCompliance, about);
-        }
-        if free.lateral_compliance {
-            loaded = true;
-            for (k, kind) in [EffectKind::Lateral1, EffectKind::Lateral2]
-                .into_iter()
-                .enumerate()
-            {
-                let across = rows.iter().map(|r| r.loads.across[index][k]).collect();
-                problem.free_effect_with(edge, kind, across, Some(prior.compliance));
+    for effect in EFFECTS.iter().filter(|e| e.profile.is_some()) {
+        let wanted = free.effects.iter().find(|f| f.effect == *effect);
+        if let Some(wanted) = wanted.filter(|_| (effect.estimable)(&states)) {
+            for term in effect.terms {
+                let p = problem.free_effect_at(edge, term.kind, &states, wanted.sigma);
+                problem.parameter_mut(p).bounds = wanted.within.map(|w| (-w, w));
+                loaded |= term.source == Source::Load;
+            }
+        } else if wanted.is_none() && effect.testable.is_some_and(|test| test(&states)) {
+            // Terms of the reading alone are tested in any case.
+            let terms = effect.terms.iter().filter(|t| t.source != Source::Reading);
+            for term in terms {
+                if let Some(values) = term.kind.regressors(&states) {
+                    problem.candidate(edge, term.kind, values);
+                }
             }
         }
     }
-    let approach: Vec<f64> = rows.iter().map(|r| r.under.approach_of(index)).collect();
-    if free.backlash {
-        let sigma = Some(free.backlash_sigma);
-        problem.free_effect_with(edge, EffectKind::Backlash, approach, sigma);
-    } else if approach.contains(&1.0) && approach.contains(&-1.0) {
-        problem.candidate(edge, EffectKind::Backlash, approach);
-    }
+    let coupling = EffectKind::Coupling;
+    let slides = !model.joint(joint).kind.turns();
     for other in &free.coupled_to {
         loaded = true;
-        let values = rows.iter().map(|r| model.position(r.q, *other)).collect();
-        problem.free_effect_with(
-            edge,
-            EffectKind::Coupling,
-            values,
-            Some(prior.gain.max(1.0)),
-        );
+        let coupled: Vec<JointState> = rows
+            .iter()
+            .zip(&states)
+            .map(|(r, state)| JointState {
+                other: model.position(r.q, *other),
+                ..*state
+            })
+            .collect();
+        let sigma = profile.solve.prior.of(coupling.effect(), slides);
+        problem.free_effect_at(edge, coupling, &coupled, sigma);
     }
     loaded
 }
@@ -631,21 +611,17 @@ fn effects(
         .iter();
     for effect in &j.effects {
         let c = values.0[effect.parameter.index()];
-        match effect.kind {
-            EffectKind::ZeroOffset => effects.offset = c,
-            EffectKind::Gain => effects.gain = c,
-            EffectKind::EccentricityCos => effects.eccentricity_cos = c,
-            EffectKind::EccentricitySin => effects.eccentricity_sin = c,
-            EffectKind::TorqueCompliance => effects.compliance = c,
-            EffectKind::Lateral1 => effects.lateral[0] = c,
-            EffectKind::Lateral2 => effects.lateral[1] = c,
-            EffectKind::Coupling => {
+        match effect.kind.term().source {
+            Source::OtherJoint => {
                 if let Some(other) = coupled.next() {
                     effects.coupling.insert(other.index(), c);
                 }
             }
-            EffectKind::Backlash => effects.backlash = c,
-            EffectKind::ClockOffset | EffectKind::Other => {}
+            // The clocks belong to the recordings, not to the robot.
+            Source::Velocity | Source::Caller => {}
+            _ => {
+                effects.coefficients.insert(effect.kind, c);
+            }
         }
     }
     effects

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use calib_core::{RankedVariant, Settings, compare_with};
+use calib_core::effect::Source;
+use calib_core::{EFFECTS, RankedVariant, Settings, compare_with};
 use calib_profile::Free;
 use serde_json::json;
 
@@ -17,16 +18,28 @@ use crate::prepare::load::{Inputs, load_recordings, load_robot};
 use crate::prepare::tracks::body_tracks;
 
 /// Models in order of growth; each adds to the one before.
-const STEPS: [(&str, &[Free]); 8] = [
-    ("registration only", &[]),
-    ("+ joint offsets", &[Free::JointOffsets]),
-    ("+ joint axes", &[Free::JointAxes]),
-    ("+ compliance", &[Free::Compliance]),
-    ("+ lateral compliance", &[Free::LateralCompliance]),
-    ("+ backlash", &[Free::Backlash]),
-    ("+ eccentricity", &[Free::Eccentricity]),
-    ("+ gains", &[Free::JointGains]),
-];
+fn steps() -> Vec<(String, Option<Free>)> {
+    /// The axes follow the offsets: what a first calibration frees.
+    const AXES: u8 = 2;
+    let effects = EFFECTS.iter().filter_map(|effect| {
+        let (place, label) = effect.ladder?;
+        Some((place, label, Free::Effect(effect)))
+    });
+    let mut steps: Vec<_> = effects
+        .chain([(AXES, "joint axes", Free::JointAxes)])
+        .collect();
+    steps.sort_by_key(|s| s.0);
+    let first = ("registration only".to_owned(), None);
+    let more = steps
+        .into_iter()
+        .map(|(_, label, free)| (format!("+ {label}"), Some(free)));
+    std::iter::once(first).chain(more).collect()
+}
+
+/// Whether what is freed needs a load to be seen.
+fn needs_load(free: Free) -> bool {
+    matches!(free, Free::Effect(e) if e.terms.iter().any(|t| t.source == Source::Load))
+}
 
 /// Ranks the models on the fitted recordings alone; validation recordings are not looked at. `progress(stage, done, all)`
 /// is told what is done next, and how many of all models are fitted; `all` is 0 until they are stated.
@@ -55,25 +68,19 @@ pub fn compare_models(
     let loaded = is_loaded(&inputs);
     let mut free: BTreeSet<Free> = [Free::Bodies, Free::Tracker].into();
     let mut variants = Vec::new();
-    for (name, added) in STEPS {
-        let needs_load = added
-            .iter()
-            .any(|f| matches!(f, Free::Compliance | Free::LateralCompliance));
-        if needs_load && !loaded {
+    for (name, added) in steps() {
+        if added.is_some_and(needs_load) && !loaded {
             continue;
         }
-        free.extend(added.iter().copied());
+        free.extend(added);
         inputs.robot.profile.solve.free.clone_from(&free);
-        let free_set = if added.is_empty() {
+        let free_set = if added.is_none() {
             FreeSet::RegistrationOnly
         } else {
             FreeSet::Profile
         };
         progress(&format!("state model: {name}"), 0, 0);
-        variants.push((
-            name.to_owned(),
-            state(&inputs, &tracks, &start, free_set).problem,
-        ));
+        variants.push((name, state(&inputs, &tracks, &start, free_set).problem));
     }
     let all = variants.len();
     let stage = |done: usize| match variants.get(done) {

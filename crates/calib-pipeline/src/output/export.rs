@@ -1,5 +1,7 @@
 //! The calibrated robot as a patched URDF, the effects that a URDF cannot hold, and the scene.
 
+use calib_core::EFFECTS;
+use calib_core::effect::{Drives, Source};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -202,36 +204,39 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
     if beyond.is_empty() {
         return None;
     }
-    let mut text = String::from(
+    let terms = || {
+        let effects = EFFECTS.iter().filter(|e| !e.geometric);
+        effects.flat_map(|e| e.terms)
+    };
+    let sum = |about: Drives| -> String {
+        let of = terms().filter(|t| {
+            let kept = !matches!(t.source, Source::Velocity | Source::Caller);
+            kept && t.drives == about
+        });
+        of.map(|t| t.formula).collect::<Vec<_>>().join(" + ")
+    };
+    let mut text = format!(
         "# Joint effects that a URDF cannot hold. Zero offsets are in the URDF's origins already.\n\
-         # phi = q + gain*q + cos*(cos q - 1) + sin*sin q + compliance*torque + backlash*approach + sum(coupling*q_other)\n\
-         # torque: what the joint holds against gravity about its axis, N m; lateral: about the two axes across.\n\
-         # approach: +1 where the joint came from below, -1 from above; backlash is half of the play.\n\
+         # phi = q + {}\n\
+         # rotation about the first axis across: {}; about the second: {}\n\
+         # torque: what the joint holds against gravity about its axis, N m; torque_across: about the two axes across.\n\
+         # approach: +1 where the joint came from below, -1 from above; backlash is half of the clearance.\n\
          calib_effects: 1\njoints:\n",
+        sum(Drives::About),
+        sum(Drives::Across(0)),
+        sum(Drives::Across(1)),
     );
     for joint in beyond {
         let e = &robot.effects[joint.index()];
+        let prismatic = !model.joint(joint).kind.turns();
         let _ = writeln!(text, "  {}:", model.joint(joint).name);
-        for (key, value) in [
-            ("gain", e.gain),
-            ("eccentricity_cos_rad", e.eccentricity_cos),
-            ("eccentricity_sin_rad", e.eccentricity_sin),
-            ("compliance_rad_per_nm", e.compliance),
-            ("lateral_1_rad_per_nm", e.lateral[0]),
-            ("lateral_2_rad_per_nm", e.lateral[1]),
-            (
-                if model.joint(joint).kind.turns() {
-                    "backlash_rad"
-                } else {
-                    "backlash_m"
-                },
-                e.backlash,
-            ),
-        ] {
-            /// Below this an effect moves no tool by a nanometre (rad, rad per N m, 1).
+        for term in terms() {
+            /// Below this an effect moves no tool by a nanometer (rad, rad per N m, 1).
             const NOTHING: f64 = 1e-15;
+            let value = e.of(term.kind);
             if value.abs() > NOTHING {
-                let _ = writeln!(text, "    {key}: {value:e}");
+                let unit = term.quantity.unit(prismatic).key_ending();
+                let _ = writeln!(text, "    {}{unit}: {value:e}", term.name);
             }
         }
         if !e.coupling.is_empty() {

@@ -1,38 +1,33 @@
 //! How exact the result is: the tool's uncertainty over the workspace, and what an error on a new pose is made of.
 
-use calib_core::{Configuration, EffectKind};
+use calib_core::Configuration;
 use calib_geometry::so3;
 use calib_profile::Usage;
 use calib_report::{AccuracyLimit, Workspace, WorkspacePoint};
 use calib_urdf::LinkId;
 use nalgebra::Matrix6;
 
-use crate::formulate::kinematics::Loads;
+use crate::formulate::kinematics::{Loads, joint_state};
 use crate::formulate::ml::MlFit;
 use crate::output::assemble::Evidence;
+use crate::prepare::conditions::Conditions;
 use crate::prepare::load::Inputs;
 
 /// Indicated joint positions of a sample as a prediction's configuration, loads included.
 pub(crate) fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configuration {
     let model = &inputs.robot.model;
     let mut at = Configuration::zero();
+    // The middle of all backlash.
+    let unknown = Conditions::default();
     let loads = fit.formulation.loaded.then(|| Loads::at(model, q));
     for joint in model.joint_ids() {
         let Some(edge) = fit.formulation.joints[joint.index()] else {
             continue;
         };
-        at = at.with(edge, model.position(q, joint));
-        if let Some(loads) = &loads {
-            let index = joint.index();
-            at.regressors.insert(
-                (edge, EffectKind::TorqueCompliance),
-                loads.about_axis[index],
-            );
-            at.regressors
-                .insert((edge, EffectKind::Lateral1), loads.across[index][0]);
-            at.regressors
-                .insert((edge, EffectKind::Lateral2), loads.across[index][1]);
-        }
+        at = match &loads {
+            Some(loads) => at.at(edge, &joint_state(model, joint, q, loads, &unknown)),
+            None => at.with(edge, model.position(q, joint)),
+        };
     }
     at
 }

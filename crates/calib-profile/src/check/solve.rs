@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::profile::{JointException, Limits, Noise, Prior, Solve};
-use crate::raw::{RawJointSolve, RawLimits, RawPrior, RawSolve};
+use crate::raw::{ANGLE, POSITION, PRIOR_KEYS, RawJointSolve, RawLimits, RawPrior, RawSolve};
+use calib_core::effect::PriorKey;
 
 impl Checker<'_> {
     pub(super) fn solve(&mut self, raw: &RawSolve) -> Solve {
@@ -62,29 +63,14 @@ impl Checker<'_> {
     }
 
     fn prior(&mut self, raw: &RawPrior) -> Prior {
-        for (key, value) in [
-            ("position_mm", raw.position_mm),
-            ("angle_deg", raw.angle_deg),
-            ("offset_deg", raw.offset_deg),
-            ("offset_mm", raw.offset_mm),
-            ("gain_percent", raw.gain_percent),
-            ("eccentricity_deg", raw.eccentricity_deg),
-            ("compliance_deg_per_nm", raw.compliance_deg_per_nm),
-            ("backlash_deg", raw.backlash_deg),
-            ("backlash_mm", raw.backlash_mm),
-        ] {
-            self.positive(&["solve", "prior", key], value);
+        for key in PRIOR_KEYS.iter() {
+            self.positive(&["solve", "prior", key.key], raw.get(key));
         }
+        let si = |key: &PriorKey| raw.get(key) * key.si;
         Prior {
-            position: raw.position_mm * MM,
-            angle: raw.angle_deg * DEG,
-            offset_rad: raw.offset_deg * DEG,
-            offset_m: raw.offset_mm * MM,
-            gain: raw.gain_percent / 100.0,
-            eccentricity: raw.eccentricity_deg * DEG,
-            compliance: raw.compliance_deg_per_nm * DEG,
-            backlash_rad: raw.backlash_deg * DEG,
-            backlash_m: raw.backlash_mm * MM,
+            position: si(&POSITION),
+            angle: si(&ANGLE),
+            by_key: PRIOR_KEYS.iter().map(|key| (key.key, si(key))).collect(),
         }
     }
 

@@ -12,7 +12,9 @@ pub use contact::{Contact, ContactBase, Tip, Touched};
 pub use origin::{LinkTransform, Loop, Orientation, Origin, PointChoice, SweptAxis};
 pub use recording::{RecordingSpec, RobotLog, Timing};
 pub use simulate::{Error3, Protocol, SimErrors, SimMount, SimNoise, Simulation, Steps};
-pub use solve::{JointException, JointFreeSet, Limits, Noise, OriginFreeSet, Prior, Solve};
+pub use solve::{
+    FreeEffect, JointException, JointFreeSet, Limits, Noise, OriginFreeSet, Prior, Solve,
+};
 
 pub use crate::raw::{
     RawClocks as Clocks, RawFree as Free, RawJointFree as JointFree, RawLoad as Load,

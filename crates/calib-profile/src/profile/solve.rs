@@ -1,6 +1,8 @@
 //! What is estimated, with priors, noise levels and limits of the verdict.
 
 use super::{Free, JointFree, Load, Method};
+use calib_core::EFFECTS;
+use calib_core::effect::Effect;
 use calib_urdf::JointId;
 use std::collections::BTreeMap;
 use std::collections::BTreeSet;
@@ -59,28 +61,14 @@ pub enum OriginFreeSet {
 pub struct JointFreeSet {
     /// Its origin.
     pub origin: OriginFreeSet,
-    /// Zero offset.
-    pub offset: bool,
-    /// Gain.
-    pub gain: bool,
-    /// First-harmonic eccentricity.
-    pub eccentricity: bool,
-    /// Compliance about the axis.
-    pub compliance: bool,
-    /// Compliance across the axis.
-    pub lateral_compliance: bool,
-    /// Play by the direction of approach.
-    pub backlash: bool,
+    /// Effects, in the order of the table.
+    pub effects: Vec<FreeEffect>,
     /// Joints whose motion it follows.
     pub coupled_to: Vec<JointId>,
     /// Prior of position numbers, m.
     pub position_sigma: f64,
     /// Prior of orientation numbers, rad.
     pub angle_sigma: f64,
-    /// Prior of the zero offset, rad (or m for a prismatic joint).
-    pub offset_sigma: f64,
-    /// Prior of half the play, rad (or m for a prismatic joint).
-    pub backlash_sigma: f64,
     /// Limit of the position numbers, m.
     pub position_within: Option<f64>,
     /// Limit of the angle numbers, rad.
@@ -93,12 +81,7 @@ impl JointFreeSet {
     pub fn held(self) -> Self {
         Self {
             origin: OriginFreeSet::Held,
-            offset: false,
-            gain: false,
-            eccentricity: false,
-            compliance: false,
-            lateral_compliance: false,
-            backlash: false,
+            effects: Vec::new(),
             coupled_to: Vec::new(),
             ..self
         }
@@ -122,60 +105,70 @@ impl Solve {
         } else {
             OriginFreeSet::Held
         };
-        let offset_prior = if slides {
-            self.prior.offset_m
+        let (own_sigma, own_within) = if slides {
+            (exception.sigma_m, exception.within_m)
         } else {
-            self.prior.offset_rad
+            (exception.sigma_rad, exception.within_rad)
         };
+        let effects = EFFECTS.iter().copied();
+        let effects = effects.filter(|effect| {
+            let possible = !(slides && effect.revolute_only);
+            possible && has(JointFree::Effect(effect), Free::Effect(effect))
+        });
+        let effects = effects.map(|effect| FreeEffect {
+            effect,
+            sigma: own_sigma
+                .filter(|_| effect.geometric)
+                .or_else(|| self.prior.of(effect, slides)),
+            within: own_within.filter(|_| effect.geometric),
+        });
         JointFreeSet {
             origin,
-            offset: has(JointFree::Offset, Free::JointOffsets),
-            gain: has(JointFree::Gain, Free::JointGains),
-            eccentricity: has(JointFree::Eccentricity, Free::Eccentricity),
-            compliance: has(JointFree::Compliance, Free::Compliance),
-            lateral_compliance: has(JointFree::LateralCompliance, Free::LateralCompliance),
-            backlash: has(JointFree::Backlash, Free::Backlash),
+            effects: effects.collect(),
             coupled_to: exception.coupled_to,
             position_sigma: exception.sigma_m.unwrap_or(self.prior.position),
             angle_sigma: exception.sigma_rad.unwrap_or(self.prior.angle),
-            offset_sigma: if slides {
-                exception.sigma_m
-            } else {
-                exception.sigma_rad
-            }
-            .unwrap_or(offset_prior),
-            backlash_sigma: if slides {
-                self.prior.backlash_m
-            } else {
-                self.prior.backlash_rad
-            },
             position_within: exception.within_m,
             angle_within: exception.within_rad,
         }
     }
 }
 
-/// Prior standard deviations.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A joint effect that is estimated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeEffect {
+    /// The effect.
+    pub effect: &'static Effect,
+    /// Prior σ of its coefficients, SI.
+    pub sigma: Option<f64>,
+    /// Limit of its coefficients about 0, SI.
+    pub within: Option<f64>,
+}
+
+/// Prior standard deviations, SI.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     /// Position numbers of joint origins, m.
     pub position: f64,
     /// Orientation numbers of joint origins, rad.
     pub angle: f64,
-    /// Zero offsets of revolute joints, rad.
-    pub offset_rad: f64,
-    /// Zero offsets of prismatic joints, m.
-    pub offset_m: f64,
-    /// Gains and couplings, 1.
-    pub gain: f64,
-    /// Eccentricity, rad.
-    pub eccentricity: f64,
-    /// Compliance, rad per N m.
-    pub compliance: f64,
-    /// Half the play of a revolute joint, rad.
-    pub backlash_rad: f64,
-    /// Half the play of a prismatic joint, m.
-    pub backlash_m: f64,
+    /// By key of `solve.prior`.
+    pub(crate) by_key: BTreeMap<&'static str, f64>,
+}
+
+impl Prior {
+    /// Prior σ of an effect's coefficients; `None` where the table has none.
+    #[must_use]
+    pub fn of(&self, effect: &Effect, prismatic: bool) -> Option<f64> {
+        let prior = effect.prior.as_ref()?;
+        let key = if prismatic {
+            prior.prismatic
+        } else {
+            prior.revolute
+        };
+        let sigma = self.by_key.get(key.key).copied();
+        Some(sigma.unwrap_or(key.default * key.si).max(prior.least))
+    }
 }
 
 /// Noise levels.

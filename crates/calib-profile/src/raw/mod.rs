@@ -5,6 +5,7 @@
 
 mod body;
 mod contact;
+mod free;
 mod origin;
 mod recording;
 mod simulate;
@@ -12,13 +13,12 @@ mod solve;
 
 pub use body::{RawBody, RawPose};
 pub use contact::{RawContact, RawTip, RawTouched};
+pub(crate) use free::{ANGLE, POSITION, PRIOR_KEYS};
+pub use free::{RawFree, RawJointFree, RawPrior};
 pub use origin::{RawLoop, RawOrientation, RawOrigin, RawPoint, RawTransform};
 pub use recording::{RawClocks, RawRecording, RawRobotLog, RawTimedPoses, RawTiming, RawUse};
 pub use simulate::{RawProtocol, RawSimErrors, RawSimMount, RawSimNoise, RawSimulate, RawSteps};
-pub use solve::{
-    RawFree, RawJointFree, RawJointSolve, RawLimits, RawLoad, RawMethod, RawNoise, RawPrior,
-    RawSolve,
-};
+pub use solve::{RawJointSolve, RawLimits, RawLoad, RawMethod, RawNoise, RawSolve};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

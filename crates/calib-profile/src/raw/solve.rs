@@ -1,5 +1,6 @@
 //! What is estimated, with priors, noise levels and limits of the verdict.
 
+use super::{RawFree, RawJointFree, RawPrior};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -13,34 +14,6 @@ pub enum RawMethod {
     /// Maximum likelihood over all loops at once.
     #[default]
     Ml,
-}
-
-/// What the solver may change.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum RawFree {
-    /// Mounts of the tracking bodies on their links.
-    Bodies,
-    /// Pose of the robot's root in the tracker.
-    Tracker,
-    /// Zero offsets of the moved joints.
-    JointOffsets,
-    /// Axis lines of the moved joints: two tilts and two shifts across the axis.
-    JointAxes,
-    /// Whole origins of the moved joints, six numbers each.
-    JointOrigins,
-    /// Gains of the moved joints: true angle per indicated angle.
-    JointGains,
-    /// First-harmonic eccentricity of the moved joints' gears or encoders.
-    Eccentricity,
-    /// Turn of the moved joints per gravity torque about their axis.
-    Compliance,
-    /// Tilt of the moved joints' axes per gravity torque across them.
-    LateralCompliance,
-    /// Play of the moved joints: half of it to either side by the direction of approach from the row before.
-    Backlash,
 }
 
 /// Extra effects or prior width of one joint (fixed joints included).
@@ -65,70 +38,6 @@ pub struct RawJointSolve {
     /// The joint also turns by an unknown share of these joints' angles (belt or parallelogram coupling).
     #[serde(default)]
     pub coupled_to: Vec<String>,
-}
-
-/// What of one joint is free.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum RawJointFree {
-    /// Zero offset.
-    Offset,
-    /// Gain.
-    Gain,
-    /// First-harmonic eccentricity.
-    Eccentricity,
-    /// Compliance about the axis.
-    Compliance,
-    /// Compliance across the axis.
-    LateralCompliance,
-    /// Play, by the direction of approach.
-    Backlash,
-    /// Whole origin.
-    Origin,
-    /// Axis line only.
-    Axis,
-}
-
-/// Prior standard deviations of what is freed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct RawPrior {
-    /// Position numbers of joint origins, mm.
-    pub position_mm: f64,
-    /// Orientation numbers of joint origins, deg.
-    pub angle_deg: f64,
-    /// Zero offsets of joints, deg.
-    pub offset_deg: f64,
-    /// Zero offsets of prismatic joints, mm.
-    pub offset_mm: f64,
-    /// Gains and couplings, per cent.
-    pub gain_percent: f64,
-    /// Eccentricity, deg.
-    pub eccentricity_deg: f64,
-    /// Compliance, deg per N m.
-    pub compliance_deg_per_nm: f64,
-    /// Half of a joint's play, deg.
-    pub backlash_deg: f64,
-    /// Half of a prismatic joint's play, mm.
-    pub backlash_mm: f64,
-}
-
-impl Default for RawPrior {
-    fn default() -> Self {
-        Self {
-            position_mm: 10.0,
-            angle_deg: 1.0,
-            offset_deg: 1.0,
-            offset_mm: 10.0,
-            gain_percent: 1.0,
-            eccentricity_deg: 0.5,
-            compliance_deg_per_nm: 0.05,
-            backlash_deg: 0.2,
-            backlash_mm: 0.5,
-        }
-    }
 }
 
 /// Where the load of a joint comes from.
@@ -201,7 +110,7 @@ impl Default for RawSolve {
             free: vec![
                 RawFree::Bodies,
                 RawFree::Tracker,
-                RawFree::JointOffsets,
+                RawFree::Effect(&calib_core::effect::offset::EFFECT),
                 RawFree::JointAxes,
             ],
             joints: BTreeMap::new(),

@@ -109,6 +109,22 @@ impl RobotModel {
         }
     }
 
+    /// `root_from_link` of every link, the motion `joint_from_child` of each joint being given by the caller.
+    #[must_use]
+    pub fn forward_kinematics_with(
+        &self,
+        mut motion: impl FnMut(JointId) -> Isometry3<f64>,
+    ) -> Vec<Isometry3<f64>> {
+        let mut root_from_link = vec![Isometry3::identity(); self.links.len()];
+        for &id in &self.from_root {
+            let joint = self.joint(id);
+            // root_from_child = root_from_parent · parent_from_joint · joint_from_child
+            root_from_link[joint.child.index()] =
+                root_from_link[joint.parent.index()] * joint.parent_link_from_joint * motion(id);
+        }
+        root_from_link
+    }
+
     /// `root_from_link` of one link: only its own chain is computed.
     #[must_use]
     pub fn root_from_link(&self, q: &[f64], link: LinkId) -> Isometry3<f64> {
