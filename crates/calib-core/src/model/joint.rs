@@ -11,7 +11,7 @@
 //! backward   ∂/∂φ: −Ad(P⁻¹) S                   ∂/∂θ: −Ad((exp(−Sφ) P)⁻¹) Exp(θ) Jr(θ)      (3)
 //! ```
 
-use nalgebra::{Isometry3, Matrix3, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use calib_geometry::so3;
 
@@ -102,10 +102,23 @@ impl JointMotion {
         }
     }
 
-    /// `joint_from_child`.
+    /// `joint_from_child`: equation (1) in quaternions, where the solver's inner loop has matrices.
     #[must_use]
     pub fn joint_from_child(&self) -> Isometry3<f64> {
-        self.pose(false).isometry()
+        let mut x = match self.axis {
+            Axis::Revolute(a) => Isometry3::from_parts(
+                Translation3::identity(),
+                UnitQuaternion::from_axis_angle(&a, self.phi),
+            ),
+            Axis::Prismatic(a) => Isometry3::from_parts(
+                Translation3::from(a.into_inner() * self.phi),
+                UnitQuaternion::identity(),
+            ),
+        };
+        if let Some(theta) = self.theta {
+            x.rotation *= so3::exp(&theta);
+        }
+        x
     }
 
     /// Equation (1), or its inverse.
