@@ -1,4 +1,4 @@
-//! Recordings: what trackers and robots write, brought into one form, and checked before anything is fitted.
+//! Recordings: what trackers and robots write, brought into one form.
 //!
 //! A recording is a set of streams, each sampled at instants `t_i` of its own clock:
 //!
@@ -8,12 +8,7 @@
 //! ```
 //!
 //! Every sample may be lost, and lost is a state of its own: no zeros, no NaN. Files of static poses have one row
-//! per pose and no useful time; [`Poses`] is that table. Bodies are read as such, or computed from three or more
-//! markers whose arrangement `m_k` is learned from the data ([`rigid_body`]):
-//!
-//! ```text
-//! min over m, {R_i, t_i}   Σ_i Σ_{k seen at i} ‖ R_i m_k + t_i − p_ik ‖²                  (1)
-//! ```
+//! per pose and no useful time; [`Poses`] is that table.
 //!
 //! ```
 //! use calib_recording::{Filled, ReadOptions, read_bytes};
@@ -25,26 +20,22 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Readers ([`readers`]) convert to SI and write down what they converted; errors name file, line and column.
-//! What no reader can know: whether a marker's name is on the right marker, or two clocks on the same second.
+//! Readers ([`readers`]) convert to SI and list what they converted; errors name file, line and column. What a reader
+//! notices without failing is a [`Finding`](calib_finding::Finding) in [`Meta`]. Whether the data make sense is
+//! checked by `calib-checks`.
 
-pub mod checks;
 mod column_map;
 mod error;
-mod finding;
 mod growth;
 mod model;
 mod poses;
 pub mod readers;
-pub mod rigid_body;
-pub mod sync;
 mod table;
 mod text;
 mod units;
 
 pub use column_map::{BodyColumns, ColumnMap, Delimiter, LongColumns, PRESETS, TimeColumn};
-pub use error::{At, Error, Problem, nearest_word};
-pub use finding::{Finding, Severity};
+pub use error::{At, Error, Problem};
 pub use model::{
     BodyStream, Filled, JointStream, JointUnit, MarkerSample, MarkerStream, Meta, Recording,
     Timeline, TorqueStream,

@@ -1,6 +1,6 @@
 //! The canonical recording: what every reader makes, whatever the laboratory wrote.
 
-use crate::finding::Finding;
+use calib_finding::Finding;
 use nalgebra::{Isometry3, Matrix6, Point3};
 use std::collections::BTreeMap;
 

@@ -12,7 +12,7 @@
 use super::common::unique_names;
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem, excerpt};
-use crate::finding::{Finding, Severity, are, counted};
+use calib_finding::{About, Fact, Finding, Subject, catalog};
 use crate::model::{MarkerSample, MarkerStream, Recording, Timeline};
 use crate::units::LengthUnit;
 use nalgebra::Point3;
@@ -385,15 +385,9 @@ fn shape(
     let unit = match LengthUnit::from_text(&unit_text) {
         Some(unit) => unit,
         None if unit_text.is_empty() => {
-            let text = "the file does not say its unit of length; millimetres assumed";
-            let remedy = "check one distance against the body";
-            out.meta.findings.push(Finding::new(
-                "unit-missing",
-                Severity::Warning,
-                "POINT:UNITS",
-                text,
-                remedy,
-            ));
+            let unit = Subject::column("POINT:UNITS");
+            let finding = Finding::new(catalog::UNIT_MISSING, unit);
+            out.meta.findings.push(finding);
             LengthUnit::Mm
         }
         None => {
@@ -460,7 +454,7 @@ fn labels(parameters: &Parameters, points: usize, findings: &mut Vec<Finding>) -
         *label = format!("point_{}", i + 1);
     }
     labels.extend((labels.len()..points).map(|i| format!("point_{}", i + 1)));
-    unique_names(labels, "marker", findings)
+    unique_names(labels, About::Marker, findings)
 }
 
 fn read_points(
@@ -536,18 +530,10 @@ fn read_points(
         }
     }
     if not_finite > 0 {
-        let text = format!(
-            "{} {} not finite; taken as lost",
-            counted(not_finite, "point"),
-            are(not_finite)
+        meta.findings.push(
+            Finding::of_kind(catalog::NOT_A_NUMBER, "points", About::Lengths)
+                .with("count", Fact::count(not_finite)),
         );
-        meta.findings.push(Finding::new(
-            "not-a-number",
-            Severity::Warning,
-            "points",
-            text,
-            "export the file again",
-        ));
     }
     let names = labels(parameters, shape.points, &mut meta.findings);
     let rows: Vec<u64> = (0..shape.frames).map(|i| shape.first_frame + i).collect();

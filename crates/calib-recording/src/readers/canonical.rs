@@ -1,7 +1,8 @@
 //! Our own tables, and any delimited table with a column map.
 
 use super::{Input, ReadOptions, Reader};
-use crate::error::{At, Placed, Problem, nearest_word};
+use crate::error::{At, Placed, Problem};
+use calib_finding::nearest_word;
 use crate::model::Recording;
 use crate::table::{is_canonical, read_table};
 use crate::text::{Separator, cells};
@@ -92,7 +93,7 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
         Some(map) => Some(map.resolved().ok_or_else(|| {
             let id = map.preset.clone().unwrap_or_default();
             let known = crate::column_map::PRESETS;
-            let nearest = nearest_word(&id, known);
+            let nearest = nearest_word(&id, known).map(str::to_owned);
             (
                 At::File,
                 Problem::UnknownReader {

@@ -1,7 +1,7 @@
 //! What the readers of tracker files share: rows of numbers, three coordinates to a sample, unique names.
 
 use crate::error::{At, Placed, Problem};
-use crate::finding::{Finding, Severity, are, counted};
+use calib_finding::{About, Fact, Finding, Subject, catalog};
 use crate::growth::push;
 use crate::model::{BodyStream, MarkerSample, MarkerStream};
 use crate::table::UNIT_TOLERANCE;
@@ -159,22 +159,25 @@ impl MarkerTrack {
     }
 
     pub(super) fn finish(self, findings: &mut Vec<Finding>) -> MarkerStream {
-        findings.extend(all_zero(&self.stream.name, self.zeros));
+        findings.extend(all_zero(Subject::marker(&self.stream.name), self.zeros));
         self.stream
     }
 }
 
 /// The finding about samples at exactly zero; `None` without such.
-pub(super) fn all_zero(subject: &str, rows: Vec<u64>) -> Option<Finding> {
-    let text = format!(
-        "{} {} exactly (0, 0, 0); taken as lost",
-        counted(rows.len(), "sample"),
-        are(rows.len())
-    );
-    let remedy = "let the tracker export lost samples as empty";
+pub(super) fn all_zero(subject: Subject, rows: Vec<u64>) -> Option<Finding> {
     (!rows.is_empty()).then(|| {
-        Finding::new("all-zero-triplet", Severity::Warning, subject, text, remedy).at_rows(rows)
+        Finding::of_kind(catalog::ALL_ZERO_TRIPLET, "lost", subject)
+            .with("samples", Fact::count(rows.len()))
+            .at_rows(rows)
     })
+}
+
+/// The finding about a header field that announces another number of frames than the file has.
+pub(super) fn frame_count_differs(field: &str, promised: u64, found: usize) -> Finding {
+    Finding::new(catalog::FRAME_COUNT_DIFFERS, Subject::column(field))
+        .with("promised", Fact::Count(promised))
+        .with("found", Fact::count(found))
 }
 
 /// An empty stream of a body.
@@ -236,10 +239,11 @@ pub(super) fn pose(position: Point3<f64>, rotation: UnitQuaternion<f64>) -> Isom
     Isometry3::from_parts(Translation3::from(position.coords), rotation)
 }
 
-/// Makes names unique by `#2`, `#3` … and says so.
+/// Makes names unique by `#2`, `#3` … with a finding for each; `about` says what they
+/// name.
 pub(super) fn unique_names(
     names: Vec<String>,
-    what: &str,
+    about: fn(String) -> About,
     findings: &mut Vec<Finding>,
 ) -> Vec<String> {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
@@ -256,16 +260,12 @@ pub(super) fn unique_names(
             while taken.contains(&unique) {
                 unique.push('\'');
             }
-            let text =
-                format!("{what} `{name}` occurs {count} times; this one is called `{unique}`");
-            let remedy = "give every marker and body its own name in the tracker's software";
-            findings.push(Finding::new(
-                "duplicate-name",
-                Severity::Warning,
-                &unique,
-                text,
-                remedy,
-            ));
+            findings.push(
+                Finding::new(catalog::DUPLICATE_NAME, Subject::from(about(unique.clone())))
+                    .with("name", Fact::name(name))
+                    .with("count", Fact::count(*count))
+                    .with("unique", Fact::name(&unique)),
+            );
             unique
         })
         .collect()

@@ -15,7 +15,7 @@
 use super::common::{body_stream, head_text, pose, rotation, unexpected};
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
-use crate::finding::{Finding, Severity, counted};
+use calib_finding::{Fact, Finding, Subject, catalog};
 use crate::growth::push;
 use crate::model::{BodyStream, MarkerSample, MarkerStream, Recording, Timeline};
 use crate::text::{Lines, Number, number};
@@ -414,10 +414,10 @@ impl Log {
         meta.conversions
             .push("lengths from mm; rotations from the matrices, angles ignored".to_string());
         if self.days > 0.0 {
-            meta.conversions.push(format!(
-                "time runs on over midnight ({})",
-                counted((self.days / DAY) as usize, "time")
-            ));
+            let days = (self.days / DAY) as usize;
+            let times = if days == 1 { "once" } else { "several times" };
+            meta.conversions
+                .push(format!("time continues past midnight ({times})"));
         }
         if !self.skipped.is_empty() {
             let kinds: Vec<String> = self
@@ -429,37 +429,20 @@ impl Log {
                 .push(format!("lines not read: {}", kinds.join(", ")));
         }
         if !self.backwards.is_empty() {
-            let text = format!(
-                "{} {} not rise",
-                counted(self.backwards.len(), "frame number"),
-                if self.backwards.len() == 1 {
-                    "does"
-                } else {
-                    "do"
-                }
-            );
-            let remedy =
-                "the log may hold several recordings, or datagrams out of order: cut it there";
             meta.findings.push(
-                Finding::new("rows-out-of-order", Severity::Warning, "fr", text, remedy)
+                Finding::of_kind(catalog::ROWS_OUT_OF_ORDER, "frames", Subject::column("fr"))
+                    .with("count", Fact::count(self.backwards.len()))
                     .at_rows(self.backwards),
             );
         }
         let without = self.times.iter().filter(|time| time.is_none()).count();
         let t: Option<Vec<f64>> = self.times.into_iter().collect();
         if t.is_none() && without < n {
-            let text = format!(
-                "no time stamp in {without} of {}; the recording is read without time",
-                counted(n, "frame")
+            meta.findings.push(
+                Finding::new(catalog::NO_TIME, Subject::column("ts"))
+                    .with("without", Fact::count(without))
+                    .with("frames", Fact::count(n)),
             );
-            let remedy = "switch on `ts` or `ts2` in DTrack's output";
-            meta.findings.push(Finding::new(
-                "no-time",
-                Severity::Warning,
-                "ts",
-                text,
-                remedy,
-            ));
         }
         let clock = if t.is_some() {
             "DTrack controller"

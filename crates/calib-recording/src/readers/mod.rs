@@ -11,7 +11,8 @@ mod trc;
 mod vicon;
 
 use crate::column_map::ColumnMap;
-use crate::error::{At, Error, Placed, Problem, in_file, nearest_word};
+use crate::error::{At, Error, Placed, Problem, in_file};
+use calib_finding::nearest_word;
 use crate::model::Recording;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -235,7 +236,7 @@ fn choose(head: &[u8], options: &ReadOptions) -> Placed<&'static Reader> {
             .iter()
             .find(|reader| reader.id == id)
             .ok_or_else(|| {
-                let nearest = nearest_word(id, readers().iter().map(|reader| reader.id));
+                let nearest = nearest_word(id, readers().iter().map(|reader| reader.id)).map(str::to_owned);
                 (
                     At::File,
                     Problem::UnknownReader {

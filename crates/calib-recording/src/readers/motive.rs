@@ -14,6 +14,7 @@
 //! measured. Times are seconds from the start; the start itself is local wall-clock text and is kept as a comment.
 //! The file does not say which axis is up (Y unless changed at export).
 
+use calib_finding::About;
 use super::common::{
     MarkerTrack, Triplet, body_stream, first_cell, numbers, pose, quaternion, triplet, unexpected,
     unique_names,
@@ -280,7 +281,7 @@ fn plan(
             .iter()
             .map(|marker| marker.stream.name.clone())
             .collect(),
-        "marker",
+        About::Marker,
         findings,
     );
     markers
@@ -292,7 +293,7 @@ fn plan(
             .iter()
             .map(|body: &Body| body.stream.name.clone())
             .collect(),
-        "body",
+        About::Body,
         findings,
     );
     bodies

@@ -7,7 +7,7 @@
 
 use super::common::{
     MarkerTrack, Triplet, all_zero, body_stream, head_text, numbers, pose, rotation, triplet,
-    unexpected, unique_names,
+    unexpected, unique_names, frame_count_differs,
 };
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
@@ -15,6 +15,7 @@ use crate::growth::push;
 use crate::model::{BodyStream, Recording, Timeline};
 use crate::text::{Lines, Number, Separator, cells, number};
 use crate::units::LengthUnit;
+use calib_finding::{About, Subject};
 use nalgebra::Matrix3;
 use std::io::BufReader;
 
@@ -118,7 +119,7 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
     let mut recording = Recording::default();
     let names = unique_names(
         header.names.clone(),
-        if header.six_d { "body" } else { "marker" },
+        if header.six_d { About::Body } else { About::Marker },
         &mut recording.meta.findings,
     );
     let (mut markers, mut bodies) = (Vec::new(), Vec::new());
@@ -246,18 +247,9 @@ fn finish(
         .frames
         .filter(|&frames| frames != recording.timelines[0].rows.len() as u64)
     {
-        let text = format!(
-            "the header says {promised} frames, the file has {}",
-            recording.timelines[0].rows.len()
-        );
-        let remedy = "check that the file was written to its end";
-        meta.findings.push(crate::Finding::new(
-            "frame-count-differs",
-            crate::Severity::Warning,
-            "NO_OF_FRAMES",
-            text,
-            remedy,
-        ));
+        let found = recording.timelines[0].rows.len();
+        meta.findings
+            .push(frame_count_differs("NO_OF_FRAMES", promised, found));
     }
     recording.markers = markers
         .into_iter()
@@ -265,7 +257,7 @@ fn finish(
         .collect();
     for body in bodies {
         meta.findings
-            .extend(all_zero(&body.stream.name, body.zeros));
+            .extend(all_zero(Subject::body(&body.stream.name), body.zeros));
         recording.bodies.push(body.stream);
     }
     Ok(recording)

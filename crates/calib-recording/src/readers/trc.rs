@@ -10,10 +10,10 @@
 //!
 //! The numbers of frames and markers in the header are often wrong; the columns count.
 
-use super::common::{MarkerTrack, first_cell, numbers, unexpected, unique_names};
+use calib_finding::About;
+use super::common::{MarkerTrack, first_cell, frame_count_differs, numbers, unexpected, unique_names};
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
-use crate::finding::{Finding, Severity};
 use crate::growth::push;
 use crate::model::{Recording, Timeline};
 use crate::text::{Lines, Separator, cells};
@@ -80,7 +80,7 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
     let mut findings = Vec::new();
     let unique = unique_names(
         names.iter().map(|(_, name)| name.clone()).collect(),
-        "marker",
+        About::Marker,
         &mut findings,
     );
     let mut markers: Vec<MarkerTrack> = (unique.iter().zip(&names).enumerate())
@@ -125,18 +125,7 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
     }
     let promised = field("NumFrames").and_then(|text| text.parse::<usize>().ok());
     if let Some(promised) = promised.filter(|&promised| promised != frames.len()) {
-        let text = format!(
-            "the header says {promised} frames, the file has {}",
-            frames.len()
-        );
-        let remedy = "check that the file was written to its end";
-        findings.push(Finding::new(
-            "frame-count-differs",
-            Severity::Warning,
-            "NumFrames",
-            text,
-            remedy,
-        ));
+        findings.push(frame_count_differs("NumFrames", promised as u64, frames.len()));
     }
     let rate = field("DataRate").and_then(|text| text.parse::<f64>().ok());
     let mut recording = Recording::default();

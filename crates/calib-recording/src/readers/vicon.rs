@@ -20,7 +20,7 @@ use super::common::{
 };
 use super::{Input, ReadOptions, Reader, RotationForm};
 use crate::error::{At, Placed, Problem};
-use crate::finding::Finding;
+use calib_finding::{About, Subject};
 use crate::growth::push;
 use crate::model::{BodyStream, Meta, Recording, Timeline};
 use crate::text::{Lines, Separator, cells};
@@ -105,7 +105,7 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
     } = &mut recording;
     let names = unique_names(
         markers.iter().map(|marker| marker.name.clone()).collect(),
-        "marker",
+        About::Marker,
         findings,
     );
     markers
@@ -114,7 +114,7 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
         .for_each(|(marker, name)| marker.name = name);
     let names = unique_names(
         bodies.iter().map(|body| body.name.clone()).collect(),
-        "body",
+        About::Body,
         findings,
     );
     bodies
@@ -271,11 +271,9 @@ fn read_section<R: BufRead>(
         mut stream, zeros, ..
     } in bodies
     {
-        out.meta.findings.extend(
-            all_zero(&stream.name, zeros)
-                .into_iter()
-                .collect::<Vec<Finding>>(),
-        );
+        out.meta
+            .findings
+            .extend(all_zero(Subject::body(&stream.name), zeros));
         stream.timeline = timeline;
         out.bodies.push(stream);
     }

@@ -3,7 +3,7 @@
 use super::header::{BodyPlan, Column, Layout, Rotation, SlotKind};
 use crate::column_map::{ColumnMap, Delimiter};
 use crate::error::{At, Placed, Problem, excerpt};
-use crate::finding::{Finding, Severity, are, counted};
+use calib_finding::{Fact, Finding, Subject, catalog};
 use crate::growth::push;
 use crate::model::{
     BodyStream, JointStream, MarkerSample, MarkerStream, Meta, Recording, Timeline, TorqueStream,
@@ -59,9 +59,7 @@ pub(crate) fn read_table(input: impl BufRead, map: Option<&ColumnMap>) -> Placed
     }
     let mut recording = rows.finish()?;
     recording.meta.findings.extend(cut.map(|line| {
-        let text = "the last row was cut off while it was written, and is left out";
-        let remedy = "nothing to do; `calib record --append` goes on from here";
-        Finding::new("row-cut-off", Severity::Info, "last row", text, remedy).at_rows([line])
+        Finding::new(catalog::ROW_CUT_OFF, Subject::default()).at_rows([line])
     }));
     recording.meta.comments = comments;
     Ok(recording)
@@ -649,25 +647,16 @@ impl<'a> Rows<'a> {
         let zeros = std::mem::take(&mut self.zeros)
             .into_iter()
             .map(|(name, rows)| {
-                let text = format!(
-                    "{} {} exactly (0, 0, 0); taken as lost",
-                    counted(rows.len(), "sample"),
-                    are(rows.len())
-                );
-                let remedy = "leave the cells empty where nothing was measured";
-                Finding::new("all-zero-triplet", Severity::Warning, name, text, remedy)
+                Finding::of_kind(catalog::ALL_ZERO_TRIPLET, "lost", Subject::marker(name))
+                    .with("samples", Fact::count(rows.len()))
                     .at_rows(rows)
             });
         let nans = std::mem::take(&mut self.nans)
             .into_iter()
             .map(|(column, rows)| {
-                let text = format!(
-                    "{} {} not a number; taken as lost",
-                    counted(rows.len(), "cell"),
-                    are(rows.len())
-                );
-                let remedy = "leave the cells empty where nothing was measured";
-                Finding::new("not-a-number", Severity::Warning, column, text, remedy).at_rows(rows)
+                Finding::of_kind(catalog::NOT_A_NUMBER, "cells", Subject::column(column))
+                    .with("count", Fact::count(rows.len()))
+                    .at_rows(rows)
             });
         zeros.chain(nans).collect()
     }

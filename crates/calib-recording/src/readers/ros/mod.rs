@@ -13,7 +13,7 @@ mod sqlite;
 use super::common::unique_names;
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
-use crate::finding::{Finding, Severity, counted};
+use calib_finding::{About, Fact, Finding, Subject, catalog};
 use crate::growth::push;
 use crate::model::{
     JointStream, JointUnit, MarkerSample, MarkerStream, Recording, Timeline, TorqueStream,
@@ -176,10 +176,9 @@ impl Bag {
         }
         let meta = &mut recording.meta;
         for (name, rows) in self.broken {
-            let text = format!("{} quaternions are no rotations; taken as lost", rows.len());
-            let remedy = "check the node that publishes them";
             meta.findings.push(
-                Finding::new("not-unit-rotation", Severity::Warning, name, text, remedy)
+                Finding::of_kind(catalog::NOT_UNIT_ROTATION, "lost", Subject::body(name))
+                    .with("count", Fact::count(rows.len()))
                     .at_rows(rows),
             );
         }
@@ -209,7 +208,7 @@ impl Bag {
         }
         let names = unique_names(
             recording.bodies.iter().map(|b| b.name.clone()).collect(),
-            "body",
+            About::Body,
             &mut meta.findings,
         );
         recording
@@ -219,7 +218,7 @@ impl Bag {
             .for_each(|(body, name)| body.name = name);
         let names = unique_names(
             recording.markers.iter().map(|m| m.name.clone()).collect(),
-            "marker",
+            About::Marker,
             &mut meta.findings,
         );
         recording
@@ -229,7 +228,7 @@ impl Bag {
             .for_each(|(marker, name)| marker.name = name);
         let names = unique_names(
             recording.joints.iter().map(|j| j.name.clone()).collect(),
-            "joint",
+            About::Joint,
             &mut meta.findings,
         );
         recording
@@ -304,19 +303,13 @@ impl Group {
             .map(|i| self.rows[i])
             .collect();
         if !moved.is_empty() {
-            let text = format!(
-                "{} came out of order; sorted by their time",
-                counted(moved.len(), "message")
-            );
-            let remedy = "nothing, unless several nodes publish this topic";
             out.meta.findings.push(
-                Finding::new(
-                    "rows-out-of-order",
-                    Severity::Info,
-                    &self.topic,
-                    text,
-                    remedy,
+                Finding::of_kind(
+                    catalog::ROWS_OUT_OF_ORDER,
+                    "sorted",
+                    Subject::column(&self.topic),
                 )
+                .with("count", Fact::count(moved.len()))
                 .at_rows(moved),
             );
         }

@@ -1,10 +1,9 @@
 //! Joints: enough of them, in the right unit, inside their limits, over the range asked for.
 
 use super::Expectations;
-use super::statistics::range;
-use crate::finding::{Finding, Severity, counted};
-use crate::model::JointUnit;
-use crate::poses::Poses;
+use crate::statistics::range;
+use calib_finding::{Fact, Finding, Subject, Unit, catalog};
+use calib_recording::{JointUnit, Poses};
 use std::f64::consts::TAU;
 
 /// A joint that turned less than this, rad (0.06°) — or slid less, m — did not move: encoders flicker by less.
@@ -26,18 +25,9 @@ pub(super) fn too_few(poses: &Poses, expected: &Expectations) -> Option<Finding>
     let has_tracker = !poses.bodies.is_empty() || !poses.markers.is_empty();
     let usable = if has_tracker { usable } else { poses.len() };
     (usable < expected.min_poses).then(|| {
-        let text = format!(
-            "{} with a tracked body or marker; the fit needs {}",
-            counted(usable, "row"),
-            expected.min_poses
-        );
-        Finding::new(
-            "too-few-poses",
-            Severity::Error,
-            "recording",
-            text,
-            "record more poses",
-        )
+        Finding::new(catalog::TOO_FEW_POSES, Subject::default())
+            .with("usable", Fact::count(usable))
+            .with("needed", Fact::count(expected.min_poses))
     })
 }
 
@@ -58,29 +48,23 @@ pub(super) fn units(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
         let too_large =
             largest > MAX_TURNS * TAU && limit.is_none_or(|limit| largest > 2.0 * limit);
         if too_large {
-            let text = format!("reaches {largest:.1} rad ({:.1} turns)", largest / TAU);
-            let remedy = "are these degrees? name the column `…_deg`, or set `angles: deg` in the column map";
             let rows =
                 (0..poses.len()).filter(|&i| q[i].is_some_and(|q| q.abs() > MAX_TURNS * TAU));
-            let finding = Finding::new("unit-mismatch", Severity::Error, joint, text, remedy);
-            findings.push(finding.at_rows(rows.map(|i| poses.rows[i])));
+            findings.push(
+                Finding::of_kind(catalog::UNIT_MISMATCH, "degrees", Subject::joint(joint))
+                    .with("largest", Fact::radians(largest))
+                    .at_rows(rows.map(|i| poses.rows[i])),
+            );
         } else if let Some((from, to)) = expected.asked.get(joint) {
             // Radians read as degrees: the range is 57.3 times too small.
             let ratio = (to - from) / (high - low).max(f64::MIN_POSITIVE);
             if (45.0..75.0).contains(&ratio) {
-                let text = format!(
-                    "moved {:.2}°, {:.0}° were asked for: a ratio of {ratio:.1}",
-                    (high - low).to_degrees(),
-                    (to - from).to_degrees()
+                findings.push(
+                    Finding::of_kind(catalog::UNIT_MISMATCH, "radians", Subject::joint(joint))
+                        .with("moved", Fact::radians(high - low))
+                        .with("asked", Fact::radians(to - from))
+                        .with("ratio", Fact::ratio(ratio)),
                 );
-                let remedy = "are these radians? name the column `…_rad`, or set `angles: rad` in the column map";
-                findings.push(Finding::new(
-                    "unit-mismatch",
-                    Severity::Error,
-                    joint,
-                    text,
-                    remedy,
-                ));
             }
         }
     }
@@ -107,16 +91,13 @@ pub(super) fn limits(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
             .copied()
             .filter(|&q| outside(q))
             .max_by(|a, b| (a - low).max(high - a).total_cmp(&(b - low).max(high - b)));
-        let unit = unit(poses, joint);
-        let text = format!(
-            "{} outside its limits {low:.4}..{high:.4} {unit}, e.g. {:.4} {unit}",
-            counted(rows.len(), "row"),
-            worst.unwrap_or_default()
-        );
-        let remedy =
-            "check the joint's name, sign and zero, or the limits in the robot's description";
+        let amount = |value: f64| Fact::number(value, unit(poses, joint));
         findings.push(
-            Finding::new("joint-outside-limits", Severity::Error, joint, text, remedy)
+            Finding::new(catalog::JOINT_OUTSIDE_LIMITS, Subject::joint(joint))
+                .with("rows", Fact::count(rows.len()))
+                .with("low", amount(low))
+                .with("high", amount(high))
+                .with("worst", amount(worst.unwrap_or_default()))
                 .at_rows(rows),
         );
     }
@@ -129,41 +110,29 @@ pub(super) fn coverage(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
         let Some(q) = poses.joints.get(joint) else {
             continue;
         };
-        let unit = unit(poses, joint);
+        let amount = |value: f64| Fact::number(value, unit(poses, joint));
+        let still = |kind| Finding::of_kind(catalog::JOINT_NEVER_MOVED, kind, Subject::joint(joint));
         let Some((low, high)) = range(q.iter().flatten().copied()) else {
-            findings.push(never_moved(joint, "has no values".to_string()));
+            findings.push(still("empty"));
             continue;
         };
         if high - low < STILL {
-            findings.push(never_moved(
-                joint,
-                format!("stays at {low:.4} {unit} in all rows"),
-            ));
+            findings.push(still("still").with("at", amount(low)));
             continue;
         }
         let covered = (high.min(to) - low.max(from)).max(0.0) / (to - from).max(f64::MIN_POSITIVE);
         if covered < COVERED {
-            let text = format!(
-                "covers {low:.3}..{high:.3} {unit} of the {from:.3}..{to:.3} {unit} asked for ({:.0} %)",
-                100.0 * covered
+            findings.push(
+                Finding::new(catalog::COVERAGE, Subject::joint(joint))
+                    .with("low", amount(low))
+                    .with("high", amount(high))
+                    .with("from", amount(from))
+                    .with("to", amount(to))
+                    .with("share", Fact::ratio(covered)),
             );
-            let remedy = "sweep the whole range, or ask for less in the profile";
-            findings.push(Finding::new(
-                "coverage",
-                Severity::Warning,
-                joint,
-                text,
-                remedy,
-            ));
         }
     }
     findings
-}
-
-fn never_moved(joint: &str, text: String) -> Finding {
-    let remedy =
-        "check that the column is the measured position of this joint, and that it was swept";
-    Finding::new("joint-never-moved", Severity::Error, joint, text, remedy)
 }
 
 /// Two joints that move and are equal in every row.
@@ -176,25 +145,20 @@ pub(super) fn duplicates(poses: &Poses) -> Vec<Finding> {
         for (b, q_b) in joints[..i].iter().filter(|_| moved) {
             let both = q_a.iter().flatten().count();
             if both >= 3 && q_a == q_b {
-                let text = format!("equals `{b}` in all {both} rows");
-                let remedy = "one column was written twice: check the export; a mimic joint need not be recorded";
-                findings.push(Finding::new(
-                    "joint-duplicate",
-                    Severity::Warning,
-                    *a,
-                    text,
-                    remedy,
-                ));
+                findings.push(
+                    Finding::new(catalog::JOINT_DUPLICATE, Subject::joint(*a))
+                        .with("other", Fact::name(*b))
+                        .with("rows", Fact::count(both)),
+                );
             }
         }
     }
     findings
 }
 
-fn unit(poses: &Poses, joint: &str) -> &'static str {
-    if poses.joint_units.get(joint) == Some(&JointUnit::Length) {
-        "m"
-    } else {
-        "rad"
+fn unit(poses: &Poses, joint: &str) -> Unit {
+    match poses.joint_units.get(joint) {
+        Some(JointUnit::Length) => Unit::Meter,
+        _ => Unit::Radian,
     }
 }

@@ -3,12 +3,11 @@
 //! Everything is read from the distances `d_ij` between markers, which no motion changes.
 
 use super::Expectations;
-use super::statistics::{median, robust_sigma};
-use crate::error::nearest_word;
-use crate::finding::{Finding, Severity, are, counted};
-use crate::poses::Poses;
 use crate::rigid_body::Template;
+use crate::statistics::{median, range, robust_sigma};
+use calib_finding::{Fact, Finding, Id, Subject, catalog, nearest_word};
 use calib_geometry::registration::rigid_registration;
+use calib_recording::Poses;
 use nalgebra::Point3;
 
 /// Gaussian distances stay within this many σ: one in 10¹⁵ does not.
@@ -51,34 +50,7 @@ pub(super) fn rigidity(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
             .filter(|marker| !poses.markers.contains_key(*marker))
             .collect();
         if !missing.is_empty() {
-            let known: Vec<&str> = poses.markers.keys().map(String::as_str).collect();
-            let text = format!(
-                "has no column for marker {}; the recording has {}",
-                missing.join(", "),
-                known.join(", ")
-            );
-            // A column of another body is not what was meant.
-            let ours = |column: &&str| !expected.bodies.values().flatten().any(|m| m == column);
-            let strangers = || known.iter().copied().filter(ours);
-            let near: Vec<String> = missing
-                .iter()
-                .filter_map(|marker| nearest_word(marker, strangers()))
-                .collect();
-            let help = if near.is_empty() {
-                "correct the marker's name in the profile".to_owned()
-            } else {
-                format!(
-                    "did you mean `{}`? correct the marker's name in the profile",
-                    near.join("`, `")
-                )
-            };
-            findings.push(Finding::new(
-                "missing-marker",
-                Severity::Error,
-                name,
-                text,
-                help,
-            ));
+            findings.push(missing_markers(name, &missing, poses, expected));
             continue;
         }
         let Some(body) = Body::new(name, markers, poses, expected) else {
@@ -98,7 +70,36 @@ pub(super) fn rigidity(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
     findings
 }
 
+/// Markers of a body that the recording does not have.
+fn missing_markers(
+    body: &str,
+    missing: &[&str],
+    poses: &Poses,
+    expected: &Expectations,
+) -> Finding {
+    // A column of another body is not what was meant.
+    let ours = |column: &&str| !expected.bodies.values().flatten().any(|m| m == column);
+    let known = || poses.markers.keys().map(String::as_str);
+    let near: Vec<&str> = missing
+        .iter()
+        .filter_map(|marker| nearest_word(marker, known().filter(ours)))
+        .collect();
+    let nearest = (!near.is_empty()).then(|| Fact::names(near));
+    Finding::new(catalog::MISSING_MARKER, Subject::body(body))
+        .with("markers", Fact::names(missing.iter().copied()))
+        .with("known", Fact::names(known()))
+        .with_some("nearest", nearest)
+}
+
 impl<'a> Body<'a> {
+    fn finding(&self, id: Id) -> Finding {
+        Finding::new(id, Subject::body(self.name))
+    }
+
+    fn finding_of(&self, id: Id, kind: &'static str) -> Finding {
+        Finding::of_kind(id, kind, Subject::body(self.name))
+    }
+
     fn new(
         name: &'a str,
         markers: &'a [String],
@@ -190,17 +191,12 @@ impl<'a> Body<'a> {
             }
         }
         let (change, row, pair) = best?;
-        let text = format!(
-            "the distance {}–{} changes by {:.2} mm for good from row {} on",
-            self.markers[pair.j],
-            self.markers[pair.i],
-            change * 1e3,
-            poses.rows[row]
-        );
-        let remedy =
-            "a marker was moved, relabelled, or the body was created anew: cut the recording there";
         Some(
-            Finding::new("body-redefined", Severity::Error, self.name, text, remedy)
+            self.finding(catalog::BODY_REDEFINED)
+                .with("first", Fact::name(self.markers[pair.j]))
+                .with("second", Fact::name(self.markers[pair.i]))
+                .with("change", Fact::meters(change))
+                .with("row", Fact::Count(poses.rows[row]))
                 .at_rows([poses.rows[row]]),
         )
     }
@@ -226,24 +222,16 @@ impl<'a> Body<'a> {
         if sigma <= self.tolerance / 2.0 {
             return None;
         }
-        let text = format!(
-            "marker {} moves on the body: its distances to the others scatter by {:.2} mm",
-            self.markers[worst],
-            sigma * 1e3
-        );
-        let remedy = "fix the marker, or leave it out of the body";
-        Some(Finding::new(
-            "not-rigid",
-            Severity::Error,
-            self.name,
-            text,
-            remedy,
-        ))
+        Some(
+            self.finding_of(catalog::NOT_RIGID, "loose")
+                .with("marker", Fact::name(self.markers[worst]))
+                .with("scatter", Fact::meters(sigma)),
+        )
     }
 
     /// Rows in which markers are exchanged, or one is out of place.
     fn bad_rows(&self, poses: &Poses) -> Vec<Finding> {
-        let mut swapped: Vec<(u64, String)> = Vec::new();
+        let mut swapped: Vec<(u64, Vec<&str>)> = Vec::new();
         let mut outliers: Vec<(u64, String, f64)> = Vec::new();
         for row in 0..poses.len() {
             let points: Vec<Option<Point3<f64>>> =
@@ -262,29 +250,25 @@ impl<'a> Body<'a> {
         }
         let mut findings = Vec::new();
         if let Some((_, which)) = swapped.first() {
-            let text = format!(
-                "markers {which} are exchanged, {} in all",
-                counted(swapped.len(), "row")
+            findings.push(
+                self.finding(catalog::MARKER_SWAP)
+                    .with("markers", Fact::names(which.iter().copied()))
+                    .with("rows", Fact::count(swapped.len()))
+                    .at_rows(swapped.iter().map(|(row, _)| *row)),
             );
-            let remedy = "correct the labels in the tracker's software, or drop these rows";
-            let finding = Finding::new("marker-swap", Severity::Error, self.name, text, remedy);
-            findings.push(finding.at_rows(swapped.iter().map(|(row, _)| *row)));
         }
         if outliers.len() as f64 > BENDING * poses.len() as f64 {
             findings.extend(self.bending(outliers.iter().map(|(row, _, _)| *row).collect()));
             return findings;
         }
         if let Some((_, marker, off)) = outliers.iter().max_by(|a, b| a.2.total_cmp(&b.2)) {
-            let text = format!(
-                "a marker is out of place in {}, most {marker} by {:.2} mm",
-                counted(outliers.len(), "row"),
-                off * 1e3
+            findings.push(
+                self.finding(catalog::MARKER_OUTLIER)
+                    .with("marker", Fact::name(marker))
+                    .with("off", Fact::meters(*off))
+                    .with("rows", Fact::count(outliers.len()))
+                    .at_rows(outliers.iter().map(|(row, _, _)| *row)),
             );
-            let remedy =
-                "a reflection or a neighbouring marker was taken for it: drop these samples";
-            let finding =
-                Finding::new("marker-outlier", Severity::Warning, self.name, text, remedy);
-            findings.push(finding.at_rows(outliers.iter().map(|(row, _, _)| *row)));
         }
         findings
     }
@@ -293,7 +277,7 @@ impl<'a> Body<'a> {
     fn bending(&self, rows: Vec<u64>) -> Option<Finding> {
         let spread = |pair: &Pair| {
             let all = distances(self.tracks[pair.i], self.tracks[pair.j]);
-            super::statistics::range(all.map(|(_, distance)| distance))
+            range(all.map(|(_, distance)| distance))
                 .map_or(0.0, |(low, high)| high - low)
         };
         let (pair, spread) = self
@@ -301,15 +285,14 @@ impl<'a> Body<'a> {
             .iter()
             .map(|pair| (pair, spread(pair)))
             .max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let (a, b) = (self.markers[pair.j], self.markers[pair.i]);
-        let text = format!(
-            "bends: the distance {a}–{b} varies by {:.2} mm, {} {} off",
-            spread * 1e3,
-            counted(rows.len(), "row"),
-            are(rows.len())
-        );
-        let remedy = "stiffen the body, or make bodies of the markers that keep their distances";
-        Some(Finding::new("not-rigid", Severity::Error, self.name, text, remedy).at_rows(rows))
+        Some(
+            self.finding_of(catalog::NOT_RIGID, "bends")
+                .with("first", Fact::name(self.markers[pair.j]))
+                .with("second", Fact::name(self.markers[pair.i]))
+                .with("range", Fact::meters(spread))
+                .with("rows", Fact::count(rows.len()))
+                .at_rows(rows),
+        )
     }
 
     /// Largest departure of a distance from its median.
@@ -320,8 +303,8 @@ impl<'a> Body<'a> {
         departures.fold(0.0, f64::max)
     }
 
-    /// The permutation of the markers seen that brings all distances back, as `A ↔ B`.
-    fn exchange(&self, points: &[Option<Point3<f64>>]) -> Option<String> {
+    /// The permutation of the markers seen that brings all distances back: the markers that it moves.
+    fn exchange(&self, points: &[Option<Point3<f64>>]) -> Option<Vec<&'a str>> {
         let n = points.len();
         let mut best: Option<(f64, Vec<usize>)> = None;
         let mut consider = |order: &[usize]| {
@@ -347,11 +330,8 @@ impl<'a> Body<'a> {
         // At least four markers, or a triangle, must be seen for a permutation to mean anything.
         let seen = points.iter().flatten().count();
         let (_, order) = best.filter(|_| seen >= 3)?;
-        let moved: Vec<&str> = (0..n)
-            .filter(|&k| order[k] != k)
-            .map(|k| self.markers[k])
-            .collect();
-        Some(moved.join(" ↔ "))
+        let moved = (0..n).filter(|&k| order[k] != k);
+        Some(moved.map(|k| self.markers[k]).collect())
     }
 
     /// The marker whose distances are most off, and by how much.
@@ -389,21 +369,15 @@ impl<'a> Body<'a> {
             (known > 0.0).then(|| pair.distance / known)
         });
         let ratio = median(ratios.collect())?;
-        for (factor, taken) in [
-            (1e3, "millimetres taken for metres"),
-            (1e-3, "metres taken for millimetres"),
-            (10.0, "a factor of ten"),
-            (0.1, "a factor of ten"),
+        for (factor, kind) in [
+            (1e3, "template_millimeters"),
+            (1e-3, "template_meters"),
+            (10.0, "template_ten"),
+            (0.1, "template_ten"),
         ] {
             if (0.8..1.25).contains(&(ratio / factor)) {
-                let text = format!("is {ratio:.4} times as large as its template: {taken}");
-                return Some(Finding::new(
-                    "unit-mismatch",
-                    Severity::Error,
-                    self.name,
-                    text,
-                    "correct the unit of length of the recording or of the template",
-                ));
+                let finding = self.finding_of(catalog::UNIT_MISMATCH, kind);
+                return Some(finding.with("ratio", Fact::ratio(ratio)));
             }
         }
         let off = self
@@ -414,17 +388,10 @@ impl<'a> Body<'a> {
             })
             .fold(0.0, f64::max);
         if off > self.tolerance.max(2e-3) {
-            let text = format!(
-                "differs from its template by up to {:.2} mm in a distance",
-                off * 1e3
+            return Some(
+                self.finding_of(catalog::NOT_RIGID, "template")
+                    .with("difference", Fact::meters(off)),
             );
-            return Some(Finding::new(
-                "not-rigid",
-                Severity::Error,
-                self.name,
-                text,
-                "check the markers' order, or learn the template from the recording",
-            ));
         }
         self.mirrored(&place)
     }
@@ -443,9 +410,9 @@ impl<'a> Body<'a> {
         };
         let (plain, mirrored) = (rms(&known)?, rms(&mirror)?);
         (plain > self.tolerance && mirrored < self.tolerance && plain > 5.0 * mirrored).then(|| {
-            let text = format!("fits the mirror image of its template to {:.2} mm, the template only to {:.2} mm", mirrored * 1e3, plain * 1e3);
-            let remedy = "the recording's frame is left-handed, or an axis has the wrong sign: check the export's axes";
-            Finding::new("mirrored", Severity::Error, self.name, text, remedy)
+            self.finding(catalog::MIRRORED)
+                .with("mirrored", Fact::meters(mirrored))
+                .with("plain", Fact::meters(plain))
         })
     }
 }

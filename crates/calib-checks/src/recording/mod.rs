@@ -1,23 +1,18 @@
-//! What is wrong with a recording, said before anything is fitted to it.
+//! Checks of one table of poses, before anything is fitted to it.
 //!
-//! [`checks`] looks at the table alone, against what is known beforehand ([`Expectations`]). Checks that need the
-//! robot's model take its predictions as plain arrays ([`model`]). Every check is made so that clean data with
-//! Gaussian noise stay silent (thresholds are 8σ and more), and its limits are named constants.
+//! [`checks`] looks at the table alone, against what is known beforehand ([`Expectations`]).
 
 mod held_out;
 mod joints;
 mod markers;
-pub mod model;
 mod motion;
 mod rigidity;
-mod statistics;
 
 pub use held_out::held_out_in_training;
-pub(crate) use statistics::{median, robust_range_limit};
 
-use crate::finding::Finding;
-use crate::poses::Poses;
 use crate::rigid_body::Template;
+use calib_finding::Finding;
+use calib_recording::Poses;
 use std::collections::BTreeMap;
 
 /// What is known about a recording beforehand. Everything may be left out; what is not given is not checked.
@@ -27,7 +22,7 @@ pub struct Expectations {
     pub bodies: BTreeMap<String, Vec<String>>,
     /// Body → where its markers sit, m, when known beforehand (a drawing, an earlier calibration).
     pub templates: BTreeMap<String, Template>,
-    /// Joint → limits from the robot's description, rad or m.
+    /// Joint → limits from the URDF, rad or m.
     pub limits: BTreeMap<String, (f64, f64)>,
     /// Joint → range of motion that the sweep asks for, rad or m. These joints must move.
     pub asked: BTreeMap<String, (f64, f64)>,
@@ -60,36 +55,3 @@ pub fn checks(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
     findings.extend(motion::unsettled(poses, expected));
     findings
 }
-
-/// Ids of all findings that this module can make, each a page of the book.
-pub const IDS: [&str; 29] = [
-    "all-zero-triplet",
-    "body-flip",
-    "body-redefined",
-    "clock-lag",
-    "coverage",
-    "duplicate-column",
-    "frozen",
-    "held-out-in-training",
-    "joint-duplicate",
-    "joint-never-moved",
-    "joint-order",
-    "joint-outside-limits",
-    "joint-sign",
-    "jump",
-    "many-lost",
-    "marker-outlier",
-    "marker-swap",
-    "mirrored",
-    "missing-marker",
-    "not-rigid",
-    "not-unit-rotation",
-    "quaternion-order",
-    "time-gap",
-    "too-few-poses",
-    "unit-mismatch",
-    "unsettled-rows",
-    "up-axis",
-    "virtual-points",
-    "wrong-mount",
-];

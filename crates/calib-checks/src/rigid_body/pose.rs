@@ -1,8 +1,8 @@
 //! The pose of a body in every row, how certain it is, and how rigid the body was.
 
 use super::learn::{MarkerFit, NotABody, Template, register};
-use crate::error::nearest_word;
-use crate::poses::Poses;
+use calib_finding::nearest_word;
+use calib_recording::Poses;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3};
 use std::ops::AddAssign;
 
@@ -179,7 +179,7 @@ pub fn body_from_markers(
     let track = |name: &String| {
         poses.markers.get(name).map(Vec::as_slice).ok_or_else(|| {
             let known: Vec<&str> = poses.markers.keys().map(String::as_str).collect();
-            let nearest = nearest_word(name, known.iter().copied());
+            let nearest = nearest_word(name, known.iter().copied()).map(str::to_owned);
             NotABody::UnknownMarker {
                 name: name.clone(),
                 known: known.join(", "),

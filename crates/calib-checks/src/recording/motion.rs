@@ -1,10 +1,9 @@
 //! Along the rows: rotations that are none, flips, jumps, gaps, rows that were not settled.
 
 use super::Expectations;
-use super::statistics::{median, range};
-use crate::JointUnit;
-use crate::finding::{Finding, Severity, counted};
-use crate::poses::Poses;
+use crate::statistics::{median, range};
+use calib_finding::{About, Fact, Finding, Subject, catalog};
+use calib_recording::{JointUnit, Poses};
 use nalgebra::{Point3, Vector3};
 
 /// Departure of a quaternion's length from 1 that rounding explains.
@@ -37,13 +36,10 @@ pub(super) fn rotations(poses: &Poses) -> Vec<Finding> {
             .collect();
         if !rows.is_empty() {
             let worst = rows.iter().map(|&i| off(i)).fold(0.0, f64::max);
-            let text = format!(
-                "{} quaternions are up to {worst:.2e} from length 1",
-                rows.len()
-            );
-            let remedy = "normalise them where they are made; check the order of the columns";
             findings.push(
-                Finding::new("not-unit-rotation", Severity::Error, name, text, remedy)
+                Finding::of_kind(catalog::NOT_UNIT_ROTATION, "kept", Subject::body(name))
+                    .with("count", Fact::count(rows.len()))
+                    .with("worst", Fact::ratio(worst))
                     .at_rows(rows.iter().map(|&i| poses.rows[i])),
             );
         }
@@ -89,16 +85,12 @@ pub(super) fn flips(poses: &Poses) -> Vec<Finding> {
             .map(|(row, _, _)| poses.rows[*row])
             .collect();
         if !flips.is_empty() {
-            let text = format!(
-                "turns by more than {:.0}° between rows {} times, {:.1}° is usual",
-                FLIP.to_degrees(),
-                flips.len(),
-                usual_turn.to_degrees()
-            );
-            let remedy =
-                "its marker pattern is nearly symmetric: move a marker; drop the flipped rows";
             findings.push(
-                Finding::new("body-flip", Severity::Error, name, text, remedy).at_rows(flips),
+                Finding::of_kind(catalog::BODY_FLIP, "rows", Subject::body(name))
+                    .with("limit", Fact::radians(FLIP))
+                    .with("count", Fact::count(flips.len()))
+                    .with("usual", Fact::radians(usual_turn))
+                    .at_rows(flips),
             );
         }
     }
@@ -121,7 +113,7 @@ pub(super) fn jumps(poses: &Poses) -> Vec<Finding> {
     }
     let markers = poses.markers.iter().map(|(name, track)| {
         (
-            name,
+            Subject::marker(name),
             track
                 .iter()
                 .map(|p| p.map(|p| p.coords))
@@ -130,7 +122,7 @@ pub(super) fn jumps(poses: &Poses) -> Vec<Finding> {
     });
     let bodies = poses.bodies.iter().map(|(name, track)| {
         (
-            name,
+            Subject::body(name),
             track
                 .iter()
                 .map(|p| p.map(|p| p.translation.vector))
@@ -138,7 +130,7 @@ pub(super) fn jumps(poses: &Poses) -> Vec<Finding> {
         )
     });
     let mut findings = Vec::new();
-    for (name, track) in markers.chain(bodies) {
+    for (subject, track) in markers.chain(bodies) {
         // Three neighbouring rows: |p₁ − 2 p₂ + p₃|
         let bends: Vec<(usize, f64)> = (1..track.len().saturating_sub(1))
             .filter(|&i| together(poses, i - 1, i) && together(poses, i, i + 1))
@@ -155,14 +147,12 @@ pub(super) fn jumps(poses: &Poses) -> Vec<Finding> {
             .collect();
         if !rows.is_empty() {
             let worst = bends.iter().map(|b| b.1).fold(0.0, f64::max);
-            let text = format!(
-                "jumps by up to {:.1} mm against its neighbours, {:.3} mm is usual",
-                worst * 1e3,
-                usual * 1e3
+            findings.push(
+                Finding::new(catalog::JUMP, subject)
+                    .with("worst", Fact::meters(worst))
+                    .with("usual", Fact::meters(usual))
+                    .at_rows(rows),
             );
-            let remedy = "a reflection or another marker was taken for it: drop these samples";
-            findings
-                .push(Finding::new("jump", Severity::Warning, name, text, remedy).at_rows(rows));
         }
     }
     findings
@@ -178,39 +168,32 @@ pub(super) fn gaps(poses: &Poses) -> Vec<Finding> {
             .collect();
         if !gaps.is_empty() {
             let longest = gaps.iter().map(|&i| steps[i]).fold(0.0, f64::max);
-            let text = format!(
-                "{} in time, the longest {longest:.3} s; {usual:.4} s is usual",
-                counted(gaps.len(), "gap")
-            );
-            let remedy = "the tracker or its network dropped frames: use a cable, or a lower rate";
             findings.push(
-                Finding::new("time-gap", Severity::Warning, "time", text, remedy)
+                Finding::new(catalog::TIME_GAP, About::Time)
+                    .with("gaps", Fact::count(gaps.len()))
+                    .with("longest", Fact::seconds(longest))
+                    .with("usual", Fact::seconds(usual))
                     .at_rows(gaps.iter().map(|&i| poses.rows[i + 1])),
             );
         }
     }
-    let lost_of = |name: &String, seen: usize, findings: &mut Vec<Finding>| {
+    let seen_markers = poses
+        .markers
+        .iter()
+        .map(|(name, track)| (Subject::marker(name), track.iter().flatten().count()));
+    let seen_bodies = poses
+        .bodies
+        .iter()
+        .map(|(name, track)| (Subject::body(name), track.iter().flatten().count()));
+    for (subject, seen) in seen_markers.chain(seen_bodies) {
         let lost = poses.len() - seen.min(poses.len());
         if lost as f64 > MANY_LOST * poses.len() as f64 {
-            let text = format!(
-                "lost (or only interpolated) in {lost} of {} rows",
-                poses.len()
+            findings.push(
+                Finding::new(catalog::MANY_LOST, subject)
+                    .with("lost", Fact::count(lost))
+                    .with("rows", Fact::count(poses.len())),
             );
-            let remedy = "move the cameras or the marker, or leave it out";
-            findings.push(Finding::new(
-                "many-lost",
-                Severity::Warning,
-                name,
-                text,
-                remedy,
-            ));
         }
-    };
-    for (name, track) in &poses.markers {
-        lost_of(name, track.iter().flatten().count(), &mut findings);
-    }
-    for (name, track) in &poses.bodies {
-        lost_of(name, track.iter().flatten().count(), &mut findings);
     }
     findings
 }
@@ -248,14 +231,10 @@ pub(super) fn unsettled(poses: &Poses, expected: &Expectations) -> Vec<Finding> 
         // The range of n Gaussian values is below 2·(3 + log n) σ.
         let usual = 2.0 * sigma * (UNSETTLED_SIGMAS / 2.0 + (rows.len() as f64).ln());
         if worst > usual {
-            let text = format!(
-                "hold `{hold}`: the tracker's values spread over {:.2} mm, noise explains {:.2} mm",
-                worst * 1e3,
-                usual * 1e3
-            );
-            let remedy = "wait longer before recording, or drop the first rows of the hold";
             findings.push(
-                Finding::new("unsettled-rows", Severity::Warning, hold, text, remedy)
+                Finding::of_kind(catalog::UNSETTLED_ROWS, "spread", About::Hold(hold.to_string()))
+                    .with("spread", Fact::meters(worst))
+                    .with("limit", Fact::meters(usual))
                     .at_rows(rows.iter().map(|&i| poses.rows[i])),
             );
         }

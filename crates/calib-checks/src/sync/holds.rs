@@ -1,9 +1,9 @@
 //! Intervals in which nothing moves, and one pose for each of them.
 
-use crate::checks::robust_range_limit;
-use crate::finding::{Finding, Severity};
-use crate::poses::Poses;
+use crate::statistics::robust_range_limit;
+use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_geometry::{mean::chordal_mean, se3};
+use calib_recording::Poses;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 
@@ -194,7 +194,7 @@ pub fn static_poses(poses: &Poses, holds: &[Hold]) -> StaticPoses {
                 .collect();
             means.push(middle_point(&points).map(Point3::from));
             covariances.push(covariance3(&points));
-            out.findings.extend(drift(name, poses, hold, &points));
+            out.findings.extend(drift(Subject::marker(name), poses, hold, &points));
         }
         out.poses.markers.insert(name.clone(), means);
         out.marker_covariance.insert(name.clone(), covariances);
@@ -211,7 +211,7 @@ pub fn static_poses(poses: &Poses, holds: &[Hold]) -> StaticPoses {
                 .map(|(t, r)| Isometry3::from_parts(Translation3::from(t), r));
             covariances.push(mean.and_then(|mean| covariance6(&mean, &seen)));
             means.push(mean);
-            out.findings.extend(drift(name, poses, hold, &points));
+            out.findings.extend(drift(Subject::body(name), poses, hold, &points));
         }
         out.poses.bodies.insert(name.clone(), means);
         out.body_covariance.insert(name.clone(), covariances);
@@ -220,7 +220,7 @@ pub fn static_poses(poses: &Poses, holds: &[Hold]) -> StaticPoses {
 }
 
 fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
-    crate::checks::median(values.collect())
+    crate::statistics::median(values.collect())
 }
 
 fn middle_point(points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
@@ -250,7 +250,7 @@ fn covariance6(mean: &Isometry3<f64>, poses: &[Isometry3<f64>]) -> Option<Matrix
 }
 
 /// The means of both halves differ by more than the scatter explains.
-fn drift(name: &str, poses: &Poses, hold: &Hold, points: &[Vector3<f64>]) -> Option<Finding> {
+fn drift(subject: Subject, poses: &Poses, hold: &Hold, points: &[Vector3<f64>]) -> Option<Finding> {
     let covariance = covariance3(points)?;
     let half = points.len() / 2;
     let mean = |part: &[Vector3<f64>]| part.iter().sum::<Vector3<f64>>() / part.len() as f64;
@@ -266,14 +266,10 @@ fn drift(name: &str, poses: &Poses, hold: &Hold, points: &[Vector3<f64>]) -> Opt
         .min((covariance.trace() / 3.0).sqrt());
     let expected = robust_range_limit(sigma, half);
     (half >= 5 && off.norm() > expected).then(|| {
-        let text = format!(
-            "drifts by {:.3} mm within the hold at {:.2} s, noise explains {:.3} mm",
-            off.norm() * 1e3,
-            hold.span.0,
-            expected * 1e3
-        );
-        let remedy = "wait longer before recording, or stiffen the robot's stand";
-        Finding::new("unsettled-rows", Severity::Warning, name, text, remedy)
+        Finding::of_kind(catalog::UNSETTLED_ROWS, "drift", subject)
+            .with("drift", Fact::meters(off.norm()))
+            .with("time", Fact::seconds(hold.span.0))
+            .with("limit", Fact::meters(expected))
             .at_rows(hold.rows.clone().map(|i| poses.rows[i]))
     })
 }

@@ -1,6 +1,6 @@
 //! The offset and drift between two clocks, from angular speed.
 
-use crate::checks::median;
+use crate::statistics::median;
 use calib_geometry::so3;
 use nalgebra::{Matrix4, UnitQuaternion, Vector4};
 

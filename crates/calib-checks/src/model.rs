@@ -15,14 +15,16 @@
 //! What this cannot see: a sign error of the only joint that moves (a mount turned by half a turn explains it), and
 //! links between which no joint moved.
 
-use super::statistics::median;
-use crate::finding::{Finding, Severity, are, counted};
-use crate::poses::Poses;
+use crate::statistics::median;
 use crate::sync::OffsetOutcome;
+use calib_finding::{About, Fact, Finding, Subject, Unit, catalog};
+use calib_recording::Poses;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 /// Disagreement, rad (1°), below which the model is not blamed: nominal robots are that good.
 pub const GOOD_ENOUGH: f64 = 0.0175;
+/// Median disagreement, rad (11°), that no error of a nominal URDF reaches.
+const NOT_ITS_MOTION: f64 = 0.2;
 /// Another explanation must be this many times better.
 const MUCH_BETTER: f64 = 4.0;
 /// A row that disagrees with the others by this many times their usual disagreement does not belong to them.
@@ -37,15 +39,78 @@ const TURNED: f64 = 0.05;
 /// Angles, rad, between which a motion's axis is known to about its rotation noise; at π its sign is open.
 const WELL_TURNED: std::ops::Range<f64> = 0.4..2.9;
 
+/// What may be wrong, where the nominal prediction does not explain a body's motion.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Mistake {
+    /// A joint has the opposite sign.
+    JointSign {
+        /// The joint.
+        joint: String,
+    },
+    /// Two joints' columns are exchanged.
+    JointOrder {
+        /// One joint.
+        joint: String,
+        /// The other joint.
+        other: String,
+    },
+    /// All joint angles are degrees that were read as radians.
+    AnglesInDegrees,
+    /// All joint angles are radians that were read as degrees.
+    AnglesInRadians,
+    /// The tracker's lengths are a thousand times too large.
+    LengthsTooLarge,
+    /// The tracker's lengths are a thousand times too small.
+    LengthsTooSmall,
+    /// The body is on another link.
+    OtherLink {
+        /// That link.
+        link: String,
+    },
+    /// The joint values belong to another row.
+    OtherRow {
+        /// Rows from the tracker's row to that of the joint values.
+        by: isize,
+    },
+}
+
+impl Mistake {
+    fn finding(&self, body: &str) -> Finding {
+        let unit = |kind| Finding::of_kind(catalog::UNIT_MISMATCH, kind, Subject::body(body));
+        match self {
+            Mistake::JointSign { joint } => {
+                Finding::new(catalog::JOINT_SIGN, Subject::body(body))
+                    .with("joint", Fact::name(joint))
+            }
+            Mistake::JointOrder { joint, other } => {
+                Finding::new(catalog::JOINT_ORDER, Subject::body(body))
+                    .with("joint", Fact::name(joint))
+                    .with("other", Fact::name(other))
+            }
+            Mistake::AnglesInDegrees => unit("all_degrees"),
+            Mistake::AnglesInRadians => unit("all_radians"),
+            Mistake::LengthsTooLarge => unit("lengths_too_large"),
+            Mistake::LengthsTooSmall => unit("lengths_too_small"),
+            Mistake::OtherLink { link } => {
+                Finding::of_kind(catalog::WRONG_MOUNT, "other_link", Subject::body(body))
+                    .with("other", Fact::name(link))
+            }
+            Mistake::OtherRow { by } => {
+                let kind = if *by < 0 { "rows_before" } else { "rows_after" };
+                Finding::of_kind(catalog::CLOCK_LAG, kind, Subject::body(body))
+                    .with("rows", Fact::count(by.unsigned_abs()))
+            }
+        }
+    }
+}
+
 /// Predictions under one assumption, for the rows of a table.
 #[derive(Clone, Debug)]
 pub struct Prediction {
-    /// What is assumed: a link's name, or `joint elbow with the other sign`.
-    pub assumption: String,
-    /// Id of the finding when this explains the data and the nominal prediction does not: `joint-sign`,
-    /// `joint-order`, `wrong-mount`, `clock-lag`.
-    pub id: &'static str,
-    /// `base_from_link` per row.
+    /// What is assumed to be wrong.
+    pub mistake: Mistake,
+    /// `base_from_link` per row, m.
     pub base_from_link: Vec<Isometry3<f64>>,
 }
 
@@ -97,8 +162,8 @@ fn size(tracker_from_body: &[Option<Isometry3<f64>>]) -> f64 {
         .flatten()
         .map(|pose| pose.translation.vector)
         .collect();
-    let centre = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
-    let distances = places.iter().map(|place| (place - centre).norm());
+    let center = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
+    let distances = places.iter().map(|place| (place - center).norm());
     median(distances.collect())
         .unwrap_or(0.0)
         .max(SMALLEST_SIZE)
@@ -118,14 +183,16 @@ fn screw(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, Option<f64>) {
     )
 }
 
-/// Whether one of `alternatives` explains a body's track much better than the nominal prediction does.
+/// Whether one of `alternatives` explains a body's track much better than `base_from_link` of its link in the
+/// profile does.
 pub fn better_explanation(
     body: &str,
+    link: &str,
     tracker_from_body: &[Option<Isometry3<f64>>],
-    nominal: &Prediction,
+    base_from_link: &[Isometry3<f64>],
     alternatives: &[Prediction],
 ) -> Option<Finding> {
-    let as_claimed = disagreement(tracker_from_body, &nominal.base_from_link)?;
+    let as_claimed = disagreement(tracker_from_body, base_from_link)?;
     if as_claimed < GOOD_ENOUGH {
         return None;
     }
@@ -139,24 +206,22 @@ pub fn better_explanation(
     if off * MUCH_BETTER > as_claimed {
         return None;
     }
-    let text = format!(
-        "its motion disagrees with {} by {:.2}°, with {} only by {:.2}°",
-        nominal.assumption,
-        as_claimed.to_degrees(),
-        best.assumption,
-        off.to_degrees()
-    );
-    let remedy = match best.id {
-        "wrong-mount" => "correct the body's link in the profile",
-        "joint-sign" => {
-            "turn the sign of this joint's column, or of its axis in the robot's description"
-        }
-        "joint-order" => "exchange these joints' columns",
-        "clock-lag" => "the joint values lag behind the tracker: synchronise, or record in holds",
-        "unit-mismatch" => "correct the unit in the columns' names, or in the column map",
-        _ => "check the profile",
-    };
-    Some(Finding::new(best.id, Severity::Error, body, text, remedy))
+    Some(
+        best.mistake
+            .finding(body)
+            .with("link", Fact::name(link))
+            .with("claimed", Fact::radians(as_claimed))
+            .with("explained", Fact::radians(off)),
+    )
+}
+
+/// A body whose motion has nothing to do with that of its link, and that no single mistake explains.
+pub fn moves_alone(body: &str, link: &str, disagreement: f64) -> Option<Finding> {
+    (disagreement > NOT_ITS_MOTION).then(|| {
+        Finding::of_kind(catalog::WRONG_MOUNT, "no_link", Subject::body(body))
+            .with("link", Fact::name(link))
+            .with("claimed", Fact::radians(disagreement))
+    })
 }
 
 /// Whether a body's quaternions were written scalar first and read scalar last: then the exchanged ones explain the
@@ -179,12 +244,9 @@ pub fn quaternion_order(
         .collect();
     let other = disagreement(&exchanged, base_from_link)?;
     (as_read > GOOD_ENOUGH && other * MUCH_BETTER < as_read).then(|| {
-        let text = format!(
-            "its motion disagrees with the robot's by {:.2}°, with the quaternions read scalar first only by {:.2}°",
-            as_read.to_degrees(), other.to_degrees()
-        );
-        let remedy = "the quaternions are written w, x, y, z: rename the columns, or use `quaternion_wxyz` in the column map";
-        Finding::new("quaternion-order", Severity::Error, body, text, remedy)
+        Finding::new(catalog::QUATERNION_ORDER, Subject::body(body))
+            .with("claimed", Fact::radians(as_read))
+            .with("explained", Fact::radians(other))
     })
 }
 
@@ -210,78 +272,46 @@ pub fn up_axis(declared: &str, tracker_from_base: &Isometry3<f64>, tilt: f64) ->
     let (nearest, _) = axes
         .iter()
         .max_by(|a, b| base_up.dot(&a.1).total_cmp(&base_up.dot(&b.1)))?;
-    let text = format!(
-        "{declared} is said to be up; the robot's base, as found, points {:.0}° away from it, nearest to {nearest}",
-        off.to_degrees()
-    );
-    let remedy = format!(
-        "export with the other axis up; or, if the robot is mounted that way, say `tracker: {{up_axis: {nearest}}}`"
-    );
-    Some(Finding::new(
-        "up-axis",
-        Severity::Warning,
-        "tracker",
-        text,
-        remedy,
-    ))
+    Some(
+        Finding::new(catalog::UP_AXIS, About::Tracker)
+            .with("declared", Fact::name(declared))
+            .with("off", Fact::radians(off))
+            .with("nearest", Fact::choice(nearest)),
+    )
 }
 
 /// What an alignment of two clocks means for the recording; `None` when they agree to within `tolerance`, s.
 pub fn alignment(outcome: &OffsetOutcome, tolerance: f64) -> Option<Finding> {
-    let finding = |severity, text: String, remedy: &str| {
-        Some(Finding::new("clock-lag", severity, "clocks", text, remedy))
-    };
-    match *outcome {
+    let of_kind = |kind| Finding::of_kind(catalog::CLOCK_LAG, kind, About::Clocks);
+    Some(match *outcome {
         OffsetOutcome::Found(map) => {
-            let agree = map.offset.abs() <= tolerance.max(4.0 * map.offset_sigma);
-            let text = format!(
-                "the tracker's clock is {:.4} s ± {:.1} ms ahead of the robot's and runs {:.0} ppm faster",
-                map.offset,
-                map.offset_sigma * 1e3,
-                map.drift * 1e6
-            );
-            if agree {
-                None
-            } else {
-                finding(
-                    Severity::Warning,
-                    text,
-                    "the offset is taken into account; a shared clock would be better",
-                )
+            if map.offset.abs() <= tolerance.max(4.0 * map.offset_sigma) {
+                return None;
             }
+            of_kind("offset")
+                .with("offset", Fact::seconds(map.offset))
+                .with("sigma", Fact::seconds(map.offset_sigma))
+                .with("drift", Fact::ratio(map.drift))
         }
         OffsetOutcome::Ambiguous {
             first,
             second,
             ratio,
-        } => finding(
-            Severity::Error,
-            format!(
-                "offsets of {first:.3} s and {second:.3} s explain the motion nearly equally well (ratio {ratio:.2})"
-            ),
-            "the motion is periodic: move irregularly once at the start, or record static poses",
-        ),
-        OffsetOutcome::NotExcited { deviation, needed } => finding(
-            Severity::Error,
-            format!(
-                "angular speed varies by {deviation:.4} rad/s, {needed} are needed to align the clocks"
-            ),
-            "move faster, or record static poses",
-        ),
+        } => of_kind("ambiguous")
+            .with("first", Fact::seconds(first))
+            .with("second", Fact::seconds(second))
+            .with("ratio", Fact::ratio(ratio)),
+        OffsetOutcome::NotExcited { deviation, needed } => of_kind("not_excited")
+            .with("deviation", Fact::number(deviation, Unit::RadianPerSecond))
+            .with("needed", Fact::number(needed, Unit::RadianPerSecond)),
         OffsetOutcome::NoMatch {
             correlation,
             needed,
-        } => finding(
-            Severity::Error,
-            format!("the two motions correlate by {correlation:.2} at most, {needed} are needed"),
-            "check that both recordings are of the same motion, and the body's link",
-        ),
-        OffsetOutcome::TooShort => finding(
-            Severity::Error,
-            "too few samples in common".to_string(),
-            "record at least some seconds with both clocks running",
-        ),
-    }
+        } => of_kind("no_match")
+            .with("correlation", Fact::ratio(correlation))
+            .with("needed", Fact::ratio(needed)),
+        OffsetOutcome::TooShort => of_kind("too_short"),
+    })
 }
 
 /// Rows that disagree with all others while the others agree among themselves: the body flipped (`body-flip`), or the
@@ -331,30 +361,20 @@ pub fn spoiled_rows(
             spoiled[row] = Some(angle);
         }
     }
-    let finding = |id, severity, flipped: bool, remedy: &str| {
+    let of_rows = |id, flipped: bool| {
         let rows: Vec<usize> = (0..n)
             .filter(|&i| spoiled[i].is_some_and(|angle| (angle > FLIPPED) == flipped))
             .collect();
         let worst = rows.iter().filter_map(|&i| spoiled[i]).fold(0.0, f64::max);
-        let text = format!(
-            "{} off the robot's model by up to {:.2}°, {:.2}° is usual",
-            format_args!("{} {}", counted(rows.len(), "row"), are(rows.len())),
-            worst.to_degrees(),
-            usual.to_degrees()
-        );
-        let finding = Finding::new(id, severity, body, text, remedy);
-        (!rows.is_empty()).then(|| finding.at_rows(rows.into_iter().map(|i| poses.rows[i])))
+        (!rows.is_empty()).then(|| {
+            Finding::of_kind(id, "model", Subject::body(body))
+                .with("count", Fact::count(rows.len()))
+                .with("worst", Fact::radians(worst))
+                .with("usual", Fact::radians(usual))
+                .at_rows(rows.into_iter().map(|i| poses.rows[i]))
+        })
     };
-    let flip = "its marker pattern is nearly symmetric: move a marker; drop the flipped rows";
-    let unsettled = "the robot had not settled, or tracker and robot were read at different times: drop these rows or synchronise the clocks";
-    let flips = finding("body-flip", Severity::Error, true, flip);
-    flips
-        .into_iter()
-        .chain(finding(
-            "unsettled-rows",
-            Severity::Warning,
-            false,
-            unsettled,
-        ))
-        .collect()
+    let flips = of_rows(catalog::BODY_FLIP, true);
+    let unsettled = of_rows(catalog::UNSETTLED_ROWS, false);
+    flips.into_iter().chain(unsettled).collect()
 }

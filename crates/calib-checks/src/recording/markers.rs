@@ -1,9 +1,9 @@
 //! Single markers: lost ones coded as zero, columns written twice, frozen and computed points, the unit of length.
 
 use super::Expectations;
-use super::statistics::{median, range};
-use crate::finding::{Finding, Severity, are, counted};
-use crate::poses::Poses;
+use crate::statistics::{median, range};
+use calib_finding::{About, Fact, Finding, Subject, catalog};
+use calib_recording::Poses;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 
@@ -34,14 +34,9 @@ pub(super) fn zeros(poses: &Poses) -> Vec<Finding> {
             .map(|i| poses.rows[i])
             .collect();
         if !rows.is_empty() {
-            let text = format!(
-                "{} {} exactly (0, 0, 0)",
-                counted(rows.len(), "sample"),
-                are(rows.len())
-            );
-            let remedy = "a lost sample is an empty cell";
             findings.push(
-                Finding::new("all-zero-triplet", Severity::Warning, name, text, remedy)
+                Finding::of_kind(catalog::ALL_ZERO_TRIPLET, "kept", Subject::marker(name))
+                    .with("samples", Fact::count(rows.len()))
                     .at_rows(rows),
             );
         }
@@ -68,38 +63,21 @@ pub(super) fn length_unit(poses: &Poses, expected: &Expectations) -> Option<Find
         .map(|(low, high)| high - low)
         .fold(0.0, f64::max);
     let farthest = all.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
-    let finding = |text: String, remedy: &str| {
-        Some(Finding::new(
-            "unit-mismatch",
-            Severity::Error,
-            "lengths",
-            text,
-            remedy,
-        ))
-    };
+    let finding = |kind| Finding::of_kind(catalog::UNIT_MISMATCH, kind, About::Lengths);
     let too_far = expected
         .reach
         .is_some_and(|reach| largest_extent > 20.0 * reach)
         || farthest > LARGEST_VOLUME;
     if too_far {
-        let text = format!(
-            "points spread over {largest_extent:.1} m, up to {farthest:.1} m from the tracker's origin"
-        );
-        return finding(
-            text,
-            "are these millimetres? name the columns `…_mm`, or set `lengths: mm` in the column map",
+        return Some(
+            finding("millimeters")
+                .with("spread", Fact::meters(largest_extent))
+                .with("farthest", Fact::meters(farthest)),
         );
     }
-    // Below 1 cm from the tracker's origin at all times: metres divided by a thousand.
+    // Below 1 cm from the tracker's origin at all times: meters divided by a thousand.
     if all.len() >= 3 && farthest < 1e-2 && farthest > 0.0 {
-        let text = format!(
-            "all points lie within {:.2} mm of the tracker's origin",
-            farthest * 1e3
-        );
-        return finding(
-            text,
-            "are these metres? name the columns `…_m`, or set `lengths: m` in the column map",
-        );
+        return Some(finding("meters").with("farthest", Fact::meters(farthest)));
     }
     None
 }
@@ -130,10 +108,11 @@ pub(super) fn duplicates(poses: &Poses) -> Vec<Finding> {
             }
             let equal = rows.len();
             if equal >= 2 && 2 * equal >= count {
-                let text = format!("equals marker `{b}` in {equal} of {count} rows");
-                let remedy = "one column was written twice: check the marker's label in the tracker's software, or leave it out";
                 findings.push(
-                    Finding::new("duplicate-column", Severity::Error, *a, text, remedy)
+                    Finding::new(catalog::DUPLICATE_COLUMN, Subject::marker(*a))
+                        .with("other", Fact::name(*b))
+                        .with("equal", Fact::count(equal))
+                        .with("shared", Fact::count(count))
                         .at_rows(rows),
                 );
             }
@@ -177,14 +156,11 @@ pub(super) fn frozen(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
             }
         }
         if !rows.is_empty() {
-            let text = format!(
-                "stands exactly still in {} while other markers move",
-                counted(rows.len(), "row")
+            findings.push(
+                Finding::of_kind(catalog::FROZEN, "marker", Subject::marker(name))
+                    .with("rows", Fact::count(rows.len()))
+                    .at_rows(rows),
             );
-            let remedy =
-                "the tracker repeated its last value: set it to export lost samples as empty";
-            findings
-                .push(Finding::new("frozen", Severity::Error, name, text, remedy).at_rows(rows));
         }
     }
     findings.extend(frozen_bodies(poses));
@@ -230,14 +206,11 @@ fn frozen_bodies(poses: &Poses) -> Vec<Finding> {
             start = i;
         }
         if !rows.is_empty() {
-            let text = format!(
-                "stands exactly still in {} while joints or other bodies move",
-                counted(rows.len(), "row")
+            findings.push(
+                Finding::of_kind(catalog::FROZEN, "body", Subject::body(name))
+                    .with("rows", Fact::count(rows.len()))
+                    .at_rows(rows),
             );
-            let remedy =
-                "the tracker repeated its last pose: set it to export lost samples as empty";
-            findings
-                .push(Finding::new("frozen", Severity::Error, name, text, remedy).at_rows(rows));
         }
     }
     findings
@@ -340,19 +313,13 @@ pub(super) fn virtual_points(poses: &Poses) -> Vec<Finding> {
             .map(|i| tracks[i].0.as_str())
             .collect();
         if members.len() >= 3 {
-            let scatter = worst.get(&g).copied().unwrap_or(0.0) * 1e6;
-            let text = format!(
-                "the distances between {} scatter by at most {scatter:.2} µm",
-                members.join(", ")
+            let scatter = worst.get(&g).copied().unwrap_or(0.0);
+            let names = members.iter().map(|name| (*name).to_owned()).collect();
+            findings.push(
+                Finding::new(catalog::VIRTUAL_POINTS, About::Markers(names))
+                    .with("markers", Fact::names(members))
+                    .with("scatter", Fact::meters(scatter)),
             );
-            let remedy = "these points were computed from a fitted body: export the measured markers, or use them as one body pose";
-            findings.push(Finding::new(
-                "virtual-points",
-                Severity::Warning,
-                members.join(", "),
-                text,
-                remedy,
-            ));
         }
     }
     findings

@@ -1,7 +1,7 @@
 //! Held-out poses must not be poses of the fit.
 
-use crate::finding::{Finding, Severity};
-use crate::poses::Poses;
+use calib_finding::{Fact, Finding, Subject, catalog};
+use calib_recording::Poses;
 
 /// Joint values closer than this in all joints, rad or m, are the same pose: three encoder steps of a good robot.
 const SAME: f64 = 1e-3;
@@ -46,22 +46,17 @@ pub fn held_out_in_training(held_out: &Poses, training: &Poses) -> Option<Findin
             same_pose.push(held_out.rows[row]);
         }
     }
-    let (severity, rows, what) = match (same_data.is_empty(), same_pose.is_empty()) {
-        (false, _) => (
-            Severity::Error,
-            same_data,
-            "are measurements that the fit uses too",
-        ),
-        (true, false) => (
-            Severity::Warning,
-            same_pose,
-            "repeat joint positions of the fit",
-        ),
+    let (kind, rows) = match (same_data.is_empty(), same_pose.is_empty()) {
+        (false, _) => ("measurement", same_data),
+        (true, false) => ("pose", same_pose),
         (true, true) => return None,
     };
-    let text = format!("{} of {} held-out rows {what}", rows.len(), held_out.len());
-    let remedy = "validate with poses that were not fitted";
-    Some(Finding::new("held-out-in-training", severity, "validation", text, remedy).at_rows(rows))
+    Some(
+        Finding::of_kind(catalog::HELD_OUT_IN_TRAINING, kind, Subject::default())
+            .with("shared", Fact::count(rows.len()))
+            .with("rows", Fact::count(held_out.len()))
+            .at_rows(rows),
+    )
 }
 
 /// Some tracker value is given in both and all shared ones are exactly equal.

@@ -1,0 +1,70 @@
+//! Bodies of markers, and tracked bodies.
+
+super::topic! {
+    /// A distance on the body changes for good.
+    BODY_REDEFINED = "body-redefined" {
+        "": Error,
+            "The distance between `{first}` and `{second}` changes by {change} from row {row} on, and keeps its new value.",
+            "Cut the recording at that row: a marker was moved or relabeled, or the body was created again.";
+    }
+    /// A body that is not rigid.
+    NOT_RIGID = "not-rigid" {
+        "loose": Error,
+            "Marker `{marker}` moves on the body: its distances to the others scatter by {scatter}.",
+            "Fix the marker, or leave it out of the body.";
+        "bends": Error,
+            "The body bends: the distance between `{first}` and `{second}` varies by {range}; {rows:row} affected.",
+            "Stiffen the body, or make bodies of the markers that keep their distances.";
+        "template": Error,
+            "The body differs from its template by up to {difference} in a distance.",
+            "Check the order of the markers, or remove the template so that it is learned from the recording.";
+    }
+    /// Markers exchanged in some rows.
+    MARKER_SWAP = "marker-swap" {
+        "": Error,
+            "The labels of markers {markers:exchange} are exchanged; {rows:row} in all.",
+            "Correct the labels in the tracker's software, or drop these rows.";
+    }
+    /// Exchanged labels that were corrected.
+    MARKER_SWAP_REPAIRED = "marker-swap-repaired" {
+        "": Warning,
+            "{rows:row} had exchanged labels, corrected by the distances between the markers: {exchanges}.",
+            "Place the markers at clearly different distances before the next recording. This recording needs nothing.";
+    }
+    /// One marker out of place in some rows.
+    MARKER_OUTLIER = "marker-outlier" {
+        "": Warning,
+            "A marker is out of place in {rows:row}; the worst is `{marker}`, by {off}.",
+            "Drop these samples: a reflection or a neighboring marker was taken for the marker.";
+    }
+    /// The mirror image of the template fits.
+    MIRRORED = "mirrored" {
+        "": Error,
+            "The body fits the mirror image of its template to {mirrored}, the template only to {plain}.",
+            "Check the axes of the export: the recording's frame is left-handed, or an axis has the wrong sign.";
+    }
+    /// A marker moves on its body over all recordings together.
+    BODY_NOT_RIGID = "body-not-rigid" {
+        "": Warning,
+            "Marker `{marker}` moves on its body by {distance} (limit {limit}).",
+            "Fix the marker, correct its label, or remove it from the body in the profile.";
+    }
+    /// Quaternions whose length is not 1.
+    NOT_UNIT_ROTATION = "not-unit-rotation" {
+        "kept": Error,
+            "{count:quaternion} with a length up to {worst} away from 1.",
+            "Normalize them where they are made, and check the order of the columns.";
+        "lost": Warning,
+            "{count:quaternion} not a rotation; taken as lost.",
+            "Check the node that publishes them.";
+    }
+    /// A body changes its orientation abruptly.
+    BODY_FLIP = "body-flip" {
+        "rows": Error,
+            "The body rotates by more than {limit} between two rows, {count:time}; {usual} is usual.",
+            "Drop the flipped rows, and move one marker: the marker pattern is nearly symmetric.";
+        "model": Error,
+            "{count:row} deviate from the robot's model by up to {worst}; {usual} is usual.",
+            "Drop the flipped rows, and move one marker: the marker pattern is nearly symmetric.";
+    }
+}

@@ -1,0 +1,79 @@
+//! Joint columns and the number of rows.
+
+super::topic! {
+    /// Fewer rows than the fit needs.
+    TOO_FEW_POSES = "too-few-poses" {
+        "": Error,
+            "Only {usable:row} with a tracked body or marker; the fit needs {needed}.",
+            "Record more poses.";
+    }
+    /// A joint, the tracker or a template is in another unit than its column says.
+    UNIT_MISMATCH = "unit-mismatch" {
+        "degrees": Error,
+            "The joint reaches {largest:rad} ({largest:turns}).",
+            "Check whether the column is in degrees: name it `…_deg`, or set `columns: {angles: deg}` for the recording.";
+        "radians": Error,
+            "The joint moves by {moved}, the profile asks for {asked}: a ratio of {ratio}.",
+            "Check whether the column is in radians: name it `…_rad`, or set `columns: {angles: rad}` for the recording.";
+        "millimeters": Error,
+            "The points spread over {spread:m}, up to {farthest:m} from the tracker's origin.",
+            "Check whether these are millimeters: name the columns `…_mm`, or set `columns: {lengths: mm}` for the recording.";
+        "meters": Error,
+            "All points lie within {farthest} of the tracker's origin.",
+            "Check whether these are meters: name the columns `…_m`, or set `columns: {lengths: m}` for the recording.";
+        "template_millimeters": Error,
+            "The body is {ratio} times as large as its template: millimeters were read as meters.",
+            "Correct the unit of length of the recording or of the template.";
+        "template_meters": Error,
+            "The body is {ratio} times as large as its template: meters were read as millimeters.",
+            "Correct the unit of length of the recording or of the template.";
+        "template_ten": Error,
+            "The body is {ratio} times as large as its template: a factor of ten.",
+            "Correct the unit of length of the recording or of the template.";
+        "all_degrees": Error,
+            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with all joint angles read as degrees.",
+            "Correct the unit in the columns' names, or set `columns: {angles: deg}` for the recording.";
+        "all_radians": Error,
+            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with all joint angles read as radians.",
+            "Correct the unit in the columns' names, or set `columns: {angles: rad}` for the recording.";
+        "lengths_too_large": Error,
+            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with the tracker's lengths a thousand times smaller.",
+            "Correct the unit in the columns' names, or set `columns: {lengths: mm}` for the recording.";
+        "lengths_too_small": Error,
+            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with the tracker's lengths a thousand times larger.",
+            "Correct the unit in the columns' names, or set `columns: {lengths: m}` for the recording.";
+    }
+    /// A joint has values beyond its limits.
+    JOINT_OUTSIDE_LIMITS = "joint-outside-limits" {
+        "": Error,
+            "{rows:row} outside the limits {low} to {high}; the worst value is {worst}.",
+            "Check the joint's name, sign and zero, or correct the limits in the URDF.";
+    }
+    /// A joint covers less of its range than the profile asks for.
+    COVERAGE = "coverage" {
+        "": Warning,
+            "The joint covers {low} to {high}, {share:percent} of the requested {from} to {to}.",
+            "Sweep the whole range, or ask for less in the profile.";
+    }
+    /// A joint that is to be swept stays where it is.
+    JOINT_NEVER_MOVED = "joint-never-moved" {
+        "still": Error,
+            "The joint stays at {at} in all rows.",
+            "Check that the column is the measured position of this joint, and that the joint was swept.";
+        "empty": Error,
+            "The joint has no values.",
+            "Check that the column is the measured position of this joint, and that the joint was swept.";
+    }
+    /// Two joints are equal in every row.
+    JOINT_DUPLICATE = "joint-duplicate" {
+        "": Warning,
+            "The joint equals `{other}` in all {rows:row}.",
+            "Check the export: one column was written twice. A mimic joint need not be recorded.";
+    }
+    /// The load is to be measured, and joints have no torque.
+    TORQUE_MISSING = "torque-missing" {
+        "": Warning,
+            "The profile says `load: measured`, but the recording has no torque of {joints}; no load is assumed.",
+            "Record a column `<joint>_nm`, map one under `columns`, or set `solve: {load: gravity}`.";
+    }
+}

@@ -1,0 +1,46 @@
+//! Single markers.
+
+super::topic! {
+    /// Samples at exactly (0, 0, 0).
+    ALL_ZERO_TRIPLET = "all-zero-triplet" {
+        "kept": Warning,
+            "{samples:sample} at exactly (0, 0, 0).",
+            "Leave the cells of a lost sample empty.";
+        "lost": Warning,
+            "{samples:sample} at exactly (0, 0, 0); taken as lost.",
+            "Export lost samples as empty. If the origin is a measured place, set `columns: {zero_is_a_point: true}` for the recording.";
+    }
+    /// Two markers with the same coordinates.
+    DUPLICATE_COLUMN = "duplicate-column" {
+        "": Error,
+            "The marker equals marker `{other}` in {equal} of {shared:row}.",
+            "Check the marker's label in the tracker's software, or leave the copy out: one column was written twice.";
+    }
+    /// A marker or body repeats its value while other things move.
+    FROZEN = "frozen" {
+        "marker": Error,
+            "The marker stands exactly still in {rows:row} while other markers move.",
+            "Set the tracker to export lost samples as empty: it repeated its last value.";
+        "body": Error,
+            "The body stands exactly still in {rows:row} while joints or other bodies move.",
+            "Set the tracker to export lost samples as empty: it repeated its last pose.";
+    }
+    /// Markers that were computed from a fitted body.
+    VIRTUAL_POINTS = "virtual-points" {
+        "": Warning,
+            "The distances between {markers} scatter by at most {scatter:um}.",
+            "Export the measured markers, or use these points as one body pose: they were computed from a fitted body.";
+    }
+    /// A marker or body is lost in most rows.
+    MANY_LOST = "many-lost" {
+        "": Warning,
+            "Lost, or only interpolated, in {lost} of {rows:row}.",
+            "Move the cameras or the marker, or leave it out.";
+    }
+    /// The profile names a marker that the recording lacks.
+    MISSING_MARKER = "missing-marker" {
+        "": Error,
+            "The recording has no column for marker {markers:code}; it has {known}.",
+            "[[Did you mean {nearest:code}? ]]Correct the marker's name in the profile.";
+    }
+}

@@ -1,0 +1,46 @@
+//! Rows in their order: jumps, gaps, motion within holds, rows that are used twice.
+
+super::topic! {
+    /// A sample far from its neighbors.
+    JUMP = "jump" {
+        "": Warning,
+            "Jumps by up to {worst} relative to the neighboring rows; {usual} is usual.",
+            "Drop these samples: a reflection or another marker was taken for this one.";
+    }
+    /// Rows are missing in time.
+    TIME_GAP = "time-gap" {
+        "": Warning,
+            "{gaps:gap} in time, the longest {longest}; {usual} is usual.",
+            "Use a cable, or a lower rate: the tracker or its network dropped frames.";
+    }
+    /// The robot moved where it should have stood still.
+    UNSETTLED_ROWS = "unsettled-rows" {
+        "spread": Warning,
+            "The tracker's values spread over {spread} within the hold; noise explains {limit}.",
+            "Wait longer before recording, or drop the first rows of the hold.";
+        "drift": Warning,
+            "Drifts by {drift} within the hold at {time:s}; noise explains {limit}.",
+            "Wait longer before each hold, or stiffen the robot's stand.";
+        "holds": Warning,
+            "{restless} of {holds:hold} had not settled and were rejected.[[ `{name}` drifts by {drift} at {time:s}.]][[ `{name}` scatters by {scatter}; {usual} is usual.]]",
+            "Wait longer before each hold, or stiffen the robot's stand.";
+        "holds_kept": Warning,
+            "{restless} of {holds:hold} had not settled, too many to reject.[[ `{name}` drifts by {drift} at {time:s}.]][[ `{name}` scatters by {scatter}; {usual} is usual.]]",
+            "Wait longer before each hold, or stiffen the robot's stand.";
+        "model": Warning,
+            "{count:row} deviate from the robot's model by up to {worst}; {usual} is usual.",
+            "Drop these rows, or synchronize the clocks: the robot had not settled, or tracker and robot were read at different times.";
+        "between": Warning,
+            "{count:row} deviate by up to {position} and {angle}, and are explained by interpolating the joint values toward an adjacent row ({fraction:percent} in the worst row).",
+            "Record again, in holds of a second: joints and tracker were read at different times, or the robot had not settled. The fit rejects these rows.";
+    }
+    /// Validation rows that the fit uses as well.
+    HELD_OUT_IN_TRAINING = "held-out-in-training" {
+        "measurement": Error,
+            "{shared} of {rows:held-out row} are measurements that the fit uses too[[, in `{training}`]].",
+            "Validate with separate poses, ideally recorded on another day.";
+        "pose": Warning,
+            "{shared} of {rows:held-out row} repeat joint positions of the fit[[, in `{training}`]].",
+            "Validate with separate poses, ideally recorded on another day.";
+    }
+}

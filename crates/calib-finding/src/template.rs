@@ -1,0 +1,185 @@
+//! Sentences with places for values.
+//!
+//! `{key}` stands for a value: a number in the unit that people read, with three significant digits; `{key:um}` for a
+//! number in that unit; `{key:row}` for a count with its noun (`1 row`, `2 rows`). `[[ … ]]` is left out unless every
+//! value in it is known.
+
+use crate::{Fact, Facts, Unit};
+
+/// What stands where a value is not known.
+const UNKNOWN: &str = "—";
+
+/// The template with the values filled in.
+pub(crate) fn fill(template: &str, facts: &Facts) -> String {
+    let mut out = String::new();
+    let mut rest = template;
+    while let Some((before, group)) = rest.split_once("[[") {
+        out += &filled(before, facts).0;
+        let (inside, after) = group.split_once("]]").unwrap_or((group, ""));
+        let (text, whole) = filled(inside, facts);
+        if whole {
+            out += &text;
+        }
+        rest = after;
+    }
+    out + &filled(rest, facts).0
+}
+
+/// The keys of all places, also of those in optional groups.
+#[cfg(test)]
+pub(crate) fn keys(template: &str) -> Vec<String> {
+    let places = template.split('{').skip(1);
+    let inside = places.filter_map(|place| place.split('}').next());
+    inside
+        .filter(|inside| is_place(inside))
+        .map(|inside| inside.split(':').next().unwrap_or_default().to_owned())
+        .collect()
+}
+
+/// The text, and whether all its values are known.
+fn filled(template: &str, facts: &Facts) -> (String, bool) {
+    let mut out = String::new();
+    let mut whole = true;
+    let mut rest = template;
+    while let Some((before, place)) = rest.split_once('{') {
+        out += before;
+        // A place ends with its brace; a YAML line in a remedy has spaces in its braces and is text.
+        let Some((inside, after)) = place.split_once('}').filter(|(inside, _)| is_place(inside))
+        else {
+            out.push('{');
+            rest = place;
+            continue;
+        };
+        let (key, form) = inside.split_once(':').unwrap_or((inside, ""));
+        match facts.get(key) {
+            Some(fact) => out += &shown(fact, form),
+            None => {
+                out += UNKNOWN;
+                whole = false;
+            }
+        }
+        rest = after;
+    }
+    (out + rest, whole)
+}
+
+/// `key` or `key:form`, where a form begins with a letter.
+fn is_place(inside: &str) -> bool {
+    let (key, form) = inside.split_once(':').unwrap_or((inside, "form"));
+    let is_key = |b: u8| b.is_ascii_lowercase() || b == b'_';
+    let is_form = |b: u8| b.is_ascii_lowercase() || b == b'-' || b == b' ';
+    !key.is_empty()
+        && key.bytes().all(is_key)
+        && form.bytes().all(is_form)
+        && form.starts_with(|c: char| c.is_ascii_lowercase())
+}
+
+fn shown(fact: &Fact, form: &str) -> String {
+    match fact {
+        Fact::Number { value, unit } => number(*value, *unit, form),
+        Fact::Count(count) if form.is_empty() => count.to_string(),
+        Fact::Count(count) => format!("{count} {form}{}", if *count == 1 { "" } else { "s" }),
+        Fact::Name(name) => name.to_string(),
+        Fact::Names(names) => match form {
+            "or" => names.join(" or "),
+            "code" => format!("`{}`", names.join("`, `")),
+            "exchange" => names.join(" ↔ "),
+            _ => names.join(", "),
+        },
+        Fact::Unknown => UNKNOWN.to_owned(),
+    }
+}
+
+/// A number in the unit that `form` names, else in the unit that people read.
+fn number(value: f64, unit: Unit, form: &str) -> String {
+    let (factor, suffix) = match form {
+        "m" => (1.0, " m"),
+        "um" => (1e6, " µm"),
+        "s" => (1.0, " s"),
+        "rad" => (1.0, " rad"),
+        "turns" => (0.5 / std::f64::consts::PI, " revolutions"),
+        "percent" => (100.0, " %"),
+        "ppm" => (1e6, " ppm"),
+        _ => unit.display(),
+    };
+    format!("{}{suffix}", significant(value * factor))
+}
+
+/// Three significant digits, at most three decimals; a scientific form for what would be all zeros.
+fn significant(value: f64) -> String {
+    /// Below this three decimals show nothing.
+    const SMALL: f64 = 5e-4;
+    let size = value.abs();
+    let text = if size > 0.0 && size < SMALL {
+        format!("{value:.1e}")
+    } else {
+        let digits = if size >= 1.0 {
+            size.log10().floor() as i32 + 1
+        } else {
+            0
+        };
+        let decimals = usize::try_from((3 - digits).clamp(0, 3)).unwrap_or(0);
+        let fixed = format!("{value:.decimals$}");
+        if fixed.contains('.') {
+            fixed.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            fixed
+        }
+    };
+    text.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn facts() -> Facts {
+        let mut facts = Facts::new();
+        facts.insert("length", Fact::meters(0.00123456));
+        facts.insert("angle", Fact::radians(-std::f64::consts::FRAC_PI_6));
+        facts.insert("rows", Fact::count(1));
+        facts.insert("lost", Fact::count(0));
+        facts.insert("markers", Fact::names(["a", "b"]));
+        facts.insert("nan", Fact::meters(f64::NAN));
+        facts
+    }
+
+    #[test]
+    fn values_in_the_unit_that_people_read() {
+        let said = |template| fill(template, &facts());
+        assert_eq!(
+            said("{length}, {length:um}, {length:m}"),
+            "1.23 mm, 1235 µm, 0.001 m"
+        );
+        assert_eq!(said("{angle}, {angle:rad}"), "−30°, −0.524 rad");
+        assert_eq!(said("{rows:row} of {lost:row}"), "1 row of 0 rows");
+        assert_eq!(
+            said("{markers:exchange}; {markers:code}"),
+            "a ↔ b; `a`, `b`"
+        );
+        assert_eq!(said("{nan}{missing}"), "——");
+    }
+
+    #[test]
+    fn a_group_needs_all_its_values() {
+        assert_eq!(
+            fill("a[[, {rows:row}]][[, {missing}]].", &facts()),
+            "a, 1 row."
+        );
+    }
+
+    #[test]
+    fn a_line_of_yaml_is_text() {
+        let line = "`tracker: {up_axis: +Y}`";
+        assert_eq!(fill(line, &facts()), line);
+    }
+
+    #[test]
+    fn no_number_is_shown_as_zero_that_is_not() {
+        assert_eq!(significant(0.0), "0");
+        assert_eq!(significant(1.0e-6), "1.0e−6");
+        assert_eq!(significant(1234.5), "1234");
+        assert_eq!(significant(12.345), "12.3");
+        assert_eq!(significant(0.9996), "1");
+    }
+}
