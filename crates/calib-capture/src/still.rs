@@ -17,7 +17,7 @@ pub struct StillSettings {
 
 impl Default for StillSettings {
     fn default() -> Self {
-        let files = calib_recording::sync::HoldSettings::default();
+        let files = calib_checks::sync::HoldSettings::default();
         StillSettings {
             window: 0.3,
             point_range: files.point_range,

@@ -79,10 +79,8 @@ impl Mistake {
     fn finding(&self, body: &str) -> Finding {
         let unit = |kind| Finding::of_kind(catalog::UNIT_MISMATCH, kind, Subject::body(body));
         match self {
-            Mistake::JointSign { joint } => {
-                Finding::new(catalog::JOINT_SIGN, Subject::body(body))
-                    .with("joint", Fact::name(joint))
-            }
+            Mistake::JointSign { joint } => Finding::new(catalog::JOINT_SIGN, Subject::body(body))
+                .with("joint", Fact::name(joint)),
             Mistake::JointOrder { joint, other } => {
                 Finding::new(catalog::JOINT_ORDER, Subject::body(body))
                     .with("joint", Fact::name(joint))

@@ -67,8 +67,9 @@ fn scale(unit: Unit) -> f64 {
     match unit {
         Unit::Metre => 0.01,
         Unit::Radian => 1_f64.to_radians(),
-        Unit::Second | Unit::One => 0.01,
-        Unit::RadianPerNewtonMetre | Unit::MetrePerNewton => 1e-4,
+        Unit::Second | Unit::One | Unit::RadianPerSecond => 0.01,
+        // Compliances.
+        _ => 1e-4,
     }
 }
 

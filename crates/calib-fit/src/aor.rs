@@ -158,7 +158,7 @@ fn axis_frame(request: &TableRequest) -> String {
     match request.parent.as_slice() {
         [] => "the tracker".to_owned(),
         [body] => format!("`{body}`"),
-        // As calib_recording::rigid_body (1).
+        // As calib_checks::rigid_body (1).
         [first, second, ..] => {
             format!("the parent body (origin {first}, x towards {second})")
         }

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use calib_checks::rigid_body::{Template, body_poses, rigid_groups};
 use calib_cor::Pose;
-use calib_recording::rigid_body::{Template, body_poses, rigid_groups};
 use calib_recording::{Filled, Poses, ReadOptions, read_path};
 use nalgebra::{Isometry3, Matrix3, Point3};
 
@@ -242,7 +242,7 @@ fn as_poses(track: &[Option<Isometry3<f64>>]) -> Vec<Option<Pose>> {
 fn poses_of_markers(file: &Path, markers: &[Track]) -> Result<Vec<Option<Pose>>, FitError> {
     let names: Vec<String> = markers.iter().map(|(n, _)| n.clone()).collect();
     let tracks: Vec<&[Option<Point3<f64>>]> = markers.iter().map(|(_, t)| t.as_slice()).collect();
-    let no_body = |error: calib_recording::rigid_body::NotABody| {
+    let no_body = |error: calib_checks::rigid_body::NotABody| {
         data(
             file,
             error.to_string(),

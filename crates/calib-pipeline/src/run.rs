@@ -5,8 +5,8 @@ use std::path::Path;
 
 use calib_core::Settings;
 use calib_files::OutputFile;
+use calib_finding::{About, Fact, Finding, Severity, catalog};
 use calib_profile::{BodyKind, Method};
-use calib_recording::Finding;
 use calib_report::{Report, ResidualRow, Status, Unobservable, Verdict};
 use calib_urdf::JointId;
 use nalgebra::{Isometry3, Matrix6};
@@ -224,7 +224,7 @@ struct Solved {
 pub(crate) fn stopped(inputs: &Inputs, findings: &[Finding]) -> PipelineError {
     let errors: Vec<String> = findings
         .iter()
-        .filter(|f| f.severity == calib_recording::Severity::Error)
+        .filter(|f| f.severity == Severity::Error)
         .map(|f| {
             let rows: Vec<String> = f.rows.iter().take(5).map(u64::to_string).collect();
             let at = if rows.is_empty() {
@@ -234,7 +234,10 @@ pub(crate) fn stopped(inputs: &Inputs, findings: &[Finding]) -> PipelineError {
             };
             format!(
                 "{} [{}]{at}: {}\n  help: {}",
-                f.subject, f.id, f.text, f.remedy
+                f.subject,
+                f.id,
+                f.text(),
+                f.remedy()
             )
         })
         .collect();
@@ -251,14 +254,7 @@ pub(crate) fn stopped(inputs: &Inputs, findings: &[Finding]) -> PipelineError {
 
 /// What the paper's method takes for granted; its regions hold only as far as this is true.
 fn paper_assumptions() -> Finding {
-    Finding::new(
-        "paper-assumptions",
-        calib_recording::Severity::Info,
-        "method: paper",
-        "the closed forms take the swept axes to meet in one point at a right angle, the encoders to have no zero \
-         offset, and the rest of the robot to be as described; the reported uncertainty covers the tracker's noise only",
-        "solve with `method: ml`, which estimates axes, offsets and mounts together",
-    )
+    Finding::new(catalog::PAPER_ASSUMPTIONS, About::Method)
 }
 
 /// Numbers that a physical limit of the profile stopped.
@@ -269,20 +265,12 @@ fn on_their_limit(fit: &MlFit) -> Vec<Finding> {
         .filter(|(found, _)| found.at_bound)
         .filter_map(|(found, stated)| {
             let (_, limit) = stated.bounds?;
-            let (unit, factor) = match found.unit {
-                calib_core::Unit::Metre => ("mm", 1e3),
-                _ => ("deg", 1f64.to_degrees()),
+            let limit = match found.unit {
+                calib_core::Unit::Metre => Fact::meters(limit),
+                _ => Fact::radians(limit),
             };
-            Some(Finding::new(
-                "on-its-limit",
-                calib_recording::Severity::Warning,
-                &found.name,
-                format!(
-                    "the data want it beyond its limit of ±{:.3} {unit}; it stays there and the rest is fitted around it",
-                    limit * factor
-                ),
-                "widen `within_mm` or `within_deg` if the limit is not physical; otherwise look for an effect that is not freed",
-            ))
+            let about = About::Parameter(found.name.clone());
+            Some(Finding::new(catalog::ON_ITS_LIMIT, about).with("limit", limit))
         })
         .collect()
 }
@@ -291,9 +279,9 @@ fn on_their_limit(fit: &MlFit) -> Vec<Finding> {
 fn only_a_cross_check(findings: &mut [Finding]) {
     for finding in findings
         .iter_mut()
-        .filter(|f| f.id == "origin-not-observable")
+        .filter(|f| f.id == catalog::ORIGIN_NOT_OBSERVABLE)
     {
-        finding.severity = calib_recording::Severity::Warning;
+        finding.severity = Severity::Warning;
     }
 }
 

@@ -2,38 +2,6 @@ use crate::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How bad a finding is.
-#[derive(
-    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum Severity {
-    /// Good to know.
-    #[default]
-    Info,
-    /// The result may be worse than it looks.
-    Warning,
-    /// The result, or a part of it, cannot be used.
-    Error,
-}
-
-/// What a check found in the data or the result.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Finding {
-    /// Stable id: the page of the book that explains it.
-    pub id: String,
-    /// How bad.
-    pub severity: Severity,
-    /// What it is about: a recording, body, marker, joint.
-    pub subject: String,
-    /// Rows of the recording, counted from 1 without the header; empty when it is about all.
-    pub rows: Vec<u64>,
-    /// What was found, with numbers.
-    pub text: String,
-    /// What to do.
-    pub remedy: String,
-}
-
 /// A file that was read.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Input {

@@ -44,13 +44,14 @@ mod verification;
 pub mod view3d;
 mod words;
 
+pub use calib_finding::{Finding, Severity, Unit};
 pub use data::{
-    AccuracyLimit, Clock, Finding, FitSummary, Input, JointCoverage, Lost, Noise, Output,
-    RecordingSummary, RecordingUse, Rejected, Severity, Workspace, WorkspacePoint,
+    AccuracyLimit, Clock, FitSummary, Input, JointCoverage, Lost, Noise, Output, RecordingSummary,
+    RecordingUse, Rejected, Workspace, WorkspacePoint,
 };
 pub use error::ReportError;
-pub use quantity::{JointValue, Unit};
 pub use read::{NotAReport, REPORT, read_report, report_path};
+pub use quantity::JointValue;
 pub use report::{FormatVersion, Limit, Method, Outcome, Report, Verdict, judge};
 pub use residuals::{JointResiduals, ResidualBin, ResidualGroup, ResidualRow, Residuals};
 pub use results::{

@@ -18,18 +18,6 @@ const SCIENTIFIC_FROM: f64 = 1e7;
 /// Decimals of a value whose uncertainty is unknown: a micrometre, a milli-degree, a microsecond.
 const PLAIN_DECIMALS: i32 = 3;
 
-/// The unit in which a person reads an SI quantity, and the factor to it.
-fn shown(unit: Unit) -> (f64, &'static str) {
-    match unit {
-        Unit::Metre => (1e3, " mm"),
-        Unit::Radian => (180.0 / std::f64::consts::PI, "°"),
-        Unit::Second => (1e3, " ms"),
-        Unit::One => (1.0, ""),
-        Unit::RadianPerNewtonMetre => (180.0 / std::f64::consts::PI, "°/(N·m)"),
-        Unit::MetrePerNewton => (1e3, " mm/N"),
-    }
-}
-
 /// `1.234 ± 0.041 mm` from SI numbers. Without a finite σ the value stands alone.
 ///
 /// ```
@@ -39,7 +27,7 @@ fn shown(unit: Unit) -> (f64, &'static str) {
 /// ```
 #[must_use]
 pub fn with_sigma(value: f64, sigma: Option<f64>, unit: Unit) -> String {
-    let (factor, suffix) = shown(unit);
+    let (factor, suffix) = unit.display();
     // What is finite in metres may not be in millimetres.
     let scaled = sigma
         .map(|sigma| (value * factor, sigma.abs() * factor))
@@ -77,7 +65,7 @@ fn is_zero(text: &str) -> bool {
 /// `± 0.041 mm`: a standard deviation alone, two significant digits.
 #[must_use]
 pub fn sigma(sigma: Option<f64>, unit: Unit) -> String {
-    let (factor, suffix) = shown(unit);
+    let (factor, suffix) = unit.display();
     match sigma.map(|sigma| sigma.abs() * factor) {
         Some(sigma) if sigma.is_finite() => format!("{}{suffix}", digits_from_sigma(0.0, sigma).1),
         _ => UNKNOWN.to_owned(),
@@ -87,7 +75,7 @@ pub fn sigma(sigma: Option<f64>, unit: Unit) -> String {
 /// `4.56 mm`: three significant digits, at most three decimals.
 #[must_use]
 pub fn plain(value: f64, unit: Unit) -> String {
-    let (factor, suffix) = shown(unit);
+    let (factor, suffix) = unit.display();
     let text = significant(value * factor, PLAIN_DECIMALS);
     if text == UNKNOWN {
         text
@@ -105,20 +93,13 @@ pub fn plain_or_unknown(value: Option<f64>, unit: Unit) -> String {
 /// [`plain`] without its unit, for a table whose heading names the unit.
 #[must_use]
 pub fn bare(value: f64, unit: Unit) -> String {
-    significant(value * shown(unit).0, PLAIN_DECIMALS)
+    significant(value * unit.display().0, PLAIN_DECIMALS)
 }
 
 /// The heading's unit for [`bare`] numbers: `mm`, `deg`, `ms`.
 #[must_use]
 pub fn unit_name(unit: Unit) -> &'static str {
-    match unit {
-        Unit::Metre => "mm",
-        Unit::Radian => "deg",
-        Unit::Second => "ms",
-        Unit::One => "1",
-        Unit::RadianPerNewtonMetre => "deg/(N·m)",
-        Unit::MetrePerNewton => "mm/N",
-    }
+    unit.heading()
 }
 
 /// A length in centimetres with two decimals, as the paper's Table 1 prints it.
@@ -136,13 +117,13 @@ pub fn degrees(radians: f64) -> String {
 /// A fixed number of decimals in the unit that a person reads, without the unit.
 #[must_use]
 pub fn fixed_in(value: f64, unit: Unit, decimals: usize) -> String {
-    fixed(value * shown(unit).0, decimals)
+    fixed(value * unit.display().0, decimals)
 }
 
 /// [`fixed_in`] with its unit: `377.910 mm`, `0.345°`.
 #[must_use]
 pub fn fixed_with_unit(value: f64, unit: Unit, decimals: usize) -> String {
-    let (factor, suffix) = shown(unit);
+    let (factor, suffix) = unit.display();
     format!("{}{suffix}", fixed(value * factor, decimals))
 }
 

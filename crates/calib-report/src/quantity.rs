@@ -1,29 +1,6 @@
+use calib_finding::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// The SI unit of a number whose kind is only known at run time.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub enum Unit {
-    /// Length, m; people read mm.
-    #[serde(rename = "m")]
-    Metre,
-    /// Angle, rad; people read degrees.
-    #[serde(rename = "rad")]
-    Radian,
-    /// Time, s; people read ms.
-    #[serde(rename = "s")]
-    Second,
-    /// A ratio.
-    #[default]
-    #[serde(rename = "1")]
-    One,
-    /// Compliance of a revolute joint, rad/(N·m).
-    #[serde(rename = "rad/(N·m)")]
-    RadianPerNewtonMetre,
-    /// Compliance of a prismatic joint, m/N.
-    #[serde(rename = "m/N")]
-    MetrePerNewton,
-}
 
 /// The position of one joint.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -199,8 +199,8 @@ pub fn summary(report: &Report, colour: bool) -> String {
                     "{} {}: {} {}",
                     finding.severity.word(),
                     finding.subject,
-                    finding.text,
-                    finding.remedy
+                    finding.text(),
+                    finding.remedy()
                 ),
                 COLUMNS,
                 "  ",

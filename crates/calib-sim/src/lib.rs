@@ -61,7 +61,7 @@ pub enum SimError {
         /// The body.
         body: String,
         /// Why.
-        source: calib_recording::rigid_body::NotABody,
+        source: calib_checks::rigid_body::NotABody,
     },
 }
 

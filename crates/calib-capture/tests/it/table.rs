@@ -62,7 +62,7 @@ fn a_cut_file_is_read_up_to_its_last_whole_row_and_gone_on_with() {
             .meta
             .findings
             .iter()
-            .any(|f| f.id == "row-cut-off");
+            .any(|f| f.id == calib_finding::catalog::ROW_CUT_OFF);
         assert_eq!(cut, length > last, "{length}");
         let mut table = Table::append(&path, HEADER).expect("gone on with");
         assert_eq!((table.rows, table.last_time), (5, Some(4.25)));

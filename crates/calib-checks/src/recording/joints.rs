@@ -111,7 +111,8 @@ pub(super) fn coverage(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
             continue;
         };
         let amount = |value: f64| Fact::number(value, unit(poses, joint));
-        let still = |kind| Finding::of_kind(catalog::JOINT_NEVER_MOVED, kind, Subject::joint(joint));
+        let still =
+            |kind| Finding::of_kind(catalog::JOINT_NEVER_MOVED, kind, Subject::joint(joint));
         let Some((low, high)) = range(q.iter().flatten().copied()) else {
             findings.push(still("empty"));
             continue;

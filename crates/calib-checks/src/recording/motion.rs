@@ -232,10 +232,14 @@ pub(super) fn unsettled(poses: &Poses, expected: &Expectations) -> Vec<Finding> 
         let usual = 2.0 * sigma * (UNSETTLED_SIGMAS / 2.0 + (rows.len() as f64).ln());
         if worst > usual {
             findings.push(
-                Finding::of_kind(catalog::UNSETTLED_ROWS, "spread", About::Hold(hold.to_string()))
-                    .with("spread", Fact::meters(worst))
-                    .with("limit", Fact::meters(usual))
-                    .at_rows(rows.iter().map(|&i| poses.rows[i])),
+                Finding::of_kind(
+                    catalog::UNSETTLED_ROWS,
+                    "spread",
+                    About::Hold(hold.to_string()),
+                )
+                .with("spread", Fact::meters(worst))
+                .with("limit", Fact::meters(usual))
+                .at_rows(rows.iter().map(|&i| poses.rows[i])),
             );
         }
     }

@@ -277,8 +277,7 @@ impl<'a> Body<'a> {
     fn bending(&self, rows: Vec<u64>) -> Option<Finding> {
         let spread = |pair: &Pair| {
             let all = distances(self.tracks[pair.i], self.tracks[pair.j]);
-            range(all.map(|(_, distance)| distance))
-                .map_or(0.0, |(low, high)| high - low)
+            range(all.map(|(_, distance)| distance)).map_or(0.0, |(low, high)| high - low)
         };
         let (pair, spread) = self
             .pairs

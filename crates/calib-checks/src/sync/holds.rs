@@ -194,7 +194,8 @@ pub fn static_poses(poses: &Poses, holds: &[Hold]) -> StaticPoses {
                 .collect();
             means.push(middle_point(&points).map(Point3::from));
             covariances.push(covariance3(&points));
-            out.findings.extend(drift(Subject::marker(name), poses, hold, &points));
+            out.findings
+                .extend(drift(Subject::marker(name), poses, hold, &points));
         }
         out.poses.markers.insert(name.clone(), means);
         out.marker_covariance.insert(name.clone(), covariances);
@@ -211,7 +212,8 @@ pub fn static_poses(poses: &Poses, holds: &[Hold]) -> StaticPoses {
                 .map(|(t, r)| Isometry3::from_parts(Translation3::from(t), r));
             covariances.push(mean.and_then(|mean| covariance6(&mean, &seen)));
             means.push(mean);
-            out.findings.extend(drift(Subject::body(name), poses, hold, &points));
+            out.findings
+                .extend(drift(Subject::body(name), poses, hold, &points));
         }
         out.poses.bodies.insert(name.clone(), means);
         out.body_covariance.insert(name.clone(), covariances);

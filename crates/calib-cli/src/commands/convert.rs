@@ -69,7 +69,7 @@ fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Conv
             .meta
             .findings
             .iter()
-            .map(|f| format!("{}: {}", f.id, f.text)),
+            .map(|f| format!("{}: {}", f.id, f.text())),
     );
     let tables = write_recording(&recording, &WriteOptions::default()).map_err(|source| {
         CliError::Table {

@@ -13,10 +13,10 @@ use std::collections::BTreeMap;
 use calib_aor::{
     Center, FrameAxes, FrameOptions, FrameOutcome, FrameSample, Letter, frame_planes::algorithm1,
 };
+use calib_finding::{About, Fact, Finding, catalog};
 use calib_geometry::{Line, Twist, se3};
 use calib_plugin::{BodyPose, MotionData, Shape};
 use calib_profile::{BodyKind, Orientation, Origin, PointChoice};
-use calib_recording::{Finding, Severity};
 use calib_report::{EstimatorResult, Status, Unit, Unobservable};
 use nalgebra::{
     Isometry3, Matrix3, Matrix6, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
@@ -150,13 +150,15 @@ impl Task<'_> {
     }
 
     fn refused(&self, findings: &mut Vec<Finding>, verdict: &str, reason: &str) -> OriginEstimate {
-        findings.push(Finding::new(
-            "origin-not-observable",
-            Severity::Error,
-            self.name,
-            format!("the sweep `{}` does not determine it ({verdict}): {reason}", self.origin.sweep),
-            "sweep two joints whose axes meet in the origin over more of their range, or ask for a line with one axis",
-        ));
+        findings.push(
+            Finding::new(
+                catalog::ORIGIN_NOT_OBSERVABLE,
+                About::Origin(self.name.to_owned()),
+            )
+            .with("sweep", Fact::name(&self.origin.sweep))
+            .with("verdict", Fact::name(verdict))
+            .with("reason", Fact::name(reason)),
+        );
         OriginEstimate {
             pose: None,
             covariance: None,

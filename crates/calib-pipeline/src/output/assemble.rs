@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use calib_core::{Gauge, RejectReason};
 use calib_files::OutputFile;
+use calib_finding::{About, Fact, Finding, catalog};
 use calib_profile::{Limits, Method, Usage};
-use calib_recording::Finding;
 use calib_report::{
     EstimatorResult, FitSummary, HeldOut, Input, JointCoverage, Limit, LoopClosure, Lost, Meaning,
     NotObservable, Output, Parameter, RecordingSummary, RecordingUse, Rejected, Report,
@@ -275,12 +275,14 @@ fn next_steps(e: &Evidence<'_>, verdict: Verdict, missing: &[String]) -> Vec<Str
     if let Some(worst) = e
         .findings
         .iter()
-        .filter(|f| f.severity >= calib_recording::Severity::Warning)
+        .filter(|f| f.severity >= calib_finding::Severity::Warning)
         .max_by_key(|f| f.severity)
     {
         steps.push(format!(
             "{} ({}): {}",
-            worst.subject, worst.id, worst.remedy
+            worst.subject,
+            worst.id,
+            worst.remedy()
         ));
     }
     if e.method == Method::Paper {
@@ -548,33 +550,11 @@ fn rejected(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Rejected> {
         .collect()
 }
 
-fn findings(e: &Evidence<'_>, missing: &[String]) -> Vec<calib_report::Finding> {
-    let mut findings: Vec<calib_report::Finding> = e
-        .findings
-        .iter()
-        .map(|f| calib_report::Finding {
-            id: f.id.to_owned(),
-            severity: match f.severity {
-                calib_recording::Severity::Info => calib_report::Severity::Info,
-                calib_recording::Severity::Warning => calib_report::Severity::Warning,
-                calib_recording::Severity::Error => calib_report::Severity::Error,
-            },
-            subject: f.subject.clone(),
-            rows: f.rows.clone(),
-            text: f.text.clone(),
-            remedy: f.remedy.clone(),
-        })
-        .collect();
-    for missing in missing {
-        findings.push(calib_report::Finding {
-                id: "missing-physics".to_owned(),
-                severity: calib_report::Severity::Warning,
-                subject: "fit".to_owned(),
-                rows: Vec::new(),
-                text: missing.clone(),
-                remedy: "free the effect under `solve.free` or `solve.joints`, and compare the held-out errors".to_owned(),
-            });
-    }
+fn findings(e: &Evidence<'_>, missing: &[String]) -> Vec<Finding> {
+    let mut findings = e.findings.to_vec();
+    findings.extend(missing.iter().map(|pattern| {
+        Finding::new(catalog::MISSING_PHYSICS, About::Fit).with("pattern", Fact::name(pattern))
+    }));
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     findings
 }

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use calib_recording::{Finding, Severity};
+use calib_finding::{About, Fact, Finding, catalog};
 use calib_report::view3d::Outline;
 use calib_urdf::sha256_hex;
 use calib_urdf::visual::{Geometry, Visual, visuals};
@@ -47,17 +47,15 @@ pub fn outlines(robot: &RobotProfile, findings: &mut Vec<Finding>) -> (Vec<Outli
     }
     if !left_out.is_empty() {
         let n = left_out.len();
-        let mut named = left_out[..n.min(NAMED)].join("; ");
-        if n > NAMED {
-            named += &format!("; and {} more", n - NAMED);
-        }
-        findings.push(Finding::new(
-            "shape-not-drawn",
-            Severity::Info,
-            file,
-            format!("{n} of {count} shapes of the links are missing in the 3-D view: {named}"),
-            "nothing: no number depends on it; for the picture, convert meshes to STL and name their package under `robot.packages`",
-        ));
+        let more = (n > NAMED).then(|| Fact::count(n - NAMED));
+        left_out.truncate(NAMED);
+        findings.push(
+            Finding::new(catalog::SHAPE_NOT_DRAWN, About::File(file.clone()))
+                .with("missing", Fact::count(n))
+                .with("total", Fact::count(count))
+                .with("shapes", Fact::names(left_out))
+                .with_some("more", more),
+        );
     }
     (outlines, read)
 }

@@ -5,22 +5,23 @@
 //! ```
 //!
 //! One clock: nothing to do. Two clocks that the profile declares to be one: δ = ρ = 0. Else δ and ρ come from the angular
-//! speed of a tracking body against that of its link ([`calib_recording::sync`]), which needs no calibration; where they
+//! speed of a tracking body against that of its link ([`calib_checks::sync`]), which needs no calibration; where they
 //! cannot be told, the recording is refused. Then either every hold gives one static pose (an error of δ costs
 //! nothing), or rows are taken from the motion, and the fit estimates what is left of δ and ρ
 //! ([`mod@crate::prepare::clock`]).
 
 use std::collections::BTreeMap;
 
-use calib_profile::{BodyKind, Clocks, RecordingSpec, TimedPoses, Timing, Tracker};
-use calib_recording::checks::model::alignment;
-use calib_recording::checks::{Expectations, checks};
-use calib_recording::rigid_body::{Template, body_poses};
-use calib_recording::sync::{
+use calib_checks::model::alignment;
+use calib_checks::rigid_body::{Template, body_poses};
+use calib_checks::sync::{
     ClockMap, HoldSettings, OffsetOutcome, OffsetSettings, RotationTrack, clock_offset, holds,
     static_poses,
 };
-use calib_recording::{Filled, Finding, Poses, Recording, Severity};
+use calib_checks::{Expectations, checks};
+use calib_finding::{About, Fact, Finding, Severity, Subject, catalog};
+use calib_profile::{BodyKind, Clocks, RecordingSpec, TimedPoses, Timing, Tracker};
+use calib_recording::{Filled, Poses, Recording};
 use nalgebra::{Isometry3, Matrix3, Point3};
 
 use crate::error::PipelineError;
@@ -159,10 +160,7 @@ pub fn align(
     let mut findings: Vec<Finding> = checks(&full, &Expectations::default())
         .into_iter()
         .filter(|f| f.severity != Severity::Error)
-        .map(|mut f| {
-            f.subject = format!("{name}: {}", f.subject);
-            f
-        })
+        .map(|f| f.in_recording(name))
         .collect();
     let one_line = robot_line.is_none_or(|line| line == tracker_line);
     let clocks = if one_line || robot_clock == tracker.clock {
@@ -171,11 +169,11 @@ pub fn align(
         ClockState::Declared
     } else {
         let (body, map) = estimate(robot, spec, timing, &full, &joints)
-            .map_err(|f| fail(format!("recording `{name}`: {}", f.text), &f.remedy))?;
+            .map_err(|f| fail(format!("recording `{name}`: {}", f.text()), &f.remedy()))?;
         findings.extend(
-            alignment(&OffsetOutcome::Found(map), SAME_TIME).map(|mut f| {
-                f.subject = format!("{name}: {body}");
-                f
+            alignment(&OffsetOutcome::Found(map), SAME_TIME).map(|mut finding| {
+                finding.subject = Subject::body(&body).in_recording(name);
+                finding
             }),
         );
         ClockState::Found { body, map }
@@ -378,15 +376,8 @@ fn estimate(
     }
     let outcome = worst.unwrap_or(OffsetOutcome::TooShort);
     best.ok_or_else(|| {
-        alignment(&outcome, SAME_TIME).unwrap_or_else(|| {
-            Finding::new(
-                "clock-lag",
-                Severity::Error,
-                "clocks",
-                "cannot be aligned",
-                "",
-            )
-        })
+        alignment(&outcome, SAME_TIME)
+            .unwrap_or_else(|| Finding::of_kind(catalog::CLOCK_LAG, "too_short", About::Clocks))
     })
 }
 
@@ -410,6 +401,14 @@ fn orientation(table: &Poses, name: &str, kind: &BodyKind) -> Option<RotationTra
     Some(RotationTrack::new(times.iter().copied().zip(turned)))
 }
 
+/// Why a hold had not settled.
+struct Restless {
+    /// The marker or body that shows it.
+    name: String,
+    /// Its drift, or its scatter.
+    facts: Vec<(&'static str, Fact)>,
+}
+
 /// One pose per hold, with the shapes of the markers' scatter; restless holds are listed.
 fn settle(name: &str, timing: &Timing, tracker: &Tracker, full: &Poses, aligned: &mut Aligned) {
     let usual = HoldSettings::default();
@@ -426,16 +425,20 @@ fn settle(name: &str, timing: &Timing, tracker: &Tracker, full: &Poses, aligned:
     let table = static_poses(full, &found);
     aligned.alignment.holds = Some(found.len());
     // Holds whose halves differ, and holds that scatter more than the others.
-    let mut restless: BTreeMap<usize, String> = BTreeMap::new();
+    let mut restless: BTreeMap<usize, Restless> = BTreeMap::new();
     for finding in table.findings {
         let first = finding.rows.first().copied();
         let hold = found
             .iter()
             .position(|h| first == Some(full.rows[h.rows.start]));
         if let Some(hold) = hold {
-            restless
-                .entry(hold)
-                .or_insert_with(|| format!("{} {}", finding.subject, finding.text));
+            restless.entry(hold).or_insert_with(|| Restless {
+                name: finding.subject.to_string(),
+                facts: ["drift", "time"]
+                    .into_iter()
+                    .filter_map(|key| Some((key, finding.facts.get(key)?.clone())))
+                    .collect(),
+            });
         }
     }
     let mut usual = Vec::new();
@@ -466,18 +469,14 @@ fn settle(name: &str, timing: &Timing, tracker: &Tracker, full: &Poses, aligned:
     let many = restless.len() as f64 > MANY * found.len() as f64;
     let rows: Vec<u64> = restless.keys().map(|&h| table.poses.rows[h]).collect();
     if let Some(first) = restless.values().next() {
-        let text = format!(
-            "{} of {} holds had not settled ({}); {first}",
-            restless.len(),
-            found.len(),
-            if many {
-                "too many to leave out"
-            } else {
-                "left out"
-            },
-        );
-        let remedy = "wait longer before each hold, or stiffen the robot's stand";
-        let finding = Finding::new("unsettled-rows", Severity::Warning, name, text, remedy);
+        let kind = if many { "holds_kept" } else { "holds" };
+        let finding = Finding::of_kind(catalog::UNSETTLED_ROWS, kind, Subject::recording(name))
+            .with("restless", Fact::count(restless.len()))
+            .with("holds", Fact::count(found.len()))
+            .with("name", Fact::name(&first.name));
+        let finding = first.facts.iter().fold(finding, |finding, (key, fact)| {
+            finding.with(key, fact.clone())
+        });
         aligned.findings.push(finding.at_rows(rows));
     }
     if !many {
@@ -501,7 +500,7 @@ fn note_scatter(
     stream: &str,
     traces: Vec<Option<f64>>,
     usual: &mut Vec<f64>,
-    restless: &mut BTreeMap<usize, String>,
+    restless: &mut BTreeMap<usize, Restless>,
 ) {
     let mut known: Vec<f64> = traces.iter().flatten().copied().collect();
     known.sort_by(f64::total_cmp);
@@ -514,12 +513,12 @@ fn note_scatter(
             && *trace > RESTLESS * middle
             && trace.sqrt() > RESTLESS_SIGMA
         {
-            restless.entry(hold).or_insert_with(|| {
-                format!(
-                    "{stream} scatters by {:.2} mm, {:.2} mm is usual",
-                    trace.sqrt() * 1e3,
-                    middle.sqrt() * 1e3
-                )
+            restless.entry(hold).or_insert_with(|| Restless {
+                name: stream.to_owned(),
+                facts: vec![
+                    ("scatter", Fact::meters(trace.sqrt())),
+                    ("usual", Fact::meters(middle.sqrt())),
+                ],
             });
         }
     }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use calib_checks::rigid_body::Template;
+use calib_checks::{Expectations, checks, held_out_in_training};
+use calib_finding::{Fact, Finding, Severity, catalog};
 use calib_profile::{BodyKind, Usage};
-use calib_recording::checks::{Expectations, checks, held_out_in_training};
-use calib_recording::rigid_body::Template;
-use calib_recording::{Finding, Severity};
 
 use crate::prepare::conditions::missing_torques;
 use crate::prepare::load::{Inputs, Loaded};
@@ -13,35 +13,36 @@ use crate::prepare::load::{Inputs, Loaded};
 /// Fewest rows of a recording that a fit can use: a sphere has four unknowns, and one row must check it.
 const MIN_POSES: usize = 5;
 
-/// All findings of all recordings, recordings in order, the subject led by the recording's name.
+/// All findings of all recordings, recordings in order.
 #[must_use]
 pub fn check(inputs: &Inputs) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (name, loaded) in &inputs.recordings {
         for mut finding in checks(&loaded.poses, &expectations(inputs, loaded)) {
-            let said = |earlier: &&mut Finding| {
-                earlier.id == "missing-marker"
-                    && earlier.text == finding.text
-                    && earlier.subject.ends_with(&format!(": {}", finding.subject))
+            let same = |earlier: &&mut Finding| {
+                earlier.id == catalog::MISSING_MARKER
+                    && earlier.facts == finding.facts
+                    && earlier.subject.about == finding.subject.about
             };
-            // A name that is wrong in the profile is wrong for every recording: it is said once.
-            if let Some(earlier) = findings.iter_mut().find(said) {
-                let body = format!(": {}", finding.subject);
-                let of = earlier.subject.trim_end_matches(&body).to_owned();
-                earlier.subject = format!("{of}, {name}{body}");
+            // A name that is wrong in the profile is wrong for every recording: it is one finding.
+            if let Some(earlier) = findings.iter_mut().find(same) {
+                earlier.subject.recordings.push(name.clone());
                 continue;
             }
-            finding.subject = format!("{name}: {}", finding.subject);
+            finding = finding.in_recording(name);
             findings.push(finding);
         }
     }
     let is = |r: &&Loaded, validation: bool| (r.spec.usage == Usage::Validation) == validation;
     for held_out in inputs.recordings.values().filter(|r| is(r, true)) {
         for training in inputs.recordings.values().filter(|r| is(r, false)) {
-            if let Some(mut finding) = held_out_in_training(&held_out.poses, &training.poses) {
-                finding.subject = format!("{} in {}", held_out.name, training.name);
-                findings.push(finding);
-            }
+            findings.extend(held_out_in_training(&held_out.poses, &training.poses).map(
+                |finding| {
+                    finding
+                        .in_recording(&held_out.name)
+                        .with("training", Fact::name(&training.name))
+                },
+            ));
         }
     }
     findings.extend(missing_torques(inputs));

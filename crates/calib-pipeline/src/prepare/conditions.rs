@@ -1,7 +1,7 @@
 //! What a joint reading alone does not say: from which side each joint came, and which torques were measured.
 
+use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::Load;
-use calib_recording::{Finding, Severity};
 use calib_urdf::RobotModel;
 
 use crate::prepare::load::{Inputs, Loaded};
@@ -40,16 +40,10 @@ pub fn missing_torques(inputs: &Inputs) -> Vec<Finding> {
             .map(String::as_str)
             .collect();
         if !without.is_empty() {
-            findings.push(Finding::new(
-                "torque-missing",
-                Severity::Warning,
-                name,
-                format!(
-                    "`load: measured`, but the recording has no torque of {}: taken as no load",
-                    without.join(", ")
-                ),
-                "record a column `<joint>_nm`, map one under `columns`, or use `load: gravity`",
-            ));
+            findings.push(
+                Finding::new(catalog::TORQUE_MISSING, Subject::recording(name))
+                    .with("joints", Fact::names(without)),
+            );
         }
     }
     findings

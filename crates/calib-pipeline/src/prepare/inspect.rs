@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use calib_recording::{Finding, Severity};
+use calib_finding::{Finding, Severity, catalog};
 
 use crate::error::{ExitCode, PipelineError};
 use crate::estimate::start::start;
@@ -38,7 +38,7 @@ pub fn check(profile: &Path) -> Result<Checked, PipelineError> {
     // A column written twice does not keep the others from being compared with the robot, row by row.
     let wrong = of_data
         .iter()
-        .any(|f| f.severity == Severity::Error && f.id != "duplicate-column");
+        .any(|f| f.severity == Severity::Error && f.id != catalog::DUPLICATE_COLUMN);
     findings.extend(of_data);
     match body_tracks(&inputs, &mut findings) {
         Ok(tracks) => {
@@ -98,12 +98,7 @@ impl Checked {
             text.push_str("no findings\n");
         }
         for f in &self.findings {
-            let severity = match f.severity {
-                Severity::Info => "info",
-                Severity::Warning => "warning",
-                Severity::Error => "error",
-            };
-            let _ = write!(text, "{severity}[{}] {}", f.id, f.subject);
+            let _ = write!(text, "{}[{}] {}", f.severity, f.id, f.subject);
             if !f.rows.is_empty() {
                 let shown: Vec<String> = f.rows.iter().take(8).map(u64::to_string).collect();
                 let more = if f.rows.len() > 8 {
@@ -113,7 +108,7 @@ impl Checked {
                 };
                 let _ = write!(text, " (rows {}{more})", shown.join(", "));
             }
-            let _ = writeln!(text, "\n  {}\n  help: {}", f.text, f.remedy);
+            let _ = writeln!(text, "\n  {}\n  help: {}", f.text(), f.remedy());
         }
         text
     }

@@ -4,11 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_plugin::{Control, Source};
 use calib_profile::{BodyKind, Profile, ProfileError, RecordingSpec, RobotLog};
-use calib_recording::{
-    ColumnMap, Filled, Finding, JointUnit, Meta, Poses, ReadOptions, Recording, Severity,
-};
+use calib_recording::{ColumnMap, Filled, JointUnit, Meta, Poses, ReadOptions, Recording};
 use calib_urdf::{RobotModel, sha256_hex};
 use nalgebra::Matrix3;
 
@@ -455,12 +454,10 @@ fn prepare(
             "record at least one row".to_owned(),
         ));
     }
-    findings.extend(
-        meta.findings
-            .iter()
-            .cloned()
-            .map(|f| in_file(f, &spec.file)),
-    );
+    findings.extend(meta.findings.iter().cloned().map(|mut finding| {
+        finding.subject = finding.subject.in_file(&spec.file);
+        finding
+    }));
     ignore_unmapped(robot, name, spec, &mut poses, findings);
     for joint in poses.joints.keys() {
         let id = model.joint_id(joint).map_err(|unknown| {
@@ -529,27 +526,10 @@ fn ignore_unmapped(
         poses.joints.remove(joint);
         poses.joint_units.remove(joint);
     }
-    findings.push(Finding::new(
-        "column-ignored",
-        Severity::Info,
-        name,
-        format!(
-            "the column map does not mention {}, and the robot has no such joint: ignored",
-            strangers.join(", ")
-        ),
-        "map the column if it matters",
-    ));
-}
-
-fn in_file(mut finding: Finding, file: &str) -> Finding {
-    if !finding.subject.contains(file) {
-        finding.subject = if finding.subject.is_empty() {
-            file.to_owned()
-        } else {
-            format!("{file}: {}", finding.subject)
-        };
-    }
-    finding
+    findings.push(
+        Finding::new(catalog::COLUMN_IGNORED, Subject::recording(name))
+            .with("columns", Fact::names(strangers)),
+    );
 }
 
 fn joint_vectors(model: &RobotModel, spec: &RecordingSpec, poses: &Poses) -> Vec<Option<Vec<f64>>> {

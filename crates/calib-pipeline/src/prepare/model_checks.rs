@@ -1,6 +1,6 @@
 //! Data checks that need the robot's model: before the fit its nominal motion, after it the rows that it cannot explain.
 //!
-//! Before: a body's motion against that of its link ([`calib_recording::checks::model`]), and where they disagree, which
+//! Before: a body's motion against that of its link ([`calib_checks::model`]), and where they disagree, which
 //! single mistake would explain it: the sign or the order of joint columns, their unit, another link, joint values
 //! of other rows, the order of a quaternion. After: a row that the robust fit left out is compared with the motion to
 //! its neighbours,
@@ -14,13 +14,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use calib_checks::model::{
+    GOOD_ENOUGH, Mistake, Prediction, better_explanation, disagreement, moves_alone,
+    quaternion_order, spoiled_rows, up_axis,
+};
+use calib_finding::{Fact, Finding, Id, Subject, catalog};
 use calib_geometry::so3;
 use calib_profile::{BodyKind, UpAxis, Usage};
-use calib_recording::checks::model::{
-    GOOD_ENOUGH, Prediction, better_explanation, disagreement, quaternion_order, spoiled_rows,
-    up_axis,
-};
-use calib_recording::{Finding, Severity};
 use calib_urdf::{JointId, LinkId};
 use nalgebra::{Isometry3, Vector6};
 
@@ -35,8 +35,6 @@ use crate::prepare::tracks::BodyTrack;
 const MOVED: f64 = 0.02;
 /// Tilt of a robot's base that its feet explain, rad (20°).
 const BASE_TILT: f64 = 0.35;
-/// Median disagreement, rad (11°), that no error of a robot's description reaches.
-const NOT_ITS_MOTION: f64 = 0.2;
 /// Rows of a body from which its motion says anything.
 const ENOUGH_ROWS: usize = 8;
 /// Rows by which joint values may lag in a table.
@@ -60,7 +58,7 @@ pub fn before_the_fit(
     start: &Start,
 ) -> Vec<Finding> {
     let mut findings: Vec<Finding> = Vec::new();
-    let mut known: BTreeSet<(String, &str)> = BTreeSet::new();
+    let mut known: BTreeSet<(String, Id)> = BTreeSet::new();
     for (name, body) in &inputs.robot.profile.bodies {
         // Recording by recording: in a sweep of other joints a mistake does not show.
         for loaded in inputs.recordings.values() {
@@ -72,14 +70,13 @@ pub fn before_the_fit(
             let off = disagreement(&motion.seen, &nominal);
             let explained = off.filter(|off| *off > GOOD_ENOUGH).and_then(|off| {
                 explain(inputs, name, body.link, &motion, &nominal)
-                    .or_else(|| moves_alone(inputs, name, body.link, off))
+                    .or_else(|| moves_alone(name, &inputs.robot.model.link(body.link).name, off))
             });
             match explained {
-                // One mistake shows in several recordings; it is said once.
-                Some(mut finding) => {
+                // One mistake shows in several recordings; it is one finding.
+                Some(finding) => {
                     if known.insert((name.clone(), finding.id)) {
-                        finding.subject = format!("{}: {name}", loaded.name);
-                        findings.push(finding);
+                        findings.push(finding.in_recording(&loaded.name));
                     }
                 }
                 None => findings.extend(spoiled(inputs, name, body.link, loaded, &tracks[name])),
@@ -93,7 +90,7 @@ pub fn before_the_fit(
         let declared = stated.or(loaded.meta.up_axis.as_deref());
         let tilted = declared.and_then(|axis| up_axis(axis, &start.tracker_from_root, BASE_TILT));
         findings.extend(tilted.map(|mut finding| {
-            finding.subject.clone_from(name);
+            finding.subject = Subject::recording(name);
             finding
         }));
     }
@@ -103,9 +100,7 @@ pub fn before_the_fit(
 /// Rows in which several bodies seem to flip at once: not the bodies are wrong there, but what the joints are said to be.
 fn wrong_joint_values(findings: &mut Vec<Finding>, inputs: &Inputs) {
     for recording in inputs.recordings.keys() {
-        let of_flip = |f: &Finding| {
-            f.id == "body-flip" && f.subject.split(':').next() == Some(recording.as_str())
-        };
+        let of_flip = |f: &Finding| f.id == catalog::BODY_FLIP && f.subject.is_in(recording);
         let mut count: BTreeMap<u64, usize> = BTreeMap::new();
         for row in findings.iter().filter(|f| of_flip(f)).flat_map(|f| &f.rows) {
             *count.entry(*row).or_default() += 1;
@@ -118,27 +113,16 @@ fn wrong_joint_values(findings: &mut Vec<Finding>, inputs: &Inputs) {
             finding.rows.retain(|row| !count.contains_key(row));
         }
         findings.retain(|f| !of_flip(f) || !f.rows.is_empty());
-        let text = format!(
-            "in {} rows several bodies disagree with the robot's model at once",
-            count.len()
+        findings.push(
+            Finding::of_kind(
+                catalog::ROW_OUTLIER,
+                "several_bodies",
+                Subject::recording(recording),
+            )
+            .with("count", Fact::count(count.len()))
+            .at_rows(count.into_keys()),
         );
-        let remedy = "the joint values of these rows are wrong: correct or drop them";
-        let finding = Finding::new("row-outlier", Severity::Error, recording, text, remedy);
-        findings.push(finding.at_rows(count.into_keys()));
     }
-}
-
-/// A body whose motion has nothing to do with its link's.
-fn moves_alone(inputs: &Inputs, name: &str, link: LinkId, off: f64) -> Option<Finding> {
-    (off > NOT_ITS_MOTION).then(|| {
-        let text = format!(
-            "it does not move with link `{}`: the motions disagree by {:.0}°, and no single mistake explains it",
-            inputs.robot.model.link(link).name,
-            off.to_degrees()
-        );
-        let remedy = "check the body's link, that its name is on the right body, and that joints and tracker recorded the same motion";
-        Finding::new("wrong-mount", Severity::Error, name, text, remedy)
-    })
 }
 
 /// One body in one recording.
@@ -224,93 +208,111 @@ fn explain(
         .independent_joints()
         .filter(|joint| motion.moved(*joint))
         .collect();
-    let mut alternatives = Vec::new();
-    let mut add = |id, assumption: String, base_from_link| {
-        alternatives.push(Prediction {
-            assumption,
-            id,
+    let alternatives = alternatives(inputs, link, motion, nominal, &moved);
+    better_explanation(
+        name,
+        &model.link(link).name,
+        &motion.seen,
+        nominal,
+        &alternatives,
+    )
+}
+
+/// The poses of the link under every single mistake that is looked for.
+fn alternatives(
+    inputs: &Inputs,
+    link: LinkId,
+    motion: &Motion<'_>,
+    nominal: &[Isometry3<f64>],
+    moved: &[JointId],
+) -> Vec<Prediction> {
+    let mut out = joint_mistakes(inputs, link, motion, moved);
+    let mut add = |mistake, base_from_link| {
+        out.push(Prediction {
+            mistake,
             base_from_link,
         });
     };
-    for joint in &moved {
-        let flip = |mut q: Vec<f64>| {
-            q[joint.index()] = -q[joint.index()];
-            q
-        };
-        let text = format!("joint `{}` with the other sign", model.joint(*joint).name);
-        add("joint-sign", text, motion.poses_of(inputs, link, &flip));
-    }
-    for (i, a) in moved.iter().enumerate() {
-        for b in &moved[..i] {
-            let (a_joint, b_joint) = (model.joint(*a), model.joint(*b));
-            if a_joint.kind.turns() == b_joint.kind.turns() {
-                let exchange = |mut q: Vec<f64>| {
-                    q.swap(a.index(), b.index());
-                    q
-                };
-                let text = format!("`{}` and `{}` exchanged", b_joint.name, a_joint.name);
-                add(
-                    "joint-order",
-                    text,
-                    motion.poses_of(inputs, link, &exchange),
-                );
-            }
-        }
-    }
-    for (factor, text) in [
-        (std::f64::consts::PI / 180.0, "all joint angles in degrees"),
-        (180.0 / std::f64::consts::PI, "all joint angles in radians"),
-    ] {
-        let scale = |mut q: Vec<f64>| {
-            for joint in moved.iter().filter(|j| model.joint(**j).kind.turns()) {
-                q[joint.index()] *= factor;
-            }
-            q
-        };
-        add(
-            "unit-mismatch",
-            text.to_owned(),
-            motion.poses_of(inputs, link, &scale),
-        );
-    }
-    for (factor, text) in [
-        (1e3, "the tracker's lengths a thousand times smaller"),
-        (1e-3, "the tracker's lengths a thousand times larger"),
+    for (factor, mistake) in [
+        (1e3, Mistake::LengthsTooLarge),
+        (1e-3, Mistake::LengthsTooSmall),
     ] {
         let scaled = nominal.iter().map(|pose| {
             let mut pose = *pose;
             pose.translation.vector *= factor;
             pose
         });
-        add("unit-mismatch", text.to_owned(), scaled.collect());
+        add(mistake, scaled.collect());
     }
+    let model = &inputs.robot.model;
     for other in model.link_ids().filter(|other| *other != link) {
-        let rigid = |joint: &JointId| !moved.contains(joint);
-        // Links between which nothing moves cannot be told apart.
-        if model
-            .chain(link, other)
-            .iter()
-            .all(|step| rigid(&step.joint))
-        {
+        // Links between which nothing moves are not distinguishable.
+        let chain = model.chain(link, other);
+        if chain.iter().all(|step| !moved.contains(&step.joint)) {
             continue;
         }
-        let text = format!("link `{}`", model.link(other).name);
-        add("wrong-mount", text, motion.poses_of(inputs, other, &|q| q));
+        let mistake = Mistake::OtherLink {
+            link: model.link(other).name.clone(),
+        };
+        add(mistake, motion.poses_of(inputs, other, &|q| q));
     }
     for by in LAGS {
-        let side = if by < 0 { "before" } else { "after" };
-        let text = match by.abs() {
-            1 => format!("the joint values of the row {side}"),
-            rows => format!("the joint values {rows} rows {side}"),
-        };
-        add("clock-lag", text, motion.shifted(inputs, link, by));
+        add(Mistake::OtherRow { by }, motion.shifted(inputs, link, by));
     }
-    let as_claimed = Prediction {
-        assumption: format!("link `{}`", model.link(link).name),
-        id: "",
-        base_from_link: nominal.to_vec(),
+    out
+}
+
+/// Signs, order and unit of the joint columns.
+fn joint_mistakes(
+    inputs: &Inputs,
+    link: LinkId,
+    motion: &Motion<'_>,
+    moved: &[JointId],
+) -> Vec<Prediction> {
+    let model = &inputs.robot.model;
+    let mut out = Vec::new();
+    let mut add = |mistake, change: &dyn Fn(Vec<f64>) -> Vec<f64>| {
+        out.push(Prediction {
+            mistake,
+            base_from_link: motion.poses_of(inputs, link, change),
+        });
     };
-    better_explanation(name, &motion.seen, &as_claimed, &alternatives)
+    for joint in moved {
+        let mistake = Mistake::JointSign {
+            joint: model.joint(*joint).name.clone(),
+        };
+        add(mistake, &|mut q: Vec<f64>| {
+            q[joint.index()] = -q[joint.index()];
+            q
+        });
+    }
+    for (i, a) in moved.iter().enumerate() {
+        for b in &moved[..i] {
+            let (a_joint, b_joint) = (model.joint(*a), model.joint(*b));
+            if a_joint.kind.turns() == b_joint.kind.turns() {
+                let mistake = Mistake::JointOrder {
+                    joint: b_joint.name.clone(),
+                    other: a_joint.name.clone(),
+                };
+                add(mistake, &|mut q: Vec<f64>| {
+                    q.swap(a.index(), b.index());
+                    q
+                });
+            }
+        }
+    }
+    for (factor, mistake) in [
+        (std::f64::consts::PI / 180.0, Mistake::AnglesInDegrees),
+        (180.0 / std::f64::consts::PI, Mistake::AnglesInRadians),
+    ] {
+        add(mistake, &|mut q: Vec<f64>| {
+            for joint in moved.iter().filter(|j| model.joint(**j).kind.turns()) {
+                q[joint.index()] *= factor;
+            }
+            q
+        });
+    }
+    out
 }
 
 /// Rows in which one body disagrees with the nominal robot.
@@ -332,11 +334,11 @@ fn spoiled(
         .flatten()
         .map(|q| model.root_from_link(q, link))
         .collect();
-    let mut findings = spoiled_rows(&loaded.poses, name, seen, &poses);
-    for finding in &mut findings {
-        finding.subject = format!("{}: {name}", loaded.name);
-    }
+    let findings = spoiled_rows(&loaded.poses, name, seen, &poses);
     findings
+        .into_iter()
+        .map(|finding| finding.in_recording(&loaded.name))
+        .collect()
 }
 
 /// Rows that a fit cannot explain, and what is wrong with them.
@@ -450,26 +452,19 @@ fn unsettled_finding(
     let (_, worst) = moving
         .iter()
         .max_by(|a, b| a.1.position.total_cmp(&b.1.position))?;
-    let text = format!(
-        "{} rows are off by up to {:.1} mm, {:.2}° and are right a part of the way to a neighbouring row ({:.1} % in the worst)",
-        moving.len(),
-        worst.position * 1e3,
-        moving
-            .iter()
-            .map(|(_, w)| w.angle)
-            .fold(0.0, f64::max)
-            .to_degrees(),
-        100.0 * worst.fraction.abs()
-    );
-    let remedy = "joints and tracker were read at different times, or the robot had not settled: these rows are left out; record again, in holds of a second";
-    let finding = Finding::new(
-        "unsettled-rows",
-        Severity::Warning,
-        format!("{recording}: {body}"),
-        text,
-        remedy,
-    );
-    Some(finding.at_rows(moving.iter().map(|(row, _)| loaded.poses.rows[*row])))
+    let angle = moving.iter().map(|(_, w)| w.angle).fold(0.0, f64::max);
+    Some(
+        Finding::of_kind(
+            catalog::UNSETTLED_ROWS,
+            "between",
+            Subject::body(body).in_recording(recording),
+        )
+        .with("count", Fact::count(moving.len()))
+        .with("position", Fact::meters(worst.position))
+        .with("angle", Fact::radians(angle))
+        .with("fraction", Fact::ratio(worst.fraction.abs()))
+        .at_rows(moving.iter().map(|(row, _)| loaded.poses.rows[*row])),
+    )
 }
 
 fn outlier_finding(
@@ -479,31 +474,24 @@ fn outlier_finding(
     rows: &[(usize, FarOff)],
 ) -> Option<Finding> {
     let (_, worst) = rows.iter().max_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio))?;
-    let mut text = format!(
-        "{} rows are off by up to {:.1} mm, {:.2}°, {:.1} times what is usual; no motion between rows explains it",
-        rows.len(),
-        worst.position * 1e3,
-        worst.angle.to_degrees(),
-        worst.ratio
-    );
     let joints: BTreeSet<&str> = rows
         .iter()
         .filter_map(|(_, w)| w.joint.as_deref())
         .collect();
-    if !joints.is_empty() {
-        let joints: Vec<&str> = joints.into_iter().collect();
-        text += &format!("; joint {} alone would", joints.join(" or "));
-    }
-    let remedy =
-        "a wrong reading, or play of that joint: look at these rows; a robust fit leaves them out";
-    let finding = Finding::new(
-        "row-outlier",
-        Severity::Warning,
-        format!("{recording}: {body}"),
-        text,
-        remedy,
-    );
-    Some(finding.at_rows(rows.iter().map(|(row, _)| loaded.poses.rows[*row])))
+    let joints = (!joints.is_empty()).then(|| Fact::names(joints));
+    Some(
+        Finding::of_kind(
+            catalog::ROW_OUTLIER,
+            "one_body",
+            Subject::body(body).in_recording(recording),
+        )
+        .with("count", Fact::count(rows.len()))
+        .with("position", Fact::meters(worst.position))
+        .with("angle", Fact::radians(worst.angle))
+        .with("ratio", Fact::ratio(worst.ratio))
+        .with_some("joints", joints)
+        .at_rows(rows.iter().map(|(row, _)| loaded.poses.rows[*row])),
+    )
 }
 
 /// A row that is right a part of the way to a neighbour.

@@ -8,8 +8,8 @@
 use std::collections::BTreeMap;
 
 use calib_core::{MarkerObservation, MeasurementKind, NoiseKind, PointId, Problem};
+use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::BodyKind;
-use calib_recording::{Finding, Severity};
 use nalgebra::Point3;
 
 use crate::prepare::load::{Inputs, Loaded};
@@ -123,25 +123,17 @@ fn finding(recording: &str, body: &str, rows: &[(u64, String)]) -> Finding {
     for (_, exchanged) in rows {
         *kinds.entry(exchanged).or_default() += 1;
     }
-    let kinds: Vec<String> = kinds
-        .into_iter()
-        .map(|(exchanged, count)| format!("{exchanged} in {count}"))
-        .collect();
-    let text = format!(
-        "{} rows had exchanged labels, put right by the distances between the markers: {}",
-        rows.len(),
-        kinds.join(", ")
-    );
-    let remedy =
-        "nothing to do; a layout with clearly different distances keeps the tracker from it";
-    let finding = Finding::new(
-        "marker-swap-repaired",
-        Severity::Warning,
-        format!("{recording}: {body}"),
-        text,
-        remedy,
-    );
-    finding.at_rows(rows.iter().map(|(row, _)| *row))
+    let exchanges = kinds.into_iter().map(|(which, count)| match count {
+        1 => format!("{which} in 1 row"),
+        count => format!("{which} in {count} rows"),
+    });
+    Finding::new(
+        catalog::MARKER_SWAP_REPAIRED,
+        Subject::body(body).in_recording(recording),
+    )
+    .with("rows", Fact::count(rows.len()))
+    .with("exchanges", Fact::names(exchanges))
+    .at_rows(rows.iter().map(|(row, _)| *row))
 }
 
 /// Largest deviation of a distance that noise explains, m; `None` where no pair is seen often enough.

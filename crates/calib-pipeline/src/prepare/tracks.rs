@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use calib_checks::rigid_body::{NotABody, Template, body_poses};
+use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::{Body, BodyKind, Usage};
-use calib_recording::Finding;
-use calib_recording::rigid_body::{NotABody, Template, body_poses};
 use calib_urdf::nearest::nearest;
 use nalgebra::{Isometry3, Point3};
 
@@ -172,18 +172,12 @@ fn body_track(
     // A marker that wanders on its body by more than this is loose or mislabelled.
     let limit = (8.0 * stated.unwrap_or(0.0005)).max(0.003);
     if let Some((fit, wander)) = all.moving_marker(limit) {
-        findings.push(Finding::new(
-            "body-not-rigid",
-            calib_recording::Severity::Warning,
-            format!("{name}: {}", fit.name),
-            format!(
-                "marker `{}` wanders on its body by {:.1} mm (limit {:.1} mm)",
-                fit.name,
-                wander * 1e3,
-                limit * 1e3
-            ),
-            "fix the marker, correct its label, or remove it from the body",
-        ));
+        findings.push(
+            Finding::new(catalog::BODY_NOT_RIGID, Subject::body(name))
+                .with("marker", Fact::name(&fit.name))
+                .with("distance", Fact::meters(wander))
+                .with("limit", Fact::meters(limit)),
+        );
     }
     for (recording, loaded) in &inputs.recordings {
         if names.iter().any(|m| loaded.poses.markers.contains_key(m)) {

@@ -12,9 +12,9 @@
 use super::common::unique_names;
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem, excerpt};
-use calib_finding::{About, Fact, Finding, Subject, catalog};
 use crate::model::{MarkerSample, MarkerStream, Recording, Timeline};
 use crate::units::LengthUnit;
+use calib_finding::{About, Fact, Finding, Subject, catalog};
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read, SeekFrom};

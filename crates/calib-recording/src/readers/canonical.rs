@@ -2,10 +2,10 @@
 
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
-use calib_finding::nearest_word;
 use crate::model::Recording;
 use crate::table::{is_canonical, read_table};
 use crate::text::{Separator, cells};
+use calib_finding::nearest_word;
 use std::io::BufReader;
 
 pub(super) const READER: Reader = Reader {

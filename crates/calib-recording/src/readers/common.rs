@@ -1,11 +1,11 @@
 //! What the readers of tracker files share: rows of numbers, three coordinates to a sample, unique names.
 
 use crate::error::{At, Placed, Problem};
-use calib_finding::{About, Fact, Finding, Subject, catalog};
 use crate::growth::push;
 use crate::model::{BodyStream, MarkerSample, MarkerStream};
 use crate::table::UNIT_TOLERANCE;
 use crate::text::{Number, Separator, cells, not_a_number, number};
+use calib_finding::{About, Fact, Finding, Subject, catalog};
 use calib_geometry::so3;
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, UnitQuaternion};
 use std::collections::BTreeMap;
@@ -261,10 +261,13 @@ pub(super) fn unique_names(
                 unique.push('\'');
             }
             findings.push(
-                Finding::new(catalog::DUPLICATE_NAME, Subject::from(about(unique.clone())))
-                    .with("name", Fact::name(name))
-                    .with("count", Fact::count(*count))
-                    .with("unique", Fact::name(&unique)),
+                Finding::new(
+                    catalog::DUPLICATE_NAME,
+                    Subject::from(about(unique.clone())),
+                )
+                .with("name", Fact::name(name))
+                .with("count", Fact::count(*count))
+                .with("unique", Fact::name(&unique)),
             );
             unique
         })

@@ -15,11 +15,11 @@
 use super::common::{body_stream, head_text, pose, rotation, unexpected};
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
-use calib_finding::{Fact, Finding, Subject, catalog};
 use crate::growth::push;
 use crate::model::{BodyStream, MarkerSample, MarkerStream, Recording, Timeline};
 use crate::text::{Lines, Number, number};
 use crate::units::LengthUnit;
+use calib_finding::{Fact, Finding, Subject, catalog};
 use nalgebra::{Isometry3, Matrix3, Point3};
 use std::collections::BTreeMap;
 use std::io::BufReader;

@@ -12,8 +12,8 @@ mod vicon;
 
 use crate::column_map::ColumnMap;
 use crate::error::{At, Error, Placed, Problem, in_file};
-use calib_finding::nearest_word;
 use crate::model::Recording;
+use calib_finding::nearest_word;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -236,7 +236,8 @@ fn choose(head: &[u8], options: &ReadOptions) -> Placed<&'static Reader> {
             .iter()
             .find(|reader| reader.id == id)
             .ok_or_else(|| {
-                let nearest = nearest_word(id, readers().iter().map(|reader| reader.id)).map(str::to_owned);
+                let nearest =
+                    nearest_word(id, readers().iter().map(|reader| reader.id)).map(str::to_owned);
                 (
                     At::File,
                     Problem::UnknownReader {

@@ -14,7 +14,6 @@
 //! measured. Times are seconds from the start; the start itself is local wall-clock text and is kept as a comment.
 //! The file does not say which axis is up (Y unless changed at export).
 
-use calib_finding::About;
 use super::common::{
     MarkerTrack, Triplet, body_stream, first_cell, numbers, pose, quaternion, triplet, unexpected,
     unique_names,
@@ -25,6 +24,7 @@ use crate::growth::push;
 use crate::model::{BodyStream, Recording, Timeline};
 use crate::text::{Lines, Separator, cells};
 use crate::units::LengthUnit;
+use calib_finding::About;
 use std::io::BufReader;
 
 pub(super) const READER: Reader = Reader {

@@ -6,8 +6,8 @@
 //! which: such markers are read as filled.
 
 use super::common::{
-    MarkerTrack, Triplet, all_zero, body_stream, head_text, numbers, pose, rotation, triplet,
-    unexpected, unique_names, frame_count_differs,
+    MarkerTrack, Triplet, all_zero, body_stream, frame_count_differs, head_text, numbers, pose,
+    rotation, triplet, unexpected, unique_names,
 };
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
@@ -119,7 +119,11 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
     let mut recording = Recording::default();
     let names = unique_names(
         header.names.clone(),
-        if header.six_d { About::Body } else { About::Marker },
+        if header.six_d {
+            About::Body
+        } else {
+            About::Marker
+        },
         &mut recording.meta.findings,
     );
     let (mut markers, mut bodies) = (Vec::new(), Vec::new());

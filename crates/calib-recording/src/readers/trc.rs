@@ -10,14 +10,16 @@
 //!
 //! The numbers of frames and markers in the header are often wrong; the columns count.
 
-use calib_finding::About;
-use super::common::{MarkerTrack, first_cell, frame_count_differs, numbers, unexpected, unique_names};
+use super::common::{
+    MarkerTrack, first_cell, frame_count_differs, numbers, unexpected, unique_names,
+};
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
 use crate::growth::push;
 use crate::model::{Recording, Timeline};
 use crate::text::{Lines, Separator, cells};
 use crate::units::LengthUnit;
+use calib_finding::About;
 use std::io::BufReader;
 
 pub(super) const READER: Reader = Reader {
@@ -125,7 +127,11 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
     }
     let promised = field("NumFrames").and_then(|text| text.parse::<usize>().ok());
     if let Some(promised) = promised.filter(|&promised| promised != frames.len()) {
-        findings.push(frame_count_differs("NumFrames", promised as u64, frames.len()));
+        findings.push(frame_count_differs(
+            "NumFrames",
+            promised as u64,
+            frames.len(),
+        ));
     }
     let rate = field("DataRate").and_then(|text| text.parse::<f64>().ok());
     let mut recording = Recording::default();

@@ -20,11 +20,11 @@ use super::common::{
 };
 use super::{Input, ReadOptions, Reader, RotationForm};
 use crate::error::{At, Placed, Problem};
-use calib_finding::{About, Subject};
 use crate::growth::push;
 use crate::model::{BodyStream, Meta, Recording, Timeline};
 use crate::text::{Lines, Separator, cells};
 use crate::units::{AngleUnit, LengthUnit};
+use calib_finding::{About, Subject};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::io::{BufRead, BufReader};
 

@@ -15,9 +15,9 @@
 
 use crate::column_map::{BodyColumns, ColumnMap};
 use crate::error::{At, Placed, Problem};
-use calib_finding::nearest_word;
 use crate::model::JointUnit;
 use crate::units::{AngleUnit, LengthUnit, TimeUnit};
+use calib_finding::nearest_word;
 use std::collections::BTreeMap;
 
 /// Meaning of one column.
@@ -296,7 +296,8 @@ impl Layout {
         let mut find =
             |layout: &mut Layout, what: String, column: &str, kind: SlotKind, scale: f64| {
                 let Some(i) = layout.names.iter().position(|name| name == column) else {
-                    let nearest = nearest_word(column, layout.names.iter().map(String::as_str)).map(str::to_owned);
+                    let nearest = nearest_word(column, layout.names.iter().map(String::as_str))
+                        .map(str::to_owned);
                     return Err(Problem::MissingColumn {
                         what,
                         column: column.to_string(),
@@ -408,7 +409,8 @@ impl Layout {
                         .ok_or_else(|| Problem::MissingColumn {
                             what: what.clone(),
                             column: w.clone(),
-                            nearest: nearest_word(w, self.names.iter().map(String::as_str)).map(str::to_owned),
+                            nearest: nearest_word(w, self.names.iter().map(String::as_str))
+                                .map(str::to_owned),
                         })?;
                     Rotation::Quaternion([x, y, z, self.slot(i, SlotKind::Tracker, 1.0)])
                 }
@@ -450,7 +452,8 @@ impl Layout {
                     .ok_or_else(|| Problem::MissingColumn {
                         what: "the long table".to_string(),
                         column: column.to_string(),
-                        nearest: nearest_word(column, layout.names.iter().map(String::as_str)).map(str::to_owned),
+                        nearest: nearest_word(column, layout.names.iter().map(String::as_str))
+                            .map(str::to_owned),
                     })
             };
             let (name, frame) = (column(self, &long.name)?, column(self, &long.frame)?);
@@ -475,7 +478,8 @@ impl Layout {
                 .ok_or_else(|| Problem::MissingColumn {
                     what: "a label".to_string(),
                     column: label.clone(),
-                    nearest: nearest_word(label, self.names.iter().map(String::as_str)).map(str::to_owned),
+                    nearest: nearest_word(label, self.names.iter().map(String::as_str))
+                        .map(str::to_owned),
                 })?;
             self.columns[i] = Column::Label(self.labels.len());
             self.labels.push(label.clone());
@@ -714,7 +718,9 @@ fn nearest_rule(name: &str) -> Option<String> {
         .chain(&LABELS)
         .copied()
         .chain(["t_s", "t_ms", "host_s", "marker", "body", "x_m", "x_mm"]);
-    nearest_word(name, fixed).map(str::to_owned).or_else(|| Some(format!("{name}_rad")))
+    nearest_word(name, fixed)
+        .map(str::to_owned)
+        .or_else(|| Some(format!("{name}_rad")))
 }
 
 /// Whether a header line reads as one of our own tables (for the detection of formats).

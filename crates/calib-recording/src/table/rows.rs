@@ -3,12 +3,12 @@
 use super::header::{BodyPlan, Column, Layout, Rotation, SlotKind};
 use crate::column_map::{ColumnMap, Delimiter};
 use crate::error::{At, Placed, Problem, excerpt};
-use calib_finding::{Fact, Finding, Subject, catalog};
 use crate::growth::push;
 use crate::model::{
     BodyStream, JointStream, MarkerSample, MarkerStream, Meta, Recording, Timeline, TorqueStream,
 };
 use crate::text::{Lines, Number, Separator, cells, not_a_number, number};
+use calib_finding::{Fact, Finding, Subject, catalog};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -58,9 +58,9 @@ pub(crate) fn read_table(input: impl BufRead, map: Option<&ColumnMap>) -> Placed
         return Err((At::Line(lines.number()), Problem::NoRows));
     }
     let mut recording = rows.finish()?;
-    recording.meta.findings.extend(cut.map(|line| {
-        Finding::new(catalog::ROW_CUT_OFF, Subject::default()).at_rows([line])
-    }));
+    recording.meta.findings.extend(
+        cut.map(|line| Finding::new(catalog::ROW_CUT_OFF, Subject::default()).at_rows([line])),
+    );
     recording.meta.comments = comments;
     Ok(recording)
 }

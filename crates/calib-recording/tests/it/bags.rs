@@ -1,6 +1,7 @@
 //! ROS 2 bags made here: messages in CDR, containers MCAP (plain, LZ4, Zstandard) and SQLite.
 
 use crate::fixtures::read;
+use calib_finding::{Subject, catalog};
 use calib_recording::{ReadOptions, read_bytes};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::io::Write;
@@ -507,7 +508,7 @@ fn a_bag_is_read_from_every_container() {
             .meta
             .findings
             .iter()
-            .any(|f| f.id == "not-unit-rotation" && f.subject == "b")
+            .any(|f| f.id == catalog::NOT_UNIT_ROTATION && f.subject == Subject::body("b"))
     );
     assert!(
         reference

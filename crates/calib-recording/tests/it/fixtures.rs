@@ -183,7 +183,7 @@ fn qualisys_3d_and_6d() {
             .meta
             .findings
             .iter()
-            .any(|f| f.id == "all-zero-triplet" && f.rows == [2])
+            .any(|f| f.id == calib_finding::catalog::ALL_ZERO_TRIPLET && f.rows == [2])
     );
     assert_eq!(
         recording.timelines[0].t.as_deref(),
@@ -276,7 +276,7 @@ fn trc_with_tabs_and_with_commas() {
                 .meta
                 .findings
                 .iter()
-                .any(|f| f.id == "frame-count-differs")
+                .any(|f| f.id == calib_finding::catalog::FRAME_COUNT_DIFFERS)
         );
     }
 }

@@ -2,15 +2,11 @@
 
 mod bad_tables;
 mod bags;
-mod bodies;
-mod checks;
 mod fixtures;
 mod fuzz_seeds;
 mod mutations;
 mod real_formats;
 mod real_tables;
-mod recall;
-mod sync;
 mod tables;
 
 /// Property tests that are the same on every run.

@@ -135,10 +135,10 @@ fn zeros_and_nan_are_lost_with_a_finding() {
         .meta
         .findings
         .iter()
-        .map(|f| (f.id, f.subject.as_str(), f.rows.clone()))
+        .map(|f| (f.id.as_str(), f.subject.to_string(), f.rows.clone()))
         .collect();
-    assert_eq!(found[0], ("all-zero-triplet", "m", vec![2, 4]));
-    assert_eq!(found[1], ("not-a-number", "n.x_m", vec![3]));
+    assert_eq!(found[0], ("all-zero-triplet", "m".to_owned(), vec![2, 4]));
+    assert_eq!(found[1], ("not-a-number", "n.x_m".to_owned(), vec![3]));
 }
 
 #[test]

@@ -129,11 +129,11 @@ pub(super) fn data(page: &mut Page, report: &Report) {
     for finding in &report.findings {
         table.row([
             finding.severity.word().to_owned(),
-            code(&finding.id),
-            finding.subject.clone(),
+            code(finding.id.as_str()),
+            finding.subject.to_string(),
             rows(&finding.rows),
-            finding.text.clone(),
-            finding.remedy.clone(),
+            finding.text(),
+            finding.remedy(),
         ]);
     }
     page.table("Findings:", table);

@@ -1,6 +1,6 @@
 //! The words of the enums: statuses, classes, outcomes.
 
-use crate::{Class, Outcome, RecordingUse, Severity, Status, Verdict};
+use crate::{Class, Outcome, RecordingUse, Status, Verdict};
 
 impl Verdict {
     /// The word for people.
@@ -47,18 +47,6 @@ impl Status {
             Self::Measured => "measured",
             Self::Calibrated => "calibrated",
             Self::Assumed => "assumed",
-        }
-    }
-}
-
-impl Severity {
-    /// The word for people.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Info => "info",
-            Self::Warning => "warning",
-            Self::Error => "error",
         }
     }
 }

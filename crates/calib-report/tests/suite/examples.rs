@@ -3,17 +3,17 @@
 //! The arm is made up (five joints, link lengths of a small table-top robot); the numbers come from a seeded generator, so
 //! that the summaries (bins, quantiles, intervals) are consistent with each other.
 
+use calib_finding::{About, Fact, Finding, Subject, catalog};
 use calib_report::scene::{Provenance, SceneBody, SceneMarker, SceneObject, SceneRobot, Shape};
 use calib_report::view3d::{
     Axis, Circle, Cloud, Outline, Sphere, ViewFrame, ViewMarker, ViewPose, pose_row,
 };
 use calib_report::{
-    AccuracyLimit, Change, Class, Clock, ErrorStats, EstimatorResult, Finding, FitSummary, HeldOut,
-    Input, JointCoverage, JointValue, Limit, LoopClosure, LoopGroup, Lost, Method, Noise,
-    NotObservable, Outcome, Output, Parameter, PoseError, RecordingSummary, RecordingUse, Rejected,
-    Report, ResidualRow, Residuals, Scene, Severity, Stats, Status, Term, Transform, Unit,
-    Unobservable, Verdict, Verification, View3d, Workspace, WorkspacePoint, judge,
-    scene::SceneFrame,
+    AccuracyLimit, Change, Class, Clock, ErrorStats, EstimatorResult, FitSummary, HeldOut, Input,
+    JointCoverage, JointValue, Limit, LoopClosure, LoopGroup, Lost, Method, Noise, NotObservable,
+    Outcome, Output, Parameter, PoseError, RecordingSummary, RecordingUse, Rejected, Report,
+    ResidualRow, Residuals, Scene, Stats, Status, Term, Transform, Unit, Unobservable, Verdict,
+    Verification, View3d, Workspace, WorkspacePoint, judge, scene::SceneFrame,
 };
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use rand::SeedableRng;
@@ -416,8 +416,12 @@ pub fn accepted() -> Report {
             AccuracyLimit { source: "a wave over the elbow angle".into(), sigma_m: None, share: None, text: "mean residuals per bin".into(), remedy: "free the gear eccentricity of the elbow".into() },
         ],
         findings: vec![
-            Finding { id: "marker-swapped".into(), severity: Severity::Warning, subject: "gripM_1".into(), rows: vec![18], text: "The marker is 14 σ from where the body says.".into(), remedy: "The row was left out; check the labels.".into() },
-            Finding { id: "range-small".into(), severity: Severity::Info, subject: "wrist_pitch".into(), rows: vec![], text: "The joint used 80 % of its range.".into(), remedy: String::new() },
+            Finding::new(catalog::MARKER_OUTLIER, Subject::body("gripM").in_recording("arm_poses"))
+                .with("marker", Fact::name("gripM_1"))
+                .with("off", Fact::meters(0.0042))
+                .with("rows", Fact::count(1))
+                .at_rows([18]),
+            Finding::new(catalog::PAPER_ASSUMPTIONS, About::Method),
         ],
         inputs: inputs(),
         outputs: vec![
@@ -580,14 +584,10 @@ pub fn rejected() -> Report {
             rows: (3..=20).collect(),
             reason: "moving while the clocks disagree".into(),
         }],
-        findings: vec![Finding {
-            id: "joint-hardly-moved".into(),
-            severity: Severity::Error,
-            subject: "arm_7".into(),
-            rows: vec![],
-            text: "The joint moved 0.4°: excitation 1.2e-4 is under 1e-3.".into(),
-            remedy: "Record a sweep of arm_7 over at least 30°.".into(),
-        }],
+        findings: vec![
+            Finding::of_kind(catalog::JOINT_NEVER_MOVED, "still", Subject::joint("arm_7"))
+                .with("at", Fact::radians(0.007)),
+        ],
         inputs: inputs(),
         reproduce: vec!["calib run robots/justin.yaml".into()],
         version: "0.1.0".into(),

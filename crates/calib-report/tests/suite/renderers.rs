@@ -74,7 +74,7 @@ fn the_terminal_summary_fits_eighty_columns_whatever_the_names() {
             transform.name = long.clone();
         }
         for finding in &mut report.findings {
-            finding.subject = long.clone();
+            finding.subject = calib_finding::Subject::joint(long.clone());
         }
         for change in &mut report.changes {
             change.joint = long.clone();

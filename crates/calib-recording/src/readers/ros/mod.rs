@@ -13,11 +13,11 @@ mod sqlite;
 use super::common::unique_names;
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
-use calib_finding::{About, Fact, Finding, Subject, catalog};
 use crate::growth::push;
 use crate::model::{
     JointStream, JointUnit, MarkerSample, MarkerStream, Recording, Timeline, TorqueStream,
 };
+use calib_finding::{About, Fact, Finding, Subject, catalog};
 use messages::Content;
 use nalgebra::{Isometry3, Point3};
 use std::collections::BTreeMap;

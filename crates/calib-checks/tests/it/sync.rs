@@ -1,6 +1,6 @@
 //! Holds and clock offsets.
 
-use calib_recording::sync::{
+use calib_checks::sync::{
     HoldSettings, OffsetOutcome, OffsetSettings, RotationTrack, clock_offset, holds, static_poses,
 };
 use calib_recording::{JointUnit, Poses};
@@ -246,7 +246,7 @@ fn a_hold_that_drifts_is_reported() {
         table
             .findings
             .iter()
-            .filter(|f| f.id == "unsettled-rows")
+            .filter(|f| f.id == calib_finding::catalog::UNSETTLED_ROWS)
             .count()
             >= 5,
         "{:?}",

@@ -1,8 +1,8 @@
 //! Rigid bodies from markers.
 
+use calib_checks::rigid_body::{NotABody, Template, WithoutPose, body_from_markers, body_poses};
 use calib_geometry::se3;
 use calib_recording::Poses;
-use calib_recording::rigid_body::{NotABody, Template, WithoutPose, body_from_markers, body_poses};
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
