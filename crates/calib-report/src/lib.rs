@@ -50,8 +50,8 @@ pub use data::{
     RecordingUse, Rejected, Workspace, WorkspacePoint,
 };
 pub use error::ReportError;
-pub use read::{NotAReport, REPORT, read_report, report_path};
 pub use quantity::JointValue;
+pub use read::{NotAReport, REPORT, read_report, report_path};
 pub use report::{FormatVersion, Limit, Method, Outcome, Report, Verdict, judge};
 pub use residuals::{JointResiduals, ResidualBin, ResidualGroup, ResidualRow, Residuals};
 pub use results::{

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use calib_profile::{BodyKind, Profile};
 use calib_checks::rigid_body::Template;
+use calib_profile::{BodyKind, Profile};
 use calib_urdf::RobotModel;
 use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
