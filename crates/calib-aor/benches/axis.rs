@@ -2,7 +2,7 @@
 //! of 36 and 1 000, one thread.
 
 use calib_aor::{
-    Center, FrameOptions, FrameSample, Input, InputKind, Options, Pose, estimators, fit,
+    Center, FrameSample, Input, InputKind, Options, Pose, estimators, fit,
     frame_ml::{self, Residuals},
     frame_planes,
 };
@@ -54,12 +54,12 @@ fn axes(c: &mut Criterion) {
             let input = match info.input {
                 InputKind::Points => Input::Points(&markers[..1]),
                 InputKind::Markers => Input::Markers(&markers),
-                InputKind::Poses => Input::Poses(&poses),
+                _ => Input::Poses(&poses),
             };
             group.bench_function(BenchmarkId::from_parameter(info.id), |b| {
                 b.iter(|| fit(info.id, black_box(&input), &Options::default()));
             });
-            if info.input == InputKind::Poses {
+            if info.input == InputKind::OneOrTwoBodies {
                 let input = Input::TwoBodies {
                     parent: &parents,
                     child: &poses,
@@ -75,7 +75,7 @@ fn axes(c: &mut Criterion) {
 
     let joint = Isometry3::new(point, Vector3::new(0.4, -0.7, 1.1));
     let body = Isometry3::new(Vector3::new(0.0, -0.1, 0.0), Vector3::new(-0.9, 0.3, 0.5));
-    let options = FrameOptions::default();
+    let options = Options::default();
     let center = Center::Given {
         point: point.into(),
         covariance: Matrix3::identity() * 1e-8,

@@ -9,93 +9,19 @@
 //! still in the body, which sits on the distal side. `world_from_joint` at α = β = 0 is the reference configuration.
 //! [`crate::frame_planes`] is the paper's Algorithm 1, [`crate::frame_ml`] its maximum-likelihood counterpart.
 
-use calib_estimator::{Verdict, measured::Pose};
+use calib_estimator::{Estimate, FrameAxes, FrameAxis, FrameSample, Verdict};
 use calib_geometry::{Line, so3};
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, Unit, Vector3};
+use serde::Serialize;
 
-use crate::outcome::{Known, NotObservable};
+use crate::outcome::Known;
 
 /// Angle between two axes below which no frame can be built from them whatever their noise.
 const PARALLEL: f64 = 1e-6;
 
-/// One row of a frame recording.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct FrameSample {
-    /// Pose of the body in the tracker's frame; `None` where it was not seen.
-    pub world_from_body: Option<Pose>,
-    /// Angle of the proximal joint, rad.
-    pub proximal: f64,
-    /// Angle of the distal joint, rad.
-    pub distal: f64,
-    /// How many single samples it is worth: its noise variance is σ²/w. A sample of weight 0 counts as not seen.
-    pub weight: f64,
-}
-
-impl FrameSample {
-    /// The pose, where it was seen and counts.
-    pub(crate) fn seen(&self) -> Option<&Pose> {
-        self.world_from_body.as_ref().filter(|_| self.weight != 0.0)
-    }
-}
-
-/// A coordinate axis of the joint's frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Letter {
-    /// First.
-    X,
-    /// Second.
-    Y,
-    /// Third.
-    Z,
-}
-
-impl Letter {
-    pub(crate) fn index(self) -> usize {
-        match self {
-            Self::X => 0,
-            Self::Y => 1,
-            Self::Z => 2,
-        }
-    }
-
-    /// The unit vector.
-    #[must_use]
-    pub fn axis(self) -> Unit<Vector3<f64>> {
-        Unit::new_unchecked(Vector3::ith(self.index(), 1.0))
-    }
-}
-
-/// Which coordinate axis each joint turns about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FrameAxes {
-    /// The axis of the joint nearer to the base: the paper's z for the hand, pan for the head.
-    pub proximal: Letter,
-    /// The axis of the joint nearer to the body: the paper's x for the hand, tilt (y) for the head.
-    pub distal: Letter,
-}
-
-impl Default for FrameAxes {
-    fn default() -> Self {
-        Self {
-            proximal: Letter::Z,
-            distal: Letter::X,
-        }
-    }
-}
-
-impl FrameAxes {
-    /// Rot(proximal, α) · Rot(distal, β).
-    #[must_use]
-    pub fn turned(&self, proximal: f64, distal: f64) -> UnitQuaternion<f64> {
-        UnitQuaternion::from_axis_angle(&self.proximal.axis(), proximal)
-            * UnitQuaternion::from_axis_angle(&self.distal.axis(), distal)
-    }
-}
-
 /// The frame of a joint.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct FrameEstimate {
     /// Id of the estimator.
     pub estimator: &'static str,
@@ -132,73 +58,46 @@ pub struct FrameEstimate {
     pub reason: Option<String>,
 }
 
-/// Estimate, or the reason why not.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub enum FrameOutcome {
-    /// A frame with its covariance.
-    Estimate(Box<FrameEstimate>),
-    /// No frame.
-    NotObservable(NotObservable),
-}
+/// A frame with its covariance, or the reason why not.
+pub type FrameOutcome = calib_estimator::Outcome<FrameEstimate>;
 
-impl FrameOutcome {
-    /// An estimate, unless a number in it is not finite: then that is said instead.
-    pub(crate) fn estimated(e: FrameEstimate) -> Self {
+impl Estimate for FrameEstimate {
+    type Known = Known;
+
+    const NOTHING: Known = Known::Nothing;
+
+    fn estimator(&self) -> &'static str {
+        self.estimator
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.verdict
+    }
+
+    fn reason(&self) -> Option<&str> {
+        self.reason.as_deref()
+    }
+
+    fn is_finite(&self) -> bool {
         let isometry = |x: &Isometry3<f64>| x.to_homogeneous().iter().all(|v| v.is_finite());
-        let finite = isometry(&e.body_from_joint)
-            && isometry(&e.world_from_joint)
-            && e.covariance.iter().all(|v| v.is_finite())
+        isometry(&self.body_from_joint)
+            && isometry(&self.world_from_joint)
+            && self.covariance.iter().all(|v| v.is_finite())
             && [
-                e.sigma_t,
-                e.sigma_r,
-                e.rms_t,
-                e.rms_r,
-                e.orthogonality_defect,
+                self.sigma_t,
+                self.sigma_r,
+                self.rms_t,
+                self.rms_r,
+                self.orthogonality_defect,
             ]
             .iter()
-            .all(|v| v.is_finite());
-        if finite {
-            Self::Estimate(Box::new(e))
-        } else {
-            Self::NotObservable(NotObservable {
-                estimator: e.estimator,
-                verdict: Verdict::Diverged,
-                reason: "the result is beyond the range of numbers".into(),
-                known: Known::Nothing,
-            })
-        }
-    }
-
-    /// The verdict of either branch.
-    #[must_use]
-    pub fn verdict(&self) -> Verdict {
-        match self {
-            Self::Estimate(e) => e.verdict,
-            Self::NotObservable(n) => n.verdict,
-        }
-    }
-
-    /// The estimate, weak or not.
-    #[must_use]
-    pub fn estimate(&self) -> Option<&FrameEstimate> {
-        match self {
-            Self::Estimate(e) => Some(e),
-            Self::NotObservable(_) => None,
-        }
-    }
-
-    /// Why the verdict is not `ok`.
-    #[must_use]
-    pub fn reason(&self) -> Option<&str> {
-        match self {
-            Self::Estimate(e) => e.reason.as_deref(),
-            Self::NotObservable(n) => Some(&n.reason),
-        }
+            .all(|v| v.is_finite())
     }
 }
 
 /// A rotation from two measured axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct FrameFromAxes {
     /// Columns are the frame's axes: the rotation nearest to the two measured ones and their cross product.
     pub rotation: Rotation3<f64>,
@@ -212,8 +111,8 @@ pub struct FrameFromAxes {
 /// # Errors
 /// [`Verdict::Parallel`] where the axes are parallel, [`Verdict::NotUnique`] where both have the same letter.
 pub fn frame_from_axes(
-    first: (Letter, Unit<Vector3<f64>>),
-    second: (Letter, Unit<Vector3<f64>>),
+    first: (FrameAxis, Unit<Vector3<f64>>),
+    second: (FrameAxis, Unit<Vector3<f64>>),
 ) -> Result<FrameFromAxes, Verdict> {
     let (i, j) = (first.0.index(), second.0.index());
     if i == j {
@@ -267,7 +166,7 @@ pub(crate) fn residuals(
 /// Both axes in the body.
 pub(crate) fn axes_in_body(axes: FrameAxes, body_from_joint: &Isometry3<f64>) -> (Line, Line) {
     let point = Point3::from(body_from_joint.translation.vector);
-    let line = |letter: Letter| Line {
+    let line = |letter: FrameAxis| Line {
         point,
         direction: body_from_joint.rotation * letter.axis(),
     };

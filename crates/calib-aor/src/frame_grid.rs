@@ -4,14 +4,12 @@ use calib_estimator::Verdict;
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 use crate::{
-    frame::{FrameOutcome, FrameSample},
-    frame_settings::{FrameOptions, PlaneFit},
-    input::Input,
+    frame::FrameOutcome,
     line_ml,
-    options::Options,
     outcome::{Known, NotObservable, Outcome},
     planar_radial, plane,
 };
+use calib_estimator::{FrameSample, Input, Options, PlaneFit};
 
 /// Name of the estimator that works on grids.
 pub(crate) const ID: &str = "algorithm1";
@@ -54,10 +52,10 @@ impl Grid {
         c: usize,
         samples: &[FrameSample],
         m: &Point3<f64>,
-        options: &FrameOptions,
+        options: &Options,
     ) -> Result<Unit<Vector3<f64>>, NotObservable> {
         if c < self.around_proximal.len() {
-            let circles = match options.fit {
+            let circles = match options.plane_fit {
                 PlaneFit::CommonLine => &self.around_proximal[..],
                 _ => &self.around_proximal[c..=c],
             };
@@ -69,13 +67,13 @@ impl Grid {
     }
 
     /// True when a change of `row` changes the axis of circle c.
-    pub fn depends(&self, c: usize, row: usize, options: &FrameOptions) -> bool {
-        let common = options.fit == PlaneFit::CommonLine && c < self.around_proximal.len();
+    pub fn depends(&self, c: usize, row: usize, options: &Options) -> bool {
+        let common = options.plane_fit == PlaneFit::CommonLine && c < self.around_proximal.len();
         self.rows(c).contains(&row)
             || (common && self.around_proximal.iter().any(|rows| rows.contains(&row)))
     }
 
-    pub fn of(samples: &[FrameSample], options: &FrameOptions) -> Result<Self, FrameOutcome> {
+    pub fn of(samples: &[FrameSample], options: &Options) -> Result<Self, FrameOutcome> {
         let around_proximal = planes(samples, options.same_angle, |s| (s.distal, s.proximal));
         let around_distal = planes(samples, options.same_angle, |s| (s.proximal, s.distal));
         let seen = samples.iter().filter(|s| s.seen().is_some()).count();
@@ -143,7 +141,7 @@ fn circle_axis(
     circles: &[Vec<usize>],
     swept: impl Fn(&FrameSample) -> f64,
     m: &Point3<f64>,
-    options: &FrameOptions,
+    options: &Options,
 ) -> Result<Unit<Vector3<f64>>, NotObservable> {
     // Every circle in its own rows of one table, so that the angles pair up.
     let rows: usize = circles.iter().map(Vec::len).sum();
@@ -158,7 +156,7 @@ fn circle_axis(
         }
     }
     let fit_options = Options {
-        center: (options.fit != PlaneFit::CommonLine).then_some(*m),
+        center: (options.plane_fit != PlaneFit::CommonLine).then_some(*m),
         angles,
         weights,
         // The mean over all planes is judged, not each plane.
@@ -167,7 +165,7 @@ fn circle_axis(
         ..Options::default()
     };
     let input = Input::Points(&tracks);
-    let outcome = match options.fit {
+    let outcome = match options.plane_fit {
         PlaneFit::PlanarRadial => planar_radial::gauss_newton(&input, &fit_options),
         PlaneFit::Plane => plane::fit(&input, &fit_options),
         PlaneFit::CommonLine => line_ml::line(&input, &fit_options),

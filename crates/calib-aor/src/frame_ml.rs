@@ -26,10 +26,11 @@ use nalgebra::{
 };
 
 use crate::{
-    frame::{FrameAxes, FrameEstimate, FrameOutcome, FrameSample, axes_in_body, residuals},
-    frame_settings::{FrameOptions, check, judge},
-    outcome::{AorError, Known, NotObservable},
+    frame::{FrameEstimate, FrameOutcome, axes_in_body, residuals},
+    frame_settings::{check, judge},
+    outcome::{Known, NotObservable},
 };
+use calib_estimator::{EstimatorError, FrameAxes, FrameSample, Input, InputKind, Options};
 
 const ID: &str = "frame_ml";
 const MAX_STEPS: usize = 100;
@@ -52,15 +53,26 @@ pub enum Residuals {
     Points,
 }
 
+/// The maximum-likelihood frame on [`Input::TwoJoints`].
+///
+/// # Errors
+/// As [`fit`]; also for another kind of data.
+pub fn by_poses(input: &Input<'_>, options: &Options) -> Result<FrameOutcome, EstimatorError> {
+    let Input::TwoJoints { samples, .. } = *input else {
+        return Err(input.wrong(InputKind::TwoJoints));
+    };
+    fit(samples, Residuals::Poses, options)
+}
+
 /// The maximum-likelihood frame.
 ///
 /// # Errors
-/// [`AorError`] for poses that are no rotations, numbers that are not finite, or unusable options.
+/// [`EstimatorError`] for poses that are no rotations, numbers that are not finite, or unusable options.
 pub fn fit(
     samples: &[FrameSample],
     which: Residuals,
-    options: &FrameOptions,
-) -> Result<FrameOutcome, AorError> {
+    options: &Options,
+) -> Result<FrameOutcome, EstimatorError> {
     check(samples, options)?;
     let none = |verdict, reason: String| {
         Ok(FrameOutcome::NotObservable(NotObservable {
@@ -210,7 +222,7 @@ pub fn fit(
         options,
     );
     let (proximal_in_body, distal_in_body) = axes_in_body(options.axes, &body_from_joint);
-    Ok(FrameOutcome::estimated(FrameEstimate {
+    Ok(FrameOutcome::Estimate(Box::new(FrameEstimate {
         estimator: ID,
         body_from_joint,
         covariance,
@@ -228,6 +240,7 @@ pub fn fit(
         verdict,
         reason,
     }))
+    .checked())
 }
 
 fn range(samples: &[FrameSample], angle: impl Fn(&FrameSample) -> f64) -> f64 {

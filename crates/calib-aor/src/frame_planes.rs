@@ -25,13 +25,13 @@ use nalgebra::{
 
 pub use crate::frame_settings::{hand_axes, head_axes};
 use crate::{
-    frame::{
-        FrameAxes, FrameEstimate, FrameOutcome, FrameSample, axes_in_body, frame_from_axes,
-        residuals,
-    },
+    frame::{FrameEstimate, FrameOutcome, axes_in_body, frame_from_axes, residuals},
     frame_grid::{Grid, ID, nearest_to_axes, none},
-    frame_settings::{FrameOptions, PlaneFit, check, judge},
-    outcome::{AorError, NotObservable},
+    frame_settings::{check, judge},
+    outcome::NotObservable,
+};
+use calib_estimator::{
+    EstimatorError, FrameAxes, FrameSample, Input, InputKind, Options, PlaneFit, Rule,
 };
 
 /// A center-of-rotation estimator of the caller, over the body's poses in the tracker's frame.
@@ -53,21 +53,34 @@ pub enum Center<'a> {
     NearestToAxes,
 }
 
+/// Algorithm 1 on [`Input::TwoJoints`].
+///
+/// # Errors
+/// As [`algorithm1`]; also for another kind of data.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<FrameOutcome, EstimatorError> {
+    let Input::TwoJoints { samples, center } = *input else {
+        return Err(input.wrong(InputKind::TwoJoints));
+    };
+    let center = center.map_or(Center::NearestToAxes, |by| Center::From(by.0));
+    algorithm1(samples, center, options)
+}
+
 /// Algorithm 1 on `samples`.
 ///
 /// # Errors
-/// [`AorError`] for poses that are no rotations, numbers that are not finite, or unusable options.
+/// [`EstimatorError`] for poses that are no rotations, numbers that are not finite, or unusable options.
 pub fn algorithm1(
     samples: &[FrameSample],
     center: Center<'_>,
-    options: &FrameOptions,
-) -> Result<FrameOutcome, AorError> {
+    options: &Options,
+) -> Result<FrameOutcome, EstimatorError> {
     check(samples, options)?;
     if let Center::Given { point, covariance } = &center
         && !point.iter().chain(covariance.iter()).all(|x| x.is_finite())
     {
-        return Err(AorError::BadOption {
+        return Err(EstimatorError::BadOption {
             name: "center",
+            rule: Rule::Finite,
             value: f64::NAN,
         });
     }
@@ -107,7 +120,7 @@ pub fn algorithm1(
         (sigma_t, sigma_r),
         options,
     );
-    Ok(FrameOutcome::estimated(FrameEstimate {
+    Ok(FrameOutcome::Estimate(Box::new(FrameEstimate {
         estimator: ID,
         body_from_joint: fitted.body_from_joint,
         covariance,
@@ -125,6 +138,7 @@ pub fn algorithm1(
         verdict,
         reason,
     }))
+    .checked())
 }
 
 /// The result with the intermediate steps that the covariance starts from.
@@ -140,7 +154,7 @@ impl Base {
         samples: &[FrameSample],
         grid: &Grid,
         center: &Center<'_>,
-        options: &FrameOptions,
+        options: &Options,
     ) -> Result<Self, NotObservable> {
         let center = center_of(samples, grid, center)?;
         let normals = normals_of(samples, grid, &center, options)?;
@@ -157,12 +171,12 @@ impl Base {
         &self,
         samples: &[FrameSample],
         grid: &Grid,
-        options: &FrameOptions,
+        options: &Options,
         step: f64,
     ) -> Vec<Matrix3<f64>> {
         let mut slopes = vec![Matrix3::zeros(); grid.circles()];
         // Only the paper's cost holds the center; and exact data have no noise to spread.
-        if options.fit != PlaneFit::PlanarRadial || step <= 0.0 {
+        if options.plane_fit != PlaneFit::PlanarRadial || step <= 0.0 {
             return slopes;
         }
         for axis in 0..3 {
@@ -218,7 +232,7 @@ fn normals_of(
     samples: &[FrameSample],
     grid: &Grid,
     m: &Point3<f64>,
-    options: &FrameOptions,
+    options: &Options,
 ) -> Result<Vec<Unit<Vector3<f64>>>, NotObservable> {
     (0..grid.circles())
         .map(|c| grid.normal_of(c, samples, m, options))
@@ -231,7 +245,7 @@ fn assemble(
     grid: &Grid,
     m: &Point3<f64>,
     normals: &[Unit<Vector3<f64>>],
-    options: &FrameOptions,
+    options: &Options,
 ) -> Result<Fitted, NotObservable> {
     let (around_proximal, around_distal) = normals.split_at(grid.around_proximal.len());
     let proximal = mean_axis(around_proximal).map_err(|why| none(Verdict::NotUnique, why))?;
@@ -300,7 +314,7 @@ fn propagate(
     samples: &[FrameSample],
     grid: &Grid,
     center: &Center<'_>,
-    options: &FrameOptions,
+    options: &Options,
     base: &Base,
     (sigma_t, sigma_r): (f64, f64),
 ) -> Matrix6<f64> {

@@ -3,113 +3,46 @@
 use calib_estimator::{Verdict, measured::RowWeights};
 use nalgebra::Matrix6;
 
-use crate::{
-    frame::{FrameAxes, FrameSample, Letter},
-    options::Options,
-    outcome::AorError,
-};
+use calib_estimator::{EstimatorError, FrameAxes, FrameAxis, FrameSample, Options, Rule};
 
-/// How each plane's axis is fitted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PlaneFit {
-    /// Planar and radial cost with the center held: the paper's.
-    PlanarRadial,
-    /// The plane's normal.
-    Plane,
-    /// One line for all circles around the proximal axis, which does not move; orthogonal-distance circles around
-    /// the distal one.
-    CommonLine,
-}
-
-/// Settings of Algorithm 1.
-#[derive(Debug, Clone, Copy)]
-pub struct FrameOptions {
-    /// Which coordinate axes the joints turn about.
-    pub axes: FrameAxes,
-    /// How each plane's axis is fitted.
-    pub fit: PlaneFit,
-    /// Angles closer than this count as the same grid line, rad. 0.01 (0.6°): above encoder noise,
-    /// below any sensible grid step.
-    pub same_angle: f64,
-    /// Position noise where the tracker states it.
-    pub sigma_t: Option<f64>,
-    /// Orientation noise where the tracker states it, rad.
-    pub sigma_r: Option<f64>,
-    /// σ of a rotation above which the verdict is `weak`, rad.
-    pub weak_angle: f64,
-    /// σ of the origin, as a part of its distance from the body, above which the verdict is `weak`.
-    pub weak_fraction: f64,
-}
-
-impl Default for FrameOptions {
-    fn default() -> Self {
-        Self {
-            axes: FrameAxes::default(),
-            fit: PlaneFit::PlanarRadial,
-            same_angle: 0.01,
-            sigma_t: None,
-            sigma_r: None,
-            weak_angle: Options::default().weak_angle,
-            weak_fraction: 0.1,
-        }
-    }
-}
-
-/// Letters of the paper's hand: z proximal, x distal.
+/// Axes of the paper's hand: z proximal, x distal.
 #[must_use]
 pub fn hand_axes() -> FrameAxes {
     FrameAxes {
-        proximal: Letter::Z,
-        distal: Letter::X,
+        proximal: FrameAxis::Z,
+        distal: FrameAxis::X,
     }
 }
 
-/// Letters of the paper's head: z (pan) proximal, y (tilt) distal.
+/// Axes of the paper's head: z (pan) proximal, y (tilt) distal.
 #[must_use]
 pub fn head_axes() -> FrameAxes {
     FrameAxes {
-        proximal: Letter::Z,
-        distal: Letter::Y,
+        proximal: FrameAxis::Z,
+        distal: FrameAxis::Y,
     }
 }
 
 /// # Errors
-/// [`AorError`] for poses that are no rotations, numbers that are not finite, or unusable options.
-pub(crate) fn check(samples: &[FrameSample], options: &FrameOptions) -> Result<(), AorError> {
-    for (name, value) in [
-        ("sigma_t", options.sigma_t),
-        ("sigma_r", options.sigma_r),
-        ("same_angle", Some(options.same_angle)),
-        ("weak_angle", Some(options.weak_angle)),
-        ("weak_fraction", Some(options.weak_fraction)),
-    ] {
-        if let Some(value) = value
-            && !(value.is_finite() && value > 0.0)
-        {
-            return Err(AorError::BadOption { name, value });
-        }
-    }
-    if options.axes.proximal == options.axes.distal {
-        let value = options.axes.distal.index() as f64;
-        return Err(AorError::BadOption {
-            name: "axes (both joints turn about the same letter)",
-            value,
-        });
-    }
+/// [`EstimatorError`] for poses that are no rotations, numbers that are not finite, or unusable options.
+pub(crate) fn check(samples: &[FrameSample], options: &Options) -> Result<(), EstimatorError> {
+    options.check()?;
     for (row, sample) in samples.iter().enumerate() {
         if let Some(value) = [sample.proximal, sample.distal]
             .into_iter()
             .find(|angle| !angle.is_finite())
         {
-            return Err(AorError::BadOption {
+            return Err(EstimatorError::BadOption {
                 name: "joint angle",
+                rule: Rule::Finite,
                 value,
             });
         }
         RowWeights(&[sample.weight])
             .check(1)
-            .map_err(|_| AorError::BadOption {
+            .map_err(|_| EstimatorError::BadOption {
                 name: "weight of a sample",
+                rule: Rule::Weight,
                 value: sample.weight,
             })?;
         if let Some(pose) = sample.seen() {
@@ -125,7 +58,7 @@ pub(crate) fn judge(
     reach: f64,
     (rms_t, rms_r): (f64, f64),
     (sigma_t, sigma_r): (f64, f64),
-    options: &FrameOptions,
+    options: &Options,
 ) -> (Verdict, Option<String>) {
     /// Residuals this many times the stated noise are not noise.
     const MISFIT: f64 = 5.0;

@@ -15,17 +15,16 @@ use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3};
 use crate::{
     axis_frame::AxisFrame,
     circles::{Axis, Free, information, linearize, minimize_line, placed, spread_out},
-    input::{Input, cloud_of},
     judge::{Candidate, inverse_or_zero, judge, prepare},
-    options::Options,
-    outcome::{AorError, Outcome},
+    outcome::Outcome,
 };
+use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 
 /// Halvorsen's line with the pairs of [`Options::separation`].
 ///
 /// # Errors
-/// [`AorError`] for data that are no numbers or of another kind.
-pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+/// [`EstimatorError`] for data that are no numbers or of another kind.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let cloud = cloud_of(input, options)?;
     let factor = match prepare("halvorsen_line", &cloud) {

@@ -22,12 +22,11 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Rotation3, SMatrix, Vector2, 
 use crate::{
     axis_frame::AxisFrame,
     circles::{Axis, Free, minimize_line, spread_out},
-    input::{Input, InputKind, cloud_of},
     judge::{Candidate, judge, prepare},
-    options::Options,
-    outcome::{AorError, Known, Outcome},
+    outcome::{Known, Outcome},
     plane, straight,
 };
+use calib_estimator::{EstimatorError, Input, InputKind, Options, cloud_of};
 
 const MAX_STEPS: usize = 200;
 /// Distance of the markers from their middle, across the axis and in units of the noise, from which their relative motion
@@ -37,15 +36,12 @@ const SEEN_APART: f64 = 5.0;
 /// The bundle on markers of one rigid body.
 ///
 /// # Errors
-/// [`AorError`] for data that are not finite, another kind of data, or angles of another length.
-pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+/// [`EstimatorError`] for data that are not finite, another kind of data, or angles of another length.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     const ID: &str = "hinge_bundle";
     options.check()?;
     if !matches!(input, Input::Markers(_)) {
-        return Err(AorError::WrongInput {
-            expects: InputKind::Markers,
-            got: input.word(),
-        });
+        return Err(input.wrong(InputKind::Markers));
     }
     let cloud = cloud_of(input, options)?;
     let factor = match prepare(ID, &cloud) {
@@ -131,10 +127,10 @@ pub(crate) struct Normal {
 }
 
 impl Bundle {
-    fn of(cloud: &Cloud, angles: &[f64], size: f64) -> Result<Self, AorError> {
+    fn of(cloud: &Cloud, angles: &[f64], size: f64) -> Result<Self, EstimatorError> {
         let rows = cloud.labels.iter().map(|l| l.1 + 1).max().unwrap_or(0);
         if !angles.is_empty() && angles.len() < rows {
-            return Err(AorError::Data(
+            return Err(EstimatorError::Data(
                 calib_estimator::measured::DataError::Lengths {
                     what: "joint angles and frames",
                     left: angles.len(),

@@ -25,12 +25,11 @@ use nalgebra::{
 
 use crate::{
     axis_frame::AxisFrame,
-    input::Input,
     judge::weak_direction,
-    options::Options,
-    outcome::{AorError, AorEstimate, Known, Outcome},
+    outcome::{AorEstimate, Known, Outcome},
     shared_axis,
 };
+use calib_estimator::{EstimatorError, Input, Options};
 
 const ID: &str = "hinge_poses";
 /// Levenberg–Marquardt steps; from SARA's axis a handful suffice.
@@ -46,8 +45,8 @@ type SixByNine = SMatrix<f64, 6, 9>;
 /// Axis of one body's poses, or between two bodies.
 ///
 /// # Errors
-/// [`AorError`] for tables of different length, matrices that are no rotations, or another kind of data.
-pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+/// [`EstimatorError`] for tables of different length, matrices that are no rotations, or another kind of data.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     let outcome = shared_axis::run(ID, input, options)?;
     let Outcome::Estimate(start) = outcome else {
         return Ok(outcome);

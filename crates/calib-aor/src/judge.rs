@@ -20,9 +20,9 @@ use nalgebra::{Matrix2, Matrix3, Matrix6, Point3, Unit, Vector3};
 use crate::{
     axis_frame::{arc_covered, sign},
     circles::Axis,
-    options::Options,
     outcome::{AorEstimate, Circle, Known, Outcome},
 };
+use calib_estimator::Options;
 
 /// Samples, factor and rank; `Err` carries the answer where there is no plane.
 pub(crate) fn prepare(estimator: &'static str, cloud: &Cloud) -> Result<Factor, Outcome> {

@@ -25,7 +25,7 @@
 //! let estimate = outcome.estimate().expect("a quarter circle determines its axis");
 //! assert!(estimate.line.direction.cross(&Vector3::z()).norm() < 1e-9);
 //! assert!((estimate.circles[0].center - Point3::new(1.0, 2.0, 0.5)).norm() < 1e-9);
-//! # Ok::<(), calib_aor::AorError>(())
+//! # Ok::<(), calib_aor::EstimatorError>(())
 //! ```
 //!
 //! "The data cannot answer" is a result ([`Outcome::NotObservable`]) with a verdict and a reason in numbers. What this does
@@ -42,10 +42,8 @@ mod frame_settings;
 pub mod halvorsen;
 pub mod hinge_bundle;
 pub mod hinge_poses;
-mod input;
 mod judge;
 pub mod line_ml;
-mod options;
 mod outcome;
 pub mod planar_radial;
 pub mod plane;
@@ -54,12 +52,13 @@ pub mod shared_axis;
 mod straight;
 
 pub use calib_estimator::measured::{DataError, Pose, Tracks};
-pub use frame::{
-    FrameAxes, FrameEstimate, FrameFromAxes, FrameOutcome, FrameSample, Letter, frame_from_axes,
+pub use calib_estimator::{
+    EstimatorError, FrameAxes, FrameAxis, FrameSample, Input, InputKind, OptionId, Options,
+    PlaneFit, Verdict,
 };
+pub use frame::{FrameEstimate, FrameFromAxes, FrameOutcome, frame_from_axes};
 pub use frame_planes::{Center, CenterOf};
-pub use frame_settings::{FrameOptions, PlaneFit};
-pub use input::{Input, InputKind};
-pub use options::Options;
-pub use outcome::{AorError, AorEstimate, Circle, Known, NotObservable, Outcome};
-pub use registry::{EstimatorInfo, FRAME_ESTIMATORS, Fit, estimator, estimators, fit};
+pub use outcome::{AorEstimate, Circle, Known, NotObservable, Outcome};
+pub use registry::{
+    EstimatorInfo, FrameInfo, estimator, estimators, fit, frame_estimator, frame_estimators,
+};

@@ -21,18 +21,17 @@ use crate::{
         Axis, Centers, Free, Normal, OwnCenters, flat_center, information, information_of_marker,
         minimize_line, placed, spread_out,
     },
-    input::{Input, cloud_of},
     judge::{Candidate, OwnCenter, inverse_or_zero, judge, prepare},
-    options::Options,
-    outcome::{AorError, Known, Outcome},
+    outcome::{Known, Outcome},
     plane,
 };
+use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 
 /// A common line for all markers.
 ///
 /// # Errors
-/// [`AorError`] for data that are no numbers or of another kind.
-pub fn line(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+/// [`EstimatorError`] for data that are no numbers or of another kind.
+pub fn line(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("line_ml", input, options, common_line)
 }
 
@@ -40,7 +39,7 @@ pub fn line(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
 ///
 /// # Errors
 /// As [`line()`].
-pub fn direction(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+pub fn direction(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("dir_ml", input, options, own_centers)
 }
 
@@ -48,7 +47,7 @@ pub fn direction(input: &Input<'_>, options: &Options) -> Result<Outcome, AorErr
 ///
 /// # Errors
 /// As [`line()`].
-pub fn circle(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+pub fn circle(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("circle_ml", input, options, |id, cloud, factor| {
         if cloud.markers() == 1 {
             common_line(id, cloud, factor)
@@ -63,7 +62,7 @@ fn run(
     input: &Input<'_>,
     options: &Options,
     solve: impl Fn(&'static str, &Cloud, &Factor) -> Option<Candidate>,
-) -> Result<Outcome, AorError> {
+) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let cloud = cloud_of(input, options)?;
     let factor = match prepare(estimator, &cloud) {

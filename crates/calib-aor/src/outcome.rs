@@ -1,57 +1,13 @@
 //! What an estimator answers: an axis with its uncertainty, or why there is none.
 
-use calib_estimator::{Verdict, measured::DataError};
+use calib_estimator::{Estimate, Verdict};
 use calib_geometry::Line;
 use nalgebra::{Matrix6, Point3, Unit, Vector3};
 use serde::Serialize;
 
-use crate::input::InputKind;
-
-/// Input that no estimator can read.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum AorError {
-    /// No estimator of this name.
-    #[error("unknown estimator `{id}`, expected one of {}", known.join(", "))]
-    Unknown {
-        /// The name asked for.
-        id: String,
-        /// The names there are.
-        known: Vec<&'static str>,
-    },
-    /// The estimator needs another kind of data.
-    #[error("this estimator needs {expects:?}, got {got}")]
-    WrongInput {
-        /// What it needs.
-        expects: InputKind,
-        /// What was given.
-        got: &'static str,
-    },
-    /// Samples that cannot be read.
-    #[error(transparent)]
-    Data(#[from] DataError),
-    /// An option that is not a usable number.
-    #[error("option {name} must be a (positive) number, got {value}")]
-    BadOption {
-        /// Its name.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-    },
-}
-
-impl AorError {
-    /// The verdict word that belongs to this error, for those that describe data.
-    #[must_use]
-    pub fn verdict(&self) -> Option<Verdict> {
-        match self {
-            Self::Data(error) => error.verdict(),
-            _ => None,
-        }
-    }
-}
-
 /// The circle of one marker around the axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Circle {
     /// Its center `m + τ n` (paper Eqs. 14, 15).
     pub center: Point3<f64>,
@@ -63,6 +19,7 @@ pub struct Circle {
 
 /// An axis of rotation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct AorEstimate {
     /// Id of the estimator.
     pub estimator: &'static str,
@@ -92,7 +49,23 @@ pub struct AorEstimate {
     pub reason: Option<String>,
 }
 
-impl AorEstimate {
+impl Estimate for AorEstimate {
+    type Known = Known;
+
+    const NOTHING: Known = Known::Nothing;
+
+    fn estimator(&self) -> &'static str {
+        self.estimator
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.verdict
+    }
+
+    fn reason(&self) -> Option<&str> {
+        self.reason.as_deref()
+    }
+
     fn is_finite(&self) -> bool {
         let line = |l: &Line| {
             l.point
@@ -114,6 +87,7 @@ impl AorEstimate {
 
 /// What is known although the axis is not.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub enum Known {
     /// The points lie on this line; any axis perpendicular to it fits.
     Chord(Line),
@@ -123,86 +97,8 @@ pub enum Known {
     Nothing,
 }
 
-/// The data cannot say where the axis is.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct NotObservable {
-    /// Id of the estimator.
-    pub estimator: &'static str,
-    /// The kind of degeneracy.
-    pub verdict: Verdict,
-    /// The reason, with numbers.
-    pub reason: String,
-    /// What the data do determine.
-    pub known: Known,
-}
+/// The data cannot say where the axis or the frame is.
+pub type NotObservable = calib_estimator::NotObservable<Known>;
 
-/// Estimate, or the reason why not.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub enum Outcome {
-    /// An axis with its covariance; look at its verdict for `weak`.
-    Estimate(Box<AorEstimate>),
-    /// No axis.
-    NotObservable(NotObservable),
-}
-
-impl Outcome {
-    /// The verdict of either branch.
-    #[must_use]
-    pub fn verdict(&self) -> Verdict {
-        match self {
-            Self::Estimate(e) => e.verdict,
-            Self::NotObservable(n) => n.verdict,
-        }
-    }
-
-    /// True when an axis is determined (`ok`); false for `weak` and all degeneracies.
-    #[must_use]
-    pub fn is_observable(&self) -> bool {
-        self.verdict() == Verdict::Ok
-    }
-
-    /// The estimate, weak or not.
-    #[must_use]
-    pub fn estimate(&self) -> Option<&AorEstimate> {
-        match self {
-            Self::Estimate(e) => Some(e),
-            Self::NotObservable(_) => None,
-        }
-    }
-
-    /// Why the verdict is not `ok`.
-    #[must_use]
-    pub fn reason(&self) -> Option<&str> {
-        match self {
-            Self::Estimate(e) => e.reason.as_deref(),
-            Self::NotObservable(n) => Some(&n.reason),
-        }
-    }
-
-    /// The outcome itself, unless a number in it is not finite: then it says so.
-    pub(crate) fn checked(self) -> Self {
-        match self {
-            Self::Estimate(e) if !e.is_finite() => Self::none(
-                e.estimator,
-                Verdict::Diverged,
-                "the result is beyond the range of numbers".into(),
-                Known::Nothing,
-            ),
-            outcome => outcome,
-        }
-    }
-
-    pub(crate) fn none(
-        estimator: &'static str,
-        verdict: Verdict,
-        reason: String,
-        known: Known,
-    ) -> Self {
-        Self::NotObservable(NotObservable {
-            estimator,
-            verdict,
-            reason,
-            known,
-        })
-    }
-}
+/// An axis with its covariance, or the reason why not.
+pub type Outcome = calib_estimator::Outcome<AorEstimate>;

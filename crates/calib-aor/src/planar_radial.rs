@@ -18,12 +18,11 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix4};
 
 use crate::{
     circles::{Axis, Free, information, linearize, minimize_line, spread_out},
-    input::{Input, cloud_of},
     judge::{Candidate, inverse_or_zero, judge, prepare},
-    options::Options,
-    outcome::{AorError, Known, Outcome},
+    outcome::{Known, Outcome},
     plane,
 };
+use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 
 /// Walks of the simplex: each starts afresh around the last end, which frees it from a collapsed shape.
 const WALKS: usize = 6;
@@ -37,8 +36,8 @@ const STEPS: u64 = 2000;
 /// By downhill simplex, center held ([`Options::center`]) or free.
 ///
 /// # Errors
-/// [`AorError`] for data that are no numbers or of another kind.
-pub fn simplex(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+/// [`EstimatorError`] for data that are no numbers or of another kind.
+pub fn simplex(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("planar_radial", input, options, walk)
 }
 
@@ -46,7 +45,7 @@ pub fn simplex(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError
 ///
 /// # Errors
 /// As [`simplex`].
-pub fn gauss_newton(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+pub fn gauss_newton(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run(
         "planar_radial_gn",
         input,
@@ -60,7 +59,7 @@ fn run(
     input: &Input<'_>,
     options: &Options,
     solve: impl Fn(&Cloud, Axis, Free, f64) -> Option<Axis>,
-) -> Result<Outcome, AorError> {
+) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let cloud = cloud_of(input, options)?;
     let factor = match prepare(estimator, &cloud) {

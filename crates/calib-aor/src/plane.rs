@@ -14,17 +14,16 @@ use nalgebra::{Matrix2, Matrix4};
 use crate::{
     axis_frame::AxisFrame,
     circles::{Axis, flat_center, information, linearize, placed, spread_out},
-    input::{Input, cloud_of},
     judge::{Candidate, inverse_or_zero, judge, prepare},
-    options::Options,
-    outcome::{AorError, Outcome},
+    outcome::Outcome,
 };
+use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 
 /// The plane fit on all markers of `input`.
 ///
 /// # Errors
-/// [`AorError`] for data that are no numbers or of another kind.
-pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+/// [`EstimatorError`] for data that are no numbers or of another kind.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let cloud = cloud_of(input, options)?;
     let factor = match prepare("plane", &cloud) {

@@ -1,42 +1,64 @@
 //! All estimators in one table: what each needs and how to call it by name.
 
-use serde::Serialize;
-
 use crate::{
-    halvorsen, hinge_bundle, hinge_poses,
-    input::{Input, InputKind},
-    line_ml,
-    options::Options,
-    outcome::{AorError, Outcome},
+    frame::FrameEstimate,
+    frame_ml, frame_planes, halvorsen, hinge_bundle, hinge_poses, line_ml,
+    outcome::{AorEstimate, Outcome},
     planar_radial, plane, shared_axis,
 };
+use calib_estimator::{
+    AxisFit, EstimatorError, FrameFit, Input, InputKind, Kind, OptionId,
+    OptionId::{
+        Angles, Axes, Center, PlaneFit, SameAngle, Separation, SigmaR, SigmaT, Significance,
+        Towards, WeakAngle, WeakFraction, Weights,
+    },
+    Options, find,
+};
 
-/// The entry point all axis estimators share.
-pub type Fit = fn(&Input<'_>, &Options) -> Result<Outcome, AorError>;
+/// One estimator of an axis.
+pub type EstimatorInfo = calib_estimator::EstimatorInfo<AorEstimate>;
 
-/// One estimator.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct EstimatorInfo {
-    /// Name in profiles and on the command line.
-    pub id: &'static str,
-    /// Its full name.
-    pub name: &'static str,
-    /// The data it needs.
-    pub input: InputKind,
-    /// What it does, in a line.
-    pub summary: &'static str,
-    /// Where it was published.
-    pub source: &'static str,
-    /// The function.
-    #[serde(skip)]
-    pub fit: Fit,
-}
+/// What every estimator on circles uses.
+const COMMON: &[OptionId] = &[SigmaT, Weights, Angles, Towards, Significance, WeakAngle];
+/// Circles with a center that may be held.
+const CENTERED: &[OptionId] = &[
+    SigmaT,
+    Weights,
+    Center,
+    Angles,
+    Towards,
+    Significance,
+    WeakAngle,
+];
+/// Pairs of samples.
+const PAIRS: &[OptionId] = &[
+    SigmaT,
+    Weights,
+    Angles,
+    Towards,
+    Separation,
+    Significance,
+    WeakAngle,
+];
+/// Linear estimators on poses: only the orientation noise enters their test.
+const ROTATIONS: &[OptionId] = &[SigmaR, Weights, Angles, Towards, Significance, WeakAngle];
+/// Poses, errors in variables.
+const POSES: &[OptionId] = &[
+    SigmaT,
+    SigmaR,
+    Weights,
+    Angles,
+    Towards,
+    Significance,
+    WeakAngle,
+];
 
 const TABLE: &[EstimatorInfo] = &[
     EstimatorInfo {
         id: "plane",
         name: "plane fit",
         input: InputKind::Points,
+        options: CENTERED,
         summary: "normal of the best plane, circle center in it: the two-step baseline",
         source: "Gamage & Lasenby 2002; Cerveri et al. 2005",
         fit: plane::fit,
@@ -45,6 +67,7 @@ const TABLE: &[EstimatorInfo] = &[
         id: "planar_radial",
         name: "planar and radial cost, downhill simplex",
         input: InputKind::Points,
+        options: CENTERED,
         summary: "the paper's AoR; center held where given, else free",
         source: "Chang & Pollard 2007; paper §4",
         fit: planar_radial::simplex,
@@ -53,6 +76,7 @@ const TABLE: &[EstimatorInfo] = &[
         id: "planar_radial_gn",
         name: "planar and radial cost, Gauss–Newton",
         input: InputKind::Points,
+        options: CENTERED,
         summary: "the same minimum in a few steps",
         source: "paper §4",
         fit: planar_radial::gauss_newton,
@@ -61,6 +85,7 @@ const TABLE: &[EstimatorInfo] = &[
         id: "circle_ml",
         name: "orthogonal-distance circle",
         input: InputKind::Points,
+        options: COMMON,
         summary: "maximum likelihood circle in space; several markers share the direction",
         source: "Gander, Golub & Strebel 1994, in space",
         fit: line_ml::circle,
@@ -69,6 +94,7 @@ const TABLE: &[EstimatorInfo] = &[
         id: "dir_ml",
         name: "common direction",
         input: InputKind::Points,
+        options: COMMON,
         summary: "several markers, one direction, own centers",
         source: "orthogonal-distance circles, see the book",
         fit: line_ml::direction,
@@ -77,6 +103,7 @@ const TABLE: &[EstimatorInfo] = &[
         id: "line_ml",
         name: "common line",
         input: InputKind::Points,
+        options: COMMON,
         summary: "several markers around one line",
         source: "orthogonal-distance circles, see the book",
         fit: line_ml::line,
@@ -85,6 +112,7 @@ const TABLE: &[EstimatorInfo] = &[
         id: "hinge_bundle",
         name: "markers of a rigid body on a hinge, jointly",
         input: InputKind::Markers,
+        options: COMMON,
         summary: "axis, marker layout and all joint angles at once; markers may be occluded",
         source: "joint likelihood, see the book",
         fit: hinge_bundle::fit,
@@ -92,7 +120,8 @@ const TABLE: &[EstimatorInfo] = &[
     EstimatorInfo {
         id: "sara",
         name: "symmetrical axis of rotation",
-        input: InputKind::Poses,
+        input: InputKind::OneOrTwoBodies,
+        options: ROTATIONS,
         summary: "axis that stands still in one or two moving bodies",
         source: "Ehrig et al. 2007 (SARA)",
         fit: shared_axis::sara,
@@ -100,7 +129,8 @@ const TABLE: &[EstimatorInfo] = &[
     EstimatorInfo {
         id: "rotation_axis",
         name: "axis of the rotations",
-        input: InputKind::Poses,
+        input: InputKind::OneOrTwoBodies,
+        options: ROTATIONS,
         summary: "direction from orientations alone",
         source: "top singular pair of the mean rotation",
         fit: shared_axis::rotation_axis,
@@ -108,7 +138,8 @@ const TABLE: &[EstimatorInfo] = &[
     EstimatorInfo {
         id: "hinge_poses",
         name: "axis of poses, errors in variables",
-        input: InputKind::Poses,
+        input: InputKind::OneOrTwoBodies,
+        options: POSES,
         summary: "weighs orientations against positions, of one or two moving bodies",
         source: "joint likelihood, see the book",
         fit: hinge_poses::fit,
@@ -117,14 +148,14 @@ const TABLE: &[EstimatorInfo] = &[
         id: "halvorsen_line",
         name: "line of the displacements",
         input: InputKind::Points,
+        options: PAIRS,
         summary: "bisecting planes of pairs of samples",
         source: "Halvorsen et al. 1999",
         fit: halvorsen::fit,
     },
 ];
 
-/// All axis estimators, the paper's first. The frame has its own functions:
-/// [`crate::frame_planes::algorithm1`] and [`crate::frame_ml::fit`].
+/// All axis estimators, the paper's first. Those of a frame are in [`frame_estimators`].
 #[must_use]
 pub fn estimators() -> &'static [EstimatorInfo] {
     TABLE
@@ -133,40 +164,92 @@ pub fn estimators() -> &'static [EstimatorInfo] {
 /// The estimator called `id`.
 ///
 /// # Errors
-/// [`AorError::Unknown`] with the names there are.
-pub fn estimator(id: &str) -> Result<&'static EstimatorInfo, AorError> {
-    TABLE
-        .iter()
-        .find(|e| e.id == id)
-        .ok_or_else(|| AorError::Unknown {
-            id: id.to_string(),
-            known: TABLE.iter().map(|e| e.id).collect(),
-        })
+/// [`EstimatorError::Unknown`] with the names of the table.
+pub fn estimator(id: &str) -> Result<&'static EstimatorInfo, EstimatorError> {
+    find(Kind::Axis, TABLE, id)
 }
 
-/// Runs the estimator called `id`.
+/// Runs the estimator called `id`. Options that it does not use say what is known of the recording and are left aside;
+/// [`calib_estimator::EstimatorInfo::run`] refuses them.
 ///
 /// # Errors
-/// [`AorError`] for an unknown name, data of another kind, or data that are no numbers.
-pub fn fit(id: &str, input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+/// [`EstimatorError`] for an unknown name, data of another kind, or data that are not finite.
+pub fn fit(id: &str, input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     let info = estimator(id)?;
     if !input.serves(info.input) {
-        return Err(AorError::WrongInput {
-            expects: info.input,
-            got: input.word(),
-        });
+        return Err(input.wrong(info.input));
     }
     Ok((info.fit)(input, options)?.checked())
 }
 
-/// Ids of the frame estimators, for lists that show all.
-pub const FRAME_ESTIMATORS: [(&str, &str); 2] = [
-    (
-        "algorithm1",
-        "circles around both axes, axes turned back by the joint angles; the paper's Algorithm 1",
-    ),
-    (
-        "frame_ml",
-        "all poses and joint angles at once by maximum likelihood",
-    ),
+/// One estimator of a frame.
+pub type FrameInfo = calib_estimator::EstimatorInfo<FrameEstimate>;
+
+const FRAMES: &[FrameInfo] = &[
+    FrameInfo {
+        id: "algorithm1",
+        name: "circles around both axes",
+        input: InputKind::TwoJoints,
+        options: &[
+            SigmaT,
+            SigmaR,
+            Axes,
+            PlaneFit,
+            SameAngle,
+            WeakAngle,
+            WeakFraction,
+        ],
+        summary: "circles around both axes, axes rotated back by the joint angles; the paper's Algorithm 1",
+        source: "Chang & Pollard 2007; paper §4, Algorithm 1",
+        fit: frame_planes::fit,
+    },
+    FrameInfo {
+        id: "frame_ml",
+        name: "both axes by maximum likelihood",
+        input: InputKind::TwoJoints,
+        options: &[
+            SigmaT,
+            SigmaR,
+            Axes,
+            PlaneFit,
+            SameAngle,
+            WeakAngle,
+            WeakFraction,
+        ],
+        summary: "all poses and joint angles at once by maximum likelihood",
+        source: "joint likelihood, see the book",
+        fit: frame_ml::by_poses,
+    },
 ];
+
+/// All frame estimators, the paper's first.
+#[must_use]
+pub fn frame_estimators() -> &'static [FrameInfo] {
+    FRAMES
+}
+
+/// The frame estimator called `id`.
+///
+/// # Errors
+/// [`EstimatorError::Unknown`] with the names of the table.
+pub fn frame_estimator(id: &str) -> Result<&'static FrameInfo, EstimatorError> {
+    find(Kind::Frame, FRAMES, id)
+}
+
+impl From<AorEstimate> for AxisFit {
+    fn from(e: AorEstimate) -> Self {
+        Self {
+            line: e.line,
+            covariance: Some(e.covariance),
+        }
+    }
+}
+
+impl From<FrameEstimate> for FrameFit {
+    fn from(e: FrameEstimate) -> Self {
+        Self {
+            body_from_joint: e.body_from_joint,
+            covariance: Some(e.covariance),
+        }
+    }
+}

@@ -19,11 +19,10 @@ use nalgebra::{Matrix3, Matrix6, Point3, Unit, Vector3};
 
 use crate::{
     axis_frame::sign,
-    input::{Input, InputKind},
     judge::weak_direction,
-    options::Options,
-    outcome::{AorError, AorEstimate, Known, Outcome},
+    outcome::{AorEstimate, Known, Outcome},
 };
+use calib_estimator::{EstimatorError, Input, InputKind, Options};
 
 /// λ_min / λ_mid of the rotations' spread above which no axis stands out: a hinge's noise stays far below,
 /// a ball's directions differ by less.
@@ -33,8 +32,8 @@ const STANDS_OUT: f64 = 0.25;
 /// axis. [`crate::hinge_poses`] lets them turn it too.
 ///
 /// # Errors
-/// [`AorError`] for tables of different length, matrices that are no rotations, or another kind of data.
-pub fn sara(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+/// [`EstimatorError`] for tables of different length, matrices that are no rotations, or another kind of data.
+pub fn sara(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("sara", input, options)
 }
 
@@ -43,7 +42,7 @@ pub fn sara(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
 ///
 /// # Errors
 /// As [`sara`].
-pub fn rotation_axis(input: &Input<'_>, options: &Options) -> Result<Outcome, AorError> {
+pub fn rotation_axis(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("rotation_axis", input, options)
 }
 
@@ -51,7 +50,7 @@ pub(crate) fn run(
     estimator: &'static str,
     input: &Input<'_>,
     options: &Options,
-) -> Result<Outcome, AorError> {
+) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let relative = parent_from_child(input)?;
     let weights = RowWeights(&options.weights);
@@ -221,12 +220,12 @@ pub(crate) fn run(
 }
 
 /// The child's poses in the parent, row by row.
-pub(crate) fn parent_from_child(input: &Input<'_>) -> Result<Vec<Option<Pose>>, AorError> {
+pub(crate) fn parent_from_child(input: &Input<'_>) -> Result<Vec<Option<Pose>>, EstimatorError> {
     match *input {
         Input::Poses(poses) => Ok(poses.to_vec()),
         Input::TwoBodies { parent, child } => {
             if parent.len() != child.len() {
-                return Err(AorError::Data(DataError::Lengths {
+                return Err(EstimatorError::Data(DataError::Lengths {
                     what: "poses of the two bodies",
                     left: parent.len(),
                     right: child.len(),
@@ -249,10 +248,7 @@ pub(crate) fn parent_from_child(input: &Input<'_>) -> Result<Vec<Option<Pose>>, 
                 })
                 .collect()
         }
-        _ => Err(AorError::WrongInput {
-            expects: InputKind::Poses,
-            got: input.word(),
-        }),
+        _ => Err(input.wrong(InputKind::OneOrTwoBodies)),
     }
 }
 

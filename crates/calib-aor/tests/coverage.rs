@@ -72,7 +72,7 @@ fn study(trials: u64) {
     const MEAN: f64 = 2.65;
     const BEYOND: f64 = 0.045;
     for info in estimators() {
-        let scenes: &[(usize, f64, f64, f64)] = if info.input == InputKind::Poses {
+        let scenes: &[(usize, f64, f64, f64)] = if info.input == InputKind::OneOrTwoBodies {
             &[
                 (0, 180.0, 1.0, 1.0),
                 (0, 60.0, 0.2, 1.0),

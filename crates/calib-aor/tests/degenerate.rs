@@ -3,8 +3,7 @@
 mod common;
 
 use calib_aor::{
-    Center, FrameOptions, FrameSample, Input, InputKind, Known, Options, Outcome, Pose, estimators,
-    fit,
+    Center, FrameSample, Input, InputKind, Known, Options, Outcome, Pose, estimators, fit,
     frame_ml::{self, Residuals},
     frame_planes,
 };
@@ -16,7 +15,7 @@ fn track(points: impl IntoIterator<Item = [f64; 3]>) -> Track {
     points.into_iter().map(|p| Some(Point3::from(p))).collect()
 }
 
-fn word(outcome: Result<Outcome, calib_aor::AorError>) -> &'static str {
+fn word(outcome: Result<Outcome, calib_aor::EstimatorError>) -> &'static str {
     match outcome {
         Ok(outcome) => outcome.verdict().as_str(),
         Err(error) => error.verdict().map_or("error", Verdict::as_str),
@@ -204,11 +203,11 @@ fn wrong_kinds_names_and_options_are_errors() {
     let text = |id: &str, options: &Options| fit(id, &input, options).expect_err(id).to_string();
     assert_eq!(
         text("sara", &Options::default()),
-        "this estimator needs Poses, got points"
+        "this estimator needs poses of one or two bodies, got points"
     );
     assert!(
         text("hinge", &Options::default())
-            .starts_with("unknown estimator `hinge`, expected one of plane, planar_radial")
+            .starts_with("unknown axis estimator `hinge`, expected one of plane, planar_radial")
     );
     let bad = Options {
         sigma_t: Some(f64::NAN),
@@ -216,7 +215,7 @@ fn wrong_kinds_names_and_options_are_errors() {
     };
     assert_eq!(
         text("plane", &bad),
-        "option sigma_t must be a (positive) number, got NaN"
+        "option sigma_t must be a finite number > 0, got NaN"
     );
     let short = Options {
         angles: vec![0.0],
@@ -232,7 +231,7 @@ fn wrong_kinds_names_and_options_are_errors() {
 // ---- frames --------------------------------------------------------------------------------------------
 
 fn frame_words(samples: &[FrameSample]) -> [&'static str; 2] {
-    let options = FrameOptions::default();
+    let options = Options::default();
     let planes = frame_planes::algorithm1(samples, Center::NearestToAxes, &options);
     let ml = frame_ml::fit(samples, Residuals::Poses, &options);
     [planes, ml].map(|outcome| match outcome {
@@ -269,8 +268,7 @@ fn recordings_that_have_no_frame() {
         ["too_few", "ok"],
         "scattered samples"
     );
-    let planes =
-        frame_planes::algorithm1(&scattered, Center::NearestToAxes, &FrameOptions::default());
+    let planes = frame_planes::algorithm1(&scattered, Center::NearestToAxes, &Options::default());
     let reason = planes
         .expect("poses")
         .reason()
@@ -368,8 +366,7 @@ fn parallel_axes_are_named() {
         point: hinge.point,
         covariance: Matrix3::zeros(),
     };
-    let outcome =
-        frame_planes::algorithm1(&samples, center, &FrameOptions::default()).expect("poses");
+    let outcome = frame_planes::algorithm1(&samples, center, &Options::default()).expect("poses");
     assert_eq!(
         outcome.verdict(),
         Verdict::Parallel,

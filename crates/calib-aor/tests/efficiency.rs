@@ -4,7 +4,7 @@
 mod common;
 
 use calib_aor::{
-    Center, FrameEstimate, FrameOptions, Input, Options, Pose, bounds, fit,
+    Center, FrameEstimate, Input, Options, Pose, bounds, fit,
     frame_ml::{self, Residuals},
     frame_planes,
 };
@@ -234,7 +234,7 @@ fn linear_center(poses: &[Option<Pose>]) -> Option<Point3<f64>> {
 }
 
 fn frame_study(trials: u64) {
-    let options = FrameOptions::default();
+    let options = Options::default();
     let joint = Joint::hand();
     let mut angles = Vec::new();
     for p in steps(-45.0, 135.0, 6) {

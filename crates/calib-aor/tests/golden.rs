@@ -3,8 +3,8 @@
 //! Read from `CALIB_GOLDEN` (a folder) or `../shared/golden` beside the workspace; never written here.
 
 use calib_aor::{
-    AorEstimate, Center, FrameOptions, FrameOutcome, FrameSample, Input, Letter, Options, Outcome,
-    PlaneFit, Pose, fit, frame_from_axes, frame_ml, frame_planes,
+    AorEstimate, Center, FrameAxis, FrameOutcome, FrameSample, Input, Options, Outcome, PlaneFit,
+    Pose, fit, frame_from_axes, frame_ml, frame_planes,
 };
 use calib_estimator::Verdict;
 use calib_geometry::{mean, so3};
@@ -318,9 +318,9 @@ fn frames() {
             ("line_derot", PlaneFit::CommonLine),
         ] {
             let want = &case["expect"][name];
-            let options = FrameOptions {
-                fit: plane_fit,
-                ..FrameOptions::default()
+            let options = Options {
+                plane_fit: plane_fit,
+                ..Options::default()
             };
             let center = Center::Given {
                 point: Point3::from(vector(&want["t"])),
@@ -344,10 +344,10 @@ fn frames() {
                 "{name}: orthogonality defect off by {off:e}"
             );
         }
-        let options = FrameOptions {
+        let options = Options {
             sigma_t: case["input"]["s_t"].as_f64(),
             sigma_r: case["input"]["s_r"].as_f64(),
-            ..FrameOptions::default()
+            ..Options::default()
         };
         for (name, which) in [
             ("bundle_points", frame_ml::Residuals::Points),
@@ -386,7 +386,7 @@ fn frames() {
 fn frames_of_two_axes() {
     for case in cases("frame_axes") {
         let (x, z) = (unit(&case["input"]["x"]), unit(&case["input"]["z"]));
-        let got = frame_from_axes((Letter::X, x), (Letter::Z, z));
+        let got = frame_from_axes((FrameAxis::X, x), (FrameAxis::Z, z));
         if case["expect"]["verdict"] == "parallel" {
             assert_eq!(got, Err(Verdict::Parallel), "{}", case["id"]);
             continue;
@@ -398,7 +398,7 @@ fn frames_of_two_axes() {
             case["id"]
         );
         // The order of the two axes does not matter.
-        let swapped = frame_from_axes((Letter::Z, z), (Letter::X, x)).expect("a frame");
+        let swapped = frame_from_axes((FrameAxis::Z, z), (FrameAxis::X, x)).expect("a frame");
         assert!(
             (swapped.rotation.matrix() - got.expect("a frame").rotation.matrix()).amax() < 1e-14
         );

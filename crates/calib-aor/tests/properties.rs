@@ -3,8 +3,8 @@
 mod common;
 
 use calib_aor::{
-    AorEstimate, Center, FrameEstimate, FrameOptions, FrameSample, Input, InputKind, Options, Pose,
-    estimators, fit,
+    AorEstimate, Center, FrameEstimate, FrameSample, Input, InputKind, Options, Pose, estimators,
+    fit,
     frame_ml::{self, Residuals},
     frame_planes,
 };
@@ -51,7 +51,7 @@ prop_compose! {
 
 fn run(scene: &Scene, id: &str, kind: InputKind, options: &Options) -> AorEstimate {
     let input = match kind {
-        InputKind::Poses => Input::Poses(&scene.child),
+        InputKind::OneOrTwoBodies => Input::Poses(&scene.child),
         _ => Input::Markers(&scene.markers),
     };
     fit(id, &input, options)
@@ -250,7 +250,7 @@ proptest! {
         }
         let samples: Vec<FrameSample> = poses.iter().enumerate().map(|(k, p)| FrameSample {
             world_from_body: *p, proximal: (k % 3) as f64, distal: (k / 3) as f64, weight: 1.0 }).collect();
-        let options = FrameOptions { sigma_t: sigma, ..FrameOptions::default() };
+        let options = Options { sigma_t: sigma, ..Options::default() };
         for outcome in [
             frame_planes::algorithm1(&samples, Center::NearestToAxes, &options),
             frame_ml::fit(&samples, Residuals::Poses, &options),
@@ -269,7 +269,7 @@ proptest! {
 // ---- frames --------------------------------------------------------------------------------------------
 
 fn frames(samples: &[FrameSample], center: Point3<f64>) -> [FrameEstimate; 3] {
-    let options = FrameOptions::default();
+    let options = Options::default();
     let given = Center::Given {
         point: center,
         covariance: Matrix3::identity() * 1e-8,
@@ -363,7 +363,7 @@ fn a_center_from_the_callers_estimator() {
             .sum();
         Some(Point3::from(sum / seen.len() as f64))
     };
-    let outcome = frame_planes::algorithm1(&samples, Center::From(&mean), &FrameOptions::default())
+    let outcome = frame_planes::algorithm1(&samples, Center::From(&mean), &Options::default())
         .expect("poses");
     let e = outcome.estimate().expect("a frame");
     assert!(
@@ -373,7 +373,7 @@ fn a_center_from_the_callers_estimator() {
             .all(|v| *v > 0.0 && v.is_finite())
     );
     let none = |_: &[Option<Pose>]| None;
-    let outcome = frame_planes::algorithm1(&samples, Center::From(&none), &FrameOptions::default())
+    let outcome = frame_planes::algorithm1(&samples, Center::From(&none), &Options::default())
         .expect("poses");
     assert!(outcome.estimate().is_none());
 }

@@ -5,8 +5,8 @@ mod common;
 use calib_aor::frame_ml::{self, Residuals};
 use calib_aor::frame_planes::algorithm1;
 use calib_aor::{
-    AorEstimate, Center, EstimatorInfo, FrameOptions, FrameOutcome, FrameSample, Input, InputKind,
-    Options, Outcome, Pose, estimators, fit,
+    AorEstimate, Center, EstimatorInfo, FrameOutcome, FrameSample, Input, InputKind, Options,
+    Outcome, Pose, estimators, fit,
 };
 use common::Noise;
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -70,7 +70,7 @@ impl Recording {
 
     fn fit(&self, info: &EstimatorInfo, options: &Options) -> Outcome {
         let input = match info.input {
-            InputKind::Poses => Input::Poses(&self.poses),
+            InputKind::OneOrTwoBodies => Input::Poses(&self.poses),
             _ => Input::Markers(&self.markers),
         };
         fit(info.id, &input, options).expect(info.id)
@@ -218,7 +218,7 @@ fn weights_reach_what_the_good_rows_allow() {
 
 /// A grid of a joint with two axes, each sample with its own noise.
 fn frame_samples(weights: &[f64], noise: &mut Noise) -> Vec<FrameSample> {
-    let axes = FrameOptions::default().axes;
+    let axes = Options::default().axes;
     let world_from_joint = Isometry3::new(POINT, Vector3::new(0.4, -0.2, 0.9));
     let joint_from_body =
         Isometry3::new(Vector3::new(0.02, 0.05, 0.1), Vector3::new(0.1, 0.7, -0.3));
@@ -242,10 +242,10 @@ fn frame_samples(weights: &[f64], noise: &mut Noise) -> Vec<FrameSample> {
 }
 
 fn frame(id: &str, samples: &[FrameSample], sigma: Option<f64>) -> calib_aor::FrameEstimate {
-    let options = FrameOptions {
+    let options = Options {
         sigma_t: sigma.map(|_| SIGMA_T),
         sigma_r: sigma.map(|_| SIGMA_R),
-        ..FrameOptions::default()
+        ..Options::default()
     };
     let outcome = match id {
         "frame_ml" => frame_ml::fit(samples, Residuals::Poses, &options),
@@ -348,7 +348,7 @@ fn weights_that_are_none_are_errors() {
     let recording = Recording::of(90.0, &[1.0; 9], &mut Noise::new(6));
     for info in estimators() {
         let input = match info.input {
-            InputKind::Poses => Input::Poses(&recording.poses),
+            InputKind::OneOrTwoBodies => Input::Poses(&recording.poses),
             _ => Input::Markers(&recording.markers),
         };
         for (weights, says) in [
@@ -364,7 +364,7 @@ fn weights_that_are_none_are_errors() {
     }
     let mut samples = frame_samples(&[1.0; 36], &mut Noise::new(7));
     samples[3].weight = -1.0;
-    let error = frame_ml::fit(&samples, Residuals::Poses, &FrameOptions::default());
+    let error = frame_ml::fit(&samples, Residuals::Poses, &Options::default());
     assert!(
         error
             .expect_err("a weight below zero")

@@ -64,10 +64,10 @@ fn centers(c: &mut Criterion) {
                 InputKind::Points => Input::Points(&data.markers[..1]),
                 InputKind::Markers => Input::Markers(&data.markers),
                 InputKind::TwoBodies => Input::TwoBodies {
-                    first: &data.poses,
-                    second: &data.second,
+                    parent: &data.poses,
+                    child: &data.second,
                 },
-                InputKind::Poses | InputKind::PointsOrPoses => Input::Poses(&data.poses),
+                _ => Input::Poses(&data.poses),
             };
             group.bench_function(BenchmarkId::from_parameter(info.id), |b| {
                 b.iter(|| fit(info.id, black_box(&input), &Options::default()));

@@ -22,11 +22,10 @@ use calib_estimator::measured::Cloud;
 use nalgebra::Vector3;
 
 use crate::{
-    input::{Input, cloud_of},
-    options::Options,
-    outcome::{CorError, Outcome},
+    outcome::Outcome,
     sphere::{Candidate, judge, prepare},
 };
+use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 
 /// A member of the family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -124,8 +123,12 @@ fn multiplier(factor: &Factor, beta: f64) -> f64 {
 /// Runs a member of the family on all markers of `input`.
 ///
 /// # Errors
-/// [`CorError`] for data that are no numbers or of another kind.
-pub fn fit(member: Algebraic, input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+/// [`EstimatorError`] for data that are no numbers or of another kind.
+pub fn fit(
+    member: Algebraic,
+    input: &Input<'_>,
+    options: &Options,
+) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let estimator = match member {
         Algebraic::Kasa => "kasa",

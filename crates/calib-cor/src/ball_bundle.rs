@@ -19,12 +19,11 @@ use calib_geometry::{decompose::symmetric_eigen_small, so3};
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, UnitQuaternion, Vector3};
 
 use crate::{
-    input::{Input, InputKind, cloud_of},
-    options::Options,
-    outcome::{CorError, CorEstimate, Known, Noise, NotObservable, Outcome, Shape},
+    outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Shape},
     sphere::{Spread, leaves_its_plane, prepare},
     sphere_ml::isotropic,
 };
+use calib_estimator::{EstimatorError, Input, InputKind, Options, cloud_of};
 
 const MAX_STEPS: usize = 100;
 /// Eigenvalue of a frame's rotation block, relative to the largest, below which the frame does not see that turn.
@@ -33,15 +32,12 @@ const UNSEEN: f64 = 1e-9;
 /// The bundle on markers of one rigid body.
 ///
 /// # Errors
-/// [`CorError`] for data that are not finite, or another kind of data.
-pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+/// [`EstimatorError`] for data that are not finite, or another kind of data.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     const ID: &str = "ball_bundle";
     options.check()?;
     if !matches!(input, Input::Markers(_)) {
-        return Err(CorError::WrongInput {
-            expects: InputKind::Markers,
-            got: input.kind(),
-        });
+        return Err(input.wrong(InputKind::Markers));
     }
     let cloud = cloud_of(input, options)?;
     let factor = match prepare(ID, &cloud, false) {

@@ -15,11 +15,10 @@ use nalgebra::Vector3;
 
 use crate::{
     algebraic::{Algebraic, solve},
-    input::{Input, cloud_of},
-    options::Options,
-    outcome::{CorError, Outcome},
+    outcome::Outcome,
     sphere::{Candidate, judge, prepare},
 };
+use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 
 /// Rounds of (2) and (3); each gains a factor σ²/s₃², so well-posed data need about ten.
 const ROUNDS: usize = 200;
@@ -27,8 +26,8 @@ const ROUNDS: usize = 200;
 /// Gamage & Lasenby's linear fit.
 ///
 /// # Errors
-/// [`CorError`] for data that are no numbers or of another kind.
-pub fn gamage_lasenby(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+/// [`EstimatorError`] for data that are no numbers or of another kind.
+pub fn gamage_lasenby(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("gamage_lasenby", input, options, |cloud, factor| {
         solve(cloud, factor, Algebraic::Kasa)
     })
@@ -37,8 +36,8 @@ pub fn gamage_lasenby(input: &Input<'_>, options: &Options) -> Result<Outcome, C
 /// Halvorsen's bias-compensated fit.
 ///
 /// # Errors
-/// [`CorError`] for data that are no numbers or of another kind.
-pub fn halvorsen(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+/// [`EstimatorError`] for data that are no numbers or of another kind.
+pub fn halvorsen(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("halvorsen", input, options, |cloud, factor| {
         let (center, _) = compensate(cloud, factor);
         (center, rms_radii(cloud, &center))
@@ -50,7 +49,7 @@ fn run(
     input: &Input<'_>,
     options: &Options,
     fit: impl Fn(&Cloud, &Factor) -> (Vector3<f64>, Vec<f64>),
-) -> Result<Outcome, CorError> {
+) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let cloud = cloud_of(input, options)?;
     let equal_markers = match prepare(estimator, &cloud, true) {

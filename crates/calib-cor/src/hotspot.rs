@@ -21,11 +21,8 @@ use calib_estimator::{
 use calib_geometry::Line;
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 
-use crate::{
-    input::{Input, InputKind},
-    options::Options,
-    outcome::{CorError, CorEstimate, Known, Noise, NotObservable, Outcome, Rejected, Shape},
-};
+use crate::outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Rejected, Shape};
+use calib_estimator::{EstimatorError, Input, InputKind, Options};
 
 /// A gradient this much smaller than at the start is rounding of the sums it is made of.
 const ROUNDING: f64 = 1e-14;
@@ -103,8 +100,8 @@ impl Spread {
 /// HSE.
 ///
 /// # Errors
-/// [`CorError`] for poses that are no rotations or not finite, or another kind of data.
-pub fn hse(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+/// [`EstimatorError`] for poses that are no rotations or not finite, or another kind of data.
+pub fn hse(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     let poses = poses_of(input)?;
     linear("hse", poses, options, Vec::new(), |sums, _| {
         sums.body_point(0)
@@ -115,20 +112,17 @@ pub fn hse(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
 ///
 /// # Errors
 /// As [`hse`].
-pub fn hsa(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+pub fn hsa(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     let poses = poses_of(input)?;
     linear("hsa", poses, options, Vec::new(), |sums, poses| {
         conjugate_gradients(sums, weighed(poses, options))
     })
 }
 
-pub(crate) fn poses_of<'a>(input: &Input<'a>) -> Result<&'a [Option<Pose>], CorError> {
+pub(crate) fn poses_of<'a>(input: &Input<'a>) -> Result<&'a [Option<Pose>], EstimatorError> {
     match *input {
         Input::Poses(poses) => Ok(poses),
-        _ => Err(CorError::WrongInput {
-            expects: InputKind::Poses,
-            got: input.kind(),
-        }),
+        _ => Err(input.wrong(InputKind::Poses)),
     }
 }
 
@@ -138,7 +132,7 @@ pub(crate) fn linear(
     options: &Options,
     rejected: Vec<Rejected>,
     solve: impl Fn(&PoseSums, &[Option<Pose>]) -> Vector3<f64>,
-) -> Result<Outcome, CorError> {
+) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let sums = match prepare(estimator, poses, options)? {
         Ok(sums) => sums,
@@ -176,7 +170,7 @@ pub(crate) fn prepare(
     estimator: &'static str,
     poses: &[Option<Pose>],
     options: &Options,
-) -> Result<Result<PoseSums, Outcome>, CorError> {
+) -> Result<Result<PoseSums, Outcome>, EstimatorError> {
     let sums = PoseSums::weighted(poses, RowWeights(&options.weights))?;
     Ok(match sums.rank_verdict() {
         None => Ok(sums),

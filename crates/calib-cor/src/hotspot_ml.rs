@@ -21,10 +21,9 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::{
     hotspot::{HotSpot, Spread, finish, poses_of, prepare, single_axis, stack, weighed},
-    input::Input,
-    options::Options,
-    outcome::{CorError, Known, Noise, NotObservable, Outcome, Rejected},
+    outcome::{Known, Noise, NotObservable, Outcome, Rejected},
 };
+use calib_estimator::{EstimatorError, Input, Options};
 
 /// Levenberg–Marquardt steps; the Hessian is approximate, so some dozens at 5° of noise.
 const MAX_STEPS: usize = 200;
@@ -38,8 +37,8 @@ const EXACT: f64 = 1e-12;
 /// The maximum-likelihood hot spot; σ_t and σ_r from [`Options`] or estimated.
 ///
 /// # Errors
-/// [`CorError`] for poses that are no rotations or not finite, or another kind of data.
-pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+/// [`EstimatorError`] for poses that are no rotations or not finite, or another kind of data.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     fit_poses("hotspot_ml", poses_of(input)?, options, Vec::new())
 }
 
@@ -48,7 +47,7 @@ pub(crate) fn fit_poses(
     poses: &[Option<Pose>],
     options: &Options,
     rejected: Vec<Rejected>,
-) -> Result<Outcome, CorError> {
+) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let sums = match prepare(estimator, poses, options)? {
         Ok(sums) => sums,

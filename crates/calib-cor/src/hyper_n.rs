@@ -16,17 +16,16 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::{
     algebraic::{Algebraic, solve},
-    input::{Input, cloud_of},
-    options::Options,
-    outcome::{CorError, Outcome},
+    outcome::Outcome,
     sphere::{Candidate, judge, prepare},
 };
+use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 
 /// HyperLS on all markers of `input`.
 ///
 /// # Errors
-/// [`CorError`] for data that are no numbers or of another kind.
-pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+/// [`EstimatorError`] for data that are no numbers or of another kind.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     const ID: &str = "hyper_n";
     options.check()?;
     let cloud = cloud_of(input, options)?;

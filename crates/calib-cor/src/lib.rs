@@ -25,7 +25,7 @@
 //! let outcome = fit("sfe", &Input::Points(&marker), &Options::default())?;
 //! let estimate = outcome.estimate().expect("a cube determines its center");
 //! assert!((estimate.center - Point3::new(1.0, 2.0, 3.0)).norm() < 1e-12);
-//! # Ok::<(), calib_cor::CorError>(())
+//! # Ok::<(), calib_cor::EstimatorError>(())
 //! ```
 //!
 //! "The data cannot answer" is a result ([`Outcome::NotObservable`]) with a verdict, a reason in numbers, and what
@@ -41,8 +41,6 @@ pub mod gamage;
 pub mod hotspot;
 pub mod hotspot_ml;
 pub mod hyper_n;
-mod input;
-mod options;
 mod outcome;
 mod registry;
 pub mod robust;
@@ -54,9 +52,8 @@ pub mod sphere_eiv;
 pub mod sphere_ml;
 
 pub use calib_estimator::measured::{DataError, Pose, Tracks};
-pub use input::{Input, InputKind};
-pub use options::Options;
+pub use calib_estimator::{EstimatorError, Input, InputKind, OptionId, Options, Verdict};
 pub use outcome::{
-    CorError, CorEstimate, Known, Noise, NotObservable, Outcome, RejectReason, Rejected, Shape,
+    CorEstimate, Known, Noise, NotObservable, Outcome, RejectReason, Rejected, Shape,
 };
-pub use registry::{EstimatorInfo, Fit, estimator, estimators, fit};
+pub use registry::{EstimatorInfo, estimator, estimators, fit};

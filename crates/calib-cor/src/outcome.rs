@@ -1,58 +1,14 @@
 //! What an estimator answers: an estimate with its uncertainty, or why there is none.
 
-use calib_estimator::{Verdict, measured::DataError};
+use calib_estimator::{Estimate, Verdict};
 use calib_geometry::Line;
 use nalgebra::{Matrix3, Matrix6, Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::input::InputKind;
-
-/// Input that no estimator can read.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum CorError {
-    /// No estimator of this name.
-    #[error("unknown estimator `{id}`, expected one of {}", known.join(", "))]
-    Unknown {
-        /// The name asked for.
-        id: String,
-        /// The names there are.
-        known: Vec<&'static str>,
-    },
-    /// The estimator needs another kind of data.
-    #[error("this estimator needs {expects:?}, got {got:?}")]
-    WrongInput {
-        /// What it needs.
-        expects: InputKind,
-        /// What was given.
-        got: InputKind,
-    },
-    /// Samples that cannot be read.
-    #[error(transparent)]
-    Data(#[from] DataError),
-    /// A standard deviation that is not a positive number.
-    #[error("option {name} must be a positive number, got {value}")]
-    BadOption {
-        /// Its name.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-    },
-}
-
-impl CorError {
-    /// The verdict word that belongs to this error, for those that describe data.
-    #[must_use]
-    pub fn verdict(&self) -> Option<Verdict> {
-        match self {
-            Self::Data(error) => error.verdict(),
-            _ => None,
-        }
-    }
-}
-
 /// Why a sample was left out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum RejectReason {
     /// Its residual lies outside the gate, both in units of the noise.
     Outlier {
@@ -65,6 +21,7 @@ pub enum RejectReason {
 
 /// A sample that was left out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Rejected {
     /// Marker (0 for poses).
     pub marker: usize,
@@ -76,6 +33,7 @@ pub struct Rejected {
 
 /// Measurement noise behind a covariance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Noise {
     /// Position noise, one coordinate, in the unit of the points.
     pub sigma_t: f64,
@@ -87,6 +45,7 @@ pub struct Noise {
 
 /// What the estimator learned beside the center.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum Shape {
     /// Spheres: one radius for each marker that was seen at least twice.
     Radii {
@@ -120,6 +79,7 @@ pub enum Shape {
 /// For two bodies the center moves; [`CorEstimate::center`] is then its position in the second
 /// body's frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct CorEstimate {
     /// Id of the estimator.
     pub estimator: &'static str,
@@ -143,7 +103,23 @@ pub struct CorEstimate {
     pub reason: Option<String>,
 }
 
-impl CorEstimate {
+impl Estimate for CorEstimate {
+    type Known = Known;
+
+    const NOTHING: Known = Known::Nothing;
+
+    fn estimator(&self) -> &'static str {
+        self.estimator
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.verdict
+    }
+
+    fn reason(&self) -> Option<&str> {
+        self.reason.as_deref()
+    }
+
     fn is_finite(&self) -> bool {
         let shape = match &self.shape {
             Shape::Radii { radii, bias } => radii.iter().chain(bias).all(|x| x.is_finite()),
@@ -182,6 +158,7 @@ impl CorEstimate {
 
 /// What is known although the center is not.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum Known {
     /// Every point of this line (tracker frame) is an equally good center.
     AxisLine(Line),
@@ -197,80 +174,7 @@ pub enum Known {
 }
 
 /// The data cannot say where the center is.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct NotObservable {
-    /// Id of the estimator.
-    pub estimator: &'static str,
-    /// The kind of degeneracy.
-    pub verdict: Verdict,
-    /// The reason, with numbers.
-    pub reason: String,
-    /// What the data do determine.
-    pub known: Known,
-}
+pub type NotObservable = calib_estimator::NotObservable<Known>;
 
-/// Estimate, or the reason why not.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub enum Outcome {
-    /// A center with its covariance; look at its verdict for `weak`.
-    Estimate(Box<CorEstimate>),
-    /// No center.
-    NotObservable(NotObservable),
-}
-
-impl Outcome {
-    /// The verdict of either branch.
-    #[must_use]
-    pub fn verdict(&self) -> Verdict {
-        match self {
-            Self::Estimate(e) => e.verdict,
-            Self::NotObservable(n) => n.verdict,
-        }
-    }
-
-    /// True when a center is determined (`ok`); false for `weak` and all degeneracies.
-    #[must_use]
-    pub fn is_observable(&self) -> bool {
-        self.verdict() == Verdict::Ok
-    }
-
-    /// The estimate, weak or not.
-    #[must_use]
-    pub fn estimate(&self) -> Option<&CorEstimate> {
-        match self {
-            Self::Estimate(e) => Some(e),
-            Self::NotObservable(_) => None,
-        }
-    }
-
-    /// Why the verdict is not `ok`.
-    #[must_use]
-    pub fn reason(&self) -> Option<&str> {
-        match self {
-            Self::Estimate(e) => e.reason.as_deref(),
-            Self::NotObservable(n) => Some(&n.reason),
-        }
-    }
-
-    /// The outcome itself, unless a number in it is not finite: then it says so.
-    pub(crate) fn checked(self) -> Self {
-        match self {
-            Self::Estimate(e) if !e.is_finite() => Self::NotObservable(NotObservable {
-                estimator: e.estimator,
-                verdict: Verdict::Diverged,
-                reason: "the result is beyond the range of numbers".into(),
-                known: Known::Nothing,
-            }),
-            outcome => outcome,
-        }
-    }
-
-    pub(crate) fn too_few(estimator: &'static str, got: usize, needed: usize, of: &str) -> Self {
-        Self::NotObservable(NotObservable {
-            estimator,
-            verdict: Verdict::TooFew,
-            reason: format!("{got} {of}, at least {needed} are needed"),
-            known: Known::Nothing,
-        })
-    }
-}
+/// A center with its covariance, or the reason why not.
+pub type Outcome = calib_estimator::Outcome<CorEstimate>;

@@ -31,13 +31,12 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use crate::{
     hotspot, hotspot_ml,
-    input::{Input, cloud_of},
-    options::Options,
-    outcome::{CorError, Outcome, RejectReason, Rejected},
+    outcome::{Outcome, RejectReason, Rejected},
     seeded::Seeded,
     sphere::prepare,
     sphere_ml,
 };
+use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 
 /// Samples that score a subset; more would not rank subsets better.
 const SCORED: usize = 1000;
@@ -59,8 +58,8 @@ const EXACT: f64 = 1e-12;
 /// Robust fit: spheres for points and markers, hot spot for poses.
 ///
 /// # Errors
-/// [`CorError`] for data that are not finite, not rotations, or of another kind.
-pub fn robust(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+/// [`EstimatorError`] for data that are not finite, not rotations, or of another kind.
+pub fn robust(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     dispatch("robust", input, options, true)
 }
 
@@ -69,7 +68,7 @@ pub fn robust(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError>
 ///
 /// # Errors
 /// As [`robust`].
-pub fn consensus(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+pub fn consensus(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     dispatch("consensus", input, options, false)
 }
 
@@ -78,7 +77,7 @@ fn dispatch(
     input: &Input<'_>,
     options: &Options,
     reweight: bool,
-) -> Result<Outcome, CorError> {
+) -> Result<Outcome, EstimatorError> {
     options.check()?;
     match input {
         Input::Poses(poses) => poses_fit(estimator, poses, options, reweight),
@@ -718,7 +717,7 @@ fn points_fit(
     input: &Input<'_>,
     options: &Options,
     reweight: bool,
-) -> Result<Outcome, CorError> {
+) -> Result<Outcome, EstimatorError> {
     let cloud = cloud_of(input, options)?;
     if let Err(answer) = prepare(estimator, &cloud, false) {
         return Ok(answer);
@@ -837,7 +836,7 @@ fn poses_fit(
     poses: &[Option<Pose>],
     options: &Options,
     reweight: bool,
-) -> Result<Outcome, CorError> {
+) -> Result<Outcome, EstimatorError> {
     if let Err(answer) = hotspot::prepare(estimator, poses, options)? {
         return Ok(answer);
     }

@@ -14,26 +14,24 @@ use calib_estimator::{
 use calib_geometry::{Line, decompose::svd_small, row_qr::RowQr};
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 
-use crate::{
-    input::{Input, InputKind},
-    options::Options,
-    outcome::{CorError, CorEstimate, Known, Noise, NotObservable, Outcome, Shape},
-};
+use crate::outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Shape};
+use calib_estimator::{EstimatorError, Input, InputKind, Options};
 
 /// SCoRE on all rows where both bodies were seen.
 ///
 /// # Errors
-/// [`CorError`] for tables of different length, poses that are no rotations, or another kind of data.
-pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+/// [`EstimatorError`] for tables of different length, poses that are no rotations, or another kind of data.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     options.check()?;
-    let Input::TwoBodies { first, second } = *input else {
-        return Err(CorError::WrongInput {
-            expects: InputKind::TwoBodies,
-            got: input.kind(),
-        });
+    let Input::TwoBodies {
+        parent: first,
+        child: second,
+    } = *input
+    else {
+        return Err(input.wrong(InputKind::TwoBodies));
     };
     if first.len() != second.len() {
-        return Err(CorError::Data(DataError::Lengths {
+        return Err(EstimatorError::Data(DataError::Lengths {
             what: "poses of the two bodies",
             left: first.len(),
             right: second.len(),

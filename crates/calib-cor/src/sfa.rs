@@ -12,12 +12,11 @@ use calib_estimator::measured::Cloud;
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use crate::{
-    input::{Input, cloud_of},
-    options::Options,
-    outcome::{CorError, Outcome},
+    outcome::Outcome,
     seeded::Seeded,
     sphere::{Candidate, judge, prepare},
 };
+use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 
 /// The paper's number of starts.
 const STARTS: usize = 10;
@@ -34,8 +33,8 @@ const LAST_STEP: f64 = 1e-9;
 /// SFA on all markers of `input` (one marker as in the paper; several share a, b, c, d).
 ///
 /// # Errors
-/// [`CorError`] for data that are no numbers or of another kind.
-pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+/// [`EstimatorError`] for data that are no numbers or of another kind.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let cloud = cloud_of(input, options)?;
     let factor = match prepare("sfa", &cloud, false) {

@@ -18,10 +18,8 @@ use calib_estimator::{
 use calib_geometry::{Line, decompose::symmetric_eigen_small};
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
-use crate::{
-    options::Options,
-    outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Rejected, Shape},
-};
+use crate::outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Rejected, Shape};
+use calib_estimator::Options;
 
 /// Chance, in units of the significance, up to which a doubtful recording still gets its answer, called weak, where it has fewer than
 /// [`ENOUGH_DOF`] degrees of freedom: no test separates a sweep from a grid both ways there, so what is between the two is said to be.

@@ -34,12 +34,11 @@ use nalgebra::{Matrix3, Vector3};
 use crate::{
     algebraic::{Algebraic, solve},
     bend::Bend,
-    input::{Input, cloud_of},
-    options::Options,
-    outcome::{CorError, Outcome},
+    outcome::Outcome,
     sphere::{Candidate, judge, mean_radii, prepare},
     sphere_ml::{isotropic, weighted_radii, with_noise_per_marker},
 };
+use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 
 /// Levenberg–Marquardt steps; from an algebraic start about ten suffice.
 const MAX_STEPS: usize = 100;
@@ -49,8 +48,8 @@ const FOOT_STEPS: usize = 60;
 /// Sphere by errors in variables, with [`Options::covariances`] or [`Options::noise_per_marker`] or equal noise.
 ///
 /// # Errors
-/// [`CorError`] for data that are no numbers, covariances that are none, or another kind of data.
-pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+/// [`EstimatorError`] for data that are no numbers, covariances that are none, or another kind of data.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     const ID: &str = "sphere_eiv";
     options.check()?;
     let cloud = cloud_of(input, options)?;

@@ -17,11 +17,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::{
     algebraic::{Algebraic, solve},
-    input::{Input, cloud_of},
-    options::Options,
-    outcome::{CorError, Outcome, Rejected},
+    outcome::{Outcome, Rejected},
     sphere::{Candidate, judge, mean_radii, prepare},
 };
+use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 
 /// Levenberg–Marquardt steps; from an algebraic start four or five suffice.
 const MAX_STEPS: usize = 100;
@@ -34,8 +33,8 @@ const NOISE_ROUNDS: usize = 50;
 /// noise of their marker; otherwise all alike.
 ///
 /// # Errors
-/// [`CorError`] for data that are no numbers, covariances that are none, or another kind of data.
-pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, CorError> {
+/// [`EstimatorError`] for data that are no numbers, covariances that are none, or another kind of data.
+pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let cloud = cloud_of(input, options)?;
     Ok(fit_cloud("ml_sphere", &cloud, options, Vec::new()))

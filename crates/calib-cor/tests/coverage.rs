@@ -80,8 +80,8 @@ fn ratio(cell: &Cell, id: &str, kind: InputKind, trials: u64) -> (f64, u64) {
             InputKind::Poses => (Input::Poses(&poses), CENTER),
             InputKind::TwoBodies => (
                 Input::TwoBodies {
-                    first: &poses,
-                    second: &second,
+                    parent: &poses,
+                    child: &second,
                 },
                 place,
             ),

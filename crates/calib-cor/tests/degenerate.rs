@@ -252,11 +252,11 @@ fn wrong_kinds_names_and_options_are_errors() {
     let text = |id: &str, options: &Options| fit(id, &input, options).expect_err(id).to_string();
     assert_eq!(
         text("hse", &Options::default()),
-        "this estimator needs Poses, got Points"
+        "this estimator needs poses, got points"
     );
     assert!(
         text("pratt", &Options::default())
-            .starts_with("unknown estimator `pratt`, expected one of hse, hsa, sfe")
+            .starts_with("unknown center estimator `pratt`, expected one of hse, hsa, sfe")
     );
     let bad = Options {
         sigma_t: Some(-1.0),
@@ -264,7 +264,7 @@ fn wrong_kinds_names_and_options_are_errors() {
     };
     assert_eq!(
         text("sfe", &bad),
-        "option sigma_t must be a positive number, got -1"
+        "option sigma_t must be a finite number > 0, got -1"
     );
     let bad = Options {
         covariances: vec![vec![Matrix3::identity(); 3]],

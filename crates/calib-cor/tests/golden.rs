@@ -260,8 +260,8 @@ fn two_bodies() {
         let first = poses(&case["input"]["R"], &case["input"]["t"]);
         let second = poses(&case["input"]["S"], &case["input"]["d"]);
         let input = Input::TwoBodies {
-            first: &first,
-            second: &second,
+            parent: &first,
+            child: &second,
         };
         let outcome = fit("score", &input, &Options::default()).expect("score");
         assert_eq!(outcome.verdict().as_str(), "ok", "{}", id(&case));
@@ -341,7 +341,7 @@ fn every_estimator_says_what_it_needs() {
                 let outcome = answer.expect(info.id);
                 assert_eq!(outcome.verdict().as_str(), "too_few", "{}", info.id);
             }
-            InputKind::Markers | InputKind::TwoBodies => {
+            _ => {
                 assert!(!serves && answer.is_err(), "{}", info.id)
             }
         }

@@ -64,8 +64,8 @@ fn run(scene: &Scene, id: &str, kind: InputKind) -> CorEstimate {
     let input = match kind {
         InputKind::Poses => Input::Poses(&scene.poses),
         InputKind::TwoBodies => Input::TwoBodies {
-            first: &scene.poses,
-            second: &scene.second,
+            parent: &scene.poses,
+            child: &scene.second,
         },
         _ => Input::Markers(&scene.markers),
     };
@@ -277,7 +277,7 @@ proptest! {
         })).collect();
         let options = Options { sigma_t: sigma, subsets: 20, ..Options::default() };
         for info in estimators() {
-            let inputs = [Input::Markers(&tracks), Input::Poses(&poses), Input::TwoBodies { first: &poses, second: &poses }];
+            let inputs = [Input::Markers(&tracks), Input::Poses(&poses), Input::TwoBodies { parent: &poses, child: &poses }];
             for input in inputs.iter().filter(|i| i.serves(info.input)) {
                 if let Ok(outcome) = fit(info.id, input, &options)
                     && let Some(e) = outcome.estimate()

@@ -208,8 +208,8 @@ fn functional_knee_score() {
         &["RATT", "RLM", "RSPH", "RLEG1", "RLEG2", "RLEG3"],
     );
     let input = Input::TwoBodies {
-        first: &parent,
-        second: &child,
+        parent: &parent,
+        child: &child,
     };
     let outcome = fit("score", &input, &Options::default()).expect("score");
     let estimate = outcome.estimate().expect("a center");

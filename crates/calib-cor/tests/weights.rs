@@ -69,8 +69,8 @@ impl Recording {
         let input = match info.input {
             InputKind::Poses => Input::Poses(&self.poses),
             InputKind::TwoBodies => Input::TwoBodies {
-                first: &self.poses,
-                second: &self.second,
+                parent: &self.poses,
+                child: &self.second,
             },
             _ => Input::Markers(&self.markers),
         };
@@ -276,8 +276,8 @@ fn weights_that_are_none_are_errors() {
             (
                 "score",
                 Input::TwoBodies {
-                    first: &recording.poses,
-                    second: &recording.second,
+                    parent: &recording.poses,
+                    child: &recording.second,
                 },
             ),
         ] {

@@ -2,17 +2,13 @@
 
 use std::fmt::Write as _;
 
-use calib_aor::AorError;
-use nalgebra::Unit;
 use serde_json::json;
 
 use crate::comparison::comparison;
 use crate::error::FitError;
+use crate::road::{self, Road};
 use crate::table::Table;
-use crate::{
-    Answer, TableRequest, answer, coordinates, data, doubt, listed, matrix, not_observable,
-    unknown, usage,
-};
+use crate::{Answer, TableRequest, answer, coordinates, doubt, listed, matrix, not_observable};
 
 /// `calib fit aor`.
 ///
@@ -22,56 +18,24 @@ pub fn aor(request: &TableRequest) -> Result<Answer, FitError> {
     if request.list {
         let rows = calib_aor::estimators()
             .iter()
-            .map(|e| (e.id, format!("{:?}", e.input), e.name, e.source));
+            .map(|e| (e.id, e.input.to_string(), e.name, e.source));
         return Ok(listed(rows));
     }
     let table = Table::read(request)?;
-    if request.towards.is_some_and(|d| d.norm() == 0.0) {
-        return Err(usage(
-            "--towards 0,0,0 is no direction",
-            "name a side, like 0,0,1",
-        ));
-    }
-    let options = calib_aor::Options {
-        sigma_t: request.sigma_m,
-        sigma_r: request.sigma_rad,
-        center: request.center_m,
-        angles: table.angles.clone(),
-        weights: table.weights.clone(),
-        towards: request.towards.and_then(|d| Unit::try_new(d, 0.0)),
-        ..Default::default()
-    };
-    for (stated, flag) in [
-        (request.noise_per_marker, "--noise-per-marker"),
-        (!table.covariances.is_empty(), "the covariance of samples"),
-    ] {
-        if stated {
-            return Err(usage(
-                format!("no estimator of an axis uses {flag}"),
-                "leave it out; `calib fit cor` weighs samples",
-            ));
-        }
-    }
+    let options = road::options(request, &table)?;
     let tracks = table.tracks();
-    let run = |id: &str| -> Result<calib_aor::Outcome, AorError> {
-        let info = calib_aor::estimator(id)?;
-        match (info.input, &table.body, &table.pair) {
-            (calib_aor::InputKind::Poses, _, Some([parent, child])) => {
-                calib_aor::fit(id, &calib_aor::Input::TwoBodies { parent, child }, &options)
-            }
-            (calib_aor::InputKind::Poses, Some(poses), _) => {
-                calib_aor::fit(id, &calib_aor::Input::Poses(poses), &options)
-            }
-            _ if table.origin_only => {
-                calib_aor::fit(id, &calib_aor::Input::Points(&tracks), &options)
-            }
-            _ => calib_aor::fit(id, &calib_aor::Input::Markers(&tracks), &options),
-        }
+    let road = Road {
+        table: &table,
+        tracks: &tracks,
+        options: &options,
+        estimators: calib_aor::estimators(),
+        command: "calib fit aor",
     };
+    road.check()?;
     if request.all {
         let mut lines = Vec::new();
         for info in calib_aor::estimators() {
-            if let Ok(outcome) = run(info.id) {
+            if let Ok(outcome) = road.run_with_its_own(info) {
                 let axis = outcome
                     .estimate()
                     .map(|e| (e.line.direction.into_inner(), e.sigma_direction));
@@ -95,7 +59,9 @@ pub fn aor(request: &TableRequest) -> Result<Answer, FitError> {
         "planar_radial"
     };
     let id = request.estimator.as_deref().unwrap_or(default);
-    let outcome = run(id).map_err(|error| aor_error(&table, id, &error))?;
+    let outcome = calib_aor::estimator(id)
+        .and_then(|info| road.run(info))
+        .map_err(|e| road.refusal(id, &e))?;
     let Some(e) = outcome.estimate() else {
         return Ok(not_observable(
             id,
@@ -141,16 +107,6 @@ pub fn aor(request: &TableRequest) -> Result<Answer, FitError> {
         rejected.len()
     );
     Ok(answer(text, &value, outcome.is_observable()))
-}
-
-fn aor_error(table: &Table, id: &str, error: &AorError) -> FitError {
-    const LIST: &str = "calib fit aor";
-    match error {
-        AorError::Unknown { id, known } => unknown(id, known, LIST),
-        AorError::WrongInput { .. } => table.wrong_input(id, error, LIST),
-        AorError::BadOption { .. } => usage(error.to_string(), "correct the option"),
-        AorError::Data(_) => data(&table.file, error.to_string(), "correct or remove the row"),
-    }
 }
 
 /// The frame that an axis is given in: the tracker's, or the parent's when two bodies move.

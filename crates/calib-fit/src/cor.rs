@@ -2,21 +2,16 @@
 
 use std::fmt::Write as _;
 
-use calib_cor::{CorError, InputKind, Shape};
+use calib_cor::{CorEstimate, Shape};
 use serde_json::json;
 
 use crate::comparison::comparison;
 use crate::error::FitError;
+use crate::road::{self, Road};
 use crate::table::Table;
-use crate::{
-    Answer, TableRequest, answer, coordinates, data, doubt, listed, matrix, not_observable,
-    unknown, usage,
-};
+use crate::{Answer, TableRequest, answer, coordinates, doubt, listed, matrix, not_observable};
 
-/// The estimators that weigh samples by their covariance, or markers by a noise of their own.
-const WEIGHING: [&str; 2] = ["sphere_eiv", "ml_sphere"];
-
-/// Without a named estimator, rows that raise the residuals so many times are left out: they are no noise.
+/// Without a named estimator, rows that raise the residuals by more than this factor are rejected: they are not noise.
 const GROSS: f64 = 3.0;
 
 /// `calib fit cor`.
@@ -27,60 +22,24 @@ pub fn cor(request: &TableRequest) -> Result<Answer, FitError> {
     if request.list {
         let rows = calib_cor::estimators()
             .iter()
-            .map(|e| (e.id, format!("{:?}", e.input), e.name, e.source));
+            .map(|e| (e.id, e.input.to_string(), e.name, e.source));
         return Ok(listed(rows));
     }
     let table = Table::read(request)?;
-    let options = calib_cor::Options {
-        sigma_t: request.sigma_m,
-        sigma_r: request.sigma_rad,
-        covariances: table.covariances.clone(),
-        weights: table.weights.clone(),
-        noise_per_marker: request.noise_per_marker,
-        ..Default::default()
-    };
-    for (given, flag) in [
-        (request.joint.is_some(), "--joint"),
-        (request.center_m.is_some(), "--center-m"),
-        (request.towards.is_some(), "--towards"),
-    ] {
-        if given {
-            return Err(usage(
-                format!("{flag} is for axes"),
-                "leave it out, or ask `calib fit aor`",
-            ));
-        }
-    }
-    let weighing = request.noise_per_marker || !table.covariances.is_empty();
-    if let Some(id) = &request.estimator
-        && weighing
-        && !WEIGHING.contains(&id.as_str())
-    {
-        return Err(usage(
-            format!("`{id}` takes all samples for equally good"),
-            format!("weigh them with --estimator {}", WEIGHING.join(" or ")),
-        ));
-    }
+    let options = road::options(request, &table)?;
     let tracks = table.tracks();
-    let run = |id: &str| -> Result<calib_cor::Outcome, CorError> {
-        let info = calib_cor::estimator(id)?;
-        match (info.input, &table.body, &table.pair) {
-            (InputKind::TwoBodies, _, Some([first, second])) => {
-                calib_cor::fit(id, &calib_cor::Input::TwoBodies { first, second }, &options)
-            }
-            (InputKind::Poses | InputKind::PointsOrPoses, Some(poses), _) => {
-                calib_cor::fit(id, &calib_cor::Input::Poses(poses), &options)
-            }
-            _ if table.origin_only => {
-                calib_cor::fit(id, &calib_cor::Input::Points(&tracks), &options)
-            }
-            _ => calib_cor::fit(id, &calib_cor::Input::Markers(&tracks), &options),
-        }
+    let road = Road {
+        table: &table,
+        tracks: &tracks,
+        options: &options,
+        estimators: calib_cor::estimators(),
+        command: "calib fit cor",
     };
+    road.check()?;
     if request.all {
         let mut lines = Vec::new();
         for info in calib_cor::estimators() {
-            if let Ok(outcome) = run(info.id) {
+            if let Ok(outcome) = road.run_with_its_own(info) {
                 let point = outcome
                     .estimate()
                     .map(|e| (e.center.coords, e.covariance.trace().max(0.0).sqrt()));
@@ -94,34 +53,35 @@ pub fn cor(request: &TableRequest) -> Result<Answer, FitError> {
         }
         return Ok(comparison("center_m", &lines));
     }
-    let default = if request.estimator.is_some() {
-        ""
-    } else if weighing {
-        WEIGHING[0]
-    } else if table.pair.is_some() {
+    let id = match &request.estimator {
+        Some(id) => id.as_str(),
+        None => preferred(&road),
+    };
+    let outcome = calib_cor::estimator(id)
+        .and_then(|info| road.run(info))
+        .map_err(|e| road.refusal(id, &e))?;
+    Ok(cor_answer(&table, id, &outcome))
+}
+
+/// The estimator for a table where none was named.
+fn preferred(road: &Road<'_, CorEstimate>) -> &'static str {
+    let options = road.options;
+    if options.noise_per_marker || !options.covariances.is_empty() {
+        "sphere_eiv"
+    } else if road.table.pair.is_some() {
         "score"
-    } else if table.body.is_some() {
+    } else if road.table.body.is_some() {
         // A rigid body: pivot calibration as everybody else does it. `--all` shows the likelihood estimates beside it.
-        let rms = |id: &str| run(id).ok()?.estimate().map(|e| e.rms);
+        let rms = |id: &str| {
+            let outcome = road.run_with_its_own(calib_cor::estimator(id).ok()?).ok()?;
+            outcome.estimate().map(|e| e.rms)
+        };
         match (rms("hse"), rms("consensus")) {
             (Some(all), Some(inliers)) if GROSS * inliers < all => "consensus",
             _ => "hse",
         }
     } else {
         "sfe"
-    };
-    let id = request.estimator.as_deref().unwrap_or(default);
-    let outcome = run(id).map_err(|e| cor_error(&table, id, &e))?;
-    Ok(cor_answer(&table, id, &outcome))
-}
-
-fn cor_error(table: &Table, id: &str, error: &CorError) -> FitError {
-    const LIST: &str = "calib fit cor";
-    match error {
-        CorError::Unknown { id, known } => unknown(id, known, LIST),
-        CorError::WrongInput { .. } => table.wrong_input(id, error, LIST),
-        CorError::BadOption { .. } => usage(error.to_string(), "correct the option"),
-        _ => data(&table.file, error.to_string(), "correct or remove the row"),
     }
 }
 
@@ -191,6 +151,7 @@ fn cor_answer(table: &Table, id: &str, outcome: &calib_cor::Outcome) -> Answer {
                 mean_gap * 1e3
             );
         }
+        _ => {}
     }
     value["covariance"] = matrix(
         e.covariance

@@ -1,7 +1,8 @@
 //! `calib fit frame`.
 
-use calib_aor::{Center, FrameAxes, FrameOptions, FrameOutcome, FrameSample, Letter};
+use calib_aor::{FrameAxes, FrameAxis, FrameOutcome, FrameSample, Options};
 use calib_cor::Pose;
+use calib_estimator::{CenterBy, EstimatorError, Input};
 use calib_recording::ReadOptions;
 use serde_json::json;
 
@@ -64,39 +65,37 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
             })
         })
         .collect();
-    let options = FrameOptions {
+    let options = Options {
         axes: FrameAxes {
             proximal: proximal_letter,
             distal: distal_letter,
         },
         sigma_t: request.sigma_m,
         sigma_r: request.sigma_rad,
-        ..FrameOptions::default()
+        ..Options::default()
     };
-    let outcome = match request.estimator.as_str() {
-        "algorithm1" => {
-            let center = |poses: &[Option<Pose>]| {
-                let options = calib_cor::Options {
-                    weights: samples.iter().map(|s| s.weight).collect(),
-                    ..calib_cor::Options::default()
-                };
-                let fit = calib_cor::fit("sfe", &calib_cor::Input::Poses(poses), &options).ok()?;
-                fit.estimate().map(|e| e.center)
-            };
-            calib_aor::frame_planes::algorithm1(&samples, Center::From(&center), &options)
-        }
-        "frame_ml" => {
-            calib_aor::frame_ml::fit(&samples, calib_aor::frame_ml::Residuals::Poses, &options)
-        }
-        other => {
-            return Err(unknown(
-                other,
-                &["algorithm1", "frame_ml"],
-                "calib fit frame",
-            ));
-        }
+    let center = |poses: &[Option<Pose>]| {
+        let options = calib_cor::Options {
+            weights: samples.iter().map(|s| s.weight).collect(),
+            ..calib_cor::Options::default()
+        };
+        let fit = calib_cor::fit("sfe", &Input::Poses(poses), &options).ok()?;
+        fit.estimate().map(|e| e.center)
     };
-    let outcome = outcome.map_err(|e| data(file, e.to_string(), "correct or remove the row"))?;
+    let input = Input::TwoJoints {
+        samples: &samples,
+        center: Some(CenterBy(&center)),
+    };
+    let info = calib_aor::frame_estimator(&request.estimator).map_err(|error| match &error {
+        EstimatorError::Unknown { id, known, .. } => unknown(id, known, "calib fit frame"),
+        error => usage(error.to_string(), "correct the option"),
+    })?;
+    let outcome = info.run(&input, &options).map_err(|error| match error {
+        EstimatorError::BadOption { .. } | EstimatorError::Ignored { .. } => {
+            usage(error.to_string(), "correct the option")
+        }
+        error => data(file, error.to_string(), "correct or remove the row"),
+    })?;
     let f = match outcome {
         FrameOutcome::Estimate(f) => f,
         FrameOutcome::NotObservable(n) => {
@@ -140,7 +139,7 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
     Ok(answer(text, &value, observable))
 }
 
-fn axis_of(text: &str) -> Result<(Letter, &str), FitError> {
+fn axis_of(text: &str) -> Result<(FrameAxis, &str), FitError> {
     let wrong = || {
         usage(
             format!("`{text}` is no axis and joint"),
@@ -149,9 +148,9 @@ fn axis_of(text: &str) -> Result<(Letter, &str), FitError> {
     };
     let (letter, joint) = text.split_once('=').ok_or_else(wrong)?;
     let letter = match letter {
-        "x" => Letter::X,
-        "y" => Letter::Y,
-        "z" => Letter::Z,
+        "x" => FrameAxis::X,
+        "y" => FrameAxis::Y,
+        "z" => FrameAxis::Z,
         _ => return Err(wrong()),
     };
     Ok((letter, joint))

@@ -10,6 +10,7 @@ mod error;
 mod frame;
 mod handeye;
 mod noise;
+mod road;
 mod table;
 
 pub use aor::aor;
@@ -107,8 +108,8 @@ fn answer(text: String, value: &Value, observable: bool) -> Answer {
 }
 
 /// An estimator that there is not, with the nearest there is.
-fn unknown(id: &str, known: &[&'static str], list: &str) -> FitError {
-    let remedy = match calib_urdf::nearest::nearest(id, known.iter().copied()) {
+fn unknown(id: &str, known: &[String], list: &str) -> FitError {
+    let remedy = match calib_urdf::nearest::nearest(id, known.iter().map(String::as_str)) {
         Some(near) => format!("did you mean `{near}`? `{list} --list` shows them all"),
         None => format!("`{list} --list` shows what there is"),
     };

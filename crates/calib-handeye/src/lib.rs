@@ -42,6 +42,7 @@ mod certificate;
 mod input;
 mod moving;
 mod problem;
+mod registry;
 mod relative;
 mod start;
 
@@ -49,4 +50,10 @@ pub use input::HandEyeError;
 pub use moving::{HandEye, solve_ax_zb};
 pub use nalgebra;
 pub use problem::HandEyeWeights;
+pub use registry::{HandEyeInfo, estimator, estimators};
 pub use relative::{relative_motions, solve_ax_xb};
+
+/// The README's example is a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

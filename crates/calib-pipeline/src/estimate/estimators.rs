@@ -203,15 +203,17 @@ impl From<PluginError> for PipelineError {
     }
 }
 
-fn shapes(input: InputKind) -> &'static [Shape] {
-    match input {
-        InputKind::Points | InputKind::PointsOrPoses => {
-            &[Shape::Points, Shape::Markers, Shape::Poses]
-        }
-        InputKind::Markers => &[Shape::Markers],
-        InputKind::Poses => &[Shape::Poses],
-        InputKind::TwoBodies => &[Shape::TwoBodies],
-    }
+fn shapes(input: InputKind) -> Vec<Shape> {
+    let shape = |kind: &InputKind| match kind {
+        InputKind::Points => Some(Shape::Points),
+        InputKind::Markers => Some(Shape::Markers),
+        InputKind::Poses => Some(Shape::Poses),
+        InputKind::TwoBodies => Some(Shape::TwoBodies),
+        _ => None,
+    };
+    let mut shapes: Vec<Shape> = input.shapes().iter().filter_map(shape).collect();
+    shapes.sort();
+    shapes
 }
 
 fn tracks(motion: &Motion<'_>) -> Vec<Vec<Option<Point3<f64>>>> {
@@ -231,7 +233,7 @@ fn poses(motion: &Motion<'_>, track: usize) -> Vec<Option<Pose>> {
 fn built_in_cor(info: &'static calib_cor::EstimatorInfo) -> Entry<dyn calib_plugin::Cor> {
     let offer = Offer::new(Kind::Cor, info.id, info.summary)
         .from_source(info.source)
-        .takes(shapes(info.input));
+        .takes(&shapes(info.input));
     Entry::built_in_cor(ByFn::new(
         offer,
         move |motion: &Motion<'_>, _: &Call<'_>| {
@@ -248,8 +250,8 @@ fn built_in_cor(info: &'static calib_cor::EstimatorInfo) -> Entry<dyn calib_plug
                 Shape::Markers => calib_cor::Input::Markers(&tracks),
                 Shape::Poses => calib_cor::Input::Poses(&first),
                 Shape::TwoBodies => calib_cor::Input::TwoBodies {
-                    first: &first,
-                    second: &second,
+                    parent: &first,
+                    child: &second,
                 },
             };
             let outcome =
@@ -274,6 +276,7 @@ fn built_in_cor(info: &'static calib_cor::EstimatorInfo) -> Entry<dyn calib_plug
                     Vec::new(),
                     vec![in_first.coords.into(), in_second.coords.into()],
                 ),
+                _ => (Vec::new(), Vec::new()),
             };
             Ok(Answer::Found(CorFit {
                 center_m: e.center.coords.into(),
@@ -292,14 +295,9 @@ fn built_in_cor(info: &'static calib_cor::EstimatorInfo) -> Entry<dyn calib_plug
 }
 
 fn built_in_aor(info: &'static calib_aor::EstimatorInfo) -> Entry<dyn calib_plugin::Aor> {
-    let takes: &[Shape] = match info.input {
-        calib_aor::InputKind::Points => &[Shape::Points, Shape::Markers, Shape::Poses],
-        calib_aor::InputKind::Markers => &[Shape::Markers],
-        calib_aor::InputKind::Poses => &[Shape::Poses, Shape::TwoBodies],
-    };
     let offer = Offer::new(Kind::Aor, info.id, info.summary)
         .from_source(info.source)
-        .takes(takes);
+        .takes(&shapes(info.input));
     Entry::built_in_aor(ByFn::new(
         offer,
         move |motion: &Motion<'_>, _: &Call<'_>| {

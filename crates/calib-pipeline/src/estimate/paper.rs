@@ -11,7 +11,7 @@
 use std::collections::BTreeMap;
 
 use calib_aor::{
-    Center, FrameAxes, FrameOptions, FrameOutcome, FrameSample, Letter, frame_planes::algorithm1,
+    Center, FrameAxes, FrameAxis, FrameOutcome, FrameSample, Options, frame_planes::algorithm1,
 };
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_geometry::{Line, Twist, se3};
@@ -341,14 +341,14 @@ impl Task<'_> {
             })
             .collect();
         let tracker = &self.inputs.robot.profile.tracker;
-        let options = FrameOptions {
+        let options = Options {
             axes: FrameAxes {
-                proximal: Letter::Z,
-                distal: Letter::X,
+                proximal: FrameAxis::Z,
+                distal: FrameAxis::X,
             },
             sigma_t: tracker.body_sigma,
             sigma_r: tracker.body_sigma_rad,
-            ..FrameOptions::default()
+            ..Options::default()
         };
         let center = Center::Given {
             point: estimate.center,

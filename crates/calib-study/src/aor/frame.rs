@@ -4,7 +4,7 @@
 //! configuration (what the paper's Algorithm 1 computes).
 
 use calib_aor::{
-    Center, FrameAxes, FrameEstimate, FrameOptions, FrameSample, Pose, bounds,
+    Center, FrameAxes, FrameEstimate, FrameSample, Options, Pose, bounds,
     frame_ml::{self, Residuals},
     frame_planes,
 };
@@ -179,7 +179,7 @@ impl Experiment for FrameScene {
     fn trial(&self, _: u64, noise: &mut Noise, tallies: &mut [Tally]) {
         let samples: Vec<FrameSample> =
             self.angles.iter().map(|a| self.sample(*a, noise)).collect();
-        let options = FrameOptions::default();
+        let options = Options::default();
         let mut places = tallies.chunks_mut(4);
 
         let poses: Vec<Option<Pose>> = samples.iter().map(|s| s.world_from_body).collect();

@@ -139,8 +139,8 @@ impl Experiment for BodiesScene {
             second.push(seen(s, center, &IN_SECOND));
         }
         let input = Input::TwoBodies {
-            first: &first,
-            second: &second,
+            parent: &first,
+            child: &second,
         };
         record(info, &input, &Options::default(), &IN_SECOND, None, tally);
     }

@@ -1,0 +1,96 @@
+//! One table of estimators for each kind.
+
+use crate::{
+    error::EstimatorError,
+    input::{Input, InputKind},
+    options::{OptionId, Options},
+    outcome::{Estimate, Outcome},
+};
+
+/// What an estimator finds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// A center of rotation.
+    Center,
+    /// An axis of rotation.
+    Axis,
+    /// The frame of a joint with two axes.
+    Frame,
+    /// The two fixed transforms between two pairs of frames.
+    HandEye,
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Center => "center",
+            Self::Axis => "axis",
+            Self::Frame => "frame",
+            Self::HandEye => "hand-eye",
+        })
+    }
+}
+
+/// The entry point of an estimator.
+pub type Fit<E> = fn(&Input<'_>, &Options) -> Result<Outcome<E>, EstimatorError>;
+
+/// One built-in estimator.
+#[derive(Debug)]
+pub struct EstimatorInfo<E: Estimate> {
+    /// Name in profiles and on the command line.
+    pub id: &'static str,
+    /// Its full name.
+    pub name: &'static str,
+    /// The data it needs.
+    pub input: InputKind,
+    /// The options it uses; any other one is refused.
+    pub options: &'static [OptionId],
+    /// What it does, in a line.
+    pub summary: &'static str,
+    /// Where it was published.
+    pub source: &'static str,
+    /// The function.
+    pub fit: Fit<E>,
+}
+
+impl<E: Estimate> EstimatorInfo<E> {
+    /// Runs it.
+    ///
+    /// # Errors
+    /// [`EstimatorError`] for data of another kind, data that are not finite, or an option that it does not use.
+    pub fn run(&self, input: &Input<'_>, options: &Options) -> Result<Outcome<E>, EstimatorError> {
+        if !input.serves(self.input) {
+            return Err(input.wrong(self.input));
+        }
+        if let Some(option) = options
+            .given()
+            .into_iter()
+            .find(|o| !self.options.contains(o))
+        {
+            return Err(EstimatorError::Ignored {
+                id: self.id.to_owned(),
+                option,
+            });
+        }
+        Ok((self.fit)(input, options)?.checked())
+    }
+}
+
+/// The estimator called `id`.
+///
+/// # Errors
+/// [`EstimatorError::Unknown`] with the names of the table.
+pub fn find<E: Estimate>(
+    kind: Kind,
+    table: &'static [EstimatorInfo<E>],
+    id: &str,
+) -> Result<&'static EstimatorInfo<E>, EstimatorError> {
+    table
+        .iter()
+        .find(|e| e.id == id)
+        .ok_or_else(|| EstimatorError::Unknown {
+            kind,
+            id: id.to_owned(),
+            known: table.iter().map(|e| e.id.to_owned()).collect(),
+        })
+}
