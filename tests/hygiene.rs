@@ -10,7 +10,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// Folders that hold nothing of ours: build output, results, version control.
+/// What holds nothing of ours: build output, results, version control (a file in a linked worktree).
 const SKIPPED: &[&str] = &["target", ".git", "results", ".calib", "node_modules"];
 
 /// Every file below the root, as (path relative to the root with `/`, absolute path), sorted.
@@ -23,10 +23,11 @@ fn files() -> Vec<(String, PathBuf)> {
                 .expect("an entry of the repository is readable")
                 .path();
             let name = path.file_name().unwrap_or_default().to_string_lossy();
+            if SKIPPED.contains(&&*name) || path.ends_with("book/book") {
+                continue;
+            }
             if path.is_dir() {
-                if !SKIPPED.contains(&&*name) && !path.ends_with("book/book") {
-                    folders.push(path);
-                }
+                folders.push(path);
             } else {
                 let relative = path.strip_prefix(root()).expect("below the root");
                 found.push((relative.to_string_lossy().replace('\\', "/"), path));

@@ -48,14 +48,12 @@ fn claim(place: &str, says: &str, unit: &str, measured: Vec<Measured>) -> Claim 
     }
 }
 
-/// A cell of the paper's hand.
+/// A cell of the paper's hand: radius and σ of positions in mm, σ of orientations in degrees.
 fn hand<'a>(
     cells: &'a [Cell],
     method: &str,
     samples: usize,
-    radius_mm: f64,
-    sigma_mm: f64,
-    turn_deg: f64,
+    [radius_mm, sigma_mm, turn_deg]: [f64; 3],
 ) -> Option<&'a Cell> {
     let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
     cells.iter().find(|c| {
@@ -90,10 +88,19 @@ fn sizes(cell: Option<&Cell>, of: &str) -> Vec<Measured> {
 }
 
 fn cor(cells: &[Cell]) -> Vec<Claim> {
+    let mut out = sphere_sizes(cells);
+    out.push(hot_spots_agree(cells));
+    out.extend(orientation_noise(cells));
+    out.push(sfa_is_unstable(cells));
+    out
+}
+
+/// Errors of SFE for the paper's numbers of poses.
+fn sphere_sizes(cells: &[Cell]) -> Vec<Claim> {
     let mut out = Vec::new();
     let mut nine = Vec::new();
     for radius in [100.0, 250.0] {
-        let cell = hand(cells, "sfe", 9, radius, 1.0, 0.0);
+        let cell = hand(cells, "sfe", 9, [radius, 1.0, 0.0]);
         nine.extend(sizes(cell, &format!(", r {radius} mm")));
     }
     out.push(claim(
@@ -104,7 +111,7 @@ fn cor(cells: &[Cell]) -> Vec<Claim> {
     ));
     let mut real = Vec::new();
     for samples in [63, 16, 9] {
-        let cell = hand(cells, "sfe", samples, 100.0, 2.5, 0.0);
+        let cell = hand(cells, "sfe", samples, [100.0, 2.5, 0.0]);
         real.extend(sizes(cell, &format!(", n = {samples}")));
     }
     out.push(claim(
@@ -117,8 +124,13 @@ fn cor(cells: &[Cell]) -> Vec<Claim> {
         "§3.3",
         "SFE: the largest error is 1 mm, 16 poses at σ = 5 mm (r 100 mm)",
         "mm",
-        sizes(hand(cells, "sfe", 16, 100.0, 5.0, 0.0), ""),
+        sizes(hand(cells, "sfe", 16, [100.0, 5.0, 0.0]), ""),
     ));
+    out
+}
+
+/// HSE against HSA.
+fn hot_spots_agree(cells: &[Cell]) -> Claim {
     let mut gaps = Vec::new();
     let poses = |method: &'static str| {
         cells
@@ -138,7 +150,7 @@ fn cor(cells: &[Cell]) -> Vec<Claim> {
             mc: None,
         })
     };
-    out.push(claim(
+    claim(
         "§3.3",
         "HSE and HSA yield almost identical results",
         "1",
@@ -152,9 +164,14 @@ fn cor(cells: &[Cell]) -> Vec<Claim> {
         .into_iter()
         .flatten()
         .collect(),
-    ));
+    )
+}
+
+/// What orientation noise does to hot spots and to spheres.
+fn orientation_noise(cells: &[Cell]) -> Vec<Claim> {
+    let mut out = Vec::new();
     let rms = |method: &str, turn: f64, radius: f64| {
-        let cell = hand(cells, method, 63, radius, 1.0, turn)?;
+        let cell = hand(cells, method, 63, [radius, 1.0, turn])?;
         Some(Measured {
             what: format!("rms {method}, {turn}°, n = 63, σ 1 mm, r {radius} mm"),
             value: cell.rms? * 1e3,
@@ -185,10 +202,15 @@ fn cor(cells: &[Cell]) -> Vec<Claim> {
             .filter_map(|turn| rms("sfe", turn, 100.0))
             .collect(),
     ));
+    out
+}
+
+/// SFA beside SFE.
+fn sfa_is_unstable(cells: &[Cell]) -> Claim {
     let mut unstable = Vec::new();
     for samples in [63, 16, 9] {
         for method in ["sfe", "sfa"] {
-            if let Some(cell) = hand(cells, method, samples, 100.0, 2.5, 0.0)
+            if let Some(cell) = hand(cells, method, samples, [100.0, 2.5, 0.0])
                 && let Some(value) = cell.rms
             {
                 unstable.push(Measured {
@@ -199,13 +221,12 @@ fn cor(cells: &[Cell]) -> Vec<Claim> {
             }
         }
     }
-    out.push(claim(
+    claim(
         "§3.3",
         "SFA is very unstable (here: on centered, scaled data)",
         "mm",
         unstable,
-    ));
-    out
+    )
 }
 
 fn aor(cells: &[Cell]) -> Vec<Claim> {

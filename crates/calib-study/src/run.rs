@@ -68,6 +68,8 @@ pub struct StudyOptions {
     pub out: Option<PathBuf>,
     /// Keep the finished scenes of an earlier run with the same settings; otherwise start over.
     pub resume: bool,
+    /// Run only the scenes whose id begins with one of these; empty: all. A part of the scenes is never saved.
+    pub only: Vec<String>,
 }
 
 impl Default for StudyOptions {
@@ -78,6 +80,7 @@ impl Default for StudyOptions {
             threads: None,
             out: None,
             resume: false,
+            only: Vec::new(),
         }
     }
 }
@@ -150,7 +153,11 @@ pub fn run(
     if options.trials == 0 {
         return Err(StudyError::NoTrials { got: 0 });
     }
-    let plan = study.plan();
+    let mut plan = study.plan();
+    if !options.only.is_empty() {
+        let id = |e: &Box<dyn Experiment>| e.scene().id();
+        plan.retain(|e| options.only.iter().any(|start| id(e).starts_with(start)));
+    }
     let state = State::open(study, options)?;
     let threads = options.threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new()

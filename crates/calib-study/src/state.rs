@@ -36,7 +36,8 @@ pub(crate) struct State {
 
 impl State {
     pub fn open(study: Study, options: &StudyOptions) -> Result<Self, StudyError> {
-        let Some(folder) = &options.out else {
+        // The file of a part of the scenes would pass for the file of all.
+        let Some(folder) = options.out.as_ref().filter(|_| options.only.is_empty()) else {
             return Ok(Self {
                 finished: BTreeMap::new(),
                 file: None,

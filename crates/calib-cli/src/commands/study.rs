@@ -71,6 +71,7 @@ fn estimators(quiet: bool, study: &StudyRun, which: Study) -> Result<ExitCode, C
         threads: study.threads,
         out: study.out.clone(),
         resume: !study.restart,
+        only: Vec::new(),
     };
     let bar = count_bar(quiet, "trials");
     let result = calib_study::run(which, &options, &|done, total| {

@@ -68,53 +68,7 @@ impl CircleScene {
         let positions: Vec<Point3<f64>> = arms.iter().map(|a| Point3::from(POINT + a)).collect();
         let free = bounds::common_line(&[positions], &truth(), scene.sigma_t_m);
         let control = inverse.map(|s| variance * s.trace() / scene.radius_m.powi(2));
-        let center_held = Options {
-            center: Some(Point3::from(POINT)),
-            ..Options::default()
-        };
-        let plain = Options::default;
-        let (methods, rows): (Vec<Method>, Vec<[Row; 2]>) = [
-            method("plane", "plane", plain(), 1, free, control),
-            method("planar_radial", "planar_radial", plain(), 10, free, control),
-            method(
-                "planar_radial_gn",
-                "planar_radial_gn",
-                plain(),
-                1,
-                free,
-                control,
-            ),
-            method(
-                "planar_radial, center held",
-                "planar_radial",
-                center_held.clone(),
-                10,
-                held,
-                control,
-            ),
-            method(
-                "planar_radial_gn, center held",
-                "planar_radial_gn",
-                center_held,
-                1,
-                held,
-                control,
-            ),
-            method("circle_ml", "circle_ml", plain(), 1, free, control),
-            method("dir_ml", "dir_ml", plain(), 1, free, control),
-            method("line_ml", "line_ml", plain(), 1, free, control),
-            method(
-                "halvorsen_line",
-                "halvorsen_line",
-                plain(),
-                1,
-                free,
-                control,
-            ),
-        ]
-        .into_iter()
-        .flatten()
-        .unzip();
+        let (methods, rows) = methods(free, held, control);
         Self {
             scene,
             arms,
@@ -123,6 +77,63 @@ impl CircleScene {
             rows: rows.into_iter().flatten().collect(),
         }
     }
+}
+
+/// The estimators of the study; the bounds with the center free and held, and the control variate's mean square.
+fn methods(
+    free: Option<Matrix6<f64>>,
+    held: Option<Matrix6<f64>>,
+    control: Option<f64>,
+) -> (Vec<Method>, Vec<[Row; 2]>) {
+    let center_held = Options {
+        center: Some(Point3::from(POINT)),
+        ..Options::default()
+    };
+    let plain = Options::default;
+    [
+        method("plane", "plane", plain(), 1, (free, control)),
+        method(
+            "planar_radial",
+            "planar_radial",
+            plain(),
+            10,
+            (free, control),
+        ),
+        method(
+            "planar_radial_gn",
+            "planar_radial_gn",
+            plain(),
+            1,
+            (free, control),
+        ),
+        method(
+            "planar_radial, center held",
+            "planar_radial",
+            center_held.clone(),
+            10,
+            (held, control),
+        ),
+        method(
+            "planar_radial_gn, center held",
+            "planar_radial_gn",
+            center_held,
+            1,
+            (held, control),
+        ),
+        method("circle_ml", "circle_ml", plain(), 1, (free, control)),
+        method("dir_ml", "dir_ml", plain(), 1, (free, control)),
+        method("line_ml", "line_ml", plain(), 1, (free, control)),
+        method(
+            "halvorsen_line",
+            "halvorsen_line",
+            plain(),
+            1,
+            (free, control),
+        ),
+    ]
+    .into_iter()
+    .flatten()
+    .unzip()
 }
 
 impl Experiment for CircleScene {

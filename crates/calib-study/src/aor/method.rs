@@ -50,8 +50,7 @@ pub(crate) fn method(
     id: &str,
     options: Options,
     every: u64,
-    bound: Option<Matrix6<f64>>,
-    control: Option<f64>,
+    (bound, control): (Option<Matrix6<f64>>, Option<f64>),
 ) -> Option<(Method, [Row; 2])> {
     let info = estimators().iter().find(|e| e.id == id)?;
     let row = |quantity, first: usize| Row {

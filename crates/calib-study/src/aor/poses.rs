@@ -34,22 +34,20 @@ impl PoseScene {
             .collect();
         let bound = hinge_poses(&truth, &axis(), &POINT, scene.sigma_t_m, scene.sigma_r_rad);
         let (methods, rows): (Vec<Method>, Vec<[Row; 2]>) = [
-            method("sara", "sara", Options::default(), 1, bound, None),
+            method("sara", "sara", Options::default(), 1, (bound, None)),
             method(
                 "rotation_axis",
                 "rotation_axis",
                 Options::default(),
                 1,
-                bound,
-                None,
+                (bound, None),
             ),
             method(
                 "hinge_poses",
                 "hinge_poses",
                 Options::default(),
                 2,
-                bound,
-                None,
+                (bound, None),
             ),
             method(
                 "hinge_poses, σ known",
@@ -60,8 +58,7 @@ impl PoseScene {
                     ..Options::default()
                 },
                 2,
-                bound,
-                None,
+                (bound, None),
             ),
         ]
         .into_iter()

@@ -142,6 +142,6 @@ impl Experiment for BodiesScene {
             parent: &first,
             child: &second,
         };
-        record(info, &input, &Options::default(), &IN_SECOND, None, tally);
+        record(info, &input, &Options::default(), (IN_SECOND, None), tally);
     }
 }

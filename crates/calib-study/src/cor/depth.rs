@@ -143,8 +143,7 @@ impl Experiment for DepthScene {
                 info,
                 &Input::Points(&tracks),
                 options,
-                &CENTER,
-                Some(linear),
+                (CENTER, Some(linear)),
                 tally,
             );
         }

@@ -137,7 +137,7 @@ impl Experiment for MarkerScene {
         let options = Options::default();
         for (method, tally) in self.methods.iter().zip(tallies) {
             let input = Input::Markers(&tracks);
-            record(method.info, &input, &options, &CENTER, Some(linear), tally);
+            record(method.info, &input, &options, (CENTER, Some(linear)), tally);
         }
     }
 }

@@ -22,7 +22,7 @@ pub(crate) struct Method {
     pub gets: Gets,
     /// The tracker states its noise.
     pub known: bool,
-    /// Runs in every so-manieth trial: the slow ones.
+    /// Runs in every n-th trial: the slow ones.
     pub every: u64,
 }
 
@@ -56,13 +56,12 @@ impl Method {
     }
 }
 
-/// Runs an estimator and records the error of its center.
+/// Runs an estimator and records the error of its center; `linear` is the control variate, (2) of `tally.rs`.
 pub(crate) fn record(
     info: &EstimatorInfo,
     input: &Input<'_>,
     options: &Options,
-    truth: &Vector3<f64>,
-    linear: Option<Vector3<f64>>,
+    (truth, linear): (Vector3<f64>, Option<Vector3<f64>>),
     tally: &mut Tally,
 ) {
     match (info.fit)(input, options) {

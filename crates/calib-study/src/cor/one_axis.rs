@@ -29,6 +29,55 @@ enum Given {
     Poses,
 }
 
+/// Name, estimator, data, whether the noise is stated, number of trials per run of it.
+const TABLE: [(&str, &str, Given, bool, u64); 21] = [
+    ("hse", "hse", Given::Poses, false, 1),
+    ("hsa", "hsa", Given::Poses, false, 1),
+    ("hotspot_ml", "hotspot_ml", Given::Poses, false, 1),
+    ("hotspot_ml, σ known", "hotspot_ml", Given::Poses, true, 1),
+    ("sfe", "sfe", Given::Marker, false, 1),
+    ("sfe, σ known", "sfe", Given::Marker, true, 1),
+    ("sfa", "sfa", Given::Marker, false, 150),
+    ("kasa", "kasa", Given::Marker, false, 1),
+    ("taubin", "taubin", Given::Marker, false, 1),
+    ("hyper", "hyper", Given::Marker, false, 1),
+    (
+        "halvorsen, 3 markers",
+        "halvorsen",
+        Given::Markers,
+        false,
+        1,
+    ),
+    (
+        "gamage_lasenby, 3 markers",
+        "gamage_lasenby",
+        Given::Markers,
+        false,
+        1,
+    ),
+    ("ml_sphere", "ml_sphere", Given::Marker, false, 1),
+    ("hyper_n", "hyper_n", Given::Marker, false, 5),
+    ("sphere_eiv", "sphere_eiv", Given::Marker, false, 1),
+    (
+        "ml_sphere, 3 markers",
+        "ml_sphere",
+        Given::Markers,
+        false,
+        1,
+    ),
+    (
+        "ball_bundle, 3 markers",
+        "ball_bundle",
+        Given::Markers,
+        false,
+        20,
+    ),
+    ("robust, points", "robust", Given::Marker, false, 9),
+    ("robust, poses", "robust", Given::Poses, false, 9),
+    ("consensus, points", "consensus", Given::Marker, false, 9),
+    ("consensus, poses", "consensus", Given::Poses, false, 9),
+];
+
 pub(crate) struct OneAxis {
     scene: Scene,
     sigma_mm: [f64; 2],
@@ -38,55 +87,8 @@ pub(crate) struct OneAxis {
 
 impl OneAxis {
     pub fn new(sigma_mm: [f64; 2]) -> Self {
-        let table = [
-            ("hse", "hse", Given::Poses, false, 1),
-            ("hsa", "hsa", Given::Poses, false, 1),
-            ("hotspot_ml", "hotspot_ml", Given::Poses, false, 1),
-            ("hotspot_ml, σ known", "hotspot_ml", Given::Poses, true, 1),
-            ("sfe", "sfe", Given::Marker, false, 1),
-            ("sfe, σ known", "sfe", Given::Marker, true, 1),
-            ("sfa", "sfa", Given::Marker, false, 150),
-            ("kasa", "kasa", Given::Marker, false, 1),
-            ("taubin", "taubin", Given::Marker, false, 1),
-            ("hyper", "hyper", Given::Marker, false, 1),
-            (
-                "halvorsen, 3 markers",
-                "halvorsen",
-                Given::Markers,
-                false,
-                1,
-            ),
-            (
-                "gamage_lasenby, 3 markers",
-                "gamage_lasenby",
-                Given::Markers,
-                false,
-                1,
-            ),
-            ("ml_sphere", "ml_sphere", Given::Marker, false, 1),
-            ("hyper_n", "hyper_n", Given::Marker, false, 5),
-            ("sphere_eiv", "sphere_eiv", Given::Marker, false, 1),
-            (
-                "ml_sphere, 3 markers",
-                "ml_sphere",
-                Given::Markers,
-                false,
-                1,
-            ),
-            (
-                "ball_bundle, 3 markers",
-                "ball_bundle",
-                Given::Markers,
-                false,
-                20,
-            ),
-            ("robust, points", "robust", Given::Marker, false, 9),
-            ("robust, poses", "robust", Given::Poses, false, 9),
-            ("consensus, points", "consensus", Given::Marker, false, 9),
-            ("consensus, poses", "consensus", Given::Poses, false, 9),
-        ];
         let (mut uses, mut rows) = (Vec::new(), Vec::new());
-        for (name, id, gets, known, every) in table {
+        for (name, id, gets, known, every) in TABLE {
             if let Some(info) = estimators().iter().find(|e| e.id == id) {
                 rows.push(Row {
                     method: name.to_owned(),

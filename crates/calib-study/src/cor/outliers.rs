@@ -33,6 +33,84 @@ enum Sees {
     Moved,
 }
 
+/// Name, estimator, data, which recording, whether the noise is stated.
+const TABLE: [(&str, &str, Gets, Sees, bool); 14] = [
+    (
+        "ml_sphere, clean",
+        "ml_sphere",
+        Gets::Points,
+        Sees::Clean,
+        false,
+    ),
+    (
+        "ml_sphere, inliers",
+        "ml_sphere",
+        Gets::Points,
+        Sees::Left,
+        false,
+    ),
+    ("ml_sphere", "ml_sphere", Gets::Points, Sees::Moved, false),
+    ("robust, points", "robust", Gets::Points, Sees::Moved, false),
+    (
+        "robust, points, σ known",
+        "robust",
+        Gets::Points,
+        Sees::Moved,
+        true,
+    ),
+    (
+        "consensus, points",
+        "consensus",
+        Gets::Points,
+        Sees::Moved,
+        false,
+    ),
+    (
+        "consensus, points, σ known",
+        "consensus",
+        Gets::Points,
+        Sees::Moved,
+        true,
+    ),
+    (
+        "hotspot_ml, clean",
+        "hotspot_ml",
+        Gets::Poses,
+        Sees::Clean,
+        false,
+    ),
+    (
+        "hotspot_ml, inliers",
+        "hotspot_ml",
+        Gets::Poses,
+        Sees::Left,
+        false,
+    ),
+    ("hotspot_ml", "hotspot_ml", Gets::Poses, Sees::Moved, false),
+    ("robust, poses", "robust", Gets::Poses, Sees::Moved, false),
+    (
+        "robust, poses, σ known",
+        "robust",
+        Gets::Poses,
+        Sees::Moved,
+        true,
+    ),
+    (
+        "consensus, poses",
+        "consensus",
+        Gets::Poses,
+        Sees::Moved,
+        false,
+    ),
+    (
+        "consensus, poses, σ known",
+        "consensus",
+        Gets::Poses,
+        Sees::Moved,
+        true,
+    ),
+];
+
 struct Use {
     info: &'static EstimatorInfo,
     gets: Gets,
@@ -53,84 +131,8 @@ pub(crate) struct OutlierScene {
 impl OutlierScene {
     pub fn new(scene: Scene, reach: f64) -> Self {
         let ball = Ball::new(Range::Hand.turns(scene.samples), &scene);
-        let table = [
-            (
-                "ml_sphere, clean",
-                "ml_sphere",
-                Gets::Points,
-                Sees::Clean,
-                false,
-            ),
-            (
-                "ml_sphere, inliers",
-                "ml_sphere",
-                Gets::Points,
-                Sees::Left,
-                false,
-            ),
-            ("ml_sphere", "ml_sphere", Gets::Points, Sees::Moved, false),
-            ("robust, points", "robust", Gets::Points, Sees::Moved, false),
-            (
-                "robust, points, σ known",
-                "robust",
-                Gets::Points,
-                Sees::Moved,
-                true,
-            ),
-            (
-                "consensus, points",
-                "consensus",
-                Gets::Points,
-                Sees::Moved,
-                false,
-            ),
-            (
-                "consensus, points, σ known",
-                "consensus",
-                Gets::Points,
-                Sees::Moved,
-                true,
-            ),
-            (
-                "hotspot_ml, clean",
-                "hotspot_ml",
-                Gets::Poses,
-                Sees::Clean,
-                false,
-            ),
-            (
-                "hotspot_ml, inliers",
-                "hotspot_ml",
-                Gets::Poses,
-                Sees::Left,
-                false,
-            ),
-            ("hotspot_ml", "hotspot_ml", Gets::Poses, Sees::Moved, false),
-            ("robust, poses", "robust", Gets::Poses, Sees::Moved, false),
-            (
-                "robust, poses, σ known",
-                "robust",
-                Gets::Poses,
-                Sees::Moved,
-                true,
-            ),
-            (
-                "consensus, poses",
-                "consensus",
-                Gets::Poses,
-                Sees::Moved,
-                false,
-            ),
-            (
-                "consensus, poses, σ known",
-                "consensus",
-                Gets::Poses,
-                Sees::Moved,
-                true,
-            ),
-        ];
         let (mut uses, mut rows) = (Vec::new(), Vec::new());
-        for (name, id, gets, sees, known) in table {
+        for (name, id, gets, sees, known) in TABLE {
             if let Some(info) = estimators().iter().find(|e| e.id == id) {
                 rows.push(Row {
                     method: name.to_owned(),
@@ -225,8 +227,7 @@ impl Experiment for OutlierScene {
                     one.info,
                     &Input::Poses(poses),
                     &options,
-                    &CENTER,
-                    None,
+                    (CENTER, None),
                     tally,
                 ),
                 Gets::Points => {
@@ -235,8 +236,7 @@ impl Experiment for OutlierScene {
                         one.info,
                         &Input::Points(&tracks),
                         &options,
-                        &CENTER,
-                        None,
+                        (CENTER, None),
                         tally,
                     );
                 }

@@ -255,7 +255,7 @@ impl Experiment for PoseScene {
             } else {
                 &self.unstated
             };
-            record(method.info, &input, options, &CENTER, Some(linear), tally);
+            record(method.info, &input, options, (CENTER, Some(linear)), tally);
         }
     }
 }

@@ -1,64 +1,85 @@
 //! Every cell as a row, SI units.
 
-use std::fmt::Write;
+use csv::WriterBuilder;
 
-use crate::run::StudyResult;
+use crate::{
+    cell::Cell,
+    run::{Study, StudyResult},
+};
+
+/// Columns of the table.
+const HEADER: [&str; 26] = [
+    "study",
+    "part",
+    "motion",
+    "condition",
+    "samples",
+    "radius_m",
+    "sigma_t_m",
+    "sigma_r_rad",
+    "method",
+    "estimator",
+    "quantity",
+    "unit",
+    "trials",
+    "answered",
+    "observable",
+    "rms",
+    "rms_mc",
+    "mean_abs",
+    "bias",
+    "bias_mc",
+    "bound",
+    "efficiency",
+    "efficiency_mc",
+    "covariance_ratio",
+    "unbiased_limit",
+    "second_order_limit",
+];
 
 /// One row for each cell. Lengths in m, angles in rad; errors in the column `unit`. Empty: not measured.
 #[must_use]
 pub fn csv(result: &StudyResult) -> String {
-    let mut out = String::from(
-        "study,part,motion,condition,samples,radius_m,sigma_t_m,sigma_r_rad,method,estimator,quantity,unit,trials,answered,observable,\
-         rms,rms_mc,mean_abs,bias,bias_mc,bound,efficiency,efficiency_mc,covariance_ratio,unbiased_limit,second_order_limit\n",
-    );
+    let mut writer = WriterBuilder::new().from_writer(Vec::new());
+    // Neither memory nor rows of one length can fail.
+    let _ = writer.write_record(HEADER);
     for cell in &result.cells {
-        let s = &cell.scene;
-        let _ = write!(
-            out,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
-            result.study.word(),
-            s.part.word(),
-            quoted(&s.motion),
-            quoted(&s.condition),
-            s.samples,
-            s.radius_m,
-            s.sigma_t_m,
-            s.sigma_r_rad,
-            quoted(&cell.method),
-            cell.estimator,
-            cell.quantity.word(),
-            cell.quantity.unit(),
-            cell.trials,
-            cell.answered,
-            cell.observable,
-        );
-        for value in [
-            cell.rms,
-            cell.rms_mc,
-            cell.mean_abs,
-            cell.bias,
-            cell.bias_mc,
-            cell.bound,
-            cell.efficiency,
-            cell.efficiency_mc,
-            cell.covariance_ratio,
-            cell.unbiased_limit,
-            cell.second_order_limit,
-        ] {
-            out.push(',');
-            if let Some(value) = value {
-                let _ = write!(out, "{value}");
-            }
-        }
-        out.push('\n');
+        let _ = writer.write_record(row(result.study, cell));
     }
-    out
+    let bytes = writer.into_inner().unwrap_or_default();
+    String::from_utf8(bytes).unwrap_or_default()
 }
 
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
+/// The texts of one row, in the order of the columns.
+fn row(study: Study, cell: &Cell) -> [String; 26] {
+    let s = &cell.scene;
+    let measured = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
+    [
+        study.word().to_owned(),
+        s.part.word().to_owned(),
+        s.motion.clone(),
+        s.condition.clone(),
+        s.samples.to_string(),
+        s.radius_m.to_string(),
+        s.sigma_t_m.to_string(),
+        s.sigma_r_rad.to_string(),
+        cell.method.clone(),
+        cell.estimator.clone(),
+        cell.quantity.word().to_owned(),
+        cell.quantity.unit().to_owned(),
+        cell.trials.to_string(),
+        cell.answered.to_string(),
+        cell.observable.to_string(),
+        measured(cell.rms),
+        measured(cell.rms_mc),
+        measured(cell.mean_abs),
+        measured(cell.bias),
+        measured(cell.bias_mc),
+        measured(cell.bound),
+        measured(cell.efficiency),
+        measured(cell.efficiency_mc),
+        measured(cell.covariance_ratio),
+        measured(cell.unbiased_limit),
+        measured(cell.second_order_limit),
+    ]
 }
