@@ -1,6 +1,6 @@
 //! Recordings with known truth, from a robot profile.
 //!
-//! The true robot differs from its description by drawn errors; the tracker and the joints add noise:
+//! The true robot differs from its nominal URDF by random errors; the tracker and the joints add noise:
 //!
 //! ```text
 //! parent_from_joint' = parent_from_joint · exp(ξ),   ξ across the joint's axis          (1)
@@ -10,23 +10,37 @@
 //! ```
 //!
 //! `g` is the gravity torque about the joint (N m) from the masses of the URDF, gravity along −z of the root.
-//! Errors of an origin along or about its own axis are not drawn in (1): they are what a zero offset and the
-//! choice of a frame on the axis mean already. The same profile and seed give the same bytes.
+//! (1) has no errors of an origin along or about its own axis: a zero offset and the choice of a frame on the axis
+//! describe them already. The same profile and seed give the same bytes.
 //!
-//! Two machines with two clocks: [`simulate_streams`]. What this crate does not simulate: cameras, marker swaps.
+//! [`simulate_streams`] simulates two machines with two clocks. This crate does not simulate cameras and marker swaps.
+//!
+//! ```
+//! use calib_profile::{check, parse};
+//! use calib_urdf::RobotModel;
+//!
+//! let robots = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots");
+//! let text = std::fs::read_to_string(format!("{robots}/ripley.yaml"))?;
+//! let raw = parse(&text, "ripley.yaml")?;
+//! let model = RobotModel::from_urdf_file(format!("{robots}/{}", raw.robot.urdf).as_ref())?;
+//! let profile = check(&raw, &text, "ripley.yaml", &model)?;
+//! let simulated = calib_sim::simulate(&profile, &model, Some(1))?;
+//! assert!(simulated.recordings.keys().all(|name| profile.recordings.contains_key(name)));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod protocol;
 mod robot;
 mod streams;
+mod tracker;
 mod truth;
 
 use std::collections::BTreeMap;
 
-use calib_geometry::{Twist, se3};
-use calib_profile::{BodyKind, Profile, Simulation};
+use calib_profile::Profile;
 use calib_recording::{JointUnit, Poses};
-use calib_urdf::RobotModel;
-use nalgebra::{Isometry3, Point3, Vector3};
+use calib_urdf::{Joint, RobotModel};
+use nalgebra::Vector3;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use rand_distr::StandardNormal;
@@ -35,6 +49,8 @@ pub use protocol::{Commanded, commanded_poses};
 pub use robot::TrueRobot;
 pub use streams::{Motion, StreamPlan, Streams, simulate_streams};
 pub use truth::{Truth, TruthTransform};
+
+use tracker::Tracker;
 
 /// Recordings by name, and the truth behind them.
 #[derive(Debug, Clone)]
@@ -47,6 +63,7 @@ pub struct Simulated {
 
 /// Why a profile cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SimError {
     /// The profile does not say how.
     #[error(
@@ -77,22 +94,22 @@ pub fn simulate(
     let plan = profile.simulate.as_ref().ok_or(SimError::NoSection)?;
     let seed = seed.unwrap_or(plan.seed);
     let robot = TrueRobot::draw(profile, plan, model, seed);
+    let tracker = Tracker {
+        profile,
+        plan,
+        robot: &robot,
+    };
     let mut recordings = BTreeMap::new();
     for (index, (name, protocol)) in plan.recordings.iter().enumerate() {
         // A stream of its own per recording: adding one leaves the others as they were.
         let mut rng = stream(seed, 1 + index as u64);
         let commanded = commanded_poses(protocol, model, &mut rng);
-        let group = profile.recordings.get(name).and_then(|r| r.group.clone());
-        let poses = measure(
-            profile,
-            plan,
-            model,
-            &robot,
-            &commanded,
-            &protocol.bodies,
-            group,
-            &mut rng,
-        );
+        let mut poses = measure(&tracker, model, &commanded, &protocol.bodies, &mut rng);
+        if !commanded.groups.is_empty() {
+            let group = profile.recordings.get(name).and_then(|r| r.group.clone());
+            let column = group.unwrap_or_else(|| "group".to_owned());
+            poses.labels.insert(column, commanded.groups);
+        }
         recordings.insert(name.clone(), poses);
     }
     let truth = Truth::of(profile, model, &robot, seed)?;
@@ -110,15 +127,11 @@ pub(crate) fn normal3(rng: &mut impl Rng, sigma: f64) -> Vector3<f64> {
 }
 
 /// Eqs. (2)–(4) for every commanded pose.
-#[allow(clippy::too_many_arguments)] // one call site; a struct would only rename the arguments
 fn measure(
-    profile: &Profile,
-    plan: &Simulation,
+    tracker: &Tracker<'_>,
     model: &RobotModel,
-    robot: &TrueRobot,
     commanded: &Commanded,
     bodies: &[String],
-    group: Option<String>,
     rng: &mut ChaCha12Rng,
 ) -> Poses {
     let mut poses = Poses {
@@ -127,58 +140,23 @@ fn measure(
     };
     for id in model.independent_joints() {
         let joint = model.joint(id);
-        let unit = if joint.kind.turns() {
-            JointUnit::Angle
-        } else {
-            JointUnit::Length
-        };
-        poses.joint_units.insert(joint.name.clone(), unit);
+        poses.joint_units.insert(joint.name.clone(), unit_of(joint));
         let column = commanded.q.iter().map(|q| Some(q[id.index()])).collect();
         poses.joints.insert(joint.name.clone(), column);
     }
     for q in &commanded.q {
-        let root_from_link = robot.forward_kinematics(q, plan.noise.joint, rng);
-        for name in bodies {
-            let body = &profile.bodies[name];
-            let tracker_from_body =
-                robot.tracker_from_root * root_from_link[body.link.index()] * robot.mounts[name];
-            match &body.kind {
-                BodyKind::Pose => {
-                    let noise = Twist::new(
-                        normal3(rng, plan.noise.body.angle),
-                        normal3(rng, plan.noise.body.position),
-                    );
-                    let seen = visible(rng, plan.noise.occluded);
-                    let sample: Option<Isometry3<f64>> =
-                        seen.then(|| tracker_from_body * se3::exp(&noise));
-                    poses.bodies.entry(name.clone()).or_default().push(sample);
-                }
-                BodyKind::Markers { names, .. } => {
-                    for marker in names {
-                        let p_body = plan.mounts[name].markers[marker];
-                        let noise = normal3(rng, plan.noise.marker);
-                        let seen = visible(rng, plan.noise.occluded);
-                        let sample: Option<Point3<f64>> =
-                            seen.then(|| tracker_from_body * p_body + noise);
-                        poses
-                            .markers
-                            .entry(marker.clone())
-                            .or_default()
-                            .push(sample);
-                    }
-                }
-            }
-        }
-    }
-    if !commanded.groups.is_empty() {
-        poses.labels.insert(
-            group.unwrap_or_else(|| "group".to_owned()),
-            commanded.groups.clone(),
-        );
+        let sigma = tracker.plan.noise.joint;
+        let root_from_link = tracker.robot.forward_kinematics(q, sigma, rng);
+        tracker.observe(bodies, &root_from_link, &mut poses, rng);
     }
     poses
 }
 
-fn visible(rng: &mut ChaCha12Rng, occluded: f64) -> bool {
-    rng.random::<f64>() >= occluded
+/// The unit of a joint's column.
+pub(crate) fn unit_of(joint: &Joint) -> JointUnit {
+    if joint.kind.turns() {
+        JointUnit::Angle
+    } else {
+        JointUnit::Length
+    }
 }

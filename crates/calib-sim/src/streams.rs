@@ -9,17 +9,17 @@
 
 use std::collections::BTreeMap;
 
-use calib_geometry::{Twist, se3};
-use calib_profile::{BodyKind, Profile};
-use calib_recording::{JointUnit, Poses};
+use calib_profile::Profile;
+use calib_recording::Poses;
 use calib_urdf::{JointId, RobotModel};
 use rand::RngExt;
 use rand_chacha::ChaCha12Rng;
 use rand_distr::StandardNormal;
 
 use crate::robot::TrueRobot;
+use crate::tracker::Tracker;
 use crate::truth::Truth;
-use crate::{SimError, normal3, stream, visible};
+use crate::{SimError, stream, unit_of};
 
 /// How the robot moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -186,14 +186,14 @@ pub fn simulate_streams(
     }
     for joint in plan.ranges.keys() {
         let joint = model.joint(*joint);
-        let unit = if joint.kind.turns() {
-            JointUnit::Angle
-        } else {
-            JointUnit::Length
-        };
-        log.joint_units.insert(joint.name.clone(), unit);
+        log.joint_units.insert(joint.name.clone(), unit_of(joint));
     }
     log.t = Some(times);
+    let tracker = Tracker {
+        profile,
+        plan: section,
+        robot: &robot,
+    };
     let mut seen = Poses::default();
     let mut times = Vec::new();
     for i in 0..(plan.duration * plan.tracker_hz) as usize {
@@ -210,33 +210,7 @@ pub fn simulate_streams(
             Motion::StopAndGo { .. } => 0.0,
         };
         let root_from_link = robot.forward_kinematics(&q, sigma, &mut rng);
-        for name in &plan.bodies {
-            let Some(body) = profile.bodies.get(name) else {
-                continue;
-            };
-            let tracker_from_body =
-                robot.tracker_from_root * root_from_link[body.link.index()] * robot.mounts[name];
-            match &body.kind {
-                BodyKind::Pose => {
-                    let noise = Twist::new(
-                        normal3(&mut rng, section.noise.body.angle),
-                        normal3(&mut rng, section.noise.body.position),
-                    );
-                    let sample = visible(&mut rng, section.noise.occluded)
-                        .then(|| tracker_from_body * se3::exp(&noise));
-                    seen.bodies.entry(name.clone()).or_default().push(sample);
-                }
-                BodyKind::Markers { names, .. } => {
-                    for marker in names {
-                        let p = section.mounts[name].markers[marker];
-                        let noise = normal3(&mut rng, section.noise.marker);
-                        let sample = visible(&mut rng, section.noise.occluded)
-                            .then(|| tracker_from_body * p + noise);
-                        seen.markers.entry(marker.clone()).or_default().push(sample);
-                    }
-                }
-            }
-        }
+        tracker.observe(&plan.bodies, &root_from_link, &mut seen, &mut rng);
     }
     seen.t = Some(times);
     let truth = Truth::of(profile, model, &robot, seed)?;
