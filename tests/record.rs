@@ -141,7 +141,7 @@ fn a_kill_leaves_a_file_that_reads_and_goes_on() {
         numbers(&after)
     );
     let said = String::from_utf8(output.stderr).expect("text");
-    assert!(said.contains("ended: ended by you"), "{said}");
+    assert!(said.contains("ended: stopped by the operator"), "{said}");
     assert!(said.lines().all(|l| l.chars().count() <= 80), "{said}");
     assert_eq!(String::from_utf8_lossy(&output.stdout), "sweep.csv\n");
 }
@@ -281,7 +281,7 @@ fn refusals_before_anything_is_written() {
         (
             justin(&["--source", "dtrack:0", "--recording", "head_sweep"]),
             7,
-            "exists already; go on with --append, or choose another with --out",
+            "already exists. Continue it with `--append`, or choose another file with",
         ),
         (
             justin(&[
@@ -295,7 +295,7 @@ fn refusals_before_anything_is_written() {
                 "0.3",
             ]),
             3,
-            "nothing came from the tracker for",
+            "no data from the tracker for",
         ),
         (
             justin(&[
@@ -320,7 +320,7 @@ fn refusals_before_anything_is_written() {
 }
 
 #[test]
-fn a_tracker_that_sends_other_names_is_told() {
+fn a_tracker_that_sends_other_names_is_refused() {
     let dir = Scratch::new().robot("justin");
     let port = free_port();
     let stop = Arc::new(AtomicBool::new(false));
@@ -345,7 +345,9 @@ fn a_tracker_that_sends_other_names_is_told() {
     let said = String::from_utf8(output.stderr).expect("text");
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(
-        said.contains("the tracker sends body_0, the profile has haT, heT; say which is which: --map haT=body_0"),
+        said.contains(
+            "the tracker sends body_0, the profile has haT, heT. Map the names: --map haT=body_0"
+        ),
         "{said}"
     );
     assert!(!dir.path("a.csv").exists());

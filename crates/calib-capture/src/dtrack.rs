@@ -45,7 +45,7 @@ pub fn datagram(bytes: &[u8]) -> Result<Vec<Frame>, Error> {
             .collect(),
         markers: Default::default(),
         // Single markers of DTrack carry a number that another marker may have a second later.
-        unlabelled: recording
+        unlabeled: recording
             .markers
             .iter()
             .filter(|marker| {

@@ -15,7 +15,7 @@ pub struct Frame {
     /// Markers that have a name of their own.
     pub markers: BTreeMap<String, Point3<f64>>,
     /// Markers without one: the device does not know which marker is which.
-    pub unlabelled: usize,
+    pub unlabeled: usize,
 }
 
 impl Frame {

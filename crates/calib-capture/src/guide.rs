@@ -1,4 +1,4 @@
-//! The poses that a sweep asks for, one after the other.
+//! The poses that a sweep requests, one after the other.
 
 use crate::{JointColumn, Unit};
 
@@ -14,9 +14,9 @@ pub struct Step {
 pub struct Guide {
     /// Index of each guided joint among the columns.
     pub joints: Vec<usize>,
-    /// Range asked of each, rad or m.
+    /// Requested range of each, rad or m.
     pub ranges: Vec<(f64, f64)>,
-    /// The poses; none for a recording whose poses the person chooses.
+    /// The poses; none for a recording whose poses the operator chooses.
     pub steps: Vec<Step>,
 }
 
@@ -63,9 +63,9 @@ pub(crate) fn shown_range(unit: Unit, low: f64, high: f64) -> String {
 }
 
 /// All combinations of equal steps through the ranges, ends included, the last joint fastest and back and forth, so
-/// that neighbours in the list are neighbours in the room.
+/// that consecutive poses are close together.
 ///
-/// `poses` is the number of values of each joint; 1 asks for the middle of the range.
+/// `poses` is the number of values of each joint; 1 requests the middle of the range.
 pub fn grid(ranges: &[(f64, f64)], poses: usize) -> Vec<Step> {
     let poses = poses.max(1);
     let value = |(low, high): (f64, f64), i: usize| match poses {

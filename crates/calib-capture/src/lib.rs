@@ -3,15 +3,15 @@
 //! ```text
 //! socket ── Source ──► Frame ── Order ──► Session ──► Table      a row per frame while a pose is held
 //!                                          ▲    │
-//!                     joint values ────────┘    └──► Screen      the next pose, who is lost, how far
+//!                     joint values ────────┘    └──► Screen      next pose, lost bodies, progress
 //! ```
 //!
-//! A frame has two times: the device's own, and the instant at which it arrived here. Both are written (`t_s`,
-//! `host_s`). What arrives late or twice is dropped and counted, never sorted in: rows go to the disk every second
-//! and stay as they are, so that a kill costs at most the last second.
+//! A frame has two times: that of the device, and that of its arrival. Both are written (`t_s`,
+//! `host_s`). Late or duplicate frames are dropped and counted, never inserted: rows are written to disk every second
+//! and never changed, so that at most one second of data is lost if the program is killed.
 //!
-//! The pose that a row belongs to is decided by stillness: within a window the tracked bodies must stay together
-//! ([`Stillness`]). Nothing in here estimates anything.
+//! The pose that a row belongs to is decided by stillness: within a time window the tracked bodies must not move
+//! ([`Stillness`]). This crate estimates nothing.
 //!
 //! ```
 //! use calib_capture::dtrack;
@@ -22,8 +22,8 @@
 //! # Ok::<(), calib_recording::Error>(())
 //! ```
 //!
-//! What this crate cannot know: whether the person stands where the joint values say, and whether a tracker's name
-//! is on the right body.
+//! What this crate cannot check: whether the robot is at the stated joint values, and whether a tracker's name belongs to the
+//! right body.
 
 pub mod dtrack;
 mod frame;

@@ -1,19 +1,19 @@
-//! What the person reads while recording: lines that stay, and one that changes.
+//! What the operator reads while recording: permanent lines and one status line.
 
 use std::io::Write;
 
-/// No line is longer.
+/// Maximum length of a line.
 pub const WIDTH: usize = 80;
 
 /// Shows lines and a status.
 pub trait Screen {
-    /// A line that stays.
+    /// Shows a permanent line.
     fn line(&mut self, text: &str);
-    /// What is going on at this time, s; replaces the status before.
+    /// Shows the status at this time, s; it replaces the previous status.
     fn status(&mut self, text: &str, now: f64);
 }
 
-/// A terminal: the status stands in the last line and is written over.
+/// A terminal: the status is in the last line and is overwritten.
 #[derive(Debug)]
 pub struct Terminal<W: Write> {
     out: W,
@@ -44,7 +44,7 @@ impl<W: Write> Screen for Terminal<W> {
     }
 
     fn status(&mut self, text: &str, now: f64) {
-        // Ten times a second is as fast as anyone reads.
+        // Faster than ten times a second is not readable.
         if self
             .last
             .is_some_and(|last| (0.0..0.1).contains(&(now - last)))
@@ -59,7 +59,7 @@ impl<W: Write> Screen for Terminal<W> {
     }
 }
 
-/// Anything else: plain lines, the status every few seconds and only when it says something new.
+/// Anything else: plain lines, and the status every few seconds when it has changed.
 #[derive(Debug)]
 pub struct Lines<W: Write> {
     out: W,
@@ -86,7 +86,7 @@ impl<W: Write> Screen for Lines<W> {
 
     fn status(&mut self, text: &str, now: f64) {
         match &self.last {
-            Some((at, said)) if now - at < SELDOM || said == text => {}
+            Some((at, shown)) if now - at < SELDOM || shown == text => {}
             None => self.last = Some((now, String::new())),
             Some(_) => {
                 self.line(text);
@@ -96,7 +96,7 @@ impl<W: Write> Screen for Lines<W> {
     }
 }
 
-/// The text in lines of at most [`WIDTH`] characters, broken at blanks, continued with two blanks.
+/// The text in lines of at most [`WIDTH`] characters, broken at spaces, continuation lines indented by two spaces.
 fn folded(text: &str) -> Vec<String> {
     let mut lines = Vec::new();
     for part in text.lines() {

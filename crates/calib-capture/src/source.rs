@@ -98,7 +98,7 @@ impl fmt::Display for Address {
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
     /// The port of this computer cannot be opened.
-    #[error("UDP port {port} cannot be opened: {source}; is another program listening there?")]
+    #[error("UDP port {port} cannot be opened: {source}. Check that no other program uses it.")]
     Port {
         /// The port.
         port: u16,
@@ -107,7 +107,7 @@ pub enum SourceError {
     },
     /// The server cannot be reached.
     #[error(
-        "{host}:{port} cannot be reached: {source}; is the VRPN server running, is a firewall in the way?"
+        "{host}:{port} cannot be reached: {source}. Check that the VRPN server is running and that no firewall blocks it."
     )]
     Connect {
         /// The host.
@@ -119,7 +119,7 @@ pub enum SourceError {
     },
     /// Connected, but nobody speaks.
     #[error(
-        "{host}:{port} accepted the connection and said nothing for {ANSWER} s; is that a VRPN server?"
+        "{host}:{port} accepted the connection but sent nothing for {ANSWER} s. Check that it is a VRPN server."
     )]
     Mute {
         /// The host.
@@ -138,7 +138,7 @@ pub enum SourceError {
         problem: VrpnError,
     },
     /// Two devices report, and none was chosen.
-    #[error("the server has several devices that report ({}); choose one: `--source vrpn:{}@{host}`", .devices.join(", "), .devices.first().map_or("DEVICE", String::as_str))]
+    #[error("the server has several devices that send reports ({}). Choose one: `--source vrpn:{}@{host}`.", .devices.join(", "), .devices.first().map_or("DEVICE", String::as_str))]
     Devices {
         /// The host.
         host: String,
@@ -146,7 +146,7 @@ pub enum SourceError {
         devices: Vec<String>,
     },
     /// The connection broke.
-    #[error("the connection broke: {0}")]
+    #[error("the connection was lost: {0}")]
     Broken(std::io::Error),
 }
 
@@ -392,7 +392,9 @@ impl Connection {
                     }
                 }
                 Message::BadPose { device, sensor } => {
-                    bad = Some(format!("sensor {sensor} of `{device}` reports no rotation"));
+                    bad = Some(format!(
+                        "sensor {sensor} of `{device}` reports no orientation"
+                    ));
                 }
                 Message::Goodbye => {
                     self.closed = true;

@@ -5,7 +5,7 @@ use crate::{Ended, Input, JointListener, Screen, Source, Watched, WatchedKind};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-/// Names that were heard.
+/// Names that were received.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Survey {
     /// Bodies and markers of the tracker.
@@ -28,7 +28,7 @@ pub fn survey(
 ) -> Result<Result<Survey, Ended>, CaptureError> {
     let began = clock();
     let mut first = None;
-    let mut told = began;
+    let mut warned = began;
     let mut found = Survey::default();
     let mut foreign = false;
     loop {
@@ -49,7 +49,7 @@ pub fn survey(
                 }
             }
             Input::Foreign(why) if !std::mem::replace(&mut foreign, true) => {
-                screen.line(&format!("not used: {why}"));
+                screen.line(&format!("ignored: {why}"));
             }
             Input::Closed if first.is_none() => return Ok(Err(Ended::Closed)),
             Input::Closed => return Ok(Ok(found)),
@@ -62,17 +62,17 @@ pub fn survey(
         if first.is_none() && silent >= patience {
             return Ok(Err(Ended::Silent(silent)));
         }
-        if first.is_none() && now - told >= 5.0 {
-            told = now;
-            screen.line(&format!("nothing from the tracker for {silent:.0} s"));
+        if first.is_none() && now - warned >= 5.0 {
+            warned = now;
+            screen.line(&format!("no data from the tracker for {silent:.0} s"));
         }
     }
 }
 
-/// Which of the tracker's names each wanted body or marker is: as given, else the one of the same name.
+/// The tracker's name of each requested body or marker: as given, otherwise the same name.
 ///
 /// # Errors
-/// A sentence that says what the tracker sends and how to map it.
+/// A message with the names that the tracker sends and how to map them.
 pub fn map_names(
     wanted: &[(String, WatchedKind)],
     given: &BTreeMap<String, String>,
@@ -89,7 +89,7 @@ pub fn map_names(
     let profile = || list(&mut wanted.iter().map(|(name, _)| name.as_str()));
     if let Some(name) = given.keys().find(|n| !wanted.iter().any(|(w, _)| w == *n)) {
         return Err(format!(
-            "--map names `{name}`, which the profile does not have; it has {}",
+            "--map: `{name}` is not in the profile, which has {}",
             profile()
         ));
     }
@@ -116,7 +116,7 @@ pub fn map_names(
             seen.iter().next().map_or("body_0", String::as_str),
         );
         return Err(format!(
-            "the tracker sends {}, the profile has {}; say which is which: --map {first}={example}",
+            "the tracker sends {}, the profile has {}. Map the names: --map {first}={example}",
             list(&mut seen.iter().map(String::as_str)),
             profile()
         ));

@@ -12,13 +12,15 @@ const EVERY: f64 = 1.0;
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// There is a file already.
-    #[error("{path} exists already; go on with --append, or choose another with --out")]
+    #[error(
+        "{path} already exists. Continue it with `--append`, or choose another file with `--out`."
+    )]
     Exists {
         /// The file.
         path: String,
     },
     /// There is a file, but it is another recording.
-    #[error("{path}: cannot go on here: {problem}; choose another file with --out")]
+    #[error("{path}: cannot continue this file: {problem}. Choose another file with `--out`.")]
     Other {
         /// The file.
         path: String,

@@ -35,14 +35,14 @@ const UNIT_TOLERANCE: f64 = 5e-3;
 pub enum VrpnError {
     /// The first bytes are no greeting.
     #[error(
-        "byte 0: found `{found}`, expected `vrpn: ver. 07.…`; this port is not a VRPN server's"
+        "byte 0: found `{found}`, expected `vrpn: ver. 07.…`; this port does not belong to a VRPN server"
     )]
     NotVrpn {
         /// The first bytes, as text.
         found: String,
     },
     /// Another major version.
-    #[error("the server speaks VRPN {found}, this program 07; major versions must agree")]
+    #[error("the server uses VRPN {found}, this program VRPN 07; the major versions must match")]
     Version {
         /// What the server says.
         found: String,

@@ -14,7 +14,7 @@ pub fn residuals_csv(rows: &[ResidualRow]) -> Result<String, ReportError> {
     for joint in rows.iter().flat_map(|row| &row.joints) {
         columns.insert(
             &joint.joint,
-            if joint.unit == Unit::Metre {
+            if joint.unit == Unit::Meter {
                 "m"
             } else {
                 "rad"
@@ -55,7 +55,7 @@ pub fn residuals_csv(rows: &[ResidualRow]) -> Result<String, ReportError> {
             cell(z),
             cell(row.length_m()),
             row.rotation_rad.map_or_else(String::new, cell),
-            row.normalised.map_or_else(String::new, cell),
+            row.normalized.map_or_else(String::new, cell),
             row.used.to_string(),
         ];
         for joint in columns.keys() {
@@ -70,7 +70,7 @@ pub fn residuals_csv(rows: &[ResidualRow]) -> Result<String, ReportError> {
     String::from_utf8(bytes).map_err(|source| ReportError::Csv(source.to_string()))
 }
 
-/// Nine significant digits: a nanometre in a metre is enough for a residual.
+/// Nine significant digits: a nanometer in a meter is enough for a residual.
 fn cell(x: f64) -> String {
     if !x.is_finite() {
         return String::new();
@@ -99,7 +99,7 @@ mod tests {
                 row: 4,
                 time_s: Some(0.25),
                 residual_m: [f64::NAN, 0.0, 0.0],
-                joints: vec![JointValue::metres("slide", 0.1)],
+                joints: vec![JointValue::meters("slide", 0.1)],
                 ..ResidualRow::default()
             },
         ];

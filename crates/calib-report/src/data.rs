@@ -1,4 +1,4 @@
-use crate::Unit;
+use crate::{ClockCheck, ErrorSource, FitEnd, NoiseKind, Unit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,7 @@ pub struct Input {
 pub struct Output {
     /// Relative to the output folder.
     pub path: String,
-    /// What it is, in words: "URDF with 12 changed values".
+    /// Its content in words: "URDF with 12 changed values".
     pub what: String,
     /// Of its bytes; null for the report itself, which cannot hold its own.
     pub sha256: Option<String>,
@@ -54,10 +54,10 @@ pub struct RecordingSummary {
     pub rejected: usize,
     /// Samples that the tracker or encoder lost.
     pub lost: Vec<Lost>,
-    /// What was converted on reading: units, rotation conventions, ignored columns. One sentence each.
+    /// Conversions on reading: units, rotation conventions, ignored columns. One clause each.
     #[serde(default)]
     pub conversions: Vec<String>,
-    /// The axis that points up, where the file says so (`+Z`).
+    /// The axis that points up, where the file states it (`+Z`).
     #[serde(default)]
     pub up_axis: Option<String>,
 }
@@ -89,17 +89,20 @@ pub struct Rejected {
 /// The noise of a group of observations.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Noise {
-    /// What is noisy: "marker position", "joint position".
+    /// What is noisy, as the profile names it: "marker", "joint".
     pub group: String,
+    /// What the level is the noise of.
+    #[serde(default)]
+    pub kind: NoiseKind,
     /// SI unit of the numbers.
     pub unit: Unit,
-    /// Standard deviation per component that the data show; null when the data cannot tell it.
+    /// Standard deviation per component estimated from the data; null when it is not observable.
     pub sigma: Option<f64>,
-    /// What the profile or the tracker's maker states.
+    /// Stated by the profile.
     pub stated: Option<f64>,
-    /// Observations behind it.
+    /// Number of observations.
     pub samples: usize,
-    /// How it was found, or why it was not: "variance components (REML)".
+    /// How it was determined, or why it was not: "variance components (REML)".
     pub text: String,
 }
 
@@ -108,6 +111,9 @@ pub struct Noise {
 pub struct Clock {
     /// The recording.
     pub recording: String,
+    /// How the clocks were brought together.
+    #[serde(default)]
+    pub check: ClockCheck,
     /// Which clock is late: "tracker".
     pub clock: String,
     /// Against which: "joints".
@@ -122,13 +128,13 @@ pub struct Clock {
     /// Its standard deviation.
     #[serde(default)]
     pub drift_sigma: Option<f64>,
-    /// Whether the clocks agree well enough for this recording; null when it could not be told.
+    /// Whether the clocks agree well enough for this recording; null when this was not tested.
     pub agrees: Option<bool>,
-    /// Why, or "static poses: the clocks do not matter".
+    /// The reason in words.
     pub text: String,
 }
 
-/// Where a joint was during the fit.
+/// The range of a joint in the data.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct JointCoverage {
     /// The joint's name in the URDF.
@@ -145,7 +151,7 @@ pub struct JointCoverage {
     pub max: f64,
     /// Number of samples.
     pub samples: usize,
-    /// (max − min) / (upper − lower), at most 1; a continuous joint counts against one turn; null when there is no range.
+    /// (max − min) / (upper − lower), at most 1; a continuous joint is compared with one revolution; null when there is no range.
     pub share: Option<f64>,
     /// Left end of the first bin and right end of the last.
     pub bins_from: f64,
@@ -155,11 +161,11 @@ pub struct JointCoverage {
     pub bins: Vec<u64>,
 }
 
-/// Bins of a joint's range: 15° each over a full turn.
+/// Bins of a joint's range: 15° each over a full revolution.
 const COVERAGE_BINS: usize = 24;
 
 impl JointCoverage {
-    /// Count positions into bins over the joint's limits, or over one turn or the data's own range where it has none. Positions outside count at the ends.
+    /// Count positions into bins over the joint's limits, or over one revolution or the range of the data where it has none. Positions outside count in the end bins.
     ///
     /// `None` when there is no finite position.
     #[must_use]
@@ -178,10 +184,10 @@ impl JointCoverage {
         let max = finite.iter().copied().reduce(f64::max)?;
         let limits =
             limits.filter(|(lower, upper)| lower.is_finite() && upper.is_finite() && lower < upper);
-        let turn = std::f64::consts::PI;
+        let half = std::f64::consts::PI;
         let (from, to) = match limits {
             Some(limits) => limits,
-            None if unit == Unit::Radian && -turn <= min && max <= turn => (-turn, turn),
+            None if unit == Unit::Radian && -half <= min && max <= half => (-half, half),
             None => (min, max),
         };
         let mut bins = vec![0; COVERAGE_BINS];
@@ -195,7 +201,7 @@ impl JointCoverage {
         }
         let whole = limits
             .map(|(lower, upper)| upper - lower)
-            .or((unit == Unit::Radian).then_some(2.0 * turn));
+            .or((unit == Unit::Radian).then_some(2.0 * half));
         Some(Self {
             joint: joint.into(),
             unit,
@@ -215,7 +221,10 @@ impl JointCoverage {
 /// How the solver ended.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FitSummary {
-    /// In words: "converged after 7 iterations: step below 1e-10".
+    /// How the solver ended.
+    #[serde(default)]
+    pub ended: FitEnd,
+    /// The same in words: "converged after 7 iterations".
     pub status: String,
     /// Whether the solver reached an optimum. It is not the verdict.
     pub converged: bool,
@@ -232,7 +241,7 @@ pub struct FitSummary {
 /// The predicted uncertainty of the tool over the workspace.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Workspace {
-    /// Which point: the link or tool.
+    /// The link or tool.
     pub link: String,
     /// The frame of the positions.
     pub frame: String,
@@ -293,15 +302,18 @@ impl Workspace {
 /// One source of the remaining error.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AccuracyLimit {
-    /// "joint position noise", "gravity compliance that is not modelled".
+    /// Which source.
+    #[serde(default)]
+    pub kind: ErrorSource,
+    /// The source in words: "joint noise".
     pub source: String,
-    /// What it contributes to the tool's error, m; null when only its presence is known.
+    /// Its contribution to the position error of the tool, m; null when it is not quantified.
     pub sigma_m: Option<f64>,
     /// Its share of the variance, in [0, 1].
     pub share: Option<f64>,
-    /// How this was found.
+    /// How it was determined.
     pub text: String,
-    /// What would reduce it.
+    /// What reduces it.
     pub remedy: String,
 }
 
@@ -323,8 +335,8 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_without_limits_or_motion_still_has_a_picture() {
-        let still = JointCoverage::of("j", Unit::Metre, None, &[0.2, 0.2]).expect("positions");
+    fn a_joint_without_limits_or_motion_still_has_bins() {
+        let still = JointCoverage::of("j", Unit::Meter, None, &[0.2, 0.2]).expect("positions");
         assert_eq!((still.bins[0], still.share), (2, None));
         let turning = JointCoverage::of("j", Unit::Radian, None, &[0.0, std::f64::consts::PI])
             .expect("positions");

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! The poses of the view are one animation, a second each, without anything between them: what was not recorded is not
-//! shown. A lost marker has the size zero in its pose. Numbers are 32-bit, as the format wants: 0.1 µm in a metre.
+//! shown. A lost marker has the size zero in its pose. Numbers are 32-bit, as the format wants: 0.1 µm in a meter.
 //! Khronos, glTF 2.0 specification, 2021 (ISO/IEC 12113:2022).
 
 use crate::view3d::{Axis, Circle, Sphere, View3d, ViewPose};
@@ -30,8 +30,8 @@ const MARKER_M: f64 = 0.007;
 /// Corners of a drawn circle.
 const CORNERS: usize = 48;
 
-/// Colours of [`Colour`], linear RGB.
-const COLOURS: [(&str, [f64; 3]); 6] = [
+/// Colors of [`Color`], linear RGB.
+const COLORS: [(&str, [f64; 3]); 6] = [
     ("calibrated", [0.0, 0.168, 0.445]),
     ("nominal", [0.565, 0.109, 0.0]),
     ("marker", [0.271, 0.040, 0.235]),
@@ -41,7 +41,7 @@ const COLOURS: [(&str, [f64; 3]); 6] = [
 ];
 
 #[derive(Clone, Copy)]
-enum Colour {
+enum Color {
     Calibrated,
     Nominal,
     Marker,
@@ -71,16 +71,16 @@ pub fn glb(scene: &Scene, view: &View3d) -> Result<Vec<u8>, ReportError> {
     let ball = file.ball();
     let mut branches = Vec::new();
     let first = view.poses.first();
-    for (name, colour, rows) in [
+    for (name, color, rows) in [
         (
             "calibrated",
-            Colour::Calibrated,
+            Color::Calibrated,
             (|pose| &pose.calibrated) as fn(&ViewPose) -> &Vec<[f64; 7]>,
         ),
-        ("nominal", Colour::Nominal, |pose| &pose.nominal),
+        ("nominal", Color::Nominal, |pose| &pose.nominal),
     ] {
         if first.is_some_and(|pose| !rows(pose).is_empty()) {
-            branches.push(file.robot(&view, (name, colour), rows, triad));
+            branches.push(file.robot(&view, (name, color), rows, triad));
         }
     }
     if first.is_some() {
@@ -153,35 +153,29 @@ impl File {
         Self::push(&mut self.accessors, accessor)
     }
 
-    fn primitive(&mut self, mode: u32, colour: Colour, points: &[[f64; 3]]) -> Value {
+    fn primitive(&mut self, mode: u32, color: Color, points: &[[f64; 3]]) -> Value {
         let positions = self.floats(points, "VEC3", true);
-        json!({"attributes": {"POSITION": positions}, "mode": mode, "material": colour as usize})
+        json!({"attributes": {"POSITION": positions}, "mode": mode, "material": color as usize})
     }
 
     /// `None` where there is nothing to draw: an accessor must not be empty.
-    fn mesh(
-        &mut self,
-        name: &str,
-        mode: u32,
-        colour: Colour,
-        points: &[[f64; 3]],
-    ) -> Option<usize> {
+    fn mesh(&mut self, name: &str, mode: u32, color: Color, points: &[[f64; 3]]) -> Option<usize> {
         if points.is_empty() {
             return None;
         }
-        let primitive = self.primitive(mode, colour, points);
+        let primitive = self.primitive(mode, color, points);
         let mesh = json!({"name": name, "primitives": [primitive]});
         Some(Self::push(&mut self.meshes, mesh))
     }
 
     /// Three axes of a frame, red, green, blue as everywhere.
     fn triad(&mut self) -> usize {
-        let colours = [Colour::Error, Colour::Joint, Colour::Calibrated];
+        let colors = [Color::Error, Color::Joint, Color::Calibrated];
         let primitives: Vec<Value> = (0..3)
             .map(|k| {
                 let mut end = [0.0; 3];
                 end[k] = TRIAD_M;
-                self.primitive(LINES, colours[k], &[[0.0; 3], end])
+                self.primitive(LINES, colors[k], &[[0.0; 3], end])
             })
             .collect();
         Self::push(
@@ -205,7 +199,7 @@ impl File {
             .chain(barbs)
             .flatten()
             .collect();
-        let primitive = self.primitive(LINES, Colour::Error, &points);
+        let primitive = self.primitive(LINES, Color::Error, &points);
         Self::push(
             &mut self.meshes,
             json!({"name": "arrow", "primitives": [primitive]}),
@@ -225,7 +219,7 @@ impl File {
         let faces: [u16; 24] = [
             0, 2, 4, 2, 1, 4, 1, 3, 4, 3, 0, 4, 2, 0, 5, 1, 2, 5, 3, 1, 5, 0, 3, 5,
         ];
-        let mut primitive = self.primitive(TRIANGLES, Colour::Marker, &corners);
+        let mut primitive = self.primitive(TRIANGLES, Color::Marker, &corners);
         let bytes: Vec<u8> = faces.iter().flat_map(|i| i.to_le_bytes()).collect();
         /// `ELEMENT_ARRAY_BUFFER`.
         const INDICES: u32 = 34963;
@@ -270,7 +264,7 @@ impl File {
     fn robot(
         &mut self,
         view: &View3d,
-        (name, colour): (&str, Colour),
+        (name, color): (&str, Color),
         rows: fn(&ViewPose) -> &Vec<[f64; 7]>,
         triad: usize,
     ) -> usize {
@@ -282,14 +276,14 @@ impl File {
         } else {
             &whole[..1]
         };
-        let suffix = match colour {
-            Colour::Nominal => " (nominal)",
+        let suffix = match color {
+            Color::Nominal => " (nominal)",
             _ => "",
         };
         let count = view.frames.len();
         let first = self.nodes.len();
         self.nodes.resize(first + count, Value::Null);
-        let line = self.segment(colour);
+        let line = self.segment(color);
         for (i, frame) in view.frames.iter().enumerate() {
             let relative = |rows: &Vec<[f64; 7]>, k: usize, parent: Option<usize>| match parent {
                 Some(parent) => isometry(&rows[parent]).inverse() * isometry(&rows[k]),
@@ -304,7 +298,7 @@ impl File {
                 .flat_map(|[ax, ay, az, bx, by, bz]| [[*ax, *ay, *az], [*bx, *by, *bz]])
                 .collect();
             let outline = format!("{} outline{suffix}", frame.name);
-            if let Some(mesh) = self.mesh(&outline, LINES, colour, &lines) {
+            if let Some(mesh) = self.mesh(&outline, LINES, color, &lines) {
                 children.push(self.node(json!({"name": outline, "mesh": mesh})));
             }
             for k in (0..count).filter(|k| view.frames[*k].parent == Some(i)) {
@@ -425,7 +419,7 @@ impl File {
             .clouds
             .iter()
             .filter_map(|cloud| {
-                let mesh = self.mesh(&cloud.name, POINTS, Colour::Soft, &cloud.points)?;
+                let mesh = self.mesh(&cloud.name, POINTS, Color::Soft, &cloud.points)?;
                 Some(self.node(json!({"name": cloud.name, "mesh": mesh})))
             })
             .collect();
@@ -436,7 +430,7 @@ impl File {
     fn joints(&mut self, view: &View3d) -> Option<usize> {
         let mut children = Vec::new();
         let mut put = |name: String, points: Vec<[f64; 3]>| {
-            if let Some(mesh) = self.mesh(&name, LINES, Colour::Joint, &points) {
+            if let Some(mesh) = self.mesh(&name, LINES, Color::Joint, &points) {
                 children.push(self.node(json!({"name": name, "mesh": mesh})));
             }
         };
@@ -470,9 +464,9 @@ impl File {
     }
 
     /// A line of length 1 along z.
-    fn segment(&mut self, colour: Colour) -> usize {
-        let primitive = self.primitive(LINES, colour, &[[0.0; 3], [0.0, 0.0, 1.0]]);
-        let name = format!("line of {}", COLOURS[colour as usize].0);
+    fn segment(&mut self, color: Color) -> usize {
+        let primitive = self.primitive(LINES, color, &[[0.0; 3], [0.0, 0.0, 1.0]]);
+        let name = format!("line of {}", COLORS[color as usize].0);
         Self::push(
             &mut self.meshes,
             json!({"name": name, "primitives": [primitive]}),
@@ -482,7 +476,7 @@ impl File {
     /// JSON and binary chunk behind the twelve bytes of the header (§4.4 of the specification).
     fn finish(mut self, scene: &Scene, view: &View3d, root: usize) -> Result<Vec<u8>, ReportError> {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let materials: Vec<Value> = COLOURS
+        let materials: Vec<Value> = COLORS
             .iter()
             .map(|(name, [r, g, b])| {
                 json!({

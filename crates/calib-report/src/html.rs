@@ -1,7 +1,7 @@
 //! `report.html`: one file that opens from disk, without network, in light and dark, on paper and by keyboard.
 //!
-//! The first screen answers twelve questions ([`crate::answers`]), where it is too small by links to the answers; below stand the 3-D view and the sections that Markdown has,
-//! with the pictures of [`crate::plots`]. A content security policy forbids the page to load anything.
+//! The first screen answers twelve questions ([`crate::answers`]), or links to the answers where it is too small; the 3-D view and the sections of the Markdown report follow,
+//! with the plots of [`crate::plots`]. A content security policy forbids the page to load anything.
 
 use crate::plots::plots;
 use crate::sections::{Block, sections};
@@ -69,7 +69,7 @@ struct PlotPart {
     svg: Markup,
 }
 
-/// HTML that was escaped when it was made.
+/// Escaped HTML.
 struct Markup(String);
 
 impl Markup {
@@ -97,7 +97,7 @@ impl Markup {
     }
 }
 
-/// The page. The view is thinned to what a page can carry ([`View3d::thinned`]).
+/// The page. The view is thinned to a size that suits a page ([`View3d::thinned`]).
 ///
 /// # Errors
 /// [`ReportError::Html`] when the template fails, [`ReportError::Json`] when the view has no JSON form.

@@ -1,6 +1,6 @@
 //! JSON that is the same text for the same report: keys in the order of the structs, floats with 12 significant digits.
 //!
-//! Twelve digits are a picometre in a metre: below what any optimiser repeats over machines, above what anybody measures.
+//! Twelve digits are a picometer in a meter: finer than optimizers repeat across machines and finer than measurements.
 
 use crate::{Report, ReportError};
 use serde::Serialize;
@@ -12,7 +12,7 @@ pub const DIGITS: usize = 12;
 /// `report.json`: SI, floats with [`DIGITS`] significant digits, ordered keys, one trailing newline.
 ///
 /// # Errors
-/// [`ReportError::NotFinite`] when a number that must be known is NaN or infinite (an unknown one is `None`).
+/// [`ReportError::NotFinite`] when a required number is NaN or infinite (an unknown one is `None`).
 pub fn report_json(report: &Report) -> Result<String, ReportError> {
     Ok(pretty(&report_value(report)?))
 }
@@ -37,7 +37,7 @@ pub fn read_report(text: &str) -> Result<Report, ReportError> {
     serde_json::from_str(text).map_err(|source| ReportError::Json(source.to_string()))
 }
 
-/// Any serialisable value as JSON, floats untouched: shortest decimals that read back to the same number.
+/// Any serializable value as JSON, floats untouched: shortest decimals that read back to the same number.
 ///
 /// # Errors
 /// [`ReportError::Json`] when the value has no JSON form.
@@ -78,7 +78,7 @@ fn round(x: f64, digits: usize) -> f64 {
     if rounded == 0.0 { 0.0 } else { rounded }
 }
 
-/// Indented by two spaces; an array of plain values stands on one line, so that a matrix looks like one.
+/// Indented by two spaces; an array of plain values is on one line, so that a matrix is readable.
 #[must_use]
 pub fn pretty(value: &Value) -> String {
     let mut text = String::new();

@@ -1,28 +1,29 @@
 //! The report as data, its renderers, and the scene that other programs read.
 //!
-//! A calibration is `n` residuals, `m` parameters and one question: may I trust it? The answer is a set of numbers that were
-//! computed elsewhere:
+//! A calibration has `n` residuals and `m` parameters, and its user needs to know whether to trust it. The answer is a set of
+//! numbers computed elsewhere:
 //!
 //! ```text
-//! x̂ ± σ,  C = (JᵀWJ + prior)⁻¹                    what was found, and how well
-//! {u : J·u ≈ 0}                                    what the data cannot say
-//! e_s = p_predicted(s) − p_observed(s), s held out  what to expect on a pose that was not fitted: [m]
+//! x̂ ± σ,  C = (JᵀWJ + prior)⁻¹                    estimate and uncertainty
+//! {u : J·u ≈ 0}                                    directions that are not observable
+//! e_s = p_predicted(s) − p_observed(s), s held out  error expected on a pose that was not fitted: [m]
 //! ```
 //!
 //! [`Report`] holds them as a plain struct (SI: m, rad, s); [`markdown`], [`terminal`], [`json`], [`csv`] and [`html`] turn the
-//! struct into text and compute nothing. A renderer changes units and rounds ([`number`]): that is all. What has to be
-//! *summarised* (quantiles, bins, a verdict from limits) is a constructor of the data, next to its struct: [`Stats::of`],
+//! struct into text: they change units and round ([`number`]), and compute nothing else. What has to be
+//! *summarized* (quantiles, bins, a verdict from limits) is a constructor of the data, next to its type: [`Stats::of`],
 //! [`ErrorStats::of`], [`HeldOut::from_poses`], [`Residuals::from_rows`], [`JointCoverage::of`], [`judge`].
 //!
 //! [`Scene`] is the calibrated world for a situation model: frames with covariance and status, markers, robot, provenance;
 //! [`Scene::json`] keeps every bit, [`Scene::ros_launch`] and [`Scene::sdf`] are derived and lossy.
 //!
-//! What this crate does **not** protect against: a report that was filled wrongly. It holds no clock and takes no
-//! absolute path: whoever fills it passes paths relative to the profile. Same report, same bytes.
+//! What this crate does **not** protect against: a report that was filled with wrong data. It reads no clock and takes no
+//! absolute path: the caller passes paths relative to the profile. The same report gives the same bytes.
 
 pub mod csv;
 mod data;
 mod error;
+mod facts;
 pub mod glb;
 pub mod html;
 pub mod json;
@@ -50,6 +51,7 @@ pub use data::{
     RecordingUse, Rejected, Workspace, WorkspacePoint,
 };
 pub use error::ReportError;
+pub use facts::{ClockCheck, ErrorSource, FitEnd, NextStep, NoiseKind, Scope};
 pub use quantity::JointValue;
 pub use read::{NotAReport, REPORT, read_report, report_path};
 pub use report::{FormatVersion, Limit, Method, Outcome, Report, Verdict, judge};

@@ -1,42 +1,39 @@
 //! Numbers for people: a unit, and no more digits than the uncertainty carries.
 //!
 //! One rule for a value with a standard deviation σ: σ is rounded to two significant digits and the value to the same
-//! decimal place, `1.234 ± 0.041 mm`. A value without σ has three significant digits, but never more decimals than its unit
-//! deserves. A number that rounds to zero has no sign. What is not finite is a dash, never `NaN`.
+//! decimal place, `1.234 ± 0.041 mm`. A value without σ has three significant digits and at most three decimals. A number that
+//! rounds to zero has no sign; a negative number has a true minus sign (−). A value that is not finite is a dash, never `NaN`.
+//!
+//! Numbers for programs (CSV, URDF, JSON) are ASCII: [`round_trip`].
 
 use crate::Unit;
 
-/// What stands where no number is known.
+/// Shown in place of an unknown number.
 pub const UNKNOWN: &str = "—";
 
-/// Decimals beyond which nothing is printed: a nanometre in mm, a microdegree in degrees.
+/// Largest number of decimals: a nanometer in mm, a microdegree in degrees.
 const MAX_DECIMALS: i32 = 6;
 
-/// From here on a fixed-point number is a row of digits that nobody reads: use an exponent.
+/// From here on a fixed-point number is unreadable: use an exponent.
 const SCIENTIFIC_FROM: f64 = 1e7;
 
-/// Decimals of a value whose uncertainty is unknown: a micrometre, a milli-degree, a microsecond.
+/// Decimals of a value whose uncertainty is unknown: a micrometer, a millidegree, a microsecond.
 const PLAIN_DECIMALS: i32 = 3;
 
 /// `1.234 ± 0.041 mm` from SI numbers. Without a finite σ the value stands alone.
 ///
 /// ```
 /// use calib_report::{number, Unit};
-/// assert_eq!(number::with_sigma(0.00123456, Some(0.0000412), Unit::Metre), "1.235 ± 0.041 mm");
-/// assert_eq!(number::with_sigma(-1e-9, Some(0.002), Unit::Metre), "0.0 ± 2.0 mm");
+/// assert_eq!(number::with_sigma(0.00123456, Some(0.0000412), Unit::Meter), "1.235 ± 0.041 mm");
+/// assert_eq!(number::with_sigma(-1e-9, Some(0.002), Unit::Meter), "0.0 ± 2.0 mm");
 /// ```
 #[must_use]
 pub fn with_sigma(value: f64, sigma: Option<f64>, unit: Unit) -> String {
-    let (factor, suffix) = unit.display();
-    // What is finite in metres may not be in millimetres.
-    let scaled = sigma
-        .map(|sigma| (value * factor, sigma.abs() * factor))
-        .filter(|(value, sigma)| value.is_finite() && sigma.is_finite());
-    let Some((value_shown, sigma_shown)) = scaled else {
+    let Some((value, sigma)) = scaled(value, sigma, unit) else {
         return plain(value, unit);
     };
-    let (value, sigma) = digits_from_sigma(value_shown, sigma_shown);
-    // A degree sign stands at both numbers, a unit with a space once.
+    let suffix = unit.display().1;
+    // Both numbers carry the degree sign; a unit with a space stands once.
     if suffix.starts_with(' ') || suffix.is_empty() {
         format!("{value} ± {sigma}{suffix}")
     } else {
@@ -44,22 +41,44 @@ pub fn with_sigma(value: f64, sigma: Option<f64>, unit: Unit) -> String {
     }
 }
 
+/// Value and σ as text in the unit that a person reads; `None` without a finite σ.
+fn scaled(value: f64, sigma: Option<f64>, unit: Unit) -> Option<(String, String)> {
+    let factor = unit.display().0;
+    // A number that is finite in meters may not be finite in millimeters.
+    sigma
+        .map(|sigma| (value * factor, sigma.abs() * factor))
+        .filter(|(value, sigma)| value.is_finite() && sigma.is_finite())
+        .map(|(value, sigma)| digits_from_sigma(value, sigma))
+}
+
+/// [`with_sigma`] without its unit, for a table whose heading names the unit.
+#[must_use]
+pub fn bare_with_sigma(value: f64, sigma: Option<f64>, unit: Unit) -> String {
+    scaled(value, sigma, unit).map_or_else(
+        || bare(value, unit),
+        |(value, sigma)| format!("{value} ± {sigma}"),
+    )
+}
+
+/// The value alone with its unit, rounded as [`with_sigma`] rounds it.
+#[must_use]
+pub fn rounded_by_sigma(value: f64, sigma: Option<f64>, unit: Unit) -> String {
+    scaled(value, sigma, unit).map_or_else(
+        || plain(value, unit),
+        |(value, _)| format!("{value}{}", unit.display().1),
+    )
+}
+
 /// `+1.235 ± 0.041 mm`: a change, with its sign.
 #[must_use]
 pub fn change(value: f64, sigma: Option<f64>, unit: Unit) -> String {
-    let text = with_sigma(value, sigma, unit);
-    if value > 0.0 && !is_zero(&text) {
-        format!("+{text}")
+    let rounded = scaled(value, sigma, unit).map_or_else(|| bare(value, unit), |(value, _)| value);
+    let plus = if value > 0.0 && rounded.contains(|c: char| ('1'..='9').contains(&c)) {
+        "+"
     } else {
-        text
-    }
-}
-
-/// Whether the leading number of a formatted text is zero.
-fn is_zero(text: &str) -> bool {
-    text.split([' ', '°'])
-        .next()
-        .is_some_and(|first| first.bytes().all(|b| matches!(b, b'0' | b'.')))
+        ""
+    };
+    format!("{plus}{}", with_sigma(value, sigma, unit))
 }
 
 /// `± 0.041 mm`: a standard deviation alone, two significant digits.
@@ -102,10 +121,10 @@ pub fn unit_name(unit: Unit) -> &'static str {
     unit.heading()
 }
 
-/// A length in centimetres with two decimals, as the paper's Table 1 prints it.
+/// A length in centimeters with two decimals, as the paper's Table 1 prints it.
 #[must_use]
-pub fn centimetres(metres: f64) -> String {
-    fixed(metres * 1e2, 2)
+pub fn centimeters(meters: f64) -> String {
+    fixed(meters * 1e2, 2)
 }
 
 /// An angle in degrees with two decimals, as the paper's Table 1 prints it.
@@ -127,7 +146,7 @@ pub fn fixed_with_unit(value: f64, unit: Unit, decimals: usize) -> String {
     format!("{}{suffix}", fixed(value * factor, decimals))
 }
 
-/// `37 %` of a share in [0, 1]; `> 99 %` and `< 1 %` where rounding would claim all or nothing.
+/// `37 %` of a share in [0, 1]; `> 99 %` and `< 1 %` where rounding would give 100 % or 0 %.
 #[must_use]
 pub fn percent(share: f64) -> String {
     if !share.is_finite() {
@@ -145,7 +164,7 @@ pub fn percent(share: f64) -> String {
 
 /// The shortest decimal that reads back to the same `f64`, without an exponent and without a negative zero.
 ///
-/// Not finite numbers do not occur in a checked scene; they become `0` so that no file ever says `NaN`.
+/// Numbers that are not finite do not occur in a checked scene; they become `0` so that no file contains `NaN`.
 #[must_use]
 pub fn round_trip(value: f64) -> String {
     if !value.is_finite() || value == 0.0 {
@@ -155,22 +174,29 @@ pub fn round_trip(value: f64) -> String {
     }
 }
 
-/// Fixed decimals, without `-0.00`.
+/// Fixed decimals with a true minus sign, without `−0.00`.
 #[must_use]
 pub fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return UNKNOWN.to_owned();
     }
     if value.abs() >= SCIENTIFIC_FROM {
-        return format!("{value:.1e}");
+        return exponential(value);
     }
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
         Some(magnitude) if magnitude.bytes().all(|b| matches!(b, b'0' | b'.')) => {
             magnitude.to_owned()
         }
-        _ => text,
+        Some(magnitude) => format!("−{magnitude}"),
+        None => text,
     }
+}
+
+/// Two significant digits and an exponent, with a true minus sign.
+fn exponential(value: f64) -> String {
+    // −0 + 0 is 0.
+    format!("{:.1e}", value + 0.0).replacen('-', "−", usize::from(value < 0.0))
 }
 
 /// Three significant digits, between 0 and `max_decimals` decimals.
@@ -189,7 +215,7 @@ fn significant(value: f64, max_decimals: i32) -> String {
 /// Value and σ > 0 as text with the decimals that two significant digits of σ leave.
 fn digits_from_sigma(value: f64, sigma: f64) -> (String, String) {
     if value.abs() >= SCIENTIFIC_FROM || sigma >= SCIENTIFIC_FROM {
-        return (format!("{:.1e}", value + 0.0), format!("{sigma:.1e}")); // −0 + 0 is 0
+        return (exponential(value), exponential(sigma));
     }
     if sigma == 0.0 {
         return (significant(value, PLAIN_DECIMALS), "0".to_owned());
@@ -252,7 +278,7 @@ mod tests {
         ];
         for (value, sigma, text) in table {
             assert_eq!(
-                with_sigma(value, Some(sigma), Unit::Metre),
+                with_sigma(value, Some(sigma), Unit::Meter),
                 text,
                 "{value} ± {sigma}"
             );
@@ -267,14 +293,14 @@ mod tests {
         );
         assert_eq!(
             with_sigma(-0.0123, Some(0.0011), Unit::Second),
-            "-12.3 ± 1.1 ms"
+            "−12.3 ± 1.1 ms"
         );
         assert_eq!(
             with_sigma(1.0002, Some(0.0001), Unit::One),
             "1.00020 ± 0.00010"
         );
-        assert_eq!(plain(1e-5, Unit::RadianPerNewtonMetre), "0.001°/(N·m)");
-        assert_eq!(plain(1e-6, Unit::MetrePerNewton), "0.001 mm/N");
+        assert_eq!(plain(1e-5, Unit::RadianPerNewtonMeter), "0.001°/(N·m)");
+        assert_eq!(plain(1e-6, Unit::MeterPerNewton), "0.001 mm/N");
     }
 
     #[test]
@@ -292,28 +318,28 @@ mod tests {
             (f64::INFINITY, "—"),
         ];
         for (value, text) in table {
-            assert_eq!(plain(value, Unit::Metre), text, "{value}");
+            assert_eq!(plain(value, Unit::Meter), text, "{value}");
         }
     }
 
     #[test]
     fn an_unknown_sigma_leaves_the_value_and_an_unknown_value_leaves_a_dash() {
-        assert_eq!(with_sigma(0.1234, None, Unit::Metre), "123 mm");
+        assert_eq!(with_sigma(0.1234, None, Unit::Meter), "123 mm");
         assert_eq!(
-            with_sigma(0.1234, Some(f64::INFINITY), Unit::Metre),
+            with_sigma(0.1234, Some(f64::INFINITY), Unit::Meter),
             "123 mm"
         );
-        assert_eq!(with_sigma(f64::NAN, Some(0.1), Unit::Metre), "—");
-        assert_eq!(sigma(None, Unit::Metre), "—");
-        assert_eq!(sigma(Some(0.000_012_3), Unit::Metre), "0.012 mm");
-        assert_eq!(plain_or_unknown(None, Unit::Metre), "—");
+        assert_eq!(with_sigma(f64::NAN, Some(0.1), Unit::Meter), "—");
+        assert_eq!(sigma(None, Unit::Meter), "—");
+        assert_eq!(sigma(Some(0.000_012_3), Unit::Meter), "0.012 mm");
+        assert_eq!(plain_or_unknown(None, Unit::Meter), "—");
     }
 
     #[test]
     fn a_change_has_a_sign_unless_it_is_nothing() {
-        assert_eq!(change(0.001, Some(0.0001), Unit::Metre), "+1.00 ± 0.10 mm");
-        assert_eq!(change(-0.001, Some(0.0001), Unit::Metre), "-1.00 ± 0.10 mm");
-        assert_eq!(change(1e-9, Some(0.0001), Unit::Metre), "0.00 ± 0.10 mm");
+        assert_eq!(change(0.001, Some(0.0001), Unit::Meter), "+1.00 ± 0.10 mm");
+        assert_eq!(change(-0.001, Some(0.0001), Unit::Meter), "−1.00 ± 0.10 mm");
+        assert_eq!(change(1e-9, Some(0.0001), Unit::Meter), "0.00 ± 0.10 mm");
         assert_eq!(
             change(1e-9, Some(0.0001), Unit::Radian),
             "0.0000° ± 0.0057°"
@@ -337,9 +363,9 @@ mod tests {
 
     #[test]
     fn the_papers_table_has_two_decimals() {
-        assert_eq!(centimetres(0.00862), "0.86");
+        assert_eq!(centimeters(0.00862), "0.86");
         assert_eq!(degrees(0.0233), "1.33");
-        assert_eq!(centimetres(-1e-9), "0.00");
+        assert_eq!(centimeters(-1e-9), "0.00");
     }
 
     proptest! {
@@ -349,12 +375,12 @@ mod tests {
         #[test]
         fn the_printed_number_is_the_number(value in -10.0..10.0f64, exponent in -7.5..1.0f64) {
             let sigma = 10f64.powf(exponent);
-            let text = with_sigma(value, Some(sigma), Unit::Metre);
+            let text = with_sigma(value, Some(sigma), Unit::Meter);
             let number = text.strip_suffix(" mm").expect("a unit");
             let (shown_value, shown_sigma) = number.split_once(" ± ").expect("a sigma");
             let decimals = |s: &str| s.split_once('.').map_or(0, |(_, d)| d.len());
             prop_assert_eq!(decimals(shown_value), decimals(shown_sigma), "{}", &text);
-            let printed: f64 = shown_value.parse().expect("a number");
+            let printed: f64 = shown_value.replace('−', "-").parse().expect("a number");
             let printed_sigma: f64 = shown_sigma.parse().expect("a number");
             prop_assert!((printed_sigma / (sigma * 1e3) - 1.0).abs() <= 0.0501, "{}", &text);
             // Two significant digits of σ: half of the last place is at most σ/20 (σ = 10), at least σ/198.
@@ -365,11 +391,11 @@ mod tests {
 
         #[test]
         fn nothing_is_minus_zero_or_not_a_number(value in proptest::num::f64::ANY, sigma in proptest::num::f64::ANY) {
-            for text in [with_sigma(value, Some(sigma), Unit::Metre), plain(value, Unit::Radian), change(value, Some(sigma), Unit::One),
+            for text in [with_sigma(value, Some(sigma), Unit::Meter), plain(value, Unit::Radian), change(value, Some(sigma), Unit::One),
                          fixed(value, 2), percent(value), round_trip(value)] {
                 prop_assert!(!text.contains("NaN") && !text.contains("inf"), "{}", &text);
                 let first = text.split([' ', '°']).next().unwrap_or("");
-                let is_minus_zero = first.starts_with('-') && first.parse::<f64>() == Ok(0.0);
+                let is_minus_zero = first.starts_with('−') && !first.contains(|c: char| ('1'..='9').contains(&c));
                 prop_assert!(!is_minus_zero, "{}", &text);
             }
         }

@@ -1,28 +1,28 @@
-//! What is drawn in `report.html`, as data: every number of a picture stands here, in the unit of its axis.
+//! The plots of `report.html` as data: every plotted number, in the unit of its axis.
 
 use crate::{Change, JointResiduals, Report, ResidualGroup, Unit, number};
 use serde::Serialize;
 
-/// A picture.
+/// A plot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Plot {
     /// Unique in the page.
     pub id: String,
     /// The section it belongs to.
     pub section: &'static str,
-    /// Above the picture.
+    /// The heading.
     pub title: String,
-    /// What it shows, for those who do not see it, and how to read it.
+    /// What it shows and how to read it, also for screen readers.
     pub description: String,
-    /// The picture.
+    /// The kind of plot and its data.
     pub kind: PlotKind,
 }
 
-/// Kinds of pictures.
+/// Kinds of plots.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PlotKind {
-    /// One row per thing: a bar, a mark with whiskers, a tick.
+    /// One row per item: a bar, a mark with whiskers, a tick.
     Rows {
         /// Label of the axis.
         axis: String,
@@ -59,7 +59,7 @@ pub enum PlotKind {
 pub struct PlotRow {
     /// Left of the row.
     pub label: String,
-    /// Colour and shape, 0 to 3: 0 is what was calibrated.
+    /// Color and shape, 0 to 3: 0 is what was calibrated.
     pub style: usize,
     /// Length of the bar from zero.
     pub bar: Option<f64>,
@@ -69,7 +69,7 @@ pub struct PlotRow {
     pub whisker: Option<[f64; 2]>,
     /// A short upright line: the largest value.
     pub tick: Option<f64>,
-    /// The number in words, right of the row.
+    /// The number as text, right of the row.
     pub text: String,
 }
 
@@ -78,7 +78,7 @@ pub struct PlotRow {
 pub struct Series {
     /// In the legend.
     pub name: String,
-    /// Colour and shape, 0 to 3: 0 is what was calibrated.
+    /// Color and shape, 0 to 3: 0 is what was calibrated.
     pub style: usize,
     /// Whether the points are joined.
     pub line: bool,
@@ -91,9 +91,9 @@ pub struct Series {
 pub struct Strip {
     /// The joint.
     pub label: String,
-    /// Left end, in words.
+    /// Left end, as text.
     pub from: String,
-    /// Right end, in words.
+    /// Right end, as text.
     pub to: String,
     /// Samples per bin.
     pub counts: Vec<u64>,
@@ -110,13 +110,13 @@ pub struct Panel {
     pub points: Vec<[f64; 3]>,
 }
 
-/// Rows in one picture: more are not read.
+/// Rows in one plot: more are not readable.
 const ROWS: usize = 40;
 
 /// Half width of an error bar in standard deviations: about 95 %.
 const SIGMAS: f64 = 2.0;
 
-/// All pictures of a report, in the order of the page.
+/// All plots of a report, in the order of the page.
 #[must_use]
 pub fn plots(report: &Report) -> Vec<Plot> {
     let mut plots = Vec::new();
@@ -130,8 +130,8 @@ pub fn plots(report: &Report) -> Vec<Plot> {
     plots
 }
 
-fn mm(metres: f64) -> f64 {
-    metres * 1e3
+fn mm(meters: f64) -> f64 {
+    meters * 1e3
 }
 
 fn held_out(plots: &mut Vec<Plot>, report: &Report) {
@@ -152,7 +152,7 @@ fn held_out(plots: &mut Vec<Plot>, report: &Report) {
             bar: Some(mm(stats.rms_m)),
             whisker: Some([mm(stats.rms_m), mm(stats.p95_m)]),
             tick: Some(mm(stats.max_m)),
-            text: number::plain(stats.rms_m, Unit::Metre),
+            text: number::plain(stats.rms_m, Unit::Meter),
             ..PlotRow::default()
         })
         .collect();
@@ -207,10 +207,10 @@ fn held_out(plots: &mut Vec<Plot>, report: &Report) {
 
 fn changes(plots: &mut Vec<Plot>, report: &Report) {
     for (unit, id, title) in [
-        (Unit::Metre, "plot-changes-length", "Changed lengths"),
+        (Unit::Meter, "plot-changes-length", "Changed lengths"),
         (Unit::Radian, "plot-changes-angle", "Changed angles"),
     ] {
-        let scale = if unit == Unit::Metre {
+        let scale = if unit == Unit::Meter {
             1e3
         } else {
             180.0 / std::f64::consts::PI
@@ -242,7 +242,9 @@ fn changes(plots: &mut Vec<Plot>, report: &Report) {
                 id: id.into(),
                 section: "changes",
                 title: title.into(),
-                description: "Dot: the change; line: ± 2 σ. A line that crosses zero is a change that the data do not show.".into(),
+                description:
+                    "Dot: change; line: ± 2 σ. A change whose line crosses zero is not significant."
+                        .into(),
                 kind: PlotKind::Rows { axis, rows },
             });
         }
@@ -264,14 +266,14 @@ fn loops(plots: &mut Vec<Plot>, report: &Report) {
                 mm(group.translation_m.mean + group.translation_m.std),
             ]),
             tick: Some(mm(group.translation_m.max)),
-            text: number::plain(group.translation_m.mean, Unit::Metre),
+            text: number::plain(group.translation_m.mean, Unit::Meter),
             ..PlotRow::default()
         };
         plots.push(Plot {
             id: format!("plot-loop-{}", i + 1),
             section: "loops",
             title: format!("{} by {}", closure.name, if closure.grouped_by.is_empty() { "group" } else { &closure.grouped_by }),
-            description: "Bar: mean length of e_t; line: ± one standard deviation of the samples; tick: the largest.".into(),
+            description: "Bar: mean length of e_t; line: ± one standard deviation of the samples; tick: maximum.".into(),
             kind: PlotKind::Rows { axis: "‖e_t‖ [mm]".into(), rows: closure.groups.iter().map(row).take(ROWS).collect() },
         });
     }
@@ -292,8 +294,10 @@ fn coverage(plots: &mut Vec<Plot>, report: &Report) {
         plots.push(Plot {
             id: "plot-coverage".into(),
             section: "data",
-            title: "Where the joints were".into(),
-            description: "Every joint over its range: the stronger a cell, the more samples; an empty cell was never visited.".into(),
+            title: "Joint ranges in the data".into(),
+            description:
+                "Samples of each joint over its range. Darker: more samples; empty: no samples."
+                    .into(),
             kind: PlotKind::Strips { rows },
         });
     }
@@ -305,7 +309,7 @@ fn residuals(plots: &mut Vec<Plot>, report: &Report) {
         bar: Some(mm(group.rms_m)),
         whisker: Some([mm(group.rms_m), mm(group.p95_m)]),
         tick: Some(mm(group.max_m)),
-        text: number::plain(group.rms_m, Unit::Metre),
+        text: number::plain(group.rms_m, Unit::Meter),
         ..PlotRow::default()
     };
     for (id, title, groups) in [
@@ -316,7 +320,7 @@ fn residuals(plots: &mut Vec<Plot>, report: &Report) {
         ),
         (
             "plot-residuals-direction",
-            "Residuals per direction of the tracker",
+            "Residuals along the axes of the tracker",
             &report.residuals.by_direction,
         ),
     ] {
@@ -325,7 +329,7 @@ fn residuals(plots: &mut Vec<Plot>, report: &Report) {
                 id: id.into(),
                 section: "residuals",
                 title: title.into(),
-                description: "Bar: rms; line: to the 95 % quantile; tick: the largest.".into(),
+                description: "Bar: rms; line: up to the 95 % quantile; tick: maximum.".into(),
                 kind: PlotKind::Rows {
                     axis: "residual [mm]".into(),
                     rows: groups.iter().map(row).take(ROWS).collect(),
@@ -343,7 +347,7 @@ fn residuals(plots: &mut Vec<Plot>, report: &Report) {
     for (i, recording) in report.residuals.over_time.iter().enumerate() {
         plots.push(over_bins(
             format!("plot-residuals-time-{}", i + 1),
-            format!("Residuals in the order of {}", recording.name),
+            format!("Residuals over {}", recording.name),
             recording,
         ));
     }
@@ -355,7 +359,7 @@ fn over_bins(id: String, title: String, residuals: &JointResiduals) -> Plot {
             180.0 / std::f64::consts::PI,
             format!("{} [deg]", residuals.name),
         ),
-        Unit::Metre => (1e3, format!("{} [mm]", residuals.name)),
+        Unit::Meter => (1e3, format!("{} [mm]", residuals.name)),
         Unit::Second => (1.0, "time [s]".to_owned()),
         _ => (1.0, "row".to_owned()),
     };
@@ -383,7 +387,7 @@ fn over_bins(id: String, title: String, residuals: &JointResiduals) -> Plot {
         id,
         section: "residuals",
         title,
-        description: "Lines: mean residual along the tracker's x, y, z; a wave is something that is not modelled. Dots: rms length.".into(),
+        description: "Lines: mean residual along the x, y, z axes of the tracker; a systematic pattern indicates an effect that is not modeled. Dots: rms length.".into(),
         kind: PlotKind::Xy { x, y: "residual [mm]".into(), log_y: false, series: vec![component("x", 0), component("y", 1), component("z", 2), rms] },
     }
 }
@@ -409,7 +413,7 @@ fn workspace(plots: &mut Vec<Plot>, report: &Report) {
         section: "workspace",
         title: format!("Predicted σ of {}", workspace.link),
         description: format!(
-            "Places in {}, from above and from the side; the stronger the colour, the less certain the tool is there.",
+            "Positions in {}, top view and side view. Darker: larger uncertainty of the tool.",
             workspace.frame
         ),
         kind: PlotKind::Map {

@@ -9,7 +9,7 @@ pub struct JointValue {
     pub joint: String,
     /// rad or m.
     pub value: f64,
-    /// [`Unit::Radian`] or [`Unit::Metre`].
+    /// [`Unit::Radian`] or [`Unit::Meter`].
     pub unit: Unit,
 }
 
@@ -26,11 +26,11 @@ impl JointValue {
 
     /// A prismatic joint's position in m.
     #[must_use]
-    pub fn metres(joint: impl Into<String>, value: f64) -> Self {
+    pub fn meters(joint: impl Into<String>, value: f64) -> Self {
         Self {
             joint: joint.into(),
             value,
-            unit: Unit::Metre,
+            unit: Unit::Meter,
         }
     }
 }

@@ -6,9 +6,9 @@ use crate::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Everything a calibration has to say, in SI. Fields stand in the order of `report.json`; a key is added, never renamed.
+/// The result of a calibration, in SI units. Fields are in the order of `report.json`; keys are added, never renamed.
 ///
-/// `..Report::default()` fills what a run does not have: an empty list is "none", a `None` is "not known".
+/// `..Report::default()` fills what a run does not have: an empty list means none, `None` means unknown.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Report {
     /// Version of this format.
@@ -17,47 +17,47 @@ pub struct Report {
     pub profile: String,
     /// The robot's name.
     pub robot: String,
-    /// How it was solved.
+    /// The solution method.
     pub method: Method,
-    /// May the result be used?
+    /// Whether the result may be used.
     pub verdict: Verdict,
-    /// Why: one sentence a reason, the decisive first.
+    /// The reasons: one sentence each, the most important first.
     pub reasons: Vec<String>,
-    /// For what the verdict holds: one sentence an item (which tool point, which joint ranges, which load).
+    /// What the verdict is valid for: one sentence each (tool point, joint ranges, load).
     #[serde(default)]
     pub scope: Vec<String>,
     /// The limits of the profile and whether they were met.
     #[serde(default)]
     pub limits: Vec<Limit>,
-    /// What the reader should do now, most useful first.
+    /// What the reader should do now, the most useful first.
     #[serde(default)]
     pub next_steps: Vec<String>,
-    /// The transforms that were solved for, and those they were derived into.
+    /// Estimated transforms, and those derived from them.
     pub transforms: Vec<Transform>,
     /// Every scalar unknown.
     pub parameters: Vec<Parameter>,
-    /// What differs in the URDF: one entry for one number.
+    /// The changed values of the URDF, one entry each.
     #[serde(default)]
     pub changes: Vec<Change>,
     /// The same as a unified text diff with relative paths; empty when no URDF was written.
     #[serde(default)]
     pub urdf_diff: String,
-    /// Combinations of parameters that the data cannot tell apart. Those of a single transform stand at the transform.
+    /// Combinations of parameters that are not observable. Those of a single transform are listed with the transform.
     #[serde(default)]
     pub not_observable: Vec<NotObservable>,
     /// The loop closures: measured against forward kinematics.
     pub loops: Vec<LoopClosure>,
     /// Errors on poses that were not fitted.
     pub verification: Verification,
-    /// The same quantities by other estimators.
+    /// Cross-check of the same quantities with other estimators.
     pub estimators: Vec<EstimatorResult>,
     /// How the solver ended.
     #[serde(default)]
     pub fit: Option<FitSummary>,
-    /// Residuals of the fit, summarised.
+    /// Residuals of the fit, summarized.
     #[serde(default)]
     pub residuals: Residuals,
-    /// What the solver found the noise to be.
+    /// The estimated noise.
     #[serde(default)]
     pub noise: Vec<Noise>,
     /// Offsets between the clocks of the recordings.
@@ -66,19 +66,19 @@ pub struct Report {
     /// What was read.
     #[serde(default)]
     pub recordings: Vec<RecordingSummary>,
-    /// Where the joints were.
+    /// The joint ranges in the data.
     #[serde(default)]
     pub coverage: Vec<JointCoverage>,
-    /// What was thrown out, and why.
+    /// Rejected samples and the reasons.
     #[serde(default)]
     pub rejected: Vec<Rejected>,
     /// The predicted uncertainty of the tool over the workspace.
     #[serde(default)]
     pub workspace: Option<Workspace>,
-    /// What limits the accuracy now, largest share first.
+    /// What limits the accuracy, largest share first.
     #[serde(default)]
     pub accuracy_limits: Vec<AccuracyLimit>,
-    /// What the data checks found.
+    /// Findings of the data checks.
     pub findings: Vec<Finding>,
     /// Files that were read.
     pub inputs: Vec<Input>,
@@ -88,13 +88,13 @@ pub struct Report {
     /// Commands that repeat this result.
     #[serde(default)]
     pub reproduce: Vec<String>,
-    /// Commands that take it back.
+    /// Commands that revert it.
     #[serde(default)]
     pub undo: Vec<String>,
     /// The seed of everything random.
     #[serde(default)]
     pub seed: u64,
-    /// What the data alone say of the parameters: for `calib drift`. Null with `method: paper`.
+    /// The information of the data alone about the parameters, for `calib drift`. Null with `method: paper`.
     #[serde(default)]
     pub data_information: Option<DataInformation>,
     /// Version of the program.
@@ -112,11 +112,11 @@ impl Default for FormatVersion {
     }
 }
 
-/// How the unknowns were found.
+/// How the unknowns were estimated.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// The closed forms of the paper, one origin after the other.
+    /// The closed forms of the paper, one origin at a time.
     Paper,
     /// Maximum likelihood over all loops at once.
     #[default]
@@ -134,7 +134,7 @@ impl Method {
     }
 }
 
-/// May the result be used?
+/// Whether the result may be used.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -142,7 +142,7 @@ pub enum Verdict {
     Accepted,
     /// A limit was exceeded, or a requested quantity is not observable.
     Rejected,
-    /// Nothing was exceeded, but not every limit could be evaluated. Not a pass.
+    /// No limit was exceeded, but not every limit could be evaluated. Not accepted.
     #[default]
     NotEvaluated,
 }
@@ -152,13 +152,13 @@ pub enum Verdict {
 pub struct Limit {
     /// The profile's key, `held_out_rms_mm`.
     pub name: String,
-    /// What is limited, in words.
+    /// The limited quantity, in words.
     pub quantity: String,
     /// SI unit of `limit` and `value`.
     pub unit: Unit,
     /// The largest accepted value.
     pub limit: f64,
-    /// What was found; `None` when it could not be evaluated.
+    /// The value; `None` when it could not be evaluated.
     pub value: Option<f64>,
     /// Met, exceeded, or not evaluated.
     pub outcome: Outcome,
@@ -167,7 +167,7 @@ pub struct Limit {
 }
 
 impl Limit {
-    /// A limit that was evaluated. A value that is not finite does not meet any limit.
+    /// A limit that was evaluated. A value that is not finite meets no limit.
     #[must_use]
     pub fn evaluated(
         name: impl Into<String>,
@@ -215,7 +215,7 @@ impl Limit {
     }
 }
 
-/// What became of a limit.
+/// The outcome of a limit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
@@ -223,14 +223,14 @@ pub enum Outcome {
     Met,
     /// value > limit, or not a number.
     Exceeded,
-    /// No data to evaluate it on. Never a pass.
+    /// No data to evaluate it with. Never accepted.
     #[default]
     NotEvaluated,
 }
 
 /// The verdict that the limits alone give: exceeded beats not evaluated beats met, and no limit at all is not evaluated.
 ///
-/// What else speaks against a result (a requested quantity that is not observable, a solver that stalled) is the caller's to add.
+/// The caller adds further reasons for rejection (a requested quantity that is not observable, a solver that stalled).
 #[must_use]
 pub fn judge(limits: &[Limit]) -> Verdict {
     if limits
@@ -254,11 +254,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_limit_that_was_not_evaluated_is_never_a_pass() {
-        let met = Limit::evaluated("a", "", Unit::Metre, 1.0, 1.0);
-        let exceeded = Limit::evaluated("b", "", Unit::Metre, 1.0, 1.0 + 1e-12);
-        let not_a_number = Limit::evaluated("c", "", Unit::Metre, 1.0, f64::NAN);
-        let open = Limit::not_evaluated("d", "", Unit::Metre, 1.0, "no validation poses");
+    fn a_limit_that_was_not_evaluated_is_never_met() {
+        let met = Limit::evaluated("a", "", Unit::Meter, 1.0, 1.0);
+        let exceeded = Limit::evaluated("b", "", Unit::Meter, 1.0, 1.0 + 1e-12);
+        let not_a_number = Limit::evaluated("c", "", Unit::Meter, 1.0, f64::NAN);
+        let open = Limit::not_evaluated("d", "", Unit::Meter, 1.0, "no validation poses");
         assert_eq!(not_a_number.outcome, Outcome::Exceeded);
         assert_eq!(not_a_number.value, None);
         let table = [

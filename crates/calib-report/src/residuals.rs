@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// One observation and what the model says: predicted − observed. The rows of `residuals.csv`; not part of `report.json`.
+/// One observation compared with the model: predicted − observed. The rows of `residuals.csv`; not part of `report.json`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ResidualRow {
     /// The recording's name.
@@ -20,7 +20,7 @@ pub struct ResidualRow {
     /// Rotation part for a body's pose, rad; `None` for a marker.
     pub rotation_rad: Option<f64>,
     /// Length of the residual in standard deviations; `None` without a noise model.
-    pub normalised: Option<f64>,
+    pub normalized: Option<f64>,
     /// Whether it took part in the fit.
     pub used: bool,
     /// Where the joints were.
@@ -35,7 +35,7 @@ impl ResidualRow {
     }
 }
 
-/// Residuals of the observations that took part in the fit, summarised four ways.
+/// Residuals of the observations that took part in the fit, summarized four ways.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Residuals {
     /// Over all.
@@ -89,18 +89,18 @@ pub struct ResidualBin {
     pub rms_m: f64,
     /// Largest length, m.
     pub max_m: f64,
-    /// Mean residual vector in the tracker frame, m: a wave here is something that is not modelled.
+    /// Mean residual vector in the tracker frame, m: a systematic pattern indicates an effect that is not modeled.
     pub mean_m: [f64; 3],
 }
 
-/// Bins over a variable: enough to see a wave of three periods, few enough to have samples in each.
+/// Bins over a variable: enough to resolve a systematic pattern of three periods, few enough to have samples in each.
 const BINS: usize = 24;
 
-/// A row and where it stands on the variable.
+/// A row and its value of the variable.
 type At<'a> = (f64, &'a ResidualRow);
 
 impl Residuals {
-    /// Summarise the rows that took part in the fit; rows with numbers that are not finite are left out.
+    /// Summarize the rows that took part in the fit; rows with non-finite values are skipped.
     #[must_use]
     pub fn from_rows(rows: &[ResidualRow]) -> Self {
         let used: Vec<&ResidualRow> = rows
@@ -164,7 +164,7 @@ impl Residuals {
         }
     }
 
-    /// Whether there is nothing to show.
+    /// Whether there are no residuals.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.all.is_none()

@@ -3,7 +3,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A transform `parent_from_child` that was found, or assumed.
+/// A transform `parent_from_child`, estimated or assumed.
 ///
 /// The covariance is of the perturbation ξ = [ω; v] in `parent_from_child · exp(ξ)`, in axes of the child (rad², rad·m, m²).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -18,16 +18,16 @@ pub struct Transform {
     pub translation_m: [f64; 3],
     /// Unit quaternion x, y, z, w.
     pub rotation_xyzw: [f64; 4],
-    /// 6×6 in [ω; v] of the child, or null when it is not known.
+    /// 6×6 in [ω; v] of the child, or null when it is unknown.
     pub covariance: Option<[[f64; 6]; 6]>,
-    /// Whether all six directions that were asked for are observable.
+    /// Whether all six degrees of freedom are observable.
     pub observable: bool,
     /// The directions that are not.
     pub unobservable: Vec<Unobservable>,
     /// Fixed-axis roll, pitch, yaw of the URDF: `Rz(yaw)·Ry(pitch)·Rx(roll)`, rad.
     #[serde(default)]
     pub rpy_rad: [f64; 3],
-    /// σ of the origin along the axes of the *parent*, m: what stands behind `translation_m ±`.
+    /// σ of the origin along the axes of the *parent*, m: the σ of `translation_m`.
     #[serde(default)]
     pub sigma_translation_m: Option<[f64; 3]>,
     /// σ of the rotation about the axes of the *child*, rad.
@@ -39,7 +39,7 @@ pub struct Transform {
 }
 
 impl Transform {
-    /// From `parent_from_child` and its covariance in [ω; v] of the child. Entries of a covariance that are not finite make it unknown.
+    /// From `parent_from_child` and its covariance in [ω; v] of the child. A covariance with non-finite entries counts as unknown.
     #[must_use]
     pub fn new(
         name: impl Into<String>,
@@ -74,7 +74,7 @@ impl Transform {
         }
     }
 
-    /// The same with directions that the data cannot give; none leaves it observable.
+    /// The same with directions that are not observable; an empty list leaves it observable.
     #[must_use]
     pub fn with_unobservable(mut self, unobservable: Vec<Unobservable>) -> Self {
         self.observable = unobservable.is_empty();
@@ -101,14 +101,14 @@ pub enum Status {
     Assumed,
 }
 
-/// A direction of one transform that the data cannot give.
+/// A direction of one transform that is not observable.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unobservable {
     /// Unit twist [ω; v] in axes of the child.
     pub direction: [f64; 6],
-    /// In words: "the point may slide along the axis of wrist_roll".
+    /// In words: "translation along the axis of wrist_roll".
     pub text: String,
-    /// What to record, or to choose.
+    /// What to record or to choose: an imperative sentence.
     pub remedy: String,
 }
 
@@ -121,44 +121,44 @@ pub struct Term {
     pub coefficient: f64,
 }
 
-/// What a direction that the data do not see means for the user of the result.
+/// What a direction that is not observable means for the user of the result.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Meaning {
-    /// Two descriptions of the same robot: every prediction of a tracked body is the same with either.
+    /// Equivalent parameter values: every prediction of a tracked body is the same with either.
     Convention,
-    /// Nothing was recorded that shows it: poses that depend on it are predicted as described, not as measured.
+    /// Not excited by the recordings: predictions that depend on it follow the nominal URDF, not the data.
     #[default]
     NotMeasured,
 }
 
-/// A combination of parameters that the data cannot tell from nothing.
+/// A combination of parameters that is not observable.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NotObservable {
     /// What it means for the user.
     #[serde(default)]
     pub meaning: Meaning,
-    /// What is asked: a joint, an origin, a pair of them.
+    /// The joint, origin or pair of them.
     pub subject: String,
     /// The direction in parameter space.
     pub direction: Vec<Term>,
-    /// In words: "`shoulder.z` trades against `elbow.z`: parallel axes".
+    /// In words: "`shoulder.z` is confounded with `elbow.z`: parallel axes".
     pub text: String,
-    /// What to record, or to choose.
+    /// What to record or to choose: an imperative sentence.
     pub remedy: String,
 }
 
-/// How well a parameter is known.
+/// How well a parameter is identifiable.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Class {
-    /// The data decide.
+    /// Determined by the data.
     Solid,
-    /// The data help, the prior decides.
+    /// Weakly identifiable: the prior contributes.
     Weak,
-    /// The prior alone.
+    /// Determined by the prior alone.
     Prior,
-    /// Nothing.
+    /// Not identifiable.
     #[default]
     NotObservable,
 }
@@ -178,11 +178,11 @@ pub struct Parameter {
     pub nominal: f64,
     /// After.
     pub value: f64,
-    /// Standard deviation; null when it is not known.
+    /// Standard deviation; null when it is unknown.
     pub sigma: Option<f64>,
     /// 1 − posterior variance / prior variance; null without a prior.
     pub data_share: Option<f64>,
-    /// How well it is known.
+    /// How well it is identifiable.
     pub class: Class,
 }
 
@@ -191,7 +191,7 @@ pub struct Parameter {
 pub struct Change {
     /// The joint of the URDF.
     pub joint: String,
-    /// Which number: `origin x`, `origin yaw`, `zero offset`.
+    /// Which value: `origin x`, `origin yaw`, `zero offset`.
     pub what: String,
     /// SI unit of the numbers.
     pub unit: Unit,
@@ -203,22 +203,22 @@ pub struct Change {
     pub delta: Option<f64>,
     /// Standard deviation of `delta`.
     pub sigma: Option<f64>,
-    /// How much of it the data said, in [0, 1].
+    /// Fraction of the prior variance removed by the data, in [0, 1].
     pub data_share: Option<f64>,
 }
 
-/// A quantity by one estimator, beside the value that the report uses.
+/// A quantity by one estimator, compared with the value that the report uses.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EstimatorResult {
     /// What was estimated: `base center`.
     pub quantity: String,
     /// By which estimator: `sfe`, `hse`, `ml`.
     pub estimator: String,
-    /// The components, SI; null when the estimator could not answer.
+    /// The components, SI; null when the estimator has no result.
     pub value: Option<Vec<f64>>,
     /// Their standard deviations.
     pub sigma: Option<Vec<f64>>,
-    /// Whether it agrees with the value that the report uses, within both uncertainties. No answer does not agree.
+    /// Whether it agrees with the value that the report uses, within both uncertainties. No result counts as not in agreement.
     pub agrees: bool,
     /// SI unit of the components.
     #[serde(default)]
@@ -226,16 +226,16 @@ pub struct EstimatorResult {
     /// Distance to the value that the report uses.
     #[serde(default)]
     pub distance: Option<f64>,
-    /// Why it has no answer or does not agree; empty otherwise.
+    /// Why it has no result or does not agree; empty otherwise.
     #[serde(default)]
     pub text: String,
 }
 
-/// What the data alone say, without any prior: enough to compare this calibration with another of the same robot.
+/// The information of the data alone, without any prior: enough to compare this calibration with another of the same robot.
 ///
 /// With the free parameters x (SI) and the whitened Jacobian J of the fit's residuals at the estimate x̂, U is upper
 /// triangular with `UᵀU = JᵀJ`. The data alone would put x at x̃ with `UᵀU (x̃ − x̂) = P (x̂ − x₀)`, P = diag(1/σ²) of the
-/// priors about the nominal values x₀; directions that the data do not see are the null space of U.
+/// priors about the nominal values x₀; directions that are not observable are the null space of U.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DataInformation {
     /// Names of the free parameters as in `parameters`, in the order of the columns of U.
@@ -246,11 +246,11 @@ pub struct DataInformation {
     pub root: Vec<Vec<f64>>,
     /// Degrees of freedom that the noise was found with.
     pub degrees_of_freedom: f64,
-    /// Numbers of the robot that no choice of frames changes.
+    /// Quantities of the robot that do not depend on the choice of frames.
     pub quantities: Vec<Quantity>,
 }
 
-/// A number of the robot that no choice of frames changes, such as the distance between two axes.
+/// A quantity of the robot that does not depend on the choice of frames, such as the distance between two axes.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Quantity {
     /// Stable name: `distance.shoulder.elbow`.
@@ -273,9 +273,9 @@ mod tests {
     #[test]
     fn sigma_of_the_origin_is_in_the_axes_it_is_printed_in() {
         // The child's x is the parent's y: what is uncertain along x of the child is uncertain along y of the parent.
-        let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2);
+        let rotation = UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2);
         let parent_from_child =
-            Isometry3::from_parts(nalgebra::Translation3::new(1.0, 2.0, 3.0), turn);
+            Isometry3::from_parts(nalgebra::Translation3::new(1.0, 2.0, 3.0), rotation);
         let mut covariance = Matrix6::zeros();
         covariance[(3, 3)] = 4e-6;
         covariance[(2, 2)] = 9e-6;

@@ -27,7 +27,7 @@ pub struct Scene {
     pub frames: Vec<SceneFrame>,
     /// Tracking bodies and their markers.
     pub bodies: Vec<SceneBody>,
-    /// Things of simple shape: a table.
+    /// Objects of simple shape: a table.
     #[serde(default)]
     pub objects: Vec<SceneObject>,
     /// Where it comes from.
@@ -58,7 +58,7 @@ pub struct SceneFrame {
     pub xyz_m: [f64; 3],
     /// Orientation in the parent, unit quaternion x, y, z, w.
     pub quat_xyzw: [f64; 4],
-    /// 6×6 in [ω; v] of this frame (rad², rad·m, m²); null when it is not known.
+    /// 6×6 in [ω; v] of this frame (rad², rad·m, m²); null when it is unknown.
     pub covariance: Option<[[f64; 6]; 6]>,
     /// Where the numbers come from.
     pub status: Status,
@@ -105,7 +105,7 @@ impl SceneFrame {
         Self {
             name: name.into(),
             parent: Some(parent.into()),
-            // x + 0 is x, but for −0, which is 0: a sign that nobody means.
+            // x + 0 is x, except that −0 becomes 0.
             xyz_m: <[f64; 3]>::from(parent_from_frame.translation.vector).map(|x| x + 0.0),
             quat_xyzw: [q.x, q.y, q.z, q.w].map(|x| x + 0.0),
             covariance: covariance
@@ -143,7 +143,7 @@ pub struct SceneMarker {
     pub xyz_m: [f64; 3],
 }
 
-/// A thing of simple shape.
+/// An object of simple shape.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SceneObject {
     /// Unique among objects.
@@ -220,7 +220,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// A ROS 2 launch file (Python): one `static_transform_publisher` per frame that has a parent and is no link of the URDF.
+    /// A ROS 2 launch file (Python): one `static_transform_publisher` per frame that has a parent and is not a link of the URDF.
     ///
     /// # Errors
     /// As [`Scene::check`].
@@ -238,10 +238,10 @@ impl Scene {
         Ok(sdf::sdf(self))
     }
 
-    /// Names are unique, parents exist and form no ring, every pose is one.
+    /// Checks that names are unique, parents exist and form no cycle, and every pose is valid.
     ///
     /// # Errors
-    /// The first that is not so: [`ReportError::FrameTwice`], [`ReportError::UnknownParent`], [`ReportError::FrameCycle`], [`ReportError::NotAPose`].
+    /// The first violation: [`ReportError::FrameTwice`], [`ReportError::UnknownParent`], [`ReportError::FrameCycle`], [`ReportError::NotAPose`].
     pub fn check(&self) -> Result<(), ReportError> {
         let mut parent_of: BTreeMap<&str, Option<&str>> = BTreeMap::new();
         for frame in &self.frames {
@@ -261,7 +261,7 @@ impl Scene {
                 return Err(ReportError::NotAPose(frame.name.clone()));
             }
         }
-        let hangs = |child: &str, parent: &str| {
+        let exists = |child: &str, parent: &str| {
             let missing = || ReportError::UnknownParent {
                 child: child.to_owned(),
                 parent: parent.to_owned(),
@@ -275,7 +275,7 @@ impl Scene {
             let mut at = frame.parent.as_deref();
             let mut steps = 0;
             while let Some(parent) = at {
-                hangs(&frame.name, parent)?;
+                exists(&frame.name, parent)?;
                 steps += 1;
                 if steps > self.frames.len() {
                     return Err(ReportError::FrameCycle(frame.name.clone()));
@@ -284,7 +284,7 @@ impl Scene {
             }
         }
         for body in &self.bodies {
-            hangs(&body.name, &body.name)?;
+            exists(&body.name, &body.name)?;
             if let Some(marker) = body
                 .markers
                 .iter()
@@ -294,7 +294,7 @@ impl Scene {
             }
         }
         for object in &self.objects {
-            hangs(&object.name, &object.frame)?;
+            exists(&object.name, &object.frame)?;
             if !is_pose(object.xyz_m, object.quat_xyzw) {
                 return Err(ReportError::NotAPose(object.name.clone()));
             }
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_that_is_no_tree_is_refused_with_the_frame() {
+    fn a_scene_that_is_not_a_tree_is_refused_with_the_frame() {
         let root = || SceneFrame::root("world", Status::Assumed);
         let table = [
             (

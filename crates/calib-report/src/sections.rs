@@ -1,12 +1,13 @@
-//! What the long report says, in the order in which a reader doubts: text, lists and tables that Markdown and HTML share.
+//! The contents of the long report: text, lists and tables that Markdown and HTML share.
 //!
-//! Text is plain but for one mark: what stands between backticks is a name, a path or a key.
+//! Text is plain, with one kind of markup: names, paths and keys are between backticks.
 
 mod evidence;
 mod robot;
 mod verdict;
 
 use crate::table::Table;
+use crate::words::prose::code;
 use crate::{Report, Unit, number};
 
 /// A part of the report under one heading.
@@ -18,11 +19,11 @@ pub(crate) struct Section {
     pub(crate) blocks: Vec<Block>,
 }
 
-/// What stands in a section.
+/// One block of a section.
 #[derive(Debug, Clone)]
 pub(crate) enum Block {
     Text(String),
-    /// Statements, each with what to do about it (or nothing).
+    /// Statements, each with its remedy, which may be empty.
     List(Vec<(String, String)>),
     /// A table under its caption; the caption may be empty.
     Table(String, Table),
@@ -96,15 +97,6 @@ impl Page {
     }
 }
 
-/// A name, a path or a key as code.
-fn code(text: &str) -> String {
-    if text.is_empty() {
-        String::new()
-    } else {
-        format!("`{}`", text.replace('`', "'"))
-    }
-}
-
-fn mm(metres: f64) -> String {
-    number::bare(metres, Unit::Metre)
+fn mm(meters: f64) -> String {
+    number::bare(meters, Unit::Meter)
 }

@@ -1,4 +1,4 @@
-//! Pictures as SVG: plain paths, colours by CSS class, so that light, dark and print need no second drawing.
+//! Plots as SVG: plain paths, colors by CSS class, so that one drawing serves light, dark and print.
 
 mod kinds;
 mod scale;
@@ -6,13 +6,13 @@ mod scale;
 use crate::plots::{Plot, PlotKind};
 use std::fmt::Write;
 
-/// Width of every picture in user units; text is 12 units high and stays readable at 400 px.
+/// Width of every plot in user units; text is 12 units high and stays readable at 400 px.
 const WIDTH: f64 = 440.0;
 
-/// Colour classes of the values of a map, light to dark.
+/// Color classes of the values of a map, light to dark.
 const STEPS: usize = 5;
 
-/// The picture as an `<svg>` element with title and description.
+/// The plot as an `<svg>` element with title and description.
 pub(crate) fn svg(plot: &Plot) -> String {
     let mut body = Body(String::new());
     let height = match &plot.kind {
@@ -84,7 +84,7 @@ impl Body {
         );
     }
 
-    /// A mark whose shape, not only its colour, says which series it is.
+    /// A mark whose shape, not only its color, identifies the series.
     fn mark(&mut self, series: usize, [x, y]: [f64; 2]) {
         let class = format!("mark s{series}");
         match series {

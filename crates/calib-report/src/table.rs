@@ -1,6 +1,6 @@
 //! Text tables with aligned columns, for Markdown and the terminal.
 
-/// Which side a column's text stands on.
+/// Alignment of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Align {
     Left,
@@ -33,7 +33,7 @@ impl Table {
         self.rows.push(cells);
     }
 
-    /// A column in which no row says anything is left out.
+    /// The same without columns whose cells are all empty.
     pub(crate) fn without_empty_columns(self) -> Self {
         let says: Vec<bool> = (0..self.heads.len())
             .map(|i| self.rows.iter().any(|row| !row[i].is_empty()))

@@ -1,4 +1,4 @@
-//! The summary for a terminal: the verdict, the numbers that carry it, what is open. At most 80 columns.
+//! The summary for a terminal: the verdict, its numbers, what is not observable. At most 80 columns.
 
 use crate::table::{Table, wrap};
 use crate::words::answers::answers_in;
@@ -6,20 +6,20 @@ use crate::words::prose::{full_stop, sentence};
 use crate::{Class, Outcome, Report, Severity, Unit, Verdict, number};
 use anstyle::{AnsiColor, Style};
 
-/// Columns of the narrowest terminal that people still use.
+/// Columns of the narrowest terminal in use.
 const COLUMNS: usize = 80;
 
-/// Words over lines that fit a terminal, the first line with `first`, the others with `rest` before them.
+/// Text wrapped to the width of a terminal; `first` precedes the first line, `rest` the others.
 #[must_use]
 pub fn wrapped(text: &str, first: &str, rest: &str) -> String {
     wrap(text, COLUMNS, first, rest)
 }
 
-/// The summary; `colour` adds ANSI styles (ask the terminal before, this function does not).
+/// The summary; `color` adds ANSI styles (the caller checks what the terminal supports).
 #[must_use]
-pub fn summary(report: &Report, colour: bool) -> String {
+pub fn summary(report: &Report, color: bool) -> String {
     let paint = |style: Style, text: &str| {
-        if colour {
+        if color {
             format!("{style}{text}{style:#}")
         } else {
             text.to_owned()
@@ -44,24 +44,24 @@ pub fn summary(report: &Report, colour: bool) -> String {
         &report.verdict.word().to_uppercase(),
     );
     text.push('\n');
-    // What was met stands in the table of limits already.
-    let told = report.verdict == Verdict::Accepted && !report.limits.is_empty();
-    for reason in report.reasons.iter().filter(|_| !told) {
+    // The table of limits already lists what was met.
+    let listed = report.verdict == Verdict::Accepted && !report.limits.is_empty();
+    for reason in report.reasons.iter().filter(|_| !listed) {
         text += &wrap(&sentence(reason), COLUMNS, "- ", "  ");
     }
     for scope in &report.scope {
-        text += &wrap(&full_stop(scope), COLUMNS, "  for: ", "       ");
+        text += &wrap(&full_stop(scope), COLUMNS, "  valid for: ", "             ");
     }
 
     if !report.limits.is_empty() {
         text += &heading("Limits");
-        let mut table = Table::new(&["<", "<", ">found", ">limit"]);
+        let mut table = Table::new(&["<", "<", ">value", ">limit"]);
         for limit in &report.limits {
-            let found = number::plain_or_unknown(limit.value, limit.unit);
+            let value = number::plain_or_unknown(limit.value, limit.unit);
             table.row([
                 limit.outcome.word().to_owned(),
                 limit.quantity.clone(),
-                found,
+                value,
                 number::plain(limit.limit, limit.unit),
             ]);
         }
@@ -81,7 +81,7 @@ pub fn summary(report: &Report, colour: bool) -> String {
     }
 
     if let Some(held_out) = &report.verification.held_out {
-        text += &heading(&format!("Held-out error [mm], {} values", held_out.n));
+        text += &heading(&format!("Held-out errors [mm], {} values", held_out.n));
         let mut table = Table::new(&["<", ">mean", ">rms", ">95 %", ">max"]);
         for (name, stats) in [
             ("nominal", held_out.nominal),
@@ -90,14 +90,14 @@ pub fn summary(report: &Report, colour: bool) -> String {
         ] {
             let Some(stats) = stats else { continue };
             let cells = [stats.mean_m, stats.rms_m, stats.p95_m, stats.max_m]
-                .map(|m| number::bare(m, Unit::Metre));
+                .map(|m| number::bare(m, Unit::Meter));
             table.row([name.to_owned()].into_iter().chain(cells));
         }
         text += &table.plain(COLUMNS);
         if let Some(expected) = &held_out.expected {
-            let length = |m| number::plain(m, Unit::Metre);
+            let length = |m| number::plain(m, Unit::Meter);
             let line = format!(
-                "A new pose: {} rms ({} interval {} to {}).",
+                "Expected on a new pose: {} rms ({} interval {} to {}).",
                 length(expected.rms_m),
                 number::percent(expected.confidence),
                 length(expected.low_m),
@@ -107,7 +107,7 @@ pub fn summary(report: &Report, colour: bool) -> String {
         }
         if let Some(angle) = held_out.orientation.and_then(|o| o.calibrated) {
             let line = format!(
-                "Orientation: {} rms, {} at most.",
+                "Orientation: {} rms, {} maximum.",
                 number::plain(angle.rms_rad, Unit::Radian),
                 number::plain(angle.max_rad, Unit::Radian)
             );
@@ -121,13 +121,12 @@ pub fn summary(report: &Report, colour: bool) -> String {
         for transform in &report.transforms {
             let sigma = |i: usize| transform.sigma_translation_m.map(|sigma| sigma[i]);
             let cell = |i: usize| {
-                number::with_sigma(transform.translation_m[i], sigma(i), Unit::Metre)
-                    .replace(" mm", "")
+                number::bare_with_sigma(transform.translation_m[i], sigma(i), Unit::Meter)
             };
             let status = if transform.observable {
                 transform.status.word()
             } else {
-                "in part"
+                "partial"
             };
             table.row([
                 transform.name.clone(),
@@ -146,8 +145,8 @@ pub fn summary(report: &Report, colour: bool) -> String {
             .iter()
             .filter(|parameter| parameter.class != Class::Solid)
             .count();
-        text += &heading(&format!("URDF: {} numbers changed", report.changes.len()));
-        let mut table = Table::new(&["<", "<", ">change", ">data"]);
+        text += &heading(&format!("URDF: {} values changed", report.changes.len()));
+        let mut table = Table::new(&["<", "<", ">change", ">data share"]);
         for change in report.changes.iter().take(CHANGES) {
             let delta = change.delta.map_or_else(
                 || "added".to_owned(),
@@ -165,14 +164,14 @@ pub fn summary(report: &Report, colour: bool) -> String {
         }
         if weak > 0 {
             text += &format!(
-                "  {weak} of {} parameters are not known from the data alone: see the report.\n",
+                "  {weak} of {} parameters depend on their priors: see the report.\n",
                 report.parameters.len()
             );
         }
     }
 
     let all = answers_in(report, "in the report");
-    for (id, title) in [("not-known", "Not known"), ("thrown-out", "Thrown out")] {
+    for (id, title) in [("unobservable", "Not observable"), ("rejected", "Rejected")] {
         if let Some(answer) = all.iter().find(|answer| answer.id == id) {
             text += &heading(title);
             for line in &answer.lines {
@@ -206,14 +205,14 @@ pub fn summary(report: &Report, colour: bool) -> String {
                 "  ",
                 "    ",
             );
-            // Only the first word is coloured: a colour over several lines breaks pagers.
+            // Only the first word is colored: a color over several lines breaks pagers.
             let word = finding.severity.word();
             text += &line.replacen(word, &paint(style.on_default(), word), 1);
         }
     }
 
     if !report.next_steps.is_empty() {
-        text += &heading("Next");
+        text += &heading("Next steps");
         for step in &report.next_steps {
             text += &wrap(&sentence(step), COLUMNS, "  - ", "    ");
         }

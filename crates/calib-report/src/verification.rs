@@ -18,27 +18,27 @@ pub struct Verification {
     pub reason: String,
 }
 
-/// The same held-out poses under three models.
+/// The same held-out poses with three models.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldOut {
-    /// Number of errors: one a posture and body (or marker).
+    /// Number of errors: one per posture and body (or marker).
     pub n: usize,
-    /// Number of postures of the robot behind them: several bodies are seen in one.
+    /// Number of robot postures: several bodies may be measured in one.
     #[serde(default)]
     pub postures: usize,
-    /// The URDF as it was delivered, mounts and tracker as the profile states them; null when the profile states none.
+    /// The nominal URDF, mounts and tracker as the profile states them; null when the profile states none.
     pub nominal: Option<ErrorStats>,
-    /// The delivered URDF after the best rigid registration of tracker and mounts: what a calibration must beat.
+    /// The nominal URDF after the best rigid registration of tracker and mounts: a calibration must do better.
     pub registration_only: Option<ErrorStats>,
     /// The calibrated robot.
     pub calibrated: Option<ErrorStats>,
     /// Orientation errors of the same three, where a body's orientation is measured; null where none is.
     #[serde(default)]
     pub orientation: Option<OrientationErrors>,
-    /// What the errors are errors of: "position of gripM".
+    /// The quantity: "position of gripM".
     #[serde(default)]
     pub quantity: String,
-    /// What to expect on a new pose of the same kind.
+    /// The error expected on a new pose of the same kind.
     #[serde(default)]
     pub expected: Option<ExpectedError>,
     /// The pose with the largest calibrated error.
@@ -50,7 +50,7 @@ pub struct HeldOut {
 }
 
 impl HeldOut {
-    /// Summarise the poses: [`ErrorStats`] per model over the poses that have it, the expected error with its 95 % interval, the worst pose.
+    /// Summarize the poses: [`ErrorStats`] per model over the poses that have it, the expected error with its 95 % interval, the worst pose.
     #[must_use]
     pub fn from_poses(quantity: impl Into<String>, poses: Vec<PoseError>) -> Self {
         let lengths = |error: fn(&PoseError) -> Option<f64>| {
@@ -107,7 +107,7 @@ pub struct PoseError {
     pub group: String,
     /// Joint positions.
     pub joints: Vec<JointValue>,
-    /// Distance between predicted and observed with the delivered robot, m.
+    /// Distance between predicted and observed with the nominal robot, m.
     pub nominal_m: Option<f64>,
     /// The same after registration only, m.
     pub registration_only_m: Option<f64>,
@@ -115,7 +115,7 @@ pub struct PoseError {
     pub calibrated_m: Option<f64>,
     /// predicted − observed with the calibrated robot, in the tracker frame, m.
     pub vector_m: Option<[f64; 3]>,
-    /// Angle between predicted and observed orientation with the delivered robot, rad; null where no orientation is measured.
+    /// Angle between predicted and observed orientation with the nominal robot, rad; null where no orientation is measured.
     #[serde(default)]
     pub nominal_rad: Option<f64>,
     /// The same after registration only, rad.
@@ -127,7 +127,7 @@ pub struct PoseError {
 }
 
 impl PoseError {
-    /// Posture and body, as a reader sees them.
+    /// Posture and body for people.
     #[must_use]
     pub fn label(&self) -> String {
         if self.subject.is_empty() {
@@ -218,7 +218,7 @@ pub struct Stats {
 }
 
 impl Stats {
-    /// Of magnitudes; values that are not finite are left out, `None` when nothing is left.
+    /// Of magnitudes; values that are not finite are skipped; `None` when none is finite.
     #[must_use]
     pub fn of(values: &[f64]) -> Option<Self> {
         let values = sorted_finite(values)?;
@@ -277,7 +277,7 @@ impl ExpectedError {
     /// rms · √(nν / χ²_{nν}(1 − α/2))  …  rms · √(nν / χ²_{nν}(α/2))
     /// ```
     ///
-    /// Poses that stand next to each other are not independent and make it too narrow.
+    /// Neighboring poses are not independent and make it too narrow.
     #[must_use]
     pub fn from_vectors(errors_m: &[[f64; 3]], confidence: f64) -> Option<Self> {
         let vectors: Vec<Vector3<f64>> = errors_m
@@ -296,7 +296,7 @@ impl ExpectedError {
         Self::with_dof(&lengths, nu, confidence)
     }
 
-    /// From lengths alone, m: as if one direction dominated (ν = 1), so the interval is never too narrow for want of the vectors.
+    /// From lengths alone, m: as if one direction dominated (ν = 1), so the interval is not too narrow without the vectors.
     #[must_use]
     pub fn from_lengths(errors_m: &[f64], confidence: f64) -> Option<Self> {
         Self::with_dof(errors_m, 1.0, confidence)
@@ -340,7 +340,7 @@ pub struct LoopClosure {
     /// The same per validation group (a torso angle), the columns of the paper's Table 1.
     #[serde(default)]
     pub groups: Vec<LoopGroup>,
-    /// What the groups differ in: `torso angle`.
+    /// What distinguishes the groups: `torso angle`.
     #[serde(default)]
     pub grouped_by: String,
 }

@@ -1,4 +1,4 @@
-//! The 3-D view of `report.html`, as data: everything is in the tracker's (or world's) frame, m and rad.
+//! The 3-D view of `report.html` as data: all coordinates in the tracker's (or world's) frame, m and rad.
 
 mod outline;
 
@@ -15,9 +15,9 @@ use serde::Serialize;
 pub struct View3d {
     /// The frame that all coordinates are in.
     pub frame: String,
-    /// Residual arrows and uncertainties are drawn this many times longer to begin with.
+    /// Initial magnification of the residual arrows and uncertainties.
     pub magnification: f64,
-    /// Frames of the robot; the parents make the links.
+    /// Frames of the robot; lines to the parents are the links.
     pub frames: Vec<ViewFrame>,
     /// Outlines of the links; empty when only frames are drawn.
     pub outlines: Vec<Outline>,
@@ -47,13 +47,13 @@ pub struct ViewFrame {
 pub struct ViewPose {
     /// Its label.
     pub name: String,
-    /// What a reader should know about it: "error 0.31 mm".
+    /// Its errors: "Error of gripM: 0.31 mm".
     pub text: String,
     /// x, y, z, qx, qy, qz, qw of every frame with the delivered robot; empty when it is not shown.
     pub nominal: Vec<[f64; 7]>,
     /// The same with the calibrated robot.
     pub calibrated: Vec<[f64; 7]>,
-    /// Markers or bodies that were seen.
+    /// Observed markers or bodies.
     pub markers: Vec<ViewMarker>,
 }
 
@@ -62,9 +62,9 @@ pub struct ViewPose {
 pub struct ViewMarker {
     /// Its name.
     pub name: String,
-    /// Where the tracker saw it; `None` when it was lost.
+    /// Measured position; `None` when the tracker lost it.
     pub observed: Option<[f64; 3]>,
-    /// Where the calibrated robot puts it.
+    /// Position predicted by the calibrated robot.
     pub predicted: [f64; 3],
 }
 
@@ -86,7 +86,7 @@ pub struct Sphere {
     pub center: [f64; 3],
     /// m.
     pub radius: f64,
-    /// σ of the center, m; `None` when it is not known.
+    /// σ of the center, m; `None` when it is unknown.
     pub sigma: Option<f64>,
 }
 
@@ -118,8 +118,8 @@ pub struct Axis {
     pub sigma_point: Option<f64>,
     /// σ of the direction, rad.
     pub sigma_direction: Option<f64>,
-    /// The frame that point and direction are in, an index into [`View3d::frames`]: the axis moves with the calibrated robot.
-    /// `None`: it stands still in [`View3d::frame`].
+    /// The frame of point and direction, an index into [`View3d::frames`]: the axis moves with the calibrated robot.
+    /// `None`: fixed in [`View3d::frame`].
     pub frame: Option<usize>,
 }
 
@@ -131,7 +131,7 @@ impl Axis {
     }
 }
 
-/// Digits of a coordinate in the page: 10 µm in a metre, below what a pixel shows.
+/// Digits of a coordinate in the page: 10 µm in a meter, less than a pixel.
 const DIGITS: usize = 5;
 
 /// Points of all clouds together in the page: 20 bytes each, a third of a megabyte.
@@ -146,7 +146,7 @@ const POSES: usize = 200;
 /// Frames of all poses together in the page: 110 bytes each for both robots, a megabyte.
 const POSE_FRAMES: usize = 9_000;
 
-/// Lines of one outline in the still picture.
+/// Lines of one outline in the static image.
 const STILL_LINES: usize = 300;
 
 /// The row of [`ViewPose::calibrated`] for a frame.
@@ -160,7 +160,7 @@ pub fn pose_row(world_from_frame: &Isometry3<f64>) -> [f64; 7] {
 }
 
 impl View3d {
-    /// The same without what no page can carry: every n-th point of the clouds, every n-th pose; what is not finite or points to no frame is left out.
+    /// The same at a size that suits a page: every n-th point of the clouds, every n-th pose, without non-finite values and indices of missing frames.
     #[must_use]
     pub fn thinned(&self) -> Self {
         let mut view = self.clone();
@@ -238,7 +238,7 @@ impl View3d {
             .replace('<', "\\u003c"))
     }
 
-    /// The first pose as a picture without script: parallel projection from the front right, a little above.
+    /// The first pose as an image that needs no script: parallel projection from the front right, slightly above.
     pub(crate) fn still(&self) -> String {
         const SIZE: [f64; 2] = [640.0, 400.0];
         let camera = Rotation3::from_axis_angle(&Vector3::x_axis(), -65f64.to_radians())
@@ -255,7 +255,7 @@ impl View3d {
             .clouds
             .iter()
             .flat_map(|cloud| cloud.points.iter().copied());
-        // Axes that move with the robot are as long as they are drawn: they do not widen the picture.
+        // Axes that move with the robot do not enlarge the image.
         let still = || self.axes.iter().filter(|axis| axis.frame.is_none());
         let axes = still().flat_map(|axis| [axis.end(-1.0), axis.end(1.0)]);
         let everything = robot.chain(swept).chain(axes);
@@ -278,7 +278,7 @@ impl View3d {
         };
         let mut body = Body(String::new());
         for cloud in &self.clouds {
-            // A still picture needs an impression of the sweep, not every point.
+            // The static image shows an impression of the sweep, not every point.
             for point in cloud
                 .points
                 .iter()
@@ -360,7 +360,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_cannot_be_drawn_is_left_out() {
+    fn what_cannot_be_drawn_is_omitted() {
         let view = View3d {
             magnification: f64::NAN,
             frames: vec![ViewFrame {
@@ -403,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_view_is_still_a_picture() {
+    fn an_empty_view_still_gives_an_image() {
         let text = View3d::default().thinned().still();
         roxmltree::Document::parse(&text).expect("well-formed");
     }

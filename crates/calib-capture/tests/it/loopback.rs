@@ -166,7 +166,7 @@ fn lost_disordered_and_foreign_datagrams_in_a_recording() {
     assert_eq!(seen, [true, true, true, false, true]);
     let text = String::from_utf8(text).expect("text");
     assert!(
-        text.contains("3 never arrived, 2 late or twice (dropped), 7 not readable"),
+        text.contains("3 missing, 2 late or duplicate (dropped), 7 not readable"),
         "{text}"
     );
 }
@@ -185,10 +185,10 @@ fn a_silent_tracker_is_told() {
     assert!(
         ended
             .to_string()
-            .contains("does it send to this computer and port")
+            .contains("sends to this computer and port")
     );
     let text = String::from_utf8(text).expect("text");
-    assert!(text.contains("nothing from the tracker for"), "{text}");
+    assert!(text.contains("no data from the tracker for"), "{text}");
 }
 
 /// A VRPN server that says this and then, when asked to, hangs up.
@@ -291,7 +291,7 @@ fn servers_that_are_none() {
     };
     assert_eq!(
         says(b"vrpn: ver. 06.04  0\0\0\0\0\0"),
-        "127.0.0.1:PORT: the server speaks VRPN 06.04, this program 07; major versions must agree"
+        "127.0.0.1:PORT: the server uses VRPN 06.04, this program VRPN 07; the major versions must match"
     );
     assert!(says(b"SSH-2.0-OpenSSH\r\n").contains("found `S`"));
     let (port, thread) = server(Vec::new(), false);

@@ -117,7 +117,7 @@ fn names_are_mapped_or_asked_for() {
     let none = map_names(&wanted[..1], &map(&[]), &seen).expect_err("unmapped");
     assert_eq!(
         none,
-        "the tracker sends body_0, body_1, head, the profile has hand; say which is which: --map hand=body_0"
+        "the tracker sends body_0, body_1, head, the profile has hand. Map the names: --map hand=body_0"
     );
     let stranger = map_names(&wanted, &map(&[("arm", "body_0")]), &seen).expect_err("stranger");
     assert!(stranger.contains("`arm`"), "{stranger}");

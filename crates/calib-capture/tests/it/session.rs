@@ -183,7 +183,7 @@ fn the_lines_of_a_sweep() {
                     let mut frame = Frame {
                         number: Some(2 * number),
                         device: Some(number as f64 * 0.01),
-                        unlabelled: 1,
+                        unlabeled: 1,
                         ..Frame::default()
                     };
                     frame.bodies.insert("body_0".into(), at(waist));

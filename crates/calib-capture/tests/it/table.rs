@@ -35,7 +35,7 @@ fn rows_wait_at_most_a_second() {
     table.tick(103.0).expect("written");
     assert_eq!(rows_on_disk(&path), 200);
     let error = Table::create(&path, &[], HEADER).expect_err("it exists");
-    assert!(error.to_string().contains("exists already"), "{error}");
+    assert!(error.to_string().contains("already exists"), "{error}");
 }
 
 #[test]

@@ -2,14 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::{Gauge, RejectReason};
+use calib_core::{Gauge, NoiseKind, RejectReason, SolveStatus};
 use calib_files::OutputFile;
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_profile::{Limits, Method, Usage};
 use calib_report::{
-    EstimatorResult, FitSummary, HeldOut, Input, JointCoverage, Limit, LoopClosure, Lost, Meaning,
-    NotObservable, Output, Parameter, RecordingSummary, RecordingUse, Rejected, Report,
-    ResidualRow, Residuals, Term, Transform, Unit, Verdict, Verification, judge, number,
+    EstimatorResult, FitEnd, FitSummary, HeldOut, Input, JointCoverage, Limit, LoopClosure, Lost,
+    Meaning, NextStep, NotObservable, Output, Parameter, RecordingSummary, RecordingUse, Rejected,
+    Report, ResidualRow, Residuals, Scope, Term, Transform, Unit, Verdict, Verification, judge,
+    number,
 };
 
 use crate::estimate::paper::OriginEstimate;
@@ -65,16 +66,19 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         Verdict::Rejected => l.outcome == calib_report::Outcome::Exceeded,
         Verdict::NotEvaluated => l.outcome == calib_report::Outcome::NotEvaluated,
     };
-    let mut reasons: Vec<String> = limits.iter().filter(decided).map(reason).collect();
+    let mut reasons: Vec<String> = limits.iter().filter(decided).map(Limit::sentence).collect();
     if limits.is_empty() {
         reasons.push(
-            "the profile names no limits (`solve.limits`), so nothing could be accepted".to_owned(),
+            "The profile sets no limits (`solve.limits`), so nothing could be accepted.".to_owned(),
         );
     }
     for (name, origin) in e.origins {
         if origin.pose.is_none() && e.method == Method::Paper {
             verdict = Verdict::Rejected;
-            reasons.insert(0, format!("origin `{name}` is not observable in its sweep"));
+            reasons.insert(
+                0,
+                format!("Origin `{name}` is not observable in its sweep."),
+            );
         }
     }
     if let Some(fit) = e.fit
@@ -83,7 +87,10 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         verdict = Verdict::Rejected;
         reasons.insert(
             0,
-            format!("the solver did not converge: {}", status_words(fit)),
+            format!(
+                "The solver did not converge: it {}.",
+                fit_end(fit).after(fit.solution.iterations)
+            ),
         );
     }
     let goodness = e.fit.and_then(|fit| fit.solution.goodness_of_fit());
@@ -99,9 +106,12 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         },
         verdict,
         reasons,
-        scope: scope(e),
+        scope: scope(e).iter().map(Scope::sentence).collect(),
         limits,
-        next_steps: next_steps(e, verdict, &missing),
+        next_steps: next_steps(e, verdict, &missing)
+            .iter()
+            .map(NextStep::sentence)
+            .collect(),
         transforms: e.found.iter().map(transform).collect(),
         parameters: e.fit.map_or_else(Vec::new, parameters),
         changes: e.urdf.changes.clone(),
@@ -116,7 +126,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
                 (_, Verdict::Rejected) => calib_report::Outcome::Exceeded,
             },
             reason: if e.held_out.is_none() {
-                "the profile names no validation recording".to_owned()
+                "The profile names no validation recording.".to_owned()
             } else {
                 String::new()
             },
@@ -168,21 +178,6 @@ fn reproduce(e: &Evidence<'_>) -> String {
     }
 }
 
-fn reason(limit: &Limit) -> String {
-    match (limit.outcome, limit.value) {
-        (calib_report::Outcome::NotEvaluated, _) | (_, None) => {
-            format!("{}: not evaluated: {}", limit.quantity, limit.reason)
-        }
-        (outcome, Some(value)) => format!(
-            "{}: {}, limit {} ({})",
-            limit.quantity,
-            number::plain(value, limit.unit),
-            number::plain(limit.limit, limit.unit),
-            outcome.word()
-        ),
-    }
-}
-
 fn limits(limits: &Limits, e: &Evidence<'_>) -> Vec<Limit> {
     let calibrated = e.held_out.as_ref().and_then(|h| h.calibrated);
     let mut out = Vec::new();
@@ -230,47 +225,38 @@ fn limits(limits: &Limits, e: &Evidence<'_>) -> Vec<Limit> {
     out
 }
 
-fn scope(e: &Evidence<'_>) -> Vec<String> {
+fn scope(e: &Evidence<'_>) -> Vec<Scope> {
     let profile = &e.inputs.robot.profile;
-    let what = if profile.bodies.is_empty() {
-        "what was touched".to_owned()
+    let mut scope = vec![if profile.bodies.is_empty() {
+        Scope::Contacts
     } else {
-        format!(
-            "positions of the tracked bodies in the tracker's frame `{}`",
-            profile.tracker.frame
-        )
-    };
-    let mut scope = vec![format!(
-        "{what}, in the joint ranges and at the load of the recordings"
-    )];
+        Scope::TrackedBodies {
+            frame: profile.tracker.frame.clone(),
+        }
+    }];
     if e.robot.effects.iter().any(|j| !j.fits_into_urdf()) {
-        scope.push(format!(
-            "only with the joint effects of `{}` applied as well; the URDF alone cannot hold them",
-            crate::output::export::calibration_name(&e.inputs.robot.profile.outputs.urdf)
-        ));
+        scope.push(Scope::EffectsOf {
+            file: crate::output::export::calibration_name(&profile.outputs.urdf),
+        });
     }
     if e.method == Method::Paper {
-        scope.push("origins are estimated one by one (method: paper); the robot's own geometry is taken as described".to_owned());
+        scope.push(Scope::OriginsOneByOne);
     }
     scope
 }
 
-fn next_steps(e: &Evidence<'_>, verdict: Verdict, missing: &[String]) -> Vec<String> {
-    let mut steps = Vec::new();
-    match verdict {
-        Verdict::Accepted => steps.push(format!(
-            "use `{}`; keep this folder: it holds what is needed to take it back",
-            e.inputs.robot.profile.outputs.urdf
-        )),
-        Verdict::Rejected => {
-            steps.push("do not use the result before the reasons above are gone".to_owned())
-        }
-        Verdict::NotEvaluated => {
-            steps.push("record validation poses and name limits, then run again".to_owned())
-        }
-    }
+fn next_steps(e: &Evidence<'_>, verdict: Verdict, missing: &[String]) -> Vec<NextStep> {
+    let mut steps = vec![match verdict {
+        Verdict::Accepted => NextStep::Use {
+            urdf: e.inputs.robot.profile.outputs.urdf.clone(),
+        },
+        Verdict::Rejected => NextStep::FixProblems,
+        Verdict::NotEvaluated => NextStep::AddValidation,
+    }];
     if let Some(first) = missing.first() {
-        steps.push(format!("free in the profile what is missing: {first}"));
+        steps.push(NextStep::EnableEffect {
+            evidence: first.clone(),
+        });
     }
     if let Some(worst) = e
         .findings
@@ -278,15 +264,14 @@ fn next_steps(e: &Evidence<'_>, verdict: Verdict, missing: &[String]) -> Vec<Str
         .filter(|f| f.severity >= calib_finding::Severity::Warning)
         .max_by_key(|f| f.severity)
     {
-        steps.push(format!(
-            "{} ({}): {}",
-            worst.subject,
-            worst.id,
-            worst.remedy()
-        ));
+        steps.push(NextStep::Resolve {
+            subject: worst.subject.to_string(),
+            finding: worst.id.to_string(),
+            remedy: worst.remedy(),
+        });
     }
     if e.method == Method::Paper {
-        steps.push("solve with `method: ml` to use all recordings at once".to_owned());
+        steps.push(NextStep::SolveJointly);
     }
     steps
 }
@@ -382,30 +367,28 @@ fn not_observable(fit: &MlFit) -> Vec<NotObservable> {
             subject: joint.clone(),
             direction: Vec::new(),
             text: format!(
-                "joint `{joint}` never moved in the fitted recordings: it is held as described"
+                "joint `{joint}` did not move in the fitted recordings and keeps its nominal parameters"
             ),
-            remedy: "move it in a sweep or in static poses".to_owned(),
+            remedy: "Move it in a sweep or in static poses.".to_owned(),
         });
     }
     out
 }
 
-fn status_words(fit: &MlFit) -> String {
-    let iterations = match fit.solution.iterations {
-        1 => "1 iteration".to_owned(),
-        n => format!("{n} iterations"),
-    };
-    if fit.solution.status.is_converged() {
-        format!("converged after {iterations}")
-    } else {
-        format!("{:?} after {iterations}", fit.solution.status)
+fn fit_end(fit: &MlFit) -> FitEnd {
+    match fit.solution.status {
+        SolveStatus::Converged => FitEnd::Converged,
+        SolveStatus::Stalled => FitEnd::Stalled,
+        SolveStatus::MaxIterations => FitEnd::MaxIterations,
+        SolveStatus::NotEvaluable => FitEnd::NotEvaluable,
     }
 }
 
 fn fit_summary(fit: &MlFit) -> FitSummary {
     let s = &fit.solution;
     FitSummary {
-        status: status_words(fit),
+        ended: fit_end(fit),
+        status: fit_end(fit).after(s.iterations),
         converged: s.status.is_converged(),
         iterations: s.iterations,
         observations: s.weights.iter().filter(|w| **w > 0.0).count(),
@@ -427,18 +410,20 @@ fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
         .iter()
         .map(|n| calib_report::Noise {
             group: n.name.clone(),
+            kind: match n.kind {
+                NoiseKind::Position => calib_report::NoiseKind::Position,
+                NoiseKind::Orientation => calib_report::NoiseKind::Orientation,
+                NoiseKind::Joint => calib_report::NoiseKind::Joint,
+                NoiseKind::Scale => calib_report::NoiseKind::Scale,
+            },
             unit: match n.kind {
-                calib_core::NoiseKind::Position => Unit::Metre,
+                NoiseKind::Position => Unit::Metre,
                 _ => Unit::Radian,
             },
             sigma: Some(n.sigma),
             stated: stated(&n.name),
             samples: fit.solution.weights.iter().filter(|w| **w > 0.0).count(),
-            text: if n.estimated {
-                "variance components (REML)".to_owned()
-            } else {
-                "as stated".to_owned()
-            },
+            text: calib_report::Noise::method(n.estimated).to_owned(),
         })
         .collect()
 }
@@ -524,10 +509,12 @@ fn rejected(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Rejected> {
     {
         let (recording, row) = &fit.formulation.samples[r.sample];
         let reason = match r.reason {
-            RejectReason::Swap => "swap: it lies where another marker of the body should be",
-            RejectReason::Occlusion => "occlusion: a measured pose on its way was lost",
-            RejectReason::Outlier => "outlier: further off than noise explains",
-            RejectReason::NotSettled => "not settled: the whole body is off, or a wrong reading",
+            RejectReason::Swap => "swapped with another marker of the body",
+            RejectReason::Occlusion => "occlusion: a pose needed to predict it was lost",
+            RejectReason::Outlier => "outlier: residual too large for the noise",
+            RejectReason::NotSettled => {
+                "not settled: the whole body is displaced, or a joint reading is wrong"
+            }
         };
         let row = inputs.recordings[recording].poses.rows[*row];
         groups
@@ -584,7 +571,7 @@ fn estimators(e: &Evidence<'_>) -> Vec<EstimatorResult> {
             .map(|c| difference.0.dot(&c.solve(&difference.0)));
         out.push(EstimatorResult {
             quantity: format!("{body}_from_{name}"),
-            estimator: "paper (closed forms)".to_owned(),
+            estimator: "paper (closed form)".to_owned(),
             value: Some(pose.translation.vector.as_slice().to_vec()),
             sigma: origin
                 .covariance
@@ -593,7 +580,7 @@ fn estimators(e: &Evidence<'_>) -> Vec<EstimatorResult> {
             unit: Unit::Metre,
             distance: Some((pose.translation.vector - found.pose.translation.vector).norm()),
             text: format!(
-                "orientation {} apart",
+                "orientation differs by {}",
                 number::plain(difference.angular().norm(), Unit::Radian)
             ),
         });

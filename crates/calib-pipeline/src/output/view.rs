@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use calib_geometry::Line;
 use calib_profile::{BodyKind, Usage};
+use calib_report::HeldOut;
 use calib_report::view3d::{
     Axis, Circle, Cloud, Outline, Sphere, View3d, ViewFrame, ViewMarker, ViewPose, pose_row,
 };
-use calib_report::{HeldOut, Unit, number};
 use nalgebra::{Isometry3, Matrix3, Point3};
 
 use crate::estimate::paper::OriginEstimate;
@@ -69,7 +69,10 @@ pub fn view(
         .filter(|r| r.spec.usage == Usage::Validation);
     let poses = validation
         .flat_map(|r| poses(inputs, tracks, nominal, robot, r))
-        .map(|pose| told(pose, held_out))
+        .map(|pose| ViewPose {
+            text: held_out.map_or_else(String::new, |h| h.errors_of(&pose.name)),
+            ..pose
+        })
         .collect();
     let mut clouds = Vec::new();
     for r in inputs
@@ -194,25 +197,6 @@ fn joint_axes(inputs: &Inputs, fit: &MlFit) -> Vec<Axis> {
         });
     }
     axes
-}
-
-/// The pose with its errors in words: "gripM 0.31 mm, linkM 0.42 mm".
-fn told(mut pose: ViewPose, held_out: Option<&HeldOut>) -> ViewPose {
-    let errors = held_out.into_iter().flat_map(|h| &h.poses);
-    let words: Vec<String> = errors
-        .filter(|e| e.pose == pose.name)
-        .map(|e| {
-            let length = number::plain_or_unknown(e.calibrated_m, Unit::Metre);
-            let angle = e.calibrated_rad.map_or_else(String::new, |a| {
-                format!(" and {}", number::plain(a, Unit::Radian))
-            });
-            format!("{} {length}{angle}", e.subject)
-        })
-        .collect();
-    if !words.is_empty() {
-        pose.text = format!("error of {}", words.join(", of "));
-    }
-    pose
 }
 
 fn poses(

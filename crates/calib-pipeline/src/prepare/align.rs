@@ -76,13 +76,13 @@ impl Alignment {
     pub fn text(&self) -> String {
         let poses = match self.holds {
             Some(holds) => format!("{holds} holds in {} samples", self.samples),
-            None => format!("rows of a motion of {} samples", self.samples),
+            None => format!("motion of {} samples", self.samples),
         };
         let clocks = match &self.clocks {
             ClockState::One => "one clock".to_owned(),
-            ClockState::Declared => "clocks declared to be one".to_owned(),
+            ClockState::Declared => "clocks stated to be the same".to_owned(),
             ClockState::Found { body, map } => format!(
-                "the tracker's clock is {:+.4} s ± {:.2} ms from the robot's and runs {:+.0} ± {:.0} ppm faster (motion of `{body}`: correlation {:.3}, second peak {:.2})",
+                "the tracker clock is offset by {:+.4} s ± {:.2} ms from the robot clock and runs {:+.0} ± {:.0} ppm fast (motion of `{body}`: correlation {:.3}, second peak {:.2})",
                 map.offset,
                 map.offset_sigma * 1e3,
                 map.drift * 1e6,

@@ -11,7 +11,7 @@
 
 use calib_core::{EffectKind, Parameter, ParameterId, ParameterKind, Unit};
 use calib_profile::Usage;
-use calib_report::Clock;
+use calib_report::{Clock, ClockCheck};
 
 use crate::formulate::ml::{Formulation, FreeSet, MlFit};
 use crate::prepare::align::ClockState;
@@ -197,9 +197,9 @@ pub fn clocks(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Clock> {
             recording: "all".to_owned(),
             clock: "tracker".to_owned(),
             against: "joints".to_owned(),
+            check: ClockCheck::NotNeeded,
             agrees: Some(true),
-            text: "static poses, joints and tracker in one row: the clocks do not matter"
-                .to_owned(),
+            text: ClockCheck::NotNeeded.text().to_owned(),
             ..Clock::default()
         }];
     }
@@ -207,18 +207,21 @@ pub fn clocks(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Clock> {
         .recordings
         .values()
         .map(|r| {
-            aligned_clock(r, fit).unwrap_or_else(|| Clock {
-                recording: r.name.clone(),
-                clock: "tracker".to_owned(),
-                against: "joints".to_owned(),
-                agrees: r.poses.t.is_none().then_some(true),
-                text: if r.poses.t.is_none() {
-                    "static poses: the clocks do not matter".to_owned()
+            aligned_clock(r, fit).unwrap_or_else(|| {
+                let check = if r.poses.t.is_none() {
+                    ClockCheck::NotNeeded
                 } else {
-                    "joints and tracker share the rows of one table; their offset was not tested"
-                        .to_owned()
-                },
-                ..Clock::default()
+                    ClockCheck::NotTested
+                };
+                Clock {
+                    recording: r.name.clone(),
+                    clock: "tracker".to_owned(),
+                    against: "joints".to_owned(),
+                    check,
+                    agrees: (check == ClockCheck::NotNeeded).then_some(true),
+                    text: check.text().to_owned(),
+                    ..Clock::default()
+                }
             })
         })
         .collect()
@@ -231,21 +234,20 @@ fn aligned_clock(r: &Loaded, fit: Option<&MlFit>) -> Option<Clock> {
     let mut text = alignment.text();
     if let Some(clock) = estimate.filter(|_| alignment.holds.is_none()) {
         text += &format!(
-            "; with all loops {:+.4} s ± {:.2} ms in the middle, {:+.0} ± {:.0} ppm: taken into account",
+            "; estimated from all loops: {:+.4} s ± {:.2} ms at mid-recording, {:+.0} ± {:.0} ppm, and corrected",
             clock.offset,
             clock.sigma.unwrap_or_default() * 1e3,
             clock.drift * 1e6,
             clock.drift_sigma.unwrap_or_default() * 1e6
         );
     } else if estimate.is_some() {
-        text += "; in a hold the rest of the offset does not matter"
-            .to_owned()
-            .as_str();
+        text += "; the remaining offset has no effect on holds";
     }
     Some(Clock {
         recording: r.name.clone(),
         clock: alignment.tracker_clock.clone(),
         against: alignment.robot_clock.clone(),
+        check: ClockCheck::Aligned,
         offset_s: estimate.map(|c| c.offset),
         sigma_s: estimate.and_then(|c| c.sigma),
         drift: estimate.map(|c| c.drift),

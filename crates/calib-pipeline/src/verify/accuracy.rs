@@ -3,7 +3,7 @@
 use calib_core::Configuration;
 use calib_geometry::so3;
 use calib_profile::Usage;
-use calib_report::{AccuracyLimit, Workspace, WorkspacePoint};
+use calib_report::{AccuracyLimit, ErrorSource, Workspace, WorkspacePoint};
 use calib_urdf::LinkId;
 use nalgebra::Matrix6;
 
@@ -117,43 +117,22 @@ pub(crate) fn accuracy_limits(
     let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
     let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
     let total = explained + rest.powi(2);
-    let limit = |source: &str, sigma: f64, text: &str, remedy: &str| AccuracyLimit {
-        source: source.to_owned(),
-        sigma_m: Some(sigma),
-        share: Some(if total > 0.0 {
+    let limit = |(kind, sigma): (ErrorSource, f64)| {
+        let share = if total > 0.0 {
             sigma.powi(2) / total
         } else {
             0.0
-        }),
-        text: text.to_owned(),
-        remedy: remedy.to_owned(),
+        };
+        AccuracyLimit::new(kind, sigma, share)
     };
-    let mut limits = vec![
-        limit(
-            "tracker noise",
-            tracker,
-            "one measurement of the body on a held-out pose",
-            "average several frames per pose",
-        ),
-        limit(
-            "joint noise",
-            joints,
-            "the joints do not stop where their encoders say, differently at each pose",
-            "let the robot settle; warm it up",
-        ),
-        limit(
-            "parameters",
-            parameters,
-            "what the recordings leave open about the geometry",
-            "record more poses, spread over the range of motion",
-        ),
-        limit(
-            "not modelled",
-            rest,
-            "what neither noise nor uncertainty explains",
-            "see the missing physics among the findings",
-        ),
-    ];
+    let mut limits: Vec<AccuracyLimit> = [
+        (ErrorSource::TrackerNoise, tracker),
+        (ErrorSource::JointNoise, joints),
+        (ErrorSource::Parameters, parameters),
+        (ErrorSource::NotModeled, rest),
+    ]
+    .map(limit)
+    .into();
     limits.sort_by(|a, b| b.share.unwrap_or(0.0).total_cmp(&a.share.unwrap_or(0.0)));
     limits
 }

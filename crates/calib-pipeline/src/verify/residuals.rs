@@ -95,7 +95,7 @@ pub fn residual_rows(
                         subject: subject.to_owned(),
                         residual_m: residual.into(),
                         rotation_rad,
-                        normalised: None,
+                        normalized: None,
                         used: !is_out(row, subject),
                         joints: joints.clone(),
                     });

@@ -36,7 +36,7 @@ pub(super) fn launch(scene: &Scene) -> String {
     }
     text.push_str("]\n\n# Joint positions of the scene [rad or m]; robot_state_publisher takes them from /joint_states.\nJOINTS = {\n");
     for joint in &scene.robot.joints {
-        let unit = if joint.unit == Unit::Metre {
+        let unit = if joint.unit == Unit::Meter {
             "m"
         } else {
             "rad"

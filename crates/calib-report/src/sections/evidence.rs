@@ -1,20 +1,21 @@
-//! What it rests on: data, residuals, what limits the accuracy, files.
+//! The evidence: data, residuals, what limits the accuracy, files.
 
 use super::{Page, code, mm};
 use crate::table::Table;
-use crate::{Report, Unit, answers, number};
+use crate::words;
+use crate::{Report, Unit, number};
 
-/// Row numbers in a table cell before the rest is counted.
+/// Row numbers shown in a table cell; the rest is counted.
 const ROWS: usize = 8;
 
 pub(super) fn data(page: &mut Page, report: &Report) {
-    page.section("data", "The data");
+    page.section("data", "Data");
     let mut table = Table::new(&[
         "<recording",
         "<for",
         ">rows",
         ">used",
-        ">whole rows left out",
+        ">rows rejected",
         "<lost by the tracker",
     ]);
     for recording in &report.recordings {
@@ -32,7 +33,7 @@ pub(super) fn data(page: &mut Page, report: &Report) {
             used,
             rejected,
             if lost.is_empty() {
-                "nothing".to_owned()
+                "none".to_owned()
             } else {
                 lost.join(", ")
             },
@@ -40,15 +41,15 @@ pub(super) fn data(page: &mut Page, report: &Report) {
     }
     page.table("", table);
 
-    let mut table = Table::new(&["<recording", "<on reading"]);
+    let mut table = Table::new(&["<recording", "<conversion"]);
     for recording in &report.recordings {
         let up = recording.up_axis.as_ref();
-        let up = up.map(|axis| format!("the file says that {axis} is up"));
+        let up = up.map(|axis| format!("the file states that {axis} points up"));
         for text in recording.conversions.iter().chain(up.as_ref()) {
             table.row([code(&recording.name), text.clone()]);
         }
     }
-    page.table("What was converted on reading:", table);
+    page.table("Conversions on reading:", table);
 
     let mut table = Table::new(&["<joint", ">from", ">to", ">limits", ">covered", ">samples"]);
     for joint in &report.coverage {
@@ -72,14 +73,14 @@ pub(super) fn data(page: &mut Page, report: &Report) {
             joint.samples.to_string(),
         ]);
     }
-    page.table("Where the joints were:", table);
+    page.table("Joint ranges in the data:", table);
 
     let mut table = Table::new(&[
         "<noise",
-        ">found σ",
+        ">estimated σ",
         ">stated σ",
-        ">from observations",
-        "<how",
+        ">observations",
+        "<method",
     ]);
     for noise in &report.noise {
         let [found, stated] =
@@ -92,17 +93,14 @@ pub(super) fn data(page: &mut Page, report: &Report) {
             noise.text.clone(),
         ]);
     }
-    page.table("Noise, per component:", table);
+    page.table("Noise per component:", table);
 
-    let clocks = answers(report)
-        .into_iter()
-        .find(|answer| answer.id == "clocks");
     page.text(format!(
-        "Did the clocks agree? {}",
-        clocks.map_or_else(String::new, |answer| answer.lines.join(" "))
+        "Were the clocks synchronized? {}",
+        words::clock::clocks(report, "below").join(" ")
     ));
 
-    let mut table = Table::new(&["<recording", "<what", "<rows", "<why"]);
+    let mut table = Table::new(&["<recording", "<subject", "<rows", "<reason"]);
     for rejected in &report.rejected {
         let what = if rejected.subject.is_empty() {
             "whole row".to_owned()
@@ -116,15 +114,15 @@ pub(super) fn data(page: &mut Page, report: &Report) {
             rejected.reason.clone(),
         ]);
     }
-    page.table("Thrown out of the fit:", table);
+    page.table("Rejected from the fit:", table);
 
     let mut table = Table::new(&[
         "<severity",
         "<finding",
-        "<about",
+        "<subject",
         "<rows",
-        "<what was found",
-        "<what to do",
+        "<description",
+        "<remedy",
     ]);
     for finding in &report.findings {
         table.row([
@@ -154,8 +152,8 @@ pub(super) fn residuals(page: &mut Page, report: &Report) {
         return;
     }
     page.section("residuals", "Residuals of the fit");
-    page.text("Predicted − observed, mm; over joints and time as pictures in `report.html`, row by row in `residuals.csv`.");
-    let mut table = Table::new(&["<of", ">samples", ">mean", ">rms", ">95 %", ">max"]);
+    page.text("Predicted minus observed, mm. `report.html` plots them over joints and time; `residuals.csv` lists every row.");
+    let mut table = Table::new(&["<group", ">samples", ">mean", ">rms", ">95 %", ">max"]);
     let directions = report
         .residuals
         .by_direction
@@ -177,39 +175,23 @@ pub(super) fn residuals(page: &mut Page, report: &Report) {
 pub(super) fn accuracy(page: &mut Page, report: &Report) {
     if let Some(workspace) = &report.workspace {
         page.section("workspace", "Uncertainty over the workspace");
-        let seen = if workspace.relative_to.is_empty() {
-            &workspace.frame
-        } else {
-            &workspace.relative_to
-        };
-        page.text(format!(
-            "Predicted position of {} in {} at {} recorded postures: σ {} rms, {} at the worst. Of the parameters only: what a single measurement adds stands below.",
-            code(&workspace.link),
-            code(seen),
-            workspace.points.len(),
-            number::plain(workspace.rms_sigma_m, Unit::Metre),
-            number::plain(workspace.max_sigma_m, Unit::Metre)
-        ));
+        page.text(words::accuracy::workspace(workspace));
     }
     if report.accuracy_limits.is_empty() {
         return;
     }
-    page.section("accuracy", "What limits the accuracy now");
-    page.text("What an error of the tool on a new pose is made of; shares of the variance.");
-    let mut table = Table::new(&[
-        "<source",
-        ">σ at the tool",
-        ">share",
-        "<how it was found",
-        "<what would help",
-    ]);
+    page.section("accuracy", "What limits the accuracy");
+    page.text(
+        "Contributions to the position error of the tool on a new pose, as shares of the variance.",
+    );
+    let mut table = Table::new(&["<source", ">σ at the tool", ">share", "<basis", "<remedy"]);
     for limit in &report.accuracy_limits {
         let share = limit
             .share
             .map_or_else(|| number::UNKNOWN.to_owned(), number::percent);
         table.row([
             limit.source.clone(),
-            number::plain_or_unknown(limit.sigma_m, Unit::Metre),
+            number::plain_or_unknown(limit.sigma_m, Unit::Meter),
             share,
             limit.text.clone(),
             limit.remedy.clone(),
@@ -234,7 +216,7 @@ pub(super) fn files(page: &mut Page, report: &Report) {
         table.row([code(&input.path), input.sha256.clone()]);
     }
     page.table("", table);
-    let mut table = Table::new(&["<written", "<what", "<SHA-256"]);
+    let mut table = Table::new(&["<written", "<content", "<SHA-256"]);
     for output in &report.outputs {
         table.row([
             code(&output.path),
@@ -243,8 +225,5 @@ pub(super) fn files(page: &mut Page, report: &Report) {
         ]);
     }
     page.table("", table);
-    page.text(format!(
-        "calib {}, seed {}. A report cannot hold its own digest.",
-        report.version, report.seed
-    ));
+    page.text(words::files::program(report));
 }

@@ -1,25 +1,25 @@
-//! What was found about the robot: changes, transforms, loops, other estimators, parameters.
+//! Results about the robot: changes, transforms, loops, other estimators, parameters.
 
 use super::{Page, code};
 use crate::table::Table;
 use crate::{LoopClosure, LoopGroup, Report, Stats, Unit, number};
 
 pub(super) fn changes(page: &mut Page, report: &Report) {
-    page.section("changes", "What changed");
+    page.section("changes", "Changes to the URDF");
     if report.changes.is_empty() {
-        page.text("No number of the URDF changed.");
+        page.text("No value of the URDF changed.");
     }
     let mut table = Table::new(&[
         "<joint",
-        "<what",
+        "<value",
         ">before",
         ">after",
         ">change ± σ",
-        ">from the data",
+        ">data share",
     ]);
     for change in &report.changes {
         let plain = |x: f64| number::fixed_with_unit(x, change.unit, 3);
-        // A number that was added has no change: its σ stands at itself.
+        // A value that was added has no change: its σ is shown with the value itself.
         let (old, new) = match change.old {
             Some(old) => (plain(old), plain(change.new)),
             None => (
@@ -46,7 +46,7 @@ pub(super) fn changes(page: &mut Page, report: &Report) {
         ]);
     }
     if !report.changes.is_empty() {
-        page.text("x, y, z along the axes of the parent link; a turn about the axes of the joint's old frame. From the data: the share of the variance known beforehand that the data took away; the rest is what the profile assumed.");
+        page.text("x, y, z along the axes of the parent link; rotations about the axes of the joint's original frame. Data share: fraction of the prior variance removed by the data (100 %: fully measured).");
     }
     page.table("", table);
     if !report.urdf_diff.is_empty() {
@@ -59,7 +59,7 @@ pub(super) fn transforms(page: &mut Page, report: &Report) {
         return;
     }
     page.section("transforms", "Transforms");
-    page.text("`parent ← child`; translation ± σ along the parent's axes; roll, pitch, yaw of the URDF; σ of the rotation about the child's axes. \"In part\": a direction of it is a choice, see What is not known.");
+    page.text("`parent ← child`; translation ± σ along the axes of the parent; roll, pitch, yaw as in the URDF; σ of the rotation about the axes of the child. Partial: not every degree of freedom is observable, see What is not observable.");
     let mut table = Table::new(&[
         "<name",
         "<parent ← child",
@@ -75,7 +75,7 @@ pub(super) fn transforms(page: &mut Page, report: &Report) {
             number::with_sigma(
                 transform.translation_m[i],
                 transform.sigma_translation_m.map(|sigma| sigma[i]),
-                Unit::Metre,
+                Unit::Meter,
             )
         };
         let finest = transform
@@ -83,10 +83,7 @@ pub(super) fn transforms(page: &mut Page, report: &Report) {
             .map(|sigma| sigma.into_iter().fold(f64::INFINITY, f64::min));
         let rpy = transform
             .rpy_rad
-            .map(|angle| {
-                let text = number::with_sigma(angle, finest, Unit::Radian);
-                text.split(" ±").next().unwrap_or_default().to_owned()
-            })
+            .map(|angle| number::rounded_by_sigma(angle, finest, Unit::Radian))
             .join(", ");
         let sigma = transform.sigma_rotation_rad.map_or_else(
             || number::UNKNOWN.to_owned(),
@@ -99,7 +96,7 @@ pub(super) fn transforms(page: &mut Page, report: &Report) {
         let status = if transform.observable {
             transform.status.word().to_owned()
         } else {
-            format!("{}, in part", transform.status.word())
+            format!("{}, partial", transform.status.word())
         };
         table.row([
             code(&transform.name),
@@ -120,7 +117,7 @@ pub(super) fn loops(page: &mut Page, report: &Report) {
         return;
     }
     page.section("loops", "Loop closures");
-    page.text("Measured against forward kinematics: e_t the translation, e_θ the rotation angle of `measured⁻¹ · kinematic`.");
+    page.text("Measurement compared with forward kinematics: e_t is the translation and e_θ the rotation angle of `measured⁻¹ · kinematic`.");
     for closure in &report.loops {
         let title = format!(
             "{}, {} poses, by {}:",
@@ -142,9 +139,13 @@ pub(super) fn loops(page: &mut Page, report: &Report) {
             table.row([name.to_owned()].into_iter().chain(cells));
         };
         if let Some(norm) = &closure.norm_error_m {
-            stats("norm error, the paper's (a lower bound)", norm, Unit::Metre);
+            stats(
+                "error of the norm, as in the paper (a lower bound)",
+                norm,
+                Unit::Meter,
+            );
         }
-        stats("vector error ‖e_t‖", &closure.translation_m, Unit::Metre);
+        stats("vector error ‖e_t‖", &closure.translation_m, Unit::Meter);
         if let Some(rotation) = &closure.rotation_rad {
             stats("|e_θ|", rotation, Unit::Radian);
         }
@@ -155,7 +156,7 @@ pub(super) fn loops(page: &mut Page, report: &Report) {
     }
 }
 
-/// The paper's Table 1: a row per number, a column per group.
+/// The paper's Table 1: one row per statistic, one column per group.
 fn by_group(closure: &LoopClosure) -> Table {
     let heads: Vec<String> = std::iter::once("<error".to_owned())
         .chain(
@@ -170,13 +171,13 @@ fn by_group(closure: &LoopClosure) -> Table {
         table.row(std::iter::once(name.to_owned()).chain(closure.groups.iter().map(cell)))
     };
     row("max ‖e_t‖ (cm)", &|group| {
-        number::centimetres(group.translation_m.max)
+        number::centimeters(group.translation_m.max)
     });
     row("mean ‖e_t‖ (cm)", &|group| {
-        number::centimetres(group.translation_m.mean)
+        number::centimeters(group.translation_m.mean)
     });
     row("std ‖e_t‖ (cm)", &|group| {
-        number::centimetres(group.translation_m.std)
+        number::centimeters(group.translation_m.std)
     });
     if closure
         .groups
@@ -202,8 +203,8 @@ pub(super) fn estimators(page: &mut Page, report: &Report) {
     if report.estimators.is_empty() {
         return;
     }
-    page.section("estimators", "The same by other estimators");
-    page.text("Each against the estimate that this report uses: how far apart, and whether both uncertainties explain it.");
+    page.section("estimators", "Cross-check with other estimators");
+    page.text("Each result compared with the estimate used in this report: the distance, and whether the two uncertainties explain it.");
     let mut table = Table::new(&[
         "<quantity",
         "<estimator",
@@ -250,13 +251,13 @@ pub(super) fn parameters(page: &mut Page, report: &Report) {
         return;
     }
     page.section("parameters", "Parameters");
-    page.text("Origins and mounts are corrections to the described pose, in axes of the child. Solid: at most a tenth of the variance known beforehand is left; weak: at most a half; prior only: more; not observable: part of a combination that the data leave open, or of a joint that did not move.");
+    page.text("Origins and mounts are corrections to the nominal pose, in the axes of the child. Identifiable: at most 10 % of the prior variance remains; weakly identifiable: at most 50 %; prior only: more than 50 %; not identifiable: part of a combination that is not observable, or of a joint that did not move.");
     let mut table = Table::new(&[
         "<parameter",
         "<kind",
         ">nominal",
         ">value ± σ",
-        ">from the data",
+        ">data share",
         "<class",
     ]);
     for parameter in &report.parameters {

@@ -1,13 +1,13 @@
-//! The verdict, the error on new poses, what is open.
+//! The verdict, the errors on held-out poses, what is not observable.
 
 use super::{Block, Page, code, mm};
 use crate::table::Table;
-use crate::words::held_out::held_out_of;
+use crate::words;
 use crate::words::observability::grouped;
 use crate::words::prose::{full_stop, sentence};
-use crate::{Meaning, Report, Unit, Verdict, answers, number};
+use crate::{Meaning, Report, Unit, Verdict, number};
 
-/// Held-out poses in the table; all of them stand in `report.json`.
+/// Held-out poses in the table; `report.json` has all of them.
 const POSES: usize = 10;
 
 pub(super) fn head(page: &mut Page, report: &Report) {
@@ -16,13 +16,13 @@ pub(super) fn head(page: &mut Page, report: &Report) {
         format!("Calibration of {}: {}", report.robot, report.verdict.word()),
     );
     if report.verdict == Verdict::NotEvaluated {
-        page.text("Not a pass: nothing was exceeded, but not every limit could be evaluated.");
+        page.text("No limit was exceeded, but not every limit could be evaluated: the result is not accepted.");
     }
-    // What was met stands in the table of limits already.
+    // The table of limits already lists what was met.
     if report.verdict != Verdict::Accepted || report.limits.is_empty() {
         page.list(report.reasons.iter().map(|reason| sentence(reason)));
     }
-    let mut limits = Table::new(&["<limit", ">found", ">allowed", "<", "<why"]);
+    let mut limits = Table::new(&["<limit", ">value", ">limit", "<", "<reason"]);
     for limit in &report.limits {
         limits.row([
             limit.quantity.clone(),
@@ -34,18 +34,13 @@ pub(super) fn head(page: &mut Page, report: &Report) {
     }
     page.table("", limits);
     if !report.scope.is_empty() {
-        page.text("It holds for:");
+        page.text("Valid for:");
         page.list(report.scope.iter().map(|scope| sentence(scope)));
     }
-    let fit = report.fit.as_ref().map_or_else(String::new, |fit| {
-        let chi2 = fit.chi2_per_dof.map_or_else(String::new, |chi2| {
-            format!(", χ²/dof {}", number::fixed(chi2, 2))
-        });
-        format!(
-            "; {} ({} measured poses and points, {} unknowns{chi2})",
-            fit.status, fit.observations, fit.unknowns
-        )
-    });
+    let fit = report
+        .fit
+        .as_ref()
+        .map_or_else(String::new, |fit| format!("; {}", words::fit::summary(fit)));
     page.text(format!(
         "Profile {}, method `{}`{fit}.",
         code(&report.profile),
@@ -54,20 +49,12 @@ pub(super) fn head(page: &mut Page, report: &Report) {
 }
 
 pub(super) fn held_out(page: &mut Page, report: &Report) {
-    page.section("held-out", "Error on poses that were not fitted");
+    page.section("held-out", "Errors on held-out poses");
     let Some(held_out) = &report.verification.held_out else {
-        let reason = if report.verification.reason.is_empty() {
-            "no pose was held out."
-        } else {
-            &report.verification.reason
-        };
-        page.text(format!("Not evaluated: {}", reason));
+        page.text(words::held_out::missing(report));
         return;
     };
-    page.text(sentence(&format!(
-        "{}; predicted against measured, in mm",
-        held_out_of(held_out)
-    )));
+    page.text(words::held_out::table_intro(held_out));
     let mut table = Table::new(&["<model", ">mean", ">rms", ">95 %", ">max"]);
     for (name, stats) in [
         ("nominal", held_out.nominal),
@@ -82,7 +69,7 @@ pub(super) fn held_out(page: &mut Page, report: &Report) {
     }
     page.table("", table);
     page.text(
-        "Nominal: the robot as described, its bodies placed by closed forms. Registration only: the robot as described after the best fit of the tracker's place and of the bodies. Calibrated: this result.",
+        "Nominal: the nominal URDF, with the bodies placed by closed-form estimators. Registration only: the nominal URDF after the best fit of the tracker and the bodies. Calibrated: this result.",
     );
     if let Some(orientation) = &held_out.orientation {
         let mut table = Table::new(&["<model", ">mean", ">rms", ">95 %", ">max"]);
@@ -100,16 +87,14 @@ pub(super) fn held_out(page: &mut Page, report: &Report) {
             table.row([name.to_owned()].into_iter().chain(cells));
         }
         page.table(
-            "Orientation of the same bodies, predicted against measured, deg:",
+            "Orientation of the same bodies, predicted minus measured, deg:",
             table,
         );
     }
-    if let Some(answer) = answers(report)
-        .into_iter()
-        .find(|answer| answer.id == "expected-error")
-    {
-        page.text(format!("On a new pose: {}", answer.lines.join(" ")));
-    }
+    page.text(format!(
+        "Expected on a new pose: {}",
+        words::held_out::expected_error(report).join(" ")
+    ));
 
     let mut poses: Vec<_> = held_out.poses.iter().collect();
     poses.sort_by(|a, b| {
@@ -127,13 +112,8 @@ pub(super) fn held_out(page: &mut Page, report: &Report) {
         "<joints",
     ]);
     for pose in poses.iter().take(POSES) {
-        // Empty, not a dash: a model that no pose has loses its column.
+        // Empty, not a dash: the column of a model without errors is dropped.
         let cell = |error: Option<f64>| error.map_or_else(String::new, mm);
-        let joints: Vec<String> = pose
-            .joints
-            .iter()
-            .map(|joint| format!("{} {}", joint.joint, number::plain(joint.value, joint.unit)))
-            .collect();
         table.row([
             pose.label(),
             pose.group.clone(),
@@ -142,22 +122,14 @@ pub(super) fn held_out(page: &mut Page, report: &Report) {
             cell(pose.calibrated_m),
             pose.calibrated_rad
                 .map_or_else(String::new, |angle| number::plain(angle, Unit::Radian)),
-            joints.join(", "),
+            words::held_out::joints(&pose.joints),
         ]);
     }
-    let title = if poses.len() > POSES {
-        format!(
-            "The {POSES} worst of {}, mm (orientation: calibrated):",
-            poses.len()
-        )
-    } else {
-        "Every pose, the worst first, mm:".to_owned()
-    };
-    page.table(&title, table);
+    page.table(&words::held_out::worst_poses(POSES, poses.len()), table);
 }
 
 pub(super) fn open_ends(page: &mut Page, report: &Report) {
-    page.section("not-observable", "What is not known");
+    page.section("not-observable", "What is not observable");
     let transforms: Vec<(String, String)> = report
         .transforms
         .iter()
@@ -180,24 +152,24 @@ pub(super) fn open_ends(page: &mut Page, report: &Report) {
     };
     let parts = [
         (
-            "Not measured: what depends on it is predicted as described, not as found.",
+            "Not measured: predictions that depend on these parameters follow the nominal URDF, not the data.",
             of(Meaning::NotMeasured),
         ),
         (
-            "Directions of transforms (a turn or a shift of the second frame) that no measurement shows:",
+            "Degrees of freedom of transforms (rotation or translation of the second frame) that are not observable:",
             transforms,
         ),
         (
-            "By convention: several descriptions of one robot; the tracked bodies are predicted the same with any of them.",
+            "Arbitrary conventions: equivalent parameter values; every prediction of a tracked body is the same with any of them.",
             of(Meaning::Convention),
         ),
     ];
     if parts.iter().all(|(_, items)| items.is_empty()) {
         let nothing = report.transforms.is_empty() && report.parameters.is_empty();
         page.text(if nothing {
-            "Everything: nothing was solved."
+            "Nothing was solved."
         } else {
-            "Everything that was asked for is observable."
+            words::observability::ALL_OBSERVABLE
         });
     }
     for (intro, items) in parts {
@@ -217,12 +189,12 @@ pub(super) fn open_ends(page: &mut Page, report: &Report) {
         page.push(Block::List(items.into_iter().map(finished).collect()));
     }
     if !report.next_steps.is_empty() {
-        page.section("next-steps", "What to do next");
+        page.section("next-steps", "Next steps");
         page.list(report.next_steps.iter().map(|step| sentence(step)));
     }
 }
 
-/// A remedy that the next item repeats stands once, at the last.
+/// A remedy shared by consecutive items is shown once, at the last of them.
 fn shared_remedies(mut items: Vec<(String, String)>) -> Vec<(String, String)> {
     for i in 1..items.len() {
         if items[i - 1].1 == items[i].1 {

@@ -1,4 +1,4 @@
-//! One function per kind of picture; each returns the height that it used.
+//! One function per kind of plot; each returns the height that it used.
 
 use super::scale::Scale;
 use super::{Body, STEPS, WIDTH};
@@ -18,7 +18,7 @@ fn label_column<'a>(labels: impl Iterator<Item = &'a str>) -> f64 {
     16.0 + LABEL_CHAR * longest.clamp(6, LABEL_CHARS) as f64
 }
 
-/// Numbers in words stand right of the rows.
+/// Width of the column of numbers right of the rows.
 const TEXTS: f64 = 134.0;
 
 pub(super) fn draw_rows(body: &mut Body, axis: &str, rows: &[PlotRow]) -> f64 {

@@ -111,7 +111,8 @@ mod tests {
             for (x, label) in ticks {
                 assert!((0.0..=100.0).contains(&scale.place(x)));
                 assert!(
-                    (label.parse::<f64>().expect("a number") - x).abs() <= 1e-9 * x.abs().max(1e-9),
+                    (label.replace('−', "-").parse::<f64>().expect("a number") - x).abs()
+                        <= 1e-9 * x.abs().max(1e-9),
                     "{label} {x}"
                 );
             }

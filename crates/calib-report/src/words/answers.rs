@@ -1,25 +1,25 @@
-//! The twelve questions that the first screen answers: words around numbers that the report holds.
+//! The twelve questions that the first screen answers, in the words of each notion.
 
 use super::clock::clocks;
 use super::files::{changed, reproduce};
 use super::held_out::{expected_error, worst_pose};
 use super::noise::noise;
-use super::observability::not_known;
+use super::observability::unobservable;
 use super::prose::{commands, or, sentence, short};
-use super::rejection::thrown_out;
+use super::rejection::rejected;
 use super::verdict::trust;
 use crate::Report;
 
-/// A question of the reader and its answer.
+/// A question and its answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Answer {
-    /// Stable id of the heading, `trust`.
+    /// Stable id of the heading: `trust`.
     pub id: &'static str,
     /// The heading.
     pub question: &'static str,
     /// The same in a word or two, for a list of links.
     pub short: &'static str,
-    /// One statement a line, the decisive first; plain text, commands between backticks.
+    /// One sentence per line, the most important first; plain text, commands between backticks.
     pub lines: Vec<String>,
 }
 
@@ -29,7 +29,7 @@ pub fn answers(report: &Report) -> Vec<Answer> {
     answers_in(report, "below")
 }
 
-/// The same for a place where what is left out stands elsewhere: "… and 3 more {rest}."
+/// The same where omitted items are listed elsewhere: "… and 3 more {rest}."
 pub(crate) fn answers_in(report: &Report, rest: &str) -> Vec<Answer> {
     let short = |items: &[String]| short(items, rest);
     let sentences =
@@ -41,45 +41,53 @@ pub(crate) fn answers_in(report: &Report, rest: &str) -> Vec<Answer> {
         lines,
     };
     vec![
-        answer("trust", "May I trust it?", trust(report, rest)),
+        answer("trust", "Can I trust it?", trust(report, rest)),
         answer(
             "scope",
-            "For what?",
+            "What is it valid for?",
             or(
                 sentences(&report.scope),
-                "The profile states no scope: only for poses like those that were recorded.",
+                "Only for poses similar to those that were recorded: the profile states no scope.",
             ),
         ),
         answer(
             "expected-error",
-            "What error on a new pose?",
+            "What error is expected on a new pose?",
             expected_error(report),
         ),
         answer(
             "worst-pose",
-            "Which pose is worst?",
+            "Which pose has the largest error?",
             worst_pose(report, rest),
         ),
-        answer("not-known", "What is not known?", not_known(report, rest)),
+        answer(
+            "unobservable",
+            "What is not observable?",
+            unobservable(report, rest),
+        ),
         answer(
             "next",
-            "What do I do next?",
-            or(sentences(&report.next_steps), "Nothing is open."),
+            "What should I do next?",
+            or(sentences(&report.next_steps), "Nothing."),
         ),
-        answer("changed", "Which file changed?", changed(report)),
+        answer("changed", "Which files changed?", changed(report)),
         answer(
-            "thrown-out",
-            "What was thrown out, and why?",
-            thrown_out(report, rest),
+            "rejected",
+            "What was rejected, and why?",
+            rejected(report, rest),
         ),
         answer("noise", "How noisy was the tracker?", noise(report, rest)),
-        answer("clocks", "Did the clocks agree?", clocks(report, rest)),
+        answer(
+            "clocks",
+            "Were the clocks synchronized?",
+            clocks(report, rest),
+        ),
         answer(
             "undo",
             "How do I undo it?",
             or(
                 commands(&report.undo),
-                "Nothing to undo: no file of yours was changed.",
+                "Nothing to undo: none of your files was changed.",
             ),
         ),
         answer("reproduce", "How do I reproduce it?", reproduce(report)),
@@ -91,11 +99,11 @@ fn short_name(id: &str) -> &'static str {
         "trust" => "Trust",
         "scope" => "Scope",
         "expected-error" => "Error",
-        "worst-pose" => "Worst pose",
-        "not-known" => "Not known",
+        "worst-pose" => "Largest error",
+        "unobservable" => "Not observable",
         "next" => "Next",
         "changed" => "Files",
-        "thrown-out" => "Thrown out",
+        "rejected" => "Rejected",
         "noise" => "Noise",
         "clocks" => "Clocks",
         "undo" => "Undo",

@@ -1,36 +1,52 @@
 //! Clocks of the recordings.
 
-use super::prose::{capital, or, sentence, short};
-use crate::{Clock, Report, Unit, number};
+use super::prose::{full_stop, or, short};
+use crate::{Clock, ClockCheck, Report, Unit, number};
 
-pub(crate) fn clocks(report: &Report, rest: &str) -> Vec<String> {
-    let line = |clock: &Clock| {
-        let verdict = match clock.agrees {
-            Some(true) => "yes",
-            Some(false) => "no",
-            None => "not known",
+impl ClockCheck {
+    /// What was done about the clocks, as a clause.
+    #[must_use]
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::NotNeeded => "each row holds the joints and the tracker data of one static pose",
+            Self::NotTested => {
+                "joints and tracker share the rows of one table; their offset was not tested"
+            }
+            Self::Aligned => "the streams were aligned",
+        }
+    }
+}
+
+impl Clock {
+    fn sentence(&self) -> String {
+        let verdict = match (self.check, self.agrees) {
+            (ClockCheck::NotNeeded, _) => "not needed",
+            (_, Some(true)) => "yes",
+            (_, Some(false)) => "no",
+            (_, None) => "not tested",
         };
-        let offset = clock.offset_s.map_or_else(String::new, |offset| {
-            format!(
-                ", {} against {} {}",
-                clock.clock,
-                clock.against,
-                number::change(offset, clock.sigma_s, Unit::Second)
-            )
+        let offset = self.offset_s.map_or_else(String::new, |offset| {
+            let offset = number::change(offset, self.sigma_s, Unit::Second);
+            format!(", {} relative to {} {offset}", self.clock, self.against)
         });
-        let text = if clock.text.is_empty() {
+        let text = if self.text.is_empty() {
             String::new()
         } else {
-            format!(": {}", clock.text)
+            format!(": {}", self.text)
         };
+        full_stop(&format!("{verdict}{offset}{text}"))
+    }
+}
+
+pub(crate) fn clocks(report: &Report, rest: &str) -> Vec<String> {
+    let lines: Vec<String> = match report.clocks.as_slice() {
         // One answer for everything needs no name.
-        if clock.recording == "all" {
-            sentence(&format!("{}{offset}{text}", capital(verdict)))
-        } else {
-            sentence(&format!("{}: {verdict}{offset}{text}", clock.recording))
-        }
+        [only] => vec![super::prose::capital(&only.sentence())],
+        all => all
+            .iter()
+            .map(|clock| format!("{}: {}", clock.recording, clock.sentence()))
+            .collect(),
     };
-    let lines: Vec<String> = report.clocks.iter().map(line).collect();
     or(
         short(&lines, rest),
         "Not compared: no recording has two clocks.",

@@ -1,57 +1,59 @@
 //! Errors on poses that were not fitted.
 
-use crate::{HeldOut, Report, Unit, number};
+use super::prose::{capital, counted, full_stop};
+use crate::{HeldOut, JointValue, PoseError, Report, Unit, number};
 
 /// Joints of the worst pose in an answer: an arm and a torso.
 const JOINTS: usize = 14;
 
+/// Why there is no held-out error.
+pub(crate) fn missing(report: &Report) -> String {
+    match report.verification.reason.as_str() {
+        "" => "Not evaluated: no poses were held out.".to_owned(),
+        reason => format!("Not evaluated: {}", full_stop(reason)),
+    }
+}
+
 pub(crate) fn expected_error(report: &Report) -> Vec<String> {
     let Some(held_out) = &report.verification.held_out else {
-        let reason = &report.verification.reason;
-        return vec![if reason.is_empty() {
-            "Not known: no pose was held out.".to_owned()
-        } else {
-            format!("Not known: {reason}")
-        }];
+        return vec![missing(report)];
     };
     let mut lines = Vec::new();
-    let length = |m| number::plain(m, Unit::Metre);
-    let over = held_out_of(held_out);
+    let length = |m| number::plain(m, Unit::Meter);
+    let basis = basis(held_out);
     match (&held_out.expected, &held_out.calibrated) {
         (Some(expected), _) => lines.push(format!(
-            "{} rms ({} interval {} to {}): {over}.",
+            "{} rms ({} interval {} to {}): {basis}.",
             length(expected.rms_m),
             number::percent(expected.confidence),
             length(expected.low_m),
             length(expected.high_m),
         )),
         (None, Some(calibrated)) => lines.push(format!(
-            "{} rms: {over}; too few for an interval.",
+            "{} rms: {basis}, too few for an interval.",
             length(calibrated.rms_m),
         )),
-        (None, None) => lines.push("Not known: no held-out pose could be predicted.".to_owned()),
+        (None, None) => {
+            lines.push("Not evaluated: no held-out pose could be predicted.".to_owned())
+        }
     }
     if let Some(angle) = held_out.orientation.and_then(|o| o.calibrated) {
         lines.push(format!(
-            "{} rms in orientation.",
+            "Orientation error: {} rms.",
             number::plain(angle.rms_rad, Unit::Radian)
         ));
     }
     if let Some(registration) = &held_out.registration_only {
         lines.push(format!(
-            "Without calibration, registered only: {} rms.",
+            "With registration only, without calibration: {} rms.",
             length(registration.rms_m)
         ));
     }
     lines
 }
 
-/// "position of the tracked bodies, 298 errors in 150 held-out postures"
-pub(crate) fn held_out_of(held_out: &HeldOut) -> String {
-    let plural = |n: usize, one: &str| {
-        let s = if n == 1 { "" } else { "s" };
-        format!("{n} {one}{s}")
-    };
+/// `position of the tracked bodies, 298 errors in 150 held-out poses`
+fn basis(held_out: &HeldOut) -> String {
     let quantity = if held_out.quantity.is_empty() {
         String::new()
     } else {
@@ -60,46 +62,83 @@ pub(crate) fn held_out_of(held_out: &HeldOut) -> String {
     let n = if held_out.postures > 0 && held_out.postures != held_out.n {
         format!(
             "{} in {}",
-            plural(held_out.n, "error"),
-            plural(held_out.postures, "held-out posture")
+            counted(held_out.n, "error"),
+            counted(held_out.postures, "held-out pose")
         )
     } else {
-        plural(held_out.n, "held-out posture")
+        counted(held_out.n, "held-out pose")
     };
     quantity + &n
 }
 
+/// What the table of held-out errors shows.
+pub(crate) fn table_intro(held_out: &HeldOut) -> String {
+    format!(
+        "{}; predicted minus measured, in mm.",
+        capital(&basis(held_out))
+    )
+}
+
+/// Above the table of the poses with the largest errors.
+pub(crate) fn worst_poses(shown: usize, all: usize) -> String {
+    if all > shown {
+        format!("The {shown} largest of {all} errors, mm (orientation: calibrated):")
+    } else {
+        "All errors, largest first, mm (orientation: calibrated):".to_owned()
+    }
+}
+
 pub(crate) fn worst_pose(report: &Report, rest: &str) -> Vec<String> {
-    let worst = report
-        .verification
-        .held_out
-        .as_ref()
-        .and_then(|held_out| held_out.worst.as_ref());
-    let Some(worst) = worst else {
-        return vec!["Not known: no pose was held out.".to_owned()];
+    let held_out = report.verification.held_out.as_ref();
+    let Some(worst) = held_out.and_then(|held_out| held_out.worst.as_ref()) else {
+        return vec!["Not evaluated: no poses were held out.".to_owned()];
     };
-    let joints: Vec<String> = worst
-        .joints
-        .iter()
-        .take(JOINTS)
-        .map(|joint| format!("{} {}", joint.joint, number::plain(joint.value, joint.unit)))
-        .collect();
-    let error = number::plain_or_unknown(worst.calibrated_m, Unit::Metre);
     let group = if worst.group.is_empty() {
         String::new()
     } else {
         format!(" ({})", worst.group)
     };
-    let angle = worst.calibrated_rad.map_or_else(String::new, |angle| {
-        format!(" and {}", number::plain(angle, Unit::Radian))
-    });
-    let mut lines = vec![format!("{}{group}: {error}{angle}.", worst.label())];
-    if !joints.is_empty() {
-        let more = match worst.joints.len() - joints.len() {
+    let mut lines = vec![format!("{}{group}: {}.", worst.label(), errors(worst))];
+    if !worst.joints.is_empty() {
+        let shown = &worst.joints[..worst.joints.len().min(JOINTS)];
+        let more = match worst.joints.len() - shown.len() {
             0 => ".".to_owned(),
             n => format!(", and {n} more joints {rest}."),
         };
-        lines.push(joints.join(", ") + &more);
+        lines.push(joints(shown) + &more);
     }
     lines
+}
+
+/// `0.31 mm and 0.2°`
+fn errors(pose: &PoseError) -> String {
+    let length = number::plain_or_unknown(pose.calibrated_m, Unit::Meter);
+    let angle = pose.calibrated_rad.map_or_else(String::new, |angle| {
+        format!(" and {}", number::plain(angle, Unit::Radian))
+    });
+    length + &angle
+}
+
+/// `elbow 12°, slide 3 mm`
+pub(crate) fn joints(joints: &[JointValue]) -> String {
+    let position =
+        |joint: &JointValue| format!("{} {}", joint.joint, number::plain(joint.value, joint.unit));
+    joints.iter().map(position).collect::<Vec<_>>().join(", ")
+}
+
+impl HeldOut {
+    /// The errors of one pose, by body, for the 3-D view: `Error of gripM: 0.31 mm and 0.2°; of linkM: 0.42 mm`. Empty
+    /// where the pose has none.
+    #[must_use]
+    pub fn errors_of(&self, pose: &str) -> String {
+        let of_pose = self.poses.iter().filter(|error| error.pose == pose);
+        let parts: Vec<String> = of_pose
+            .map(|error| format!("of {}: {}", error.subject, errors(error)))
+            .collect();
+        if parts.is_empty() {
+            String::new()
+        } else {
+            format!("Error {}", parts.join("; "))
+        }
+    }
 }

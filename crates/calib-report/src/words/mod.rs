@@ -4,13 +4,17 @@
 //! nowhere else; renderers only lay it out, and no code reads a sentence back. A new fact gets its words in the file of its
 //! notion, or a new file and one line below.
 
+pub(crate) mod accuracy;
 pub(crate) mod answers;
 pub(crate) mod clock;
 pub(crate) mod files;
+pub(crate) mod fit;
 pub(crate) mod held_out;
+mod next_steps;
 pub(crate) mod noise;
 pub(crate) mod observability;
 pub(crate) mod prose;
 pub(crate) mod rejection;
+mod scope;
 mod terms;
 pub(crate) mod verdict;

@@ -1,11 +1,14 @@
 //! What is not observable.
 
-use super::prose::{SHOWN, full_stop, or, sentence, short};
+use super::prose::{SHOWN, code, counted, full_stop, or, sentence, short};
 use crate::{Meaning, NotObservable, Report, Transform};
 
-pub(crate) fn not_known(report: &Report, rest: &str) -> Vec<String> {
+/// Where nothing is missing.
+pub(crate) const ALL_OBSERVABLE: &str = "All requested quantities are observable.";
+
+pub(crate) fn unobservable(report: &Report, rest: &str) -> Vec<String> {
     if report.transforms.is_empty() && report.parameters.is_empty() {
-        return vec!["Everything: nothing was solved.".to_owned()];
+        return vec!["Nothing was solved.".to_owned()];
     }
     let of = |meaning: Meaning| {
         report
@@ -20,12 +23,11 @@ pub(crate) fn not_known(report: &Report, rest: &str) -> Vec<String> {
     let open: Vec<&Transform> = report.transforms.iter().filter(|t| !t.observable).collect();
     let directions: usize = open.iter().map(|t| t.unobservable.len()).sum();
     if directions > SHOWN {
-        let transforms: Vec<String> = open
-            .iter()
-            .map(|t| format!("{} of `{}`", t.unobservable.len(), t.name))
-            .collect();
+        let count =
+            |t: &&Transform| format!("{} of the 6 of {}", t.unobservable.len(), code(&t.name));
+        let transforms: Vec<String> = open.iter().map(count).collect();
         lines.push(format!(
-            "Of the six directions of a transform: {}.",
+            "Degrees of freedom of transforms: {}.",
             transforms.join(", ")
         ));
     } else {
@@ -37,16 +39,19 @@ pub(crate) fn not_known(report: &Report, rest: &str) -> Vec<String> {
     }
     let conventions = of(Meaning::Convention).count();
     if conventions > 0 {
-        let s = if conventions == 1 { "" } else { "s" };
-        lines.push(format!(
-            "{conventions} combination{s} of parameters, by convention: no tracked body depends on the choice."
-        ));
+        let are = if conventions == 1 {
+            "is an arbitrary convention; no prediction depends on it"
+        } else {
+            "are arbitrary conventions; no prediction depends on them"
+        };
+        let n = counted(conventions, "parameter combination");
+        lines.push(format!("{n} {are}."));
     }
-    or(lines, "Everything that was asked for is observable.")
+    or(lines, ALL_OBSERVABLE)
 }
 
 impl NotObservable {
-    /// Its text, with the subject in front where the text does not name it.
+    /// The text, preceded by the subject where the text does not name it.
     pub(crate) fn words(&self) -> String {
         if self.text.contains(&format!("`{}`", self.subject)) {
             self.text.clone()
@@ -55,7 +60,7 @@ impl NotObservable {
         }
     }
 
-    /// The same without the parameters that it trades against: those stand in the long report.
+    /// The same without the parameters that it is confounded with: the long report lists those.
     pub(crate) fn in_short(&self) -> String {
         match self.text.rsplit_once(": ") {
             Some((trade, reason)) if trade.contains(Self::TRADES) => {
@@ -65,11 +70,11 @@ impl NotObservable {
         }
     }
 
-    /// Between a parameter and those that it cannot be told from.
+    /// Between a parameter and those that it is confounded with.
     pub(crate) const TRADES: &str = " trades against ";
 }
 
-/// Combinations with one reason and one remedy as one item; everything else as it is.
+/// Combinations with the same reason and the same remedy as one item; everything else unchanged.
 pub(crate) fn grouped(items: &[&NotObservable]) -> Vec<(String, String)> {
     let mut out: Vec<(String, String)> = Vec::new();
     let mut groups: Vec<(&str, &str, Vec<String>)> = Vec::new();

@@ -1,8 +1,9 @@
 //! Sentences, lists and counts: what every notion needs to become prose.
 
-/// How many items of a list stand in an answer; the rest is counted and stands further down.
+/// Items of a list shown in an answer; the rest is counted and listed further down.
 pub(crate) const SHOWN: usize = 3;
 
+/// The lines, or `otherwise` where there is none.
 pub(crate) fn or(lines: Vec<String>, otherwise: &str) -> Vec<String> {
     if lines.is_empty() {
         vec![otherwise.to_owned()]
@@ -11,6 +12,7 @@ pub(crate) fn or(lines: Vec<String>, otherwise: &str) -> Vec<String> {
     }
 }
 
+/// The first [`SHOWN`] items and how many more there are.
 pub(crate) fn short(items: &[String], rest: &str) -> Vec<String> {
     let mut lines: Vec<String> = items.iter().take(SHOWN).cloned().collect();
     if items.len() > SHOWN {
@@ -19,15 +21,27 @@ pub(crate) fn short(items: &[String], rest: &str) -> Vec<String> {
     lines
 }
 
-/// Commands stand between backticks.
+/// Commands between backticks.
 pub(crate) fn commands(commands: &[String]) -> Vec<String> {
-    commands
-        .iter()
-        .map(|command| format!("`{command}`"))
-        .collect()
+    commands.iter().map(|command| code(command)).collect()
 }
 
-/// A capital letter in front where a word of prose begins, a full stop at the end.
+/// A name, a path or a key as code.
+pub(crate) fn code(text: &str) -> String {
+    if text.is_empty() {
+        String::new()
+    } else {
+        format!("`{}`", text.replace('`', "'"))
+    }
+}
+
+/// `1 error`, `2 errors`.
+pub(crate) fn counted(n: usize, one: &str) -> String {
+    let s = if n == 1 { "" } else { "s" };
+    format!("{n} {one}{s}")
+}
+
+/// A capital letter in front where a word of prose begins, a period at the end.
 pub(crate) fn sentence(text: &str) -> String {
     let text = text.trim();
     let first_word = text.split(' ').next().unwrap_or("");
@@ -36,13 +50,18 @@ pub(crate) fn sentence(text: &str) -> String {
             .bytes()
             .all(|b| b.is_ascii_lowercase() || b == b'-' || b == b',');
     if prose {
-        full_stop(&(text[..1].to_ascii_uppercase() + &text[1..]))
+        full_stop(&capital(text))
     } else {
         full_stop(text)
     }
 }
 
-/// A full stop at the end, where no other sign is.
+/// [`sentence`] of every item.
+pub(crate) fn sentences(items: &[String]) -> Vec<String> {
+    items.iter().map(|item| sentence(item)).collect()
+}
+
+/// A period at the end, where there is no other end mark.
 pub(crate) fn full_stop(text: &str) -> String {
     let text = text.trim();
     if text.ends_with(['.', '!', '?', '…']) {
@@ -52,9 +71,10 @@ pub(crate) fn full_stop(text: &str) -> String {
     }
 }
 
+/// A capital letter in front.
 pub(crate) fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| {
-        first.to_uppercase().chain(letters).collect()
+    let mut characters = text.chars();
+    characters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(characters).collect()
     })
 }

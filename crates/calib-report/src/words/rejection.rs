@@ -1,38 +1,26 @@
 //! Samples that did not take part in the fit.
 
-use super::prose::{or, short};
-use crate::Report;
+use super::prose::{counted, or, short};
+use crate::{Rejected, Report};
 
-pub(crate) fn thrown_out(report: &Report, rest: &str) -> Vec<String> {
-    let lines: Vec<String> = report
-        .rejected
-        .iter()
-        .map(|rejected| {
-            let subject = if rejected.subject.is_empty() {
-                String::new()
-            } else {
-                format!(" {}", rejected.subject)
-            };
-            let rows = if rejected.rows.len() == 1 {
-                "row"
-            } else {
-                "rows"
-            };
-            format!(
-                "{}{subject}: {} {rows}, {}.",
-                rejected.recording,
-                rejected.rows.len(),
-                rejected.reason
-            )
-        })
-        .collect();
-    let lost: usize = report
-        .recordings
-        .iter()
-        .flat_map(|recording| &recording.lost)
-        .map(|lost| lost.lost)
-        .sum();
+pub(crate) fn rejected(report: &Report, rest: &str) -> Vec<String> {
+    let line = |rejected: &Rejected| {
+        let subject = if rejected.subject.is_empty() {
+            String::new()
+        } else {
+            format!(" {}", rejected.subject)
+        };
+        format!(
+            "{}{subject}: {}, {}.",
+            rejected.recording,
+            counted(rejected.rows.len(), "row"),
+            rejected.reason
+        )
+    };
+    let lines: Vec<String> = report.rejected.iter().map(line).collect();
     let mut lines = or(short(&lines, rest), "Nothing.");
+    let recordings = report.recordings.iter();
+    let lost: usize = recordings.flat_map(|r| &r.lost).map(|lost| lost.lost).sum();
     match lost {
         0 => {}
         1 => lines.push("1 sample was lost by the tracker.".to_owned()),

@@ -9,7 +9,7 @@ impl Verdict {
         match self {
             Self::Accepted => "accepted",
             Self::Rejected => "rejected",
-            Self::NotEvaluated => "not evaluated",
+            Self::NotEvaluated => "not decided",
         }
     }
 }
@@ -31,10 +31,10 @@ impl Class {
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
-            Self::Solid => "solid",
-            Self::Weak => "weak",
+            Self::Solid => "identifiable",
+            Self::Weak => "weakly identifiable",
             Self::Prior => "prior only",
-            Self::NotObservable => "not observable",
+            Self::NotObservable => "not identifiable",
         }
     }
 }

@@ -9,11 +9,12 @@ use calib_report::view3d::{
     Axis, Circle, Cloud, Outline, Sphere, ViewFrame, ViewMarker, ViewPose, pose_row,
 };
 use calib_report::{
-    AccuracyLimit, Change, Class, Clock, ErrorStats, EstimatorResult, FitSummary, HeldOut, Input,
-    JointCoverage, JointValue, Limit, LoopClosure, LoopGroup, Lost, Method, Noise, NotObservable,
-    Outcome, Output, Parameter, PoseError, RecordingSummary, RecordingUse, Rejected, Report,
-    ResidualRow, Residuals, Scene, Stats, Status, Term, Transform, Unit, Unobservable, Verdict,
-    Verification, View3d, Workspace, WorkspacePoint, judge, scene::SceneFrame,
+    AccuracyLimit, Change, Class, Clock, ClockCheck, ErrorSource, ErrorStats, EstimatorResult,
+    FitEnd, FitSummary, HeldOut, Input, JointCoverage, JointValue, Limit, LoopClosure, LoopGroup,
+    Lost, Method, Noise, NoiseKind, NotObservable, Outcome, Output, Parameter, PoseError,
+    RecordingSummary, RecordingUse, Rejected, Report, ResidualRow, Residuals, Scene, Stats, Status,
+    Term, Transform, Unit, Unobservable, Verdict, Verification, View3d, Workspace, WorkspacePoint,
+    judge, scene::SceneFrame,
 };
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use rand::SeedableRng;
@@ -58,7 +59,7 @@ impl Draw {
     }
 }
 
-/// Frames of the arm in the world: base, five links, gripper. `error` bends the nominal robot into the real one.
+/// Frames of the arm in the world: base, five links, gripper. `error` scales the difference of the real robot from the nominal one.
 pub fn frames(q: &[f64; 5], error: f64) -> Vec<Isometry3<f64>> {
     let turn = |axis: Vector3<f64>, angle: f64| {
         Isometry3::from_parts(Translation3::identity(), UnitQuaternion::new(axis * angle))
@@ -103,21 +104,21 @@ pub const MARKERS: [(&str, [f64; 3]); 3] = [
     ("gripM_3", [0.0, -0.04, 0.02]),
 ];
 
-/// Residuals of 40 sweep poses, three markers each, with a wave over the elbow that nobody modelled.
+/// Residuals of 40 sweep poses, three markers each, with a systematic pattern over the elbow angle that is not modeled.
 pub fn residual_rows() -> Vec<ResidualRow> {
     let mut draw = Draw::new(11);
     let mut rows = Vec::new();
     for pose in 0..40 {
         let q = draw.pose();
         for (marker, (name, _)) in MARKERS.iter().enumerate() {
-            let wave = Vector3::x() * 0.000_15 * (2.0 * q[2]).sin();
-            let residual = draw.vector(if marker == 2 { 0.000_25 } else { 0.000_12 }) + wave;
+            let pattern = Vector3::x() * 0.000_15 * (2.0 * q[2]).sin();
+            let residual = draw.vector(if marker == 2 { 0.000_25 } else { 0.000_12 }) + pattern;
             rows.push(ResidualRow {
                 recording: "arm_sweep".into(),
                 row: pose + 1,
                 subject: (*name).into(),
                 residual_m: residual.into(),
-                normalised: Some(residual.norm() / 0.000_2),
+                normalized: Some(residual.norm() / 0.000_2),
                 used: !(marker == 0 && pose == 17),
                 joints: joint_values(&q),
                 ..ResidualRow::default()
@@ -176,7 +177,7 @@ fn inputs() -> Vec<Input> {
     ]
 }
 
-/// Everything went well; one origin is only known as a line, as the profile expects.
+/// Every limit is met; one origin is only observable as a line, as the profile expects.
 pub fn accepted() -> Report {
     let mut draw = Draw::new(3);
     let held_out = HeldOut::from_poses(
@@ -187,7 +188,7 @@ pub fn accepted() -> Report {
     let limits = vec![Limit::evaluated(
         "held_out_rms_mm",
         "held-out rms error",
-        Unit::Metre,
+        Unit::Meter,
         0.005,
         calibrated.rms_m,
     )];
@@ -196,8 +197,8 @@ pub fn accepted() -> Report {
     };
     let slide = Unobservable {
         direction: [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-        text: "the origin may slide along the axis of wrist_roll: one rotating axis gives a line, not a point".into(),
-        remedy: "nothing, the profile chose the point nearest to the body; to find a point, sweep wrist_pitch as well".into(),
+        text: "translation along the axis of wrist_roll: one rotating axis determines a line, not a point".into(),
+        remedy: "None needed: the profile chose the point nearest to the body. To determine a point, sweep wrist_pitch as well.".into(),
     };
     let change =
         |joint: &str, what: &str, unit: Unit, old: f64, delta: f64, sigma: f64, share: f64| {
@@ -225,7 +226,7 @@ pub fn accepted() -> Report {
         change(
             "elbow",
             "origin z",
-            Unit::Metre,
+            Unit::Meter,
             0.375,
             0.002_91,
             0.000_052,
@@ -243,7 +244,7 @@ pub fn accepted() -> Report {
         change(
             "wrist_pitch",
             "origin x",
-            Unit::Metre,
+            Unit::Meter,
             0.0,
             0.001_97,
             0.000_061,
@@ -261,7 +262,7 @@ pub fn accepted() -> Report {
         change(
             "wrist_roll",
             "origin z",
-            Unit::Metre,
+            Unit::Meter,
             0.042,
             0.000_000_2,
             0.009_8,
@@ -320,7 +321,7 @@ pub fn accepted() -> Report {
             value: Some(value.into()),
             sigma: Some(vec![sigma; 3]),
             agrees,
-            unit: Unit::Metre,
+            unit: Unit::Meter,
             distance: Some((value[0] - 0.0213).abs()),
             text: text.into(),
         };
@@ -329,15 +330,15 @@ pub fn accepted() -> Report {
         robot: "ripley".into(),
         method: Method::Ml,
         verdict: judge(&limits),
-        reasons: vec!["The held-out error is below its limit and well below what registration alone reaches.".into()],
+        reasons: vec!["The held-out error is below its limit and well below the error with registration only.".into()],
         scope: vec![
-            "the position of gripM, joints inside the ranges that were recorded".into(),
-            "no load: compliance was not modelled".into(),
+            "Position of gripM, within the recorded joint ranges.".into(),
+            "No load: compliance was not modeled.".into(),
         ],
         limits,
         next_steps: vec![
             "Use results/ripley/ripley.calibrated.urdf.".into(),
-            "Record five poses with the elbow beyond 120° if you work there.".into(),
+            "Record five poses with the elbow beyond 120° if the task needs that range.".into(),
         ],
         transforms: vec![
             Transform::new("base", "linkM", "base", &parent_from_child(0.0213, -0.0541, 0.1187, 0.3), Some(&covariance(0.0003, 0.000_05)), Status::Calibrated),
@@ -361,17 +362,18 @@ pub fn accepted() -> Report {
         estimators: vec![
             estimator("ml", [0.0213, -0.0541, 0.1187], 0.000_05, true, ""),
             estimator("sfe", [0.0219, -0.0537, 0.1191], 0.000_42, true, ""),
-            estimator("hse", [0.0236, -0.0555, 0.1179], 0.000_31, false, "biased by the noise of the body's orientation"),
+            estimator("hse", [0.0236, -0.0555, 0.1179], 0.000_31, false, "biased by the orientation noise of the body"),
             EstimatorResult {
                 quantity: "endJ center in gripM".into(),
                 estimator: "sfe".into(),
-                unit: Unit::Metre,
+                unit: Unit::Meter,
                 text: "not observable: one rotating axis".into(),
                 ..EstimatorResult::default()
             },
         ],
         fit: Some(FitSummary {
-            status: "converged: the step is below 1e-10".into(),
+            ended: FitEnd::Converged,
+            status: FitEnd::Converged.after(7),
             converged: true,
             iterations: 7,
             observations: 357,
@@ -380,15 +382,16 @@ pub fn accepted() -> Report {
         }),
         residuals: Residuals::from_rows(&residual_rows()),
         noise: vec![
-            Noise { group: "marker position".into(), unit: Unit::Metre, sigma: Some(0.000_131), stated: Some(0.000_1), samples: 357, text: "variance components (REML)".into() },
-            Noise { group: "joint position".into(), unit: Unit::Radian, sigma: Some(0.000_31), stated: None, samples: 200, text: "variance components (REML)".into() },
+            Noise { group: "marker".into(), kind: NoiseKind::Position, unit: Unit::Meter, sigma: Some(0.000_131), stated: Some(0.000_1), samples: 357, text: "variance components (REML)".into() },
+            Noise { group: "joint".into(), kind: NoiseKind::Joint, unit: Unit::Radian, sigma: Some(0.000_31), stated: None, samples: 200, text: "variance components (REML)".into() },
         ],
         clocks: vec![Clock {
             recording: "arm_sweep".into(),
             clock: "tracker".into(),
             against: "joints".into(),
             agrees: Some(true),
-            text: "static poses, the clocks do not matter".into(),
+            check: ClockCheck::NotNeeded,
+            text: ClockCheck::NotNeeded.text().into(),
             ..Clock::default()
         }],
         recordings: vec![
@@ -407,13 +410,13 @@ pub fn accepted() -> Report {
         coverage,
         rejected: vec![
             Rejected { recording: "arm_sweep".into(), subject: String::new(), rows: vec![23], reason: "the body was lost".into() },
-            Rejected { recording: "arm_sweep".into(), subject: "gripM_1".into(), rows: vec![18], reason: "14 σ off: a swapped marker".into() },
+            Rejected { recording: "arm_sweep".into(), subject: "gripM_1".into(), rows: vec![18], reason: "14 σ: swapped marker".into() },
         ],
         workspace: Workspace::of("gripper", "base", places),
         accuracy_limits: vec![
-            AccuracyLimit { source: "joint position noise".into(), sigma_m: Some(0.000_21), share: Some(0.62), text: "variance components".into(), remedy: "average three visits of a pose".into() },
-            AccuracyLimit { source: "marker noise".into(), sigma_m: Some(0.000_13), share: Some(0.24), text: "variance components".into(), remedy: "record longer at each pose".into() },
-            AccuracyLimit { source: "a wave over the elbow angle".into(), sigma_m: None, share: None, text: "mean residuals per bin".into(), remedy: "free the gear eccentricity of the elbow".into() },
+            AccuracyLimit::new(ErrorSource::JointNoise, 0.000_21, 0.62),
+            AccuracyLimit::new(ErrorSource::TrackerNoise, 0.000_13, 0.24),
+            AccuracyLimit { source: "systematic pattern over the elbow angle".into(), text: "mean residuals per bin".into(), remedy: "Enable the gear eccentricity of the elbow.".into(), ..AccuracyLimit::default() },
         ],
         findings: vec![
             Finding::new(catalog::MARKER_OUTLIER, Subject::body("gripM").in_recording("arm_poses"))
@@ -425,7 +428,7 @@ pub fn accepted() -> Report {
         ],
         inputs: inputs(),
         outputs: vec![
-            Output { path: "ripley.calibrated.urdf".into(), what: "URDF with 6 changed numbers".into(), sha256: Some("4".repeat(64)), changes: Some("ripley/r17.urdf".into()) },
+            Output { path: "ripley.calibrated.urdf".into(), what: "URDF with 6 changed values".into(), sha256: Some("4".repeat(64)), changes: Some("ripley/r17.urdf".into()) },
             Output { path: "ripley.scene.json".into(), what: "scene for the situation model".into(), sha256: Some("5".repeat(64)), changes: None },
             Output { path: "report.json".into(), what: "this report".into(), sha256: None, changes: None },
         ],
@@ -437,7 +440,7 @@ pub fn accepted() -> Report {
     }
 }
 
-/// The paper's table of five torso positions; the wrist hardly moved, two parameters trade against each other.
+/// The paper's table of five torso positions; the wrist hardly moved, two parameters are confounded.
 pub fn rejected() -> Report {
     let mut draw = Draw::new(9);
     let angles = ["0°", "90°", "90° again", "-90°", "90° third"];
@@ -457,7 +460,7 @@ pub fn rejected() -> Report {
                 pose: format!("torso {angle} hand {}", i + 1),
                 group: format!("torso {angle}"),
                 joints: vec![
-                    JointValue::metres("lift", 0.1),
+                    JointValue::meters("lift", 0.1),
                     JointValue::radians("arm_1", draw.even()),
                 ],
                 nominal_m: None,
@@ -485,7 +488,7 @@ pub fn rejected() -> Report {
         Limit::evaluated(
             "held_out_rms_mm",
             "held-out rms error",
-            Unit::Metre,
+            Unit::Meter,
             0.004,
             rms,
         ),
@@ -494,7 +497,7 @@ pub fn rejected() -> Report {
             "drift since the last calibration",
             Unit::Radian,
             0.001,
-            "there is no earlier report",
+            "no earlier report",
         ),
     ];
     Report {
@@ -503,14 +506,14 @@ pub fn rejected() -> Report {
         method: Method::Paper,
         verdict: judge(&limits),
         reasons: vec![
-            "The held-out rms error is above its limit.".into(),
-            "Two quantities that the profile asks for are not observable.".into(),
+            "The held-out rms error exceeds its limit.".into(),
+            "Two quantities that the profile requests are not observable.".into(),
         ],
         limits,
         next_steps: vec![
             "Move arm_7 over at least 30° and record again.".into(),
             "Choose one of the two offsets in the profile.".into(),
-            "Look at the rows of torso -90°: the cameras may have been occluded.".into(),
+            "Check the rows of torso -90°: the cameras may have been occluded.".into(),
             "Then run the profile again.".into(),
         ],
         transforms: vec![
@@ -524,8 +527,8 @@ pub fn rejected() -> Report {
             )
             .with_unobservable(vec![Unobservable {
                 direction: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
-                text: "the rotation about z: arm_7 moved 0.4° in all".into(),
-                remedy: "move arm_7 over at least 30°".into(),
+                text: "rotation about z: arm_7 moved 0.4° in total".into(),
+                remedy: "Move arm_7 over at least 30°.".into(),
             }]),
         ],
         not_observable: vec![NotObservable {
@@ -542,8 +545,7 @@ pub fn rejected() -> Report {
                 },
             ],
             text: "arm_2.origin.z trades against arm_3.origin.z: the axes are parallel".into(),
-            remedy: "hold one of them in the profile; the tool's error does not depend on it"
-                .into(),
+            remedy: "Fix one of them in the profile: it does not affect predictions.".into(),
         }],
         loops: vec![LoopClosure {
             name: "hand_in_head".into(),
@@ -563,15 +565,17 @@ pub fn rejected() -> Report {
             recording: "hand_sweep".into(),
             clock: "tracker".into(),
             against: "joints".into(),
+            check: ClockCheck::Aligned,
             offset_s: Some(0.0213),
             sigma_s: Some(0.0008),
             drift: None,
             drift_sigma: None,
             agrees: Some(false),
-            text: "rows with motion were left out".into(),
+            text: "rows with motion were rejected".into(),
         }],
         noise: vec![Noise {
             group: "body orientation".into(),
+            kind: NoiseKind::Orientation,
             unit: Unit::Radian,
             sigma: None,
             stated: Some(0.002),
@@ -582,7 +586,7 @@ pub fn rejected() -> Report {
             recording: "hand_sweep".into(),
             subject: "haT".into(),
             rows: (3..=20).collect(),
-            reason: "moving while the clocks disagree".into(),
+            reason: "moving while the clocks are not synchronized".into(),
         }],
         findings: vec![
             Finding::of_kind(catalog::JOINT_NEVER_MOVED, "still", Subject::joint("arm_7"))
@@ -595,12 +599,12 @@ pub fn rejected() -> Report {
     }
 }
 
-/// No validation poses: nothing speaks against the result, and nothing for it.
+/// No validation poses: nothing can be decided.
 pub fn not_evaluated() -> Report {
     let limits = vec![Limit::not_evaluated(
         "held_out_rms_mm",
         "held-out rms error",
-        Unit::Metre,
+        Unit::Meter,
         0.005,
         "the profile has no recording with `use: validation`",
     )];
@@ -608,11 +612,24 @@ pub fn not_evaluated() -> Report {
         profile: "robots/arm.yaml".into(),
         robot: "arm | <six>".into(),
         verdict: judge(&limits),
-        reasons: vec!["No pose was held out, so no error on new poses is known.".into()],
+        reasons: vec!["No poses were held out, so the error on new poses is unknown.".into()],
         limits,
-        next_steps: vec!["Record ten poses that were not used, and name them in the profile with `use: validation`.".into()],
-        transforms: vec![Transform::new("base", "mount", "base", &Isometry3::translation(0.1, -1e-9, 0.0), Some(&covariance(0.001, 0.002)), Status::Calibrated)],
-        verification: Verification { held_out: None, outcome: Outcome::NotEvaluated, reason: "the profile has no recording with `use: validation`.".into() },
+        next_steps: vec![
+            "Record ten separate poses and list them in the profile with `use: validation`.".into(),
+        ],
+        transforms: vec![Transform::new(
+            "base",
+            "mount",
+            "base",
+            &Isometry3::translation(0.1, -1e-9, 0.0),
+            Some(&covariance(0.001, 0.002)),
+            Status::Calibrated,
+        )],
+        verification: Verification {
+            held_out: None,
+            outcome: Outcome::NotEvaluated,
+            reason: "the profile has no recording with `use: validation`.".into(),
+        },
         version: "0.1.0".into(),
         ..Report::default()
     }

@@ -88,26 +88,26 @@ fn the_terminal_summary_fits_eighty_columns_whatever_the_names() {
 }
 
 #[test]
-fn colour_changes_nothing_but_colour() {
+fn color_changes_nothing_but_color() {
     for (_, report) in examples::all() {
-        let coloured = terminal::summary(&report, true);
+        let colored = terminal::summary(&report, true);
         let mut plain = String::new();
-        let mut rest = coloured.as_str();
+        let mut rest = colored.as_str();
         while let Some((before, after)) = rest.split_once('\u{1b}') {
             plain += before;
             rest = after.split_once('m').expect("a complete sequence").1;
         }
         plain += rest;
-        assert!(coloured.contains('\u{1b}'));
+        assert!(colored.contains('\u{1b}'));
         assert_eq!(plain, terminal::summary(&report, false));
     }
 }
 
 #[test]
-fn an_empty_report_is_not_a_pass_and_renders() {
+fn an_empty_report_is_not_accepted_and_renders() {
     let report = calib_report::Report::default();
-    assert!(markdown::markdown(&report).contains("not evaluated"));
-    assert!(terminal::summary(&report, false).contains("NOT EVALUATED"));
+    assert!(markdown::markdown(&report).contains("not decided"));
+    assert!(terminal::summary(&report, false).contains("NOT DECIDED"));
     assert!(
         json::report_json(&report)
             .expect("finite")
@@ -216,7 +216,7 @@ fn the_examples_are_valid_by_the_published_schema() {
     assert!(validator.is_valid(&scene));
 }
 
-/// The schemas in `schema/` are what the structs say; `CALIB_UPDATE_SCHEMA=1` writes them anew.
+/// The schemas in `schema/` are what the structs say; `CALIB_UPDATE_SCHEMA=1` regenerates them.
 #[test]
 fn the_published_schemas_are_up_to_date() {
     for (file, schema) in [

@@ -38,7 +38,7 @@ pub(super) fn watched(
         .map(|w| w.name.as_str())
         .collect();
     if !unseen.is_empty() {
-        screen.line(&format!("not seen so far: {}", unseen.join(", ")));
+        screen.line(&format!("not yet seen: {}", unseen.join(", ")));
     }
     let left: Vec<&str> = wanted
         .iter()

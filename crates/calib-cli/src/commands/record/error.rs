@@ -7,10 +7,10 @@ use calib_urdf::UnknownName;
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// `--source` is not an address.
-    #[error("{0}\n  help: correct --source")]
+    #[error("{0}\n  help: Correct `--source`.")]
     Source(#[from] BadAddress),
     /// `--joints` is not a source of joint values; the text says why.
-    #[error("--joints: {0}\n  help: correct --joints")]
+    #[error("--joints: {0}\n  help: Correct `--joints`.")]
     Joints(String),
     /// The recording has no joint ranges, and the robot sends no joint values.
     #[error(

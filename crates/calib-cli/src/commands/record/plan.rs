@@ -38,14 +38,14 @@ pub(super) fn plan(
         .collect();
     if joints != JointSource::Targets && !unheard.is_empty() {
         screen.line(&format!(
-            "not heard from the robot so far: {}",
+            "not yet received from the robot: {}",
             unheard.join(", ")
         ));
     }
     let watched = watched(robot, &options.map, heard, screen)?;
     if !guide.steps.is_empty() {
         screen.line(&format!(
-            "{} poses of {}; keys: Enter = I am there, s = leave out, q = end (then Enter)",
+            "{} poses of {}. Keys: Enter = the robot is at the pose; s Enter = skip the pose; q Enter = stop.",
             guide.steps.len(),
             guide.shown_ranges(&columns)
         ));

@@ -1,0 +1,138 @@
+//! What the operator reads: the pose that was held, the state now, the whole recording.
+
+use super::{Phase, Session};
+use crate::guide::shown_range;
+use crate::{Order, Screen};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// Statistics of a recording.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Rows in the file.
+    pub rows: u64,
+    /// Poses held.
+    pub poses: usize,
+    /// Frames recorded, missing, dropped because they were late.
+    pub frames: (u64, u64, u64),
+    /// Datagrams or reports that are not from the tracker or cannot be read.
+    pub foreign: u64,
+    /// By body: fraction of the frames in which it was lost.
+    pub lost: BTreeMap<String, f64>,
+    /// By guided joint: lowest and highest value recorded, rad or m.
+    pub covered: BTreeMap<String, (f64, f64)>,
+}
+
+impl Session {
+    pub(super) fn report_pose(&self, held: f64, screen: &mut dyn Screen) {
+        let rows = self.rows_of_pose;
+        let mut text = format!(
+            "  held {held:.1} s: {rows} row{}",
+            if rows == 1 { "" } else { "s" }
+        );
+        for (watched, sight) in self.plan.watched.iter().zip(&self.sights) {
+            if sight.pose_lost > 0 {
+                let share = 100.0 * sight.pose_lost as f64 / sight.pose_frames.max(1) as f64;
+                let _ = write!(text, "; {} lost in {share:.0} % of them", watched.name);
+            }
+        }
+        screen.line(&text);
+    }
+
+    /// The current state in one line, at this time of this computer, s.
+    pub fn status(&self, now: f64) -> String {
+        let mut text = match self.plan.guide.steps.len() {
+            0 => format!("pose {}", self.held + 1),
+            n => format!("pose {}/{n}", (self.step + 1).min(n)),
+        };
+        let doing = match self.phase {
+            Phase::Going => "moving".to_string(),
+            Phase::Settling => "settling".to_string(),
+            Phase::Holding(since) => format!("held {:.1}/{:.1} s", now - since, self.plan.hold),
+            Phase::Leaving => "move to the next pose".to_string(),
+        };
+        let _ = write!(text, " · {doing}");
+        if let Some(rate) = self.rate {
+            let _ = write!(text, " · {rate:.0} Hz");
+        }
+        let lost: Vec<String> = self
+            .plan
+            .watched
+            .iter()
+            .zip(&self.sights)
+            .filter_map(|(w, s)| Some(format!("{} {:.0} s", w.name, now - s.lost_since?)))
+            .collect();
+        if lost.is_empty() {
+            text.push_str(" · all visible");
+        } else {
+            let _ = write!(text, " · LOST {}", lost.join(", "));
+        }
+        let Order { missing, late, .. } = self.order;
+        if missing + late + self.foreign > 0 {
+            let _ = write!(
+                text,
+                " · missing {missing} late {late} ignored {}",
+                self.foreign
+            );
+        }
+        text
+    }
+
+    /// Statistics so far.
+    pub fn summary(&self) -> Summary {
+        let lost = self.plan.watched.iter().zip(&self.sights);
+        let guided = self.plan.guide.joints.iter();
+        Summary {
+            rows: self.table.rows,
+            poses: self.held,
+            frames: (self.order.taken, self.order.missing, self.order.late),
+            foreign: self.foreign,
+            lost: lost
+                .map(|(w, s)| (w.name.clone(), s.lost as f64 / s.frames.max(1) as f64))
+                .collect(),
+            covered: guided
+                .filter_map(|&j| Some((self.plan.columns[j].name.clone(), self.covered[j]?)))
+                .collect(),
+        }
+    }
+
+    /// Shows what was recorded.
+    pub fn report(&self, screen: &mut dyn Screen) {
+        let summary = self.summary();
+        let of = match self.plan.guide.steps.len() {
+            0 => String::new(),
+            n => format!(" of {n}"),
+        };
+        screen.line(&format!(
+            "{} rows in the file; {}{of} poses held in this session",
+            summary.rows, summary.poses
+        ));
+        let (taken, missing, late) = summary.frames;
+        screen.line(&format!(
+            "frames: {taken} received, {missing} missing, {late} late or duplicate (dropped), {} not readable",
+            summary.foreign
+        ));
+        for (&column, &(low, high)) in self.plan.guide.joints.iter().zip(&self.plan.guide.ranges) {
+            let joint = &self.plan.columns[column];
+            let requested = shown_range(joint.unit, low, high);
+            match self.covered[column] {
+                Some((from, to)) => {
+                    let part = (to.min(high) - from.max(low)).max(0.0) / (high - low).max(1e-12);
+                    screen.line(&format!(
+                        "  {}: {} of {requested} ({:.0} %)",
+                        joint.name,
+                        shown_range(joint.unit, from, to),
+                        100.0 * part
+                    ));
+                }
+                None => screen.line(&format!("  {}: no data in {requested}", joint.name)),
+            }
+        }
+        for (name, lost) in &summary.lost {
+            screen.line(&format!(
+                "  {name}: lost in {:.1} % of the frames",
+                100.0 * lost
+            ));
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! Facts that a report states in sentences: ids and values; the sentences are those of [`crate::words`].
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// One condition under which a result holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Scope {
+    /// Positions of the tracked bodies in the tracker's frame of this name.
+    TrackedBodies {
+        /// The tracker's frame.
+        frame: String,
+    },
+    /// The contacts that were recorded.
+    Contacts,
+    /// Only together with the joint effects in this file.
+    EffectsOf {
+        /// The file that holds them.
+        file: String,
+    },
+    /// Origins were estimated one by one, with nominal link geometry.
+    OriginsOneByOne,
+}
+
+/// What the reader should do now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NextStep {
+    /// Use the calibrated URDF.
+    Use {
+        /// The file.
+        urdf: String,
+    },
+    /// Fix the problems of a rejected result.
+    FixProblems,
+    /// Record validation poses and set limits.
+    AddValidation,
+    /// Enable an effect that the residuals show and the model lacks.
+    EnableEffect {
+        /// What the residuals show.
+        evidence: String,
+    },
+    /// Follow the remedy of the most severe finding.
+    Resolve {
+        /// What the finding is about.
+        subject: String,
+        /// The finding's id.
+        finding: String,
+        /// Its remedy.
+        remedy: String,
+    },
+    /// Use all recordings at once.
+    SolveJointly,
+}
+
+/// How the solver ended.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum FitEnd {
+    /// The gradient vanished.
+    Converged,
+    /// No step lowered the cost.
+    Stalled,
+    /// The iterations did not suffice.
+    MaxIterations,
+    /// The model could not be evaluated at the start values.
+    NotEvaluable,
+    /// Not recorded.
+    #[default]
+    Unknown,
+}
+
+/// What a noise level is the noise of.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum NoiseKind {
+    /// A position that the tracker measures.
+    #[default]
+    Position,
+    /// An orientation or direction that the tracker measures.
+    Orientation,
+    /// A joint position that the robot reports.
+    Joint,
+    /// A factor on stated covariances.
+    Scale,
+}
+
+/// A source of the error that remains.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum ErrorSource {
+    /// Noise of one measurement of the tracker.
+    TrackerNoise,
+    /// Noise of the joint positions.
+    JointNoise,
+    /// Uncertainty of the estimated parameters.
+    Parameters,
+    /// What neither noise nor uncertainty explains.
+    #[default]
+    NotModeled,
+}
+
+/// How the clocks of a recording were brought together.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum ClockCheck {
+    /// Static poses: each row holds joints and tracker data of one pose.
+    NotNeeded,
+    /// Joints and tracker share the rows of one table; their offset was not estimated.
+    #[default]
+    NotTested,
+    /// Streams were aligned.
+    Aligned,
+}

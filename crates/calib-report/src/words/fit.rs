@@ -1,0 +1,30 @@
+//! How the solver ended.
+
+use super::prose::counted;
+use crate::{FitEnd, FitSummary, number};
+
+impl FitEnd {
+    /// How the solver ended, after this many iterations: `converged after 7 iterations`.
+    #[must_use]
+    pub fn after(self, iterations: usize) -> String {
+        let how = match self {
+            Self::Converged => "converged",
+            Self::Stalled => "stalled before convergence: no step lowered the cost",
+            Self::MaxIterations => "reached the iteration limit",
+            Self::NotEvaluable => "could not evaluate the model at the start values",
+            Self::Unknown => "ended",
+        };
+        format!("{how} after {}", counted(iterations, "iteration"))
+    }
+}
+
+/// `converged after 7 iterations (354 measured poses and points, 89 unknowns, χ²/dof 1.03)`
+pub(crate) fn summary(fit: &FitSummary) -> String {
+    let chi2 = fit.chi2_per_dof.map_or_else(String::new, |chi2| {
+        format!(", χ²/dof {}", number::fixed(chi2, 2))
+    });
+    format!(
+        "{} ({} measured poses and points, {} unknowns{chi2})",
+        fit.status, fit.observations, fit.unknowns
+    )
+}

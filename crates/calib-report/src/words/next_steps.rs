@@ -1,0 +1,35 @@
+//! What the reader should do now: one imperative sentence per step.
+
+use super::prose::full_stop;
+use crate::NextStep;
+
+impl NextStep {
+    /// The step as an imperative sentence.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        match self {
+            Self::Use { urdf } => {
+                format!("Use `{urdf}`, and keep this folder: `calib revert` needs it.")
+            }
+            Self::FixProblems => {
+                "Do not use this result until the problems above are fixed.".to_owned()
+            }
+            Self::AddValidation => {
+                "Record validation poses, set `solve.limits` in the profile, and run again."
+                    .to_owned()
+            }
+            Self::EnableEffect { evidence } => format!(
+                "Enable the missing effect in the profile: {}",
+                full_stop(evidence)
+            ),
+            Self::Resolve {
+                subject,
+                finding,
+                remedy,
+            } => format!("{subject} (`{finding}`): {}", full_stop(remedy)),
+            Self::SolveJointly => {
+                "Solve with `method: ml` to use all recordings at once.".to_owned()
+            }
+        }
+    }
+}
