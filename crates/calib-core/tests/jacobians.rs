@@ -2,6 +2,7 @@
 
 mod common;
 
+use calib_core::effect::Source;
 use calib_core::{
     Axis, Chart, DirectionObservation, EffectKind, MarkerObservation, Measurement, MeasurementKind,
     Model, NoiseKind, PoseNoise, PoseObservation, Problem, Values,
@@ -71,26 +72,21 @@ fn rig(samples: usize, seed: u64) -> Rig {
     };
     let q1 = array();
     let e1 = p.joint("turn", a, b, Axis::Revolute(axis(0.3, -0.5, 0.8)), q1);
-    for kind in [
-        EffectKind::ZeroOffset,
-        EffectKind::Gain,
-        EffectKind::EccentricityCos,
-        EffectKind::EccentricitySin,
-    ] {
-        p.free_effect(e1, kind, None);
-    }
-    for kind in [
-        EffectKind::TorqueCompliance,
-        EffectKind::Lateral1,
-        EffectKind::Lateral2,
-        EffectKind::Backlash,
-        EffectKind::Coupling,
-    ] {
+    // Every term of the table, each at random states.
+    let mut clock = None;
+    for kind in EffectKind::all() {
         let v = array();
-        p.free_effect_with(e1, kind, v, None);
+        let own = matches!(kind.term().source, Source::Constant | Source::Reading);
+        let id = if own {
+            p.free_effect(e1, kind, None)
+        } else {
+            p.free_effect_with(e1, kind, v, None)
+        };
+        if kind == EffectKind::ClockOffset {
+            clock = Some(id);
+        }
     }
-    let v = array();
-    let clock = p.free_effect_with(e1, EffectKind::ClockOffset, v, None);
+    let clock = clock.expect("in the table");
     let e2 = p.unknown(
         "second",
         b,

@@ -564,3 +564,58 @@ fn an_effect_that_needs_its_regressor_is_not_freed_without_it() {
     let error = calib_core::Model::new(&p).expect_err("no torque");
     assert!(error.to_string().contains("joint.compliance"), "{error}");
 }
+
+#[test]
+fn a_direction_that_is_not_finite_is_refused() {
+    let bad = nalgebra::Unit::new_unchecked(nalgebra::Vector3::new(f64::NAN, 0.0, 1.0));
+    let good = nalgebra::Vector3::z_axis();
+    let measurements: [fn(
+        calib_core::GroupId,
+        calib_core::PointId,
+        [Direction; 2],
+    ) -> MeasurementKind; 3] = [
+        |noise, _, [fixed, seen]| MeasurementKind::Directions {
+            direction: fixed,
+            noise,
+            observations: vec![calib_core::DirectionObservation {
+                sample: 1,
+                direction: seen,
+            }],
+            sign_free: false,
+        },
+        |noise, point, [normal, _]| MeasurementKind::Plane {
+            point,
+            normal,
+            noise,
+            observations: vec![(1, 0.1)],
+        },
+        |noise, point, [direction, _]| MeasurementKind::Line {
+            point,
+            through: nalgebra::Point3::origin(),
+            direction,
+            noise,
+            samples: vec![1],
+        },
+    ];
+    for (k, kind) in measurements.iter().enumerate() {
+        for directions in [[bad, good], [good, bad], [good, good]] {
+            let mut p = Problem::new(2);
+            let (a, b) = (p.frame("a"), p.frame("b"));
+            p.unknown("pose", a, b, Isometry3::identity(), Chart::full());
+            let point = p.known_point("p", b, nalgebra::Point3::origin());
+            let noise = p.noise_group("n", NoiseKind::Orientation, 1e-3, false);
+            p.add_measurement(Measurement {
+                name: "m".into(),
+                from: a,
+                to: b,
+                path: None,
+                kind: kind(noise, point, directions),
+            });
+            let refused = calib_core::Model::new(&p).is_err();
+            let seen = directions[1] == good || k > 0;
+            assert_eq!(refused, !(directions[0] == good && seen), "{k}");
+        }
+    }
+}
+
+type Direction = nalgebra::Unit<nalgebra::Vector3<f64>>;

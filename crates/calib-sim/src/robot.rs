@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use calib_core::{Axis, EffectKind, JointMotion, JointState};
 use calib_geometry::{Twist, se3};
 use calib_profile::{Error3, Profile, Simulation};
 use calib_urdf::{JointId, RobotModel};
@@ -88,9 +89,23 @@ impl TrueRobot {
         let torques = self.nominal.gravity_torques(q_indicated, &GRAVITY);
         let mut q = q_indicated.to_vec();
         for (id, offset) in &self.offsets {
-            let compliance = self.compliance.get(id).copied().unwrap_or(0.0);
             let noise = rng.sample::<f64, _>(StandardNormal) * joint_sigma;
-            q[id.index()] += offset + compliance * torques[id.index()] + noise;
+            let state = JointState {
+                q: q[id.index()],
+                torque: torques[id.index()],
+                ..JointState::default()
+            };
+            let compliance = self.compliance.get(id).copied().unwrap_or(0.0);
+            let effects = [
+                (EffectKind::ZeroOffset, *offset),
+                (EffectKind::TorqueCompliance, compliance),
+            ];
+            let amounts = effects.map(|(kind, c)| (kind, c * (kind.term().regressor)(&state)));
+            // Only joints that rotate have offsets (see `draw`).
+            if let Some(axis) = self.model.joint(*id).kind.axis() {
+                let motion = JointMotion::new(Axis::Revolute(axis), state.q, amounts);
+                q[id.index()] = motion.phi() + noise;
+            }
         }
         self.model.forward_kinematics(&q)
     }

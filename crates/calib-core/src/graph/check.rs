@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Unit, Vector3};
 
 use crate::graph::edge::EdgeKind;
 use crate::graph::error::Error;
@@ -172,15 +172,27 @@ pub(crate) fn check(problem: &Problem) -> Result<(), Error> {
             MeasurementKind::Loop { noise, .. } => check_noise(&measurement.name, noise)?,
             MeasurementKind::Plane {
                 point,
-                observations,
-                ..
-            }
-            | MeasurementKind::Distance {
-                point,
+                normal,
                 observations,
                 ..
             } => {
                 at_frame(*point)?;
+                unit_vector(&measurement.name, 0, normal)?;
+                for &(s, h) in observations {
+                    finite(&measurement.name, &[h]).map_err(|_| Error::NotFinite {
+                        what: measurement.name.clone(),
+                        sample: s,
+                    })?;
+                }
+            }
+            MeasurementKind::Distance {
+                point,
+                anchor,
+                observations,
+                ..
+            } => {
+                at_frame(*point)?;
+                finite(&measurement.name, anchor.coords.as_slice())?;
                 for &(s, h) in observations {
                     if !h.is_finite() {
                         return Err(Error::NotFinite {
@@ -190,11 +202,44 @@ pub(crate) fn check(problem: &Problem) -> Result<(), Error> {
                     }
                 }
             }
-            MeasurementKind::Line { point, .. } => at_frame(*point)?,
-            MeasurementKind::Directions { .. } => {}
+            MeasurementKind::Line {
+                point,
+                through,
+                direction,
+                ..
+            } => {
+                at_frame(*point)?;
+                finite(&measurement.name, through.coords.as_slice())?;
+                unit_vector(&measurement.name, 0, direction)?;
+            }
+            MeasurementKind::Directions {
+                direction,
+                observations,
+                ..
+            } => {
+                unit_vector(&measurement.name, 0, direction)?;
+                for o in observations {
+                    unit_vector(&measurement.name, o.sample, &o.direction)?;
+                }
+            }
         }
     }
     Ok(())
+}
+
+/// A direction must be finite and of length 1: `Unit::new_normalize` of a zero vector is neither.
+fn unit_vector(what: &str, sample: usize, d: &Unit<Vector3<f64>>) -> Result<(), Error> {
+    /// Rounding of a normalization, and of numbers read from text with six digits.
+    const LENGTH: f64 = 1e-5;
+    // NaN compares false.
+    if (d.norm() - 1.0).abs() < LENGTH {
+        Ok(())
+    } else {
+        Err(Error::NotFinite {
+            what: what.to_owned(),
+            sample,
+        })
+    }
 }
 
 fn check_noise(measurement: &str, noise: &PoseNoise) -> Result<(), Error> {
