@@ -18,6 +18,7 @@ pub mod clock_offset;
 pub mod compliance;
 pub mod coupling;
 pub mod eccentricity;
+pub mod eccentricity_2;
 pub mod gain;
 pub mod lateral_compliance;
 pub mod offset;
@@ -28,6 +29,7 @@ pub static EFFECTS: &[&Effect] = &[
     &offset::EFFECT,
     &gain::EFFECT,
     &eccentricity::EFFECT,
+    &eccentricity_2::EFFECT,
     &compliance::EFFECT,
     &lateral_compliance::EFFECT,
     &backlash::EFFECT,
@@ -49,6 +51,10 @@ pub enum EffectKind {
     EccentricityCos,
     /// F = sin q.
     EccentricitySin,
+    /// F = cos 2q − 1.
+    Eccentricity2Cos,
+    /// F = sin 2q.
+    Eccentricity2Sin,
     /// F = torque about (force along) the axis, N·m (N).
     TorqueCompliance,
     /// Rotation about the first axis across, F = torque about it, N·m.
