@@ -1,0 +1,192 @@
+//! Bodies: where they are mounted, their markers, and what the tracker says of them.
+
+use std::collections::BTreeMap;
+
+use calib_core::{
+    Chart, FrameId, GroupId, MarkerObservation, NoiseKind, PointId, PoseNoise, PoseObservation,
+    Problem, Role,
+};
+use calib_profile::{BodyKind, Profile};
+use nalgebra::{Isometry3, Point3};
+
+use super::Formulation;
+use crate::estimate::start::Start;
+use crate::prepare::load::Inputs;
+use crate::prepare::tracks::BodyTrack;
+
+/// Marker noise that estimation starts from where the profile states none, m.
+const MARKER_SIGMA: f64 = 0.5e-3;
+/// Body position noise that estimation starts from, m.
+const BODY_SIGMA: f64 = 0.5e-3;
+/// Body orientation noise that estimation starts from, rad (0.2°).
+const BODY_SIGMA_RAD: f64 = 3.5e-3;
+pub(super) fn add_bodies(
+    formulation: &mut Formulation,
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    start: &Start,
+) {
+    let profile = &inputs.robot.profile;
+    let as_pose =
+        |name: &String| profile.bodies[name].kind == BodyKind::Pose || tracks[name].is_computed();
+    let (marker_noise, body_noise) = noise_groups(formulation, profile, &as_pose);
+    for (name, body) in &profile.bodies {
+        let Some(link) = formulation.links[body.link.index()] else {
+            continue;
+        };
+        let track = &tracks[name];
+        let has_frame = body.kind == BodyKind::Pose || track.template.is_some();
+        let frame = if has_frame {
+            let frame = formulation.problem.frame(name);
+            let (value, chart) = match body.mount {
+                Some(mount) => (mount, Chart::none()),
+                None => (
+                    start
+                        .mounts
+                        .get(name)
+                        .copied()
+                        .unwrap_or_else(Isometry3::identity),
+                    Chart::full(),
+                ),
+            };
+            let mount =
+                formulation
+                    .problem
+                    .unknown(&format!("{name}.mount"), link, frame, value, chart);
+            formulation.problem.set_role(mount, Role::Mount, None);
+            formulation.mounts.insert(name.clone(), mount);
+            formulation.bodies.insert(name.clone(), frame);
+            frame
+        } else {
+            link
+        };
+        match (&body.kind, marker_noise, body_noise) {
+            (_, _, Some(noise)) if as_pose(name) => {
+                let seen = formulation.samples.iter().enumerate().filter_map(
+                    |(sample, (recording, row))| {
+                        let pose = (*track.in_recording(recording).get(*row)?)?;
+                        Some(PoseObservation { sample, pose })
+                    },
+                );
+                let seen = seen.collect();
+                formulation
+                    .problem
+                    .poses(name, formulation.tracker, frame, noise, seen);
+            }
+            (BodyKind::Markers { names, .. }, Some(noise), _) => {
+                let points = add_points(&mut formulation.problem, names, track, start, name, frame);
+                let mut seen = Vec::new();
+                for (sample, (recording, row)) in formulation.samples.iter().enumerate() {
+                    for (marker, point) in &points {
+                        let loaded = &inputs.recordings[recording];
+                        let track = loaded.poses.markers.get(marker);
+                        if let Some(position) = track.and_then(|t| t[*row]) {
+                            let shapes = loaded.shapes.get(marker);
+                            seen.push(MarkerObservation {
+                                sample,
+                                point: *point,
+                                position,
+                                shape: shapes.and_then(|s| s.get(*row).copied().flatten()),
+                            });
+                        }
+                    }
+                }
+                formulation
+                    .problem
+                    .markers(name, formulation.tracker, frame, noise, seen);
+                formulation
+                    .points
+                    .insert(name.clone(), points.into_iter().collect());
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Noise of markers and of body poses, where some body is seen so.
+fn noise_groups(
+    formulation: &mut Formulation,
+    profile: &Profile,
+    as_pose: &dyn Fn(&String) -> bool,
+) -> (Option<GroupId>, Option<PoseNoise>) {
+    let known = profile.solve.noise.known;
+    let tracker = &profile.tracker;
+    let uses = |pose: bool| profile.bodies.keys().any(|name| as_pose(name) == pose);
+    let problem = &mut formulation.problem;
+    let marker_noise = uses(false).then(|| {
+        problem.noise_group(
+            "marker",
+            NoiseKind::Position,
+            tracker.marker_sigma.unwrap_or(MARKER_SIGMA),
+            !known,
+        )
+    });
+    let body_noise = uses(true).then(|| PoseNoise::Split {
+        orientation: problem.noise_group(
+            "body orientation",
+            NoiseKind::Orientation,
+            tracker.body_sigma_rad.unwrap_or(BODY_SIGMA_RAD),
+            !known,
+        ),
+        position: problem.noise_group(
+            "body position",
+            NoiseKind::Position,
+            tracker.body_sigma.unwrap_or(BODY_SIGMA),
+            !known,
+        ),
+    });
+    (marker_noise, body_noise)
+}
+
+/// Points of a marker body. A given template is known. A learned one is estimated with the fit, held to the frame's
+/// convention: first marker at the origin, second on x, the third that is off that line in the xy plane.
+fn add_points(
+    problem: &mut Problem,
+    names: &[String],
+    track: &BodyTrack,
+    start: &Start,
+    body: &str,
+    frame: FrameId,
+) -> Vec<(String, PointId)> {
+    /// Off the x axis by more than this counts as the marker that defines the plane, m.
+    const OFF_AXIS: f64 = 1e-9;
+    let mut points = Vec::new();
+    let mut plane_defined = false;
+    for (i, marker) in names.iter().enumerate() {
+        let Some(template) = &track.template else {
+            let place = start
+                .points
+                .get(body)
+                .and_then(|p| p.get(marker))
+                .copied()
+                .unwrap_or_else(Point3::origin);
+            points.push((
+                marker.clone(),
+                problem.unknown_point(marker, frame, place, None),
+            ));
+            continue;
+        };
+        let place = template.points[i];
+        if !track.learned || i == 0 {
+            points.push((marker.clone(), problem.known_point(marker, frame, place)));
+            continue;
+        }
+        let defines_plane =
+            i >= 2 && !plane_defined && place.z.abs() < OFF_AXIS && place.y > OFF_AXIS;
+        let held: &[usize] = match (i, defines_plane) {
+            (1, _) => &[1, 2],
+            (_, true) => &[2],
+            _ => &[],
+        };
+        plane_defined |= defines_plane;
+        let point = problem.unknown_point(marker, frame, place, None);
+        let coordinates = problem.points()[point.index()].parameters;
+        for &axis in held {
+            if let Some(ids) = coordinates {
+                problem.parameter_mut(ids[axis]).fixed = true;
+            }
+        }
+        points.push((marker.clone(), point));
+    }
+    points
+}

@@ -1,0 +1,194 @@
+//! Joints: their origins, their motion and its effects.
+
+use calib_core::effect::Source;
+use calib_core::{
+    Axis, Chart, EFFECTS, EdgeId, EffectKind, GroupId, JointState, NoiseKind, Problem, Role,
+};
+use calib_profile::{ContactBase, JointFreeSet, OriginFreeSet, Profile};
+use calib_urdf::{JointId, JointKind, RobotModel};
+
+use super::{Formulation, FreeSet};
+use crate::formulate::kinematics::{Loads, joint_state};
+use crate::prepare::conditions::Conditions;
+use crate::prepare::load::Inputs;
+
+/// Joint noise that estimation starts from, rad (0.01°).
+const JOINT_SIGMA: f64 = 1.7e-4;
+/// A revolute joint that moves less than this in the fitted recordings did not move, rad.
+const MOVED: f64 = 1e-3;
+
+/// One sample: indicated positions, and what else is known of it.
+pub(super) struct Row<'a> {
+    pub q: &'a [f64],
+    pub under: &'a Conditions,
+    pub loads: Loads,
+}
+
+/// Joints between the root and any link that something is attached to or reported at, parents first.
+pub(super) fn used_joints(inputs: &Inputs, model: &RobotModel) -> Vec<JointId> {
+    let profile = &inputs.robot.profile;
+    let mut links: Vec<_> = profile.bodies.values().map(|b| b.link).collect();
+    links.extend(profile.origins.values().map(|o| o.link));
+    links.extend(
+        profile
+            .transforms
+            .values()
+            .flat_map(|t| [t.parent, t.child]),
+    );
+    links.extend(profile.points.values().map(|p| p.link));
+    links.extend(profile.contacts.values().filter_map(|c| match c.on {
+        ContactBase::Link(link) => Some(link),
+        ContactBase::Tracker => None,
+    }));
+    let mut joints: Vec<JointId> = Vec::new();
+    for link in links {
+        for step in model.chain(model.root(), link) {
+            if !joints.contains(&step.joint) {
+                joints.push(step.joint);
+            }
+        }
+    }
+    joints.sort_by_key(|j| {
+        (
+            model.chain(model.root(), model.joint(*j).child).len(),
+            j.index(),
+        )
+    });
+    joints
+}
+
+pub(super) fn joint_noise_group(problem: &mut Problem, profile: &Profile) -> Option<GroupId> {
+    let noise = profile.solve.noise;
+    match noise.joint {
+        Some(0.0) => None,
+        Some(sigma) => Some(problem.noise_group("joint", NoiseKind::Joint, sigma, !noise.known)),
+        None => Some(problem.noise_group("joint", NoiseKind::Joint, JOINT_SIGMA, true)),
+    }
+}
+
+pub(super) fn add_joint(
+    formulation: &mut Formulation,
+    inputs: &Inputs,
+    joint: JointId,
+    rows: &[Row<'_>],
+    noise: Option<GroupId>,
+    free_set: FreeSet,
+) {
+    let profile = &inputs.robot.profile;
+    let model = &inputs.robot.model;
+    let j = model.joint(joint);
+    let Some(parent) = formulation.links[j.parent.index()] else {
+        return;
+    };
+    let readings: Vec<f64> = rows.iter().map(|r| model.position(r.q, joint)).collect();
+    let fitted = readings
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| !formulation.problem.held_out.contains(i))
+        .map(|(_, q)| *q);
+    let (low, high) = fitted.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
+        (l.min(q), h.max(q))
+    });
+    let moved = high - low > MOVED;
+    let slides = matches!(j.kind, JointKind::Prismatic { .. });
+    let free = match free_set {
+        FreeSet::Profile => profile.solve.free_set(joint, moved, slides),
+        FreeSet::RegistrationOnly => profile.solve.free_set(joint, false, slides).held(),
+    };
+    let problem = &mut formulation.problem;
+    let chart = match (free.origin, j.kind.axis()) {
+        (OriginFreeSet::Held, _) | (OriginFreeSet::Axis, None) => Chart::none(),
+        (OriginFreeSet::Axis, Some(axis)) => Chart::axis_line(&axis),
+        (OriginFreeSet::Full, _) => Chart::full(),
+    };
+    let fixed = j.kind == JointKind::Fixed;
+    let child = problem.frame(&model.link(j.child).name);
+    let origin_child = if fixed {
+        child
+    } else {
+        problem.frame(&format!("{}.origin", j.name))
+    };
+    let name = format!("{}.origin", j.name);
+    let origin = problem.unknown(&name, parent, origin_child, j.parent_link_from_joint, chart);
+    problem.set_role(origin, Role::JointOrigin, Some(&j.name));
+    if free.origin != OriginFreeSet::Held {
+        problem.set_prior(origin, Some(free.angle_sigma), Some(free.position_sigma));
+    }
+    for (coordinate, parameter) in problem.edge_parameters(origin) {
+        let within = if coordinate < 3 {
+            free.angle_within
+        } else {
+            free.position_within
+        };
+        problem.parameter_mut(parameter).bounds = within.map(|w| (-w, w));
+    }
+    formulation.origins[joint.index()] = Some(origin);
+    formulation.links[j.child.index()] = Some(child);
+    let Some(axis) = j.kind.axis() else { return };
+    let motion = if slides {
+        Axis::Prismatic(axis)
+    } else {
+        Axis::Revolute(axis)
+    };
+    let edge = problem.joint(&j.name, origin_child, child, motion, readings);
+    formulation.joints[joint.index()] = Some(edge);
+    formulation.loaded |= add_effects(problem, profile, model, joint, edge, &free, rows);
+    if let Some(group) = noise
+        && moved
+        && !slides
+    {
+        problem.joint_noise(edge, group);
+    }
+}
+
+/// Frees the effects of a joint and offers the others to the test for missing physics; returns whether a prediction
+/// needs its load or another joint's reading.
+fn add_effects(
+    problem: &mut Problem,
+    profile: &Profile,
+    model: &RobotModel,
+    joint: JointId,
+    edge: EdgeId,
+    free: &JointFreeSet,
+    rows: &[Row<'_>],
+) -> bool {
+    let states: Vec<JointState> = rows
+        .iter()
+        .map(|r| joint_state(model, joint, r.q, &r.loads, r.under))
+        .collect();
+    let mut loaded = false;
+    for effect in EFFECTS.iter().filter(|e| e.profile.is_some()) {
+        let wanted = free.effects.iter().find(|f| f.effect == *effect);
+        if let Some(wanted) = wanted.filter(|_| (effect.estimable)(&states)) {
+            for term in effect.terms {
+                let p = problem.free_effect_at(edge, term.kind, &states, wanted.sigma);
+                problem.parameter_mut(p).bounds = wanted.within.map(|w| (-w, w));
+                loaded |= term.source == Source::Load;
+            }
+        } else if wanted.is_none() && effect.testable.is_some_and(|test| test(&states)) {
+            // Terms of the reading alone are tested in any case.
+            let terms = effect.terms.iter().filter(|t| t.source != Source::Reading);
+            for term in terms {
+                if let Some(values) = term.kind.regressors(&states) {
+                    problem.candidate(edge, term.kind, values);
+                }
+            }
+        }
+    }
+    let coupling = EffectKind::Coupling;
+    let slides = !model.joint(joint).kind.turns();
+    for other in &free.coupled_to {
+        loaded = true;
+        let coupled: Vec<JointState> = rows
+            .iter()
+            .zip(&states)
+            .map(|(r, state)| JointState {
+                other: model.position(r.q, *other),
+                ..*state
+            })
+            .collect();
+        let sigma = profile.solve.prior.of(coupling.effect(), slides);
+        problem.free_effect_at(edge, coupling, &coupled, sigma);
+    }
+    loaded
+}
