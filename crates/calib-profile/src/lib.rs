@@ -9,7 +9,13 @@
 //! Neither stage opens another file. Every problem is reported with file, line and caret, what was found and
 //! what was expected; the check collects all of them rather than stopping at the first.
 //!
-//! What this crate does not check: whether recordings hold what the profile asks of them.
+//! This crate does not check whether the recordings hold what the profile asks of them.
+//!
+//! ```
+//! let text = "calib: 1\nrobot: {name: arm, urdf: arm.urdf}\ntracker: {frame: world, marker_sigma: 1}\n";
+//! let error = calib_profile::parse(text, "arm.yaml").unwrap_err();
+//! assert!(error.to_string().contains("marker_sigma_mm"), "{error}");
+//! ```
 
 mod check;
 mod error;
@@ -22,6 +28,7 @@ mod units;
 pub use check::check;
 pub use error::{Problem, ProfileError};
 pub use locate::Place;
+pub use nalgebra;
 pub use profile::{
     Body, BodyKind, Clocks, Contact, ContactBase, Error3, Free, FreeEffect, JointException,
     JointFree, JointFreeSet, Limits, LinkTransform, Load, Loop, Method, Noise, Orientation, Origin,
@@ -44,7 +51,7 @@ pub fn parse(text: &str, file: &str) -> Result<RawProfile, ProfileError> {
     if text.len() > LARGEST {
         let problem = Problem::new(
             None,
-            format!("{} bytes are no profile", text.len()),
+            format!("a file of {} bytes is not a profile", text.len()),
             "give the YAML profile, not a recording; profiles have at most 1 MiB",
         );
         return Err(ProfileError::new(file, "", vec![problem]));

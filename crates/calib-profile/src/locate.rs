@@ -19,7 +19,7 @@ pub struct Place {
 pub struct Places(Option<Tree>);
 
 impl Places {
-    /// Reads the structure; a text that is no YAML has no places.
+    /// Reads the structure; a text that is not YAML has no places.
     #[must_use]
     pub fn of(text: &str) -> Self {
         // Otherwise one `.nan` would make the whole text unreadable, and no problem would have a place.

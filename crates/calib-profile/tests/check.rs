@@ -107,7 +107,7 @@ const WRONG: &[(&str, &str, &str, &str)] = &[
         "axes: {z: pan, y: tilt}",
         "axes: {q: pan, y: tilt}",
         "arm.yaml:9:",
-        "`q` is no axis",
+        "`q` is not an axis",
     ),
     (
         "markers: [a, b, c]",
@@ -125,7 +125,7 @@ const WRONG: &[(&str, &str, &str, &str)] = &[
         "marker_sigma_mm: 0.3",
         "marker_sigma_mm: -0.3",
         "arm.yaml:3:",
-        "no standard deviation",
+        "not a standard deviation",
     ),
     ("use: sweep", "use: validation", "arm.yaml:9:", "held out"),
     (

@@ -45,6 +45,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use rand_distr::StandardNormal;
 
+pub use nalgebra;
 pub use protocol::{Commanded, commanded_poses};
 pub use robot::TrueRobot;
 pub use streams::{Motion, StreamPlan, Streams, simulate_streams};

@@ -129,7 +129,7 @@ pub enum Problem {
     },
     #[error("the axis of joint `{joint}` is zero, so it has no direction")]
     ZeroAxis { joint: String },
-    #[error("the quaternion of {owner} is zero, so it is no rotation")]
+    #[error("the quaternion of {owner} is zero, so it is not a rotation")]
     ZeroQuaternion { owner: String },
     #[error("the origin of {owner} gives its rotation twice, as `rpy` and as `quat_xyzw`")]
     TwoRotations { owner: String },
@@ -204,7 +204,7 @@ impl Problem {
             Self::NotUtf8 { .. } => "save the file as UTF-8 (for example: iconv -f latin1 -t utf8)",
             Self::Utf16 => "save the file as UTF-8 (for example: iconv -f utf16 -t utf8)",
             Self::Xml { .. } => {
-                "mend the XML here, or a little before: an open tag, quote or comment shows only later"
+                "correct the XML here or just before: an unclosed tag, quote or comment is detected only later"
             }
             Self::NotARobot { found } if found == "sdf" => "convert the SDF to URDF first",
             Self::NotARobot { found } if found == "mujoco" => "convert the MJCF to URDF first",

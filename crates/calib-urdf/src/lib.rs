@@ -1,6 +1,6 @@
 //! Robot model and forward kinematics from a URDF; edits of the URDF's text.
 //!
-//! A URDF is a tree of links. Joint `j` hangs `child` on `parent`; at position `q_j` (rad or m)
+//! A URDF is a tree of links. Joint `j` connects `child` to `parent`; at position `q_j` (rad or m)
 //!
 //! ```text
 //! parent_from_child(q_j) = parent_from_joint · motion(q_j)                                    (1)
@@ -14,11 +14,31 @@
 //! calibration corrects, so the way back, from a rotation to three decimals in a text, has to be
 //! exact as well: see [`rpy`].
 //!
-//! The file is text that we were lent: [`patch()`] exchanges attribute values by their byte range, and every other
-//! byte (comments, quotes, order, line endings) stays. [`revert()`] gives the original bytes back.
+//! [`patch()`] replaces attribute values by their byte range and leaves every other byte of the file (comments, quotes,
+//! order, line endings) as it is. [`revert()`] restores the original bytes.
 //!
-//! What this crate does **not** do: it opens no mesh (`package://` stays a text), expands no xacro,
-//! and knows no closed kinematic loops.
+//! This crate does **not** open meshes (`package://` stays a text), expand xacro, or support closed kinematic loops.
+//!
+//! ```
+//! use calib_urdf::nalgebra::Isometry3;
+//! use calib_urdf::{RobotModel, UrdfEdit, patch, revert};
+//!
+//! let text = r#"<robot name="arm"><link name="base"/><link name="hand"/>
+//!   <joint name="wrist" type="revolute"><parent link="base"/><child link="hand"/>
+//!     <origin xyz="0 0 0.30" rpy="0 0 0"/><axis xyz="0 0 1"/><limit effort="1" velocity="1"/></joint></robot>"#;
+//! let model = RobotModel::from_urdf_text(text, "arm.urdf")?;
+//! let root_from_hand = model.root_from_link(&[1.0], model.link_id("hand")?);
+//! assert!((root_from_hand.translation.z - 0.30).abs() < 1e-15);
+//!
+//! let edit = UrdfEdit::SetOrigin {
+//!     joint: "wrist".to_owned(),
+//!     parent_link_from_joint: Isometry3::translation(0.0, 0.0, 0.302),
+//! };
+//! let patched = patch(text, "arm.urdf", &[edit])?;
+//! assert_eq!(patched.text, text.replace("0.30\"", "0.302\""));
+//! assert_eq!(revert(&patched.text, &patched.record(text))?, text);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod edit;
 pub mod error;

@@ -138,7 +138,7 @@ pub struct Inertial {
     /// kg.
     pub mass: f64,
     /// Centre of mass in the link's frame, m.
-    pub centre_of_mass: Point3<f64>,
+    pub center_of_mass: Point3<f64>,
 }
 
 /// A rigid body of the robot.

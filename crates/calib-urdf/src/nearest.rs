@@ -2,7 +2,7 @@
 
 use std::cmp::Reverse;
 
-/// Of `known`, the name nearest to `wrong` by edit distance; `None` when nothing is near enough to be a slip.
+/// Of `known`, the name nearest to `wrong` by edit distance; `None` when nothing is near enough to be a typo.
 ///
 /// Near enough: a third of the letters (at least one) may be wrong, capital letters count nothing. Of names that
 /// are equally near, the one with the same letters in another order (`haed` is `head`, not `hand`), then the one
@@ -33,7 +33,7 @@ fn letters(word: &str) -> Vec<char> {
     letters
 }
 
-/// Letters to insert, delete, exchange or swap with their neighbour: `wirst` is one slip away from `wrist`.
+/// Letters to insert, delete, replace or swap with their neighbor: `wirst` is one typo away from `wrist`.
 fn edit_distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
     // distance[i][j] between the first i letters of a and the first j of b
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn of_equally_near_names_the_likelier_slip() {
+    fn of_equally_near_names_the_likelier_typo() {
         assert_eq!(nearest("haed", ["hand", "head"]), Some("head"));
         assert_eq!(nearest("heI", ["haI", "heT"]), Some("heT"));
         assert_eq!(nearest("ab", ["ad", "ac"]), Some("ac"));
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slip_is_found_and_a_stranger_is_not() {
+    fn a_typo_is_found_and_another_word_is_not() {
         let known = ["shoulder_lift_joint", "elbow_joint", "wrist_1_joint"];
         assert_eq!(nearest("elbw_joint", known), Some("elbow_joint"));
         assert_eq!(nearest("Elbow_Joint", known), Some("elbow_joint"));

@@ -278,7 +278,7 @@ fn gravity_torques_are_the_derivative_of_the_potential_energy() {
     let q = some_positions(&model);
     let energy = |q: &[f64]| {
         model
-            .centre_of_mass(q)
+            .center_of_mass(q)
             .map_or(0.0, |(mass, c)| -mass * gravity.dot(&c.coords))
     };
     let torque = model.gravity_torques(&q, &gravity);
@@ -319,7 +319,7 @@ fn gravity_torques_by_hand() {
         "{upright:?}"
     );
     assert_eq!(
-        model.centre_of_mass(&[0.0, 0.0]),
+        model.center_of_mass(&[0.0, 0.0]),
         Some((5.0, Point3::new(0.2, 0.0, 0.0)))
     );
 }

@@ -33,7 +33,7 @@ pub fn gravity_moments(model: &RobotModel, root_from_link: &[Isometry3<f64>]) ->
                 continue;
             };
             if model.carries(joint, link) {
-                let c = root_from_link[link.index()] * inertial.centre_of_mass;
+                let c = root_from_link[link.index()] * inertial.center_of_mass;
                 *moment += (c.coords - origin).cross(&(GRAVITY * inertial.mass));
             }
         }

@@ -128,7 +128,7 @@ impl Checker<'_> {
                 if !(distance_mm > 0.0 || self.named_already(distance_mm)) {
                     self.problem(
                         &["contacts", name, "touches"],
-                        format!("{distance_mm} is no distance"),
+                        format!("{distance_mm} is not a distance"),
                         "give a number above 0; for distance 0 use `point`",
                     );
                 }

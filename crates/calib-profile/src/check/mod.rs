@@ -67,8 +67,8 @@ mod simulate;
 mod solve;
 mod transform;
 
-/// What does not resolve is left out of the checked profile, and nothing is concluded from it: one slip of the
-/// pen is one problem. The profile of a checker with problems is not given out.
+/// A name that does not resolve is excluded from the checked profile, and nothing is concluded from it: one typo
+/// yields exactly one diagnostic. A profile with problems is never returned.
 struct Checker<'a> {
     raw: &'a RawProfile,
     robot: &'a RobotModel,

@@ -258,7 +258,7 @@ impl Checker<'_> {
         if !(value > 0.0 || self.named_already(value)) {
             self.problem(
                 path,
-                format!("{value} is no standard deviation"),
+                format!("{value} is not a standard deviation"),
                 "give a number above 0",
             );
         }
@@ -268,7 +268,7 @@ impl Checker<'_> {
         if !(value >= 0.0 || self.named_already(value)) {
             self.problem(
                 path,
-                format!("{value} is no noise level"),
+                format!("{value} is not a noise level"),
                 "give 0 or a number above",
             );
         }

@@ -144,7 +144,7 @@ impl Checker<'_> {
         let Some(stated) = axis_label(label) else {
             self.key_problem(
                 &path,
-                format!("`{label}` is no axis"),
+                format!("`{label}` is not an axis"),
                 "axes are x, y, z, -x, -y or -z of the joint frame",
             );
             return None;

@@ -14,7 +14,7 @@ impl Checker<'_> {
         if !(0.0..1.0).contains(&raw.noise.occluded) && !self.named_already(raw.noise.occluded) {
             self.problem(
                 &["simulate", "noise", "occluded"],
-                format!("{} is no share of lost samples", raw.noise.occluded),
+                format!("{} is not a fraction of lost samples", raw.noise.occluded),
                 "give a number from 0 to below 1",
             );
         }

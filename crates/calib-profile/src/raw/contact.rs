@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A point of a link, e.g. the tip of a stylus or the center of a ball.
+/// A point of a link, e.g. the end of a stylus or the center of a ball.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawTip {
@@ -17,13 +17,13 @@ pub struct RawTip {
     pub sigma_mm: Option<f64>,
 }
 
-/// Poses in which a point of the robot touches something.
+/// Poses in which a point of the robot is in contact with something.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawContact {
-    /// The recordings; every row of them is a touch. They may have joint positions only.
+    /// The recordings; every row is one contact. They may have joint positions only.
     pub recordings: Vec<String>,
-    /// The touching point, by its name under `points`.
+    /// The contact point, by its name under `points`.
     pub point: String,
     /// What is touched is fixed to this link, or to the tracker's frame by its name; the robot's root when absent.
     #[serde(default)]
@@ -33,10 +33,10 @@ pub struct RawContact {
     /// Prior standard deviation of where it is, mm: its place is estimated; exact when absent.
     #[serde(default)]
     pub place_sigma_mm: Option<f64>,
-    /// Prior standard deviation of how it is turned (planes and lines), deg: estimated; exact when absent.
+    /// Prior standard deviation of its orientation (planes and lines), deg: estimated; exact when absent.
     #[serde(default)]
     pub place_sigma_deg: Option<f64>,
-    /// Standard deviation of one touch, mm.
+    /// Standard deviation of one contact, mm.
     pub sigma_mm: f64,
 }
 

@@ -50,10 +50,10 @@ pub struct RawProfile {
     /// Loop closures: two origins measured by the tracker against forward kinematics, by name.
     #[serde(default)]
     pub loops: BTreeMap<String, RawLoop>,
-    /// Points of links that touch things, by name.
+    /// Contact points of links, by name.
     #[serde(default)]
     pub points: BTreeMap<String, RawTip>,
-    /// Touches: a point of one link on a plane, line, point or at a distance fixed to another link, by name.
+    /// Contacts: a point of one link on a plane, line, point or at a distance fixed to another link, by name.
     #[serde(default)]
     pub contacts: BTreeMap<String, RawContact>,
     /// How to solve, and what counts as good enough.

@@ -85,7 +85,7 @@ pub enum RawClocks {
     /// Two clocks: offset and drift are found from the motion.
     #[default]
     Estimate,
-    /// One clock (synchronised machines): the times are taken as they are.
+    /// One clock (synchronized machines): the times are used unchanged.
     Shared,
 }
 

@@ -28,7 +28,7 @@ pub struct ModelDiff {
     pub added_joints: Vec<String>,
     /// Joints only in `a`.
     pub removed_joints: Vec<String>,
-    /// Links of both whose mass (kg) or centre of mass differs.
+    /// Links of both whose mass (kg) or center of mass differs.
     pub inertials: Vec<String>,
     /// The robot's name before and after, where it differs.
     pub name: Option<Changed<String>>,
@@ -349,7 +349,7 @@ impl fmt::Display for ModelDiff {
             ("removed links", &self.removed_links),
             ("added joints", &self.added_joints),
             ("removed joints", &self.removed_joints),
-            ("mass or centre of mass changed", &self.inertials),
+            ("mass or center of mass changed", &self.inertials),
             ("not compared, xacro computes them", &self.not_compared),
         ];
         for (what, names) in lists {

@@ -12,17 +12,17 @@ pub enum EditError {
     #[error(transparent)]
     Read(#[from] ReadError),
     #[error(
-        "{file}: {source}\n  help: give the description of the robot that was calibrated; this one has other names"
+        "{file}: {source}\n  help: give the URDF of the robot that was calibrated; the names in this one differ"
     )]
     UnknownName { file: String, source: UnknownName },
     #[error(
-        "the new {what} of joint `{joint}` is not a finite number: the solution must not be written\n  help: calibrate again and look at its verdict"
+        "the new {what} of joint `{joint}` is not a finite number: the solution must not be written\n  help: run the calibration again and check its verdict"
     )]
     NotFinite { joint: String, what: &'static str },
     #[error("joint `{joint}` is given two new values for its {what}\n  help: give one")]
     EditedTwice { joint: String, what: &'static str },
     #[error(
-        "{file}:{place}: joint `{joint}` is fixed, so it has no axis to set\n  help: give the description whose joint moves"
+        "{file}:{place}: joint `{joint}` is fixed, so it has no axis to set\n  help: give the URDF in which this joint moves"
     )]
     NoAxis {
         file: String,
@@ -47,7 +47,7 @@ pub enum EditError {
         kind: String,
     },
     #[error(
-        "the new lower limit {lower} of joint `{joint}` is above the new upper limit {upper}\n  help: exchange them"
+        "the new lower limit {lower} of joint `{joint}` is above the new upper limit {upper}\n  help: swap them"
     )]
     LimitsReversed {
         joint: String,
@@ -105,7 +105,7 @@ pub enum EditError {
         argument: String,
     },
     #[error(
-        "{file}:{place}: not well-formed YAML: {reason}\n  help: mend the YAML there, or give another file"
+        "{file}:{place}: not well-formed YAML: {reason}\n  help: correct the YAML there, or give another file"
     )]
     Yaml {
         file: String,

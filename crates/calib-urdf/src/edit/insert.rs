@@ -43,7 +43,7 @@ pub(crate) fn first_child(text: &str, parent: Node<'_, '_>, element: &str) -> (u
         Some(first) => {
             let at = first.range().start;
             let space = space_before(text, at);
-            // From the line's end on: blank lines above the neighbour are not repeated.
+            // From the line's end on: blank lines above the neighbor are not repeated.
             let space = match space.rfind('\n') {
                 Some(newline) => {
                     &space[if space[..newline].ends_with('\r') {

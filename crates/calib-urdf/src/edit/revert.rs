@@ -43,7 +43,7 @@ pub struct Replacement {
     pub new: String,
 }
 
-/// Why a text is not taken back.
+/// Why a text is not reverted.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "each variant's text is its documentation")]

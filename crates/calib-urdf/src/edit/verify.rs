@@ -12,9 +12,9 @@ use crate::model::{Joint, JointId, JointKind, JointLimits, Link, LinkId, MimicLa
 use crate::read::source::{has_quaternions, parse};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
-/// m. A hundredth of a nanometre: what decimals and rounding may cost, and nothing else.
+/// m. A thousandth of a nanometer: decimals and rounding may cost this much, and nothing else.
 pub const POSITION_TOLERANCE: f64 = 1e-12;
-/// rad. At a metre's distance as much as [`POSITION_TOLERANCE`].
+/// rad. The same at a distance of one meter as [`POSITION_TOLERANCE`].
 pub const ROTATION_TOLERANCE: f64 = 1e-12;
 
 /// How well a text reproduces the model that it should hold.
@@ -45,7 +45,7 @@ pub enum SecondReader {
 /// Reads a patched URDF again and compares its forward kinematics with the model that it should hold.
 ///
 /// # Errors
-/// [`EditError::Read`] when it is no URDF, [`EditError::StructureChanged`] when links or joints differ, and
+/// [`EditError::Read`] when it is not a URDF, [`EditError::StructureChanged`] when links or joints differ, and
 /// [`EditError::NotReproduced`] when a link stands elsewhere.
 pub fn verify(
     patched_text: &str,
@@ -102,7 +102,7 @@ fn compare(
     reader: &'static str,
     worst: &mut (f64, f64),
 ) -> Result<(), EditError> {
-    // Rounding grows with the distance from the root: a mobile base's map may lie kilometres away.
+    // Rounding grows with the distance from the root: a mobile base's map may be kilometers away.
     let size = wanted
         .iter()
         .map(|pose| pose.translation.vector.norm())
@@ -182,7 +182,7 @@ fn same_limits(a: &JointLimits, b: &JointLimits) -> bool {
     })
 }
 
-/// Zero, and two positions in which no joint stands at zero or at the same angle as its neighbour.
+/// Zero, and two positions in which no joint is at zero or at the same angle as its neighbor.
 fn trial_positions(model: &RobotModel) -> Vec<Vec<f64>> {
     let bent = |sign: f64| {
         (0..model.joints().len())

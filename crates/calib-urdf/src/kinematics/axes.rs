@@ -61,7 +61,7 @@ impl RobotModel {
     /// Consecutive axes along the chain between two links, at joint positions `q`.
     ///
     /// Angles under `angle_tolerance` (rad) count as parallel, distances under `distance_tolerance` (m) as touching. The
-    /// relation of turning neighbours does not depend on `q`.
+    /// relation of neighboring revolute joints does not depend on `q`.
     #[must_use]
     pub fn axis_pairs(
         &self,

@@ -249,7 +249,7 @@ impl RobotModel {
         for (i, link) in self.links.iter().enumerate() {
             if let Some(inertial) = link.inertial {
                 mass[i] = inertial.mass;
-                moment[i] = inertial.mass * (root_from_link[i] * inertial.centre_of_mass).coords;
+                moment[i] = inertial.mass * (root_from_link[i] * inertial.center_of_mass).coords;
             }
         }
         let mut torque = vec![0.0; self.joints.len()];
@@ -276,16 +276,16 @@ impl RobotModel {
         torque
     }
 
-    /// Mass (kg) and centre of mass (m, root frame) of the whole robot; `None` where no link has a mass.
+    /// Mass (kg) and center of mass (m, root frame) of the whole robot; `None` where no link has a mass.
     #[must_use]
-    pub fn centre_of_mass(&self, q: &[f64]) -> Option<(f64, Point3<f64>)> {
+    pub fn center_of_mass(&self, q: &[f64]) -> Option<(f64, Point3<f64>)> {
         let root_from_link = self.forward_kinematics(q);
         let mut mass = 0.0;
         let mut moment = Vector3::zeros();
         for (link, root_from_link) in self.links.iter().zip(&root_from_link) {
             if let Some(inertial) = link.inertial {
                 mass += inertial.mass;
-                moment += inertial.mass * (root_from_link * inertial.centre_of_mass).coords;
+                moment += inertial.mass * (root_from_link * inertial.center_of_mass).coords;
             }
         }
         (mass > 0.0).then(|| (mass, Point3::from(moment / mass)))

@@ -82,7 +82,7 @@ impl Reader<'_> {
         let origin = self.origin(inertial, &owner);
         Some(Inertial {
             mass,
-            centre_of_mass: Point3::from(origin.translation.vector),
+            center_of_mass: Point3::from(origin.translation.vector),
         })
     }
 
@@ -241,7 +241,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A slip such as `xzy="…"` would otherwise mean "all zeros".
+    /// A typo such as `xzy="…"` would otherwise mean "all zeros".
     fn unknown_attribute(
         &mut self,
         node: Node<'_, '_>,
@@ -256,11 +256,11 @@ impl Reader<'_> {
             }
             let meant = nearest(attribute.name(), known.iter().copied())
                 .filter(|name| !node.has_attribute(*name));
-            // A slip keeps the letters; other names are somebody's extension.
-            let slip = meant.is_some_and(|name| same_letters(name, attribute.name()))
+            // A typo keeps the letters; other names are extensions.
+            let typo = meant.is_some_and(|name| same_letters(name, attribute.name()))
                 || (known.iter().all(|name| !node.has_attribute(*name))
                     && node.attributes().len() > 0);
-            if slip {
+            if typo {
                 let problem = Problem::UnknownAttribute {
                     owner: owner.to_owned(),
                     element,

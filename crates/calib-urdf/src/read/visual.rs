@@ -1,6 +1,6 @@
 //! What a URDF says of the look of its links: `<visual>` shapes, read apart from the kinematics.
 //!
-//! A picture is no reason to refuse a robot: a shape that cannot be understood is a [`VisualFault`], never an error, and
+//! A picture is not a reason to refuse a robot: a shape that cannot be read is a [`VisualFault`], never an error, and
 //! [`RobotModel`](crate::RobotModel) does not depend on any of it. Meshes are named, not opened.
 
 use crate::error::{Place, ReadError};
@@ -64,7 +64,7 @@ pub struct VisualFault {
 /// All shapes of a URDF in the order of the file, and those that could not be understood.
 ///
 /// # Errors
-/// [`ReadError`] when the text is no XML with the root `<robot>`.
+/// [`ReadError`] when the text is not XML with the root `<robot>`.
 ///
 /// ```
 /// use calib_urdf::visual::{Geometry, visuals};
@@ -143,7 +143,7 @@ fn shape(visual: Node<'_, '_>) -> Result<(Isometry3<f64>, Geometry), String> {
                 .to_owned(),
             scale: numbers::<3>(solid, "scale", Some([1.0; 3]))?,
         },
-        other => return Err(format!("`<{other}>` is no shape of a URDF")),
+        other => return Err(format!("`<{other}>` is not a URDF shape")),
     };
     Ok((link_from_visual, geometry))
 }
@@ -171,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_shape_is_read_and_what_is_none_is_told_with_its_place() {
+    fn every_shape_is_read_and_anything_else_is_reported_with_its_place() {
         let text = r#"<robot name="r">
 <link name="a">
   <visual><geometry><box size="1 2 3"/></geometry></visual>
@@ -197,14 +197,14 @@ mod tests {
             }
         );
         assert!((shapes[1].link_from_visual.rotation.angle() - 1.5).abs() < 1e-12);
-        let told: Vec<(usize, &str)> = faults
+        let reported: Vec<(usize, &str)> = faults
             .iter()
             .map(|f| (f.place.line, f.text.as_str()))
             .collect();
         assert_eq!(
-            told,
+            reported,
             [
-                (9, "`<capsule>` is no shape of a URDF"),
+                (9, "`<capsule>` is not a URDF shape"),
                 (10, "`size`: there are 2"),
                 (11, "a visual has a `<geometry>`"),
                 (12, "a mesh has a `filename`"),

@@ -54,7 +54,7 @@ pub struct Reference {
 /// What a xacro's text reads, in the order of the text, each argument once.
 ///
 /// # Errors
-/// [`ReadError`] for a text that is no XML with the root `<robot>`.
+/// [`ReadError`] for a text that is not XML with the root `<robot>`.
 pub fn references(text: &str, name_for_errors: &str) -> Result<Vec<Reference>, ReadError> {
     let document = parse(text, name_for_errors)?;
     let mut found: Vec<Reference> = Vec::new();

@@ -193,7 +193,7 @@ struct Constant<'a> {
 }
 
 impl Constant<'_> {
-    /// More parentheses than this are no constant of a robot.
+    /// No constant of a robot needs more nested parentheses.
     const DEEPEST: usize = 32;
 
     fn take(&mut self, sign: char) -> bool {

@@ -18,7 +18,7 @@ pub type Origins = (Vec<(String, Isometry3<f64>)>, Vec<String>);
 /// Does a text need xacro before it is a URDF?
 ///
 /// # Errors
-/// [`ReadError`] for a text that is no XML with the root `<robot>`.
+/// [`ReadError`] for a text that is not XML with the root `<robot>`.
 pub fn is_xacro(text: &str, name_for_errors: &str) -> Result<bool, ReadError> {
     Ok(xacro_evidence(&parse(text, name_for_errors)?).is_some())
 }
@@ -26,7 +26,7 @@ pub fn is_xacro(text: &str, name_for_errors: &str) -> Result<bool, ReadError> {
 /// The origins of all joints of a xacro, in the order of the text, under the names as written (`${side}_elbow`).
 ///
 /// # Errors
-/// [`ReadError`] for a text that is no XML with the root `<robot>`.
+/// [`ReadError`] for a text that is not XML with the root `<robot>`.
 pub fn xacro_origins(
     text: &str,
     name_for_errors: &str,

@@ -212,7 +212,7 @@ fn yaml_value(
             node.range.start,
             "the value has quotes, a tag or a block style",
         )),
-        _ => Err(bad(node.range.start, "the value is no number")),
+        _ => Err(bad(node.range.start, "the value is not a number")),
     }
 }
 

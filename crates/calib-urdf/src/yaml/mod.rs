@@ -25,7 +25,7 @@ pub(crate) struct YamlNode {
 pub(crate) enum YamlKind {
     /// A value; `plain` without quotes, tag or block style.
     Scalar { text: String, plain: bool },
-    /// Keys and values in the order of the file; keys that are no scalars are left out.
+    /// Keys and values in the order of the file; keys that are not scalars are ignored.
     Map(Vec<(String, YamlNode)>),
     /// A list.
     List(Vec<YamlNode>),

@@ -61,7 +61,7 @@ impl YamlOrigin {
 /// The origins of a YAML text, in its order; empty for a file that has none.
 ///
 /// # Errors
-/// [`EditError::Yaml`] for a text that is no YAML, [`EditError::YamlValue`] for an origin whose numbers cannot be read.
+/// [`EditError::Yaml`] for a text that is not YAML, [`EditError::YamlValue`] for an origin whose numbers cannot be read.
 pub fn yaml_origins(text: &str, name_for_errors: &str) -> Result<Vec<YamlOrigin>, EditError> {
     let tree = parse(text, name_for_errors)?;
     let mut found = Vec::new();
@@ -303,9 +303,9 @@ fn slots(
         match &at.kind {
             YamlKind::Scalar { text, plain: true } => parse_numbers::<1>(text)
                 .map(|[value]| (at.range.clone(), value))
-                .map_err(|_| bad(at, what, "it is no number")),
+                .map_err(|_| bad(at, what, "it is not a number")),
             YamlKind::Scalar { .. } => Err(bad(at, what, "it has quotes, a tag or a block style")),
-            _ => Err(bad(at, what, "it is no number")),
+            _ => Err(bad(at, what, "it is not a number")),
         }
     };
     let mut slots: [Slot; 6] = Default::default();
@@ -331,10 +331,10 @@ fn slots(
             ));
         }
         let YamlKind::List(items) = &value.kind else {
-            return Err(bad(value, name, "it is no list of three numbers"));
+            return Err(bad(value, name, "it is not a list of three numbers"));
         };
         if items.len() != 3 {
-            return Err(bad(value, name, "it is no list of three numbers"));
+            return Err(bad(value, name, "it is not a list of three numbers"));
         }
         for (k, item) in items.iter().enumerate() {
             slots[first + k] = Some(number(item, name)?);
