@@ -4,5 +4,6 @@ mod browser;
 mod examples;
 mod glb;
 mod page;
+mod parts;
 mod renderers;
 mod scenes;
