@@ -5,6 +5,7 @@
 //! - [`model`] compares a body's motion with that of its link, whose poses come as plain arrays, and names the single
 //!   mistake that would explain a disagreement.
 //! - [`rigid_body`] learns the arrangement of a body's markers and computes its pose in every row.
+//! - [`structural`] finds the mistake that would explain a whole data set, with one marker or many, at registration level.
 //! - [`sync`] finds holds, and the offset between two clocks.
 //!
 //! A check returns [`Finding`](calib_finding::Finding)s: ids and values, no sentences. It stays silent on clean data
@@ -31,6 +32,7 @@ pub mod model;
 mod recording;
 pub mod rigid_body;
 mod statistics;
+pub mod structural;
 pub mod sync;
 
 pub use recording::{Expectations, checks, held_out_in_training};

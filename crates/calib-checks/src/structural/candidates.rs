@@ -1,0 +1,236 @@
+//! Which hypotheses are tried on given data, and in which scopes.
+
+use super::apply::same_shape;
+use super::chain::Motion;
+use super::data::{Data, Measured};
+use super::hypothesis::{Hypothesis, PoseMistake, QuarterTurns, Scope, UnitMistake};
+use super::ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex};
+
+/// A column whose values differ by less (rad or m) carries no information about its own sign or unit.
+const MOVES: f64 = 1e-6;
+/// With more recordings a fault in all but one is left to the pairs: the scopes would outnumber the hypotheses.
+const MOST_RECORDINGS_EXCEPT: usize = 6;
+
+/// A hypothesis with its scopes.
+pub(crate) type Candidate = (Hypothesis, Vec<Scope>);
+
+/// Everything that is tried; the order is fixed.
+pub(crate) fn candidates(data: &Data) -> Vec<Candidate> {
+    let present = recordings_present(data);
+    let parts = parts(&present);
+    let mut everywhere = vec![Scope::All];
+    everywhere.extend(&parts);
+    let mut list: Vec<Candidate> = Vec::new();
+    of_readings(data, &everywhere, &mut list);
+    of_claims(data, &parts, &mut list);
+    of_tracker(data, &everywhere, &parts, &mut list);
+    of_missing(data, &mut list);
+    list
+}
+
+fn recordings_present(data: &Data) -> Vec<RecordingIndex> {
+    let mut present: Vec<RecordingIndex> = data.recording.clone();
+    present.sort_unstable();
+    present.dedup();
+    present
+}
+
+/// Scopes that are a part of the data.
+fn parts(present: &[RecordingIndex]) -> Vec<Scope> {
+    let mut parts = Vec::new();
+    if present.len() > 1 {
+        parts.extend(present.iter().map(|r| Scope::Recording(*r)));
+    }
+    if (3..=MOST_RECORDINGS_EXCEPT).contains(&present.len()) {
+        parts.extend(present.iter().map(|r| Scope::AllExcept(*r)));
+    }
+    parts
+}
+
+/// The joint turns (or slides) something itself.
+fn turns(data: &Data, joint: JointIndex) -> Option<bool> {
+    match data.chain.joints()[joint.0].motion {
+        Motion::Fixed => None,
+        Motion::Revolute(_) => Some(true),
+        Motion::Prismatic(_) => Some(false),
+    }
+}
+
+/// The largest difference of a joint's readings.
+pub(crate) fn span(data: &Data, joint: JointIndex) -> f64 {
+    let values = || data.readings.iter().map(|row| row[joint.0].unwrap_or(0.0));
+    let high = values().fold(f64::NEG_INFINITY, f64::max);
+    let low = values().fold(f64::INFINITY, f64::min);
+    if high >= low { high - low } else { 0.0 }
+}
+
+fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
+    use UnitMistake::*;
+    let joints = data.relevant_joints();
+    let mut add = |h: Hypothesis| list.push((h, scopes.to_vec()));
+    for &joint in &joints {
+        let Some(revolute) = turns(data, joint) else {
+            continue;
+        };
+        if span(data, joint) > MOVES {
+            add(Hypothesis::Sign { joint });
+            let units = if revolute {
+                [DegreesReadAsRadians, RadiansReadAsDegrees]
+            } else {
+                [MillimetersReadAsMeters, MetersReadAsMillimeters]
+            };
+            units
+                .into_iter()
+                .for_each(|mistake| add(Hypothesis::Unit { joint, mistake }));
+        }
+        if revolute {
+            for turns in [
+                QuarterTurns::Plus90,
+                QuarterTurns::Minus90,
+                QuarterTurns::Half,
+            ] {
+                add(Hypothesis::Offset { joint, turns });
+            }
+        }
+    }
+    for (n, &first) in joints.iter().enumerate() {
+        for &second in &joints[n + 1..] {
+            if span(data, first).max(span(data, second)) > MOVES {
+                add(Hypothesis::Exchange { first, second });
+            }
+        }
+    }
+    for &joint in &joints {
+        for &source in &joints {
+            let alike = joint != source && turns(data, joint) == turns(data, source);
+            if alike && span(data, source) > MOVES {
+                for factor in [1.0, -1.0] {
+                    add(Hypothesis::Coupling {
+                        joint,
+                        source,
+                        factor,
+                    });
+                }
+            }
+        }
+    }
+    for rows in [1, -1] {
+        add(Hypothesis::RowShift { rows });
+    }
+}
+
+fn of_claims(data: &Data, parts: &[Scope], list: &mut Vec<Candidate>) {
+    let group = |link| data.chain.rigid_group(link);
+    let mut groups: Vec<LinkIndex> = (0..data.chain.links())
+        .map(|l| group(LinkIndex(l)))
+        .collect();
+    groups.sort_unstable();
+    groups.dedup();
+    for (b, body) in data.bodies.iter().enumerate() {
+        for &link in groups.iter().filter(|link| **link != group(body.link)) {
+            list.push((
+                Hypothesis::WrongLink {
+                    body: BodyIndex(b),
+                    link,
+                },
+                vec![Scope::All],
+            ));
+        }
+        list.push((Hypothesis::Remounted { body: BodyIndex(b) }, single(parts)));
+        for (c, other) in data.bodies.iter().enumerate().skip(b + 1) {
+            let h = Hypothesis::ExchangedBodies {
+                first: BodyIndex(b),
+                second: BodyIndex(c),
+            };
+            if group(body.link) != group(other.link) {
+                list.push((h, vec![Scope::All]));
+            }
+        }
+    }
+    list.retain(|c| !c.1.is_empty());
+}
+
+/// Only single recordings: the complement is the same partition.
+fn single(parts: &[Scope]) -> Vec<Scope> {
+    let only: Vec<Scope> = parts
+        .iter()
+        .copied()
+        .filter(|s| matches!(s, Scope::Recording(_)))
+        .collect();
+    // With two recordings the one is the complement of the other.
+    if only.len() == 2 {
+        only[1..].to_vec()
+    } else {
+        only
+    }
+}
+
+fn of_tracker(data: &Data, everywhere: &[Scope], parts: &[Scope], list: &mut Vec<Candidate>) {
+    for mistake in [
+        UnitMistake::MillimetersReadAsMeters,
+        UnitMistake::MetersReadAsMillimeters,
+    ] {
+        list.push((Hypothesis::TrackerUnit { mistake }, everywhere.to_vec()));
+    }
+    list.push((Hypothesis::Mirrored, everywhere.to_vec()));
+    let one = single(parts);
+    if !one.is_empty() {
+        for rotation in 1..24 {
+            list.push((Hypothesis::TrackerAxes { rotation }, one.clone()));
+        }
+        list.push((Hypothesis::TrackerMoved, one));
+    }
+    let posed: Vec<BodyIndex> = data
+        .bodies
+        .iter()
+        .enumerate()
+        .filter(|(_, b)| matches!(b.measured, Measured::Poses { .. }))
+        .map(|(b, _)| BodyIndex(b))
+        .collect();
+    if posed.is_empty() {
+        return;
+    }
+    let mut which = vec![None];
+    if data.bodies.len() > 1 {
+        which.extend(posed.into_iter().map(Some));
+    }
+    for body in which {
+        for mistake in [
+            PoseMistake::ScalarFirstReadAsLast,
+            PoseMistake::ScalarLastReadAsFirst,
+            PoseMistake::Inverse,
+            PoseMistake::Transposed,
+        ] {
+            list.push((Hypothesis::Poses { body, mistake }, everywhere.to_vec()));
+        }
+    }
+}
+
+fn of_missing(data: &Data, list: &mut Vec<Candidate>) {
+    let empty = data.assumed_zero();
+    let present = recordings_present(data);
+    for joint in data.relevant_joints() {
+        let at: Vec<RecordingIndex> = empty.iter().filter(|e| e.0 == joint).map(|e| e.1).collect();
+        if turns(data, joint).is_none() || at.is_empty() {
+            continue;
+        }
+        let scopes = if at.len() == present.len() {
+            vec![Scope::All]
+        } else {
+            at.into_iter().map(Scope::Recording).collect()
+        };
+        list.push((Hypothesis::MissingColumn { joint }, scopes));
+    }
+    let bodies = &data.bodies;
+    for (a, body) in bodies.iter().enumerate() {
+        for (b, other) in bodies.iter().enumerate().skip(a + 1) {
+            if present.len() > 1 && same_shape(body, other) {
+                let h = Hypothesis::ExchangedBodies {
+                    first: BodyIndex(a),
+                    second: BodyIndex(b),
+                };
+                list.push((h, present.iter().map(|r| Scope::Recording(*r)).collect()));
+            }
+        }
+    }
+}

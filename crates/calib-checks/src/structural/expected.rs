@@ -1,0 +1,44 @@
+//! The residual of a registration that nominal errors explain, with C = σ_prior² per column and K = A_gᵀ(I − A_r A_r⁺)A_g:
+//!
+//! ```text
+//! E f = tr(C K) + σ² ν,   var f = 2 tr((C K)²)                    quantile of the matched gamma distribution
+//! ```
+
+use nalgebra::DMatrix;
+
+use super::data::Data;
+use super::ids::SampleIndex;
+use super::linear::{Model, prior_precision, projected};
+use super::{Expected, Options};
+
+/// Standard normal quantile of 99 %.
+const Z99: f64 = 2.326;
+/// What nominal errors within the priors make of the registration residual.
+pub(crate) fn expected(
+    data: &Data,
+    screened: &[SampleIndex],
+    options: &Options,
+) -> Option<Expected> {
+    let model = Model::new(data, &[], screened);
+    let sums = model.sums(0.0);
+    let (m, g) = (model.registration, 6 * model.geometry.len());
+    let k = projected(&sums.gram, m, m, g)?;
+    let c = prior_precision(&model, options);
+    // C^½ K C^½
+    let scaled = DMatrix::from_fn(g, g, |a, b| k[(a, b)] / (c[a] * c[b]).sqrt());
+    let (_, freedom) = model.scan.freedom();
+    if freedom <= 0.0 {
+        return None;
+    }
+    let noise = options.sigma * options.sigma * freedom;
+    let (mean, variance) = (scaled.trace(), 2.0 * scaled.norm_squared());
+    // Wilson–Hilferty for the gamma distribution of shape k = mean²/variance
+    let shape = (mean * mean / variance.max(f64::MIN_POSITIVE)).max(1e-3);
+    let root = 1.0 - 1.0 / (9.0 * shape) + Z99 / (3.0 * shape.sqrt());
+    let high = mean * root.powi(3);
+    let rms = |f: f64| (3.0 * f / freedom).sqrt();
+    Some(Expected {
+        rms: rms(mean + noise),
+        limit: rms(high + noise),
+    })
+}

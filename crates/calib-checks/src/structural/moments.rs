@@ -1,0 +1,167 @@
+//! Sums over the samples of one point, and the elimination of everything but the tracker's rotation.
+
+use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector3, Vector4};
+
+use super::chain::Pose;
+use super::rotation::{Mat9, Quadratic, Vec9};
+
+/// Relative ridge on the normal matrix of the tracker's position: directions that the markers absorb as well are harmless.
+const RIDGE: f64 = 1e-12;
+
+/// Moments of one marker (or virtual point of a pose) over some rows; they add up.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Moments {
+    /// Σ w
+    pub w: f64,
+    /// Σ w z̃ z̃ᵀ,  z̃ = [y; 1]
+    z: Matrix4<f64>,
+    /// Σ w t z̃ᵀ
+    t: SMatrix<f64, 3, 4>,
+    /// Σ w z̃ᵀ ⊗ Rᵀ, which is Σ w Rᵀ D with D = z̃ᵀ ⊗ I
+    b: SMatrix<f64, 3, 12>,
+    /// Σ w Rᵀ t
+    u: Vector3<f64>,
+    /// Σ w tᵀ t
+    tt: f64,
+}
+
+impl Moments {
+    pub(crate) const ZERO: Moments = Moments {
+        w: 0.0,
+        z: Matrix4::from_array_storage(nalgebra::ArrayStorage([[0.0; 4]; 4])),
+        t: SMatrix::from_array_storage(nalgebra::ArrayStorage([[0.0; 3]; 4])),
+        b: SMatrix::from_array_storage(nalgebra::ArrayStorage([[0.0; 3]; 12])),
+        u: Vector3::new(0.0, 0.0, 0.0),
+        tt: 0.0,
+    };
+
+    /// One sample: the measured point y (m), the link's pose, the weight.
+    pub(crate) fn add(&mut self, y: &Vector3<f64>, link: &Pose, w: f64) {
+        let z = Vector4::new(y.x, y.y, y.z, 1.0);
+        self.w += w;
+        self.z.ger(w, &z, &z, 1.0);
+        self.t.ger(w, &link.t, &z, 1.0);
+        for a in 0..4 {
+            let wz = w * z[a];
+            for row in 0..3 {
+                for col in 0..3 {
+                    self.b[(row, 3 * a + col)] += wz * link.r[(col, row)];
+                }
+            }
+        }
+        self.u += link.r.tr_mul(&link.t) * w;
+        self.tt += w * link.t.norm_squared();
+    }
+
+    /// The other's sums on top.
+    pub(crate) fn include(&mut self, other: &Moments) {
+        self.w += other.w;
+        self.z += other.z;
+        self.t += other.t;
+        self.b += other.b;
+        self.u += other.u;
+        self.tt += other.tt;
+    }
+
+    /// The point in its link that fits best for x = [vec Q; c]: `m = (B x − u)/W`.
+    pub(crate) fn point(&self, x: &SVector<f64, 12>) -> Vector3<f64> {
+        if self.w > 0.0 {
+            (self.b * x - self.u) / self.w
+        } else {
+            Vector3::zeros()
+        }
+    }
+}
+
+/// The cost of all points as a quadratic of x = [vec Q; c], marker positions eliminated: `xᵀ H x + 2 gᵀ x + d`.
+#[derive(Debug, Clone)]
+pub(crate) struct Normal {
+    h: SMatrix<f64, 12, 12>,
+    g: SVector<f64, 12>,
+    d: f64,
+    /// Σ w
+    pub w: f64,
+    /// Points that have a sample.
+    pub points: usize,
+}
+
+/// Where everything is in the best registration.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Registration {
+    /// `root_from_tracker`, rotation.
+    pub q: Matrix3<f64>,
+    /// `root_from_tracker`, translation of the centered coordinates, m.
+    pub c: Vector3<f64>,
+    /// Weighted sum of squared residuals, m².
+    pub f: f64,
+}
+
+impl Registration {
+    pub(crate) fn x(&self) -> SVector<f64, 12> {
+        let mut x = SVector::<f64, 12>::zeros();
+        x.fixed_rows_mut::<9>(0).copy_from_slice(self.q.as_slice());
+        x.fixed_rows_mut::<3>(9).copy_from(&self.c);
+        x
+    }
+}
+
+impl Normal {
+    pub(crate) fn new() -> Self {
+        Self {
+            h: SMatrix::zeros(),
+            g: SVector::zeros(),
+            d: 0.0,
+            w: 0.0,
+            points: 0,
+        }
+    }
+
+    /// Adds one point with all of its samples, its position in the link eliminated.
+    pub(crate) fn include(&mut self, m: &Moments) {
+        if m.w <= 0.0 {
+            return;
+        }
+        // f = xᵀ(Z̃ ⊗ I)x − 2 vec(T̃)ᵀx + Σ w tᵀt − |B x − u|²/W
+        for a in 0..4 {
+            for b in 0..4 {
+                for i in 0..3 {
+                    self.h[(3 * a + i, 3 * b + i)] += m.z[(a, b)];
+                }
+            }
+        }
+        let bt = m.b.transpose();
+        self.h -= bt * m.b / m.w;
+        for a in 0..4 {
+            for i in 0..3 {
+                self.g[3 * a + i] -= m.t[(i, a)];
+            }
+        }
+        self.g += bt * m.u / m.w;
+        self.d += m.tt - m.u.norm_squared() / m.w;
+        self.w += m.w;
+        self.points += 1;
+    }
+
+    /// Eliminates c and minimizes over the rotations.
+    pub(crate) fn solve(&self) -> Registration {
+        let h_qq: Mat9 = self.h.fixed_view::<9, 9>(0, 0).into_owned();
+        let h_qc: SMatrix<f64, 9, 3> = self.h.fixed_view::<9, 3>(0, 9).into_owned();
+        let h_cc: Matrix3<f64> = self.h.fixed_view::<3, 3>(9, 9).into_owned();
+        let g_q: Vec9 = self.g.fixed_rows::<9>(0).into_owned();
+        let g_c: Vector3<f64> = self.g.fixed_rows::<3>(9).into_owned();
+        let ridge = RIDGE * self.w.max(f64::MIN_POSITIVE);
+        // c = −H_cc⁻¹ (H_cq q + g_c)
+        let inverse = (h_cc + Matrix3::identity() * ridge)
+            .try_inverse()
+            .unwrap_or_else(Matrix3::zeros);
+        let reduced = Quadratic {
+            a: h_qq - h_qc * inverse * h_qc.transpose(),
+            b: g_q - h_qc * inverse * g_c,
+            d: self.d - g_c.dot(&(inverse * g_c)),
+        };
+        let (q, f) = reduced.minimum();
+        let x_q = super::rotation::vec9(&q);
+        let c = -(inverse * (h_qc.transpose() * x_q + g_c));
+        Registration { q, c, f }
+    }
+}

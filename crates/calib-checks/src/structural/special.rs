@@ -1,0 +1,263 @@
+//! Hypotheses that estimate something of their own: where the tracker was moved to, what an empty column should hold.
+
+use calib_geometry::registration::rigid_registration;
+use calib_geometry::so3;
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
+
+use super::chain::{Motion, Walk};
+use super::data::{Data, Measured};
+use super::hypothesis::{Hypothesis, Scope, Scoped};
+use super::ids::{JointIndex, LinkIndex};
+use super::scan::{Fit, Scan, Score};
+
+/// Alternations between registration and the estimated part; the residual falls by half or more in each.
+const ALTERNATIONS: usize = 12;
+/// Relative fall of the residual below which alternating ends.
+const SETTLED: f64 = 1e-3;
+/// Starts per row for an empty column: 30° apart, less than half the width of a basin.
+const STARTS: usize = 12;
+/// Half the stroke (m) that is searched for an empty column of a prismatic joint.
+const STROKE: f64 = 0.6;
+
+/// [`apply`](super::apply) for the hypotheses of this file.
+pub(crate) fn apply(scoped: &Scoped, data: &Data) -> Data {
+    match scoped.hypothesis {
+        Hypothesis::TrackerMoved => tracker_moved(scoped.scope, data),
+        Hypothesis::MissingColumn { joint } => missing_column(scoped.scope, joint, data),
+        _ => data.clone(),
+    }
+}
+
+/// One estimated reading per row: the degrees of freedom that are left are fewer.
+pub(crate) fn penalize(scan: &Scan<'_>, scope: Scope, score: &mut Score) {
+    let rows = scan
+        .data
+        .recording
+        .iter()
+        .filter(|r| scope.contains(**r))
+        .count() as f64;
+    let (_, freedom) = scan.freedom();
+    let left = (freedom - rows) / freedom.max(1.0);
+    let factor = if left > 0.1 {
+        left.sqrt().recip()
+    } else {
+        f64::INFINITY
+    };
+    score.rms *= factor;
+    score.score *= factor;
+}
+
+fn tracker_moved(scope: Scope, data: &Data) -> Data {
+    let inside: Vec<bool> = data.recording.iter().map(|r| scope.contains(*r)).collect();
+    let mut moved = data.clone();
+    let mut last = f64::INFINITY;
+    for round in 0..ALTERNATIONS {
+        let scan = Scan::new(&moved, &[]);
+        let fit = if round == 0 {
+            // The first registration does without the rows that may have moved.
+            let rows: Vec<usize> = (0..inside.len()).filter(|&i| !inside[i]).collect();
+            let rest = data.select(&rows);
+            let mut fit = Scan::new(&rest, &[]).fit(None);
+            let known = fit.points.len();
+            fit.points
+                .resize(scan.recordings * scan.channels.len(), Vector3::zeros());
+            spread(&scan, &mut fit.points, known, &rest);
+            fit
+        } else {
+            scan.fit(None)
+        };
+        let Some(new_from_old) = motion(&scan, &fit, &inside) else {
+            break;
+        };
+        transform(&mut moved, &inside, &new_from_old);
+        let now = Scan::new(&moved, &[]).fit(None).score.rms;
+        if now > last * (1.0 - SETTLED) {
+            break;
+        }
+        last = now;
+    }
+    moved
+}
+
+/// Copies each point to the recordings without samples in the part that was fitted.
+fn spread(scan: &Scan<'_>, points: &mut [Vector3<f64>], known: usize, rest: &Data) {
+    let n = scan.channels.len();
+    for k in 0..n {
+        for group in super::channels::mounts(scan.data, scan.channels[k].body, scan.recordings) {
+            let source = group.iter().copied().find(|&r| {
+                r * n + k < known && rest.recording.iter().any(|recording| recording.0 == r)
+            });
+            if let Some(source) = source {
+                group
+                    .iter()
+                    .for_each(|&r| points[r * n + k] = points[source * n + k]);
+            }
+        }
+    }
+}
+
+/// The motion of the tracked points inside that brings them onto the prediction, in tracker coordinates.
+fn motion(scan: &Scan<'_>, fit: &Fit, inside: &[bool]) -> Option<Isometry3<f64>> {
+    let n = scan.channels.len();
+    let mut pairs = Vec::new();
+    for i in (0..inside.len()).filter(|&i| inside[i]) {
+        for k in 0..n {
+            if scan.weights[i * n + k] > 0.0 {
+                let (predicted, _) = scan.predicted(fit, i, k);
+                let seen = scan.seen(fit, i, k);
+                // tracker coordinates: y = Qᵀ (p − c) + center
+                let back = |p: Vector3<f64>| {
+                    fit.registration.q.tr_mul(&(p - fit.registration.c)) + fit.center
+                };
+                pairs.push((back(seen), back(predicted)));
+            }
+        }
+    }
+    let count = pairs.len() as f64;
+    let mean = |pick: fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>| {
+        pairs.iter().map(pick).sum::<Vector3<f64>>() / count.max(1.0)
+    };
+    let (from, to) = (mean(|p| p.0), mean(|p| p.1));
+    let spread: Matrix3<f64> = pairs
+        .iter()
+        .map(|(a, b)| (b - to) * (a - from).transpose())
+        .sum();
+    let rotation = so3::nearest_rotation(&spread)?;
+    Some(Isometry3::from_parts(
+        Translation3::from(to - rotation * from),
+        rotation,
+    ))
+}
+
+pub(crate) fn transform(data: &mut Data, inside: &[bool], new_from_old: &Isometry3<f64>) {
+    for body in &mut data.bodies {
+        for i in (0..inside.len()).filter(|&i| inside[i]) {
+            match &mut body.measured {
+                Measured::Markers(rows) => {
+                    for p in rows[i].iter_mut().flatten() {
+                        *p = new_from_old * Point3::from(p.coords);
+                    }
+                }
+                Measured::Poses {
+                    tracker_from_body, ..
+                } => {
+                    if let Some(pose) = &mut tracker_from_body[i] {
+                        *pose = new_from_old * *pose;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The rigid motion that carries the measurements of `from` onto those of `to`, in tracker coordinates.
+pub(crate) fn rigid_motion(scope: Scope, from: &Data, to: &Data) -> Option<Isometry3<f64>> {
+    let (mut a, mut b) = (Vec::new(), Vec::new());
+    let inside = (0..from.recording.len()).filter(|&i| scope.contains(from.recording[i]));
+    for i in inside {
+        for (old, new) in from.bodies.iter().zip(&to.bodies) {
+            match (&old.measured, &new.measured) {
+                (Measured::Markers(old), Measured::Markers(new)) => {
+                    for (old, new) in old[i].iter().zip(&new[i]) {
+                        if let (Some(old), Some(new)) = (old, new) {
+                            a.push(*old);
+                            b.push(*new);
+                        }
+                    }
+                }
+                (
+                    Measured::Poses {
+                        tracker_from_body: old,
+                        ..
+                    },
+                    Measured::Poses {
+                        tracker_from_body: new,
+                        ..
+                    },
+                ) => {
+                    if let (Some(old), Some(new)) = (&old[i], &new[i]) {
+                        // new = motion · old
+                        return Some(new * old.inverse());
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+    Some(rigid_registration(&a, &b, None).ok()?.b_from_a)
+}
+
+fn missing_column(scope: Scope, joint: JointIndex, data: &Data) -> Data {
+    let rows: Vec<usize> = (0..data.readings.len())
+        .filter(|&i| scope.contains(data.recording[i]) && data.readings[i][joint.0].is_none())
+        .collect();
+    let mut filled = data.clone();
+    rows.iter()
+        .for_each(|&i| filled.readings[i][joint.0] = Some(0.0));
+    let links: Vec<LinkIndex> = data.bodies.iter().map(|b| b.link).collect();
+    let mut walk = Walk::new(&data.chain, &links);
+    let range = match data.chain.joints().get(joint.0).map(|j| j.motion) {
+        Some(Motion::Prismatic(_)) => STROKE,
+        _ => std::f64::consts::PI,
+    };
+    let mut last = f64::INFINITY;
+    for _ in 0..ALTERNATIONS {
+        let found: Vec<f64> = {
+            let scan = Scan::new(&filled, &[]);
+            let fit = scan.fit(None);
+            if fit.score.rms > last * (1.0 - SETTLED) {
+                break;
+            }
+            last = fit.score.rms;
+            rows.iter()
+                .map(|&i| best_reading(&scan, &fit, &mut walk, i, joint, range))
+                .collect()
+        };
+        for (&i, q) in rows.iter().zip(found) {
+            filled.readings[i][joint.0] = Some(q);
+        }
+    }
+    filled
+}
+
+/// The reading of one joint that explains a row best.
+fn best_reading(
+    scan: &Scan<'_>,
+    fit: &Fit,
+    walk: &mut Walk,
+    i: usize,
+    joint: JointIndex,
+    range: f64,
+) -> f64 {
+    let n = scan.channels.len();
+    let mut readings = scan.readings(i).to_vec();
+    let mut cost = |q: f64| {
+        readings[joint.0] = q;
+        walk.go(&scan.data.chain, &readings);
+        let mut sum = 0.0;
+        for k in (0..n).filter(|&k| scan.weights[i * n + k] > 0.0) {
+            let link = scan.data.bodies[scan.channels[k].body].link;
+            let pose = walk.root_from_link[link.0];
+            let m = fit.points[scan.data.recording[i].0 * n + k];
+            sum += (scan.seen(fit, i, k) - pose.r * m - pose.t).norm_squared();
+        }
+        sum
+    };
+    let step = 2.0 * range / STARTS as f64;
+    let mut best = (cost(0.0), 0.0);
+    for s in 0..STARTS {
+        let q = -range + step * s as f64;
+        let f = cost(q);
+        if f < best.0 {
+            best = (f, q);
+        }
+    }
+    // Golden-section search around the best start: the cost of one row has one minimum there.
+    let (mut low, mut high) = (best.1 - step, best.1 + step);
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    for _ in 0..36 {
+        let (a, b) = (high - golden * (high - low), low + golden * (high - low));
+        if cost(a) < cost(b) { high = b } else { low = a }
+    }
+    0.5 * (low + high)
+}
