@@ -105,17 +105,17 @@ fn faulty(
     let ideal = setting.data(false);
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xfa17);
     let fault = fault(&clean, &mut rng);
-    let clean = if outliers > 0.0 {
-        with_outliers(clean, outliers, seed)
+    // Other links and mounts are measured anew, so that their outliers come last; those of a wrong unit come first.
+    let anew = matches!(
+        fault.hypothesis,
+        Hypothesis::WrongLink { .. } | Hypothesis::Remounted { .. }
+    );
+    let data = if anew {
+        with_outliers(with_fault(&setting, &clean, &fault), outliers, seed)
     } else {
-        clean
+        with_fault(&setting, &with_outliers(clean, outliers, seed), &fault)
     };
-
-    (
-        fault,
-        with_fault(&setting, &clean, &fault),
-        with_fault(&setting, &ideal, &fault),
-    )
+    (fault, data, with_fault(&setting, &ideal, &fault))
 }
 
 fn study(seeds: std::ops::Range<u64>, errors: Errors, outliers: f64, tell: bool) -> Counts {

@@ -235,7 +235,8 @@ fn decide(
         }
         Some(pair) if gain(&pair) >= options.name_ratio => undecided(Some(pair), best_ratio),
         _ => match single {
-            Some(named) if settled(&named, options) => Decision::Named(named),
+            // No pair explains more: nominal errors beyond the priors are the likelier reason for what is left.
+            Some(named) if named.verified(options) => Decision::Named(named),
             single => undecided(single, best_ratio),
         },
     }
