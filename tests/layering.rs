@@ -1,6 +1,7 @@
 //! Layers point down: a crate may depend on crates of a lower layer only, and never on a sibling.
 //!
 //! The manifests are read as text, so that dev-dependencies, build-dependencies and target tables count as well.
+//! Inside the pipeline a stage uses earlier stages only, and in no crate do files import each other in a circle.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -169,4 +170,240 @@ fn the_rule_finds_what_it_is_for() {
     );
     let down = "[package]\nname = \"calib-core\"\n[dependencies]\ncalib-geometry.workspace = true # calib-cli\n";
     assert_eq!(faults("calib-core", 2, down), Vec::<String>::new());
+}
+
+/// The stages of the pipeline, in order: a stage may use those before it and itself.
+const STAGES: &[&str] = &["prepare", "estimate", "formulate", "verify", "output"];
+
+/// Code without comments, so that a link in a doc comment is not an import.
+fn code(text: &str) -> String {
+    let lines = text.lines().filter(|l| !l.trim_start().starts_with("//"));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// Every path that starts with `root` in code, with braces expanded: `crate::a::{b, c::d}` gives two.
+fn paths(code: &str, root: &str) -> Vec<Vec<String>> {
+    let mut found = Vec::new();
+    let free = |c: Option<char>| !c.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':');
+    for (at, _) in code.match_indices(&format!("{root}::")) {
+        if free(code[..at].chars().next_back()) {
+            expand(&code[at + root.len() + 2..], &[], &mut found);
+        }
+    }
+    found
+}
+
+/// Reads one path after its root; returns how many bytes it took.
+fn expand(text: &str, before: &[String], found: &mut Vec<Vec<String>>) -> usize {
+    let mut path = before.to_vec();
+    let mut at = 0;
+    loop {
+        let rest = &text[at..];
+        at += rest.len() - rest.trim_start().len();
+        let rest = &text[at..];
+        if let Some(inner) = rest.strip_prefix('{') {
+            let mut read = 1;
+            loop {
+                let tail = &inner[read - 1..];
+                let skipped = tail.len() - tail.trim_start_matches([' ', '\n', ',']).len();
+                read += skipped;
+                let tail = &inner[read - 1..];
+                if tail.is_empty() || tail.starts_with('}') {
+                    return at + read + 1;
+                }
+                // A word at least, or the text is no path: give up rather than loop.
+                match expand(tail, &path, found) {
+                    0 => return at + read,
+                    n => read += n,
+                }
+            }
+        }
+        let word: String = rest
+            .chars()
+            .take_while(|c| c.is_alphanumeric() || *c == '_')
+            .collect();
+        at += word.len();
+        if !word.is_empty() {
+            path.push(word);
+        }
+        match text[at..].strip_prefix("::") {
+            Some(_) => at += 2,
+            None => {
+                if path.len() > before.len() {
+                    found.push(path);
+                }
+                return at;
+            }
+        }
+    }
+}
+
+/// Imports of a file of the pipeline that go against the order of its stages.
+fn stage_faults(file: &str, text: &str) -> Vec<String> {
+    let place = |name: &str| STAGES.iter().position(|s| *s == name);
+    let Some(own) = file.split('/').next().and_then(place) else {
+        return Vec::new();
+    };
+    let mut wrong: Vec<String> = paths(&code(text), "crate")
+        .into_iter()
+        .filter(|path| path[0] == "run" || place(&path[0]).is_some_and(|other| other > own))
+        .map(|path| format!("{file} uses crate::{}", path.join("::")))
+        .collect();
+    wrong.dedup();
+    wrong
+}
+
+/// The sources below a folder as (path from there, text), sorted.
+fn sources(folder: &Path) -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(&next).into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                let name = path.strip_prefix(folder).expect("below the folder");
+                let name = name.to_string_lossy().replace('\\', "/");
+                found.push((name, fs::read_to_string(&path).expect("a source is text")));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn stages_of_the_pipeline_use_earlier_stages_only() {
+    let files = sources(&root().join("crates/calib-pipeline/src"));
+    let wrong: Vec<String> = files
+        .iter()
+        .flat_map(|(file, text)| stage_faults(file, text))
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Crates whose files still import each other in circles: the list may only become shorter.
+const CIRCLES_LEFT: &[&str] = &[
+    "calib-aor",
+    "calib-cor",
+    "calib-core",
+    "calib-fit",
+    "calib-pipeline",
+    "calib-study",
+];
+
+/// `a/b/mod.rs`, `a/b.rs` → [a, b]; `lib.rs` → [].
+fn module(file: &str) -> Vec<String> {
+    let stem = file.trim_end_matches(".rs");
+    let mut path: Vec<String> = stem.split('/').map(str::to_owned).collect();
+    if path
+        .last()
+        .is_some_and(|l| l == "mod" || (path.len() == 1 && (l == "lib" || l == "main")))
+    {
+        path.pop();
+    }
+    path
+}
+
+/// Files of a crate that import each other in a circle; a module and its parents may.
+fn circles(files: &[(String, String)]) -> Vec<String> {
+    let modules: BTreeMap<Vec<String>, usize> = files
+        .iter()
+        .enumerate()
+        .map(|(i, (file, _))| (module(file), i))
+        .collect();
+    let names: Vec<Vec<String>> = files.iter().map(|(file, _)| module(file)).collect();
+    // The file of the longest beginning of a path that is a module.
+    let resolve = |path: &[String]| {
+        let mut ends = (1..=path.len()).rev();
+        ends.find_map(|n| modules.get(&path[..n]).copied())
+    };
+    let mut uses: Vec<Vec<usize>> = Vec::new();
+    for (i, (_, text)) in files.iter().enumerate() {
+        let code = code(text);
+        let mut to: Vec<usize> = paths(&code, "crate")
+            .iter()
+            .filter_map(|p| resolve(p))
+            .collect();
+        let parent = &names[i][..names[i].len().saturating_sub(1)];
+        for path in paths(&code, "super") {
+            to.extend(resolve(&[parent, &path].concat()));
+        }
+        to.retain(|&j| !names[j].starts_with(&names[i]) && !names[i].starts_with(&names[j]));
+        uses.push(to);
+    }
+    let reaches = |from: usize, to: usize| {
+        let (mut seen, mut next) = (vec![false; uses.len()], vec![from]);
+        while let Some(i) = next.pop() {
+            for &j in &uses[i] {
+                if j == to {
+                    return true;
+                }
+                if !std::mem::replace(&mut seen[j], true) {
+                    next.push(j);
+                }
+            }
+        }
+        false
+    };
+    (0..files.len())
+        .filter(|&i| reaches(i, i))
+        .map(|i| files[i].0.clone())
+        .collect()
+}
+
+#[test]
+fn no_files_import_each_other_in_a_circle() {
+    let mut wrong = Vec::new();
+    for folder in manifests(&root().join("crates")).keys() {
+        if CIRCLES_LEFT.contains(&folder.as_str()) {
+            continue;
+        }
+        let files = sources(&root().join("crates").join(folder).join("src"));
+        let found = circles(&files);
+        if !found.is_empty() {
+            wrong.push(format!("{folder}: {}", found.join(", ")));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_rules_inside_a_crate_find_what_they_are_for() {
+    assert_eq!(
+        stage_faults(
+            "prepare/load.rs",
+            "use crate::{error::E, verify::{known, closure::x}};\n"
+        ),
+        [
+            "prepare/load.rs uses crate::verify::known",
+            "prepare/load.rs uses crate::verify::closure::x"
+        ]
+    );
+    assert_eq!(
+        stage_faults("verify/known.rs", "fn f() { crate::run::run(); }\n"),
+        ["verify/known.rs uses crate::run::run"]
+    );
+    let down =
+        "//! [`crate::output`]\nuse crate::prepare::load::Inputs;\nuse crate::verify::known;\n";
+    assert_eq!(
+        stage_faults("verify/closure.rs", down),
+        Vec::<String>::new()
+    );
+
+    let file = |name: &str, text: &str| (name.to_owned(), text.to_owned());
+    let circle = [
+        file("lib.rs", "mod a;\nmod b;\nmod c;\npub use a::A;\n"),
+        file("a.rs", "use crate::b::{B, C};\n"),
+        file("b.rs", "use super::c::D;\n"),
+        file("c.rs", "pub fn f() -> crate::a::A {}\n"),
+    ];
+    assert_eq!(circles(&circle), ["a.rs", "b.rs", "c.rs"]);
+    let family = [
+        file("a/mod.rs", "mod b;\nuse crate::a::b::B;\n"),
+        file("a/b.rs", "use super::A;\nuse crate::c::C;\n"),
+        file("c.rs", "use std::fmt;\n"),
+    ];
+    assert_eq!(circles(&family), Vec::<String>::new());
 }

@@ -4,24 +4,15 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use calib_urdf::{ChangeRecord, ModelDiff, Patched, UrdfEdit, diff_origins};
+use calib_urdf::{ModelDiff, UrdfEdit, diff_origins};
 use nalgebra::Isometry3;
 
+use crate::change::{Destination, FileChange};
 use crate::error::{ApplyError, OriginDifference};
 use crate::files;
+use crate::kind::Kind;
 use crate::result::{self, Calibrated};
-use crate::target::{Kind, Target};
-
-/// Where the changed files go.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Destination {
-    /// Nowhere: a dry run.
-    Nowhere,
-    /// Over the target and the YAML that it loads.
-    InPlace,
-    /// A new file; a folder where more than one file changes.
-    To(PathBuf),
-}
+use crate::target::Target;
 
 /// What to apply to what.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,21 +27,6 @@ pub struct ApplyRequest {
     pub destination: Destination,
     /// Also a result that was not accepted.
     pub force: bool,
-}
-
-/// One file that changes.
-#[derive(Debug, Clone)]
-pub struct FileChange {
-    /// The file, as the caller named it or as it was found from there.
-    pub path: PathBuf,
-    /// Its text before.
-    pub original: String,
-    /// Its text after, and what differs.
-    pub patched: Patched,
-    /// What reverts it.
-    pub record: ChangeRecord,
-    /// Where it was written.
-    pub written: Option<PathBuf>,
 }
 
 /// What was applied.

@@ -5,7 +5,8 @@ use std::path::Path;
 use calib_urdf::source;
 
 use crate::error::ApplyError;
-use crate::target::{Kind, origins};
+use crate::kind::Kind;
+use crate::target::origins;
 
 fn text(path: &Path) -> Result<String, ApplyError> {
     Ok(source::read_text(path, &path.display().to_string())?)

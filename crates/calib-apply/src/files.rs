@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use calib_files::{OutputFile, replace, write_new};
 
-use crate::apply::{Destination, FileChange};
+use crate::change::{Destination, FileChange};
 use crate::error::ApplyError;
 use crate::revert::record_path;
 

@@ -8,18 +8,22 @@
 //! ```
 
 mod apply;
+mod change;
 mod diff;
 mod error;
 mod files;
+mod kind;
 mod render;
 mod result;
 mod revert;
 mod target;
 
-pub use apply::{Applied, ApplyRequest, Destination, FileChange, apply};
+pub use apply::{Applied, ApplyRequest, apply};
+pub use change::{Destination, FileChange};
 pub use diff::{diff_json, diff_table, diff_unified};
 pub use error::{ApplyError, OriginDifference};
+pub use kind::Kind;
 pub use render::{json, text};
 pub use result::{Calibrated, find as find_result};
 pub use revert::{original, read_record, record_path, revert, revert_in_place};
-pub use target::{Kind, Target};
+pub use target::Target;

@@ -6,7 +6,8 @@ use std::fmt::Write as _;
 use calib_urdf::ModelDiff;
 use serde::Serialize;
 
-use crate::apply::{Applied, Destination, FileChange};
+use crate::apply::Applied;
+use crate::change::{Destination, FileChange};
 use crate::error::ApplyError;
 use crate::revert::record_path;
 

@@ -7,8 +7,8 @@ use calib_urdf::{ChangeRecord, RobotModel, UrdfEdit, source};
 use nalgebra::Isometry3;
 
 use crate::error::ApplyError;
+use crate::kind::Kind;
 use crate::revert::{read_record, reverted};
-use crate::target::Kind;
 
 /// A calibration's robot before and after.
 #[derive(Debug, Clone)]

@@ -10,7 +10,7 @@ use calib_plugin::NewProjectError;
 use calib_study::StudyError;
 use calib_study::cases::CaseError;
 
-use crate::commands::record::RecordError;
+use crate::commands::record::error::RecordError;
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]

@@ -11,6 +11,7 @@
 //! Stages are functions of plain values. Only [`prepare::load`] reads files, and no stage writes any: a run returns the files
 //! to write.
 
+pub mod check;
 pub mod error;
 pub mod estimate;
 pub mod formulate;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use calib_pipeline::ExitCode;
-use calib_pipeline::prepare::inspect;
+use calib_pipeline::check;
 use clap::Args;
 
 use crate::error::CliError;
@@ -21,7 +21,7 @@ pub struct Check {
 
 /// Prints what the checks found.
 pub fn run(options: &Check) -> Result<ExitCode, CliError> {
-    let checked = inspect::check(&options.profile)?;
+    let checked = check::check(&options.profile)?;
     emit(&if options.json {
         checked.json()?
     } else {

@@ -1,9 +1,7 @@
 //! `calib completions`.
 
 use calib_pipeline::ExitCode;
-use clap::{Args, CommandFactory as _};
-
-use crate::arguments::Arguments;
+use clap::{Args, Command};
 
 /// Arguments of `calib completions`.
 #[derive(Debug, Args)]
@@ -12,9 +10,8 @@ pub struct Completions {
     shell: clap_complete::Shell,
 }
 
-/// Prints the completions.
-pub fn run(options: &Completions) -> ExitCode {
-    let command = &mut Arguments::command();
+/// Prints the completions of the program's command line.
+pub fn run(options: &Completions, command: &mut Command) -> ExitCode {
     clap_complete::generate(options.shell, command, "calib", &mut std::io::stdout());
     ExitCode::Accepted
 }

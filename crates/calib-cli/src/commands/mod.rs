@@ -16,6 +16,7 @@ pub mod simulate;
 pub mod study;
 
 use calib_pipeline::ExitCode;
+use clap::CommandFactory as _;
 
 use crate::arguments::{Arguments, Command};
 use crate::error::CliError;
@@ -23,7 +24,7 @@ use crate::error::CliError;
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
     match &arguments.command {
-        Command::Run(options) => run::run(arguments, options),
+        Command::Run(options) => run::run(arguments.quiet, arguments.verbose, options),
         Command::Check(options) => check::run(options),
         Command::Simulate(options) => simulate::run(options),
         Command::Fit(options) => fit::run(options),
@@ -36,6 +37,6 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
         Command::Convert(options) => convert::run(arguments.quiet, options),
         Command::Plugins(options) => plugins::run(options),
         Command::Schema(options) => schema::run(options),
-        Command::Completions(options) => Ok(completions::run(options)),
+        Command::Completions(options) => Ok(completions::run(options, &mut Arguments::command())),
     }
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use calib_pipeline::ExitCode;
-use calib_pipeline::estimate::estimators::Estimators;
+use calib_pipeline::prepare::estimators::Estimators;
 use calib_plugin::check::{Limits, check};
 use calib_plugin::{HEADER, Host, Kind, Language, SearchPath, new_project};
 

@@ -10,7 +10,6 @@ use calib_pipeline::formulate::models;
 use calib_pipeline::run::{RunOptions, RunOutput, run as run_profile};
 use clap::{Args, ValueEnum};
 
-use crate::arguments::Arguments;
 use crate::error::CliError;
 use crate::remaining::with_remaining;
 use crate::terminal::{emit, spinner};
@@ -50,11 +49,11 @@ pub enum MethodName {
 }
 
 /// Calibrates, or compares models.
-pub fn run(arguments: &Arguments, options: &Run) -> Result<ExitCode, CliError> {
-    let bar = spinner(arguments.quiet);
+pub fn run(quiet: bool, verbose: bool, options: &Run) -> Result<ExitCode, CliError> {
+    let bar = spinner(quiet);
     let mut progress = |stage: &str| {
         bar.set_message(stage.to_owned());
-        if arguments.verbose {
+        if verbose {
             eprintln!("calib: {stage}");
         }
     };
@@ -81,7 +80,7 @@ pub fn run(arguments: &Arguments, options: &Run) -> Result<ExitCode, CliError> {
     let written = write_results(&out, &output.files)?;
     bar.finish_and_clear();
     show(&output, options.json)?;
-    if !options.json && !arguments.quiet {
+    if !options.json && !quiet {
         // Their names stand in the summary.
         let results = written
             .iter()

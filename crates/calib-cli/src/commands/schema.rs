@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use calib_pipeline::ExitCode;
-use calib_pipeline::estimate::estimators::Estimators;
+use calib_pipeline::prepare::estimators::Estimators;
 use calib_pipeline::prepare::load::load_robot;
 use clap::{Args, ValueEnum};
 

@@ -10,9 +10,8 @@
 
 use std::collections::BTreeMap;
 
-use calib_aor::{
-    Center, FrameAxes, FrameAxis, FrameOutcome, FrameSample, Options, frame_planes::algorithm1,
-};
+use calib_aor::frame_planes::algorithm1;
+use calib_aor::{Center, FrameAxes, FrameAxis, FrameOutcome, FrameSample, Options};
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_geometry::{Line, Twist, se3};
 use calib_plugin::{BodyPose, MotionData, Shape};
@@ -23,9 +22,9 @@ use nalgebra::{
 };
 
 use crate::error::PipelineError;
-use crate::estimate::estimators::{CenterFit, Estimators};
 use crate::estimate::start::{Start, mean_pose};
-use crate::prepare::load::{Inputs, Loaded};
+use crate::prepare::estimators::{CenterFit, Estimators};
+use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::tracks::BodyTrack;
 
 /// One origin found by closed forms.
@@ -179,7 +178,7 @@ impl Task<'_> {
     /// The center by the profile's estimator, and by the others that take the same data.
     fn center(&self) -> Result<Centers, PipelineError> {
         let id = &self.origin.center;
-        let parameters = crate::estimate::estimators::values(&self.origin.center_parameters);
+        let parameters = crate::prepare::estimators::values(&self.origin.center_parameters);
         let chosen = self.fit_center(id, &parameters)?;
         let mut others = Vec::new();
         for other in ["sfe", "hse", "hotspot_ml", "ml_sphere", "ball_bundle"] {
@@ -434,7 +433,7 @@ impl Task<'_> {
             .iter()
             .map(|r| self.inputs.robot.model.position(r.q, swept.joint))
             .collect();
-        let parameters = crate::estimate::estimators::values(&self.origin.axis_parameters);
+        let parameters = crate::prepare::estimators::values(&self.origin.axis_parameters);
         let axis = match self
             .estimators
             .axis(&self.origin.axis, &parameters, &motion)?

@@ -19,7 +19,7 @@ use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3,
 };
 
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
 
 /// Start values.

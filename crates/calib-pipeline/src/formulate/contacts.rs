@@ -14,7 +14,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::formulate::kinematics::Calibration;
 use crate::formulate::ml::Formulation;
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
 
 /// Adds every contact of the profile to the problem.
 pub fn add_contacts(formulation: &mut Formulation, inputs: &Inputs) {

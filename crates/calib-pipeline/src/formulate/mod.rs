@@ -1,6 +1,13 @@
 //! The profile and the recordings as one likelihood problem.
 
+pub mod by_closed_forms;
+pub mod by_likelihood;
+pub mod checked;
+pub mod clock;
 pub mod contacts;
+pub mod found;
 pub mod kinematics;
 pub mod ml;
+pub mod model_checks;
 pub mod models;
+pub mod solved;

@@ -14,7 +14,9 @@ use crate::estimate::start::start;
 use crate::formulate::kinematics::Loads;
 use crate::formulate::ml::{FreeSet, state};
 use crate::prepare::checks;
-use crate::prepare::load::{Inputs, load_recordings, load_robot};
+use crate::prepare::inputs::Inputs;
+use crate::prepare::load::load_recordings;
+use crate::prepare::robot::load_robot;
 use crate::prepare::tracks::body_tracks;
 
 /// Models in order of growth; each adds to the one before.
@@ -58,7 +60,7 @@ pub fn compare_models(
     }
     findings.extend(checks::check(&inputs));
     if checks::stops(&findings) && !force {
-        return Err(crate::run::stopped(&inputs, &findings));
+        return Err(crate::prepare::stopped::stopped(&inputs, &findings));
     }
     inputs
         .recordings

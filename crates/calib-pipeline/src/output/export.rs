@@ -1,40 +1,23 @@
 //! The calibrated robot as a patched URDF, the effects that a URDF cannot hold, and the scene.
 
-use calib_core::EFFECTS;
-use calib_core::effect::{Drives, Source};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use calib_core::EFFECTS;
+use calib_core::effect::{Drives, Source};
 use calib_geometry::so3;
 use calib_report::scene::{Provenance, SceneBody, SceneFrame, SceneMarker, SceneRobot};
 use calib_report::{Change, Input, Scene, Status, Unit};
-use calib_urdf::{ChangeRecord, RobotModel, UrdfEdit, patch, rpy::rpy_from_rotation};
+use calib_urdf::rpy::rpy_from_rotation;
+use calib_urdf::{ChangeRecord, RobotModel, UrdfEdit, patch};
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::error::PipelineError;
+use crate::formulate::found::Found;
 use crate::formulate::kinematics::Calibration;
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::known::Known;
-
-/// A transform to be reported: an origin on its body, or one between links.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Found {
-    /// Name in the report.
-    pub name: String,
-    /// Parent frame.
-    pub parent: String,
-    /// Child frame.
-    pub child: String,
-    /// `parent_from_child`.
-    pub pose: Isometry3<f64>,
-    /// 6×6 in `[ω; v]` of the child; `None` where nothing determines a direction.
-    pub covariance: Option<Matrix6<f64>>,
-    /// Directions that the data do not see.
-    pub unobservable: Vec<calib_report::Unobservable>,
-    /// Measured, calibrated or assumed.
-    pub status: Status,
-}
 
 /// The patched robot description.
 #[derive(Debug, Clone)]

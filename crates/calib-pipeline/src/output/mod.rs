@@ -1,6 +1,11 @@
 //! What a run leaves: the URDF, the scene, the pictures, the report as data, and the files.
 
 pub mod assemble;
+pub mod evidence;
 pub mod export;
+pub(crate) mod files;
+mod of_data;
+mod of_fit;
 pub mod shapes;
+mod verdict;
 pub mod view;

@@ -9,7 +9,7 @@ use calib_report::view3d::Outline;
 use calib_urdf::sha256_hex;
 use calib_urdf::visual::{Geometry, Visual, visuals};
 
-use crate::prepare::load::{Digest, RobotProfile};
+use crate::prepare::inputs::{Digest, RobotProfile};
 
 /// A mesh file larger than this is a scan, not a drawing.
 const MAX_BYTES: u64 = 128 << 20;

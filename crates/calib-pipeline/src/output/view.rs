@@ -13,7 +13,7 @@ use nalgebra::{Isometry3, Matrix3, Point3};
 use crate::estimate::paper::OriginEstimate;
 use crate::formulate::kinematics::Calibration;
 use crate::formulate::ml::MlFit;
-use crate::prepare::load::{Inputs, Loaded};
+use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::accuracy::configuration;
 

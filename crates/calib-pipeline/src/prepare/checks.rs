@@ -8,7 +8,7 @@ use calib_finding::{Fact, Finding, Severity, catalog};
 use calib_profile::{BodyKind, Usage};
 
 use crate::prepare::conditions::missing_torques;
-use crate::prepare::load::{Inputs, Loaded};
+use crate::prepare::inputs::{Inputs, Loaded};
 
 /// Fewest rows of a recording that a fit can use: a sphere has four unknowns, and one row must check it.
 const MIN_POSES: usize = 5;

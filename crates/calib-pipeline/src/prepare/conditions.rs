@@ -4,7 +4,7 @@ use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::Load;
 use calib_urdf::RobotModel;
 
-use crate::prepare::load::{Inputs, Loaded};
+use crate::prepare::inputs::{Inputs, Loaded};
 
 /// A joint that moves less than this from one row to the next keeps its direction of approach, rad or m.
 const STILL: f64 = 1e-5;

@@ -1,15 +1,21 @@
 //! From a profile to checked inputs: robot, recordings, clocks, tracks of bodies.
 
 pub mod align;
+pub mod aligned;
 pub mod checks;
-pub mod clock;
 pub mod conditions;
-pub mod inspect;
+pub mod estimators;
+pub mod excluded;
+pub mod inputs;
 pub mod load;
 pub mod loads;
-pub mod model_checks;
 pub(crate) mod paths;
 pub mod readers;
 pub mod relabel;
+pub mod robot;
+pub mod rows;
+pub mod settled;
+pub mod stopped;
 pub mod streams;
+pub mod timelines;
 pub mod tracks;

@@ -12,7 +12,7 @@ use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::BodyKind;
 use nalgebra::Point3;
 
-use crate::prepare::load::{Inputs, Loaded};
+use crate::prepare::inputs::{Inputs, Loaded};
 
 /// Distances stay within this many σ: one Gaussian value in 10¹⁵ does not.
 const SIGMAS: f64 = 8.0;

@@ -9,7 +9,7 @@ use calib_urdf::nearest::nearest;
 use nalgebra::{Isometry3, Point3};
 
 use crate::error::PipelineError;
-use crate::prepare::load::{Inputs, Loaded};
+use crate::prepare::inputs::{Inputs, Loaded};
 
 /// One body over all recordings.
 #[derive(Debug, Clone)]

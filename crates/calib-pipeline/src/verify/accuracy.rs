@@ -1,17 +1,19 @@
 //! How exact the result is: the tool's uncertainty over the workspace, and what an error on a new pose is made of.
 
+use std::collections::BTreeMap;
+
 use calib_core::Configuration;
 use calib_geometry::so3;
 use calib_profile::Usage;
-use calib_report::{AccuracyLimit, ErrorSource, Workspace, WorkspacePoint};
+use calib_report::{AccuracyLimit, ErrorSource, HeldOut, Workspace, WorkspacePoint};
 use calib_urdf::LinkId;
 use nalgebra::Matrix6;
 
 use crate::formulate::kinematics::{Loads, joint_state};
 use crate::formulate::ml::MlFit;
-use crate::output::assemble::Evidence;
 use crate::prepare::conditions::Conditions;
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
+use crate::prepare::tracks::BodyTrack;
 
 /// Indicated joint positions of a sample as a prediction's configuration, loads included.
 pub(crate) fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configuration {
@@ -97,11 +99,13 @@ pub(crate) fn workspace(inputs: &Inputs, fit: &MlFit) -> Option<Workspace> {
 
 /// What a tool error on a new pose is made of: rms over the held-out poses, in metres.
 pub(crate) fn accuracy_limits(
-    e: &Evidence<'_>,
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    held_out: Option<&HeldOut>,
     fit: &MlFit,
     workspace: Option<&Workspace>,
 ) -> Vec<AccuracyLimit> {
-    let Some(measured) = e.held_out.as_ref().and_then(|h| h.calibrated) else {
+    let Some(measured) = held_out.and_then(|h| h.calibrated) else {
         return Vec::new();
     };
     let sigma_of = |name: &str| {
@@ -112,8 +116,12 @@ pub(crate) fn accuracy_limits(
             .map(|n| n.sigma)
     };
     let parameters = workspace.map_or(0.0, |w| w.rms_sigma_m);
-    let tracker = tracker_sigma(e, sigma_of("marker"), sigma_of("body position"));
-    let joints = sigma_of("joint").unwrap_or(0.0) * joint_lever(e.inputs);
+    let tracker = tracker_sigma(
+        (inputs, tracks),
+        sigma_of("marker"),
+        sigma_of("body position"),
+    );
+    let joints = sigma_of("joint").unwrap_or(0.0) * joint_lever(inputs);
     let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
     let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
     let total = explained + rest.powi(2);
@@ -138,11 +146,15 @@ pub(crate) fn accuracy_limits(
 }
 
 /// σ of one measured position, as the held-out errors count it (m): of a body by its origin, otherwise of a marker.
-fn tracker_sigma(e: &Evidence<'_>, marker: Option<f64>, body: Option<f64>) -> f64 {
-    let of_template = tool_link(e.inputs).and_then(|tool| {
-        let bodies = &e.inputs.robot.profile.bodies;
+fn tracker_sigma(
+    (inputs, tracks): (&Inputs, &BTreeMap<String, BodyTrack>),
+    marker: Option<f64>,
+    body: Option<f64>,
+) -> f64 {
+    let of_template = tool_link(inputs).and_then(|tool| {
+        let bodies = &inputs.robot.profile.bodies;
         let (name, _) = bodies.iter().find(|(_, b)| b.link == tool)?;
-        let template = e.tracks.get(name)?.template.as_ref()?;
+        let template = tracks.get(name)?.template.as_ref()?;
         // Fit of a pose to n markers: information JᵀJ/σ² with J_i = [−[p_i]ₓ, 1], and the part of the origin.
         let information: Matrix6<f64> = template
             .points

@@ -15,7 +15,7 @@ use nalgebra::Isometry3;
 
 use crate::formulate::kinematics::Calibration;
 use crate::prepare::conditions::conditions;
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
 
 /// Closes every loop of the profile with the given origins (`body_from_origin`) and robot.

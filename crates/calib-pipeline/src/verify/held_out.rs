@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Vector3};
 use crate::formulate::contacts::miss;
 use crate::formulate::kinematics::Calibration;
 use crate::prepare::conditions::conditions;
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
 
 /// Predicted minus measured position of one body or marker in one row, tracker frame, m.

@@ -5,7 +5,7 @@ use calib_report::{DataInformation, Quantity, Term};
 use nalgebra::DMatrix;
 
 use crate::formulate::ml::MlFit;
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
 use crate::verify::invariants::invariants;
 
 /// The square root of the data's information and the gauge-free numbers of the robot, with their derivatives.

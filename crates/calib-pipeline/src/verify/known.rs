@@ -7,7 +7,7 @@ use calib_urdf::Joint;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 
 use crate::formulate::ml::MlFit;
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
 
 /// σ of a number, and how much of it the data said.
 #[derive(Debug, Clone, Copy, PartialEq)]

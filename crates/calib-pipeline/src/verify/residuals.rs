@@ -10,7 +10,7 @@ use crate::formulate::contacts::miss;
 use crate::formulate::kinematics::Calibration;
 use crate::formulate::ml::MlFit;
 use crate::prepare::conditions::conditions;
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::held_out::joint_values;
 

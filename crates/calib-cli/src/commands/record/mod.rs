@@ -1,7 +1,7 @@
 //! `calib record`: from the profile to a capture session.
 
 mod bodies;
-mod error;
+pub mod error;
 mod plan;
 
 use std::io::{BufRead as _, IsTerminal as _};
@@ -19,7 +19,7 @@ use calib_profile::RecordingSpec;
 use clap::Args;
 
 use crate::error::CliError;
-pub use error::RecordError;
+use error::RecordError;
 use plan::{guide_ranges, plan};
 
 /// How long the tracker is listened to before the columns are decided, s.

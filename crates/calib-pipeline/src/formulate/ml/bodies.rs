@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::Formulation;
 use calib_core::{
     Chart, FrameId, GroupId, MarkerObservation, NoiseKind, PointId, PoseNoise, PoseObservation,
     Problem, Role,
@@ -9,9 +10,8 @@ use calib_core::{
 use calib_profile::{BodyKind, Profile};
 use nalgebra::{Isometry3, Point3};
 
-use super::Formulation;
 use crate::estimate::start::Start;
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
 
 /// Marker noise that estimation starts from where the profile states none, m.

@@ -1,13 +1,13 @@
 //! The robot that values of the parameters describe.
 
+use super::Formulation;
 use calib_core::effect::Source;
 use calib_core::{EdgeId, Solution};
 use calib_urdf::JointId;
 use nalgebra::Isometry3;
 
-use super::Formulation;
 use crate::formulate::kinematics::{Calibration, JointEffects};
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
 
 /// The robot that a solution describes.
 pub(super) fn calibration(

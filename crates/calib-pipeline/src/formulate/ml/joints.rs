@@ -1,5 +1,6 @@
 //! Joints: their origins, their motion and its effects.
 
+use super::{Formulation, FreeSet};
 use calib_core::effect::Source;
 use calib_core::{
     Axis, Chart, EFFECTS, EdgeId, EffectKind, GroupId, JointState, NoiseKind, Problem, Role,
@@ -7,10 +8,9 @@ use calib_core::{
 use calib_profile::{ContactBase, JointFreeSet, OriginFreeSet, Profile};
 use calib_urdf::{JointId, JointKind, RobotModel};
 
-use super::{Formulation, FreeSet};
 use crate::formulate::kinematics::{Loads, joint_state};
 use crate::prepare::conditions::Conditions;
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
 
 /// Joint noise that estimation starts from, rad (0.01°).
 const JOINT_SIGMA: f64 = 1.7e-4;

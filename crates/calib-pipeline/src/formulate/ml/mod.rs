@@ -2,25 +2,25 @@
 
 use std::collections::BTreeMap;
 
+use bodies::add_bodies;
 use calib_core::{Chart, EdgeId, FrameId, PointId, Problem, Role, Settings, Solution};
 use calib_profile::{Free, Usage};
+use calibration::calibration;
+use joints::{Row, add_joint, joint_noise_group, used_joints};
 
 use crate::error::PipelineError;
 use crate::estimate::start::Start;
 use crate::formulate::contacts::add_contacts;
 use crate::formulate::kinematics::{Calibration, Loads};
 use crate::prepare::conditions::{Conditions, conditions};
-use crate::prepare::load::Inputs;
+use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
 
 mod bodies;
 mod calibration;
 mod joints;
 
-use bodies::add_bodies;
-use calibration::calibration;
 pub(crate) use calibration::calibration_at;
-use joints::{Row, add_joint, joint_noise_group, used_joints};
 
 /// What to free in a solve: the profile's choice, or the bodies and the robot's place only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -153,7 +153,7 @@ pub fn state(
     }
     add_bodies(&mut formulation, inputs, tracks, start);
     add_contacts(&mut formulation, inputs);
-    crate::prepare::clock::add_clocks(&mut formulation, inputs, free_set);
+    crate::formulate::clock::add_clocks(&mut formulation, inputs, free_set);
     formulation
 }
 

@@ -7,10 +7,12 @@ use calib_finding::{Finding, Severity, catalog};
 
 use crate::error::{ExitCode, PipelineError};
 use crate::estimate::start::start;
+use crate::formulate::model_checks;
 use crate::prepare::checks;
-use crate::prepare::load::{Inputs, load_recordings, load_robot};
-use crate::prepare::model_checks;
+use crate::prepare::inputs::Inputs;
+use crate::prepare::load::load_recordings;
 use crate::prepare::relabel::relabel;
+use crate::prepare::robot::load_robot;
 use crate::prepare::tracks::body_tracks;
 
 /// What `calib check` found.
@@ -63,7 +65,7 @@ pub fn check(profile: &Path) -> Result<Checked, PipelineError> {
 }
 
 fn lines(inputs: &Inputs) -> Vec<String> {
-    let line = |r: &crate::prepare::load::Loaded| {
+    let line = |r: &crate::prepare::inputs::Loaded| {
         let usage = match r.spec.usage {
             calib_profile::Usage::Sweep => "sweep",
             calib_profile::Usage::Static => "static poses",

@@ -15,7 +15,7 @@ use calib_report::{Clock, ClockCheck};
 
 use crate::formulate::ml::{Formulation, FreeSet, MlFit};
 use crate::prepare::align::ClockState;
-use crate::prepare::load::{Inputs, Loaded};
+use crate::prepare::inputs::{Inputs, Loaded};
 
 /// Prior σ of c₀ and c₁, s: ten times what the alignment leaves on a bad recording.
 const PRIOR: f64 = 5e-3;

@@ -28,7 +28,8 @@ use crate::error::PipelineError;
 use crate::estimate::start::{Start, start};
 use crate::formulate::ml::{self, FreeSet, MlFit};
 use crate::prepare::conditions::{Conditions, conditions};
-use crate::prepare::load::{Excluded, Inputs, Loaded};
+use crate::prepare::excluded::Excluded;
+use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::tracks::BodyTrack;
 
 /// A joint that moves less than this, rad or m, has no sign and no order.

@@ -1,0 +1,58 @@
+//! What either method finds.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry3, Matrix6};
+
+use crate::estimate::start::Start;
+use crate::formulate::found::Found;
+use crate::formulate::kinematics::Calibration;
+use crate::formulate::ml::MlFit;
+use crate::prepare::inputs::Inputs;
+
+/// What either method hands on.
+#[derive(Debug)]
+pub struct Solved {
+    /// The calibrated robot.
+    pub robot: Calibration,
+    /// The robot whose forward kinematics the loops are closed with.
+    pub fk: Calibration,
+    /// The robot as drawn, with tracker and bodies fitted; `None` with the paper's method.
+    pub registered: Option<Calibration>,
+    /// Transforms found.
+    pub found: Vec<Found>,
+    /// Covariance of where the robot stands.
+    pub root_covariance: Option<Matrix6<f64>>,
+    /// The fit, with `method: ml`.
+    pub fit: Option<MlFit>,
+}
+
+impl Solved {
+    /// Where each origin of the profile stands on its body.
+    #[must_use]
+    pub fn body_from_origin(&self, inputs: &Inputs) -> BTreeMap<String, Isometry3<f64>> {
+        let origins = inputs.robot.profile.origins.iter();
+        origins
+            .filter_map(|(name, o)| {
+                let wanted = format!("{}_from_{name}", o.body);
+                let found = self.found.iter().find(|f| f.name == wanted)?;
+                Some((name.clone(), found.pose))
+            })
+            .collect()
+    }
+}
+
+/// The robot as described, with the bodies placed by closed forms.
+pub(crate) fn nominal(inputs: &Inputs, start: &Start) -> Calibration {
+    let mut robot = Calibration::nominal(&inputs.robot.model, start.tracker_from_root);
+    robot.mounts = start.mounts.clone();
+    robot.points = start.points.clone();
+    let profile = &inputs.robot.profile;
+    let tips = profile.points.iter();
+    robot.contact_points = tips.map(|(name, tip)| (name.clone(), tip.at)).collect();
+    let contacts = profile.contacts.iter();
+    robot.places = contacts
+        .map(|(name, contact)| (name.clone(), contact.base_from_place))
+        .collect();
+    robot
+}

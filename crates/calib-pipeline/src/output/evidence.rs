@@ -1,0 +1,47 @@
+//! What the report is made of.
+
+use std::collections::BTreeMap;
+
+use calib_files::OutputFile;
+use calib_finding::Finding;
+use calib_profile::Method;
+use calib_report::{HeldOut, LoopClosure, ResidualRow};
+
+use crate::estimate::paper::OriginEstimate;
+use crate::formulate::found::Found;
+use crate::formulate::kinematics::Calibration;
+use crate::formulate::ml::MlFit;
+use crate::output::export::PatchedUrdf;
+use crate::prepare::inputs::Inputs;
+use crate::prepare::tracks::BodyTrack;
+
+/// What the report is made of.
+#[derive(Debug)]
+pub struct Evidence<'a> {
+    /// Profile, robot, recordings.
+    pub inputs: &'a Inputs,
+    /// Body tracks.
+    pub tracks: &'a BTreeMap<String, BodyTrack>,
+    /// How it was solved.
+    pub method: Method,
+    /// Data checks and what the stages noticed.
+    pub findings: &'a [Finding],
+    /// Closed forms.
+    pub origins: &'a BTreeMap<String, OriginEstimate>,
+    /// Transforms found.
+    pub found: &'a [Found],
+    /// The fit, with `method: ml`.
+    pub fit: Option<&'a MlFit>,
+    /// The calibrated robot.
+    pub robot: &'a Calibration,
+    /// Loop closures.
+    pub loops: Vec<LoopClosure>,
+    /// Held-out errors.
+    pub held_out: Option<HeldOut>,
+    /// The patched description.
+    pub urdf: &'a PatchedUrdf,
+    /// Files that do not depend on the report, and what they are.
+    pub written: &'a [(OutputFile, String)],
+    /// Residuals of the fit.
+    pub residuals: &'a [ResidualRow],
+}

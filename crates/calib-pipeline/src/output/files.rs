@@ -1,0 +1,108 @@
+//! The files of a run.
+
+use calib_files::OutputFile;
+use calib_report::{Report, ResidualRow};
+
+use crate::error::PipelineError;
+use crate::formulate::kinematics::Calibration;
+use crate::output::export::calibration_yaml;
+use crate::prepare::estimators::values;
+use crate::prepare::inputs::Inputs;
+
+/// The files that do not depend on the report, and what they are in words.
+pub(crate) fn written(
+    inputs: &Inputs,
+    residuals: &[ResidualRow],
+    (scene, view): (&calib_report::Scene, &calib_report::view3d::View3d),
+    urdf: &crate::output::export::PatchedUrdf,
+    robot: &Calibration,
+) -> Result<Vec<(OutputFile, String)>, PipelineError> {
+    let outputs = &inputs.robot.profile.outputs;
+    let mut record = calib_report::json::exact_json(&urdf.record)?;
+    record.push('\n');
+    let stem = outputs.scene.trim_end_matches(".json");
+    let mut files = vec![
+        (
+            OutputFile::text(outputs.urdf.clone(), urdf.text.clone()),
+            format!("URDF with {} changed numbers", urdf.changes.len()),
+        ),
+        (
+            OutputFile::text(format!("{}.changes.json", outputs.urdf), record),
+            "what `calib revert` needs".to_owned(),
+        ),
+    ];
+    if let Some(yaml) = calibration_yaml(inputs, robot) {
+        let name = crate::output::export::calibration_name(&outputs.urdf);
+        let what = "joint effects that a URDF cannot hold".to_owned();
+        files.push((OutputFile::text(name, yaml), what));
+    }
+    let mut put = |name: String, text: String, what: &str| {
+        files.push((OutputFile::text(name, text), what.to_owned()));
+    };
+    put(
+        outputs.scene.clone(),
+        scene.json()?,
+        "scene for the situation model",
+    );
+    put(
+        format!("{stem}.launch.py"),
+        scene.ros_launch()?,
+        "the scene as a ROS 2 launch file",
+    );
+    put(
+        format!("{stem}.sdf"),
+        scene.sdf()?,
+        "the scene as an SDF world",
+    );
+    put(
+        "residuals.csv".to_owned(),
+        calib_report::csv::residuals_csv(residuals)?,
+        "residuals of the fit, row by row",
+    );
+    files.push((
+        OutputFile {
+            name: format!("{stem}.glb"),
+            bytes: calib_report::glb::glb(scene, view)?,
+        },
+        "robot, markers, errors as glTF for viewers".to_owned(),
+    ));
+    Ok(files)
+}
+
+pub(crate) fn files(
+    inputs: &Inputs,
+    report: &Report,
+    scene: &calib_report::Scene,
+    written: Vec<(OutputFile, String)>,
+    view: &calib_report::view3d::View3d,
+) -> Result<Vec<OutputFile>, PipelineError> {
+    let outputs = &inputs.robot.profile.outputs;
+    let mut files = vec![
+        OutputFile::text("report.md", calib_report::markdown::markdown(report)),
+        OutputFile::text("report.json", calib_report::json::report_json(report)?),
+        OutputFile::text("report.html", calib_report::html::html(report, Some(view))?),
+    ];
+    files.extend(written.into_iter().map(|(file, _)| file));
+    let report_json = files[1].bytes.clone();
+    let scene_json = scene.json()?.into_bytes();
+    for (name, parameters) in &outputs.reports {
+        let writer = inputs
+            .estimators
+            .tables
+            .report
+            .get(name)?
+            .with(&values(parameters))?;
+        let input = calib_plugin::ReportInput {
+            report_json: &report_json,
+            scene_json: Some(&scene_json),
+        };
+        for file in writer.write(&input, &calib_plugin::Control::default())? {
+            let own = format!("{name}.{}", file.path.replace(['/', '\\'], "."));
+            files.push(OutputFile {
+                name: own,
+                bytes: file.bytes,
+            });
+        }
+    }
+    Ok(files)
+}

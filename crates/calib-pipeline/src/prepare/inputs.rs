@@ -1,0 +1,109 @@
+//! A robot and its recordings, ready for the estimators.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use calib_finding::Finding;
+use calib_profile::{BodyKind, Profile, RecordingSpec};
+use calib_recording::{Meta, Poses};
+use calib_urdf::RobotModel;
+use nalgebra::Matrix3;
+
+use crate::prepare::aligned::Alignment;
+use crate::prepare::estimators::Estimators;
+use crate::prepare::excluded::Excluded;
+
+/// A profile with its robot, before any recording is read.
+#[derive(Debug, Clone)]
+pub struct RobotProfile {
+    /// The profile's file name, without folder.
+    pub file: String,
+    /// Folder that relative paths start from.
+    pub folder: PathBuf,
+    /// The checked profile.
+    pub profile: Profile,
+    /// The nominal robot.
+    pub model: RobotModel,
+    /// The robot description, byte for byte.
+    pub urdf_text: String,
+    /// Digests of the profile and the description.
+    pub digests: Vec<Digest>,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Digest {
+    /// Relative to the profile.
+    pub path: String,
+    /// SHA-256 of its bytes, hexadecimal.
+    pub sha256: String,
+}
+
+/// One recording, ready for the estimators.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// Its name in the profile.
+    pub name: String,
+    /// What the profile says of it.
+    pub spec: RecordingSpec,
+    /// The table, SI.
+    pub poses: Poses,
+    /// Joint positions per row, indexed by joint id, rad or m; `None` where a recorded joint is missing in that row.
+    pub q: Vec<Option<Vec<f64>>>,
+    /// Where it comes from and what was converted.
+    pub meta: Meta,
+    /// How rows with a time became poses; `None` for a table whose rows are poses.
+    pub alignment: Option<Alignment>,
+    /// Speed of each recorded joint per row of a motion, rad/s or m/s; empty for static poses.
+    pub velocities: BTreeMap<String, Vec<Option<f64>>>,
+    /// Shape of each marker's covariance per row, in units of the usual variance; empty where no scatter is known.
+    pub shapes: BTreeMap<String, Vec<Option<Matrix3<f64>>>>,
+}
+
+/// Everything the estimation needs.
+#[derive(Debug, Clone)]
+pub struct Inputs {
+    /// Profile and robot.
+    pub robot: RobotProfile,
+    /// Recordings by name.
+    pub recordings: BTreeMap<String, Loaded>,
+    /// What was noticed while reading.
+    pub findings: Vec<Finding>,
+    /// What of the recordings takes no part, found before the fit.
+    pub excluded: Vec<Excluded>,
+    /// Digests of all files read, profile first.
+    pub digests: Vec<Digest>,
+    /// Estimators, readers and writers that the profile can name.
+    pub estimators: Arc<Estimators>,
+}
+
+impl Inputs {
+    /// Takes bodies and markers of single rows out, as if the tracker had lost them, and remembers why.
+    pub fn exclude(&mut self, excluded: Vec<Excluded>) {
+        for out in &excluded {
+            let markers = match self.robot.profile.bodies.get(&out.body).map(|b| &b.kind) {
+                Some(BodyKind::Markers { names, .. }) => names.clone(),
+                Some(BodyKind::Pose) | None => vec![out.body.clone()],
+            };
+            let Some(loaded) = self.recordings.get_mut(&out.recording) else {
+                continue;
+            };
+            if let Some(pose) = loaded
+                .poses
+                .bodies
+                .get_mut(&out.body)
+                .and_then(|track| track.get_mut(out.row))
+            {
+                *pose = None;
+            }
+            for marker in markers {
+                let track = loaded.poses.markers.get_mut(&marker);
+                if let Some(point) = track.and_then(|track| track.get_mut(out.row)) {
+                    *point = None;
+                }
+            }
+        }
+        self.excluded.extend(excluded);
+    }
+}

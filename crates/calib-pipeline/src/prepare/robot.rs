@@ -1,0 +1,119 @@
+//! Reads and checks a profile and its robot description.
+
+use std::path::{Path, PathBuf};
+
+use calib_profile::{Profile, ProfileError};
+use calib_urdf::{RobotModel, sha256_hex};
+
+use crate::error::PipelineError;
+use crate::prepare::inputs::{Digest, RobotProfile};
+
+/// Largest profile or robot description that is read, bytes.
+const LARGEST_TEXT: u64 = 64 << 20;
+
+/// Reads and checks a profile and its robot description.
+///
+/// # Errors
+/// [`PipelineError`] with file, place and remedy.
+pub fn load_robot(profile_path: &Path) -> Result<RobotProfile, PipelineError> {
+    let shown = profile_path.display().to_string();
+    let text = read_text(profile_path)?;
+    let raw = calib_profile::parse(&text, &shown)?;
+    let folder = profile_path
+        .parent()
+        .map_or_else(PathBuf::new, Path::to_path_buf);
+    let urdf_path = folder.join(&raw.robot.urdf);
+    let urdf_text = read_text(&urdf_path).map_err(|error| match error {
+        PipelineError::Read {
+            path,
+            source,
+            remedy,
+        } => PipelineError::Read {
+            path,
+            source,
+            remedy: format!("{remedy} `robot: urdf` in {shown} starts from the profile's folder"),
+        },
+        other => other,
+    })?;
+    let model = RobotModel::from_urdf_text(&urdf_text, &urdf_path.display().to_string())?;
+    let profile = calib_profile::check(&raw, &text, &shown, &model)?;
+    known_estimators(&profile, &text, &shown)?;
+    let file = profile_path
+        .file_name()
+        .map_or_else(String::new, |f| f.to_string_lossy().into_owned());
+    let digests = vec![
+        Digest {
+            path: file.clone(),
+            sha256: sha256_hex(text.as_bytes()),
+        },
+        Digest {
+            path: profile.urdf.clone(),
+            sha256: sha256_hex(urdf_text.as_bytes()),
+        },
+    ];
+    Ok(RobotProfile {
+        file,
+        folder,
+        profile,
+        model,
+        urdf_text,
+        digests,
+    })
+}
+
+/// A profile does not know the estimators; their names are checked here, at their place in the profile.
+fn known_estimators(profile: &Profile, text: &str, shown: &str) -> Result<(), PipelineError> {
+    if !profile.plugins.is_empty() {
+        // What plugins offer is known when they are loaded.
+        return Ok(());
+    }
+    let centers: Vec<&str> = calib_cor::estimators().iter().map(|e| e.id).collect();
+    let axes: Vec<&str> = calib_aor::estimators().iter().map(|e| e.id).collect();
+    for (name, origin) in &profile.origins {
+        for (key, wanted, ids) in [
+            ("center", &origin.center, &centers),
+            ("axis", &origin.axis, &axes),
+        ] {
+            if ids.contains(&wanted.as_str()) {
+                continue;
+            }
+            let near = match calib_urdf::nearest::nearest(wanted, ids.iter().copied()) {
+                Some(near) => format!("did you mean `{near}`? "),
+                None => String::new(),
+            };
+            return Err(ProfileError::at(
+                shown,
+                text,
+                &["origins", name, key],
+                format!("origin `{name}`: no {key} estimator is called `{wanted}`"),
+                format!("{near}known: {}", ids.join(", ")),
+            )
+            .into());
+        }
+    }
+    Ok(())
+}
+
+fn read_text(path: &Path) -> Result<String, PipelineError> {
+    let size = std::fs::metadata(path).map_err(|e| PipelineError::read(path, e))?;
+    if size.is_dir() {
+        return Err(PipelineError::read(
+            path,
+            std::io::Error::other("it is a folder"),
+        ));
+    }
+    if size.len() > LARGEST_TEXT {
+        return Err(PipelineError::read(
+            path,
+            std::io::Error::other(format!(
+                "{} bytes are too many for a profile or URDF",
+                size.len()
+            )),
+        ));
+    }
+    let bytes = std::fs::read(path).map_err(|e| PipelineError::read(path, e))?;
+    String::from_utf8(bytes).map_err(|e| PipelineError::NotText {
+        path: path.display().to_string(),
+        offset: e.utf8_error().valid_up_to(),
+    })
+}

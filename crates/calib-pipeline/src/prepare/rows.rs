@@ -1,0 +1,131 @@
+//! The table of a recording checked against the robot: names, units, and the joint positions of each row.
+
+use std::collections::BTreeMap;
+
+use calib_finding::{Fact, Finding, Subject, catalog};
+use calib_profile::RecordingSpec;
+use calib_recording::{JointUnit, Meta, Poses};
+use calib_urdf::RobotModel;
+
+use crate::error::PipelineError;
+use crate::prepare::inputs::{Loaded, RobotProfile};
+
+/// Checks the names of a table against robot and profile and makes its joint vectors.
+pub(crate) fn prepare(
+    robot: &RobotProfile,
+    name: &str,
+    spec: &RecordingSpec,
+    mut poses: Poses,
+    meta: Meta,
+    findings: &mut Vec<Finding>,
+) -> Result<Loaded, PipelineError> {
+    let model = &robot.model;
+    let error = |finding: String, remedy: String| PipelineError::Data {
+        file: robot.folder.join(&spec.file).display().to_string(),
+        finding,
+        remedy,
+    };
+    if poses.is_empty() {
+        return Err(error(
+            "has no poses".to_owned(),
+            "record at least one row".to_owned(),
+        ));
+    }
+    findings.extend(meta.findings.iter().cloned().map(|mut finding| {
+        finding.subject = finding.subject.in_file(&spec.file);
+        finding
+    }));
+    ignore_unmapped(robot, name, spec, &mut poses, findings);
+    for joint in poses.joints.keys() {
+        let id = model.joint_id(joint).map_err(|unknown| {
+            error(
+                format!("column `{joint}` is no joint: {unknown}"),
+                "rename the column, or map it under `columns`".to_owned(),
+            )
+        })?;
+        let robot_joint = model.joint(id);
+        let turns = robot_joint.kind.turns();
+        let is_angle = poses
+            .joint_units
+            .get(joint)
+            .is_none_or(|u| *u == JointUnit::Angle);
+        if turns != is_angle {
+            let units = if turns { "an angle" } else { "a length" };
+            return Err(error(
+                format!(
+                    "joint `{joint}` is {}, its column is not {units}",
+                    robot_joint.kind.name()
+                ),
+                "correct the unit in the column name".to_owned(),
+            ));
+        }
+        if spec.hold.contains_key(&id) {
+            return Err(error(
+                format!("joint `{joint}` is in the file and held by the profile"),
+                "remove it from `hold`".to_owned(),
+            ));
+        }
+    }
+    let q = joint_vectors(model, spec, &poses);
+    Ok(Loaded {
+        name: name.to_owned(),
+        spec: spec.clone(),
+        poses,
+        q,
+        meta,
+        alignment: None,
+        velocities: BTreeMap::new(),
+        shapes: BTreeMap::new(),
+    })
+}
+
+/// In a table with a column map, a column that only looks like a joint is ignored, and said so.
+fn ignore_unmapped(
+    robot: &RobotProfile,
+    name: &str,
+    spec: &RecordingSpec,
+    poses: &mut Poses,
+    findings: &mut Vec<Finding>,
+) {
+    if spec.columns.is_none() {
+        return;
+    }
+    let strangers: Vec<String> = poses
+        .joints
+        .keys()
+        .filter(|j| robot.model.joint_id(j).is_err())
+        .cloned()
+        .collect();
+    if strangers.is_empty() {
+        return;
+    }
+    for joint in &strangers {
+        poses.joints.remove(joint);
+        poses.joint_units.remove(joint);
+    }
+    findings.push(
+        Finding::new(catalog::COLUMN_IGNORED, Subject::recording(name))
+            .with("columns", Fact::names(strangers)),
+    );
+}
+
+fn joint_vectors(model: &RobotModel, spec: &RecordingSpec, poses: &Poses) -> Vec<Option<Vec<f64>>> {
+    let mut base = model.zero_positions();
+    for (joint, value) in &spec.hold {
+        base[joint.index()] = *value;
+    }
+    let columns: Vec<(usize, &Vec<Option<f64>>)> = poses
+        .joints
+        .iter()
+        .filter_map(|(joint, column)| Some((model.joint_id(joint).ok()?.index(), column)))
+        .collect();
+    (0..poses.len())
+        .map(|row| {
+            let mut q = base.clone();
+            for (joint, column) in &columns {
+                q[*joint] = column[row]?;
+            }
+            Some(q)
+        })
+        .collect()
+}

@@ -1,0 +1,185 @@
+//! The timelines of tracker and robot: one recording of two files, the tracker's table, and the offset of the clocks.
+
+use std::collections::BTreeMap;
+
+use calib_checks::model::alignment;
+use calib_checks::rigid_body::{Template, body_poses};
+use calib_checks::sync::{ClockMap, OffsetOutcome, OffsetSettings, RotationTrack, clock_offset};
+use calib_finding::{About, Finding, catalog};
+use calib_profile::{BodyKind, RecordingSpec, Timing};
+use calib_recording::{Filled, Poses, Recording};
+use nalgebra::{Isometry3, Point3};
+
+use crate::prepare::align::SAME_TIME;
+use crate::prepare::inputs::RobotProfile;
+use crate::prepare::streams::{Scalars, interpolated_body, interpolated_point};
+
+/// The recording with the streams of the robot's own file added, under clocks of their own.
+#[must_use]
+pub fn with_robot_log(mut tracker: Recording, robot: Recording) -> Recording {
+    let first = tracker.timelines.len();
+    // The log's own joints count, not copies that the tracker's file may have.
+    if !robot.joints.is_empty() {
+        tracker.joints.clear();
+    }
+    tracker
+        .timelines
+        .extend(robot.timelines.into_iter().map(|mut line| {
+            line.clock = format!("robot's file: {}", line.clock);
+            line
+        }));
+    tracker.joints.extend(robot.joints.into_iter().map(|mut s| {
+        s.timeline += first;
+        s
+    }));
+    tracker
+        .torques
+        .extend(robot.torques.into_iter().map(|mut s| {
+            s.timeline += first;
+            s
+        }));
+    tracker.meta.conversions.extend(robot.meta.conversions);
+    tracker.meta.findings.extend(robot.meta.findings);
+    tracker
+}
+
+/// The time line with most samples among those of markers and bodies.
+pub(crate) fn tracker_timeline(recording: &Recording) -> Option<usize> {
+    let markers = recording.markers.iter().map(|m| m.timeline);
+    let bodies = recording.bodies.iter().map(|b| b.timeline);
+    markers.chain(bodies).max_by_key(|&line| {
+        let samples = recording
+            .timelines
+            .get(line)
+            .map_or(0, calib_recording::Timeline::len);
+        (samples, std::cmp::Reverse(line))
+    })
+}
+
+/// Markers and bodies at the tracker's times; streams on another line of the same device are interpolated.
+pub(crate) fn tracker_table(
+    recording: &Recording,
+    line: usize,
+    times: &[f64],
+) -> Result<Poses, String> {
+    let own = &recording.timelines[line];
+    let mut poses = Poses {
+        rows: own.rows.clone(),
+        t: Some(times.to_vec()),
+        labels: own.labels.clone(),
+        ..Poses::default()
+    };
+    let no_time = |what: &str| format!("`{what}` has no time");
+    for marker in &recording.markers {
+        let points: Vec<Option<Point3<f64>>> = marker
+            .samples
+            .iter()
+            .map(|s| s.point(Filled::Exclude))
+            .collect();
+        let track = if marker.timeline == line {
+            points
+        } else {
+            let known = recording.timelines.get(marker.timeline);
+            let t = known
+                .and_then(|l| l.t.as_ref())
+                .ok_or_else(|| no_time(&marker.name))?;
+            times
+                .iter()
+                .map(|&at| interpolated_point(t, &points, at))
+                .collect()
+        };
+        if poses.markers.insert(marker.name.clone(), track).is_some() {
+            return Err(format!("`{}` is the name of two streams", marker.name));
+        }
+    }
+    for body in &recording.bodies {
+        let track: Vec<Option<Isometry3<f64>>> = if body.timeline == line {
+            body.tracker_from_body.clone()
+        } else {
+            let known = recording.timelines.get(body.timeline);
+            let t = known
+                .and_then(|l| l.t.as_ref())
+                .ok_or_else(|| no_time(&body.name))?;
+            let at = |&at: &f64| interpolated_body(t, &body.tracker_from_body, at);
+            times.iter().map(at).collect()
+        };
+        if poses.bodies.insert(body.name.clone(), track).is_some() {
+            return Err(format!("`{}` is the name of two streams", body.name));
+        }
+    }
+    Ok(poses)
+}
+
+/// Equation (1) from the body that tells it best; else why not.
+pub(crate) fn estimate(
+    robot: &RobotProfile,
+    spec: &RecordingSpec,
+    timing: &Timing,
+    table: &Poses,
+    joints: &BTreeMap<String, Scalars>,
+) -> Result<(String, ClockMap), Finding> {
+    let settings = OffsetSettings {
+        max_offset: timing.max_offset,
+        ..OffsetSettings::default()
+    };
+    let longest = joints.values().max_by_key(|j| j.t.len());
+    let robot_times: &[f64] = longest.map_or(&[], |j| &j.t);
+    let mut best: Option<(String, ClockMap)> = None;
+    let mut worst: Option<OffsetOutcome> = None;
+    for (name, body) in &robot.profile.bodies {
+        let Some(seen) = orientation(table, name, &body.kind) else {
+            continue;
+        };
+        let link = robot_times.iter().map(|&t| {
+            let mut q = robot.model.zero_positions();
+            for (joint, value) in &spec.hold {
+                q[joint.index()] = *value;
+            }
+            for (joint, stream) in joints {
+                let id = robot.model.joint_id(joint).ok()?;
+                q[id.index()] = stream.at(t)?;
+            }
+            Some(robot.model.root_from_link(&q, body.link).rotation)
+        });
+        let link = RotationTrack::new(robot_times.iter().copied().zip(link));
+        match clock_offset(&seen, &link, &settings) {
+            OffsetOutcome::Found(map) => {
+                let better =
+                    |(_, known): &(String, ClockMap)| map.offset_sigma < known.offset_sigma;
+                if best.as_ref().is_none_or(better) {
+                    best = Some((name.clone(), map));
+                }
+            }
+            // A body that hardly moves says nothing; one that moves and does not fit says why.
+            outcome @ (OffsetOutcome::NotExcited { .. } | OffsetOutcome::TooShort) => {
+                worst = worst.or(Some(outcome));
+            }
+            outcome => worst = Some(outcome),
+        }
+    }
+    let outcome = worst.unwrap_or(OffsetOutcome::TooShort);
+    best.ok_or_else(|| {
+        alignment(&outcome, SAME_TIME)
+            .unwrap_or_else(|| Finding::of_kind(catalog::CLOCK_LAG, "too_short", About::Clocks))
+    })
+}
+
+/// A body's orientation over the tracker's time, where it has one.
+fn orientation(table: &Poses, name: &str, kind: &BodyKind) -> Option<RotationTrack> {
+    let track = match kind {
+        BodyKind::Pose => table.bodies.get(name)?.clone(),
+        BodyKind::Markers { names, template } => {
+            let tracks: Option<Vec<&[Option<Point3<f64>>]>> = names
+                .iter()
+                .map(|m| table.markers.get(m).map(Vec::as_slice))
+                .collect();
+            let given = template
+                .as_ref()
+                .and_then(|points| Template::given(names.clone(), points.clone()).ok());
+            body_poses(names, &tracks?, given, None).ok()?.track()
+        }
+    };
+    let times = table.t.as_ref()?;
+    let turned = track.iter().map(|pose| pose.map(|p| p.rotation));
+    Some(RotationTrack::new(times.iter().copied().zip(turned)))
+}
