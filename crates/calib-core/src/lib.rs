@@ -148,7 +148,7 @@ pub use graph::effect::{self, EFFECTS, Effect, EffectKind, JointState};
 pub use graph::error::Error;
 pub use graph::ids::{EdgeId, FrameId, GroupId, ParameterId, PointId};
 pub use graph::measurement::{
-    DirectionObservation, MarkerObservation, Measurement, MeasurementKind, PoseNoise,
+    self, DirectionObservation, MarkerObservation, Measurement, MeasurementKind, PoseNoise,
     PoseObservation,
 };
 pub use graph::parameter::{

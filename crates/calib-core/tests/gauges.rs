@@ -5,7 +5,7 @@ mod common;
 
 use calib_core::{
     Chart, EffectKind, Gauge, Measurement, MeasurementKind, NoiseKind, ParameterClass, PoseNoise,
-    Settings, Solution, solve,
+    Settings, Solution, measurement, solve,
 };
 use common::{Chain, Free, Link, axis, pose, prismatic, revolute, rng, six_r};
 use nalgebra::{Isometry3, Point3};
@@ -672,12 +672,12 @@ fn a_table_and_a_contact_offset_are_one_number() {
         from: surface,
         to: tcp,
         path: None,
-        kind: MeasurementKind::Plane {
+        kind: MeasurementKind::Plane(measurement::Plane {
             point: tip,
             normal: along(Z),
             noise: group,
             observations: seen,
-        },
+        }),
     });
     let s = solve(&h.problem, &Settings::plain()).unwrap();
     assert_eq!(s.observability.nullity(), 1);

@@ -192,7 +192,11 @@ fn one_clock_for_all_joints_is_recovered() {
 fn drift_of_the_tracker_is_seen() {
     let mut r = rig(6, Physics::None, true);
     for measurement in r.h.problem.measurements_mut() {
-        if let calib_core::MeasurementKind::Markers { observations, .. } = &mut measurement.kind {
+        if let calib_core::MeasurementKind::Markers(calib_core::measurement::Markers {
+            observations,
+            ..
+        }) = &mut measurement.kind
+        {
             for o in observations {
                 o.position.x += 1e-5 * o.sample as f64;
             }

@@ -5,7 +5,7 @@ mod common;
 use calib_core::effect::Source;
 use calib_core::{
     Axis, Chart, DirectionObservation, EffectKind, MarkerObservation, Measurement, MeasurementKind,
-    Model, NoiseKind, PoseNoise, PoseObservation, Problem, Values,
+    Model, NoiseKind, PoseNoise, PoseObservation, Problem, Values, measurement,
 };
 use common::{axis, central, jitter, normal, normal3, pose, rng};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector6};
@@ -155,10 +155,10 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
     }
     add(
         "markers",
-        MeasurementKind::Markers {
+        MeasurementKind::Markers(measurement::Markers {
             noise,
             observations: markers,
-        },
+        }),
     );
     let observations = (0..n)
         .map(|sample| PoseObservation {
@@ -168,10 +168,10 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
         .collect();
     add(
         "poses",
-        MeasurementKind::Poses {
+        MeasurementKind::Poses(measurement::Poses {
             noise: split,
             observations,
-        },
+        }),
     );
     for sign_free in [false, true] {
         let observations = (0..n)
@@ -182,42 +182,42 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
             .collect();
         add(
             "directions",
-            MeasurementKind::Directions {
+            MeasurementKind::Directions(measurement::Directions {
                 direction: axis(0.2, 0.4, -0.9),
                 noise,
                 observations,
                 sign_free,
-            },
+            }),
         );
     }
     for point in [known, unknown] {
         add(
             "plane",
-            MeasurementKind::Plane {
+            MeasurementKind::Plane(measurement::Plane {
                 point,
                 normal: axis(0.1, 0.2, 0.9),
                 noise,
                 observations: (0..n).map(|s| (s, 0.1)).collect(),
-            },
+            }),
         );
         add(
             "line",
-            MeasurementKind::Line {
+            MeasurementKind::Line(measurement::Line {
                 point,
                 through: Point3::new(0.1, 0.2, 0.3),
                 direction: axis(0.5, 0.2, 0.9),
                 noise,
                 samples: (0..n).collect(),
-            },
+            }),
         );
         add(
             "distance",
-            MeasurementKind::Distance {
+            MeasurementKind::Distance(measurement::Distance {
                 point,
                 anchor: Point3::new(1.1, 0.2, 0.3),
                 noise,
                 observations: (0..n).map(|s| (s, 0.7)).collect(),
-            },
+            }),
         );
     }
 }
@@ -258,7 +258,7 @@ fn a_block_that_occurs_twice_contributes_twice() {
         from: rig.base,
         to: rig.base,
         path: Some(vec![(e0, false), (e1, false), (home, false), (e0, true)]),
-        kind: MeasurementKind::Poses {
+        kind: MeasurementKind::Poses(measurement::Poses {
             noise: PoseNoise::Split {
                 orientation: noise,
                 position: noise,
@@ -269,7 +269,7 @@ fn a_block_that_occurs_twice_contributes_twice() {
                     pose: pose(0.1, 0.2, 0.3, 0.2, 0.1, 0.4),
                 })
                 .collect(),
-        },
+        }),
     });
     let at = displaced(&rig.problem, 9);
     assert_jacobian("conjugate", &rig.problem, &at);

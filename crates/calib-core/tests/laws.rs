@@ -2,7 +2,7 @@
 
 mod common;
 
-use calib_core::{Configuration, MeasurementKind, Problem, Settings, Solution, solve};
+use calib_core::{Configuration, MeasurementKind, Problem, Settings, Solution, measurement, solve};
 use common::{Chain, Free, Handles, jitter, rng, six_r};
 use nalgebra::{Isometry3, Point3};
 use proptest::prelude::*;
@@ -53,7 +53,7 @@ proptest! {
         let (_, mut h) = rig(seed, 20);
         let before = fit(&h.problem);
         for measurement in h.problem.measurements_mut() {
-            if let MeasurementKind::Markers { observations, .. } = &mut measurement.kind {
+            if let MeasurementKind::Markers(measurement::Markers { observations, .. }) = &mut measurement.kind {
                 observations.reverse();
             }
         }
@@ -69,7 +69,7 @@ proptest! {
         let before = fit(&h.problem);
         let new_from_old: Isometry3<f64> = jitter(&mut rng(seed + 1), 0.3, 0.5);
         for measurement in h.problem.measurements_mut() {
-            if let MeasurementKind::Markers { observations, .. } = &mut measurement.kind {
+            if let MeasurementKind::Markers(measurement::Markers { observations, .. }) = &mut measurement.kind {
                 for o in observations {
                     o.position = new_from_old * o.position;
                 }

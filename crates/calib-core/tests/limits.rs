@@ -5,7 +5,7 @@ mod common;
 use calib_core::{
     Axis, Chart, ClosureStatistics, Configuration, EffectKind, Error, MarkerObservation,
     Measurement, MeasurementKind, NoiseKind, PoseNoise, PoseObservation, Problem, Settings,
-    SolveStatus, Spread, solve,
+    SolveStatus, Spread, measurement, solve,
 };
 use common::{Chain, Free, axis, normal3, pose, rng, six_r};
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
@@ -240,7 +240,7 @@ fn what_cannot_be_stated_is_refused_by_name() {
         from: a,
         to: c,
         path: Some(vec![(e, false)]),
-        kind: MeasurementKind::Poses {
+        kind: MeasurementKind::Poses(measurement::Poses {
             noise: PoseNoise::Split {
                 orientation: g,
                 position: g,
@@ -249,7 +249,7 @@ fn what_cannot_be_stated_is_refused_by_name() {
                 sample: 0,
                 pose: Isometry3::identity(),
             }],
-        },
+        }),
     });
     assert_eq!(
         refused(&p),
@@ -574,27 +574,33 @@ fn a_direction_that_is_not_finite_is_refused() {
         calib_core::PointId,
         [Direction; 2],
     ) -> MeasurementKind; 3] = [
-        |noise, _, [fixed, seen]| MeasurementKind::Directions {
-            direction: fixed,
-            noise,
-            observations: vec![calib_core::DirectionObservation {
-                sample: 1,
-                direction: seen,
-            }],
-            sign_free: false,
+        |noise, _, [fixed, seen]| {
+            MeasurementKind::Directions(measurement::Directions {
+                direction: fixed,
+                noise,
+                observations: vec![calib_core::DirectionObservation {
+                    sample: 1,
+                    direction: seen,
+                }],
+                sign_free: false,
+            })
         },
-        |noise, point, [normal, _]| MeasurementKind::Plane {
-            point,
-            normal,
-            noise,
-            observations: vec![(1, 0.1)],
+        |noise, point, [normal, _]| {
+            MeasurementKind::Plane(measurement::Plane {
+                point,
+                normal,
+                noise,
+                observations: vec![(1, 0.1)],
+            })
         },
-        |noise, point, [direction, _]| MeasurementKind::Line {
-            point,
-            through: nalgebra::Point3::origin(),
-            direction,
-            noise,
-            samples: vec![1],
+        |noise, point, [direction, _]| {
+            MeasurementKind::Line(measurement::Line {
+                point,
+                through: nalgebra::Point3::origin(),
+                direction,
+                noise,
+                samples: vec![1],
+            })
         },
     ];
     for (k, kind) in measurements.iter().enumerate() {

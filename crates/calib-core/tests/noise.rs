@@ -39,7 +39,10 @@ fn draw(seed: u64, poses: usize, joint_noise: f64, model_joint: bool, outliers: 
     if outliers > 0.0 {
         use rand::RngExt;
         for measurement in h.problem.measurements_mut() {
-            if let calib_core::MeasurementKind::Markers { observations, .. } = &mut measurement.kind
+            if let calib_core::MeasurementKind::Markers(calib_core::measurement::Markers {
+                observations,
+                ..
+            }) = &mut measurement.kind
             {
                 for o in observations {
                     if r.random_bool(outliers) {

@@ -4,7 +4,7 @@ mod common;
 
 use calib_core::{
     Configuration, MarkerObservation, MeasurementKind, PointId, RejectReason, RobustSettings,
-    Settings, Solution, relabel, solve,
+    Settings, Solution, measurement, relabel, solve,
 };
 use common::{Chain, Free, Handles, normal3, rng, six_r};
 use nalgebra::Point3;
@@ -34,7 +34,7 @@ fn case_with(seed: u64, poses: usize, free: &Free) -> Case {
 
 fn seen(h: &mut Handles) -> &mut Vec<MarkerObservation> {
     match &mut h.problem.measurements_mut()[0].kind {
-        MeasurementKind::Markers { observations, .. } => observations,
+        MeasurementKind::Markers(measurement::Markers { observations, .. }) => observations,
         _ => unreachable!("the chain has one marker measurement"),
     }
 }

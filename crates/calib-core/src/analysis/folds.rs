@@ -12,7 +12,7 @@ pub fn folds(problem: &Problem, k: usize) -> Vec<Vec<usize>> {
     let mut used: Vec<usize> = problem
         .measurements
         .iter()
-        .flat_map(|h| h.kind.samples())
+        .flat_map(|h| h.kind.of().samples())
         .filter(|s| !problem.held_out.contains(s))
         .collect();
     used.sort_unstable();

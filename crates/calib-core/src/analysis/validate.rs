@@ -12,7 +12,6 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::analysis::solution::Solution;
-use crate::graph::measurement::MeasurementKind;
 use crate::model::layout::Model;
 use crate::solve::noise::{covariance_of, whitened};
 use crate::solve::normal::{NormalEquations, Workspace, accumulate};
@@ -237,18 +236,12 @@ fn vector_error(
     let z = nalgebra::Cholesky::new(block)
         .and_then(|c| c.l().solve_lower_triangular(&error))
         .map_or(f64::INFINITY, |y| y.norm());
-    let (rotation, position) = match &measurement.kind {
-        MeasurementKind::Poses { .. } | MeasurementKind::Loop { .. } => {
-            (Some(error.rows(0, 3).norm()), Some(error.rows(3, 3).norm()))
-        }
-        MeasurementKind::Directions { .. } => (Some(error.norm()), None),
-        _ => (None, Some(error.norm())),
-    };
+    let deviation = measurement.kind.of().deviation(error.as_slice());
     VectorError {
         measurement: measurement.name.clone(),
         item: o.item,
-        position,
-        rotation,
+        position: deviation.position,
+        rotation: deviation.rotation,
         error: error.as_slice().to_vec(),
         z,
     }

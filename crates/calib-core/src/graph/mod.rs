@@ -7,6 +7,6 @@ pub(crate) mod edge;
 pub mod effect;
 pub(crate) mod error;
 pub(crate) mod ids;
-pub(crate) mod measurement;
+pub mod measurement;
 pub(crate) mod parameter;
 pub(crate) mod problem;

@@ -73,8 +73,8 @@ impl Model {
         let mut observations = Vec::new();
         let mut lost_items = Vec::new();
         for (h, measurement) in problem.measurements.iter().enumerate() {
-            let rows = measurement.kind.rows();
-            for (item, sample) in measurement.kind.samples().into_iter().enumerate() {
+            let rows = measurement.kind.of().rows();
+            for (item, sample) in measurement.kind.of().samples().into_iter().enumerate() {
                 let lost = walks[h].iter().any(|&(e, _)| {
                     matches!(&problem.edges[e.index()].kind,
                         EdgeKind::Measured { poses, .. } if poses[sample].is_none())

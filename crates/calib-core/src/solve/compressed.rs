@@ -12,12 +12,13 @@
 
 use nalgebra::{DMatrix, Dyn, Matrix6, MatrixView, Vector3, Vector6};
 
-use crate::graph::measurement::MeasurementKind;
+use crate::graph::measurement::{Markers, MeasurementKind, Rows};
+use crate::model::cache::EdgeCache;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
 use crate::solve::normal::{NormalEquations, Workspace};
-use crate::solve::rows::{add_block, residual};
+use crate::solve::rows::{add_block, dot, point_columns, residual};
 
 /// Rows gathered before one matrix product: 64 to 96 rows fill the cache lines of the product's kernel.
 const PANEL: usize = 96;
@@ -78,14 +79,13 @@ impl Local {
     }
 }
 
-/// Sum of w Jᵀ over the samples, per point of a body (transposed coupling of pose and point).
-struct PointSums {
-    point: usize,
-    columns: [Option<usize>; 3],
-    /// Σ w J, 6 × k by columns.
-    coupling: Vec<Vector6<f64>>,
-    weight: f64,
-    gradient: Vector3<f64>,
+/// Where the equations are wanted: the values, the weight of each observation, σ² per group, and the edges' poses.
+struct Pass<'a> {
+    model: &'a Model,
+    values: &'a Values,
+    weights: &'a [f64],
+    theta: &'a [f64],
+    cache: &'a EdgeCache,
 }
 
 /// Adds the data's share of H, g and cost to `out`; the caller clears it and adds the prior.
@@ -97,43 +97,30 @@ pub(crate) fn accumulate_compressed(
     work: &mut Workspace,
     out: &mut NormalEquations,
 ) -> bool {
-    for measurement in 0..model.problem.measurements.len() {
-        let k = model.paths[measurement].columns.len();
+    let pass = Pass {
+        model,
+        values,
+        weights,
+        theta,
+        cache: &work.cache,
+    };
+    for (measurement, stated) in model.problem.measurements.iter().enumerate() {
+        let columns = &model.paths[measurement].columns;
+        let k = columns.len();
         let mut local = Local::new(k, 6);
-        let isotropic = match &model.problem.measurements[measurement].kind {
-            MeasurementKind::Markers { observations, .. } => {
-                observations.iter().all(|o| o.shape.is_none())
+        match &stated.kind {
+            MeasurementKind::Markers(seen)
+                if seen.observations.iter().all(|o| o.shape.is_none()) =>
+            {
+                pass.markers(measurement, seen, &mut local, out);
             }
-            _ => false,
-        };
-        let fine = if isotropic {
-            markers(
-                model,
-                values,
-                weights,
-                theta,
-                measurement,
-                work,
-                &mut local,
-                out,
-            )
-        } else {
-            general(
-                model,
-                values,
-                weights,
-                theta,
-                measurement,
-                work,
-                &mut local,
-                out,
-            )
-        };
-        if !fine {
-            return false;
+            _ => {
+                if !pass.general(measurement, &mut local, out) {
+                    return false;
+                }
+            }
         }
         local.multiply();
-        let columns = &model.paths[measurement].columns;
         let n = out.n;
         for a in 0..k {
             out.g[columns[a]] += local.g[a];
@@ -147,118 +134,157 @@ pub(crate) fn accumulate_compressed(
     out.data.is_finite()
 }
 
-#[expect(
-    clippy::too_many_arguments,
-    reason = "one pass over one measurement with everything it needs"
-)]
-fn markers(
-    model: &Model,
-    values: &Values,
-    weights: &[f64],
-    theta: &[f64],
-    measurement: usize,
-    work: &mut Workspace,
-    local: &mut Local,
-    out: &mut NormalEquations,
-) -> bool {
-    let MeasurementKind::Markers {
-        noise,
-        observations,
-    } = &model.problem.measurements[measurement].kind
-    else {
-        return false;
-    };
-    let information = 1.0 / theta[noise.index()];
-    let path = &model.paths[measurement];
-    let k = local.k;
-    let positions: Vec<Vector3<f64>> = (0..model.problem.points.len())
-        .map(|p| model.point_position(p, values).coords)
-        .collect();
-    let mut sums: Vec<PointSums> = Vec::new();
-    let mut buffer = path.buffer();
-    // W and its factor depend only on which markers were seen and their weights: kept while those stay.
-    let mut seen: Vec<(usize, f64)> = Vec::new();
-    let mut now: Vec<(usize, f64)> = Vec::new();
-    let mut factor = [[0.0; 6]; 6];
-    for (sample, range) in &model.of_measurement[measurement] {
-        let pose = path.evaluate(
-            &model.problem,
-            &work.cache,
-            values,
-            *sample,
-            Derivatives::All,
-            &mut buffer,
-        );
-        now.clear();
-        let mut moment = Vector3::zeros();
-        let mut force = Vector3::zeros();
-        for o in range.clone() {
-            let w = weights[o] * information;
-            if w <= 0.0 {
-                continue;
-            }
-            let marker = &observations[model.observations[o].item];
-            let point = marker.point.index();
-            let p = positions[point];
-            let e = p - pose.r.tr_mul(&(marker.position.coords - pose.t));
-            let we = e * w;
-            moment += p.cross(&we);
-            force += we;
-            local.cost += we.dot(&e);
-            now.push((point, w));
-            if let Some(ids) = model.problem.points[point].parameters {
-                let i = sums
-                    .iter()
-                    .position(|s| s.point == point)
-                    .unwrap_or_else(|| {
-                        sums.push(PointSums {
-                            point,
-                            columns: ids.map(|id| model.column_of[id.index()]),
-                            coupling: vec![Vector6::zeros(); k],
-                            weight: 0.0,
-                            gradient: Vector3::zeros(),
-                        });
-                        sums.len() - 1
-                    });
-                let s = &mut sums[i];
-                s.weight += w;
-                s.gradient += we;
-                for (sum, column) in s.coupling.iter_mut().zip(&buffer.columns) {
-                    *sum += column * w;
+impl Pass<'_> {
+    /// Markers of isotropic noise: equations (1) and (2).
+    fn markers(
+        &self,
+        measurement: usize,
+        kind: &Markers,
+        local: &mut Local,
+        out: &mut NormalEquations,
+    ) {
+        let model = self.model;
+        let information = 1.0 / self.theta[kind.noise.index()];
+        let path = &model.paths[measurement];
+        let positions = positions(model, self.values);
+        let mut sums = Vec::new();
+        let mut buffer = path.buffer();
+        let mut upper = Upper::default();
+        let mut now: Vec<(usize, f64)> = Vec::new();
+        for (sample, range) in &model.of_measurement[measurement] {
+            let pose = path.evaluate(
+                &model.problem,
+                self.cache,
+                self.values,
+                *sample,
+                Derivatives::All,
+                &mut buffer,
+            );
+            now.clear();
+            let mut moment = Vector3::zeros();
+            let mut force = Vector3::zeros();
+            for o in range.clone() {
+                let w = self.weights[o] * information;
+                if w <= 0.0 {
+                    continue;
+                }
+                let marker = &kind.observations[model.observations[o].item];
+                let point = marker.point.index();
+                // e = p − Rᵀ(y − t),   b = Σ w [p × e; e]
+                let p = positions[point];
+                let e = p - pose.r.tr_mul(&(marker.position.coords - pose.t));
+                let we = e * w;
+                moment += p.cross(&we);
+                force += we;
+                local.cost += we.dot(&e);
+                now.push((point, w));
+                if let Some(sum) = PointSums::of(&mut sums, model, point, local.k) {
+                    sum.add(w, &we, &buffer.columns);
                 }
             }
+            if now.is_empty() {
+                continue;
+            }
+            // g += Jᵀb,   H += (U J)ᵀ(U J) with UᵀU = W
+            let b = Vector6::new(moment.x, moment.y, moment.z, force.x, force.y, force.z);
+            for (g, j) in local.g.iter_mut().zip(&buffer.columns) {
+                *g += j.dot(&b);
+            }
+            let factor = upper.of(&now, &positions);
+            upper_product(factor, &buffer.columns, local.rows(6));
         }
-        if now.is_empty() {
-            continue;
-        }
-        if now != seen {
-            let u = upper_factor(&compressed_weight(&now, &positions));
-            factor = std::array::from_fn(|r| std::array::from_fn(|c| u[(r, c)]));
-            seen.clone_from(&now);
-        }
-        // A = U J with UᵀU = W; g += Jᵀb
-        let b = Vector6::new(moment.x, moment.y, moment.z, force.x, force.y, force.z);
-        for (g, j) in local.g.iter_mut().zip(&buffer.columns) {
-            *g += j.dot(&b);
-        }
-        let rows = local.rows(6);
-        for (c, j) in buffer.columns.iter().enumerate() {
-            let [u0, u1, u2, u3, u4, u5] = &factor;
-            rows[c] = u0[0] * j[0]
-                + u0[1] * j[1]
-                + u0[2] * j[2]
-                + u0[3] * j[3]
-                + u0[4] * j[4]
-                + u0[5] * j[5];
-            rows[k + c] = u1[1] * j[1] + u1[2] * j[2] + u1[3] * j[3] + u1[4] * j[4] + u1[5] * j[5];
-            rows[2 * k + c] = u2[2] * j[2] + u2[3] * j[3] + u2[4] * j[4] + u2[5] * j[5];
-            rows[3 * k + c] = u3[3] * j[3] + u3[4] * j[4] + u3[5] * j[5];
-            rows[4 * k + c] = u4[4] * j[4] + u4[5] * j[5];
-            rows[5 * k + c] = u5[5] * j[5];
+        point_blocks(model, measurement, &positions, &sums, out);
+    }
+}
+
+/// Current coordinates of all points, m.
+fn positions(model: &Model, values: &Values) -> Vec<Vector3<f64>> {
+    (0..model.problem.points.len())
+        .map(|p| model.point_position(p, values).coords)
+        .collect()
+}
+
+/// Sum of w Jᵀ over the samples, per point of a body (transposed coupling of pose and point).
+struct PointSums {
+    point: usize,
+    columns: [Option<usize>; 3],
+    /// Σ w J, 6 × k by columns.
+    coupling: Vec<Vector6<f64>>,
+    weight: f64,
+    gradient: Vector3<f64>,
+}
+
+impl PointSums {
+    /// The sums of a point, begun where it has none; `None` for a point of known place.
+    #[inline]
+    fn of<'s>(
+        sums: &'s mut Vec<Self>,
+        model: &Model,
+        point: usize,
+        k: usize,
+    ) -> Option<&'s mut Self> {
+        let ids = model.problem.points[point].parameters?;
+        let i = sums
+            .iter()
+            .position(|s| s.point == point)
+            .unwrap_or_else(|| {
+                sums.push(Self {
+                    point,
+                    columns: ids.map(|id| model.column_of[id.index()]),
+                    coupling: vec![Vector6::zeros(); k],
+                    weight: 0.0,
+                    gradient: Vector3::zeros(),
+                });
+                sums.len() - 1
+            });
+        Some(&mut sums[i])
+    }
+
+    /// `Σ w`, `Σ w e`, `Σ w J`.
+    #[inline]
+    fn add(&mut self, w: f64, we: &Vector3<f64>, twists: &[Vector6<f64>]) {
+        self.weight += w;
+        self.gradient += we;
+        for (sum, twist) in self.coupling.iter_mut().zip(twists) {
+            *sum += twist * w;
         }
     }
-    point_blocks(model, measurement, &positions, &sums, out);
-    true
+}
+
+/// U with UᵀU = W. W depends only on which markers were seen and their weights: U is kept while those stay.
+#[derive(Default)]
+struct Upper {
+    seen: Vec<(usize, f64)>,
+    factor: [[f64; 6]; 6],
+}
+
+impl Upper {
+    #[inline]
+    fn of(&mut self, now: &[(usize, f64)], positions: &[Vector3<f64>]) -> &[[f64; 6]; 6] {
+        if now != self.seen {
+            let u = upper_factor(&compressed_weight(now, positions));
+            self.factor = std::array::from_fn(|r| std::array::from_fn(|c| u[(r, c)]));
+            self.seen.clear();
+            self.seen.extend_from_slice(now);
+        }
+        &self.factor
+    }
+}
+
+/// Rows of U J, each k long, one after the other.
+#[inline]
+fn upper_product(factor: &[[f64; 6]; 6], twists: &[Vector6<f64>], rows: &mut [f64]) {
+    let k = twists.len();
+    let [u0, u1, u2, u3, u4, u5] = factor;
+    for (c, j) in twists.iter().enumerate() {
+        rows[c] =
+            u0[0] * j[0] + u0[1] * j[1] + u0[2] * j[2] + u0[3] * j[3] + u0[4] * j[4] + u0[5] * j[5];
+        rows[k + c] = u1[1] * j[1] + u1[2] * j[2] + u1[3] * j[3] + u1[4] * j[4] + u1[5] * j[5];
+        rows[2 * k + c] = u2[2] * j[2] + u2[3] * j[3] + u2[4] * j[4] + u2[5] * j[5];
+        rows[3 * k + c] = u3[3] * j[3] + u3[4] * j[4] + u3[5] * j[5];
+        rows[4 * k + c] = u4[4] * j[4] + u4[5] * j[5];
+        rows[5 * k + c] = u5[5] * j[5];
+    }
 }
 
 /// eᵀV⁻¹e without derivatives; infinite where it cannot be computed.
@@ -269,16 +295,25 @@ pub(crate) fn cost_compressed(
     theta: &[f64],
     work: &mut Workspace,
 ) -> f64 {
-    let positions: Vec<Vector3<f64>> = (0..model.problem.points.len())
-        .map(|p| model.point_position(p, values).coords)
-        .collect();
+    let pass = Pass {
+        model,
+        values,
+        weights,
+        theta,
+        cache: &work.cache,
+    };
+    let positions = positions(model, values);
     let mut sum = 0.0;
     for (measurement, path) in model.paths.iter().enumerate() {
+        let markers = match &model.problem.measurements[measurement].kind {
+            MeasurementKind::Markers(markers) => Some(markers),
+            _ => None,
+        };
         let mut buffer = path.buffer();
         for (sample, range) in &model.of_measurement[measurement] {
             let pose = path.evaluate(
                 &model.problem,
-                &work.cache,
+                pass.cache,
                 values,
                 *sample,
                 Derivatives::None,
@@ -288,36 +323,22 @@ pub(crate) fn cost_compressed(
                 if weights[o] <= 0.0 {
                     continue;
                 }
-                let observation = model.observations[o];
-                if let MeasurementKind::Markers {
-                    noise,
-                    observations,
-                } = &model.problem.measurements[measurement].kind
+                let item = model.observations[o].item;
+                if let Some(markers) = markers
+                    && markers.observations[item].shape.is_none()
                 {
-                    let marker = &observations[observation.item];
-                    if marker.shape.is_none() {
-                        let p = positions[marker.point.index()];
-                        let e = pose.r * p + pose.t - marker.position.coords;
-                        sum += weights[o] / theta[noise.index()] * e.norm_squared();
-                        continue;
-                    }
+                    // e = R p + t − y,   cost = w |e|² / σ²
+                    let marker = &markers.observations[item];
+                    let p = positions[marker.point.index()];
+                    let e = pose.r * p + pose.t - marker.position.coords;
+                    sum += weights[o] / theta[markers.noise.index()] * e.norm_squared();
+                    continue;
                 }
-                let m = observation.rows;
-                let mut e = residual(model, values, measurement, observation.item, &pose).e;
-                let mut l = [[0.0; 6]; 6];
-                add_block(model, o, |i, j, group, shape| {
-                    l[i][j] += theta[group] * shape / weights[o];
-                });
-                if !cholesky6(&mut l, m) {
+                let e = residual(model, values, measurement, item, &pose).e;
+                let Some(cost) = pass.cost(o, e) else {
                     return f64::INFINITY;
-                }
-                for i in 0..m {
-                    for b in 0..i {
-                        e[i] -= l[i][b] * e[b];
-                    }
-                    e[i] /= l[i][i];
-                    sum += e[i] * e[i];
-                }
+                };
+                sum += cost;
             }
         }
     }
@@ -327,6 +348,7 @@ pub(crate) fn cost_compressed(
 /// W of equation (1).
 fn compressed_weight(seen: &[(usize, f64)], positions: &[Vector3<f64>]) -> Matrix6<f64> {
     let mut weight = Matrix6::zeros();
+    // W = Σ w [ |p|²I − ppᵀ, [p]ₓ ; −[p]ₓ, I ]
     for &(point, w) in seen {
         let p = positions[point];
         let pp = p.norm_squared();
@@ -390,110 +412,143 @@ fn point_blocks(
     }
 }
 
-/// Any measurement without compression: whitened rows of each observation, over local columns.
-#[expect(
-    clippy::too_many_arguments,
-    reason = "one pass over one measurement with everything it needs"
-)]
-fn general(
-    model: &Model,
-    values: &Values,
-    weights: &[f64],
-    theta: &[f64],
-    measurement: usize,
-    work: &mut Workspace,
-    local: &mut Local,
-    out: &mut NormalEquations,
-) -> bool {
-    let path = &model.paths[measurement];
-    let (k, n) = (local.k, out.n);
-    let mut buffer = path.buffer();
-    for (sample, range) in &model.of_measurement[measurement] {
-        let pose = path.evaluate(
-            &model.problem,
-            &work.cache,
-            values,
-            *sample,
-            Derivatives::All,
-            &mut buffer,
-        );
-        for o in range.clone() {
-            if weights[o] <= 0.0 {
-                continue;
+impl Pass<'_> {
+    /// L with L Lᵀ = V of an observation; `None` where V is not positive definite.
+    #[inline]
+    fn lower(&self, o: usize) -> Option<[[f64; 6]; 6]> {
+        let mut l = [[0.0; 6]; 6];
+        // V = σ_g² shape / w
+        add_block(self.model, o, |i, j, group, shape| {
+            l[i][j] += self.theta[group] * shape / self.weights[o];
+        });
+        cholesky6(&mut l, self.model.observations[o].rows).then_some(l)
+    }
+
+    /// |L⁻¹e|² of an observation.
+    #[inline]
+    fn cost(&self, o: usize, mut e: [f64; 6]) -> Option<f64> {
+        let l = self.lower(o)?;
+        let mut sum = 0.0;
+        for i in 0..self.model.observations[o].rows {
+            for b in 0..i {
+                e[i] -= l[i][b] * e[b];
             }
-            let observation = model.observations[o];
-            let m = observation.rows;
-            let rows = residual(model, values, measurement, observation.item, &pose);
-            let mut l = [[0.0; 6]; 6];
-            add_block(model, o, |i, j, group, shape| {
-                l[i][j] += theta[group] * shape / weights[o];
-            });
-            if !cholesky6(&mut l, m) {
-                return false;
-            }
-            // Whitened e, M and point columns.
-            let mut e = rows.e;
-            let mut jacobian = rows.m;
-            let mut point = rows.point.map(|(_, j)| j).unwrap_or_default();
-            for i in 0..m {
-                for b in 0..i {
-                    let c = l[i][b];
-                    e[i] -= c * e[b];
-                    for x in 0..6 {
-                        jacobian[i][x] -= c * jacobian[b][x];
-                    }
-                    for x in 0..3 {
-                        point[i][x] -= c * point[b][x];
+            e[i] /= l[i][i];
+            sum += e[i] * e[i];
+        }
+        Some(sum)
+    }
+
+    /// Any measurement without compression: whitened rows of each observation, over local columns.
+    fn general(&self, measurement: usize, local: &mut Local, out: &mut NormalEquations) -> bool {
+        let model = self.model;
+        let path = &model.paths[measurement];
+        let mut buffer = path.buffer();
+        for (sample, range) in &model.of_measurement[measurement] {
+            let pose = path.evaluate(
+                &model.problem,
+                self.cache,
+                self.values,
+                *sample,
+                Derivatives::All,
+                &mut buffer,
+            );
+            for o in range.clone() {
+                if self.weights[o] <= 0.0 {
+                    continue;
+                }
+                let observation = model.observations[o];
+                let mut rows = residual(model, self.values, measurement, observation.item, &pose);
+                let Some(l) = self.lower(o) else {
+                    return false;
+                };
+                whiten(&l, observation.rows, &mut rows);
+                // cost += eᵀe,   g += Jᵀe,   rows of J = ∂e/∂ξ ∂ξ/∂x
+                let Local { g, cost, .. } = local;
+                for i in 0..observation.rows {
+                    *cost += rows.e[i] * rows.e[i];
+                    for (g, twist) in g.iter_mut().zip(&buffer.columns) {
+                        *g += dot(&rows.m[i], twist) * rows.e[i];
                     }
                 }
-                let d = 1.0 / l[i][i];
-                e[i] *= d;
-                jacobian[i].iter_mut().for_each(|x| *x *= d);
-                point[i].iter_mut().for_each(|x| *x *= d);
-            }
-            let Local { g, cost, .. } = local;
-            for i in 0..m {
-                *cost += e[i] * e[i];
-                for (g, twist) in g.iter_mut().zip(&buffer.columns) {
-                    *g += crate::solve::rows::dot(&jacobian[i], twist) * e[i];
-                }
-            }
-            let own = local.rows(m);
-            for i in 0..m {
-                for (c, twist) in buffer.columns.iter().enumerate() {
-                    own[i * k + c] = crate::solve::rows::dot(&jacobian[i], twist);
-                }
-            }
-            let Some((columns, _)) = &rows.point else {
-                continue;
-            };
-            for (axis, c) in columns.iter().enumerate() {
-                let Some(c) = *c else { continue };
-                for i in 0..m {
-                    let d = point[i][axis];
-                    out.g[c] += d * e[i];
-                    for (other, c2) in columns.iter().enumerate() {
-                        if let Some(c2) = *c2
-                            && c2 >= c
-                        {
-                            out.h[c * n + c2] += d * point[i][other];
-                        }
+                let k = local.k;
+                let own = local.rows(observation.rows);
+                for i in 0..observation.rows {
+                    for (c, twist) in buffer.columns.iter().enumerate() {
+                        own[i * k + c] = dot(&rows.m[i], twist);
                     }
-                    for a in 0..k {
-                        let g = path.columns[a];
-                        out.h[g.min(c) * n + g.max(c)] += d * own[i * k + a];
-                    }
+                }
+                if let Some((columns, by_point)) = point_columns(model, &rows) {
+                    let point = (&columns, &by_point[..observation.rows]);
+                    add_point(&path.columns, own, point, &rows.e, out);
                 }
             }
         }
+        true
     }
-    true
+}
+
+/// e ← L⁻¹e and the same for its derivatives: row_i ← (row_i − Σ_b<i L_ib row_b) / L_ii.
+#[inline]
+fn whiten(l: &[[f64; 6]; 6], m: usize, rows: &mut Rows) {
+    let mut nothing = [[0.0; 3]; 6];
+    let point = rows.point.as_mut().map_or(&mut nothing, |(_, j)| j);
+    for i in 0..m {
+        for b in 0..i {
+            let c = l[i][b];
+            rows.e[i] -= c * rows.e[b];
+            for x in 0..6 {
+                rows.m[i][x] -= c * rows.m[b][x];
+            }
+            for x in 0..3 {
+                point[i][x] -= c * point[b][x];
+            }
+        }
+        let d = 1.0 / l[i][i];
+        rows.e[i] *= d;
+        rows.m[i].iter_mut().for_each(|x| *x *= d);
+        point[i].iter_mut().for_each(|x| *x *= d);
+    }
+}
+
+/// The share of a point's coordinates p in the equations of one observation, `own` its rows of J over the path's
+/// columns.
+///
+/// ```text
+/// g_p += ∂e/∂pᵀ e,   H_pp += ∂e/∂pᵀ ∂e/∂p,   H_pJ += ∂e/∂pᵀ J
+/// ```
+fn add_point(
+    path: &[usize],
+    own: &[f64],
+    (columns, by_point): (&[Option<usize>; 3], &[[f64; 3]]),
+    e: &[f64; 6],
+    out: &mut NormalEquations,
+) {
+    let (k, n) = (path.len(), out.n);
+    for (axis, c) in columns.iter().enumerate() {
+        let Some(c) = *c else { continue };
+        for (i, row) in by_point.iter().enumerate() {
+            let d = row[axis];
+            out.g[c] += d * e[i];
+            for (other, c2) in columns.iter().enumerate() {
+                if let Some(c2) = *c2
+                    && c2 >= c
+                {
+                    out.h[c * n + c2] += d * row[other];
+                }
+            }
+            for (a, &g) in path.iter().enumerate() {
+                out.h[g.min(c) * n + g.max(c)] += d * own[i * k + a];
+            }
+        }
+    }
 }
 
 /// Lower Cholesky factor of the leading m × m block, in place.
 fn cholesky6(l: &mut [[f64; 6]; 6], m: usize) -> bool {
     for i in 0..m {
         for j in 0..=i {
+            // L_ij = (V_ij − Σ L_ik L_jk) / L_jj,   L_ii² = V_ii − Σ L_ik²
             let mut sum = l[i][j];
             for k in 0..j {
                 sum -= l[i][k] * l[j][k];

@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use crate::graph::ids::PointId;
-use crate::graph::measurement::MeasurementKind;
+use crate::graph::measurement::{Markers, MeasurementKind};
 use crate::graph::problem::Problem;
 
 /// Bodies with more markers than this are only searched by exchanging two (7! is 5040).
@@ -34,7 +34,7 @@ pub fn relabel(problem: &mut Problem, tolerance: f64) -> Vec<Relabelled> {
     let samples = problem.samples;
     for measurement in &mut problem.measurements {
         let name = measurement.name.clone();
-        if let MeasurementKind::Markers { observations, .. } = &mut measurement.kind {
+        if let MeasurementKind::Markers(Markers { observations, .. }) = &mut measurement.kind {
             let mut by_sample: Vec<Vec<usize>> = vec![Vec::new(); samples];
             for (i, o) in observations.iter().enumerate() {
                 if o.sample < samples {

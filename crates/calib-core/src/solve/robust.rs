@@ -15,7 +15,7 @@
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::graph::measurement::MeasurementKind;
+use crate::graph::measurement::{Markers, MeasurementKind};
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
@@ -324,10 +324,10 @@ fn swapped(
     limits: &Limits,
     work: &mut Workspace,
 ) -> bool {
-    let MeasurementKind::Markers {
+    let MeasurementKind::Markers(Markers {
         noise,
         observations,
-    } = &model.problem.measurements[observation.measurement].kind
+    }) = &model.problem.measurements[observation.measurement].kind
     else {
         return false;
     };

@@ -7,11 +7,9 @@
 //!
 //! u are the sample's random effects (joint noise, wobble), w the robust weight of each vector.
 
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix6, Vector6};
 
-use calib_geometry::so3;
-
-use crate::graph::measurement::{MeasurementKind, PoseNoise};
+use crate::graph::measurement::{At, Rows};
 use crate::model::cache::EdgeCache;
 use crate::model::layout::Model;
 use crate::model::path::{Derivatives, PathBuffer};
@@ -39,14 +37,6 @@ pub(crate) struct SampleRows {
 
 /// Columns of a point's coordinates, and ∂e/∂p by rows.
 type PointRows = ([Option<usize>; 3], [[f64; 3]; 6]);
-
-/// Rows of one observation against the body twist, before the chain rule.
-pub(crate) struct MeasurementRows {
-    pub e: [f64; 6],
-    pub m: [[f64; 6]; 6],
-    /// ∂e/∂(point coordinates), rows × 3.
-    pub point: Option<PointRows>,
-}
 
 impl SampleRows {
     pub(crate) fn new(model: &Model) -> Self {
@@ -80,7 +70,6 @@ impl SampleRows {
     ) {
         self.m = 0;
         self.blocks.clear();
-        let (n, k) = (self.n, self.k);
         let range = model.of_sample[sample].clone();
         let mut measurement = usize::MAX;
         let mut pose = Pose::identity();
@@ -100,43 +89,58 @@ impl SampleRows {
                     &mut self.buffers[measurement],
                 );
             }
-            let rows = residual(
-                model,
-                values,
-                observation.measurement,
-                observation.item,
-                &pose,
-            );
+            let rows = residual(model, values, measurement, observation.item, &pose);
             let first = self.m;
-            let count = observation.rows;
-            self.blocks.push((o, first, count));
-            self.m += count;
-            let path = &model.paths[measurement];
-            let buffer = &self.buffers[measurement];
-            for i in 0..count {
-                let row = first + i;
-                self.r[row] = rows.e[i];
-                if wanted == Derivatives::All {
-                    let out = &mut self.j[row * n..(row + 1) * n];
-                    out.fill(0.0);
-                    for (&global, twist) in path.columns.iter().zip(&buffer.columns) {
-                        out[global] = dot(&rows.m[i], twist);
-                    }
-                    if let Some((columns, jacobian)) = &rows.point {
-                        for (c, &d) in columns.iter().zip(&jacobian[i]) {
-                            if let Some(c) = c {
-                                out[*c] += d;
-                            }
-                        }
+            self.blocks.push((o, first, observation.rows));
+            self.m += observation.rows;
+            for i in 0..observation.rows {
+                self.r[first + i] = rows.e[i];
+            }
+            if wanted == Derivatives::All {
+                self.fill_jacobian(model, measurement, &rows, first);
+            }
+            if wanted != Derivatives::None && self.k > 0 {
+                self.fill_random(model, measurement, &rows, first);
+            }
+        }
+    }
+
+    /// Rows of J from `first` on: the chain rule of the path, and the point's own coordinates.
+    ///
+    /// ```text
+    /// ∂e/∂x = ∂e/∂ξ ∂ξ/∂x + ∂e/∂p ∂p/∂x
+    /// ```
+    #[inline]
+    fn fill_jacobian(&mut self, model: &Model, measurement: usize, rows: &Rows, first: usize) {
+        let n = self.n;
+        let point = point_columns(model, rows);
+        let own = self.j[first * n..self.m * n].chunks_exact_mut(n.max(1));
+        for (i, out) in own.enumerate() {
+            out.fill(0.0);
+            let twists = &self.buffers[measurement].columns;
+            for (&global, twist) in model.paths[measurement].columns.iter().zip(twists) {
+                out[global] = dot(&rows.m[i], twist);
+            }
+            if let Some((columns, jacobian)) = &point {
+                for (c, &d) in columns.iter().zip(&jacobian[i]) {
+                    if let Some(c) = c {
+                        out[*c] += d;
                     }
                 }
-                if wanted != Derivatives::None && k > 0 {
-                    let out = &mut self.g[row * k..(row + 1) * k];
-                    out.fill(0.0);
-                    for (&global, twist) in path.slots.iter().zip(&buffer.slots) {
-                        out[global] = dot(&rows.m[i], twist);
-                    }
-                }
+            }
+        }
+    }
+
+    /// Rows of G from `first` on: `∂e/∂u = ∂e/∂ξ ∂ξ/∂u`.
+    #[inline]
+    fn fill_random(&mut self, model: &Model, measurement: usize, rows: &Rows, first: usize) {
+        let k = self.k;
+        let own = self.g[first * k..self.m * k].chunks_exact_mut(k);
+        for (i, out) in own.enumerate() {
+            out.fill(0.0);
+            let twists = &self.buffers[measurement].slots;
+            for (&global, twist) in model.paths[measurement].slots.iter().zip(twists) {
+                out[global] = dot(&rows.m[i], twist);
             }
         }
     }
@@ -145,12 +149,13 @@ impl SampleRows {
     pub(crate) fn covariance(&mut self, model: &Model, weights: &[f64], theta: &[f64]) {
         let m = self.m;
         self.v[..m * m].fill(0.0);
-        for &(o, first, count) in &self.blocks {
+        // V_s = blockdiag( σ_g² shape / w )
+        for &(o, first, _) in &self.blocks {
             add_block(model, o, |i, j, group, shape| {
                 self.v[(first + i) * m + first + j] += theta[group] * shape / weights[o];
             });
-            let _ = count;
         }
+        // V_s += Σ_k σ_k² g_k g_kᵀ
         for (s, slot) in model.slots.iter().enumerate() {
             let variance = slot.group.map_or(1.0, |g| theta[g]);
             for i in 0..m {
@@ -170,6 +175,7 @@ impl SampleRows {
         let mut log_det = 0.0;
         for j in 0..m {
             for i in j..m {
+                // L_jj² = V_jj − Σ L_jl²,   L_ij = (V_ij − Σ L_il L_jl) / L_jj,   log det V = 2 Σ log L_jj
                 let mut sum = self.v[i * m + j];
                 for l in 0..j {
                     sum -= self.v[i * m + l] * self.v[j * m + l];
@@ -191,6 +197,7 @@ impl SampleRows {
     /// r ← L⁻¹ r and, if asked, J ← L⁻¹ J.
     pub(crate) fn whiten(&mut self, jacobian: bool) {
         let (m, n) = (self.m, self.n);
+        // Forward substitution: row_i ← (row_i − Σ_l<i L_il row_l) / L_ii
         for i in 0..m {
             let (done, rest) = self.j.split_at_mut(i * n);
             let row = &mut rest[..n];
@@ -229,228 +236,44 @@ pub(crate) fn dot(row: &[f64; 6], twist: &Vector6<f64>) -> f64 {
         + row[5] * twist[5]
 }
 
-/// Calls `f(i, j ≤ i, group, shape_ij)` for every entry of an observation's own covariance.
+/// Calls `f(i, j ≤ i, group, shape_ij)` for every entry of an observation's own covariance `σ_group² shape`.
+#[inline]
 pub(crate) fn add_block(
     model: &Model,
     observation: usize,
     mut f: impl FnMut(usize, usize, usize, f64),
 ) {
     let o = model.observations[observation];
-    let mut isotropic = |group: usize, rows: std::ops::Range<usize>| {
-        for i in rows {
-            f(i, i, group, 1.0);
-        }
-    };
-    match &model.problem.measurements[o.measurement].kind {
-        MeasurementKind::Markers {
-            noise,
-            observations,
-        } => match observations[o.item].shape {
-            None => isotropic(noise.index(), 0..3),
-            Some(shape) => {
-                for i in 0..3 {
-                    for j in 0..=i {
-                        f(i, j, noise.index(), shape[(i, j)]);
-                    }
-                }
-            }
-        },
-        MeasurementKind::Poses { noise, .. } | MeasurementKind::Loop { noise, .. } => match noise {
-            PoseNoise::Split {
-                orientation,
-                position,
-            } => {
-                isotropic(orientation.index(), 0..3);
-                isotropic(position.index(), 3..6);
-            }
-            PoseNoise::Full { shape, scale } => {
-                for i in 0..6 {
-                    for j in 0..=i {
-                        f(i, j, scale.index(), shape[(i, j)]);
-                    }
-                }
-            }
-        },
-        MeasurementKind::Directions { noise, .. } | MeasurementKind::Line { noise, .. } => {
-            isotropic(noise.index(), 0..2);
-        }
-        MeasurementKind::Plane { noise, .. } | MeasurementKind::Distance { noise, .. } => {
-            isotropic(noise.index(), 0..1);
-        }
-    }
-}
-
-/// Two unit vectors across d, deterministic.
-pub(crate) fn tangent_basis(d: &Vector3<f64>) -> [Vector3<f64>; 2] {
-    let k = d.iamin();
-    let mut seed = Vector3::zeros();
-    seed[k] = 1.0;
-    let e1 = (seed - d * d.dot(&seed)).normalize();
-    [e1, d.cross(&e1)]
+    let kind = model.problem.measurements[o.measurement].kind.of();
+    kind.covariance(o.item, &mut |i, j, group, shape| {
+        f(i, j, group.index(), shape);
+    });
 }
 
 /// Equations (1)–(7) of the measurements at the path's pose.
+#[inline]
 pub(crate) fn residual(
     model: &Model,
     values: &Values,
     measurement: usize,
     item: usize,
     pose: &Pose,
-) -> MeasurementRows {
-    let mut out = MeasurementRows {
-        e: [0.0; 6],
-        m: [[0.0; 6]; 6],
-        point: None,
+) -> Rows {
+    let at = At {
+        r: &pose.r,
+        t: &pose.t,
+        point: &|p| model.point_position(p.index(), values).coords,
     };
-    match &model.problem.measurements[measurement].kind {
-        MeasurementKind::Markers { observations, .. } => {
-            let o = &observations[item];
-            let p = model.point_position(o.point.index(), values).coords;
-            // e = R p + t − y; de = R (−[p]ₓ ω + v + dp). Never −[Rᵀ(y − t)]ₓ, which is as good a
-            // derivative of e turned into the body, but lets the noise of y into the Jacobian: it
-            // would then see turns of the body that no marker can show.
-            let e = pose.r * p + pose.t - o.position.coords;
-            set_point_rows(&mut out, &pose.r, &p, &e);
-            out.point = point_columns(model, o.point.index(), &pose.r, 3);
-        }
-        MeasurementKind::Poses { observations, .. } => {
-            pose_rows(&mut out, &Pose::of(&observations[item].pose), pose);
-        }
-        MeasurementKind::Loop { .. } => pose_rows(&mut out, &Pose::identity(), pose),
-        MeasurementKind::Directions {
-            direction,
-            observations,
-            sign_free,
-            ..
-        } => {
-            let d = observations[item].direction.into_inner();
-            let predicted = pose.r * direction.into_inner();
-            let d = if *sign_free && d.dot(&predicted) < 0.0 {
-                -d
-            } else {
-                d
-            };
-            // d(R a) = −R [a]ₓ ω
-            let by_omega = -(pose.r * so3::skew(direction));
-            for (i, b) in tangent_basis(&d).iter().enumerate() {
-                out.e[i] = b.dot(&predicted);
-                let row = by_omega.tr_mul(b);
-                out.m[i][..3].copy_from_slice(row.as_slice());
-            }
-        }
-        MeasurementKind::Plane {
-            point,
-            normal,
-            observations,
-            ..
-        } => {
-            let p = model.point_position(point.index(), values).coords;
-            let e = normal.dot(&(pose.r * p + pose.t)) - observations[item].1;
-            project(&mut out, model, point.index(), pose, &p, 0, normal, e);
-        }
-        MeasurementKind::Line {
-            point,
-            through,
-            direction,
-            ..
-        } => {
-            let p = model.point_position(point.index(), values).coords;
-            let off = pose.r * p + pose.t - through.coords;
-            for (i, b) in tangent_basis(direction).iter().enumerate() {
-                project(&mut out, model, point.index(), pose, &p, i, b, b.dot(&off));
-            }
-        }
-        MeasurementKind::Distance {
-            point,
-            anchor,
-            observations,
-            ..
-        } => {
-            let p = model.point_position(point.index(), values).coords;
-            let off = pose.r * p + pose.t - anchor.coords;
-            let length = off.norm();
-            // At distance 0 the gradient has no direction; any unit vector is a subgradient.
-            let unit = if length > 0.0 {
-                off / length
-            } else {
-                Vector3::x()
-            };
-            let e = length - observations[item].1;
-            project(&mut out, model, point.index(), pose, &p, 0, &unit, e);
-        }
-    }
-    out
+    let kind = model.problem.measurements[measurement].kind.of();
+    kind.residual(item, &at)
 }
 
-/// Rows of `A (ω × p + v)` with residual e.
-fn set_point_rows(out: &mut MeasurementRows, a: &Matrix3<f64>, p: &Vector3<f64>, e: &Vector3<f64>) {
-    let rotation = -(a * so3::skew(p));
-    for i in 0..3 {
-        out.e[i] = e[i];
-        for c in 0..3 {
-            out.m[i][c] = rotation[(i, c)];
-            out.m[i][3 + c] = a[(i, c)];
-        }
-    }
-}
-
-/// One row `bᵀ (R p + t)`.
-#[expect(clippy::too_many_arguments, reason = "one row of one measurement")]
-fn project(
-    out: &mut MeasurementRows,
-    model: &Model,
-    point: usize,
-    pose: &Pose,
-    p: &Vector3<f64>,
-    row: usize,
-    b: &Vector3<f64>,
-    e: f64,
-) {
-    out.e[row] = e;
-    let in_body = pose.r.tr_mul(b);
-    // bᵀ R (ω × p + v) = (p × Rᵀb)·ω + Rᵀb·v
-    let omega = p.cross(&in_body);
-    for c in 0..3 {
-        out.m[row][c] = omega[c];
-        out.m[row][3 + c] = in_body[c];
-    }
-    let mut a = Matrix3::zeros();
-    a.row_mut(0).copy_from(&in_body.transpose());
-    if let Some((columns, jacobian)) = point_columns(model, point, &a, 1) {
-        let entry = out.point.get_or_insert((columns, [[0.0; 3]; 6]));
-        entry.1[row] = jacobian[0];
-    }
-}
-
-/// Columns of a point's coordinates and the first `rows` rows of ∂e/∂p = A.
-fn point_columns(model: &Model, point: usize, a: &Matrix3<f64>, rows: usize) -> Option<PointRows> {
-    let ids = model.problem.points[point].parameters?;
-    let columns = ids.map(|id| model.column_of[id.index()]);
-    let mut jacobian = [[0.0; 3]; 6];
-    for i in 0..rows {
-        for c in 0..3 {
-            jacobian[i][c] = a[(i, c)];
-        }
-    }
-    Some((columns, jacobian))
-}
-
-/// e = [Log(R_zᵀR); R_zᵀ(t − t_z)], de = [Jr⁻¹ ω; R_zᵀR v]
-fn pose_rows(out: &mut MeasurementRows, measured: &Pose, pose: &Pose) {
-    let relative = measured.r.tr_mul(&pose.r);
-    let log = so3::log(&so3::quaternion_of(
-        &nalgebra::Rotation3::from_matrix_unchecked(relative),
-    ));
-    let shift = measured.r.tr_mul(&(pose.t - measured.t));
-    let jr = so3::right_jacobian_inverse(&log);
-    for i in 0..3 {
-        out.e[i] = log[i];
-        out.e[3 + i] = shift[i];
-        for c in 0..3 {
-            out.m[i][c] = jr[(i, c)];
-            out.m[3 + i][3 + c] = relative[(i, c)];
-        }
-    }
+/// Columns of the coordinates of the point that an observation measures, and ∂e/∂p by rows; `None` where its place
+/// is known.
+pub(crate) fn point_columns(model: &Model, rows: &Rows) -> Option<PointRows> {
+    let (point, jacobian) = rows.point?;
+    let ids = model.problem.points[point.index()].parameters?;
+    Some((ids.map(|id| model.column_of[id.index()]), jacobian))
 }
 
 /// Covariance of a measured body pose given as 6×6: kept for callers that need the dense form.

@@ -8,7 +8,9 @@
 //!
 //! Its place and the point are unknowns where the profile gives them a prior.
 
-use calib_core::{Chart, MarkerObservation, Measurement, MeasurementKind, NoiseKind, Role};
+use calib_core::{
+    Chart, MarkerObservation, Measurement, MeasurementKind, NoiseKind, Role, measurement,
+};
 use calib_profile::{Contact, ContactBase, Touched};
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -68,20 +70,20 @@ pub fn add_contacts(formulation: &mut Formulation, inputs: &Inputs) {
             !profile.solve.noise.known,
         );
         let kind = match contact.touched {
-            Touched::Plane => MeasurementKind::Plane {
+            Touched::Plane => MeasurementKind::Plane(measurement::Plane {
                 point,
                 normal: Vector3::z_axis(),
                 noise,
                 observations: touches.into_iter().map(|s| (s, 0.0)).collect(),
-            },
-            Touched::Line => MeasurementKind::Line {
+            }),
+            Touched::Line => MeasurementKind::Line(measurement::Line {
                 point,
                 through: Point3::origin(),
                 direction: Vector3::z_axis(),
                 noise,
                 samples: touches,
-            },
-            Touched::Point => MeasurementKind::Markers {
+            }),
+            Touched::Point => MeasurementKind::Markers(measurement::Markers {
                 noise,
                 observations: touches
                     .into_iter()
@@ -92,13 +94,13 @@ pub fn add_contacts(formulation: &mut Formulation, inputs: &Inputs) {
                         shape: None,
                     })
                     .collect(),
-            },
-            Touched::Distance(distance) => MeasurementKind::Distance {
+            }),
+            Touched::Distance(distance) => MeasurementKind::Distance(measurement::Distance {
                 point,
                 anchor: Point3::origin(),
                 noise,
                 observations: touches.into_iter().map(|s| (s, distance)).collect(),
-            },
+            }),
         };
         problem.add_measurement(Measurement {
             name: name.clone(),

@@ -428,7 +428,11 @@ fn rejected_bodies(fit: &MlFit) -> BTreeSet<(String, usize, String)> {
     }
     let mut seen: BTreeMap<(usize, &str), usize> = BTreeMap::new();
     for measurement in fit.formulation.problem.measurements() {
-        if let calib_core::MeasurementKind::Markers { observations, .. } = &measurement.kind {
+        if let calib_core::MeasurementKind::Markers(calib_core::measurement::Markers {
+            observations,
+            ..
+        }) = &measurement.kind
+        {
             for o in observations {
                 *seen.entry((o.sample, &measurement.name)).or_default() += 1;
             }

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::{MarkerObservation, MeasurementKind, NoiseKind, PointId, Problem};
+use calib_core::{MarkerObservation, MeasurementKind, NoiseKind, PointId, Problem, measurement};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::BodyKind;
 use nalgebra::Point3;
@@ -86,7 +86,7 @@ fn relabel_body(
     };
     problem.markers(body, tracker, frame, noise, observations);
     let changed = calib_core::relabel(&mut problem, tolerance);
-    let Some(MeasurementKind::Markers { observations, .. }) =
+    let Some(MeasurementKind::Markers(measurement::Markers { observations, .. })) =
         problem.measurements().first().map(|h| &h.kind)
     else {
         return Vec::new();

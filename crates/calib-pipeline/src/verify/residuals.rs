@@ -41,7 +41,10 @@ pub fn subject(fit: &MlFit, measurement: &str, item: usize) -> String {
         .iter()
         .find(|h| h.name == measurement);
     match observed.map(|h| &h.kind) {
-        Some(calib_core::MeasurementKind::Markers { observations, .. }) => {
+        Some(calib_core::MeasurementKind::Markers(calib_core::measurement::Markers {
+            observations,
+            ..
+        })) => {
             let point = observations.get(item).map(|o| o.point);
             let name = point
                 .and_then(|p| fit.formulation.problem.points().get(p.index()))

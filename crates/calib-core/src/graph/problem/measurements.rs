@@ -4,7 +4,8 @@ use nalgebra::Point3;
 
 use crate::graph::ids::{EdgeId, FrameId, GroupId, PointId};
 use crate::graph::measurement::{
-    MarkerObservation, Measurement, MeasurementKind, PoseNoise, PoseObservation,
+    Loop, MarkerObservation, Markers, Measurement, MeasurementKind, PoseNoise, PoseObservation,
+    Poses,
 };
 use crate::graph::parameter::{Parameter, ParameterKind, Unit};
 use crate::graph::problem::{Point, Problem};
@@ -71,10 +72,10 @@ impl Problem {
             from,
             to,
             path: None,
-            kind: MeasurementKind::Markers {
+            kind: MeasurementKind::Markers(Markers {
                 noise,
                 observations,
-            },
+            }),
         });
     }
 
@@ -92,10 +93,10 @@ impl Problem {
             from,
             to,
             path: None,
-            kind: MeasurementKind::Poses {
+            kind: MeasurementKind::Poses(Poses {
                 noise,
                 observations,
-            },
+            }),
         });
     }
 
@@ -118,7 +119,7 @@ impl Problem {
             from: end,
             to: end,
             path: Some(path),
-            kind: MeasurementKind::Loop { noise, samples },
+            kind: MeasurementKind::Loop(Loop { noise, samples }),
         });
     }
 }

@@ -1,0 +1,144 @@
+//! Measurements: what the tracker says about the frames at the two ends of a path. One file per kind.
+//!
+//! With `T = from_from_to(s; x) = [R, t]` along the path, residual = predicted ⊟ observed:
+//!
+//! ```text
+//! marker      e = R p + t − y                                          3, from axes, m      (1)
+//! pose        e = [ Log(R_zᵀ R); R_zᵀ (t − t_z) ]                      6, body axes, rad, m (2)
+//! direction   e = E(d)ᵀ R a,  E(d) spans the plane across d            2, rad               (3)
+//! plane       e = nᵀ (R p + t) − h                                     1, m                 (4)
+//! line        e = E(d)ᵀ (R p + t − o)                                  2, m                 (5)
+//! distance    e = |R p + t − y| − ℓ                                    1, m                 (6)
+//! loop        (2) with T the closed path and T_z = identity            6                    (7)
+//! ```
+//!
+//! An unknown plane or line is a frame with an unknown edge: give the measurement that frame as `from`. A touched
+//! point is a marker of known place.
+//!
+//! To add a kind: write its file (the fields, and `Kind` for them), name it in [`MeasurementKind`] and in
+//! the one `match` below. Layout, solver, robust weights, validation and input check follow.
+
+use crate::graph::error::Error;
+use crate::graph::ids::{EdgeId, FrameId, GroupId};
+
+mod closed;
+mod directions;
+mod distance;
+mod input;
+mod line;
+mod markers;
+mod plane;
+mod poses;
+mod rows;
+
+pub use closed::Loop;
+pub use directions::{DirectionObservation, Directions};
+pub use distance::Distance;
+pub(crate) use input::Input;
+pub use line::Line;
+pub use markers::{MarkerObservation, Markers};
+pub use plane::Plane;
+pub use poses::{PoseNoise, PoseObservation, Poses};
+pub(crate) use rows::{At, Rows};
+
+/// One kind of measurement along one path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measurement {
+    /// Name, for findings (`hand`, `table contact`).
+    pub name: String,
+    /// Frame in which the measurement is stated.
+    pub from: FrameId,
+    /// Frame that is measured.
+    pub to: FrameId,
+    /// The edges from `from` to `to`, each with `true` where it is walked from child to parent;
+    /// `None`: the shortest way through the graph.
+    pub path: Option<Vec<(EdgeId, bool)>>,
+    /// What is measured.
+    pub kind: MeasurementKind,
+}
+
+/// Equations (1) to (7).
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum MeasurementKind {
+    /// Marker points, one vector each.
+    Markers(Markers),
+    /// Body poses.
+    Poses(Poses),
+    /// A direction that is fixed in `to` (an axis, a beam).
+    Directions(Directions),
+    /// A point of `to` lies at height h over a plane of `from`.
+    Plane(Plane),
+    /// A point of `to` lies on a line of `from`.
+    Line(Line),
+    /// The distance of a point of `to` from a point of `from`.
+    Distance(Distance),
+    /// A closed path.
+    Loop(Loop),
+}
+
+/// What the rest of the crate asks of a kind of measurement.
+pub(crate) trait Kind {
+    /// Samples of the observations, in their order.
+    fn samples(&self) -> Vec<usize>;
+
+    /// Rows per observation, at most 6.
+    fn rows(&self) -> usize;
+
+    /// Everything that can be wrong with the numbers given.
+    fn check(&self, input: &Input<'_>) -> Result<(), Error>;
+
+    /// Residual of an observation and its derivatives at the path's pose.
+    fn residual(&self, item: usize, at: &At<'_>) -> Rows;
+
+    /// Calls `add(i, j ≤ i, group, shape_ij)` for every entry of an observation's own covariance `σ_group² shape`.
+    fn covariance(&self, item: usize, add: &mut dyn FnMut(usize, usize, GroupId, f64));
+
+    /// A residual split into what is an angle and what is a length.
+    fn deviation(&self, e: &[f64]) -> Deviation {
+        Deviation {
+            rotation: None,
+            position: Some(norm(e)),
+        }
+    }
+}
+
+/// Sizes of a residual, where it has such a part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Deviation {
+    /// rad.
+    pub rotation: Option<f64>,
+    /// m.
+    pub position: Option<f64>,
+}
+
+impl MeasurementKind {
+    /// The only place that tells the kinds apart.
+    #[inline]
+    pub(crate) fn of(&self) -> &dyn Kind {
+        match self {
+            Self::Markers(kind) => kind,
+            Self::Poses(kind) => kind,
+            Self::Directions(kind) => kind,
+            Self::Plane(kind) => kind,
+            Self::Line(kind) => kind,
+            Self::Distance(kind) => kind,
+            Self::Loop(kind) => kind,
+        }
+    }
+}
+
+/// Covariance `σ² I` of some rows.
+fn isotropic(
+    rows: std::ops::Range<usize>,
+    group: GroupId,
+    add: &mut dyn FnMut(usize, usize, GroupId, f64),
+) {
+    for i in rows {
+        add(i, i, group, 1.0);
+    }
+}
+
+fn norm(e: &[f64]) -> f64 {
+    e.iter().map(|x| x * x).sum::<f64>().sqrt()
+}

@@ -1,0 +1,115 @@
+//! Body poses: `e = [Log(R_zᵀ R); R_zᵀ (t − t_z)]`, six rows in body axes, rad and m.
+
+use nalgebra::{Isometry3, Matrix6};
+
+use super::{At, Deviation, Input, Kind, Rows, isotropic, norm};
+use crate::graph::error::Error;
+use crate::graph::ids::GroupId;
+
+/// Body poses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Poses {
+    /// How their noise is described.
+    pub noise: PoseNoise,
+    /// What was seen.
+    pub observations: Vec<PoseObservation>,
+}
+
+/// Body seen at a pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoseObservation {
+    /// Sample index.
+    pub sample: usize,
+    /// `from_from_to`.
+    pub pose: Isometry3<f64>,
+}
+
+/// Noise of a measured pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one per measurement, not per observation; a box would cost Copy"
+)]
+pub enum PoseNoise {
+    /// Isotropic in orientation and position.
+    Split {
+        /// σ rad.
+        orientation: GroupId,
+        /// σ m.
+        position: GroupId,
+    },
+    /// Full covariance `[ω; v]` in the body frame, times the group's σ².
+    Full {
+        /// Shape.
+        shape: Matrix6<f64>,
+        /// Its scale.
+        scale: GroupId,
+    },
+}
+
+impl PoseNoise {
+    pub(super) fn check(&self, input: &Input<'_>) -> Result<(), Error> {
+        match self {
+            Self::Split { .. } => Ok(()),
+            Self::Full { shape, .. } => input.definite(*shape, shape.determinant()),
+        }
+    }
+
+    pub(super) fn covariance(&self, add: &mut dyn FnMut(usize, usize, GroupId, f64)) {
+        match self {
+            Self::Split {
+                orientation,
+                position,
+            } => {
+                isotropic(0..3, *orientation, add);
+                isotropic(3..6, *position, add);
+            }
+            Self::Full { shape, scale } => {
+                for i in 0..6 {
+                    for j in 0..=i {
+                        add(i, j, *scale, shape[(i, j)]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Rotation and position of a residual (2).
+pub(super) fn deviation(e: &[f64]) -> Deviation {
+    Deviation {
+        rotation: Some(norm(&e[..3])),
+        position: Some(norm(&e[3..])),
+    }
+}
+
+impl Kind for Poses {
+    fn samples(&self) -> Vec<usize> {
+        self.observations.iter().map(|o| o.sample).collect()
+    }
+
+    fn rows(&self) -> usize {
+        6
+    }
+
+    fn check(&self, input: &Input<'_>) -> Result<(), Error> {
+        for o in &self.observations {
+            input.pose(o.sample, &o.pose)?;
+        }
+        self.noise.check(input)
+    }
+
+    fn residual(&self, item: usize, at: &At<'_>) -> Rows {
+        let z = &self.observations[item].pose;
+        let r_z = z.rotation.to_rotation_matrix();
+        Rows::pose(r_z.matrix(), &z.translation.vector, at)
+    }
+
+    fn covariance(&self, _item: usize, add: &mut dyn FnMut(usize, usize, GroupId, f64)) {
+        self.noise.covariance(add);
+    }
+
+    fn deviation(&self, e: &[f64]) -> Deviation {
+        deviation(e)
+    }
+}
