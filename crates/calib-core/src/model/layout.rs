@@ -51,6 +51,67 @@ pub(crate) struct Observation {
     pub rows: usize,
 }
 
+/// All observations whose path is known at their sample, sample after sample; and (measurement, sample, item) of those
+/// whose path is not.
+fn lay_out(
+    problem: &Problem,
+    walks: &[Vec<(EdgeId, bool)>],
+) -> (Vec<Observation>, Vec<(usize, usize, usize)>) {
+    let mut observations = Vec::new();
+    let mut lost_items = Vec::new();
+    for (h, measurement) in problem.measurements.iter().enumerate() {
+        let kind = measurement.kind.of();
+        for (item, sample) in kind.samples().into_iter().enumerate() {
+            let lost = walks[h].iter().any(|&(e, _)| {
+                matches!(&problem.edges[e.index()].kind,
+                    EdgeKind::Measured { poses, .. } if poses[sample].is_none())
+            });
+            if lost {
+                lost_items.push((h, sample, item));
+            } else {
+                observations.push(Observation {
+                    sample,
+                    measurement: h,
+                    item,
+                    rows: kind.rows(),
+                });
+            }
+        }
+    }
+    observations.sort_by_key(|o| (o.sample, o.measurement, o.item));
+    (observations, lost_items)
+}
+
+/// Range of the observations of each sample.
+fn of_sample(observations: &[Observation], samples: usize) -> Vec<Range<usize>> {
+    let mut ranges = Vec::with_capacity(samples);
+    let mut start = 0;
+    for s in 0..samples {
+        let mut end = start;
+        while end < observations.len() && observations[end].sample == s {
+            end += 1;
+        }
+        ranges.push(start..end);
+        start = end;
+    }
+    ranges
+}
+
+/// Per measurement: the samples that it saw, and the range of its observations there.
+fn of_measurement(
+    observations: &[Observation],
+    measurements: usize,
+) -> Vec<Vec<(usize, Range<usize>)>> {
+    let mut ranges: Vec<Vec<(usize, Range<usize>)>> = vec![Vec::new(); measurements];
+    for (i, o) in observations.iter().enumerate() {
+        match ranges[o.measurement].last_mut() {
+            Some((sample, range)) if *sample == o.sample => range.end = i + 1,
+            _ => ranges[o.measurement].push((o.sample, i..i + 1)),
+        }
+    }
+    ranges
+}
+
 impl Model {
     /// Checks a problem and lays it out.
     ///
@@ -70,54 +131,15 @@ impl Model {
             )?);
         }
 
-        let mut observations = Vec::new();
-        let mut lost_items = Vec::new();
-        for (h, measurement) in problem.measurements.iter().enumerate() {
-            let rows = measurement.kind.of().rows();
-            for (item, sample) in measurement.kind.of().samples().into_iter().enumerate() {
-                let lost = walks[h].iter().any(|&(e, _)| {
-                    matches!(&problem.edges[e.index()].kind,
-                        EdgeKind::Measured { poses, .. } if poses[sample].is_none())
-                });
-                if lost {
-                    lost_items.push((h, sample, item));
-                } else {
-                    observations.push(Observation {
-                        sample,
-                        measurement: h,
-                        item,
-                        rows,
-                    });
-                }
-            }
-        }
+        let (observations, lost_items) = lay_out(&problem, &walks);
         if observations
             .iter()
-            .all(|o: &Observation| problem.held_out.contains(&o.sample))
+            .all(|o| problem.held_out.contains(&o.sample))
         {
             return Err(Error::NoObservations);
         }
-        observations.sort_by_key(|o| (o.sample, o.measurement, o.item));
-        let mut of_sample = Vec::with_capacity(problem.samples);
-        let mut start = 0;
-        for s in 0..problem.samples {
-            let mut end = start;
-            while end < observations.len() && observations[end].sample == s {
-                end += 1;
-            }
-            of_sample.push(start..end);
-            start = end;
-        }
-
-        let mut of_measurement: Vec<Vec<(usize, Range<usize>)>> =
-            vec![Vec::new(); problem.measurements.len()];
-        for (i, o) in observations.iter().enumerate() {
-            match of_measurement[o.measurement].last_mut() {
-                Some((sample, range)) if *sample == o.sample => range.end = i + 1,
-                _ => of_measurement[o.measurement].push((o.sample, i..i + 1)),
-            }
-        }
-
+        let of_sample = of_sample(&observations, problem.samples);
+        let of_measurement = of_measurement(&observations, problem.measurements.len());
         let unmoved = contract_unmoved(&mut problem, &walks, &of_sample);
 
         // Only parameters that some observation can feel, or that are free by themselves, get columns.

@@ -74,6 +74,24 @@ pub(crate) enum Derivatives {
     All,
 }
 
+/// Columns of an edge of unknown pose, `twists` those of its six coordinates: `∂ξ/∂δ_i = Ad(P⁻¹) twist_i`.
+#[inline]
+fn add_unknown(
+    twists: &[Vector6<f64>; 6],
+    columns: &[(usize, usize)],
+    suffix: &Pose,
+    out: &mut [Vector6<f64>],
+) {
+    for &(i, c) in columns {
+        // Coordinates 3 to 5 are translations, walked either way.
+        out[c] += if i < 3 {
+            suffix.pull_back(&twists[i])
+        } else {
+            suffix.pull_back_translation(&twists[i])
+        };
+    }
+}
+
 impl CompiledPath {
     pub(crate) fn new(
         problem: &Problem,
@@ -194,7 +212,7 @@ impl CompiledPath {
         if random {
             out.slots.fill(Vector6::zeros());
         }
-        // P: what lies behind the step in hand.
+        // P: what lies behind the step in hand; from the end of the path to its start P ← X^±1 P.
         let mut suffix = Pose::identity();
         for step in self.steps.iter().rev() {
             match step {
@@ -210,14 +228,7 @@ impl CompiledPath {
                         } else {
                             &cache.forward[*edge]
                         };
-                        for &(i, c) in columns {
-                            // Coordinates 3 to 5 are translations, walked either way.
-                            out.columns[c] += if i < 3 {
-                                suffix.pull_back(&twists[i])
-                            } else {
-                                suffix.pull_back_translation(&twists[i])
-                            };
-                        }
+                        add_unknown(twists, columns, &suffix, &mut out.columns);
                     }
                     suffix = cache.pose[*edge].oriented(*inverse).then(&suffix);
                 }
@@ -255,6 +266,7 @@ impl CompiledPath {
                     let x = poses[sample].as_ref().map_or_else(Pose::identity, Pose::of);
                     if random {
                         for (direction, s) in noise {
+                            // Ad(P⁻¹) δ, or −Ad(P⁻¹) Ad(X) δ
                             let twist = if *inverse {
                                 -x.push_forward(direction)
                             } else {
@@ -267,6 +279,7 @@ impl CompiledPath {
                 }
                 Step::Random { inverse, noise } => {
                     if random {
+                        // ±Ad(P⁻¹) δ: X is the identity
                         let sign = if *inverse { -1.0 } else { 1.0 };
                         for (direction, s) in noise {
                             out.slots[*s] += suffix.pull_back(direction) * sign;

@@ -47,42 +47,9 @@ pub(crate) fn bounded_step(
             if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 }
         })
         .collect();
-    let mut quadratic = vec![vec![0.0; n]; n];
-    for i in 0..n {
-        for j in 0..=i {
-            let more = curvature.map_or(0.0, |s| s[i * n + j]);
-            let h = (system.h[j * n + i] + more) * scale[i] * scale[j];
-            quadratic[i][j] = h;
-            quadratic[j][i] = h;
-        }
-        // A direction that nothing sees is held at 0.
-        quadratic[i][i] = if system.h[i * n + i] > 0.0 {
-            quadratic[i][i] + 1e-10 + damping * natural[i] * scale[i] * scale[i]
-        } else {
-            1.0
-        };
-    }
+    let quadratic = quadratic(system, curvature, natural, damping, &scale);
     let linear: Vec<f64> = (0..n).map(|i| system.g[i] * scale[i]).collect();
-    let mut a = Vec::new();
-    let mut b = Vec::new();
-    let mut walls = Vec::new();
-    for (c, limits) in room.iter().enumerate() {
-        if let Some((lower, upper)) = limits {
-            let mut row = vec![0.0; n];
-            if upper.is_finite() {
-                row[c] = 1.0;
-                a.push(row.clone());
-                b.push(upper / scale[c]);
-                walls.push((c, *upper));
-            }
-            if lower.is_finite() {
-                row[c] = -1.0;
-                a.push(row);
-                b.push(-lower / scale[c]);
-                walls.push((c, *lower));
-            }
-        }
-    }
+    let (a, b, walls) = walls(&room, &scale);
     let triangle = CscMatrix::from(&quadratic).to_triu();
     let a = CscMatrix::from(&a);
     let cones = [NonnegativeConeT(b.len())];
@@ -123,6 +90,61 @@ pub(crate) fn bounded_step(
         step.copy_from_slice(&exact);
     }
     step.iter().all(|x| x.is_finite())
+}
+
+/// The matrix of (1) in the scaled unknowns.
+///
+/// ```text
+/// Q_ij = (H_ij + S_ij) s_i s_j,   Q_ii += λ N_i s_i²
+/// ```
+fn quadratic(
+    system: &NormalEquations,
+    curvature: Option<&[f64]>,
+    natural: &[f64],
+    damping: f64,
+    scale: &[f64],
+) -> Vec<Vec<f64>> {
+    let n = system.n;
+    let mut quadratic = vec![vec![0.0; n]; n];
+    for i in 0..n {
+        for j in 0..=i {
+            let more = curvature.map_or(0.0, |s| s[i * n + j]);
+            let h = (system.h[j * n + i] + more) * scale[i] * scale[j];
+            quadratic[i][j] = h;
+            quadratic[j][i] = h;
+        }
+        // A direction that nothing sees is held at 0.
+        quadratic[i][i] = if system.h[i * n + i] > 0.0 {
+            quadratic[i][i] + 1e-10 + damping * natural[i] * scale[i] * scale[i]
+        } else {
+            1.0
+        };
+    }
+    quadratic
+}
+
+/// The walls `A z ≤ b` in the scaled unknowns, and the column and place of each.
+#[expect(clippy::type_complexity, reason = "three lists, one entry per wall")]
+fn walls(
+    room: &[Option<(f64, f64)>],
+    scale: &[f64],
+) -> (Vec<Vec<f64>>, Vec<f64>, Vec<(usize, f64)>) {
+    let (mut a, mut b, mut walls) = (Vec::new(), Vec::new(), Vec::new());
+    for (c, limits) in room.iter().enumerate() {
+        let Some((lower, upper)) = limits else {
+            continue;
+        };
+        for (wall, side) in [(*upper, 1.0), (*lower, -1.0)] {
+            if wall.is_finite() {
+                let mut row = vec![0.0; room.len()];
+                row[c] = side;
+                a.push(row);
+                b.push(side * wall / scale[c]);
+                walls.push((c, wall));
+            }
+        }
+    }
+    (a, b, walls)
 }
 
 /// The minimiser of (1) with the pressed coordinates on their walls and the others free.

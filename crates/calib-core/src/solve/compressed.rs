@@ -10,7 +10,7 @@
 //! A marker of unknown position adds its own 3 columns: `JᵀG_mᵀ w`, `w I`, `w e`. The result equals the
 //! general way to rounding (a test holds both to it).
 
-use nalgebra::{DMatrix, Dyn, Matrix6, MatrixView, Vector3, Vector6};
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::graph::measurement::{Markers, MeasurementKind, Rows};
 use crate::model::cache::EdgeCache;
@@ -18,66 +18,8 @@ use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
 use crate::solve::normal::{NormalEquations, Workspace};
-use crate::solve::rows::{add_block, dot, point_columns, residual};
-
-/// Rows gathered before one matrix product: 64 to 96 rows fill the cache lines of the product's kernel.
-const PANEL: usize = 96;
-
-/// H and g over some columns, and their share of the cost.
-pub(crate) struct Local {
-    k: usize,
-    /// k × k.
-    pub h: DMatrix<f64>,
-    pub g: Vec<f64>,
-    /// k × PANEL: whitened rows of J waiting to be multiplied, one per column.
-    panel: DMatrix<f64>,
-    filled: usize,
-    cost: f64,
-}
-
-impl Local {
-    /// Space for k columns; never more than `most` rows are asked for at once.
-    pub(crate) fn new(k: usize, most: usize) -> Self {
-        let panel = PANEL.max(most);
-        Self {
-            k,
-            h: DMatrix::zeros(k, k),
-            g: vec![0.0; k],
-            panel: DMatrix::zeros(k, panel),
-            filled: 0,
-            cost: 0.0,
-        }
-    }
-
-    /// Space for `m` further rows, each k long, one after the other.
-    pub(crate) fn rows(&mut self, m: usize) -> &mut [f64] {
-        if self.filled + m > self.panel.ncols() {
-            self.multiply();
-        }
-        let start = self.filled * self.k;
-        self.filled += m;
-        &mut self.panel.as_mut_slice()[start..start + m * self.k]
-    }
-
-    /// H += Σ rowᵀ row
-    pub(crate) fn multiply(&mut self) {
-        if self.filled == 0 || self.k == 0 {
-            self.filled = 0;
-            return;
-        }
-        let rows = self.panel.columns(0, self.filled);
-        // The same numbers read along the other way: row stride k, column stride 1.
-        let transposed = MatrixView::<_, _, _, Dyn, Dyn>::from_slice_with_strides_generic(
-            &self.panel.as_slice()[..self.k * self.filled],
-            Dyn(self.filled),
-            Dyn(self.k),
-            Dyn(self.k),
-            Dyn(1),
-        );
-        self.h.gemm(1.0, &rows, &transposed, 1.0);
-        self.filled = 0;
-    }
-}
+use crate::solve::panel::Local;
+use crate::solve::rows::{add_block, cholesky6, dot, point_columns, residual};
 
 /// Where the equations are wanted: the values, the weight of each observation, σ² per group, and the edges' poses.
 struct Pass<'a> {
@@ -542,26 +484,4 @@ fn add_point(
             }
         }
     }
-}
-
-/// Lower Cholesky factor of the leading m × m block, in place.
-fn cholesky6(l: &mut [[f64; 6]; 6], m: usize) -> bool {
-    for i in 0..m {
-        for j in 0..=i {
-            // L_ij = (V_ij − Σ L_ik L_jk) / L_jj,   L_ii² = V_ii − Σ L_ik²
-            let mut sum = l[i][j];
-            for k in 0..j {
-                sum -= l[i][k] * l[j][k];
-            }
-            if i == j {
-                if !(sum > 0.0 && sum.is_finite()) {
-                    return false;
-                }
-                l[i][i] = sum.sqrt();
-            } else {
-                l[i][j] = sum / l[j][j];
-            }
-        }
-    }
-    true
 }

@@ -191,120 +191,189 @@ pub(crate) fn minimize_in(
     settings: &MinimizeSettings,
     work: &mut Workspace,
 ) -> Minimum {
-    let n = model.free();
-    let mut values = start.clone();
-    let mut system = NormalEquations::new(n);
-    let mut next = NormalEquations::new(n);
-    let mut factor = vec![0.0; n * n];
-    let mut step = vec![0.0; n];
-    let mut trial = values.clone();
-    let mut damping = settings.damping;
-    let mut decrement = f64::INFINITY;
-    let bounded = model
-        .columns
-        .iter()
-        .any(|&p| model.problem.parameters[p].bounds.is_some());
-    let mut curvature = Curvature::new(n);
-    let natural: Vec<f64> = model
-        .columns
-        .iter()
-        .map(|&p| model.problem.parameters[p].scale().powi(-2))
-        .collect();
-    // Without random effects V is constant: the next linearisation delivers the cost to check.
-    let constant_noise = model.slots.is_empty();
-    let mut iterations = 1;
-    let mut evaluable = accumulate(model, &values, weights, theta, work, &mut system);
-    let status = loop {
-        if !evaluable {
-            break SolveStatus::NotEvaluable;
+    let mut search = Search::new(model, start, (weights, theta), settings, work);
+    let status = search.run();
+    Minimum {
+        values: search.values,
+        status,
+        iterations: search.iterations,
+        data_cost: search.system.data,
+        prior_cost: search.system.prior,
+        decrement: search.decrement,
+    }
+}
+
+/// State of the descent.
+struct Search<'a> {
+    model: &'a Model,
+    weights: &'a [f64],
+    theta: &'a [f64],
+    settings: &'a MinimizeSettings,
+    work: &'a mut Workspace,
+    /// Some parameter has limits.
+    bounded: bool,
+    /// Without random effects V is constant: the next linearisation delivers the cost to check.
+    constant_noise: bool,
+    /// 1 / scale² per column.
+    natural: Vec<f64>,
+    values: Values,
+    trial: Values,
+    system: NormalEquations,
+    next: NormalEquations,
+    curvature: Curvature,
+    factor: Vec<f64>,
+    step: Vec<f64>,
+    damping: f64,
+    decrement: f64,
+    iterations: usize,
+    evaluable: bool,
+}
+
+impl<'a> Search<'a> {
+    fn new(
+        model: &'a Model,
+        start: &Values,
+        (weights, theta): (&'a [f64], &'a [f64]),
+        settings: &'a MinimizeSettings,
+        work: &'a mut Workspace,
+    ) -> Self {
+        let n = model.free();
+        let free = || model.columns.iter().map(|&p| &model.problem.parameters[p]);
+        let mut system = NormalEquations::new(n);
+        let evaluable = accumulate(model, start, weights, theta, work, &mut system);
+        Self {
+            model,
+            weights,
+            theta,
+            settings,
+            work,
+            bounded: free().any(|p| p.bounds.is_some()),
+            constant_noise: model.slots.is_empty(),
+            natural: free().map(|p| p.scale().powi(-2)).collect(),
+            values: start.clone(),
+            trial: start.clone(),
+            system,
+            next: NormalEquations::new(n),
+            curvature: Curvature::new(n),
+            factor: vec![0.0; n * n],
+            step: vec![0.0; n],
+            damping: settings.damping,
+            decrement: f64::INFINITY,
+            iterations: 1,
+            evaluable,
         }
-        let current = system.cost();
-        let before = decrement;
-        let outcome = loop {
-            let solved = damped_step(
-                &system,
-                &mut curvature,
-                &natural,
-                damping,
-                &mut factor,
-                &mut step,
-            ) && (!bounded
-                || bounded_step(
-                    model,
-                    &values,
-                    &system,
-                    curvature.known.then_some(curvature.s.as_slice()),
-                    &natural,
-                    damping,
-                    &mut step,
-                ));
-            if solved {
-                decrement = -dot(&system.g, &step);
-                retract(model, &values, &step, &mut trial);
-                // The decrement falls at least in proportion: is the next one already small enough?
-                let rate = if before.is_finite() {
-                    (decrement / before).min(1.0)
-                } else {
-                    1.0
-                };
-                let expected = decrement * rate;
-                if decrement <= settings.decrement
-                    || (constant_noise && expected <= settings.decrement)
-                {
-                    let fallen = decrement <= settings.decrement
-                        || cost(model, &trial, weights, theta, work)
-                            <= current * (1.0 + COST_ROUNDING);
-                    if fallen {
-                        break Step::Last;
-                    }
-                } else if constant_noise {
-                    iterations += 1;
-                    if accumulate(model, &trial, weights, theta, work, &mut next)
-                        && next.cost() <= current * (1.0 + COST_ROUNDING)
-                    {
-                        break Step::Taken;
-                    }
-                } else if cost(model, &trial, weights, theta, work)
-                    <= current * (1.0 + COST_ROUNDING)
-                {
-                    iterations += 1;
-                    evaluable = accumulate(model, &trial, weights, theta, work, &mut next);
-                    break Step::Taken;
+    }
+
+    fn run(&mut self) -> SolveStatus {
+        loop {
+            if !self.evaluable {
+                return SolveStatus::NotEvaluable;
+            }
+            let current = self.system.cost();
+            let before = self.decrement;
+            match self.descend(current, before) {
+                Step::Last => {
+                    std::mem::swap(&mut self.values, &mut self.trial);
+                    return SolveStatus::Converged;
+                }
+                Step::Taken => {
+                    self.damping = (self.damping * 0.1).max(MIN_DAMPING);
+                    self.curvature.slow |= self.decrement < NEAR && self.decrement > SLOW * before;
+                    self.curvature.learn(&self.system, &self.next, &self.step);
+                    std::mem::swap(&mut self.values, &mut self.trial);
+                    std::mem::swap(&mut self.system, &mut self.next);
+                }
+                // At the minimum of a cost that is only rounding (exact data) nothing can fall further.
+                Step::None if self.decrement <= 1e-6 + current * 1e-9 => {
+                    return SolveStatus::Converged;
+                }
+                Step::None => return SolveStatus::Stalled,
+            }
+            if self.iterations > self.settings.max_iterations {
+                return SolveStatus::MaxIterations;
+            }
+        }
+    }
+
+    /// Raises the damping until a step lowers the cost from `current`; `before`: the decrement of the step before.
+    fn descend(&mut self, current: f64, before: f64) -> Step {
+        loop {
+            if self.solve() {
+                // −gᵀδ is twice what the quadratic model falls by.
+                self.decrement = -dot(&self.system.g, &self.step);
+                retract(self.model, &self.values, &self.step, &mut self.trial);
+                if let Some(step) = self.judge(current, before) {
+                    return step;
                 }
             }
-            curvature.slow |= decrement < NEAR;
-            damping = (damping * 10.0).max(1e-3);
-            if damping > MAX_DAMPING {
-                break Step::None;
+            self.curvature.slow |= self.decrement < NEAR;
+            self.damping = (self.damping * 10.0).max(1e-3);
+            if self.damping > MAX_DAMPING {
+                return Step::None;
             }
+        }
+    }
+
+    /// The damped step inside the limits.
+    fn solve(&mut self) -> bool {
+        damped_step(
+            &self.system,
+            &mut self.curvature,
+            &self.natural,
+            self.damping,
+            &mut self.factor,
+            &mut self.step,
+        ) && (!self.bounded
+            || bounded_step(
+                self.model,
+                &self.values,
+                &self.system,
+                self.curvature.known.then_some(self.curvature.s.as_slice()),
+                &self.natural,
+                self.damping,
+                &mut self.step,
+            ))
+    }
+
+    /// Is the trial good enough to be taken?
+    fn judge(&mut self, current: f64, before: f64) -> Option<Step> {
+        let limit = current * (1.0 + COST_ROUNDING);
+        // The decrement falls at least in proportion: is the next one already small enough?
+        let rate = if before.is_finite() {
+            (self.decrement / before).min(1.0)
+        } else {
+            1.0
         };
-        match outcome {
-            Step::Last => {
-                std::mem::swap(&mut values, &mut trial);
-                break SolveStatus::Converged;
-            }
-            Step::Taken => {
-                damping = (damping * 0.1).max(MIN_DAMPING);
-                curvature.slow |= decrement < NEAR && decrement > SLOW * before;
-                curvature.learn(&system, &next, &step);
-                std::mem::swap(&mut values, &mut trial);
-                std::mem::swap(&mut system, &mut next);
-            }
-            // At the minimum of a cost that is only rounding (exact data) nothing can fall further.
-            Step::None if decrement <= 1e-6 + current * 1e-9 => break SolveStatus::Converged,
-            Step::None => break SolveStatus::Stalled,
+        let expected = self.decrement * rate;
+        let small = self.decrement <= self.settings.decrement;
+        if small || (self.constant_noise && expected <= self.settings.decrement) {
+            return (small || self.trial_cost() <= limit).then_some(Step::Last);
         }
-        if iterations > settings.max_iterations {
-            break SolveStatus::MaxIterations;
+        if self.constant_noise {
+            self.iterations += 1;
+            return (self.linearize_trial() && self.next.cost() <= limit).then_some(Step::Taken);
         }
-    };
-    Minimum {
-        values,
-        status,
-        iterations,
-        data_cost: system.data,
-        prior_cost: system.prior,
-        decrement,
+        if self.trial_cost() <= limit {
+            self.iterations += 1;
+            self.evaluable = self.linearize_trial();
+            return Some(Step::Taken);
+        }
+        None
+    }
+
+    fn trial_cost(&mut self) -> f64 {
+        cost(self.model, &self.trial, self.weights, self.theta, self.work)
+    }
+
+    fn linearize_trial(&mut self) -> bool {
+        accumulate(
+            self.model,
+            &self.trial,
+            self.weights,
+            self.theta,
+            self.work,
+            &mut self.next,
+        )
     }
 }
 

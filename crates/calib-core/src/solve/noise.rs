@@ -18,9 +18,9 @@ use nalgebra::{DMatrix, DVector};
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
-use crate::solve::compressed::Local;
 use crate::solve::minimize::{cholesky_in_place, solve_in_place};
 use crate::solve::normal::{NormalEquations, Workspace, accumulate, add_prior};
+use crate::solve::panel::Local;
 use crate::solve::rows::{SampleRows, add_block};
 
 /// A σ may fall to this fraction of what was stated before it counts as zero.
@@ -235,28 +235,14 @@ fn sums(
         rows.random_part(random)?;
         row_groups(model, &rows.blocks, &mut group_of);
         // V⁻¹ in block-whitened rows, and what it makes of e, J and U.
-        let mut p0 = vec![0.0; m * m];
-        for i in 0..m {
-            p0[i * m + i] = 1.0;
-        }
+        let mut p0 = unit_matrix(m);
         random.weigh(&mut p0, m);
         let u = rows.g[..m * k].to_vec();
         let mut pu = u.clone();
         random.weigh(&mut pu, k);
         random.weigh(&mut rows.r[..m], 1);
         random.weigh(&mut rows.j[..m * n], n);
-        // Uᵀ V⁻¹ U, per pair of columns
-        let mut upu = vec![0.0; k * k];
-        for i in 0..m {
-            for a in 0..k {
-                let ua = u[i * k + a];
-                if ua != 0.0 {
-                    for b in 0..k {
-                        upu[a * k + b] += ua * pu[i * k + b];
-                    }
-                }
-            }
-        }
+        let upu = inner_products(&u, &pu, k);
         for i in 0..m {
             let group = place[group_of[i]];
             sums.moments[group.unwrap_or(count)]
@@ -271,42 +257,108 @@ fn sums(
                 }
             }
         }
+        let weighed = Weighed {
+            u: &u,
+            pu: &pu,
+            upu: &upu,
+            r: &rows.r[..m],
+            j: &rows.j[..m * n],
+        };
+        let places: Vec<Option<usize>> = group_of.iter().map(|&g| place[g]).collect();
+        sums.add_random(&weighed, &slots_of, &places);
+    }
+    sums.moments.iter_mut().for_each(Local::multiply);
+    Some(sums)
+}
+
+/// One sample in block-whitened rows, row-major: its random effects U, and V⁻¹ applied to what is needed.
+struct Weighed<'a> {
+    /// U, m × k.
+    u: &'a [f64],
+    /// V⁻¹U, m × k.
+    pu: &'a [f64],
+    /// UᵀV⁻¹U, k × k.
+    upu: &'a [f64],
+    /// V⁻¹e, m.
+    r: &'a [f64],
+    /// V⁻¹J, m × n.
+    j: &'a [f64],
+}
+
+impl Sums {
+    /// The share of the random effects, `slots_of` those of each group and last those of none; `places`: the group of
+    /// each row, where it is estimated. With V_u = u uᵀ:
+    ///
+    /// ```text
+    /// (uᵀV⁻¹e)²,   uᵀV⁻¹u,   tr(V_u V⁻¹ V_w V⁻¹) = (uᵀV⁻¹w)²,   tr(V_u V⁻¹ E_g V⁻¹) = Σ_{i ∈ g} (V⁻¹u)_i²
+    /// ```
+    fn add_random(
+        &mut self,
+        sample: &Weighed<'_>,
+        slots_of: &[Vec<usize>],
+        places: &[Option<usize>],
+    ) {
+        let m = sample.r.len();
+        if m == 0 {
+            return;
+        }
+        let (n, k) = (sample.j.len() / m, sample.u.len() / m);
+        let count = slots_of.len() - 1;
         for (g, slots) in slots_of.iter().enumerate() {
             for &a in slots {
                 let mut along = 0.0;
-                let row = sums.moments[g].rows(1);
+                let row = self.moments[g].rows(1);
                 row.fill(0.0);
                 for i in 0..m {
-                    let ua = u[i * k + a];
+                    let ua = sample.u[i * k + a];
                     if ua != 0.0 {
-                        along += ua * rows.r[i];
+                        along += ua * sample.r[i];
                         row.iter_mut()
-                            .zip(&rows.j[i * n..(i + 1) * n])
+                            .zip(&sample.j[i * n..(i + 1) * n])
                             .for_each(|(x, j)| *x += ua * j);
                     }
                 }
                 if g == count {
                     continue;
                 }
-                sums.squares[g] += along * along;
-                sums.traces[g] += upu[a * k + a];
+                self.squares[g] += along * along;
+                self.traces[g] += sample.upu[a * k + a];
                 for (h, others) in slots_of[..count].iter().enumerate() {
                     for &b in others {
-                        sums.products[(g, h)] += upu[a * k + b] * upu[a * k + b];
+                        self.products[(g, h)] += sample.upu[a * k + b] * sample.upu[a * k + b];
                     }
                 }
-                for i in 0..m {
-                    if let Some(h) = place[group_of[i]] {
-                        let x = pu[i * k + a] * pu[i * k + a];
-                        sums.products[(g, h)] += x;
-                        sums.products[(h, g)] += x;
+                for (i, place) in places.iter().enumerate() {
+                    if let Some(h) = *place {
+                        let x = sample.pu[i * k + a] * sample.pu[i * k + a];
+                        self.products[(g, h)] += x;
+                        self.products[(h, g)] += x;
                     }
                 }
             }
         }
     }
-    sums.moments.iter_mut().for_each(Local::multiply);
-    Some(sums)
+}
+
+fn unit_matrix(m: usize) -> Vec<f64> {
+    let mut unit = vec![0.0; m * m];
+    unit.iter_mut().step_by(m + 1).for_each(|x| *x = 1.0);
+    unit
+}
+
+/// Uᵀ V⁻¹ U per pair of columns, from U and V⁻¹U of k columns each.
+fn inner_products(u: &[f64], pu: &[f64], k: usize) -> Vec<f64> {
+    let mut upu = vec![0.0; k * k];
+    for (u, pu) in u.chunks_exact(k.max(1)).zip(pu.chunks_exact(k.max(1))) {
+        for (a, &ua) in u.iter().enumerate() {
+            if ua != 0.0 {
+                for (b, &pb) in pu.iter().enumerate() {
+                    upu[a * k + b] += ua * pb;
+                }
+            }
+        }
+    }
+    upu
 }
 
 /// One step of (2) and (3) at fixed values; `None` when the model cannot be evaluated.
@@ -438,238 +490,4 @@ pub fn sandwich(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::*;
-    use nalgebra::{Isometry3, Point3, Vector3};
-
-    /// Markers and a body pose behind two noisy joints; everything that can be wrong in a sum is different here.
-    fn problem() -> Problem {
-        let n = 14;
-        let q = |a: f64| (0..n).map(|i| (f64::from(i) * a).sin()).collect::<Vec<_>>();
-        let mut p = Problem::new(n as usize);
-        let base = p.frame("base");
-        let a = p.frame("a");
-        let b = p.frame("b");
-        let c = p.frame("c");
-        let d = p.frame("d");
-        let x = Isometry3::new(Vector3::new(0.3, 0.1, 0.2), Vector3::new(0.2, -0.4, 0.5));
-        p.unknown("first", base, a, x, Chart::full());
-        let turn = p.joint("turn", a, b, Axis::Revolute(Vector3::z_axis()), q(0.9));
-        p.known("elbow", b, c, x);
-        let tilt = p.joint("tilt", c, d, Axis::Revolute(Vector3::x_axis()), q(0.53));
-        p.free_effect(turn, EffectKind::ZeroOffset, Some(0.1));
-        let joint = p.noise_group("joint", NoiseKind::Joint, 4e-3, true);
-        p.joint_noise(turn, joint);
-        p.joint_noise(tilt, joint);
-        let marker = p.noise_group("marker", NoiseKind::Position, 2e-3, true);
-        let orientation = p.noise_group("orientation", NoiseKind::Orientation, 3e-3, true);
-        let position = p.noise_group("position", NoiseKind::Position, 1e-3, false);
-        let points = [
-            p.known_point("k", d, Point3::new(0.3, 0.1, 0.0)),
-            p.unknown_point("u", d, Point3::new(0.1, -0.2, 0.3), None),
-        ];
-        let seen = (0..2 * n as usize)
-            .map(|i| MarkerObservation {
-                sample: i / 2,
-                point: points[i % 2],
-                position: Point3::new((i as f64).sin(), (i as f64 * 1.7).cos(), 0.1),
-                shape: None,
-            })
-            .collect();
-        p.markers("hand", base, d, marker, seen);
-        let noise = PoseNoise::Split {
-            orientation,
-            position,
-        };
-        let poses = (0..n as usize)
-            .map(|sample| PoseObservation { sample, pose: x })
-            .collect();
-        p.poses("arm", base, b, noise, poses);
-        p
-    }
-
-    /// A model at its start, with the noise that was stated; every observation of its own weight.
-    struct Case {
-        model: Model,
-        values: Values,
-        weights: Vec<f64>,
-        theta: Vec<f64>,
-        work: Workspace,
-    }
-
-    impl Case {
-        fn new(weight: impl Fn(usize) -> f64) -> Self {
-            let model = Model::new(&problem()).unwrap();
-            let sigmas = model.problem.groups.iter().map(|g| g.sigma);
-            Self {
-                values: model.start(),
-                weights: (0..model.observation_count()).map(weight).collect(),
-                theta: sigmas.map(|s| s.powi(2)).collect(),
-                work: Workspace::new(&model),
-                model,
-            }
-        }
-
-        fn system(&mut self) -> NormalEquations {
-            let mut system = NormalEquations::new(self.model.free());
-            let (model, values, work) = (&self.model, &self.values, &mut self.work);
-            assert!(accumulate(
-                model,
-                values,
-                &self.weights,
-                &self.theta,
-                work,
-                &mut system
-            ));
-            system
-        }
-
-        /// Every sample in dense factors, at other variances than the stated ones.
-        fn dense(&mut self, theta: &[f64]) -> Vec<Whitened> {
-            let (model, values, work) = (&self.model, &self.values, &mut self.work);
-            work.cache.update(&model.problem, values);
-            (0..model.problem.samples)
-                .map(|s| whitened(model, values, &self.weights, theta, s, work).unwrap())
-                .collect()
-        }
-
-        /// Variances of which one is `factor` times what was stated.
-        fn scaled(&self, group: usize, factor: f64) -> Vec<f64> {
-            let mut theta = self.theta.clone();
-            theta[group] *= factor;
-            theta
-        }
-
-        /// Diagonal of the prior's information.
-        fn prior(&self, column: usize) -> f64 {
-            let sigma = self.model.problem.parameters[self.model.columns[column]].prior_sigma;
-            sigma.map_or(0.0, |s| 1.0 / (s * s))
-        }
-
-        /// −½ [ Σ log det V + log det H + Σ eᵀV⁻¹e ] by dense factors: what (2) is the gradient of at fixed values.
-        fn likelihood(&mut self, theta: &[f64]) -> f64 {
-            let n = self.model.free();
-            let mut h = DMatrix::from_fn(n, n, |i, j| if i == j { self.prior(i) } else { 0.0 });
-            let mut sum = 0.0;
-            for s in self.dense(theta) {
-                h += s.a.tr_mul(&s.a);
-                sum += s.log_det + s.w.norm_squared();
-            }
-            let cholesky = nalgebra::Cholesky::new(h).unwrap();
-            -0.5 * (sum + 2.0 * cholesky.l().diagonal().map(f64::ln).sum())
-        }
-    }
-
-    /// Groups of [`problem`] that are estimated: joint, marker, orientation.
-    const GROUPS: [usize; 3] = [0, 1, 2];
-
-    fn unequal_weights(observation: usize) -> f64 {
-        [1.0, 0.3, 2.0][observation % 3]
-    }
-
-    fn sums_of(case: &mut Case) -> Sums {
-        let (model, values) = (&case.model, &case.values);
-        sums(
-            model,
-            values,
-            &case.weights,
-            &case.theta,
-            &GROUPS,
-            &mut case.work,
-        )
-        .unwrap()
-    }
-
-    #[test]
-    fn the_score_is_the_gradient_of_the_restricted_likelihood() {
-        let mut case = Case::new(unequal_weights);
-        let system = case.system();
-        let c = covariance_of(&system).unwrap();
-        let sums = sums_of(&mut case);
-        // Position noise is stated here: it goes into the rest, and the sum is still all of H.
-        let own = sums.normal_equations(&case.model, &case.values);
-        let scale = system.h.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        for (a, b) in own.h.iter().zip(&system.h) {
-            assert!((a - b).abs() < 1e-10 * scale);
-        }
-        for (i, &g) in GROUPS.iter().enumerate() {
-            let taken = sums.moments[i].h.dot(&c);
-            let score = 0.5 * (sums.squares[i] - sums.traces[i] + taken);
-            const STEP: f64 = 1e-4;
-            let mut at = |step: f64| {
-                let theta = case.scaled(g, step.exp());
-                case.likelihood(&theta)
-            };
-            let slope = (at(STEP) - at(-STEP)) / (2.0 * STEP);
-            assert!(
-                (score - slope).abs() < 1e-5 * slope.abs().max(1.0),
-                "{g}: {score} {slope}"
-            );
-        }
-    }
-
-    /// The sums of (3) against dense factors: tr(V_g V⁻¹) and tr(V_g V⁻¹ V_h V⁻¹), in log θ.
-    #[test]
-    fn the_expected_information_is_that_of_dense_factors() {
-        let mut case = Case::new(unequal_weights);
-        let sums = sums_of(&mut case);
-        let at = case.dense(&case.theta.clone());
-        // B_g = L⁻¹ (∂V/∂log θ_g) L⁻ᵀ; V is linear in θ, so the difference to twice θ_g is the derivative.
-        let changes: Vec<Vec<DMatrix<f64>>> = GROUPS
-            .iter()
-            .map(|&g| {
-                let twice = case.dense(&case.scaled(g, 2.0));
-                let of_sample = |(s, twice): (&Whitened, &Whitened)| {
-                    let change = &twice.l * twice.l.transpose() - &s.l * s.l.transpose();
-                    &s.l_inverse * change * s.l_inverse.transpose()
-                };
-                at.iter().zip(&twice).map(of_sample).collect()
-            })
-            .collect();
-        for g in 0..GROUPS.len() {
-            let trace: f64 = changes[g].iter().map(DMatrix::trace).sum();
-            assert!((sums.traces[g] - trace).abs() < 1e-9 * trace, "{g}");
-            for h in 0..GROUPS.len() {
-                // tr(B_g B_h) of symmetric matrices
-                let pairs = changes[g].iter().zip(&changes[h]);
-                let dense: f64 = pairs.map(|(a, b)| a.dot(b)).sum();
-                let found = sums.products[(g, h)];
-                assert!(
-                    dense > 0.0,
-                    "groups {g} and {h} share no row: nothing is tested"
-                );
-                assert!(
-                    (found - dense).abs() < 1e-9 * dense,
-                    "{g} {h}: {found} {dense}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn dense_and_structured_whitening_give_the_same_normal_equations() {
-        let mut case = Case::new(|_| 0.7);
-        let system = case.system();
-        let n = case.model.free();
-        let (mut h, mut g, mut cost) = (DMatrix::zeros(n, n), DVector::zeros(n), 0.0);
-        for s in case.dense(&case.theta.clone()) {
-            h += s.a.tr_mul(&s.a);
-            g += s.a.tr_mul(&s.w);
-            cost += s.w.norm_squared();
-        }
-        let scale = h.amax();
-        for a in 0..n {
-            for b in a..n {
-                let prior = if a == b { case.prior(a) } else { 0.0 };
-                assert!((system.h[a * n + b] - prior - h[(a, b)]).abs() < 1e-11 * scale);
-            }
-            assert!((system.g[a] - g[a]).abs() < 1e-10 * g.amax());
-        }
-        assert!((system.data - cost).abs() < 1e-11 * cost);
-        // A step is judged by the V that proposed it.
-        let (model, values, work) = (&case.model, &case.values, &mut case.work);
-        let again = crate::solve::normal::cost(model, values, &case.weights, &case.theta, work);
-        assert!((again - system.cost()).abs() < 1e-11 * cost);
-    }
-}
+mod tests;

@@ -9,7 +9,8 @@ use crate::model::cache::EdgeCache;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
-use crate::solve::compressed::{Local, accumulate_compressed, cost_compressed};
+use crate::solve::compressed::{accumulate_compressed, cost_compressed};
+use crate::solve::panel::Local;
 use crate::solve::rows::SampleRows;
 use crate::solve::structured::RandomPart;
 

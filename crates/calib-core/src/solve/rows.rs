@@ -280,3 +280,25 @@ pub(crate) fn point_columns(model: &Model, rows: &Rows) -> Option<PointRows> {
 pub(crate) fn symmetric(a: &Matrix6<f64>) -> Matrix6<f64> {
     (a + a.transpose()) * 0.5
 }
+
+/// Lower Cholesky factor of the leading m × m block, in place.
+pub(crate) fn cholesky6(l: &mut [[f64; 6]; 6], m: usize) -> bool {
+    for i in 0..m {
+        for j in 0..=i {
+            // L_ij = (V_ij − Σ L_ik L_jk) / L_jj,   L_ii² = V_ii − Σ L_ik²
+            let mut sum = l[i][j];
+            for k in 0..j {
+                sum -= l[i][k] * l[j][k];
+            }
+            if i == j {
+                if !(sum > 0.0 && sum.is_finite()) {
+                    return false;
+                }
+                l[i][i] = sum.sqrt();
+            } else {
+                l[i][j] = sum / l[j][j];
+            }
+        }
+    }
+    true
+}

@@ -1,0 +1,233 @@
+use super::*;
+use crate::*;
+use nalgebra::{Isometry3, Point3, Vector3};
+
+/// Markers and a body pose behind two noisy joints; everything that can be wrong in a sum is different here.
+fn problem() -> Problem {
+    let n = 14;
+    let q = |a: f64| (0..n).map(|i| (f64::from(i) * a).sin()).collect::<Vec<_>>();
+    let mut p = Problem::new(n as usize);
+    let base = p.frame("base");
+    let a = p.frame("a");
+    let b = p.frame("b");
+    let c = p.frame("c");
+    let d = p.frame("d");
+    let x = Isometry3::new(Vector3::new(0.3, 0.1, 0.2), Vector3::new(0.2, -0.4, 0.5));
+    p.unknown("first", base, a, x, Chart::full());
+    let turn = p.joint("turn", a, b, Axis::Revolute(Vector3::z_axis()), q(0.9));
+    p.known("elbow", b, c, x);
+    let tilt = p.joint("tilt", c, d, Axis::Revolute(Vector3::x_axis()), q(0.53));
+    p.free_effect(turn, EffectKind::ZeroOffset, Some(0.1));
+    let joint = p.noise_group("joint", NoiseKind::Joint, 4e-3, true);
+    p.joint_noise(turn, joint);
+    p.joint_noise(tilt, joint);
+    let marker = p.noise_group("marker", NoiseKind::Position, 2e-3, true);
+    let orientation = p.noise_group("orientation", NoiseKind::Orientation, 3e-3, true);
+    let position = p.noise_group("position", NoiseKind::Position, 1e-3, false);
+    let points = [
+        p.known_point("k", d, Point3::new(0.3, 0.1, 0.0)),
+        p.unknown_point("u", d, Point3::new(0.1, -0.2, 0.3), None),
+    ];
+    let seen = (0..2 * n as usize)
+        .map(|i| MarkerObservation {
+            sample: i / 2,
+            point: points[i % 2],
+            position: Point3::new((i as f64).sin(), (i as f64 * 1.7).cos(), 0.1),
+            shape: None,
+        })
+        .collect();
+    p.markers("hand", base, d, marker, seen);
+    let noise = PoseNoise::Split {
+        orientation,
+        position,
+    };
+    let poses = (0..n as usize)
+        .map(|sample| PoseObservation { sample, pose: x })
+        .collect();
+    p.poses("arm", base, b, noise, poses);
+    p
+}
+
+/// A model at its start, with the noise that was stated; every observation of its own weight.
+struct Case {
+    model: Model,
+    values: Values,
+    weights: Vec<f64>,
+    theta: Vec<f64>,
+    work: Workspace,
+}
+
+impl Case {
+    fn new(weight: impl Fn(usize) -> f64) -> Self {
+        let model = Model::new(&problem()).unwrap();
+        let sigmas = model.problem.groups.iter().map(|g| g.sigma);
+        Self {
+            values: model.start(),
+            weights: (0..model.observation_count()).map(weight).collect(),
+            theta: sigmas.map(|s| s.powi(2)).collect(),
+            work: Workspace::new(&model),
+            model,
+        }
+    }
+
+    fn system(&mut self) -> NormalEquations {
+        let mut system = NormalEquations::new(self.model.free());
+        let (model, values, work) = (&self.model, &self.values, &mut self.work);
+        assert!(accumulate(
+            model,
+            values,
+            &self.weights,
+            &self.theta,
+            work,
+            &mut system
+        ));
+        system
+    }
+
+    /// Every sample in dense factors, at other variances than the stated ones.
+    fn dense(&mut self, theta: &[f64]) -> Vec<Whitened> {
+        let (model, values, work) = (&self.model, &self.values, &mut self.work);
+        work.cache.update(&model.problem, values);
+        (0..model.problem.samples)
+            .map(|s| whitened(model, values, &self.weights, theta, s, work).unwrap())
+            .collect()
+    }
+
+    /// Variances of which one is `factor` times what was stated.
+    fn scaled(&self, group: usize, factor: f64) -> Vec<f64> {
+        let mut theta = self.theta.clone();
+        theta[group] *= factor;
+        theta
+    }
+
+    /// Diagonal of the prior's information.
+    fn prior(&self, column: usize) -> f64 {
+        let sigma = self.model.problem.parameters[self.model.columns[column]].prior_sigma;
+        sigma.map_or(0.0, |s| 1.0 / (s * s))
+    }
+
+    /// −½ [ Σ log det V + log det H + Σ eᵀV⁻¹e ] by dense factors: what (2) is the gradient of at fixed values.
+    fn likelihood(&mut self, theta: &[f64]) -> f64 {
+        let n = self.model.free();
+        let mut h = DMatrix::from_fn(n, n, |i, j| if i == j { self.prior(i) } else { 0.0 });
+        let mut sum = 0.0;
+        for s in self.dense(theta) {
+            h += s.a.tr_mul(&s.a);
+            sum += s.log_det + s.w.norm_squared();
+        }
+        let cholesky = nalgebra::Cholesky::new(h).unwrap();
+        -0.5 * (sum + 2.0 * cholesky.l().diagonal().map(f64::ln).sum())
+    }
+}
+
+/// Groups of [`problem`] that are estimated: joint, marker, orientation.
+const GROUPS: [usize; 3] = [0, 1, 2];
+
+fn unequal_weights(observation: usize) -> f64 {
+    [1.0, 0.3, 2.0][observation % 3]
+}
+
+fn sums_of(case: &mut Case) -> Sums {
+    let (model, values) = (&case.model, &case.values);
+    sums(
+        model,
+        values,
+        &case.weights,
+        &case.theta,
+        &GROUPS,
+        &mut case.work,
+    )
+    .unwrap()
+}
+
+#[test]
+fn the_score_is_the_gradient_of_the_restricted_likelihood() {
+    let mut case = Case::new(unequal_weights);
+    let system = case.system();
+    let c = covariance_of(&system).unwrap();
+    let sums = sums_of(&mut case);
+    // Position noise is stated here: it goes into the rest, and the sum is still all of H.
+    let own = sums.normal_equations(&case.model, &case.values);
+    let scale = system.h.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    for (a, b) in own.h.iter().zip(&system.h) {
+        assert!((a - b).abs() < 1e-10 * scale);
+    }
+    for (i, &g) in GROUPS.iter().enumerate() {
+        let taken = sums.moments[i].h.dot(&c);
+        let score = 0.5 * (sums.squares[i] - sums.traces[i] + taken);
+        const STEP: f64 = 1e-4;
+        let mut at = |step: f64| {
+            let theta = case.scaled(g, step.exp());
+            case.likelihood(&theta)
+        };
+        let slope = (at(STEP) - at(-STEP)) / (2.0 * STEP);
+        assert!(
+            (score - slope).abs() < 1e-5 * slope.abs().max(1.0),
+            "{g}: {score} {slope}"
+        );
+    }
+}
+
+/// The sums of (3) against dense factors: tr(V_g V⁻¹) and tr(V_g V⁻¹ V_h V⁻¹), in log θ.
+#[test]
+fn the_expected_information_is_that_of_dense_factors() {
+    let mut case = Case::new(unequal_weights);
+    let sums = sums_of(&mut case);
+    let at = case.dense(&case.theta.clone());
+    // B_g = L⁻¹ (∂V/∂log θ_g) L⁻ᵀ; V is linear in θ, so the difference to twice θ_g is the derivative.
+    let changes: Vec<Vec<DMatrix<f64>>> = GROUPS
+        .iter()
+        .map(|&g| {
+            let twice = case.dense(&case.scaled(g, 2.0));
+            let of_sample = |(s, twice): (&Whitened, &Whitened)| {
+                let change = &twice.l * twice.l.transpose() - &s.l * s.l.transpose();
+                &s.l_inverse * change * s.l_inverse.transpose()
+            };
+            at.iter().zip(&twice).map(of_sample).collect()
+        })
+        .collect();
+    for g in 0..GROUPS.len() {
+        let trace: f64 = changes[g].iter().map(DMatrix::trace).sum();
+        assert!((sums.traces[g] - trace).abs() < 1e-9 * trace, "{g}");
+        for h in 0..GROUPS.len() {
+            // tr(B_g B_h) of symmetric matrices
+            let pairs = changes[g].iter().zip(&changes[h]);
+            let dense: f64 = pairs.map(|(a, b)| a.dot(b)).sum();
+            let found = sums.products[(g, h)];
+            assert!(
+                dense > 0.0,
+                "groups {g} and {h} share no row: nothing is tested"
+            );
+            assert!(
+                (found - dense).abs() < 1e-9 * dense,
+                "{g} {h}: {found} {dense}"
+            );
+        }
+    }
+}
+
+#[test]
+fn dense_and_structured_whitening_give_the_same_normal_equations() {
+    let mut case = Case::new(|_| 0.7);
+    let system = case.system();
+    let n = case.model.free();
+    let (mut h, mut g, mut cost) = (DMatrix::zeros(n, n), DVector::zeros(n), 0.0);
+    for s in case.dense(&case.theta.clone()) {
+        h += s.a.tr_mul(&s.a);
+        g += s.a.tr_mul(&s.w);
+        cost += s.w.norm_squared();
+    }
+    let scale = h.amax();
+    for a in 0..n {
+        for b in a..n {
+            let prior = if a == b { case.prior(a) } else { 0.0 };
+            assert!((system.h[a * n + b] - prior - h[(a, b)]).abs() < 1e-11 * scale);
+        }
+        assert!((system.g[a] - g[a]).abs() < 1e-10 * g.amax());
+    }
+    assert!((system.data - cost).abs() < 1e-11 * cost);
+    // A step is judged by the V that proposed it.
+    let (model, values, work) = (&case.model, &case.values, &mut case.work);
+    let again = crate::solve::normal::cost(model, values, &case.weights, &case.theta, work);
+    assert!((again - system.cost()).abs() < 1e-11 * cost);
+}
