@@ -49,7 +49,7 @@ fn six_r_with_1000_poses(c: &mut Criterion) {
         &theta,
         &MinimizeSettings::default(),
     );
-    println!("{:?} after {} linearisations", fit.status, fit.iterations);
+    println!("{:?} after {} linearizations", fit.status, fit.iterations);
     best_of("full solve", 400, || {
         std::hint::black_box(minimize(
             &model,
@@ -59,12 +59,10 @@ fn six_r_with_1000_poses(c: &mut Criterion) {
             &MinimizeSettings::default(),
         ));
     });
-    best_of("one linearisation and one cost", 400, || {
-        let once = MinimizeSettings {
-            max_iterations: 0,
-            decrement: 1e300,
-            ..MinimizeSettings::default()
-        };
+    best_of("one linearization and one cost", 400, || {
+        let mut once = MinimizeSettings::default();
+        once.max_iterations = 0;
+        once.decrement = 1e300;
         std::hint::black_box(minimize(&model, &start, &weights, &theta, &once));
     });
     c.bench_function("full solve, 1000 poses x 4 markers", |b| {
@@ -78,12 +76,10 @@ fn six_r_with_1000_poses(c: &mut Criterion) {
             )
         });
     });
-    let once = MinimizeSettings {
-        max_iterations: 1,
-        ..MinimizeSettings::default()
-    };
+    let mut once = MinimizeSettings::default();
+    once.max_iterations = 1;
     c.bench_function(
-        "one linearisation and one cost, 1000 poses x 4 markers",
+        "one linearization and one cost, 1000 poses x 4 markers",
         |b| {
             b.iter(|| minimize(&model, &start, &weights, &theta, &once));
         },

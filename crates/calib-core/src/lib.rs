@@ -133,20 +133,21 @@ pub use nalgebra;
 
 pub use analysis::closure::{ClosureStatistics, Spread};
 pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};
+pub use analysis::estimate::{Settings, solve};
 pub use analysis::folds::{folds, k_fold};
+pub use analysis::gauge::Gauge;
 pub use analysis::goodness::{GoodnessOfFit, ScoreTest};
 pub use analysis::information::{Information, NULL_TOLERANCE};
-pub use analysis::observability::{Direction, Gauge, Observability, Term};
-pub use analysis::solution::{
-    NoiseEstimate, ParameterClass, ParameterEstimate, Settings, Solution, solve,
-};
+pub use analysis::observability::{Direction, Observability, Term};
+pub use analysis::sandwich::sandwich;
+pub use analysis::solution::{NoiseEstimate, ParameterClass, ParameterEstimate, Solution};
 pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
 pub use graph::baseline::Baseline;
 pub use graph::chart::Chart;
 pub use graph::edge::{Axis, Candidate, Edge, EdgeKind, Joint, JointEffect, Role, UnknownPose};
 pub use graph::effect::{self, EFFECTS, Effect, EffectKind, JointState};
 pub use graph::error::Error;
-pub use graph::ids::{EdgeId, FrameId, GroupId, ParameterId, PointId};
+pub use graph::ids::{EdgeId, FrameId, GroupId, MeasurementId, ParameterId, PointId};
 pub use graph::measurement::{
     self, DirectionObservation, MarkerObservation, Measurement, MeasurementKind, PoseNoise,
     PoseObservation,
@@ -161,8 +162,7 @@ pub use model::layout::Model;
 pub use model::values::Values;
 pub use model::walk::MIN_JOINT_RANGE;
 pub use solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize};
-pub use solve::noise::sandwich;
-pub use solve::relabel::{Relabelled, relabel};
+pub use solve::relabel::{Relabeled, relabel};
 pub use solve::robust::{RejectReason, Rejection, RobustSettings};
 
 /// The README's example is a test.

@@ -259,14 +259,8 @@ fn problem(postures: &[Posture], level: Level) -> Problem {
 }
 
 fn settings() -> Settings {
-    Settings {
-        // The published errors count every posture.
-        robust: RobustSettings {
-            enabled: false,
-            ..RobustSettings::default()
-        },
-        ..Settings::default()
-    }
+    // The published errors count every posture.
+    Settings::default().with_robust(RobustSettings::off())
 }
 
 #[test]

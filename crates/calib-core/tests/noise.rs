@@ -126,6 +126,9 @@ fn both_levels_are_found() {
     }
     let ratio = d.solution.chi2 / d.solution.degrees_of_freedom;
     assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+    // Each group counts its own samples: kept markers, and readings of the six joints at every posture.
+    let kept = d.solution.weights.iter().filter(|w| **w > 0.0).count();
+    assert_eq!([noise[0].samples, noise[1].samples], [kept, 120 * 6]);
 }
 
 #[test]

@@ -102,13 +102,7 @@ fn median(mut x: Vec<f64>) -> f64 {
 }
 
 fn medians(free: &Free, spoil: impl Fn(&mut Handles, &mut rand_chacha::ChaCha8Rng)) -> (f64, f64) {
-    let plain = Settings {
-        robust: RobustSettings {
-            enabled: false,
-            ..RobustSettings::default()
-        },
-        ..Settings::default()
-    };
+    let plain = Settings::default().with_robust(RobustSettings::off());
     let mut errors = (Vec::new(), Vec::new());
     for seed in 0..7 {
         let mut c = case_with(seed, 36, free);

@@ -244,13 +244,7 @@ fn tiago_frozen() {
         return;
     };
     assert_eq!((train.len(), test.len()), (37, 62));
-    let settings = Settings {
-        robust: RobustSettings {
-            enabled: false,
-            ..RobustSettings::default()
-        },
-        ..Settings::default()
-    };
+    let settings = Settings::default().with_robust(RobustSettings::off());
     let base = Variant::default();
     let variants = [
         ("registration", base),

@@ -103,12 +103,7 @@ pub fn run_on(
     progress("verify");
     let tracks = &checked.tracks;
     let (robot, fit) = (&solved.robot, solved.fit.as_ref());
-    let loops = close_loops(
-        &inputs,
-        tracks,
-        &solved.body_from_origin(&inputs),
-        &solved.fk,
-    );
+    let loops = close_loops(&inputs, tracks, &solved.body_from_origin(), &solved.fk);
     let held_out = held_out::held_out(
         &inputs,
         tracks,

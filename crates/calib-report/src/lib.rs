@@ -57,8 +57,8 @@ pub use read::{NotAReport, REPORT, read_report, report_path};
 pub use report::{FormatVersion, Limit, Method, Outcome, Report, Verdict, judge};
 pub use residuals::{JointResiduals, ResidualBin, ResidualGroup, ResidualRow, Residuals};
 pub use results::{
-    Change, Class, DataInformation, EstimatorResult, Meaning, NotObservable, Parameter, Quantity,
-    Status, Term, Transform, Unobservable,
+    Cause, Change, Class, DataInformation, EstimatorResult, Meaning, NotObservable, Parameter,
+    Quantity, Status, Term, Transform, Unobservable,
 };
 pub use scene::Scene;
 pub use schema::{report_schema, scene_schema};

@@ -91,7 +91,7 @@ pub struct Report {
     /// Commands that revert it.
     #[serde(default)]
     pub undo: Vec<String>,
-    /// The seed of everything random.
+    /// The seed of everything random; 0: nothing was random.
     #[serde(default)]
     pub seed: u64,
     /// The information of the data alone about the parameters, for `calib drift`. Null with `method: paper`.

@@ -40,6 +40,9 @@ impl ResidualRow {
 pub struct Residuals {
     /// Over all.
     pub all: Option<ResidualGroup>,
+    /// Observations that did not take part in the fit; no error below counts them.
+    #[serde(default)]
+    pub rejected: usize,
     /// Per marker or body, by name.
     pub by_marker: Vec<ResidualGroup>,
     /// Along the tracker's x, y, z: `mean_m` is the signed mean, the others are of magnitudes.
@@ -57,6 +60,9 @@ pub struct ResidualGroup {
     pub name: String,
     /// Observations.
     pub samples: usize,
+    /// Observations that did not take part in the fit; the errors do not count them.
+    #[serde(default)]
+    pub rejected: usize,
     /// Mean length; the signed mean for a direction.
     pub mean_m: f64,
     /// Root of the mean square.
@@ -100,13 +106,13 @@ const BINS: usize = 24;
 type At<'a> = (f64, &'a ResidualRow);
 
 impl Residuals {
-    /// Summarize the rows that took part in the fit; rows with non-finite values are skipped.
+    /// Summarize the rows that took part in the fit and count the others; rows with non-finite values are excluded.
     #[must_use]
     pub fn from_rows(rows: &[ResidualRow]) -> Self {
-        let used: Vec<&ResidualRow> = rows
-            .iter()
-            .filter(|row| row.used && row.residual_m.iter().all(|x| x.is_finite()))
-            .collect();
+        let finite = |row: &&ResidualRow| row.residual_m.iter().all(|x| x.is_finite());
+        let (used, rejected): (Vec<&ResidualRow>, Vec<_>) =
+            rows.iter().filter(finite).partition(|row| row.used);
+        let rejected_of = |name: &str| rejected.iter().filter(|row| row.subject == name).count();
         let lengths: Vec<f64> = used.iter().map(|row| row.length_m()).collect();
         let mut by_marker: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
         let mut by_joint: BTreeMap<&str, (Unit, Vec<At<'_>>)> = BTreeMap::new();
@@ -139,13 +145,25 @@ impl Residuals {
             let components: Vec<f64> = used.iter().map(|row| row.residual_m[i]).collect();
             let magnitudes: Vec<f64> = components.iter().map(|x| x.abs()).collect();
             let mean_m = components.iter().sum::<f64>() / components.len().max(1) as f64;
-            ResidualGroup::of(name, &magnitudes).map(|group| ResidualGroup { mean_m, ..group })
+            ResidualGroup::of(name, &magnitudes).map(|group| ResidualGroup {
+                mean_m,
+                rejected: rejected.len(),
+                ..group
+            })
         };
         Self {
-            all: ResidualGroup::of("all", &lengths),
+            all: ResidualGroup::of("all", &lengths).map(|group| ResidualGroup {
+                rejected: rejected.len(),
+                ..group
+            }),
+            rejected: rejected.len(),
             by_marker: by_marker
                 .into_iter()
-                .filter_map(|(name, lengths)| ResidualGroup::of(name, &lengths))
+                .filter_map(|(name, lengths)| {
+                    let rejected = rejected_of(name);
+                    let group = ResidualGroup::of(name, &lengths)?;
+                    Some(ResidualGroup { rejected, ..group })
+                })
                 .collect(),
             by_direction: ["x", "y", "z"]
                 .iter()
@@ -186,6 +204,7 @@ impl ResidualGroup {
         Some(Self {
             name: name.into(),
             samples: sorted.len(),
+            rejected: 0,
             mean_m: stats.mean,
             rms_m: stats.rms,
             p95_m,
@@ -304,6 +323,29 @@ mod tests {
         assert!((residuals.all.expect("rows").rms_m - 0.003).abs() < 1e-15);
         let bin = residuals.by_joint[0].bins[3];
         assert!((bin.mean_m[2] - 0.002).abs() < 1e-15);
+    }
+
+    #[test]
+    fn rejected_rows_are_counted_beside_the_errors_that_exclude_them() {
+        let rejected = ResidualRow {
+            used: false,
+            ..row("a", 0.5, [1.0; 3])
+        };
+        let residuals = Residuals::from_rows(&[
+            row("a", 0.1, [0.001; 3]),
+            rejected,
+            row("b", 0.2, [0.001; 3]),
+        ]);
+        assert_eq!(residuals.rejected, 1);
+        let all = residuals.all.expect("two rows took part");
+        assert_eq!((all.samples, all.rejected), (2, 1));
+        assert!(all.max_m < 0.002);
+        let counts: Vec<_> = residuals
+            .by_marker
+            .iter()
+            .map(|g| (g.samples, g.rejected))
+            .collect();
+        assert_eq!(counts, [(1, 1), (1, 0)]);
     }
 
     #[test]

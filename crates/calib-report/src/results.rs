@@ -106,7 +106,7 @@ pub enum Status {
 pub struct Unobservable {
     /// Unit twist [ω; v] in axes of the child.
     pub direction: [f64; 6],
-    /// In words: "translation along the axis of wrist_roll".
+    /// In words: "the rotation about its z axis is not observable; the value comes from the prior".
     pub text: String,
     /// What to record or to choose: an imperative sentence.
     pub remedy: String,
@@ -132,17 +132,62 @@ pub enum Meaning {
     NotMeasured,
 }
 
+/// Why a combination of parameters is not observable. The words are made in `words/observability.rs`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Cause {
+    /// No measurement depends on the parameter.
+    NotMeasured,
+    /// The joint did not move in the fitted recordings.
+    JointNotMoved,
+    /// The robot's base frame can be placed anywhere on the robot.
+    WorldAgainstBase,
+    /// A joint offset and the rotation of the joint's own origin about its axis.
+    OffsetAgainstOwnOrigin,
+    /// A joint offset and the rotation of the next frame about the joint axis.
+    OffsetAgainstNeighbor,
+    /// Translations of two origins along one axis.
+    TranslationAlongAxis,
+    /// Rotations of two origins about one axis.
+    RotationAboutAxis,
+    /// Translations along parallel axes.
+    ParallelAxes,
+    /// Offsets of joints whose axes coincide in every pose.
+    CollinearAxes,
+    /// The last joint's origin and the mount of the body behind it.
+    ToolAgainstLastOrigin,
+    /// The orientation of a body of which too few points are observed.
+    PointOnlyTool,
+    /// The markers of a body and the frame that only they define.
+    MarkersAgainstMount,
+    /// The tracker's pose and the mount of a body, with too few axes moved between them.
+    WorldAgainstTool,
+    /// A gain and a length.
+    Scale,
+    /// A contact and what it touches.
+    TableAgainstContact,
+    /// A combination without a name.
+    Combination,
+    /// Not stated: a report of an earlier version.
+    #[default]
+    Unstated,
+}
+
 /// A combination of parameters that is not observable.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NotObservable {
     /// What it means for the user.
     #[serde(default)]
     pub meaning: Meaning,
-    /// The joint, origin or pair of them.
+    /// Why.
+    #[serde(default)]
+    pub cause: Cause,
+    /// The parameter with the largest share, or the joint.
     pub subject: String,
     /// The direction in parameter space.
     pub direction: Vec<Term>,
-    /// In words: "`shoulder.z` is confounded with `elbow.z`: parallel axes".
+    /// In words: "`shoulder.z` is confounded with `elbow.z`: the joint axes are parallel".
     pub text: String,
     /// What to record or to choose: an imperative sentence.
     pub remedy: String,

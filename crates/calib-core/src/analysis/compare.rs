@@ -12,9 +12,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::analysis::solution::{Settings, Solution, solve};
+use crate::analysis::estimate::{Settings, solve};
+use crate::analysis::solution::Solution;
 use crate::analysis::validate::{CrossValidation, SamplePrediction};
 use crate::graph::error::Error;
+use crate::graph::ids::{MeasurementId, ParameterId};
 use crate::graph::problem::Problem;
 
 /// By what variants are ranked.
@@ -43,8 +45,8 @@ pub struct RankedVariant {
     pub worse_by: f64,
     /// Standard error of `worse_by`.
     pub standard_error: f64,
-    /// Parameters that differ from nominal by less than two of their σ: noise, as far as one can tell.
-    pub noise_parameters: Vec<String>,
+    /// Parameters that are not significantly different from nominal (< 2 σ).
+    pub noise_parameters: Vec<ParameterId>,
     /// The rule's choice.
     pub chosen: bool,
 }
@@ -144,31 +146,27 @@ pub fn compare_with(
 /// (sample, measurement, item) that every variant kept and could predict.
 fn common_vectors(
     solved: &[(&String, Solution, CrossValidation)],
-) -> std::collections::BTreeSet<(usize, String, usize)> {
+) -> std::collections::BTreeSet<(usize, MeasurementId, usize)> {
     let mut sets = solved.iter().map(|(_, _, loo)| {
         loo.samples
             .iter()
-            .flat_map(|s| {
-                s.vectors
-                    .iter()
-                    .map(|v| (s.sample, v.measurement.clone(), v.item))
-            })
+            .flat_map(|s| s.vectors.iter().map(|v| (s.sample, v.measurement, v.item)))
             .collect::<std::collections::BTreeSet<_>>()
     });
     let first = sets.next().unwrap_or_default();
-    sets.fold(first, |a, b| a.intersection(&b).cloned().collect())
+    sets.fold(first, |a, b| a.intersection(&b).copied().collect())
 }
 
 /// Mean squared position error (rotation where there is none) per sample.
 fn sample_scores(
     loo: &CrossValidation,
-    common: &std::collections::BTreeSet<(usize, String, usize)>,
+    common: &std::collections::BTreeSet<(usize, MeasurementId, usize)>,
 ) -> Vec<f64> {
     let score = |s: &SamplePrediction| {
         let squares: Vec<f64> = s
             .vectors
             .iter()
-            .filter(|v| common.contains(&(s.sample, v.measurement.clone(), v.item)))
+            .filter(|v| common.contains(&(s.sample, v.measurement, v.item)))
             .map(|v| v.position.or(v.rotation).unwrap_or(0.0).powi(2))
             .collect();
         (!squares.is_empty()).then(|| squares.iter().sum::<f64>() / squares.len() as f64)
@@ -176,7 +174,7 @@ fn sample_scores(
     loo.samples.iter().filter_map(score).collect()
 }
 
-fn noise_parameters(solution: &Solution) -> Vec<String> {
+fn noise_parameters(solution: &Solution) -> Vec<ParameterId> {
     /// Two σ: one parameter in twenty looks like more by chance.
     const NOISE: f64 = 2.0;
     solution
@@ -187,6 +185,6 @@ fn noise_parameters(solution: &Solution) -> Vec<String> {
                 && p.sigma
                     .is_some_and(|s| (p.value - p.nominal).abs() < NOISE * s)
         })
-        .map(|p| p.name.clone())
+        .map(|p| p.id)
         .collect()
 }

@@ -19,9 +19,9 @@ use crate::analysis::solution::Solution;
 use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{EFFECTS, EffectKind, Source};
 use crate::model::layout::Model;
-use crate::solve::noise::{Whitened, covariance_of, whitened};
 use crate::solve::normal::{NormalEquations, Workspace, accumulate};
 use crate::solve::rows::{dot, residual};
+use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
 /// One effect that was tested.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

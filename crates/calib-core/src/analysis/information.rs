@@ -108,6 +108,7 @@ impl StreamedQr {
 
 /// Spectrum and covariance at a solution.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Information {
     /// S of equation (1): one length unit per free parameter.
     pub scale: DVector<f64>,
@@ -215,6 +216,19 @@ impl Information {
             indeterminate: posterior.v.columns(known, n - known).into_owned(),
             r,
         }
+    }
+
+    /// tr(C JᵀV⁻¹J): how many parameters the data determined.
+    pub(crate) fn effective_parameters(&self) -> f64 {
+        // A = Q R carries S, C carries S on both sides: tr(R S⁻¹ C S⁻¹ Rᵀ)
+        let n = self.scale.len();
+        let mut unscaled = self.covariance.clone();
+        for i in 0..n {
+            for j in 0..n {
+                unscaled[(i, j)] /= self.scale[i] * self.scale[j];
+            }
+        }
+        (&self.r * unscaled).dot(&self.r)
     }
 
     /// Directions that the data do not see at all, columns in units of `scale`.

@@ -2,9 +2,12 @@
 
 pub(crate) mod closure;
 pub(crate) mod compare;
+pub(crate) mod estimate;
 pub(crate) mod folds;
+pub(crate) mod gauge;
 pub(crate) mod goodness;
 pub(crate) mod information;
 pub(crate) mod observability;
+pub(crate) mod sandwich;
 pub(crate) mod solution;
 pub(crate) mod validate;

@@ -12,9 +12,10 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::analysis::solution::Solution;
+use crate::graph::ids::MeasurementId;
 use crate::model::layout::Model;
-use crate::solve::noise::{covariance_of, whitened};
 use crate::solve::normal::{NormalEquations, Workspace, accumulate};
+use crate::solve::whitened::{covariance_of, whitened};
 
 /// Prediction of one sample from the others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -35,7 +36,7 @@ pub struct SamplePrediction {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct VectorError {
     /// Measurement.
-    pub measurement: String,
+    pub measurement: MeasurementId,
     /// Index within the measurement.
     pub item: usize,
     /// Norm of the position part, m (`None` for measurements without one).
@@ -238,7 +239,7 @@ fn vector_error(
         .map_or(f64::INFINITY, |y| y.norm());
     let deviation = measurement.kind.of().deviation(error.as_slice());
     VectorError {
-        measurement: measurement.name.clone(),
+        measurement: MeasurementId::of(o.measurement),
         item: o.item,
         position: deviation.position,
         rotation: deviation.rotation,

@@ -40,3 +40,7 @@ id!(
     /// A noise level that several measurements share.
     GroupId
 );
+id!(
+    /// A measurement: one kind of observation along one path.
+    MeasurementId
+);

@@ -6,7 +6,7 @@ use nalgebra::Isometry3;
 
 use crate::graph::edge::EdgeKind;
 use crate::graph::error::Error;
-use crate::graph::ids::{EdgeId, FrameId};
+use crate::graph::ids::{EdgeId, FrameId, MeasurementId};
 use crate::graph::problem::Problem;
 use crate::model::cache::{Trig, tabulate};
 use crate::model::path::CompiledPath;
@@ -196,10 +196,10 @@ impl Model {
     /// (measurement, sample, index within the measurement) of observations whose path has a measured edge that was
     /// lost at their sample.
     #[must_use]
-    pub fn lost(&self) -> Vec<(String, usize, usize)> {
+    pub fn lost(&self) -> Vec<(MeasurementId, usize, usize)> {
         self.lost
             .iter()
-            .map(|&(h, sample, item)| (self.problem.measurements[h].name.clone(), sample, item))
+            .map(|&(m, sample, item)| (MeasurementId::of(m), sample, item))
             .collect()
     }
 

@@ -26,65 +26,31 @@ pub(crate) fn bounded_step(
     step: &mut [f64],
 ) -> bool {
     let n = system.n;
-    let room: Vec<Option<(f64, f64)>> = model
-        .columns
-        .iter()
+    let parameters = &model.problem.parameters;
+    let columns = model.columns.iter();
+    // lower − x, upper − x
+    let room: Vec<Option<(f64, f64)>> = columns
         .map(|&p| {
-            let x = values.0[p];
-            model.problem.parameters[p]
-                .bounds
-                .map(|(lower, upper)| (lower - x, upper - x))
+            let bounds = parameters[p].bounds;
+            bounds.map(|(lower, upper)| (lower - values.0[p], upper - values.0[p]))
         })
         .collect();
     let inside = |c: usize, d: f64| room[c].is_none_or(|(l, u)| l <= d && d <= u);
     if (0..n).all(|c| inside(c, step[c])) {
         return true;
     }
-    // Scaled unknowns z = δ √H_ii keep the program well conditioned.
-    let scale: Vec<f64> = (0..n)
-        .map(|i| {
-            let d = system.h[i * n + i];
-            if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 }
-        })
-        .collect();
-    let quadratic = quadratic(system, curvature, natural, damping, &scale);
-    let linear: Vec<f64> = (0..n).map(|i| system.g[i] * scale[i]).collect();
-    let (a, b, walls) = walls(&room, &scale);
-    let triangle = CscMatrix::from(&quadratic).to_triu();
-    let a = CscMatrix::from(&a);
-    let cones = [NonnegativeConeT(b.len())];
-    let Ok(settings) = DefaultSettingsBuilder::default()
-        .verbose(false)
-        .tol_gap_abs(1e-12)
-        .tol_gap_rel(1e-12)
-        .tol_feas(1e-12)
-        .build()
-    else {
+    let program = Program::new(system, curvature, natural, damping);
+    let walls = walls(&room);
+    let Some((z, pressed)) = program.interior_point(&walls) else {
         return false;
     };
-    let Ok(mut solver) = DefaultSolver::new(&triangle, &linear, &a, &b, &cones, settings) else {
-        return false;
-    };
-    solver.solve();
-    if !matches!(
-        solver.solution.status,
-        SolverStatus::Solved | SolverStatus::AlmostSolved | SolverStatus::InsufficientProgress
-    ) {
-        return false;
-    }
     for c in 0..n {
-        let d = solver.solution.x[c] * scale[c];
+        let d = z[c] * program.scale[c];
         step[c] = room[c].map_or(d, |(lower, upper)| d.clamp(lower, upper));
     }
-    // The interior point stops a hair off the walls. Which of them press is all that is taken from it where the rest
-    // can be solved exactly: otherwise a strong gradient against a wall would hide that the minimum is reached.
-    let mut pressed = vec![None; n];
-    for (k, &(c, wall)) in walls.iter().enumerate() {
-        if solver.solution.z[k] > solver.solution.s[k] {
-            pressed[c] = Some(wall);
-        }
-    }
-    if let Some(exact) = exact_step(&quadratic, &linear, &scale, &pressed)
+    // The interior point stops slightly short of the walls. Only the set of active walls is taken from it where the
+    // rest can be solved exactly: otherwise a strong gradient against a wall would hide that the minimum is reached.
+    if let Some(exact) = program.exact_step(&pressed)
         && (0..n).all(|c| inside(c, exact[c]))
     {
         step.copy_from_slice(&exact);
@@ -92,86 +58,137 @@ pub(crate) fn bounded_step(
     step.iter().all(|x| x.is_finite())
 }
 
-/// The matrix of (1) in the scaled unknowns.
-///
-/// ```text
-/// Q_ij = (H_ij + S_ij) s_i s_j,   Q_ii += λ N_i s_i²
-/// ```
-fn quadratic(
-    system: &NormalEquations,
-    curvature: Option<&[f64]>,
-    natural: &[f64],
-    damping: f64,
-    scale: &[f64],
-) -> Vec<Vec<f64>> {
-    let n = system.n;
-    let mut quadratic = vec![vec![0.0; n]; n];
-    for i in 0..n {
-        for j in 0..=i {
-            let more = curvature.map_or(0.0, |s| s[i * n + j]);
-            let h = (system.h[j * n + i] + more) * scale[i] * scale[j];
-            quadratic[i][j] = h;
-            quadratic[j][i] = h;
-        }
-        // A direction that nothing sees is held at 0.
-        quadratic[i][i] = if system.h[i * n + i] > 0.0 {
-            quadratic[i][i] + 1e-10 + damping * natural[i] * scale[i] * scale[i]
-        } else {
-            1.0
-        };
-    }
-    quadratic
+/// A finite bound on a step: its coordinate, +1 for an upper and −1 for a lower one, the largest step towards it.
+struct Wall {
+    column: usize,
+    side: f64,
+    at: f64,
 }
 
-/// The walls `A z ≤ b` in the scaled unknowns, and the column and place of each.
-#[expect(clippy::type_complexity, reason = "three lists, one entry per wall")]
-fn walls(
-    room: &[Option<(f64, f64)>],
-    scale: &[f64],
-) -> (Vec<Vec<f64>>, Vec<f64>, Vec<(usize, f64)>) {
-    let (mut a, mut b, mut walls) = (Vec::new(), Vec::new(), Vec::new());
-    for (c, limits) in room.iter().enumerate() {
-        let Some((lower, upper)) = limits else {
-            continue;
-        };
-        for (wall, side) in [(*upper, 1.0), (*lower, -1.0)] {
-            if wall.is_finite() {
-                let mut row = vec![0.0; room.len()];
-                row[c] = side;
-                a.push(row);
-                b.push(side * wall / scale[c]);
-                walls.push((c, wall));
+fn walls(room: &[Option<(f64, f64)>]) -> Vec<Wall> {
+    let of = |(column, limits): (usize, &Option<(f64, f64)>)| {
+        let (lower, upper) = limits.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        [(1.0, upper), (-1.0, lower)].map(|(side, at)| Wall { column, side, at })
+    };
+    let walls = room.iter().enumerate().flat_map(of);
+    walls.filter(|w| w.at.is_finite()).collect()
+}
+
+/// Equation (1) in scaled unknowns z = δ √H_ii, which keep the program well conditioned.
+struct Program {
+    /// 1/√H_ii
+    scale: Vec<f64>,
+    quadratic: Vec<Vec<f64>>,
+    linear: Vec<f64>,
+}
+
+impl Program {
+    fn new(
+        system: &NormalEquations,
+        curvature: Option<&[f64]>,
+        natural: &[f64],
+        damping: f64,
+    ) -> Self {
+        let n = system.n;
+        let scale: Vec<f64> = (0..n)
+            .map(|i| {
+                let d = system.h[i * n + i];
+                if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 }
+            })
+            .collect();
+        let mut quadratic = vec![vec![0.0; n]; n];
+        for i in 0..n {
+            for j in 0..=i {
+                let more = curvature.map_or(0.0, |s| s[i * n + j]);
+                let h = (system.h[j * n + i] + more) * scale[i] * scale[j];
+                quadratic[i][j] = h;
+                quadratic[j][i] = h;
+            }
+            // A direction that nothing determines is held at 0.
+            quadratic[i][i] = if system.h[i * n + i] > 0.0 {
+                quadratic[i][i] + 1e-10 + damping * natural[i] * scale[i] * scale[i]
+            } else {
+                1.0
+            };
+        }
+        let linear = (0..n).map(|i| system.g[i] * scale[i]).collect();
+        Self {
+            scale,
+            quadratic,
+            linear,
+        }
+    }
+
+    /// z, and per coordinate the wall that is active; `None` when the solver fails.
+    fn interior_point(&self, walls: &[Wall]) -> Option<(Vec<f64>, Vec<Option<f64>>)> {
+        let n = self.linear.len();
+        // ±z_c ≤ ±wall/scale_c
+        let rows: Vec<Vec<f64>> = walls
+            .iter()
+            .map(|w| {
+                let mut row = vec![0.0; n];
+                row[w.column] = w.side;
+                row
+            })
+            .collect();
+        let b: Vec<f64> = walls
+            .iter()
+            .map(|w| w.side * w.at / self.scale[w.column])
+            .collect();
+        let triangle = CscMatrix::from(&self.quadratic).to_triu();
+        let a = CscMatrix::from(&rows);
+        let cones = [NonnegativeConeT(b.len())];
+        let settings = DefaultSettingsBuilder::default()
+            .verbose(false)
+            .tol_gap_abs(1e-12)
+            .tol_gap_rel(1e-12)
+            .tol_feas(1e-12)
+            .build()
+            .ok()?;
+        let mut solver =
+            DefaultSolver::new(&triangle, &self.linear, &a, &b, &cones, settings).ok()?;
+        solver.solve();
+        let solution = &solver.solution;
+        let solved = matches!(
+            solution.status,
+            SolverStatus::Solved | SolverStatus::AlmostSolved | SolverStatus::InsufficientProgress
+        );
+        let mut pressed = vec![None; n];
+        for (k, wall) in walls.iter().enumerate() {
+            // Complementary slackness: the multiplier of an active wall exceeds its slack.
+            if solution.z[k] > solution.s[k] {
+                pressed[wall.column] = Some(wall.at);
             }
         }
+        solved.then(|| (solution.x.clone(), pressed))
     }
-    (a, b, walls)
-}
 
-/// The minimiser of (1) with the pressed coordinates on their walls and the others free.
-fn exact_step(
-    quadratic: &[Vec<f64>],
-    linear: &[f64],
-    scale: &[f64],
-    pressed: &[Option<f64>],
-) -> Option<Vec<f64>> {
-    let n = linear.len();
-    let free: Vec<usize> = (0..n).filter(|&c| pressed[c].is_none()).collect();
-    let held: Vec<f64> = (0..n)
-        .map(|c| pressed[c].map_or(0.0, |wall| wall / scale[c]))
-        .collect();
-    let h = DMatrix::from_fn(free.len(), free.len(), |i, j| quadratic[free[i]][free[j]]);
-    let g = DVector::from_fn(free.len(), |i, _| {
-        let row = &quadratic[free[i]];
-        linear[free[i]] + row.iter().zip(&held).map(|(q, z)| q * z).sum::<f64>()
-    });
-    let z = Cholesky::new(h)?.solve(&-g);
-    let mut step: Vec<f64> = (0..n).map(|c| held[c] * scale[c]).collect();
-    for (i, &c) in free.iter().enumerate() {
-        step[c] = z[i] * scale[c];
+    /// The minimizer of (1) with the pressed coordinates on their walls and the others free.
+    fn exact_step(&self, pressed: &[Option<f64>]) -> Option<Vec<f64>> {
+        let Self {
+            scale,
+            quadratic,
+            linear,
+        } = self;
+        let n = linear.len();
+        let free: Vec<usize> = (0..n).filter(|&c| pressed[c].is_none()).collect();
+        let held: Vec<f64> = (0..n)
+            .map(|c| pressed[c].map_or(0.0, |wall| wall / scale[c]))
+            .collect();
+        let h = DMatrix::from_fn(free.len(), free.len(), |i, j| quadratic[free[i]][free[j]]);
+        let g = DVector::from_fn(free.len(), |i, _| {
+            let row = &quadratic[free[i]];
+            linear[free[i]] + row.iter().zip(&held).map(|(q, z)| q * z).sum::<f64>()
+        });
+        let z = Cholesky::new(h)?.solve(&-g);
+        let mut step: Vec<f64> = (0..n).map(|c| held[c] * scale[c]).collect();
+        for (i, &c) in free.iter().enumerate() {
+            step[c] = z[i] * scale[c];
+        }
+        // Exactly on the wall, not a rounding beside it.
+        for (c, wall) in pressed.iter().enumerate() {
+            step[c] = wall.unwrap_or(step[c]);
+        }
+        Some(step)
     }
-    // Exactly on the wall, not a rounding beside it.
-    for (c, wall) in pressed.iter().enumerate() {
-        step[c] = wall.unwrap_or(step[c]);
-    }
-    Some(step)
 }

@@ -4,7 +4,7 @@
 //! (H + λ S⁻²) δ = −g,   x ⊞ δ accepted when F falls;   stop when −gᵀδ (in σ²) vanishes          (1)
 //! ```
 //!
-//! S holds the parameters' natural scales (prior σ, or 1°, 1 cm): what makes a linearisation wrong is the size
+//! S holds the parameters' natural scales (prior σ, or 1°, 1 cm): what makes a linearization wrong is the size
 //! of a step in degrees, not in units of the data's precision, so weakly seen directions are held back first.
 //!
 //! Directions that neither data nor prior see have zero gradient and stay where they start.
@@ -26,7 +26,7 @@ use crate::model::values::{Values, coordinates};
 use crate::solve::bounded::bounded_step;
 use crate::solve::normal::{NormalEquations, Workspace, accumulate, cost};
 
-/// How the minimisation ended.
+/// How the minimization ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SolveStatus {
@@ -41,17 +41,20 @@ pub enum SolveStatus {
 }
 
 impl SolveStatus {
-    /// Whether the values may be used.
+    /// Whether the values can be used.
     #[must_use]
     pub fn is_converged(self) -> bool {
         self == Self::Converged
     }
 }
 
-/// Limits of the minimisation.
+/// Limits of the minimization.
+///
+/// Non-exhaustive: start from [`MinimizeSettings::default`] and change what differs.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct MinimizeSettings {
-    /// Linearisations allowed; a coarse start takes 5–15.
+    /// Linearizations allowed; a coarse start takes 5–15.
     pub max_iterations: usize,
     /// Stop when the decrement −gᵀδ falls below this (units of σ²).
     pub decrement: f64,
@@ -107,7 +110,7 @@ impl Curvature {
             v[i] = after.g[i] - before.g[i] - predicted;
         }
         let along = dot(&v, step);
-        // In units of √H_ii, so that metres and radians count alike.
+        // In units of √H_ii, so that meters and radians count alike.
         let size = |x: &[f64], power: i32| -> f64 {
             (0..n)
                 .map(|i| {
@@ -142,7 +145,7 @@ enum Step {
     None,
 }
 
-/// Relative ridge: keeps the factorisation positive along directions that nothing sees, and is far too
+/// Relative ridge: keeps the factorization positive along directions that nothing sees, and is far too
 /// small to slow down the others.
 const RIDGE: f64 = 1e-10;
 /// Least damping.
@@ -152,14 +155,15 @@ const MAX_DAMPING: f64 = 1e16;
 /// A rise of the cost by this fraction is rounding of its sum.
 const COST_ROUNDING: f64 = 1e-13;
 
-/// Where a minimisation ended.
+/// Where a minimization ended.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Minimum {
     /// Values of all parameters.
     pub values: Values,
     /// Why it ended.
     pub status: SolveStatus,
-    /// Linearisations used.
+    /// Linearizations used.
     pub iterations: usize,
     /// eᵀV⁻¹e over the data.
     pub data_cost: f64,
@@ -169,7 +173,7 @@ pub struct Minimum {
     pub decrement: f64,
 }
 
-/// Minimises `eᵀV⁻¹e + prior` from `start` with given weights (one per observation) and variances
+/// Minimizes `eᵀV⁻¹e + prior` from `start` with given weights (one per observation) and variances
 /// `theta` (σ² per noise group).
 #[must_use]
 pub fn minimize(
@@ -191,31 +195,20 @@ pub(crate) fn minimize_in(
     settings: &MinimizeSettings,
     work: &mut Workspace,
 ) -> Minimum {
-    let mut search = Search::new(model, start, (weights, theta), settings, work);
-    let status = search.run();
-    Minimum {
-        values: search.values,
-        status,
-        iterations: search.iterations,
-        data_cost: search.system.data,
-        prior_cost: search.system.prior,
-        decrement: search.decrement,
-    }
+    Descent::new(model, start, weights, theta, settings).run(work)
 }
 
-/// State of the descent.
-struct Search<'a> {
+/// The state of a minimization.
+struct Descent<'a> {
     model: &'a Model,
     weights: &'a [f64],
     theta: &'a [f64],
     settings: &'a MinimizeSettings,
-    work: &'a mut Workspace,
-    /// Some parameter has limits.
-    bounded: bool,
-    /// Without random effects V is constant: the next linearisation delivers the cost to check.
-    constant_noise: bool,
-    /// 1 / scale² per column.
+    /// Diagonal of S⁻².
     natural: Vec<f64>,
+    bounded: bool,
+    /// Without random effects V is constant: the next linearization delivers the cost to check.
+    constant_noise: bool,
     values: Values,
     trial: Values,
     system: NormalEquations,
@@ -229,30 +222,31 @@ struct Search<'a> {
     evaluable: bool,
 }
 
-impl<'a> Search<'a> {
+impl<'a> Descent<'a> {
     fn new(
         model: &'a Model,
         start: &Values,
-        (weights, theta): (&'a [f64], &'a [f64]),
+        weights: &'a [f64],
+        theta: &'a [f64],
         settings: &'a MinimizeSettings,
-        work: &'a mut Workspace,
     ) -> Self {
         let n = model.free();
-        let free = || model.columns.iter().map(|&p| &model.problem.parameters[p]);
-        let mut system = NormalEquations::new(n);
-        let evaluable = accumulate(model, start, weights, theta, work, &mut system);
+        let parameters = &model.problem.parameters;
+        let columns = model.columns.iter();
         Self {
             model,
             weights,
             theta,
             settings,
-            work,
-            bounded: free().any(|p| p.bounds.is_some()),
+            natural: columns
+                .clone()
+                .map(|&p| parameters[p].scale().powi(-2))
+                .collect(),
+            bounded: columns.clone().any(|&p| parameters[p].bounds.is_some()),
             constant_noise: model.slots.is_empty(),
-            natural: free().map(|p| p.scale().powi(-2)).collect(),
             values: start.clone(),
             trial: start.clone(),
-            system,
+            system: NormalEquations::new(n),
             next: NormalEquations::new(n),
             curvature: Curvature::new(n),
             factor: vec![0.0; n * n],
@@ -260,21 +254,23 @@ impl<'a> Search<'a> {
             damping: settings.damping,
             decrement: f64::INFINITY,
             iterations: 1,
-            evaluable,
+            evaluable: true,
         }
     }
 
-    fn run(&mut self) -> SolveStatus {
-        loop {
+    fn run(mut self, work: &mut Workspace) -> Minimum {
+        let (model, weights, theta) = (self.model, self.weights, self.theta);
+        self.evaluable = accumulate(model, &self.values, weights, theta, work, &mut self.system);
+        let status = loop {
             if !self.evaluable {
-                return SolveStatus::NotEvaluable;
+                break SolveStatus::NotEvaluable;
             }
             let current = self.system.cost();
             let before = self.decrement;
-            match self.descend(current, before) {
+            match self.descend(work) {
                 Step::Last => {
                     std::mem::swap(&mut self.values, &mut self.trial);
-                    return SolveStatus::Converged;
+                    break SolveStatus::Converged;
                 }
                 Step::Taken => {
                     self.damping = (self.damping * 0.1).max(MIN_DAMPING);
@@ -285,26 +281,32 @@ impl<'a> Search<'a> {
                 }
                 // At the minimum of a cost that is only rounding (exact data) nothing can fall further.
                 Step::None if self.decrement <= 1e-6 + current * 1e-9 => {
-                    return SolveStatus::Converged;
+                    break SolveStatus::Converged;
                 }
-                Step::None => return SolveStatus::Stalled,
+                Step::None => break SolveStatus::Stalled,
             }
             if self.iterations > self.settings.max_iterations {
-                return SolveStatus::MaxIterations;
+                break SolveStatus::MaxIterations;
             }
+        };
+        Minimum {
+            values: self.values,
+            status,
+            iterations: self.iterations,
+            data_cost: self.system.data,
+            prior_cost: self.system.prior,
+            decrement: self.decrement,
         }
     }
 
-    /// Raises the damping until a step lowers the cost from `current`; `before`: the decrement of the step before.
-    fn descend(&mut self, current: f64, before: f64) -> Step {
+    /// One accepted step, with as much damping as it takes.
+    fn descend(&mut self, work: &mut Workspace) -> Step {
+        let before = self.decrement;
         loop {
-            if self.solve() {
-                // −gᵀδ is twice what the quadratic model falls by.
-                self.decrement = -dot(&self.system.g, &self.step);
-                retract(self.model, &self.values, &self.step, &mut self.trial);
-                if let Some(step) = self.judge(current, before) {
-                    return step;
-                }
+            if self.propose()
+                && let Some(outcome) = self.judge(before, work)
+            {
+                return outcome;
             }
             self.curvature.slow |= self.decrement < NEAR;
             self.damping = (self.damping * 10.0).max(1e-3);
@@ -314,30 +316,39 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The damped step inside the limits.
-    fn solve(&mut self) -> bool {
-        damped_step(
+    /// The step of (1), inside the bounds; `false` when the system cannot be solved.
+    fn propose(&mut self) -> bool {
+        let solved = damped_step(
             &self.system,
             &mut self.curvature,
             &self.natural,
             self.damping,
             &mut self.factor,
             &mut self.step,
-        ) && (!self.bounded
-            || bounded_step(
-                self.model,
-                &self.values,
-                &self.system,
-                self.curvature.known.then_some(self.curvature.s.as_slice()),
-                &self.natural,
-                self.damping,
-                &mut self.step,
-            ))
+        );
+        let curvature = &self.curvature;
+        solved
+            && (!self.bounded
+                || bounded_step(
+                    self.model,
+                    &self.values,
+                    &self.system,
+                    curvature.known.then_some(curvature.s.as_slice()),
+                    &self.natural,
+                    self.damping,
+                    &mut self.step,
+                ))
     }
 
-    /// Is the trial good enough to be taken?
-    fn judge(&mut self, current: f64, before: f64) -> Option<Step> {
-        let limit = current * (1.0 + COST_ROUNDING);
+    /// What becomes of the proposed step; `None` when it does not lower the cost. `before`: decrement of the step
+    /// before.
+    fn judge(&mut self, before: f64, work: &mut Workspace) -> Option<Step> {
+        let (model, weights, theta) = (self.model, self.weights, self.theta);
+        let limit = self.system.cost() * (1.0 + COST_ROUNDING);
+        let enough = self.settings.decrement;
+        // −gᵀδ
+        self.decrement = -dot(&self.system.g, &self.step);
+        retract(model, &self.values, &self.step, &mut self.trial);
         // The decrement falls at least in proportion: is the next one already small enough?
         let rate = if before.is_finite() {
             (self.decrement / before).min(1.0)
@@ -345,35 +356,21 @@ impl<'a> Search<'a> {
             1.0
         };
         let expected = self.decrement * rate;
-        let small = self.decrement <= self.settings.decrement;
-        if small || (self.constant_noise && expected <= self.settings.decrement) {
-            return (small || self.trial_cost() <= limit).then_some(Step::Last);
-        }
-        if self.constant_noise {
+        if self.decrement <= enough || (self.constant_noise && expected <= enough) {
+            let fallen =
+                self.decrement <= enough || cost(model, &self.trial, weights, theta, work) <= limit;
+            fallen.then_some(Step::Last)
+        } else if self.constant_noise {
             self.iterations += 1;
-            return (self.linearize_trial() && self.next.cost() <= limit).then_some(Step::Taken);
-        }
-        if self.trial_cost() <= limit {
+            let linearized = accumulate(model, &self.trial, weights, theta, work, &mut self.next);
+            (linearized && self.next.cost() <= limit).then_some(Step::Taken)
+        } else if cost(model, &self.trial, weights, theta, work) <= limit {
             self.iterations += 1;
-            self.evaluable = self.linearize_trial();
-            return Some(Step::Taken);
+            self.evaluable = accumulate(model, &self.trial, weights, theta, work, &mut self.next);
+            Some(Step::Taken)
+        } else {
+            None
         }
-        None
-    }
-
-    fn trial_cost(&mut self) -> f64 {
-        cost(self.model, &self.trial, self.weights, self.theta, self.work)
-    }
-
-    fn linearize_trial(&mut self) -> bool {
-        accumulate(
-            self.model,
-            &self.trial,
-            self.weights,
-            self.theta,
-            self.work,
-            &mut self.next,
-        )
     }
 }
 

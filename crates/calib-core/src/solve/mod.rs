@@ -1,6 +1,7 @@
 //! The minimum of the stated problem: rows, normal equations, steps, noise, robust weights.
 
 pub(crate) mod bounded;
+pub(crate) mod components;
 pub(crate) mod compressed;
 pub(crate) mod dense;
 pub(crate) mod minimize;
@@ -11,3 +12,4 @@ pub(crate) mod relabel;
 pub(crate) mod robust;
 pub(crate) mod rows;
 pub(crate) mod structured;
+pub(crate) mod whitened;

@@ -7,7 +7,7 @@
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
-use crate::graph::ids::PointId;
+use crate::graph::ids::{MeasurementId, PointId};
 use crate::graph::measurement::{Markers, MeasurementKind};
 use crate::graph::problem::Problem;
 
@@ -18,22 +18,21 @@ const UNAMBIGUOUS: f64 = 3.0;
 
 /// A sample whose labels were put right.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Relabelled {
+pub struct Relabeled {
     /// Sample.
     pub sample: usize,
     /// Measurement.
-    pub measurement: String,
+    pub measurement: MeasurementId,
     /// (index of the observation within the measurement, its new point).
     pub changes: Vec<(usize, PointId)>,
 }
 
 /// Puts exchanged marker labels right, in place. `tolerance`: largest deviation of a distance that
 /// noise explains (m), for instance 6 σ.
-pub fn relabel(problem: &mut Problem, tolerance: f64) -> Vec<Relabelled> {
+pub fn relabel(problem: &mut Problem, tolerance: f64) -> Vec<Relabeled> {
     let mut out = Vec::new();
     let samples = problem.samples;
-    for measurement in &mut problem.measurements {
-        let name = measurement.name.clone();
+    for (m, measurement) in problem.measurements.iter_mut().enumerate() {
         if let MeasurementKind::Markers(Markers { observations, .. }) = &mut measurement.kind {
             let mut by_sample: Vec<Vec<usize>> = vec![Vec::new(); samples];
             for (i, o) in observations.iter().enumerate() {
@@ -64,9 +63,9 @@ pub fn relabel(problem: &mut Problem, tolerance: f64) -> Vec<Relabelled> {
                     for &(i, new) in &changes {
                         observations[i].point = new;
                     }
-                    out.push(Relabelled {
+                    out.push(Relabeled {
                         sample,
-                        measurement: name.clone(),
+                        measurement: MeasurementId::of(m),
                         changes,
                     });
                 }

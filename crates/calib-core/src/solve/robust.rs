@@ -15,6 +15,7 @@
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::graph::ids::MeasurementId;
 use crate::graph::measurement::{Markers, MeasurementKind};
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
@@ -42,7 +43,7 @@ pub struct Rejection {
     /// Sample.
     pub sample: usize,
     /// Measurement.
-    pub measurement: String,
+    pub measurement: MeasurementId,
     /// Index within the measurement.
     pub item: usize,
     /// Why.
@@ -52,7 +53,10 @@ pub struct Rejection {
 }
 
 /// How to treat outliers.
+///
+/// Non-exhaustive: start from [`RobustSettings::default`] or [`RobustSettings::off`] and change what differs.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct RobustSettings {
     /// Off: every observation counts fully.
     pub enabled: bool,
@@ -71,6 +75,17 @@ impl Default for RobustSettings {
             huber: 2.8,
             gate: 0.999,
             anneal: 1.6,
+        }
+    }
+}
+
+impl RobustSettings {
+    /// Every observation counts fully.
+    #[must_use]
+    pub fn off() -> Self {
+        Self {
+            enabled: false,
+            ..Self::default()
         }
     }
 }
@@ -289,7 +304,6 @@ pub(crate) fn explain(
         if mask[o] <= 0.0 || kept[o] > 0.0 {
             continue;
         }
-        let measurement = &model.problem.measurements[observation.measurement];
         let same_body: Vec<usize> = model.of_sample[observation.sample]
             .clone()
             .filter(|&other| {
@@ -306,7 +320,7 @@ pub(crate) fn explain(
         };
         out.push(Rejection {
             sample: observation.sample,
-            measurement: measurement.name.clone(),
+            measurement: MeasurementId::of(observation.measurement),
             item: observation.item,
             reason,
             distance: d2[o].sqrt(),

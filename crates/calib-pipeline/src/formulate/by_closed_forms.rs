@@ -54,6 +54,7 @@ pub(crate) fn paper_result(
         }
         found.push(Found {
             name: format!("{}_from_{name}", origin.body),
+            origin: Some(name.clone()),
             parent: origin.body.clone(),
             child: name.clone(),
             pose,
@@ -138,6 +139,7 @@ fn paper_transform(
     });
     let found = Found {
         name: name.to_owned(),
+        origin: None,
         parent: model.link(t.parent).name.clone(),
         child: model.link(t.child).name.clone(),
         pose: parent_from_child,

@@ -91,32 +91,27 @@ fn ml_result(
     let model = &inputs.robot.model;
     let at_zero = calib_core::Configuration::zero();
     let mut found = Vec::new();
-    let mut push =
-        |name: String, parent: &str, child: &str, from, to| -> Result<(), PipelineError> {
-            let derived = fit.solution.relative_pose(from, to, &at_zero)?;
-            found.push(Found {
-                name,
-                parent: parent.to_owned(),
-                child: child.to_owned(),
-                pose: derived.pose,
-                covariance: derived.covariance,
-                unobservable: derived.unobservable.iter().map(in_words).collect(),
-                status: Status::Calibrated,
-            });
-            Ok(())
-        };
+    let mut push = |frames: Found, from, to| -> Result<(), PipelineError> {
+        let derived = fit.solution.relative_pose(from, to, &at_zero)?;
+        found.push(Found {
+            pose: derived.pose,
+            covariance: derived.covariance,
+            unobservable: derived.unobservable.iter().map(unobservable).collect(),
+            status: Status::Calibrated,
+            ..frames
+        });
+        Ok(())
+    };
     for (name, origin) in &profile.origins {
         if let (Some(body), Some(link)) = (
             fit.formulation.bodies.get(&origin.body),
             fit.formulation.links[origin.link.index()],
         ) {
-            push(
-                format!("{}_from_{name}", origin.body),
-                &origin.body,
-                name,
-                *body,
-                link,
-            )?;
+            let frames = Found {
+                origin: Some(name.clone()),
+                ..Found::between(format!("{}_from_{name}", origin.body), &origin.body, name)
+            };
+            push(frames, *body, link)?;
         }
     }
     for (name, t) in &profile.transforms {
@@ -124,13 +119,8 @@ fn ml_result(
             fit.formulation.links[t.parent.index()],
             fit.formulation.links[t.child.index()],
         ) {
-            push(
-                name.clone(),
-                &model.link(t.parent).name,
-                &model.link(t.child).name,
-                parent,
-                child,
-            )?;
+            let [outer, inner] = [t.parent, t.child].map(|link| &model.link(link).name);
+            push(Found::between(name.clone(), outer, inner), parent, child)?;
         }
     }
     let root = fit.formulation.links[model.root().index()];
@@ -152,32 +142,7 @@ fn ml_result(
     })
 }
 
-/// A twist of the child that the data do not see, as a sentence.
-fn in_words(twist: &calib_geometry::Twist) -> Unobservable {
+fn unobservable(twist: &calib_geometry::Twist) -> Unobservable {
     let (w, v) = (twist.angular(), twist.linear());
-    let direction = [w.x, w.y, w.z, v.x, v.y, v.z];
-    let axis = |a: &nalgebra::Vector3<f64>| {
-        /// A direction this near to a coordinate axis (cosine, 0.6°) is called by its letter.
-        const ON_AXIS: f64 = 0.999_95;
-        let n = a / a.norm();
-        match n.iter().position(|c| c.abs() > ON_AXIS) {
-            Some(k) => format!("{} axis", ["x", "y", "z"][k]),
-            None => format!("direction [{:.2}, {:.2}, {:.2}]", n.x, n.y, n.z),
-        }
-    };
-    let motion = match (w.norm() > 1e-6, v.norm() > 1e-6) {
-        (true, false) => format!("a turn about its {}", axis(&w)),
-        (false, true) => format!("a shift along its {}", axis(&v)),
-        _ => format!(
-            "a turn about its {} with a shift along its {}",
-            axis(&w),
-            axis(&v)
-        ),
-    };
-    let text = format!("{motion}: no measurement shows it, the priors chose its size");
-    Unobservable {
-        direction,
-        text,
-        remedy: "usually nothing: it is a convention between this frame and the next, and the combinations below say with which; a mark or a second axis on the link would define it".to_owned(),
-    }
+    Unobservable::along([w.x, w.y, w.z, v.x, v.y, v.z])
 }

@@ -8,6 +8,8 @@ use nalgebra::{Isometry3, Matrix6};
 pub struct Found {
     /// Name in the report.
     pub name: String,
+    /// The profile's origin that it places, if it is one on its body.
+    pub origin: Option<String>,
     /// Parent frame.
     pub parent: String,
     /// Child frame.
@@ -20,4 +22,21 @@ pub struct Found {
     pub unobservable: Vec<calib_report::Unobservable>,
     /// Measured, calibrated or assumed.
     pub status: Status,
+}
+
+impl Found {
+    /// The two frames, with nothing found yet.
+    #[must_use]
+    pub fn between(name: String, parent: &str, child: &str) -> Self {
+        Self {
+            name,
+            origin: None,
+            parent: parent.to_owned(),
+            child: child.to_owned(),
+            pose: Isometry3::identity(),
+            covariance: None,
+            unobservable: Vec::new(),
+            status: Status::Assumed,
+        }
+    }
 }

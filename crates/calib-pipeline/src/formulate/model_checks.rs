@@ -422,28 +422,32 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
 
 /// Recording, row and body where nothing that was seen of the body takes part.
 fn rejected_bodies(fit: &MlFit) -> BTreeSet<(String, usize, String)> {
-    let mut left_out: BTreeMap<(usize, &str), usize> = BTreeMap::new();
+    // (sample, measurement) → observations
+    let mut rejected: BTreeMap<(usize, usize), usize> = BTreeMap::new();
     for r in &fit.solution.rejected {
-        *left_out.entry((r.sample, &r.measurement)).or_default() += 1;
+        *rejected
+            .entry((r.sample, r.measurement.index()))
+            .or_default() += 1;
     }
-    let mut seen: BTreeMap<(usize, &str), usize> = BTreeMap::new();
-    for measurement in fit.formulation.problem.measurements() {
+    let measurements = fit.formulation.problem.measurements();
+    let mut seen: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+    for (m, measurement) in measurements.iter().enumerate() {
         if let calib_core::MeasurementKind::Markers(calib_core::measurement::Markers {
             observations,
             ..
         }) = &measurement.kind
         {
             for o in observations {
-                *seen.entry((o.sample, &measurement.name)).or_default() += 1;
+                *seen.entry((o.sample, m)).or_default() += 1;
             }
         }
     }
-    left_out
+    rejected
         .into_iter()
         .filter(|(key, count)| seen.get(key).is_none_or(|all| count >= all))
-        .map(|((sample, measurement), _)| {
+        .map(|((sample, m), _)| {
             let (recording, row) = &fit.formulation.samples[sample];
-            (recording.clone(), *row, measurement.to_owned())
+            (recording.clone(), *row, measurements[m].name.clone())
         })
         .collect()
 }

@@ -30,14 +30,10 @@ pub struct Solved {
 impl Solved {
     /// Where each origin of the profile stands on its body.
     #[must_use]
-    pub fn body_from_origin(&self, inputs: &Inputs) -> BTreeMap<String, Isometry3<f64>> {
-        let origins = inputs.robot.profile.origins.iter();
-        origins
-            .filter_map(|(name, o)| {
-                let wanted = format!("{}_from_{name}", o.body);
-                let found = self.found.iter().find(|f| f.name == wanted)?;
-                Some((name.clone(), found.pose))
-            })
+    pub fn body_from_origin(&self) -> BTreeMap<String, Isometry3<f64>> {
+        let placed = self.found.iter();
+        placed
+            .filter_map(|f| Some((f.origin.clone()?, f.pose)))
             .collect()
     }
 }

@@ -106,7 +106,7 @@ pub(crate) fn rejected(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Rejected> {
         groups
             .entry((
                 recording.clone(),
-                subject(fit, &r.measurement, r.item),
+                subject(fit, r.measurement, r.item),
                 reason,
             ))
             .or_default()
@@ -140,12 +140,7 @@ pub(crate) fn estimators(e: &Evidence<'_>) -> Vec<EstimatorResult> {
         let Some(pose) = origin.pose.filter(|_| e.method == Method::Ml) else {
             continue;
         };
-        let body = &e.inputs.robot.profile.origins[name].body;
-        let Some(found) = e
-            .found
-            .iter()
-            .find(|f| f.name == format!("{body}_from_{name}"))
-        else {
+        let Some(found) = e.found.iter().find(|f| f.origin.as_ref() == Some(name)) else {
             continue;
         };
         let difference = crate::estimate::paper::difference(&found.pose, &pose);
@@ -156,7 +151,7 @@ pub(crate) fn estimators(e: &Evidence<'_>) -> Vec<EstimatorResult> {
             .and_then(nalgebra::Cholesky::new)
             .map(|c| difference.0.dot(&c.solve(&difference.0)));
         out.push(EstimatorResult {
-            quantity: format!("{body}_from_{name}"),
+            quantity: found.name.clone(),
             estimator: "paper (closed form)".to_owned(),
             value: Some(pose.translation.vector.as_slice().to_vec()),
             sigma: origin

@@ -1,7 +1,7 @@
 //! The fit as the report's data.
 
 use calib_core::{Gauge, NoiseKind};
-use calib_report::{FitSummary, Meaning, NotObservable, Parameter, Term, Transform, Unit};
+use calib_report::{Cause, FitSummary, NotObservable, Parameter, Term, Transform, Unit};
 
 use crate::formulate::found::Found;
 use crate::formulate::ml::MlFit;
@@ -62,49 +62,42 @@ pub(crate) fn parameters(fit: &MlFit) -> Vec<Parameter> {
 }
 
 pub(crate) fn not_observable(fit: &MlFit) -> Vec<NotObservable> {
-    let mut out: Vec<NotObservable> = fit
-        .solution
-        .observability
-        .null
-        .iter()
-        .map(|d| NotObservable {
-            meaning: match d.gauge {
-                Gauge::WorldAgainstBase
-                | Gauge::OffsetAgainstOwnOrigin
-                | Gauge::OffsetAgainstNeighbour
-                | Gauge::SlideAlongAxis
-                | Gauge::TurnAboutAxis
-                | Gauge::ParallelAxes
-                | Gauge::ToolAgainstLastOrigin
-                | Gauge::MarkersAgainstMount => Meaning::Convention,
-                // With other motion or another mark it would show.
-                _ => Meaning::NotMeasured,
-            },
-            subject: d.terms.first().map_or_else(String::new, |t| t.name.clone()),
-            direction: d
-                .terms
-                .iter()
-                .map(|t| Term {
-                    parameter: t.name.clone(),
-                    coefficient: t.amount,
-                })
-                .collect(),
-            text: d.text.clone(),
-            remedy: d.remedy.clone(),
-        })
-        .collect();
-    for joint in &fit.solution.observability.unmoved {
-        out.push(NotObservable {
-            meaning: Meaning::NotMeasured,
-            subject: joint.clone(),
-            direction: Vec::new(),
-            text: format!(
-                "joint `{joint}` did not move in the fitted recordings and keeps its nominal parameters"
-            ),
-            remedy: "Move it in a sweep or in static poses.".to_owned(),
+    let parameters = fit.formulation.problem.parameters();
+    let terms = |d: &calib_core::Direction| {
+        let terms = d.terms.iter().map(|t| Term {
+            parameter: parameters[t.parameter.index()].name.clone(),
+            coefficient: t.amount,
         });
+        terms.collect()
+    };
+    let observability = &fit.solution.observability;
+    let directions = observability.null.iter();
+    let edges = fit.formulation.problem.edges();
+    let unmoved = observability.unmoved.iter();
+    directions
+        .map(|d| NotObservable::new(cause(d.gauge), terms(d)))
+        .chain(unmoved.map(|e| NotObservable::joint_not_moved(&edges[e.index()].name)))
+        .collect()
+}
+
+fn cause(gauge: Gauge) -> Cause {
+    match gauge {
+        Gauge::NotMeasured => Cause::NotMeasured,
+        Gauge::WorldAgainstBase => Cause::WorldAgainstBase,
+        Gauge::OffsetAgainstOwnOrigin => Cause::OffsetAgainstOwnOrigin,
+        Gauge::OffsetAgainstNeighbor => Cause::OffsetAgainstNeighbor,
+        Gauge::TranslationAlongAxis => Cause::TranslationAlongAxis,
+        Gauge::RotationAboutAxis => Cause::RotationAboutAxis,
+        Gauge::ParallelAxes => Cause::ParallelAxes,
+        Gauge::CollinearAxes => Cause::CollinearAxes,
+        Gauge::ToolAgainstLastOrigin => Cause::ToolAgainstLastOrigin,
+        Gauge::PointOnlyTool => Cause::PointOnlyTool,
+        Gauge::MarkersAgainstMount => Cause::MarkersAgainstMount,
+        Gauge::WorldAgainstTool => Cause::WorldAgainstTool,
+        Gauge::Scale => Cause::Scale,
+        Gauge::TableAgainstContact => Cause::TableAgainstContact,
+        Gauge::Unnamed => Cause::Combination,
     }
-    out
 }
 
 pub(crate) fn fit_summary(fit: &MlFit) -> FitSummary {
@@ -145,7 +138,7 @@ pub(crate) fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
             },
             sigma: Some(n.sigma),
             stated: stated(&n.name),
-            samples: fit.solution.weights.iter().filter(|w| **w > 0.0).count(),
+            samples: n.samples,
             text: calib_report::Noise::method(n.estimated).to_owned(),
         })
         .collect()

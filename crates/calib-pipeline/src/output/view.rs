@@ -168,7 +168,8 @@ fn joint_axes(inputs: &Inputs, fit: &MlFit) -> Vec<Axis> {
     let mut axes = Vec::new();
     for id in model.independent_joints() {
         let joint = model.joint(id);
-        let moved = !fit.solution.observability.unmoved.contains(&joint.name);
+        let unmoved = &fit.solution.observability.unmoved;
+        let moved = fit.formulation.joints[id.index()].is_none_or(|edge| !unmoved.contains(&edge));
         let frame = fit.formulation.links[joint.child.index()].filter(|_| moved);
         let (Some(frame), true, Some(direction)) = (frame, joint.kind.turns(), joint.kind.axis())
         else {

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use calib_core::{MeasurementId, MeasurementKind};
 use calib_geometry::so3;
 use calib_profile::{BodyKind, Usage};
 use calib_report::ResidualRow;
@@ -22,37 +23,24 @@ pub fn left_out(fit: &MlFit) -> BTreeSet<(String, usize, String)> {
         .iter()
         .map(|r| {
             let (recording, row) = &fit.formulation.samples[r.sample];
-            (
-                recording.clone(),
-                *row,
-                subject(fit, &r.measurement, r.item),
-            )
+            (recording.clone(), *row, subject(fit, r.measurement, r.item))
         })
         .collect()
 }
 
 /// The marker of an observation, or its body where poses are observed.
 #[must_use]
-pub fn subject(fit: &MlFit, measurement: &str, item: usize) -> String {
-    let observed = fit
-        .formulation
-        .problem
-        .measurements()
-        .iter()
-        .find(|h| h.name == measurement);
-    match observed.map(|h| &h.kind) {
-        Some(calib_core::MeasurementKind::Markers(calib_core::measurement::Markers {
-            observations,
-            ..
-        })) => {
-            let point = observations.get(item).map(|o| o.point);
-            let name = point
-                .and_then(|p| fit.formulation.problem.points().get(p.index()))
-                .map(|p| p.name.clone());
-            name.unwrap_or_else(|| measurement.to_owned())
+pub fn subject(fit: &MlFit, measurement: MeasurementId, item: usize) -> String {
+    let problem = &fit.formulation.problem;
+    let measurement = &problem.measurements()[measurement.index()];
+    let marker = match &measurement.kind {
+        MeasurementKind::Markers(calib_core::measurement::Markers { observations, .. }) => {
+            observations.get(item)
         }
-        _ => measurement.to_owned(),
-    }
+        _ => None,
+    };
+    let point = marker.and_then(|o| problem.points().get(o.point.index()));
+    point.map_or(&measurement.name, |p| &p.name).clone()
 }
 
 /// Predicted − measured for every sample of every fitted recording.

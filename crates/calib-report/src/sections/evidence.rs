@@ -152,8 +152,19 @@ pub(super) fn residuals(page: &mut Page, report: &Report) {
         return;
     }
     page.section("residuals", "Residuals of the fit");
-    page.text("Predicted minus observed, mm. `report.html` plots them over joints and time; `residuals.csv` lists every row.");
-    let mut table = Table::new(&["<group", ">samples", ">mean", ">rms", ">95 %", ">max"]);
+    page.text(format!(
+        "Predicted minus observed, mm. `report.html` plots them over joints and time; `residuals.csv` lists every row. {}",
+        words::rejection::not_counted(report.residuals.rejected)
+    ));
+    let mut table = Table::new(&[
+        "<group",
+        ">samples",
+        ">rejected",
+        ">mean",
+        ">rms",
+        ">95 %",
+        ">max",
+    ]);
     let directions = report
         .residuals
         .by_direction
@@ -167,7 +178,13 @@ pub(super) fn residuals(page: &mut Page, report: &Report) {
         .map(|group| (code(&group.name), group));
     for (name, group) in groups.chain(directions) {
         let cells = [group.mean_m, group.rms_m, group.p95_m, group.max_m].map(mm);
-        table.row([name, group.samples.to_string()].into_iter().chain(cells));
+        // Empty where nothing was rejected: the column goes.
+        let rejected = match report.residuals.rejected {
+            0 => String::new(),
+            _ => group.rejected.to_string(),
+        };
+        let counts = [name, group.samples.to_string(), rejected];
+        table.row(counts.into_iter().chain(cells));
     }
     page.table("", table);
 }

@@ -29,9 +29,8 @@ pub(crate) fn changed(report: &Report) -> Vec<String> {
 pub(crate) fn reproduce(report: &Report) -> Vec<String> {
     let mut lines = or(commands(&report.reproduce), "Run the same profile again.");
     lines.push(format!(
-        "calib {}, seed {}; {} identified by SHA-256 below.",
-        report.version,
-        report.seed,
+        "{}; {} identified by SHA-256 below.",
+        version(report),
         counted(report.inputs.len(), "input")
     ));
     lines
@@ -40,7 +39,31 @@ pub(crate) fn reproduce(report: &Report) -> Vec<String> {
 /// Program and seed, below the table of files.
 pub(crate) fn program(report: &Report) -> String {
     format!(
-        "calib {}, seed {}. A report cannot contain its own digest.",
-        report.version, report.seed
+        "{}. A report cannot contain its own digest.",
+        version(report)
     )
+}
+
+/// The program's version, and the seed where something was random.
+fn version(report: &Report) -> String {
+    match report.seed {
+        0 => format!("calib {}", report.version),
+        seed => format!("calib {}, seed {seed}", report.version),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_seed_is_named_only_where_something_was_random() {
+        let mut report = Report {
+            version: "1.2.3".to_owned(),
+            ..Report::default()
+        };
+        assert_eq!(version(&report), "calib 1.2.3");
+        report.seed = 7;
+        assert_eq!(version(&report), "calib 1.2.3, seed 7");
+    }
 }

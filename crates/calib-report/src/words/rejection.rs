@@ -28,3 +28,12 @@ pub(crate) fn rejected(report: &Report, rest: &str) -> Vec<String> {
     }
     lines
 }
+
+/// Beside errors of the fit: whether they are those of all observations.
+pub(crate) fn not_counted(rejected: usize) -> String {
+    match rejected {
+        0 => "No observation was rejected.".to_owned(),
+        1 => "1 rejected observation is not counted in the errors.".to_owned(),
+        n => format!("{n} rejected observations are not counted in the errors."),
+    }
+}

@@ -531,10 +531,9 @@ pub fn rejected() -> Report {
                 remedy: "Move arm_7 over at least 30°.".into(),
             }]),
         ],
-        not_observable: vec![NotObservable {
-            meaning: calib_report::Meaning::Convention,
-            subject: "arm_2, arm_3".into(),
-            direction: vec![
+        not_observable: vec![NotObservable::new(
+            calib_report::Cause::ParallelAxes,
+            vec![
                 Term {
                     parameter: "arm_2.origin.z".into(),
                     coefficient: std::f64::consts::FRAC_1_SQRT_2,
@@ -544,9 +543,7 @@ pub fn rejected() -> Report {
                     coefficient: -std::f64::consts::FRAC_1_SQRT_2,
                 },
             ],
-            text: "arm_2.origin.z trades against arm_3.origin.z: the axes are parallel".into(),
-            remedy: "Fix one of them in the profile: it does not affect predictions.".into(),
-        }],
+        )],
         loops: vec![LoopClosure {
             name: "hand_in_head".into(),
             samples: all.0.len(),

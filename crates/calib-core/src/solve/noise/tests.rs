@@ -1,6 +1,13 @@
-use super::*;
+//! The sums and the score against dense factors.
+
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
+
+use crate::model::layout::Model;
+use crate::model::values::Values;
+use crate::solve::components::{Sums, sums};
+use crate::solve::normal::{NormalEquations, Workspace, accumulate};
+use crate::solve::whitened::{Whitened, covariance_of, whitened};
 use crate::*;
-use nalgebra::{Isometry3, Point3, Vector3};
 
 /// Markers and a body pose behind two noisy joints; everything that can be wrong in a sum is different here.
 fn problem() -> Problem {

@@ -1,0 +1,322 @@
+//! The whole estimate, step by step.
+//!
+//! ```text
+//! start ─► minimize ─► Huber ─► GNC ─► gate ─► minimize ⇄ REML ─► gate again until it stays ─► analyze
+//! ```
+
+use std::collections::BTreeSet;
+
+use crate::analysis::information::Information;
+use crate::analysis::observability::observe;
+use crate::analysis::solution::{NoiseEstimate, Solution, describe_parameters};
+use crate::graph::error::Error;
+use crate::graph::ids::GroupId;
+use crate::graph::problem::Problem;
+use crate::model::layout::Model;
+use crate::model::values::Values;
+use crate::solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize_in};
+use crate::solve::noise::{Scoring, score};
+use crate::solve::normal::{Workspace, data_cost};
+use crate::solve::robust::{RejectReason, Rejection, RobustSettings, clean, explain, gate};
+use crate::solve::rows::add_block;
+
+/// How to solve.
+///
+/// Non-exhaustive: start from [`Settings::default`] or [`Settings::plain`] and change what differs.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Settings {
+    /// Limits of the minimization.
+    pub minimize: MinimizeSettings,
+    /// Treatment of outliers; on by default.
+    pub robust: RobustSettings,
+    /// Rounds of minimizing and re-estimating noise levels; they settle to 0.1 % in 5 to 15.
+    pub noise_rounds: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            minimize: MinimizeSettings::default(),
+            robust: RobustSettings::default(),
+            noise_rounds: 60,
+        }
+    }
+}
+
+impl Settings {
+    /// Every observation counts fully, noise levels as stated: the plain least-squares fit.
+    #[must_use]
+    pub fn plain() -> Self {
+        let mut settings = Self::default();
+        settings.robust.enabled = false;
+        settings.noise_rounds = 0;
+        settings
+    }
+
+    /// The same with these limits of the minimization.
+    #[must_use]
+    pub fn with_minimize(mut self, minimize: MinimizeSettings) -> Self {
+        self.minimize = minimize;
+        self
+    }
+
+    /// The same with this treatment of outliers.
+    #[must_use]
+    pub fn with_robust(mut self, robust: RobustSettings) -> Self {
+        self.robust = robust;
+        self
+    }
+
+    /// The same with this number of rounds for the noise levels; 0 keeps them as stated.
+    #[must_use]
+    pub fn with_noise_rounds(mut self, rounds: usize) -> Self {
+        self.noise_rounds = rounds;
+        self
+    }
+}
+
+/// Noise levels have settled when log σ² changes by less than this: 0.05 % in σ.
+const NOISE_SETTLED: f64 = 1e-3;
+/// Values need not be better than 1e-3 σ while noise levels or outliers are still being decided.
+const BETWEEN_ROUNDS: f64 = 1e-6;
+/// Gate and refit alternate; the set settles in two or three rounds unless an observation lies at the border.
+const GATE_ROUNDS: usize = 6;
+
+/// Solves a problem.
+///
+/// # Errors
+/// [`Error`] when the problem cannot be stated; a fit that does not converge or cannot determine something
+/// is a [`Solution`] that says so.
+pub fn solve(problem: &Problem, settings: &Settings) -> Result<Solution, Error> {
+    let model = Model::new(problem)?;
+    // 1: fitted, 0: held out
+    let fitted = |sample: usize| if model.is_held_out(sample) { 0.0 } else { 1.0 };
+    let mask: Vec<f64> = model
+        .observations
+        .iter()
+        .map(|o| fitted(o.sample))
+        .collect();
+    if mask.iter().all(|w| *w == 0.0) {
+        return Err(Error::NoObservations);
+    }
+    let groups = &model.problem.groups;
+    let stated: Vec<f64> = groups.iter().map(|g| g.sigma * g.sigma).collect();
+    let mut work = Workspace::new(&model);
+    let mut fit = Fit {
+        model: &model,
+        settings,
+        iterations: 0,
+        relative_sigma: vec![None; stated.len()],
+    };
+    let mut theta = stated.clone();
+    let (minimum, weights) = fit.robustly(&mask, &mut theta, &mut work);
+    let values = &minimum.values;
+    let outcome = Outcome {
+        rejected: explain(&model, values, &theta, &mask, &weights, &mut work),
+        iterations: fit.iterations,
+        relative_sigma: fit.relative_sigma,
+        chi2_stated: data_cost(&model, values, &weights, &stated, &mut work),
+        weights,
+        theta,
+    };
+    finish(model, minimum, outcome)
+}
+
+/// What [`finish`] only passes on.
+struct Outcome {
+    weights: Vec<f64>,
+    theta: Vec<f64>,
+    rejected: Vec<Rejection>,
+    iterations: usize,
+    relative_sigma: Vec<Option<f64>>,
+    chi2_stated: f64,
+}
+
+struct Fit<'a> {
+    model: &'a Model,
+    settings: &'a Settings,
+    iterations: usize,
+    relative_sigma: Vec<Option<f64>>,
+}
+
+impl Fit<'_> {
+    /// Start, Huber and GNC, then values, noise levels and gate in turn until the gate keeps the same set.
+    fn robustly(
+        &mut self,
+        mask: &[f64],
+        theta: &mut Vec<f64>,
+        work: &mut Workspace,
+    ) -> (Minimum, Vec<f64>) {
+        let model = self.model;
+        let robust = &self.settings.robust;
+        let mut weights = mask.to_vec();
+        let mut minimum = self.minimize(&model.start(), &weights, theta, work, BETWEEN_ROUNDS);
+        if robust.enabled
+            && minimum.status != SolveStatus::NotEvaluable
+            && let Some((values, kept, iterations)) =
+                clean(model, &minimum, mask, theta, robust, work)
+        {
+            self.iterations += iterations;
+            minimum.values = values;
+            weights = kept;
+        }
+        for _ in 0..GATE_ROUNDS {
+            minimum = self.with_noise(&minimum, &weights, theta, work);
+            if !robust.enabled || minimum.status == SolveStatus::NotEvaluable {
+                break;
+            }
+            match gate(model, &minimum.values, theta, mask, robust, work) {
+                Some(again) if again != weights => weights = again,
+                _ => break,
+            }
+        }
+        (minimum, weights)
+    }
+
+    fn minimize(
+        &mut self,
+        start: &Values,
+        weights: &[f64],
+        theta: &[f64],
+        work: &mut Workspace,
+        decrement: f64,
+    ) -> Minimum {
+        let settings = MinimizeSettings {
+            decrement,
+            ..self.settings.minimize
+        };
+        let minimum = minimize_in(self.model, start, weights, theta, &settings, work);
+        self.iterations += minimum.iterations;
+        minimum
+    }
+
+    /// Values and noise levels in turn until both stay.
+    fn with_noise(
+        &mut self,
+        start: &Minimum,
+        weights: &[f64],
+        theta: &mut Vec<f64>,
+        work: &mut Workspace,
+    ) -> Minimum {
+        if self.settings.noise_rounds == 0 || !self.model.problem.groups.iter().any(|g| g.estimate)
+        {
+            return self.minimize(
+                &start.values,
+                weights,
+                theta,
+                work,
+                self.settings.minimize.decrement,
+            );
+        }
+        let mut minimum = self.minimize(&start.values, weights, theta, work, BETWEEN_ROUNDS);
+        for _ in 0..self.settings.noise_rounds {
+            if minimum.status == SolveStatus::NotEvaluable {
+                break;
+            }
+            let Some(Scoring {
+                theta: next,
+                change,
+                relative_sigma,
+            }) = score(self.model, &minimum.values, weights, theta, work)
+            else {
+                break;
+            };
+            self.relative_sigma = relative_sigma;
+            *theta = next;
+            if change < NOISE_SETTLED {
+                break;
+            }
+            minimum = self.minimize(&minimum.values, weights, theta, work, BETWEEN_ROUNDS);
+        }
+        self.minimize(
+            &minimum.values,
+            weights,
+            theta,
+            work,
+            self.settings.minimize.decrement,
+        )
+    }
+}
+
+/// Spectrum, covariance and observability at the minimum.
+fn finish(model: Model, minimum: Minimum, outcome: Outcome) -> Result<Solution, Error> {
+    let Outcome {
+        weights,
+        theta,
+        mut rejected,
+        iterations,
+        relative_sigma,
+        chi2_stated,
+    } = outcome;
+    let information =
+        Information::at(&model, &minimum.values, &weights, &theta).ok_or(Error::NotEvaluable)?;
+    let samples = samples_per_group(&model, &weights);
+    let groups = model.problem.groups.iter().enumerate();
+    let noise = groups
+        .map(|(g, group)| NoiseEstimate {
+            id: GroupId::of(g),
+            name: group.name.clone(),
+            kind: group.kind,
+            stated: group.sigma,
+            sigma: theta[g].sqrt(),
+            relative_error: relative_sigma[g],
+            estimated: group.estimate,
+            samples: samples[g],
+        })
+        .collect();
+    rejected.extend(
+        model
+            .lost()
+            .into_iter()
+            .map(|(measurement, sample, item)| Rejection {
+                sample,
+                measurement,
+                item,
+                reason: RejectReason::Occlusion,
+                distance: 0.0,
+            }),
+    );
+    // ν = rows − tr(C JᵀV⁻¹J)
+    let kept = model.observations.iter().zip(&weights);
+    let rows: usize = kept.filter(|(_, w)| **w > 0.0).map(|(o, _)| o.rows).sum();
+    let degrees_of_freedom = rows as f64 - information.effective_parameters();
+    Ok(Solution {
+        parameters: describe_parameters(&model, &minimum.values, &information),
+        observability: observe(&model, &minimum.values, &information),
+        values: minimum.values,
+        status: minimum.status,
+        iterations,
+        chi2: minimum.data_cost,
+        chi2_stated,
+        degrees_of_freedom,
+        noise,
+        information,
+        weights,
+        rejected,
+        theta,
+        model,
+    })
+}
+
+/// What each noise level is found from: kept observations whose covariance has it, and readings of its joints on
+/// their paths.
+fn samples_per_group(model: &Model, weights: &[f64]) -> Vec<usize> {
+    /// In place of an edge, where the observation itself is counted.
+    const ITSELF: usize = usize::MAX;
+    let mut used = vec![BTreeSet::new(); model.problem.groups.len()];
+    for (o, observation) in model.observations.iter().enumerate() {
+        if weights[o] == 0.0 {
+            continue;
+        }
+        add_block(model, o, |_, _, group, _| {
+            used[group].insert((o, ITSELF));
+        });
+        for &k in &model.paths[observation.measurement].slots {
+            if let Some(group) = model.slots[k].group {
+                used[group].insert((observation.sample, model.slots[k].edge));
+            }
+        }
+    }
+    used.iter().map(BTreeSet::len).collect()
+}

@@ -1,0 +1,66 @@
+//! Covariance of the parameters that does not trust the noise model.
+//!
+//! ```text
+//! A = L⁻¹J,   w = L⁻¹e,   Q = A C Aᵀ   (V = LLᵀ)
+//! C (Σ_s Aᵀ(I − Q)^(-½) w wᵀ (I − Q)^(-½) A + Λ) C                                         (1)
+//! ```
+//!
+//! Bell & McCaffrey 2002 (CR2).
+
+use nalgebra::DMatrix;
+
+use calib_geometry::decompose::symmetric_eigen;
+
+use crate::model::layout::Model;
+use crate::model::values::Values;
+use crate::solve::normal::{NormalEquations, Workspace, accumulate};
+use crate::solve::whitened::{covariance_of, whitened};
+
+/// An eigenvalue of I − Q below this means a direction with leverage 1, which carries no residual.
+const LEVERAGE_LEFT: f64 = 1e-10;
+
+/// Equation (1), samples being the clusters. The prior enters as if it were right. `None` when the model cannot be
+/// evaluated.
+#[must_use]
+pub fn sandwich(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+) -> Option<DMatrix<f64>> {
+    let n = model.free();
+    let mut work = Workspace::new(model);
+    let mut system = NormalEquations::new(n);
+    if !accumulate(model, values, weights, theta, &mut work, &mut system) {
+        return None;
+    }
+    let c = covariance_of(&system)?;
+    // Λ = diag(1/σ²)
+    let mut middle = DMatrix::zeros(n, n);
+    for (i, &p) in model.columns.iter().enumerate() {
+        if let Some(sigma) = model.problem.parameters[p].prior_sigma {
+            middle[(i, i)] = 1.0 / (sigma * sigma);
+        }
+    }
+    for sample in 0..model.problem.samples {
+        let Some(s) = whitened(model, values, weights, theta, sample, &mut work) else {
+            continue;
+        };
+        let m = s.w.len();
+        // I − Q = U diag(λ) Uᵀ
+        let eigen = symmetric_eigen(&(DMatrix::identity(m, m) - &s.a * &c * s.a.transpose()));
+        // (I − Q)^(-½) w = U diag(λ^(-½)) Uᵀ w
+        let mut coefficients = eigen.vectors.tr_mul(&s.w);
+        for k in 0..m {
+            coefficients[k] = if eigen.values[k] > LEVERAGE_LEFT {
+                coefficients[k] / eigen.values[k].sqrt()
+            } else {
+                0.0
+            };
+        }
+        let adjusted = &eigen.vectors * coefficients;
+        let score = s.a.tr_mul(&adjusted);
+        middle.ger(1.0, &score, &score, 1.0);
+    }
+    Some(&c * middle * &c)
+}

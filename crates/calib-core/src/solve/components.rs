@@ -1,0 +1,245 @@
+//! Sums over the samples for the noise levels: equations (2) and (3) of [`noise`](crate::solve::noise).
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::model::layout::Model;
+use crate::model::path::Derivatives;
+use crate::model::values::Values;
+use crate::solve::normal::{NormalEquations, Workspace, add_prior};
+use crate::solve::panel::Local;
+use crate::solve::rows::{SampleRows, add_block};
+use crate::solve::structured::RandomPart;
+
+/// Sums of (2) and (3) over the samples, for the groups that are to be estimated.
+pub(crate) struct Sums {
+    /// eᵀV⁻¹V_gV⁻¹e
+    pub squares: DVector<f64>,
+    /// tr(V_g V⁻¹)
+    pub traces: DVector<f64>,
+    /// tr(V_g V⁻¹ V_h V⁻¹)
+    pub products: DMatrix<f64>,
+    /// JᵀV⁻¹V_gV⁻¹J, and last the same of everything that is not to be estimated. Their sum is JᵀV⁻¹J.
+    pub moments: Vec<Local>,
+}
+
+impl Sums {
+    /// H of the sums and the prior; without gradient and cost.
+    pub(crate) fn normal_equations(&self, model: &Model, values: &Values) -> NormalEquations {
+        let n = model.free();
+        let mut system = NormalEquations::new(n);
+        for moment in &self.moments {
+            for a in 0..n {
+                for b in a..n {
+                    system.h[a * n + b] += moment.h[(a, b)];
+                }
+            }
+        }
+        add_prior(model, values, &mut system);
+        system
+    }
+}
+
+/// Group of every row of a sample, in the order of its rows.
+fn row_groups(model: &Model, blocks: &[(usize, usize, usize)], out: &mut Vec<usize>) {
+    out.clear();
+    for &(o, first, count) in blocks {
+        out.resize(first + count, 0);
+        add_block(model, o, |i, j, group, _| {
+            if i == j {
+                out[first + i] = group;
+            }
+        });
+    }
+}
+
+/// Where each row and random effect is counted.
+struct Layout {
+    /// Group → its place among those that are to be estimated.
+    place: Vec<Option<usize>>,
+    /// Random effects of every estimated group, and last those of none.
+    slots: Vec<Vec<usize>>,
+}
+
+impl Layout {
+    fn new(model: &Model, groups: &[usize]) -> Self {
+        let place: Vec<Option<usize>> = (0..model.problem.groups.len())
+            .map(|g| groups.iter().position(|h| *h == g))
+            .collect();
+        let mut slots = vec![Vec::new(); groups.len() + 1];
+        for (k, slot) in model.slots.iter().enumerate() {
+            let at = slot.group.and_then(|g| place[g]);
+            slots[at.unwrap_or(groups.len())].push(k);
+        }
+        Self { place, slots }
+    }
+}
+
+/// One sample: what V⁻¹ makes of e, J and U, in block-whitened rows (D = L_D L_Dᵀ).
+struct Weighed {
+    m: usize,
+    k: usize,
+    n: usize,
+    /// Place of every row's group.
+    place: Vec<Option<usize>>,
+    /// V⁻¹, m × m
+    p: Vec<f64>,
+    /// V⁻¹ e
+    e: Vec<f64>,
+    /// V⁻¹ J, m × n
+    j: Vec<f64>,
+    /// U, m × k
+    u: Vec<f64>,
+    /// V⁻¹ U
+    pu: Vec<f64>,
+    /// Uᵀ V⁻¹ U, k × k
+    upu: Vec<f64>,
+}
+
+impl Weighed {
+    /// Of the sample that `rows` holds, whitened by its blocks.
+    fn new(model: &Model, layout: &Layout, rows: &SampleRows, random: &RandomPart) -> Self {
+        let (m, n, k) = (rows.m, rows.n, rows.k);
+        let mut groups = Vec::new();
+        row_groups(model, &rows.blocks, &mut groups);
+        let mut p = vec![0.0; m * m];
+        for i in 0..m {
+            p[i * m + i] = 1.0;
+        }
+        let mut e = rows.r[..m].to_vec();
+        let mut j = rows.j[..m * n].to_vec();
+        let u = rows.g[..m * k].to_vec();
+        let mut pu = u.clone();
+        for (x, columns) in [(&mut p, m), (&mut e, 1), (&mut j, n), (&mut pu, k)] {
+            random.weigh(x, columns);
+        }
+        let mut upu = vec![0.0; k * k];
+        for i in 0..m {
+            for a in 0..k {
+                let ua = u[i * k + a];
+                if ua != 0.0 {
+                    for b in 0..k {
+                        upu[a * k + b] += ua * pu[i * k + b];
+                    }
+                }
+            }
+        }
+        Self {
+            m,
+            k,
+            n,
+            place: groups.iter().map(|g| layout.place[*g]).collect(),
+            p,
+            e,
+            j,
+            u,
+            pu,
+            upu,
+        }
+    }
+
+    /// Measurement noise: V_g = E_g/θ_g with E_g the unit matrix on the group's rows.
+    fn add_rows(&self, sums: &mut Sums) {
+        let (m, n) = (self.m, self.n);
+        let rest = sums.squares.len();
+        for i in 0..m {
+            sums.moments[self.place[i].unwrap_or(rest)]
+                .rows(1)
+                .copy_from_slice(&self.j[i * n..(i + 1) * n]);
+            let Some(g) = self.place[i] else { continue };
+            sums.squares[g] += self.e[i] * self.e[i];
+            sums.traces[g] += self.p[i * m + i];
+            for j in 0..m {
+                if let Some(h) = self.place[j] {
+                    sums.products[(g, h)] += self.p[i * m + j] * self.p[i * m + j];
+                }
+            }
+        }
+    }
+
+    /// Random effects: V_u = u uᵀ/θ_u summed over the columns u of the group.
+    fn add_effects(&self, layout: &Layout, sums: &mut Sums) {
+        let (m, k) = (self.m, self.k);
+        let rest = sums.squares.len();
+        for (g, slots) in layout.slots.iter().enumerate() {
+            for &a in slots {
+                let along = self.moment_along(a, sums.moments[g].rows(1));
+                if g == rest {
+                    continue;
+                }
+                sums.squares[g] += along * along;
+                sums.traces[g] += self.upu[a * k + a];
+                for (h, others) in layout.slots[..rest].iter().enumerate() {
+                    for &b in others {
+                        sums.products[(g, h)] += self.upu[a * k + b] * self.upu[a * k + b];
+                    }
+                }
+                for i in 0..m {
+                    if let Some(h) = self.place[i] {
+                        let x = self.pu[i * k + a] * self.pu[i * k + a];
+                        sums.products[(g, h)] += x;
+                        sums.products[(h, g)] += x;
+                    }
+                }
+            }
+        }
+    }
+
+    /// uᵀ V⁻¹ J of one random effect, written to `row`; returns uᵀ V⁻¹ e.
+    fn moment_along(&self, a: usize, row: &mut [f64]) -> f64 {
+        let (k, n) = (self.k, self.n);
+        let mut along = 0.0;
+        row.fill(0.0);
+        for i in 0..self.m {
+            let ua = self.u[i * k + a];
+            if ua != 0.0 {
+                along += ua * self.e[i];
+                let j = &self.j[i * n..(i + 1) * n];
+                row.iter_mut().zip(j).for_each(|(x, j)| *x += ua * j);
+            }
+        }
+        along
+    }
+}
+
+/// One pass over the samples; `None` when the model cannot be evaluated. V⁻¹ is the weighing of
+/// [`structured`](crate::solve::structured), equation (3).
+pub(crate) fn sums(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    groups: &[usize],
+    work: &mut Workspace,
+) -> Option<Sums> {
+    let count = groups.len();
+    let most = model.max_rows.max(model.slots.len());
+    let mut sums = Sums {
+        squares: DVector::zeros(count),
+        traces: DVector::zeros(count),
+        products: DMatrix::zeros(count, count),
+        moments: (0..=count)
+            .map(|_| Local::new(model.free(), most))
+            .collect(),
+    };
+    let layout = Layout::new(model, groups);
+    work.cache.update(&model.problem, values);
+    let Workspace {
+        cache,
+        rows,
+        random,
+        ..
+    } = work;
+    for sample in 0..model.problem.samples {
+        rows.fill(model, cache, values, weights, sample, Derivatives::All);
+        if rows.m == 0 {
+            continue;
+        }
+        rows.whiten_blocks(model, weights, theta, true)?;
+        rows.random_part(random)?;
+        let weighed = Weighed::new(model, &layout, rows, random);
+        weighed.add_rows(&mut sums);
+        weighed.add_effects(&layout, &mut sums);
+    }
+    sums.moments.iter_mut().for_each(Local::multiply);
+    Some(sums)
+}
