@@ -7,6 +7,7 @@ mod joints;
 mod markers;
 mod motion;
 mod rigidity;
+mod rows;
 
 pub use held_out::held_out_in_training;
 
@@ -48,6 +49,7 @@ pub fn checks(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
     findings.extend(markers::frozen(poses, expected));
     findings.extend(markers::virtual_points(poses));
     findings.extend(rigidity::rigidity(poses, expected));
+    findings.extend(rows::repeated(poses));
     findings.extend(motion::rotations(poses));
     findings.extend(motion::flips(poses));
     findings.extend(motion::jumps(poses));

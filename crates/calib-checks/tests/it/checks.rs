@@ -435,6 +435,15 @@ pub fn faults() -> Vec<(&'static str, &'static str, bool, Fault)> {
                     .collect::<Vec<_>>(),
             );
         }),
+        (
+            "rows-repeated",
+            "the first 5 rows pasted again",
+            false,
+            |r, _| {
+                let twice: Vec<usize> = (0..36).chain(0..5).collect();
+                r.poses = r.poses.select(&twice);
+            },
+        ),
         ("unsettled-rows", "a hold in motion", true, |r, rng| {
             let row = rng.random_range(0..280);
             let label = |i: usize| {

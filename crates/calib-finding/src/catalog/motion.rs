@@ -34,6 +34,12 @@ super::topic! {
             "{count:row} deviate by up to {position} and {angle}, and are explained by interpolating the joint values toward an adjacent row ({fraction:percent} in the worst row).",
             "Record again, in holds of a second: joints and tracker were read at different times, or the robot had not settled. The fit rejects these rows.";
     }
+    /// Rows that stand in a recording twice.
+    ROWS_REPEATED = "rows-repeated" {
+        "": Warning,
+            "{repeated} of {rows:row} repeat an earlier row in every joint and every tracked value.",
+            "Remove the copies: each measurement must appear once, or the uncertainties come out too small.";
+    }
     /// Validation rows that the fit uses as well.
     HELD_OUT_IN_TRAINING = "held-out-in-training" {
         "measurement": Error,
