@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use calib_estimator::{Input, Options, Outcome};
 use calib_recording::{BodyColumns, ColumnMap, ReadOptions};
 use nalgebra::Isometry3;
 use serde_json::{Value, json};
@@ -51,16 +52,18 @@ pub fn handeye(file: &Path, robot: &str, measured: &str) -> Result<Answer, FitEr
         .filter_map(|(a, b)| Some(((*a)?, (*b)?)))
         .collect();
     let (a, b): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
-    let solved = match calib_handeye::solve_ax_zb(&a, &b, calib_handeye::HandEyeWeights::default())
-    {
-        Ok(solved) => solved,
-        Err(
-            error @ (calib_handeye::HandEyeError::OneAxis { .. }
-            | calib_handeye::HandEyeError::TooFew { .. }),
-        ) => {
-            return Ok(not_observable("handeye", "single_axis", &error.to_string()));
+    let input = Input::PosePairs {
+        robot: &a,
+        measured: &b,
+    };
+    let outcome = calib_handeye::estimator("handeye")
+        .and_then(|info| info.run(&input, &Options::default()))
+        .map_err(|error| data(file, error.to_string(), "correct the table"))?;
+    let solved = match outcome {
+        Outcome::Estimate(solved) => solved,
+        Outcome::NotObservable(n) => {
+            return Ok(not_observable("handeye", n.verdict.as_str(), &n.reason));
         }
-        Err(error) => return Err(data(file, error.to_string(), "correct the table")),
     };
     let value = json!({
         "estimator": "handeye",

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_cor::{InputKind, Pose, Shape as CorShape};
+use calib_estimator::{OptionId, parameter};
 use calib_plugin::{
     Answer, AorFit, AxisLine, ByFn, Call, Control, CorFit, Entry, Failure, Host, Kind, Motion,
     MotionData, Offer, PluginError, SearchPath, Shape, Tables, Value,
@@ -230,20 +231,66 @@ fn poses(motion: &Motion<'_>, track: usize) -> Vec<Option<Pose>> {
     motion.poses(track).map(|p| p.map(pose)).collect()
 }
 
+/// The options that a profile can set, as parameters of the offer.
+fn with_parameters(offer: Offer, options: &[OptionId]) -> Offer {
+    let described = options.iter().filter_map(|o| parameter::parameter(*o));
+    described.fold(offer, |offer, p| {
+        offer.with(calib_plugin::Parameter {
+            name: p.name,
+            summary: p.summary,
+            value: match p.value {
+                parameter::Value::Bool(v) => Value::Bool(v),
+                parameter::Value::Integer(v) => Value::Integer(v),
+                parameter::Value::Number(v) => Value::Number(v),
+                parameter::Value::Text(v) => Value::Text(v),
+            },
+            limits: p.limits,
+            choices: p.choices,
+            required: p.required,
+        })
+    })
+}
+
+/// Sets the options that the profile gives as parameters.
+fn set_parameters(
+    options: &mut calib_estimator::Options,
+    used: &[OptionId],
+    call: &Call<'_>,
+) -> Result<(), Failure> {
+    for option in used {
+        let Some(p) = parameter::parameter(*option) else {
+            continue;
+        };
+        let value = match &p.value {
+            parameter::Value::Bool(_) => parameter::Value::Bool(call.flag(&p.name)?),
+            parameter::Value::Integer(_) => parameter::Value::Integer(call.integer(&p.name)?),
+            parameter::Value::Number(_) => parameter::Value::Number(call.number(&p.name)?),
+            parameter::Value::Text(_) => parameter::Value::Text(call.text(&p.name)?.to_owned()),
+        };
+        // An option at its default stays as the recording states it.
+        if value != p.value {
+            parameter::set(options, *option, &value);
+        }
+    }
+    Ok(())
+}
+
 fn built_in_cor(info: &'static calib_cor::EstimatorInfo) -> Entry<dyn calib_plugin::Cor> {
     let offer = Offer::new(Kind::Cor, info.id, info.summary)
         .from_source(info.source)
         .takes(&shapes(info.input));
+    let offer = with_parameters(offer, info.options);
     Entry::built_in_cor(ByFn::new(
         offer,
-        move |motion: &Motion<'_>, _: &Call<'_>| {
-            let options = calib_cor::Options {
+        move |motion: &Motion<'_>, call: &Call<'_>| {
+            let mut options = calib_cor::Options {
                 sigma_t: motion.sigma_t_m,
                 sigma_r: motion.sigma_r_rad,
                 significance: motion.significance,
                 seed: motion.seed,
                 ..calib_cor::Options::default()
             };
+            set_parameters(&mut options, info.options, call)?;
             let (tracks, first, second) = (tracks(motion), poses(motion, 0), poses(motion, 1));
             let input = match motion.shape {
                 Shape::Points => calib_cor::Input::Points(&tracks),
@@ -298,10 +345,11 @@ fn built_in_aor(info: &'static calib_aor::EstimatorInfo) -> Entry<dyn calib_plug
     let offer = Offer::new(Kind::Aor, info.id, info.summary)
         .from_source(info.source)
         .takes(&shapes(info.input));
+    let offer = with_parameters(offer, info.options);
     Entry::built_in_aor(ByFn::new(
         offer,
-        move |motion: &Motion<'_>, _: &Call<'_>| {
-            let options = calib_aor::Options {
+        move |motion: &Motion<'_>, call: &Call<'_>| {
+            let mut options = calib_aor::Options {
                 sigma_t: motion.sigma_t_m,
                 sigma_r: motion.sigma_r_rad,
                 center: motion.center_m.map(Point3::from),
@@ -309,6 +357,7 @@ fn built_in_aor(info: &'static calib_aor::EstimatorInfo) -> Entry<dyn calib_plug
                 significance: motion.significance,
                 ..calib_aor::Options::default()
             };
+            set_parameters(&mut options, info.options, call)?;
             let (tracks, parent, child) = (tracks(motion), poses(motion, 0), poses(motion, 1));
             let input = match motion.shape {
                 Shape::Points => calib_aor::Input::Points(&tracks),
@@ -345,4 +394,36 @@ fn built_in_aor(info: &'static calib_aor::EstimatorInfo) -> Entry<dyn calib_plug
             }))
         },
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_of_built_in_estimators_are_honored_and_unknown_ones_refused() {
+        let estimators = Estimators::built_in().unwrap();
+        // A patch of a sphere of radius 1 with a millimeter of scatter.
+        let track: Vec<_> = (0..40)
+            .map(f64::from)
+            .map(|i| {
+                let (a, b) = (0.9 * (1.7 * i).sin(), 0.9 * (2.3 * i).cos());
+                let r = 1.0 + 1e-3 * (5.1 * i).sin();
+                Some([r * a.sin() * b.cos(), r * b.sin(), r * a.cos() * b.cos()])
+            })
+            .collect();
+        let motion = MotionData::points(&[track]);
+        let with = |name: &str, value: Value| {
+            let given: BTreeMap<String, Value> = [(name.to_owned(), value)].into();
+            estimators.center("sfe", &given, &motion)
+        };
+        let plain = estimators.center("sfe", &BTreeMap::new(), &motion);
+        assert!(plain.unwrap().is_ok());
+        let strict = with("weak_fraction", Value::Number(1e-8)).unwrap();
+        assert!(strict.is_err(), "{strict:?}");
+        let unknown = with("weak_fractoin", Value::Number(0.1)).unwrap_err();
+        assert!(unknown.to_string().contains("weak_fraction"), "{unknown}");
+        // `sfe` draws nothing at random.
+        assert!(with("seed", Value::Integer(3)).is_err());
+    }
 }
