@@ -7,7 +7,7 @@ use crate::{
     planar_radial, plane, shared_axis,
 };
 use calib_estimator::{
-    AxisFit, EstimatorError, FrameFit, Input, InputKind, Kind, OptionId,
+    EstimatorError, Input, InputKind, Kind, OptionId,
     OptionId::{
         Angles, Axes, Center, PlaneFit, SameAngle, Separation, SigmaR, SigmaT, Significance,
         Towards, WeakAngle, WeakFraction, Weights,
@@ -234,22 +234,4 @@ pub fn frame_estimators() -> &'static [FrameInfo] {
 /// [`EstimatorError::Unknown`] with the names of the table.
 pub fn frame_estimator(id: &str) -> Result<&'static FrameInfo, EstimatorError> {
     find(Kind::Frame, FRAMES, id)
-}
-
-impl From<AorEstimate> for AxisFit {
-    fn from(e: AorEstimate) -> Self {
-        Self {
-            line: e.line,
-            covariance: Some(e.covariance),
-        }
-    }
-}
-
-impl From<FrameEstimate> for FrameFit {
-    fn from(e: FrameEstimate) -> Self {
-        Self {
-            body_from_joint: e.body_from_joint,
-            covariance: Some(e.covariance),
-        }
-    }
 }

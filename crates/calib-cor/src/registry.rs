@@ -7,7 +7,7 @@ use crate::{
     robust, score, sfa, sphere_eiv, sphere_ml,
 };
 use calib_estimator::{
-    CenterFit, EstimatorError, Input, InputKind, Kind, OptionId,
+    EstimatorError, Input, InputKind, Kind, OptionId,
     OptionId::{
         Covariances, NoisePerMarker, Seed, SigmaR, SigmaT, Significance, Subsets, WeakFraction,
         Weights,
@@ -227,13 +227,4 @@ pub fn fit(id: &str, input: &Input<'_>, options: &Options) -> Result<Outcome, Es
         return Err(input.wrong(info.input));
     }
     Ok((info.fit)(input, options)?.checked())
-}
-
-impl From<CorEstimate> for CenterFit {
-    fn from(e: CorEstimate) -> Self {
-        Self {
-            center: e.center,
-            covariance: Some(e.covariance),
-        }
-    }
 }

@@ -1,8 +1,7 @@
 //! Input that no estimator can read, and options that do not fit.
 
 use crate::{
-    input::InputKind, measured::DataError, options::OptionId, parameter::ParameterError,
-    registry::Kind, verdict::Verdict,
+    input::InputKind, measured::DataError, options::OptionId, registry::Kind, verdict::Verdict,
 };
 
 /// What an option must be.
@@ -73,45 +72,6 @@ pub enum EstimatorError {
         /// The option.
         option: OptionId,
     },
-    /// A parameter that the estimator does not have, or a value that it does not take.
-    #[error("`{id}`: {problem}")]
-    Parameter {
-        /// The estimator.
-        id: String,
-        /// What is wrong.
-        problem: ParameterError,
-    },
-    /// Two estimators of one kind have the same name.
-    #[error("two {kind} estimators are called `{id}`: one {first}, one {second}")]
-    Taken {
-        /// The kind.
-        kind: Kind,
-        /// The name.
-        id: String,
-        /// Where the first comes from.
-        first: String,
-        /// Where the second comes from.
-        second: String,
-    },
-    /// An estimator of a plugin did not answer.
-    #[error("{text}")]
-    Plugin {
-        /// What the plugin's host says.
-        text: String,
-        /// Whose fault it is.
-        fault: Fault,
-    },
-}
-
-/// Whose fault it is that an estimator of a plugin did not answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fault {
-    /// The request's.
-    Usage,
-    /// The data's.
-    Data,
-    /// The plugin's.
-    Plugin,
 }
 
 impl EstimatorError {

@@ -1,6 +1,4 @@
-//! Parameters by name: the options of built-in estimators, and those that a plugin describes.
-
-use std::collections::BTreeMap;
+//! Options as parameters that a profile can set by name.
 
 use crate::{
     frame::PlaneFit,
@@ -19,9 +17,6 @@ pub enum Value {
     /// A text.
     Text(String),
 }
-
-/// Values by name, as a profile gives them.
-pub type Parameters = BTreeMap<String, Value>;
 
 /// One parameter of an estimator. Its type is the type of its value.
 #[derive(Debug, Clone, PartialEq)]
@@ -150,122 +145,4 @@ pub fn set(options: &mut Options, option: OptionId, value: &Value) {
         (OptionId::SameAngle, Value::Number(v)) => options.same_angle = v.to_radians(),
         _ => {}
     }
-}
-
-/// A parameter that is not what an estimator describes.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ParameterError {
-    /// No such parameter.
-    #[error(
-        "unknown parameter `{name}`, expected {}",
-        if known.is_empty() { "none".to_owned() } else { known.join(", ") }
-    )]
-    Unknown {
-        /// The one given.
-        name: String,
-        /// Those that exist.
-        known: Vec<String>,
-    },
-    /// Another type.
-    #[error("parameter `{name}` must be {needed}")]
-    Type {
-        /// The parameter.
-        name: String,
-        /// The type in words.
-        needed: &'static str,
-    },
-    /// Out of its limits.
-    #[error("parameter `{name}` must be {minimum} to {maximum}, got {got}")]
-    Range {
-        /// The parameter.
-        name: String,
-        /// Smallest.
-        minimum: f64,
-        /// Largest.
-        maximum: f64,
-        /// The value given.
-        got: f64,
-    },
-    /// Not one of the texts.
-    #[error("parameter `{name}` must be one of {}, got `{got}`", choices.join(", "))]
-    Choice {
-        /// The parameter.
-        name: String,
-        /// The texts.
-        choices: Vec<String>,
-        /// The value given.
-        got: String,
-    },
-}
-
-/// The given values, checked and brought to the types of the parameters.
-///
-/// # Errors
-/// [`ParameterError`] for the first value that does not fit.
-pub fn given(
-    parameters: &[Parameter],
-    values: &Parameters,
-) -> Result<Vec<(String, Value)>, ParameterError> {
-    values
-        .iter()
-        .map(|(name, value)| {
-            let Some(parameter) = parameters.iter().find(|p| &p.name == name) else {
-                let known: Vec<String> = parameters.iter().map(|p| p.name.clone()).collect();
-                return Err(ParameterError::Unknown {
-                    name: name.clone(),
-                    known,
-                });
-            };
-            Ok((name.clone(), checked(parameter, value)?))
-        })
-        .collect()
-}
-
-fn checked(parameter: &Parameter, value: &Value) -> Result<Value, ParameterError> {
-    let name = || parameter.name.clone();
-    let wrong = |needed| {
-        Err(ParameterError::Type {
-            name: name(),
-            needed,
-        })
-    };
-    let value = match (&parameter.value, value) {
-        // A whole number is taken where a number is described.
-        (Value::Number(_), Value::Integer(v)) => Value::Number(*v as f64),
-        (Value::Bool(_), Value::Bool(_))
-        | (Value::Integer(_), Value::Integer(_))
-        | (Value::Number(_), Value::Number(_))
-        | (Value::Text(_), Value::Text(_)) => value.clone(),
-        (Value::Bool(_), _) => return wrong("true or false"),
-        (Value::Integer(_), _) => return wrong("a whole number"),
-        (Value::Number(_), _) => return wrong("a number"),
-        (Value::Text(_), _) => return wrong("a text"),
-    };
-    let number = match &value {
-        Value::Integer(v) => Some(*v as f64),
-        Value::Number(v) => Some(*v),
-        _ => None,
-    };
-    if let (Some(got), Some((minimum, maximum))) = (number, parameter.limits)
-        && !(minimum..=maximum).contains(&got)
-    {
-        return Err(ParameterError::Range {
-            name: name(),
-            minimum,
-            maximum,
-            got,
-        });
-    }
-    if let Value::Text(got) = &value
-        && !parameter.choices.is_empty()
-        && !parameter.choices.contains(got)
-    {
-        return Err(ParameterError::Choice {
-            name: name(),
-            choices: parameter.choices.clone(),
-            got: got.clone(),
-        });
-    }
-    Ok(value)
 }

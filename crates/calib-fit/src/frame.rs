@@ -1,6 +1,6 @@
 //! `calib fit frame`.
 
-use calib_aor::{FrameAxes, FrameAxis, FrameOutcome, FrameSample, Options};
+use calib_aor::{FrameAxes, FrameAxis, FrameEstimate, FrameOutcome, FrameSample, Options};
 use calib_cor::Pose;
 use calib_estimator::{CenterBy, EstimatorError, Input};
 use calib_recording::ReadOptions;
@@ -10,7 +10,7 @@ use crate::error::FitError;
 use crate::table::{it_has, read_poses};
 use crate::{
     Answer, FrameRequest, answer, data, doubt, matrix, noise, not_observable, pose_text,
-    pose_value, unknown, usage,
+    pose_value, usage,
 };
 
 /// `calib fit frame`.
@@ -31,24 +31,7 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
             )
         })
     };
-    let body = match (&request.body, poses.bodies.len()) {
-        (Some(name), _) => poses
-            .bodies
-            .get(name)
-            .ok_or_else(|| data(file, format!("has no body `{name}`"), "correct --body"))?,
-        (None, 1) => poses
-            .bodies
-            .values()
-            .next()
-            .ok_or_else(|| data(file, "has no body", "give poses"))?,
-        (None, n) => {
-            return Err(data(
-                file,
-                format!("has {n} bodies"),
-                "name one with --body",
-            ));
-        }
-    };
+    let body = body_of(request, &poses.bodies)?;
     let (a, b) = (column(proximal)?, column(distal)?);
     let weights = noise::weights(request.weights.as_deref(), poses.rows.len())?;
     let samples: Vec<FrameSample> = a
@@ -87,7 +70,11 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
         center: Some(CenterBy(&center)),
     };
     let info = calib_aor::frame_estimator(&request.estimator).map_err(|error| match &error {
-        EstimatorError::Unknown { id, known, .. } => unknown(id, known, "calib fit frame"),
+        // This command has no `--list`: the names fit in the remedy.
+        EstimatorError::Unknown { id, known, .. } => usage(
+            format!("there is no estimator `{id}`"),
+            format!("use one of {}", known.join(", ")),
+        ),
         error => usage(error.to_string(), "correct the option"),
     })?;
     let outcome = info.run(&input, &options).map_err(|error| match error {
@@ -106,9 +93,13 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
             ));
         }
     };
+    Ok(frame_answer(&request.estimator, &f))
+}
+
+fn frame_answer(id: &str, f: &FrameEstimate) -> Answer {
     let observable = f.verdict == calib_estimator::Verdict::Ok;
     let value = json!({
-        "estimator": request.estimator,
+        "estimator": id,
         "observable": observable,
         "verdict": f.verdict.as_str(),
         "reason": f.reason,
@@ -122,7 +113,7 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
     let sigma = f.covariance.diagonal().map(|v| v.max(0.0).sqrt());
     let text = format!(
         "{}: body_from_joint {}\n{}  sigma {:.4}, {:.4}, {:.4} mm; {:.4}, {:.4}, {:.4} deg\n  axes {:.3} deg off square; rms {:.4} mm, {:.4} deg; {} samples\n",
-        request.estimator,
+        id,
         pose_text(&f.body_from_joint),
         doubt(f.reason.as_deref()),
         sigma[3] * 1e3,
@@ -136,7 +127,7 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
         f.rms_r.to_degrees(),
         f.used
     );
-    Ok(answer(text, &value, observable))
+    answer(text, &value, observable)
 }
 
 fn axis_of(text: &str) -> Result<(FrameAxis, &str), FitError> {
@@ -154,4 +145,26 @@ fn axis_of(text: &str) -> Result<(FrameAxis, &str), FitError> {
         _ => return Err(wrong()),
     };
     Ok((letter, joint))
+}
+
+/// The body that the request names, or the only one.
+fn body_of<'a, T>(
+    request: &FrameRequest,
+    bodies: &'a std::collections::BTreeMap<String, T>,
+) -> Result<&'a T, FitError> {
+    let file = &request.file;
+    match (&request.body, bodies.len()) {
+        (Some(name), _) => bodies
+            .get(name)
+            .ok_or_else(|| data(file, format!("has no body `{name}`"), "correct --body")),
+        (None, 1) => bodies
+            .values()
+            .next()
+            .ok_or_else(|| data(file, "has no body", "give poses")),
+        (None, n) => Err(data(
+            file,
+            format!("has {n} bodies"),
+            "name one with --body",
+        )),
+    }
 }

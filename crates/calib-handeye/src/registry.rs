@@ -1,11 +1,10 @@
 //! The hand-eye estimator in the table of all estimators.
 
 use calib_estimator::{
-    Estimate, EstimatorError, EstimatorInfo, HandEyeFit, Input, InputKind, Kind,
+    Estimate, EstimatorError, EstimatorInfo, Input, InputKind, Kind,
     OptionId::{SigmaR, SigmaT},
     Options, Outcome, Verdict, find,
 };
-use nalgebra::DMatrix;
 
 use crate::{
     input::HandEyeError,
@@ -111,15 +110,5 @@ impl Estimate for HandEye {
             ]
             .iter()
             .all(|v| v.is_finite())
-    }
-}
-
-impl From<HandEye> for HandEyeFit {
-    fn from(e: HandEye) -> Self {
-        Self {
-            x: e.x,
-            z: e.z,
-            covariance: e.covariance.map(|c| DMatrix::from_row_slice(12, 12, &c)),
-        }
     }
 }

@@ -10,7 +10,11 @@ use crate::offer::{Parameter, Value};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ParameterError {
     /// No such parameter.
-    #[error("unknown parameter `{name}`, expected {}", expected(known))]
+    #[error(
+        "unknown parameter `{name}`, expected {}{}",
+        expected(known),
+        hint(name, known)
+    )]
     Unknown {
         /// The one given.
         name: String,
@@ -67,6 +71,11 @@ pub enum ParameterError {
         /// A value that would do.
         example: Value,
     },
+}
+
+fn hint(name: &str, known: &[String]) -> String {
+    calib_finding::nearest_word(name, known.iter().map(String::as_str))
+        .map_or_else(String::new, |near| format!("; did you mean `{near}`?"))
 }
 
 fn expected(names: &[String]) -> String {

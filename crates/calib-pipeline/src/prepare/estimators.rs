@@ -1,4 +1,7 @@
-//! Estimators by name: built-in ones and those of plugins in one table.
+//! Estimators that a profile names: the entries of the estimators' crates and those of plugins in one table.
+//!
+//! This is the only place where the plugin ABI and [`calib_estimator::EstimatorInfo`] meet: an adapter offers each built-in entry with the
+//! options that a profile can set as its parameters, and calls [`calib_estimator::EstimatorInfo::run`].
 
 use std::collections::BTreeMap;
 
@@ -14,7 +17,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use crate::error::PipelineError;
 use crate::prepare::readers;
 
-/// A center that was found.
+/// A center that was estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CenterFit {
     /// In the tracker's frame, m.
@@ -23,7 +26,7 @@ pub struct CenterFit {
     pub covariance: Option<Matrix3<f64>>,
 }
 
-/// An axis that was found.
+/// An axis that was estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisFit {
     /// In the tracker's frame.
@@ -301,8 +304,9 @@ fn built_in_cor(info: &'static calib_cor::EstimatorInfo) -> Entry<dyn calib_plug
                     child: &second,
                 },
             };
-            let outcome =
-                (info.fit)(&input, &options).map_err(|e| Failure::BadInput(e.to_string()))?;
+            let outcome = info
+                .run(&input, &options.only(info.options))
+                .map_err(|e| Failure::BadInput(e.to_string()))?;
             let Some(e) = outcome.estimate() else {
                 return Ok(Answer::NotObservable(format!(
                     "{}: {}",
@@ -368,8 +372,9 @@ fn built_in_aor(info: &'static calib_aor::EstimatorInfo) -> Entry<dyn calib_plug
                     child: &child,
                 },
             };
-            let outcome =
-                (info.fit)(&input, &options).map_err(|e| Failure::BadInput(e.to_string()))?;
+            let outcome = info
+                .run(&input, &options.only(info.options))
+                .map_err(|e| Failure::BadInput(e.to_string()))?;
             let Some(e) = outcome.estimate() else {
                 return Ok(Answer::NotObservable(format!(
                     "{}: {}",
@@ -422,7 +427,12 @@ mod tests {
         let strict = with("weak_fraction", Value::Number(1e-8)).unwrap();
         assert!(strict.is_err(), "{strict:?}");
         let unknown = with("weak_fractoin", Value::Number(0.1)).unwrap_err();
-        assert!(unknown.to_string().contains("weak_fraction"), "{unknown}");
+        assert!(
+            unknown
+                .to_string()
+                .contains("did you mean `weak_fraction`?"),
+            "{unknown}"
+        );
         // `sfe` draws nothing at random.
         assert!(with("seed", Value::Integer(3)).is_err());
     }
