@@ -146,24 +146,7 @@ pub(crate) fn judge(
         Err(answer) => return answer,
     };
 
-    // Take the share of noise off what the weakest direction seems to tell.
-    let mut covariance = unit_covariance * (sigma * sigma);
-    let of_direction: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
-    let eigen = symmetric_eigen_small(&of_direction);
-    let worst = eigen.vectors.column(2).into_owned();
-    let excess = if kappa.is_finite() {
-        1.0 / (kappa - 1.0)
-    } else {
-        0.0
-    };
-    // Along the worst turn w the joint change of (n, c) is C[:, w]/C_ww.
-    let mut along = nalgebra::Vector6::zeros();
-    along.fixed_rows_mut::<3>(0).copy_from(&worst);
-    let joint = covariance * along;
-    if eigen.values[2] > 0.0 {
-        covariance += joint * joint.transpose() * (excess / eigen.values[2]);
-    }
-    let sigma_direction = (eigen.values[2].max(0.0) * (1.0 + excess)).sqrt();
+    let (covariance, sigma_direction) = inflated(&unit_covariance, sigma, kappa);
 
     let n = axis.frame.n;
     let center_of = |p: usize| own_centers.get(p).map_or(axis.point, |c| c.center);
@@ -180,39 +163,10 @@ pub(crate) fn judge(
     });
     let s = sign(&n, options.towards, turns);
 
-    let mut circles = Vec::with_capacity(cloud.markers());
-    for p in 0..cloud.markers() {
-        let count = cloud.total(cloud.range(p));
-        let c = center_of(p);
-        let height = cloud
-            .samples(p)
-            .map(|(x, w)| w * (x - c).dot(&n))
-            .sum::<f64>()
-            / count;
-        let radius = cloud
-            .samples(p)
-            .map(|(x, w)| {
-                let d = x - c;
-                w * (d - n * d.dot(&n)).norm()
-            })
-            .sum::<f64>()
-            / count;
-        let mut angles: Vec<f64> = cloud.marker(p).iter().map(|x| angle_about(p, x)).collect();
-        circles.push(Circle {
-            center: Point3::from(cloud.origin + c + n * height),
-            radius,
-            arc: arc_covered(&mut angles),
-        });
-    }
+    let circles = circles_of(cloud, &n, center_of, angle_about);
     // τ = (v̄ − m)·n (paper Eq. 15, ‖n‖ = 1)
     let from = held.map_or(axis.point + cloud.origin, |m| m.coords);
     let tau = (cloud.origin - from).dot(&n) * s;
-    let adrift = own_centers
-        .iter()
-        .zip(&circles)
-        .map(|(own, circle)| (own.unit_variance.max(0.0).sqrt() * sigma, circle.radius))
-        .filter(|(deviation, radius)| *deviation > KNOWN_CENTER * radius)
-        .max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
     let arc = circles.iter().map(|c| c.arc).fold(0.0, f64::max);
     let weak = weak_direction(sigma_direction, options, || {
         format!(
@@ -220,18 +174,9 @@ pub(crate) fn judge(
             arc.to_degrees()
         )
     });
-    let weak = match (weak, doubt) {
+    let (verdict, reason) = match (weak, doubt) {
         ((Verdict::Ok, _), Some(doubt)) => (Verdict::Weak, Some(doubt)),
-        (weak, _) => weak,
-    };
-    let (verdict, reason) = match (weak, adrift) {
-        ((Verdict::Ok, _), Some((deviation, radius))) => {
-            let text = format!(
-                "the direction is known, the own center of a circle is not: σ {deviation:.2e} for a radius of {radius:.2e}; \
-                 where the markers share an axis, `line_ml` tells it"
-            );
-            (Verdict::Weak, Some(text))
-        }
+        ((Verdict::Ok, _), None) => own_centers_known(&own_centers, &circles, sigma),
         (weak, _) => weak,
     };
     let per_weight = cloud.points.len() as f64 / cloud.total(0..cloud.points.len());
@@ -253,6 +198,86 @@ pub(crate) fn judge(
         verdict,
         reason,
     }))
+}
+
+/// Covariance with the share of noise taken off what the weakest direction seems to tell, and σ of that direction, (2).
+fn inflated(unit_covariance: &Matrix6<f64>, sigma: f64, kappa: f64) -> (Matrix6<f64>, f64) {
+    // C = σ² (JᵀJ)⁻¹
+    let mut covariance = unit_covariance * (sigma * sigma);
+    let of_direction: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
+    let eigen = symmetric_eigen_small(&of_direction);
+    let worst = eigen.vectors.column(2).into_owned();
+    // 1/(1 − 1/κ) = 1 + 1/(κ − 1)
+    let excess = if kappa.is_finite() {
+        1.0 / (kappa - 1.0)
+    } else {
+        0.0
+    };
+    // Along the worst turn w the joint change of (n, c) is C[:, w]/C_ww.
+    let mut along = nalgebra::Vector6::zeros();
+    along.fixed_rows_mut::<3>(0).copy_from(&worst);
+    let joint = covariance * along;
+    if eigen.values[2] > 0.0 {
+        covariance += joint * joint.transpose() * (excess / eigen.values[2]);
+    }
+    let sigma_direction = (eigen.values[2].max(0.0) * (1.0 + excess)).sqrt();
+    (covariance, sigma_direction)
+}
+
+/// The circle of each marker about the axis: mean height, mean radius, arc.
+fn circles_of(
+    cloud: &Cloud,
+    n: &Vector3<f64>,
+    center_of: impl Fn(usize) -> Vector3<f64>,
+    angle_about: impl Fn(usize, &Vector3<f64>) -> f64,
+) -> Vec<Circle> {
+    let mut circles = Vec::with_capacity(cloud.markers());
+    for p in 0..cloud.markers() {
+        let count = cloud.total(cloud.range(p));
+        let c = center_of(p);
+        let height = cloud
+            .samples(p)
+            .map(|(x, w)| w * (x - c).dot(n))
+            .sum::<f64>()
+            / count;
+        let radius = cloud
+            .samples(p)
+            .map(|(x, w)| {
+                let d = x - c;
+                w * (d - n * d.dot(n)).norm()
+            })
+            .sum::<f64>()
+            / count;
+        let mut angles: Vec<f64> = cloud.marker(p).iter().map(|x| angle_about(p, x)).collect();
+        circles.push(Circle {
+            center: Point3::from(cloud.origin + c + n * height),
+            radius,
+            arc: arc_covered(&mut angles),
+        });
+    }
+    circles
+}
+
+/// `weak` where an own center is not known against its radius.
+fn own_centers_known(
+    own_centers: &[OwnCenter],
+    circles: &[Circle],
+    sigma: f64,
+) -> (Verdict, Option<String>) {
+    let adrift = own_centers
+        .iter()
+        .zip(circles)
+        .map(|(own, circle)| (own.unit_variance.max(0.0).sqrt() * sigma, circle.radius))
+        .filter(|(deviation, radius)| *deviation > KNOWN_CENTER * radius)
+        .max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
+    let Some((deviation, radius)) = adrift else {
+        return (Verdict::Ok, None);
+    };
+    let text = format!(
+        "the direction is known, the own center of a circle is not: σ {deviation:.2e} for a radius of {radius:.2e}; \
+         where the markers share an axis, `line_ml` tells it"
+    );
+    (Verdict::Weak, Some(text))
 }
 
 /// `weak`, with the reason, where the direction is known worse than [`Options::weak_angle`].

@@ -74,7 +74,7 @@ fn run(
         None => Ok(Outcome::none(
             estimator,
             Verdict::Diverged,
-            "the center of a circle ran away: its arc is straight within the noise".into(),
+            "the estimate diverged: the arc of a circle is straight within the noise".into(),
             Known::Nothing,
         )),
     }

@@ -76,7 +76,7 @@ fn run(
         return Ok(Outcome::none(
             estimator,
             Verdict::Diverged,
-            "the center of the circles ran away: their arcs are straight within the noise".into(),
+            "the estimate diverged: the arcs of the circles are straight within the noise".into(),
             Known::Nothing,
         ));
     };

@@ -55,29 +55,8 @@ pub(crate) fn run(
     let relative = parent_from_child(input)?;
     let weights = RowWeights(&options.weights);
     let sums = PoseSums::weighted(&relative, weights)?;
-    match sums.rank_verdict() {
-        Some(Verdict::TooFew) => {
-            let reason = format!("{} poses, at least 2 are needed", sums.n);
-            return Ok(Outcome::none(
-                estimator,
-                Verdict::TooFew,
-                reason,
-                Known::Nothing,
-            ));
-        }
-        Some(Verdict::NoRotation) => {
-            let reason = format!(
-                "the body does not turn: its rotations differ by {:.1e} rad rms",
-                (sums.lambda.sum().max(0.0) / 2.0 / sums.total).sqrt()
-            );
-            return Ok(Outcome::none(
-                estimator,
-                Verdict::NoRotation,
-                reason,
-                Known::Nothing,
-            ));
-        }
-        _ => {}
+    if let Some(answer) = without_rotation(estimator, &sums) {
+        return Ok(answer);
     }
     let n = sums.n as f64;
     let two_bodies = matches!(input, Input::TwoBodies { .. });
@@ -90,41 +69,8 @@ pub(crate) fn run(
         0.0
     };
     let sigma_r = options.sigma_r.map_or(estimated, |s| s * f64::sqrt(spread));
-    if sums.lambda[0] > STANDS_OUT * sums.lambda[1] {
-        let reason = format!(
-            "no axis stands out: the rotations spread {:.2}° rms about the best axis's perpendicular and \
-             {:.2}° about the next",
-            (sums.lambda[0].max(0.0) / sums.total).sqrt().to_degrees(),
-            (sums.lambda[1] / sums.total).sqrt().to_degrees()
-        );
-        return Ok(Outcome::none(
-            estimator,
-            Verdict::NotUnique,
-            reason,
-            Known::Nothing,
-        ));
-    }
-    if sigma_r > 0.0 {
-        // H₀: the body does not turn, Σ‖R − R̄‖² = 2 Σ|δ|²
-        let turning = sums.lambda.sum() / 2.0 / (sigma_r * sigma_r);
-        let all = 3.0 * n - 3.0;
-        let chance = match options.sigma_r {
-            Some(_) => chance::chi2_tail(turning, all),
-            None => chance::f_tail(turning / all, all, dof),
-        };
-        if chance > options.significance {
-            let reason = format!(
-                "the body turns by {:.3}° rms, no more than its orientation noise of {:.3}° (chance {chance:.1e})",
-                (sums.lambda.sum() / 2.0 / sums.total).sqrt().to_degrees(),
-                sigma_r.to_degrees()
-            );
-            return Ok(Outcome::none(
-                estimator,
-                Verdict::NoRotation,
-                reason,
-                Known::Nothing,
-            ));
-        }
+    if let Some(answer) = without_axis(estimator, &sums, sigma_r, options) {
+        return Ok(answer);
     }
 
     let (child_axis, parent_axis) = sums.axis();
@@ -135,47 +81,20 @@ pub(crate) fn run(
     let parent_point = parent_point + parent_axis.into_inner() * toward_middle;
     let child_point = child_point + child_axis.into_inner() * toward_middle;
 
-    // Residuals across the axis.
-    let (mut rss, mut across) = (0.0, 0.0);
-    for (row, pose) in relative.iter().enumerate() {
-        let Some(pose) = pose else { continue };
-        let w = weights.of(row);
-        let e = pose.transform(&child_point) - parent_point;
-        rss += w * e.norm_squared();
-        across += w * (e - parent_axis.into_inner() * e.dot(&parent_axis)).norm_squared();
-    }
+    let (rss, across) = squares(
+        &relative,
+        weights,
+        (&child_point, &parent_point),
+        &parent_axis,
+    );
     let sigma = if dof > 0.0 {
         (across / dof).sqrt()
     } else {
         0.0
     };
 
-    // M⁺ over the two strong directions, carried to the parent.
-    let mut strong = Matrix3::zeros();
-    for k in 1..3 {
-        let v = sums.directions.column(k);
-        strong += v * v.transpose() / sums.lambda[k];
-    }
-    let strong = sums.mean_r * strong * sums.mean_r.transpose();
-    let perpendicular = Matrix3::identity() - parent_axis.into_inner() * parent_axis.transpose();
-    let per_mean = perpendicular / sums.total;
-    let of_direction = perpendicular * strong * perpendicular * (sigma_r * sigma_r)
-        + per_mean * (sigma_r * sigma_r);
-    let of_point =
-        perpendicular * strong * perpendicular * (sigma * sigma) + per_mean * (sigma * sigma);
-    // Noise of the orientations lengthens the spread M by 2(n−1)σ_r² and draws the point towards the body's origin.
-    let (p, count) = (&child_point, n - 1.0);
-    let drawn = |k: usize| {
-        let v = sums.directions.column(k);
-        v * (v.dot(p) * 2.0 * count * sigma_r * sigma_r / sums.lambda[k])
-    };
-    let drawn = sums.mean_r * (drawn(1) + drawn(2));
-    let of_point = of_point + perpendicular * drawn * drawn.transpose() * perpendicular;
-    let mut covariance = Matrix6::zeros();
-    covariance
-        .fixed_view_mut::<3, 3>(0, 0)
-        .copy_from(&of_direction);
-    covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&of_point);
+    let covariance = covariance(&sums, &parent_axis, &child_point, (sigma_r, sigma));
+    let of_direction: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
     let sigma_direction = of_direction.symmetric_eigenvalues().max().max(0.0).sqrt();
 
     // Turn of each pose about the axis, against the encoder.
@@ -217,6 +136,136 @@ pub(crate) fn run(
         verdict,
         reason,
     })))
+}
+
+/// The answer where there are too few poses, or the body does not turn at all.
+fn without_rotation(estimator: &'static str, sums: &PoseSums) -> Option<Outcome> {
+    match sums.rank_verdict() {
+        Some(Verdict::TooFew) => {
+            let reason = format!("{} poses, at least 2 are needed", sums.n);
+            Some(Outcome::none(
+                estimator,
+                Verdict::TooFew,
+                reason,
+                Known::Nothing,
+            ))
+        }
+        Some(Verdict::NoRotation) => {
+            let reason = format!(
+                "the body does not turn: its rotations differ by {:.1e} rad rms",
+                (sums.lambda.sum().max(0.0) / 2.0 / sums.total).sqrt()
+            );
+            Some(Outcome::none(
+                estimator,
+                Verdict::NoRotation,
+                reason,
+                Known::Nothing,
+            ))
+        }
+        _ => None,
+    }
+}
+
+/// The answer where no axis stands out, or the turn is no more than the orientation noise.
+fn without_axis(
+    estimator: &'static str,
+    sums: &PoseSums,
+    sigma_r: f64,
+    options: &Options,
+) -> Option<Outcome> {
+    let n = sums.n as f64;
+    let dof = 2.0 * n - 4.0;
+    if sums.lambda[0] > STANDS_OUT * sums.lambda[1] {
+        let reason = format!(
+            "no axis stands out: the rotations spread {:.2}° rms about the best axis's perpendicular and \
+             {:.2}° about the next",
+            (sums.lambda[0].max(0.0) / sums.total).sqrt().to_degrees(),
+            (sums.lambda[1] / sums.total).sqrt().to_degrees()
+        );
+        return Some(Outcome::none(
+            estimator,
+            Verdict::NotUnique,
+            reason,
+            Known::Nothing,
+        ));
+    }
+    if sigma_r > 0.0 {
+        // H₀: the body does not turn, Σ‖R − R̄‖² = 2 Σ|δ|²
+        let turning = sums.lambda.sum() / 2.0 / (sigma_r * sigma_r);
+        let all = 3.0 * n - 3.0;
+        let chance = match options.sigma_r {
+            Some(_) => chance::chi2_tail(turning, all),
+            None => chance::f_tail(turning / all, all, dof),
+        };
+        if chance > options.significance {
+            let reason = format!(
+                "the body turns by {:.3}° rms, no more than its orientation noise of {:.3}° (chance {chance:.1e})",
+                (sums.lambda.sum() / 2.0 / sums.total).sqrt().to_degrees(),
+                sigma_r.to_degrees()
+            );
+            return Some(Outcome::none(
+                estimator,
+                Verdict::NoRotation,
+                reason,
+                Known::Nothing,
+            ));
+        }
+    }
+    None
+}
+
+/// Weighted squares of R_i x_child + p_i − x_parent, whole and across the axis.
+fn squares(
+    relative: &[Option<Pose>],
+    weights: RowWeights<'_>,
+    (child_point, parent_point): (&Vector3<f64>, &Vector3<f64>),
+    parent_axis: &Unit<Vector3<f64>>,
+) -> (f64, f64) {
+    let (mut rss, mut across) = (0.0, 0.0);
+    for (row, pose) in relative.iter().enumerate() {
+        let Some(pose) = pose else { continue };
+        let w = weights.of(row);
+        let e = pose.transform(child_point) - parent_point;
+        rss += w * e.norm_squared();
+        across += w * (e - parent_axis.into_inner() * e.dot(parent_axis)).norm_squared();
+    }
+    (rss, across)
+}
+
+/// Over [direction; point], from the noise of orientations and positions.
+fn covariance(
+    sums: &PoseSums,
+    parent_axis: &Unit<Vector3<f64>>,
+    child_point: &Vector3<f64>,
+    (sigma_r, sigma): (f64, f64),
+) -> Matrix6<f64> {
+    // M⁺ over the two strong directions, carried to the parent.
+    let mut strong = Matrix3::zeros();
+    for k in 1..3 {
+        let v = sums.directions.column(k);
+        strong += v * v.transpose() / sums.lambda[k];
+    }
+    let strong = sums.mean_r * strong * sums.mean_r.transpose();
+    let perpendicular = Matrix3::identity() - parent_axis.into_inner() * parent_axis.transpose();
+    let per_mean = perpendicular / sums.total;
+    let of_direction = perpendicular * strong * perpendicular * (sigma_r * sigma_r)
+        + per_mean * (sigma_r * sigma_r);
+    let of_point =
+        perpendicular * strong * perpendicular * (sigma * sigma) + per_mean * (sigma * sigma);
+    // Noise of the orientations lengthens the spread M by 2(n−1)σ_r² and draws the point towards the body's origin.
+    let (p, count) = (child_point, sums.n as f64 - 1.0);
+    let drawn = |k: usize| {
+        let v = sums.directions.column(k);
+        v * (v.dot(p) * 2.0 * count * sigma_r * sigma_r / sums.lambda[k])
+    };
+    let drawn = sums.mean_r * (drawn(1) + drawn(2));
+    let of_point = of_point + perpendicular * drawn * drawn.transpose() * perpendicular;
+    let mut covariance = Matrix6::zeros();
+    covariance
+        .fixed_view_mut::<3, 3>(0, 0)
+        .copy_from(&of_direction);
+    covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&of_point);
+    covariance
 }
 
 /// The child's poses in the parent, row by row.

@@ -81,7 +81,7 @@ pub(crate) fn fit_poses(
         return Ok(Outcome::NotObservable(NotObservable {
             estimator,
             verdict: Verdict::Diverged,
-            reason: format!("the center ran away to {reach:.1e} from the body"),
+            reason: format!("the estimate diverged: the center is {reach:.1e} away from the body"),
             known: Known::Nothing,
         }));
     };

@@ -10,8 +10,13 @@
 use calib_estimator::{
     Verdict,
     measured::{DataError, Pose, RowWeights},
+    pose_sums::PoseSums,
 };
-use calib_geometry::{Line, decompose::svd_small, row_qr::RowQr};
+use calib_geometry::{
+    Line,
+    decompose::{SvdSmall, svd_small},
+    row_qr::RowQr,
+};
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Shape};
@@ -30,28 +35,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorErr
     else {
         return Err(input.wrong(InputKind::TwoBodies));
     };
-    if first.len() != second.len() {
-        return Err(EstimatorError::Data(DataError::Lengths {
-            what: "poses of the two bodies",
-            left: first.len(),
-            right: second.len(),
-        }));
-    }
-    // second_from_first, whose rotations carry the question of one axis
-    let mut relative = Vec::with_capacity(first.len());
-    for (row, pair) in first.iter().zip(second).enumerate() {
-        relative.push(match pair {
-            (Some(a), Some(b)) => {
-                a.check(row)?;
-                b.check(row)?;
-                Some(Pose {
-                    rotation: b.rotation.tr_mul(&a.rotation),
-                    translation: b.rotation.tr_mul(&(a.translation - b.translation)),
-                })
-            }
-            _ => None,
-        });
-    }
+    let relative = second_from_first(first, second)?;
     let sums = match crate::hotspot::prepare("score", &relative, options)? {
         Ok(sums) => sums,
         Err(answer) => return Ok(in_second(answer)),
@@ -66,20 +50,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorErr
             .filter_map(move |(row, (a, b))| Some((a.as_ref()?, b.as_ref()?, weights.of(row))))
             .filter(|(_, _, w)| *w > 0.0)
     };
-    let mut qr = RowQr::<7>::default();
-    for (a, b, w) in pairs() {
-        let root = w.sqrt();
-        for k in 0..3 {
-            let (r, s) = (a.rotation.row(k), b.rotation.row(k));
-            let rhs = b.translation[k] - a.translation[k];
-            let row = [r[0], r[1], r[2], -s[0], -s[1], -s[2], rhs];
-            qr.push(row.map(|x| x * root));
-        }
-    }
-    let r = qr.factor();
-    let svd = svd_small(&r.fixed_view::<6, 6>(0, 0).into_owned());
-    let y = svd.u.tr_mul(&r.fixed_view::<6, 1>(0, 6));
-    let x: Vector6<f64> = svd.v * y.component_div(&svd.s);
+    let (svd, x) = least_squares(pairs());
     let (in_first, in_second_body): (Vector3<f64>, Vector3<f64>) =
         (x.fixed_rows::<3>(0).into(), x.fixed_rows::<3>(3).into());
 
@@ -90,6 +61,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorErr
         rss += w * gap.norm_squared();
         gaps += gap.norm();
     }
+    // σ² = RSS/(3n − 6)
     let sigma2 = rss / (3 * n - 6) as f64;
     // A gap holds position noise of both bodies and their orientation noise times the levers.
     let lever = (in_first.norm_squared() + in_second_body.norm_squared()).sqrt();
@@ -98,16 +70,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorErr
     if let Some((verdict, reason)) =
         sums.noise_verdict(options.sigma_r, bound, 2.0, options.significance)
     {
-        let known = if verdict == Verdict::SingleAxis {
-            let (_, direction) = sums.axis();
-            let point = sums.center(&sums.body_point(1));
-            Known::AxisLine(Line {
-                point: Point3::from(point),
-                direction,
-            })
-        } else {
-            Known::Nothing
-        };
+        let known = axis_line(verdict, &sums);
         return Ok(Outcome::NotObservable(NotObservable {
             estimator: "score",
             verdict,
@@ -115,11 +78,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorErr
             known,
         }));
     }
-    let mut covariance = Matrix6::zeros();
-    for k in 0..6 {
-        let v = svd.v.column(k);
-        covariance += v * v.transpose() * (sigma2 / (svd.s[k] * svd.s[k]));
-    }
+    let mut covariance = scaled_covariance(&svd, sigma2);
     // As in the hot spot, orientation noise lengthens AᵀA by 2nσ_r² and draws both points towards their bodies.
     let sigma_r2 = options.sigma_r.map_or_else(
         || {
@@ -133,12 +92,7 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorErr
         |s| s * s,
     );
     let shift = 2.0 * n as f64 * sigma_r2;
-    let drawn: Vector6<f64> = (0..6)
-        .map(|k| {
-            let (v, square) = (svd.v.column(k), svd.s[k] * svd.s[k]);
-            v * (v.dot(&x) * shift / (square - shift).max(0.1 * square))
-        })
-        .sum();
+    let drawn = drawn(&svd, &x, shift);
     covariance += drawn * drawn.transpose();
     let of_center: Matrix3<f64> = covariance.fixed_view::<3, 3>(3, 3).into_owned();
     let weakest = (sigma2 / (svd.s[5] * svd.s[5]) + drawn.norm_squared()).sqrt();
@@ -166,6 +120,92 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorErr
             )
         }),
     })))
+}
+
+/// `second_from_first`, whose rotations carry the question of one axis.
+fn second_from_first(
+    first: &[Option<Pose>],
+    second: &[Option<Pose>],
+) -> Result<Vec<Option<Pose>>, EstimatorError> {
+    if first.len() != second.len() {
+        return Err(EstimatorError::Data(DataError::Lengths {
+            what: "poses of the two bodies",
+            left: first.len(),
+            right: second.len(),
+        }));
+    }
+    let mut relative = Vec::with_capacity(first.len());
+    for (row, pair) in first.iter().zip(second).enumerate() {
+        relative.push(match pair {
+            (Some(a), Some(b)) => {
+                a.check(row)?;
+                b.check(row)?;
+                Some(Pose {
+                    rotation: b.rotation.tr_mul(&a.rotation),
+                    translation: b.rotation.tr_mul(&(a.translation - b.translation)),
+                })
+            }
+            _ => None,
+        });
+    }
+    Ok(relative)
+}
+
+/// (1) in least squares: its decomposition and `[c₁; c₂]`.
+fn least_squares<'a>(
+    pairs: impl Iterator<Item = (&'a Pose, &'a Pose, f64)>,
+) -> (SvdSmall<6>, Vector6<f64>) {
+    // [R_i  −S_i  d_i − t_i], each row times √w
+    let mut qr = RowQr::<7>::default();
+    for (a, b, w) in pairs {
+        let root = w.sqrt();
+        for k in 0..3 {
+            let (r, s) = (a.rotation.row(k), b.rotation.row(k));
+            let rhs = b.translation[k] - a.translation[k];
+            let row = [r[0], r[1], r[2], -s[0], -s[1], -s[2], rhs];
+            qr.push(row.map(|x| x * root));
+        }
+    }
+    let r = qr.factor();
+    let svd = svd_small(&r.fixed_view::<6, 6>(0, 0).into_owned());
+    let y = svd.u.tr_mul(&r.fixed_view::<6, 1>(0, 6));
+    // x = V S⁻¹ Uᵀ b
+    let x: Vector6<f64> = svd.v * y.component_div(&svd.s);
+    (svd, x)
+}
+
+/// The line of all rotations, where that is what the data show.
+fn axis_line(verdict: Verdict, sums: &PoseSums) -> Known {
+    if verdict == Verdict::SingleAxis {
+        let (_, direction) = sums.axis();
+        let point = sums.center(&sums.body_point(1));
+        Known::AxisLine(Line {
+            point: Point3::from(point),
+            direction,
+        })
+    } else {
+        Known::Nothing
+    }
+}
+
+/// C = σ² Σ v_k v_kᵀ/s_k².
+fn scaled_covariance(svd: &SvdSmall<6>, sigma2: f64) -> Matrix6<f64> {
+    let mut covariance = Matrix6::zeros();
+    for k in 0..6 {
+        let v = svd.v.column(k);
+        covariance += v * v.transpose() * (sigma2 / (svd.s[k] * svd.s[k]));
+    }
+    covariance
+}
+
+/// How far orientation noise draws x: Σ v_k (v_k·x) shift/(s_k² − shift).
+fn drawn(svd: &SvdSmall<6>, x: &Vector6<f64>, shift: f64) -> Vector6<f64> {
+    (0..6)
+        .map(|k| {
+            let (v, square) = (svd.v.column(k), svd.s[k] * svd.s[k]);
+            v * (v.dot(x) * shift / (square - shift).max(0.1 * square))
+        })
+        .sum()
 }
 
 /// σ_r² from the gaps: along the longer lever they hold no orientation noise of its own body.

@@ -15,7 +15,10 @@ use calib_estimator::{
     chance::{chi2_tail, f_tail},
     measured::Cloud,
 };
-use calib_geometry::{Line, decompose::symmetric_eigen_small};
+use calib_geometry::{
+    Line,
+    decompose::{SymmetricEigenSmall, symmetric_eigen_small},
+};
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 use crate::outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Rejected, Shape};
@@ -131,52 +134,17 @@ pub(crate) fn judge(
     let (n, markers) = (cloud.points.len(), cloud.markers());
     let scatter = factor.s[0];
     if !center.iter().all(|x| x.is_finite()) || center.norm() > 1e6 * scatter {
-        return Outcome::NotObservable(NotObservable {
-            estimator,
-            verdict: Verdict::Diverged,
-            reason: format!(
-                "the center ran away to {:.1e} from points that spread {:.1e}",
-                center.norm(),
-                scatter
-            ),
-            known: Known::Nothing,
-        });
+        let reason = format!(
+            "the estimate diverged: the center is {:.1e} away from points that spread {scatter:.1e}",
+            center.norm()
+        );
+        return Outcome::none(estimator, Verdict::Diverged, reason, Known::Nothing);
     }
-    let weight = |k: usize| weights.get(k).copied().unwrap_or(1.0);
-    // JᵀWJ with J = −(u − ū_p): the radii are eliminated by centering each marker's directions.
-    let mut information = Matrix3::zeros();
-    let (mut rss, mut weighted_rss) = (0.0, 0.0);
-    for p in 0..markers {
-        let range = cloud.range(p);
-        let (mut sum, mut sum_u, mut sum_d) = (0.0, Vector3::zeros(), 0.0);
-        let (mut scatter_u, mut sum_dd, mut plain_d) = (Matrix3::zeros(), 0.0, 0.0);
-        let guess = radii[p];
-        let mut plain_dd = 0.0;
-        for k in range.clone() {
-            let d = cloud.points[k] - center;
-            let length = d.norm();
-            let u = if length > 0.0 {
-                d / length
-            } else {
-                Vector3::zeros()
-            };
-            let plain = cloud.weight(k);
-            let w = weight(k) * plain;
-            let e = length - guess;
-            sum += w;
-            sum_u += u * w;
-            scatter_u += u * (u * w).transpose();
-            sum_d += w * e;
-            sum_dd += w * e * e;
-            plain_d += plain * e;
-            plain_dd += plain * e * e;
-        }
-        let mean_u = sum_u / sum;
-        information += scatter_u - mean_u * mean_u.transpose() * sum;
-        // Residuals about the least-squares radius, whatever radius the estimator states.
-        weighted_rss += (sum_dd - sum_d * sum_d / sum).max(0.0);
-        rss += (plain_dd - plain_d * plain_d / cloud.total(range)).max(0.0);
-    }
+    let Sums {
+        information,
+        rss,
+        weighted_rss,
+    } = sums(cloud, &center, &radii, &weights);
     let dof = n - markers - 3;
     let estimated = if dof > 0 {
         (weighted_rss / dof as f64).sqrt()
@@ -205,28 +173,16 @@ pub(crate) fn judge(
             Err(answer) => return answer,
         };
 
-    // Noise inflates the spread of the weakest direction: take its share off the information.
-    let mut covariance = Matrix3::zeros();
-    for k in 0..3 {
-        let axis = eigen.vectors.column(k);
-        let trust = if k == 0 { 1.0 - 1.0 / kappa } else { 1.0 };
-        covariance += axis * axis.transpose() * (sigma * sigma / (eigen.values[k] * trust));
-    }
-    covariance += known_bias * known_bias.transpose();
+    let covariance = inflated(&eigen, sigma, kappa) + known_bias * known_bias.transpose();
+    // σ_weakest² = σ²/(λ₀(1 − 1/κ)) + (bias · v₀)²
     let weakest = sigma / (eigen.values[0] * (1.0 - 1.0 / kappa)).sqrt();
     let weakest = weakest.hypot(known_bias.dot(&eigen.vectors.column(0)));
     let radius = radii.iter().sum::<f64>() / markers as f64;
     let (verdict, reason) = if weakest > options.weak_fraction * radius {
-        let axis = eigen.vectors.column(0);
+        let axis = eigen.vectors.column(0).into_owned();
         (
             Verdict::Weak,
-            Some(format!(
-                "σ = {weakest:.3e} along ({:.2}, {:.2}, {:.2}) exceeds {:.0} % of the radius {radius:.3e}",
-                axis[0],
-                axis[1],
-                axis[2],
-                100.0 * options.weak_fraction
-            )),
+            Some(too_weak(weakest, &axis, radius, options)),
         )
     } else if doubt.is_some() {
         (Verdict::Weak, doubt)
@@ -257,6 +213,77 @@ pub(crate) fn judge(
         verdict,
         reason,
     }))
+}
+
+/// Information of the center and sums of squares about the fitted spheres.
+struct Sums {
+    information: Matrix3<f64>,
+    rss: f64,
+    weighted_rss: f64,
+}
+
+/// JᵀWJ with J = −(u − ū_p): the radii are eliminated by centering each marker's directions.
+fn sums(cloud: &Cloud, center: &Vector3<f64>, radii: &[f64], weights: &[f64]) -> Sums {
+    let weight = |k: usize| weights.get(k).copied().unwrap_or(1.0);
+    let mut information = Matrix3::zeros();
+    let (mut rss, mut weighted_rss) = (0.0, 0.0);
+    for p in 0..cloud.markers() {
+        let range = cloud.range(p);
+        let (mut sum, mut sum_u, mut sum_d) = (0.0, Vector3::zeros(), 0.0);
+        let (mut scatter_u, mut sum_dd, mut plain_d) = (Matrix3::zeros(), 0.0, 0.0);
+        let guess = radii[p];
+        let mut plain_dd = 0.0;
+        for k in range.clone() {
+            let d = cloud.points[k] - center;
+            let length = d.norm();
+            let u = if length > 0.0 {
+                d / length
+            } else {
+                Vector3::zeros()
+            };
+            let plain = cloud.weight(k);
+            let w = weight(k) * plain;
+            let e = length - guess;
+            sum += w;
+            sum_u += u * w;
+            scatter_u += u * (u * w).transpose();
+            sum_d += w * e;
+            sum_dd += w * e * e;
+            plain_d += plain * e;
+            plain_dd += plain * e * e;
+        }
+        let mean_u = sum_u / sum;
+        information += scatter_u - mean_u * mean_u.transpose() * sum;
+        // Residuals about the least-squares radius, whatever radius the estimator states.
+        weighted_rss += (sum_dd - sum_d * sum_d / sum).max(0.0);
+        rss += (plain_dd - plain_d * plain_d / cloud.total(range)).max(0.0);
+    }
+    Sums {
+        information,
+        rss,
+        weighted_rss,
+    }
+}
+
+/// C = σ² Σ v_k v_kᵀ/λ_k. Noise inflates the spread of the weakest direction: its share 1/κ is taken off the information.
+fn inflated(eigen: &SymmetricEigenSmall<3>, sigma: f64, kappa: f64) -> Matrix3<f64> {
+    let mut covariance = Matrix3::zeros();
+    for k in 0..3 {
+        let axis = eigen.vectors.column(k);
+        let trust = if k == 0 { 1.0 - 1.0 / kappa } else { 1.0 };
+        covariance += axis * axis.transpose() * (sigma * sigma / (eigen.values[k] * trust));
+    }
+    covariance
+}
+
+fn too_weak(weakest: f64, axis: &Vector3<f64>, radius: f64, options: &Options) -> String {
+    format!(
+        "σ = {weakest:.3e} along ({:.2}, {:.2}, {:.2}) exceeds {:.0} % of the radius {radius:.3e}",
+        axis[0],
+        axis[1],
+        axis[2],
+        100.0 * options.weak_fraction
+    )
 }
 
 /// The spread across the planes.

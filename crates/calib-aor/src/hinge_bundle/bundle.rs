@@ -1,96 +1,17 @@
-//! Hinge bundle: the axis, the markers' places around it and the joint angle of every frame, jointly.
-//!
-//! ```text
-//! v_ip = c + F Rz(θ_i) β_p,     F = [e₁ e₂ n]                                             (1)
-//! e = y + z,   y = Fᵀ(c − v_ip),  z = Rz(θ_i) β_p
-//! de = (γ, δ, 0) + [y]ₓ (turn) + Rz dβ_p + (ẑ × z) dθ_i                                   (2)
-//! ```
-//!
-//! All seen samples count, frames may miss markers. The angles are eliminated frame by frame; with encoder
-//! angles ([`Options::angles`]) they are data instead. It reaches the bound where a circle for each marker does not:
-//! the body is rigid, and the angle of a frame is one number for all its markers. Where the noise of such an angle is a
-//! part of the arc itself (20° at 5 mm and 100 mm) nobody reaches it who treats all frames alike: see `tests/short_arcs.rs`.
+//! The bundle's unknowns and its normal equations, (1) and (2).
 
-use calib_estimator::{
-    Verdict,
-    levenberg::{Problem, Stop, minimize},
-    measured::Cloud,
-};
+use calib_estimator::{EstimatorError, levenberg::Problem, measured::Cloud};
 use calib_geometry::so3;
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Rotation3, SMatrix, Vector2, Vector3, Vector4};
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SMatrix, Vector2, Vector3, Vector4};
 
-use crate::{
-    axis_frame::AxisFrame,
-    circles::{Axis, Free, minimize_line, spread_out},
-    judge::{Candidate, judge, prepare},
-    outcome::{Known, Outcome},
-    plane, straight,
-};
-use calib_estimator::{EstimatorError, Input, InputKind, Options, cloud_of};
+use crate::{axis_frame::AxisFrame, circles::Axis, straight};
 
-const MAX_STEPS: usize = 200;
 /// Distance of the markers from their middle, across the axis and in units of the noise, from which their relative motion
 /// holds the turn within the range where it is two numbers ([`crate::straight`]).
 const SEEN_APART: f64 = 5.0;
 
-/// The bundle on markers of one rigid body.
-///
-/// # Errors
-/// [`EstimatorError`] for data that are not finite, another kind of data, or angles of another length.
-pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
-    const ID: &str = "hinge_bundle";
-    options.check()?;
-    if !matches!(input, Input::Markers(_)) {
-        return Err(input.wrong(InputKind::Markers));
-    }
-    let cloud = cloud_of(input, options)?;
-    let factor = match prepare(ID, &cloud) {
-        Ok(factor) => factor,
-        Err(answer) => return Ok(answer),
-    };
-    let start = plane::start(&cloud, &factor, &Options::default());
-    // A common line is a better start than the plane's normal, where it exists.
-    let start =
-        minimize_line(&cloud, start, Free::Line, factor.s[0]).map_or(start, |(axis, _)| axis);
-    let problem = Bundle::of(&cloud, &options.angles, factor.s[0])?;
-    let Some(state) = problem.start(start) else {
-        return Ok(Outcome::none(
-            ID,
-            Verdict::TooFew,
-            "the frames do not share enough markers to chain their angles".into(),
-            Known::Nothing,
-        ));
-    };
-    let end = minimize(&problem, state, MAX_STEPS);
-    let inverse = problem
-        .information(&end.x)
-        .and_then(DMatrix::cholesky)
-        .map(|c| c.inverse());
-    let far = (end.x.axis.point - start.point).norm() > 1e4 * factor.s[0];
-    let (Some(inverse), false, true) = (inverse, far, end.stop != Stop::Broken) else {
-        return Ok(Outcome::none(
-            ID,
-            Verdict::Diverged,
-            format!("no minimum after {} steps", end.iterations),
-            Known::Nothing,
-        ));
-    };
-    let unit: Matrix4<f64> = inverse.fixed_view::<4, 4>(0, 0).into();
-    let candidate = Candidate {
-        estimator: ID,
-        axis: end.x.axis,
-        own_centers: Vec::new(),
-        cost: end.normal.cost,
-        dof: problem.degrees_of_freedom(),
-        unit_covariance: spread_out(&unit, &end.x.axis.frame),
-        residuals: 3 * cloud.points.len(),
-        held: None,
-        gain_by_turning: problem.gain_by_turning(&end.x, &end.normal),
-    };
-    Ok(judge(&cloud, &factor, candidate, options))
-}
-
-pub(crate) struct Bundle {
+/// The bundle on one rigid body.
+pub(super) struct Bundle {
     /// For each frame: (marker, position).
     frames: Vec<Vec<(usize, Vector3<f64>)>>,
     /// Weight of each frame.
@@ -99,12 +20,13 @@ pub(crate) struct Bundle {
     angles: Vec<f64>,
     markers: usize,
     /// The frame whose angle is zero.
-    reference: usize,
+    pub reference: usize,
     size: f64,
 }
 
+/// The unknowns.
 #[derive(Clone)]
-pub(crate) struct State {
+pub(super) struct State {
     pub axis: Axis,
     pub angles: Vec<f64>,
     /// Marker places in the frame of the axis, at angle zero.
@@ -119,15 +41,16 @@ struct FrameBlock {
     to_places: Vec<(usize, Vector3<f64>)>,
 }
 
-pub(crate) struct Normal {
+/// The normal equations before the angles are eliminated.
+pub(super) struct Normal {
     shared: DMatrix<f64>,
     gradient: DVector<f64>,
     frames: Vec<FrameBlock>,
-    cost: f64,
+    pub cost: f64,
 }
 
 impl Bundle {
-    fn of(cloud: &Cloud, angles: &[f64], size: f64) -> Result<Self, EstimatorError> {
+    pub fn of(cloud: &Cloud, angles: &[f64], size: f64) -> Result<Self, EstimatorError> {
         let rows = cloud.labels.iter().map(|l| l.1 + 1).max().unwrap_or(0);
         if !angles.is_empty() && angles.len() < rows {
             return Err(EstimatorError::Data(
@@ -157,7 +80,7 @@ impl Bundle {
         Ok(Self::new(kept, weights, kept_angles, cloud.markers(), size))
     }
 
-    fn new(
+    pub fn new(
         frames: Vec<Vec<(usize, Vector3<f64>)>>,
         weights: Vec<f64>,
         angles: Vec<f64>,
@@ -181,7 +104,7 @@ impl Bundle {
         }
     }
 
-    fn degrees_of_freedom(&self) -> usize {
+    pub fn degrees_of_freedom(&self) -> usize {
         let samples: usize = self.frames.iter().map(Vec::len).sum();
         let turns = if self.angles.is_empty() {
             self.frames.len() - 1
@@ -192,32 +115,11 @@ impl Bundle {
     }
 
     /// Angles and places around a first axis: chained from the reference frame over shared markers.
-    fn start(&self, axis: Axis) -> Option<State> {
+    pub fn start(&self, axis: Axis) -> Option<State> {
         let m = axis.frame.matrix();
         let local = |v: &Vector3<f64>| m.tr_mul(&(v - axis.point));
         if !self.angles.is_empty() {
-            // The encoder's sense: the axis follows it.
-            let turns = self.frames.iter().zip(&self.angles).flat_map(|(frame, q)| {
-                frame.iter().filter(|(p, _)| *p == 0).map(move |(_, v)| {
-                    let y = local(v);
-                    (y.y.atan2(y.x), *q)
-                })
-            });
-            let s =
-                crate::axis_frame::sign(&axis.frame.n, None, turns.collect::<Vec<_>>().into_iter());
-            if s < 0.0 {
-                let f = axis.frame;
-                let flipped = AxisFrame {
-                    e1: f.e1,
-                    e2: -f.e2,
-                    n: -f.n,
-                };
-                return self.known_angles(Axis {
-                    frame: flipped,
-                    point: axis.point,
-                });
-            }
-            return self.known_angles(axis);
+            return self.start_by_encoder(axis);
         }
         let mut places: Vec<Option<Vector3<f64>>> = vec![None; self.markers];
         for (p, v) in &self.frames[self.reference] {
@@ -264,6 +166,31 @@ impl Bundle {
         })
     }
 
+    /// Axis in the encoder's sense, places by its angles.
+    fn start_by_encoder(&self, axis: Axis) -> Option<State> {
+        let m = axis.frame.matrix();
+        let turns = self.frames.iter().zip(&self.angles).flat_map(|(frame, q)| {
+            frame.iter().filter(|(p, _)| *p == 0).map(move |(_, v)| {
+                let y = m.tr_mul(&(v - axis.point));
+                (y.y.atan2(y.x), *q)
+            })
+        });
+        let s = crate::axis_frame::sign(&axis.frame.n, None, turns.collect::<Vec<_>>().into_iter());
+        if s < 0.0 {
+            let f = axis.frame;
+            let flipped = AxisFrame {
+                e1: f.e1,
+                e2: -f.e2,
+                n: -f.n,
+            };
+            return self.known_angles(Axis {
+                frame: flipped,
+                point: axis.point,
+            });
+        }
+        self.known_angles(axis)
+    }
+
     /// Places as means of the samples turned back by the encoder.
     fn known_angles(&self, axis: Axis) -> Option<State> {
         let m = axis.frame.matrix();
@@ -286,7 +213,7 @@ impl Bundle {
     }
 
     /// What the best straight motion costs above the hinge; `None` where the markers are as one point seen along the axis.
-    fn gain_by_turning(&self, x: &State, normal: &Normal) -> Option<f64> {
+    pub fn gain_by_turning(&self, x: &State, normal: &Normal) -> Option<f64> {
         let count = self.markers as f64;
         let middle = x.places.iter().map(Vector3::xy).sum::<Vector2<f64>>() / count;
         let spread = x.places.iter().map(|b| (b.xy() - middle).norm_squared());
@@ -302,7 +229,7 @@ impl Bundle {
     }
 
     /// Information about axis and places at the modelled positions: measured ones would add their noise to every lever arm.
-    fn information(&self, x: &State) -> Option<DMatrix<f64>> {
+    pub fn information(&self, x: &State) -> Option<DMatrix<f64>> {
         let m = x.axis.frame.matrix();
         let modelled = |(frame, angle): (&Vec<(usize, Vector3<f64>)>, &f64)| {
             let place = |p: usize| x.axis.point + m * turned(*angle, &x.places[p]);
@@ -324,7 +251,7 @@ impl Bundle {
     }
 
     /// Normal equations of axis and places with the angles eliminated.
-    fn reduced(&self, normal: &Normal, damping: f64) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    pub fn reduced(&self, normal: &Normal, damping: f64) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let mut h = normal.shared.clone();
         for k in 0..h.nrows() {
             h[(k, k)] *= 1.0 + damping;
@@ -349,7 +276,7 @@ impl Bundle {
 }
 
 /// Rz(angle) v.
-fn turned(angle: f64, v: &Vector3<f64>) -> Vector3<f64> {
+pub(super) fn turned(angle: f64, v: &Vector3<f64>) -> Vector3<f64> {
     let (s, c) = angle.sin_cos();
     Vector3::new(c * v.x - s * v.y, s * v.x + c * v.y, v.z)
 }
@@ -471,121 +398,5 @@ impl Problem for Bundle {
         shared[0].hypot(shared[1]) <= 1e-15
             && shared.rows(2, shared.len() - 2).amax() <= 1e-15 * self.size
             && turns.iter().all(|t| t.abs() <= 1e-15)
-    }
-}
-
-/// Unit-noise covariance of (turn, shift) at the truth; `places` in the frame of the axis.
-pub(crate) fn unit_bound(
-    axis: &Axis,
-    places: &[Vector3<f64>],
-    angles: &[f64],
-    angles_known: bool,
-) -> Option<Matrix4<f64>> {
-    let m = axis.frame.matrix();
-    let frames = angles
-        .iter()
-        .map(|a| {
-            places
-                .iter()
-                .enumerate()
-                .map(|(p, b)| (p, axis.point + m * turned(*a, b)))
-                .collect()
-        })
-        .collect();
-    let known = if angles_known {
-        angles.to_vec()
-    } else {
-        Vec::new()
-    };
-    let weights = vec![1.0; angles.len()];
-    let problem = Bundle::new(frames, weights, known, places.len(), 1.0);
-    // The reference frame's angle is the zero of the others.
-    let zero = if angles_known {
-        0.0
-    } else {
-        angles[problem.reference]
-    };
-    let truth = State {
-        axis: *axis,
-        angles: angles.iter().map(|a| a - zero).collect(),
-        places: places.iter().map(|b| turned(zero, b)).collect(),
-    };
-    let (h, _) = problem.reduced(&problem.linearize(&truth), 0.0)?;
-    Some(
-        h.cholesky()?
-            .inverse()
-            .fixed_view::<4, 4>(0, 0)
-            .into_owned(),
-    )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::circles::flat_center;
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-
-    /// What is wide of the mark at 20° and 5 mm is the likelihood's own minimum: no start finds a lower one, the truth included.
-    #[test]
-    fn the_minimum_is_the_lowest() {
-        const RADIUS: f64 = 0.1;
-        const STARTS: usize = 12;
-        let axis = Axis {
-            frame: AxisFrame::of(Vector3::new(-0.18, -0.83, 0.53)),
-            point: Vector3::new(1.2, -0.8, 0.9),
-        };
-        let m = axis.frame.matrix();
-        let place = |p: f64| Vector3::new((0.6 * p).cos(), (0.6 * p).sin(), 0.3 * (2.3 * p).cos());
-        for (frames, trials) in [(19, 60), (10, 60), (6, 100)] {
-            for seed in 0..trials {
-                let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-                let mut noise = || {
-                    let mut one = || Distribution::<f64>::sample(&StandardNormal, &mut rng);
-                    Vector3::from_fn(|_, _| 5e-3 * one())
-                };
-                let tracks: Vec<Vec<_>> = (0..4)
-                    .map(|p| {
-                        let at = |i: i32| {
-                            let angle = 0.35 * f64::from(i) / f64::from(frames - 1);
-                            m * turned(angle, &(place(f64::from(p)) * RADIUS)) + axis.point
-                        };
-                        (0..frames)
-                            .map(|i| Some((at(i) + noise()).into()))
-                            .collect()
-                    })
-                    .collect();
-                let input = Input::Markers(&tracks);
-                let outcome = fit(&input, &Options::default()).expect("markers");
-                let Some(found) = outcome.estimate() else {
-                    continue;
-                };
-                let cloud = cloud_of(&input, &Options::default()).expect("markers");
-                let cost = found.rms * found.rms * (3 * cloud.points.len()) as f64;
-                let size = prepare("", &cloud).expect("a plane").s[0];
-                let bundle = Bundle::of(&cloud, &[], size).expect("frames");
-                let truth = Axis {
-                    point: axis.point - cloud.origin,
-                    ..axis
-                };
-                let everywhere = (0..STARTS).map(|k| {
-                    // Fibonacci's half sphere.
-                    let z = (k as f64 + 0.5) / STARTS as f64;
-                    let (s, c) = (2.4 * k as f64).sin_cos();
-                    let across = (1.0 - z * z).sqrt();
-                    let frame = AxisFrame::of(Vector3::new(across * c, across * s, z));
-                    let point = flat_center(&cloud, &frame, 0..4);
-                    Axis { frame, point }
-                });
-                for start in everywhere.chain([truth]) {
-                    let state = bundle.start(start).expect("linked frames");
-                    let other = minimize(&bundle, state, MAX_STEPS).normal.cost;
-                    assert!(
-                        cost <= other * (1.0 + 1e-9),
-                        "{frames} frames, seed {seed}: {cost:e} above {other:e}"
-                    );
-                }
-            }
-        }
     }
 }
