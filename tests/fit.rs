@@ -654,7 +654,7 @@ fn noise_that_cannot_be_used_is_an_error_with_a_remedy() {
         (
             vec!["--covariances", "noise.csv", "--estimator", "sfe"],
             2,
-            "--estimator sphere_eiv",
+            "--estimator ml_sphere, sphere_eiv",
         ),
         (vec!["--covariances", "short.csv"], 3, "60 rows"),
         (vec!["--covariances", "narrow.csv"], 3, "`m.xz_mm2`"),
