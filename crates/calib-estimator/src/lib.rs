@@ -29,7 +29,7 @@
 //! use nalgebra::Point3;
 //!
 //! /// The mean of the points.
-//! #[derive(Debug)]
+//! #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 //! struct Mean(Point3<f64>);
 //!
 //! impl Estimate for Mean {
