@@ -136,7 +136,7 @@ pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};
 pub use analysis::estimate::{Settings, solve};
 pub use analysis::folds::{folds, k_fold};
 pub use analysis::gauge::Gauge;
-pub use analysis::goodness::{GoodnessOfFit, ScoreTest};
+pub use analysis::goodness::{GoodnessOfFit, Physics, ScoreTest};
 pub use analysis::information::{Information, NULL_TOLERANCE};
 pub use analysis::observability::{Direction, Observability, Term};
 pub use analysis::sandwich::sandwich;

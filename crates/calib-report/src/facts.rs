@@ -23,8 +23,31 @@ pub enum Scope {
     OriginsOneByOne,
 }
 
+/// Physics that the residuals show and the model lacks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MissingPhysics {
+    /// What it is.
+    pub physics: Physics,
+    /// Name of its parameter, for instance `elbow.compliance`.
+    pub parameter: String,
+    /// Share of χ² that it would remove.
+    pub explains: f64,
+    /// Probability of such residuals if it were absent.
+    pub p_value: f64,
+}
+
+/// What a score test asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Physics {
+    /// An effect of a joint, as its entry in the table of effects calls it.
+    Effect(&'static str),
+    /// A drift of the measuring frame over time.
+    Drift,
+}
+
 /// What the reader should do now.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum NextStep {
     /// Use the calibrated URDF.
@@ -39,7 +62,7 @@ pub enum NextStep {
     /// Enable an effect that the residuals show and the model lacks.
     EnableEffect {
         /// What the residuals show.
-        evidence: String,
+        missing: MissingPhysics,
     },
     /// Follow the remedy of the most severe finding.
     Resolve {

@@ -51,7 +51,9 @@ pub use data::{
     RecordingUse, Rejected, Workspace, WorkspacePoint,
 };
 pub use error::ReportError;
-pub use facts::{ClockCheck, ErrorSource, FitEnd, NextStep, NoiseKind, Scope};
+pub use facts::{
+    ClockCheck, ErrorSource, FitEnd, MissingPhysics, NextStep, NoiseKind, Physics, Scope,
+};
 pub use quantity::JointValue;
 pub use read::{NotAReport, REPORT, read_report, report_path};
 pub use report::{FormatVersion, Limit, Method, Outcome, Report, Verdict, judge};

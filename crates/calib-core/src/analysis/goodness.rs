@@ -23,6 +23,17 @@ use crate::solve::normal::{NormalEquations, Workspace, accumulate};
 use crate::solve::rows::{dot, residual};
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
+/// What a score test asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Physics {
+    /// An effect of a joint; [`EffectKind::ClockOffset`] of all joints together.
+    Effect(EffectKind),
+    /// A drift of the measuring frame along one of its axes, over time.
+    Drift,
+}
+
 /// One effect that was tested.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScoreTest {
@@ -30,8 +41,8 @@ pub struct ScoreTest {
     pub name: String,
     /// The joint; `None` for drift of the whole frame and for the common clock.
     pub joint: Option<String>,
-    /// The physics in words.
-    pub physics: String,
+    /// The physics.
+    pub physics: Physics,
     /// Coefficient that one step towards the better model gives (rad, 1, rad/Nm, s, m/s …).
     pub estimate: f64,
     /// z² of equation (2).
@@ -54,8 +65,8 @@ pub struct GoodnessOfFit {
     pub p_value: Option<f64>,
     /// Every effect tested, most significant first.
     pub tests: Vec<ScoreTest>,
-    /// The effects that are missing, in words; empty when none is significant.
-    pub missing: Vec<String>,
+    /// The tests of the effects that are missing, most significant first; empty when none is significant.
+    pub missing: Vec<ScoreTest>,
 }
 
 /// An effect counts as missing when chance would show one as large in less than 1 of 1000 analyses…
@@ -74,7 +85,7 @@ enum Effect {
 struct Candidate {
     name: String,
     joint: Option<String>,
-    physics: &'static str,
+    physics: Physics,
     effect: Effect,
 }
 
@@ -96,15 +107,7 @@ impl Solution {
         let missing = tests
             .iter()
             .filter(|t| t.p_corrected < SIGNIFICANT && t.explains > RELEVANT)
-            .map(|t| {
-                format!(
-                    "{} (`{}`): explains {:.0} % of χ², p = {:.0e}",
-                    t.physics,
-                    t.name,
-                    100.0 * t.explains,
-                    t.p_corrected.max(1e-300)
-                )
-            })
+            .cloned()
             .collect();
         Some(GoodnessOfFit {
             chi2_per_dof,
@@ -169,7 +172,7 @@ impl Solution {
             out.push(ScoreTest {
                 name: candidate.name.clone(),
                 joint: candidate.joint.clone(),
-                physics: candidate.physics.to_owned(),
+                physics: candidate.physics,
                 estimate: -u[k] / information,
                 z2,
                 p_value,
@@ -279,7 +282,7 @@ fn candidates(model: &Model) -> Vec<Candidate> {
             out.push(Candidate {
                 name: label,
                 joint: Some(name.clone()),
-                physics: kind.physics(),
+                physics: Physics::Effect(kind),
                 effect: Effect::Joints(vec![(e, kind.lateral(), values)]),
             });
         };
@@ -308,7 +311,7 @@ fn candidates(model: &Model) -> Vec<Candidate> {
         out.push(Candidate {
             name: "clock_offset".to_owned(),
             joint: None,
-            physics: EffectKind::ClockOffset.physics(),
+            physics: Physics::Effect(EffectKind::ClockOffset),
             effect: Effect::Joints(clocks),
         });
     }
@@ -319,7 +322,7 @@ fn candidates(model: &Model) -> Vec<Candidate> {
             out.push(Candidate {
                 name: format!("drift.{label}"),
                 joint: None,
-                physics: "drift of tracker or base over time (temperature)",
+                physics: Physics::Drift,
                 effect: Effect::Drift(axis, centred.clone()),
             });
         }

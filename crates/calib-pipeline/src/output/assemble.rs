@@ -3,13 +3,16 @@
 use calib_core::SolveStatus;
 use calib_profile::Method;
 use calib_report::{
-    FitEnd, Input, Limit, NextStep, Output, Report, Residuals, Scope, Verdict, Verification, judge,
+    FitEnd, Input, Limit, MissingPhysics, NextStep, Output, Report, Residuals, Scope, Verdict,
+    Verification, judge,
 };
 
 use crate::formulate::ml::MlFit;
 use crate::output::evidence::Evidence;
 use crate::output::of_data::{coverage, estimators, findings, recordings, rejected};
-use crate::output::of_fit::{fit_summary, noise, not_observable, parameters, transform};
+use crate::output::of_fit::{
+    fit_summary, missing_physics, noise, not_observable, parameters, transform,
+};
 use crate::output::verdict::{limits, next_steps, scope};
 use crate::verify::accuracy::{accuracy_limits, workspace};
 
@@ -54,7 +57,11 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         );
     }
     let goodness = e.fit.and_then(|fit| fit.solution.goodness_of_fit());
-    let missing = goodness.map(|g| g.missing).unwrap_or_default();
+    let missing: Vec<MissingPhysics> = goodness
+        .iter()
+        .flat_map(|g| &g.missing)
+        .map(missing_physics)
+        .collect();
     let workspace = e.fit.and_then(|fit| workspace(e.inputs, fit));
     let findings = findings(e, &missing);
     Report {

@@ -6,7 +6,8 @@ use calib_core::RejectReason;
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_profile::{Method, Usage};
 use calib_report::{
-    EstimatorResult, JointCoverage, Lost, RecordingSummary, RecordingUse, Rejected, Unit, number,
+    EstimatorResult, JointCoverage, Lost, MissingPhysics, RecordingSummary, RecordingUse, Rejected,
+    Unit, number,
 };
 
 use crate::formulate::ml::MlFit;
@@ -123,10 +124,10 @@ pub(crate) fn rejected(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Rejected> {
         .collect()
 }
 
-pub(crate) fn findings(e: &Evidence<'_>, missing: &[String]) -> Vec<Finding> {
+pub(crate) fn findings(e: &Evidence<'_>, missing: &[MissingPhysics]) -> Vec<Finding> {
     let mut findings = e.findings.to_vec();
-    findings.extend(missing.iter().map(|pattern| {
-        Finding::new(catalog::MISSING_PHYSICS, About::Fit).with("pattern", Fact::name(pattern))
+    findings.extend(missing.iter().map(|m| {
+        Finding::new(catalog::MISSING_PHYSICS, About::Fit).with("pattern", Fact::name(m.evidence()))
     }));
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     findings

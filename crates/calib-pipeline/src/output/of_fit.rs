@@ -143,3 +143,16 @@ pub(crate) fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
         })
         .collect()
 }
+
+/// A significant score test as the report tells it.
+pub(crate) fn missing_physics(test: &calib_core::ScoreTest) -> calib_report::MissingPhysics {
+    calib_report::MissingPhysics {
+        physics: match test.physics {
+            calib_core::Physics::Effect(kind) => calib_report::Physics::Effect(kind.physics()),
+            _ => calib_report::Physics::Drift,
+        },
+        parameter: test.name.clone(),
+        explains: test.explains,
+        p_value: test.p_corrected,
+    }
+}

@@ -1,7 +1,7 @@
 //! The limits of the profile against what was measured, and what to do next.
 
 use calib_profile::{Limits, Method};
-use calib_report::{Limit, NextStep, Scope, Unit, Verdict};
+use calib_report::{Limit, MissingPhysics, NextStep, Scope, Unit, Verdict};
 
 use crate::output::evidence::Evidence;
 
@@ -72,7 +72,11 @@ pub(crate) fn scope(e: &Evidence<'_>) -> Vec<Scope> {
     scope
 }
 
-pub(crate) fn next_steps(e: &Evidence<'_>, verdict: Verdict, missing: &[String]) -> Vec<NextStep> {
+pub(crate) fn next_steps(
+    e: &Evidence<'_>,
+    verdict: Verdict,
+    missing: &[MissingPhysics],
+) -> Vec<NextStep> {
     let mut steps = vec![match verdict {
         Verdict::Accepted => NextStep::Use {
             urdf: e.inputs.robot.profile.outputs.urdf.clone(),
@@ -82,7 +86,7 @@ pub(crate) fn next_steps(e: &Evidence<'_>, verdict: Verdict, missing: &[String])
     }];
     if let Some(first) = missing.first() {
         steps.push(NextStep::EnableEffect {
-            evidence: first.clone(),
+            missing: first.clone(),
         });
     }
     if let Some(worst) = e

@@ -13,6 +13,7 @@ pub(crate) mod held_out;
 mod next_steps;
 pub(crate) mod noise;
 pub(crate) mod observability;
+mod physics;
 pub(crate) mod prose;
 pub(crate) mod rejection;
 mod scope;

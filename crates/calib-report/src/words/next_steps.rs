@@ -18,9 +18,9 @@ impl NextStep {
                 "Record validation poses, set `solve.limits` in the profile, and run again."
                     .to_owned()
             }
-            Self::EnableEffect { evidence } => format!(
+            Self::EnableEffect { missing } => format!(
                 "Enable the missing effect in the profile: {}",
-                full_stop(evidence)
+                full_stop(&missing.evidence())
             ),
             Self::Resolve {
                 subject,
