@@ -12,7 +12,7 @@ use crate::estimate::paper::{self, OriginEstimate};
 use crate::formulate::by_closed_forms::{paper_assumptions, paper_result};
 use crate::formulate::by_likelihood::likelihood;
 use crate::formulate::checked::check_data;
-use crate::formulate::ml::MlFit;
+use crate::formulate::formulation::MlFit;
 use crate::formulate::solved::nominal;
 use crate::output::assemble::assemble;
 use crate::output::evidence::Evidence;

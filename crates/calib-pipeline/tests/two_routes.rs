@@ -4,8 +4,9 @@ use std::path::Path;
 
 use calib_core::{Configuration, EffectKind, Settings, effect};
 use calib_pipeline::estimate::start::start;
+use calib_pipeline::formulate::formulation::FreeSet;
 use calib_pipeline::formulate::kinematics::{Loads, joint_state};
-use calib_pipeline::formulate::ml::{FreeSet, fit, state};
+use calib_pipeline::formulate::ml::{fit, state};
 use calib_pipeline::prepare::conditions::Conditions;
 use calib_pipeline::prepare::load::{load_recordings, load_robot};
 use calib_pipeline::prepare::tracks::body_tracks;

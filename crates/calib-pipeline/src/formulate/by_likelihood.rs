@@ -6,9 +6,10 @@ use calib_report::{Status, Unobservable};
 
 use crate::error::PipelineError;
 use crate::formulate::checked::Checked;
+use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::found::Found;
 use crate::formulate::kinematics::Calibration;
-use crate::formulate::ml::{self, FreeSet, MlFit};
+use crate::formulate::ml;
 use crate::formulate::solved::Solved;
 use crate::formulate::{clock, model_checks};
 use crate::prepare::inputs::Inputs;

@@ -13,7 +13,7 @@ use calib_core::{EffectKind, Parameter, ParameterId, ParameterKind, Unit};
 use calib_profile::Usage;
 use calib_report::{Clock, ClockCheck};
 
-use crate::formulate::ml::{Formulation, FreeSet, MlFit};
+use crate::formulate::formulation::{Formulation, FreeSet, MlFit};
 use crate::prepare::align::ClockState;
 use crate::prepare::inputs::{Inputs, Loaded};
 

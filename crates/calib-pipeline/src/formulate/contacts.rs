@@ -14,8 +14,8 @@ use calib_core::{
 use calib_profile::{Contact, ContactBase, Touched};
 use nalgebra::{Isometry3, Point3, Vector3};
 
+use crate::formulate::formulation::Formulation;
 use crate::formulate::kinematics::Calibration;
-use crate::formulate::ml::Formulation;
 use crate::prepare::inputs::Inputs;
 
 /// Adds every contact of the profile to the problem.

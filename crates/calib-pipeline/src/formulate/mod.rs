@@ -5,6 +5,7 @@ pub mod by_likelihood;
 pub mod checked;
 pub mod clock;
 pub mod contacts;
+pub mod formulation;
 pub mod found;
 pub mod kinematics;
 pub mod ml;

@@ -26,7 +26,8 @@ use nalgebra::{Isometry3, Vector6};
 
 use crate::error::PipelineError;
 use crate::estimate::start::{Start, start};
-use crate::formulate::ml::{self, FreeSet, MlFit};
+use crate::formulate::formulation::{FreeSet, MlFit};
+use crate::formulate::ml;
 use crate::prepare::conditions::{Conditions, conditions};
 use crate::prepare::excluded::Excluded;
 use crate::prepare::inputs::{Inputs, Loaded};

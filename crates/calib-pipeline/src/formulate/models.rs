@@ -11,8 +11,9 @@ use serde_json::json;
 
 use crate::error::PipelineError;
 use crate::estimate::start::start;
+use crate::formulate::formulation::FreeSet;
 use crate::formulate::kinematics::Loads;
-use crate::formulate::ml::{FreeSet, state};
+use crate::formulate::ml::state;
 use crate::prepare::checks;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;

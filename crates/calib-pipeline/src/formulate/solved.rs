@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::estimate::start::Start;
+use crate::formulate::formulation::MlFit;
 use crate::formulate::found::Found;
 use crate::formulate::kinematics::Calibration;
-use crate::formulate::ml::MlFit;
 use crate::prepare::inputs::Inputs;
 
 /// What either method hands on.

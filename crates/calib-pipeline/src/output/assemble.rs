@@ -7,7 +7,7 @@ use calib_report::{
     Verification, judge,
 };
 
-use crate::formulate::ml::MlFit;
+use crate::formulate::formulation::MlFit;
 use crate::output::evidence::Evidence;
 use crate::output::of_data::{coverage, estimators, findings, recordings, rejected};
 use crate::output::of_fit::{

@@ -8,9 +8,9 @@ use calib_profile::Method;
 use calib_report::{HeldOut, LoopClosure, ResidualRow};
 
 use crate::estimate::paper::OriginEstimate;
+use crate::formulate::formulation::MlFit;
 use crate::formulate::found::Found;
 use crate::formulate::kinematics::Calibration;
-use crate::formulate::ml::MlFit;
 use crate::output::export::PatchedUrdf;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;

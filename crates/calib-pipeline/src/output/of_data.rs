@@ -10,7 +10,7 @@ use calib_report::{
     Unit, number,
 };
 
-use crate::formulate::ml::MlFit;
+use crate::formulate::formulation::MlFit;
 use crate::output::evidence::Evidence;
 use crate::prepare::inputs::Inputs;
 use crate::verify::residuals::subject;

@@ -3,8 +3,8 @@
 use calib_core::{Gauge, NoiseKind};
 use calib_report::{Cause, FitSummary, NotObservable, Parameter, Term, Transform, Unit};
 
+use crate::formulate::formulation::MlFit;
 use crate::formulate::found::Found;
-use crate::formulate::ml::MlFit;
 use crate::output::assemble::fit_end;
 use crate::output::evidence::Evidence;
 

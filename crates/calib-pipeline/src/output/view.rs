@@ -11,8 +11,8 @@ use calib_report::view3d::{
 use nalgebra::{Isometry3, Matrix3, Point3};
 
 use crate::estimate::paper::OriginEstimate;
+use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::Calibration;
-use crate::formulate::ml::MlFit;
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::accuracy::configuration;

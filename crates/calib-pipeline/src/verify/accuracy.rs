@@ -9,8 +9,8 @@ use calib_report::{AccuracyLimit, ErrorSource, HeldOut, Workspace, WorkspacePoin
 use calib_urdf::LinkId;
 use nalgebra::Matrix6;
 
+use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::{Loads, joint_state};
-use crate::formulate::ml::MlFit;
 use crate::prepare::conditions::Conditions;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;

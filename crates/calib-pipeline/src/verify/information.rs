@@ -4,7 +4,7 @@
 use calib_report::{DataInformation, Quantity, Term};
 use nalgebra::DMatrix;
 
-use crate::formulate::ml::MlFit;
+use crate::formulate::formulation::MlFit;
 use crate::prepare::inputs::Inputs;
 use crate::verify::invariants::invariants;
 

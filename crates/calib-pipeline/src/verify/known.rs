@@ -6,7 +6,7 @@ use calib_core::Configuration;
 use calib_urdf::Joint;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 
-use crate::formulate::ml::MlFit;
+use crate::formulate::formulation::MlFit;
 use crate::prepare::inputs::Inputs;
 
 /// σ of a number, and how much of it the data said.

@@ -8,8 +8,8 @@ use calib_profile::{BodyKind, Usage};
 use calib_report::ResidualRow;
 
 use crate::formulate::contacts::miss;
+use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::Calibration;
-use crate::formulate::ml::MlFit;
 use crate::prepare::conditions::conditions;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;

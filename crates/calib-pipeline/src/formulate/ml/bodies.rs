@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use super::Formulation;
 use calib_core::{
     Chart, FrameId, GroupId, MarkerObservation, NoiseKind, PointId, PoseNoise, PoseObservation,
     Problem, Role,
@@ -11,6 +10,7 @@ use calib_profile::{BodyKind, Profile};
 use nalgebra::{Isometry3, Point3};
 
 use crate::estimate::start::Start;
+use crate::formulate::formulation::Formulation;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
 

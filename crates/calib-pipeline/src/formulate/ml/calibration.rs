@@ -1,11 +1,11 @@
 //! The robot that values of the parameters describe.
 
-use super::Formulation;
 use calib_core::effect::Source;
 use calib_core::{EdgeId, Solution};
 use calib_urdf::JointId;
 use nalgebra::Isometry3;
 
+use crate::formulate::formulation::Formulation;
 use crate::formulate::kinematics::{Calibration, JointEffects};
 use crate::prepare::inputs::Inputs;
 

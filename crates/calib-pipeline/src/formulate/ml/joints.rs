@@ -1,6 +1,5 @@
 //! Joints: their origins, their motion and its effects.
 
-use super::{Formulation, FreeSet};
 use calib_core::effect::Source;
 use calib_core::{
     Axis, Chart, EFFECTS, EdgeId, EffectKind, GroupId, JointState, NoiseKind, Problem, Role,
@@ -8,6 +7,7 @@ use calib_core::{
 use calib_profile::{ContactBase, JointFreeSet, OriginFreeSet, Profile};
 use calib_urdf::{JointId, JointKind, RobotModel};
 
+use crate::formulate::formulation::{Formulation, FreeSet};
 use crate::formulate::kinematics::{Loads, joint_state};
 use crate::prepare::conditions::Conditions;
 use crate::prepare::inputs::Inputs;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use bodies::add_bodies;
-use calib_core::{Chart, EdgeId, FrameId, PointId, Problem, Role, Settings, Solution};
+use calib_core::{Chart, Problem, Role, Settings};
 use calib_profile::{Free, Usage};
 use calibration::calibration;
 use joints::{Row, add_joint, joint_noise_group, used_joints};
@@ -11,7 +11,8 @@ use joints::{Row, add_joint, joint_noise_group, used_joints};
 use crate::error::PipelineError;
 use crate::estimate::start::Start;
 use crate::formulate::contacts::add_contacts;
-use crate::formulate::kinematics::{Calibration, Loads};
+use crate::formulate::formulation::{Formulation, FreeSet, MlFit};
+use crate::formulate::kinematics::Loads;
 use crate::prepare::conditions::{Conditions, conditions};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
@@ -21,57 +22,6 @@ mod calibration;
 mod joints;
 
 pub(crate) use calibration::calibration_at;
-
-/// What to free in a solve: the profile's choice, or the bodies and the robot's place only.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FreeSet {
-    /// What the profile says.
-    Profile,
-    /// Mounts and `tracker_from_root` only: the baseline.
-    RegistrationOnly,
-}
-
-/// A stated problem, and how its parts are called there.
-#[derive(Debug, Clone)]
-pub struct Formulation {
-    /// The problem.
-    pub problem: Problem,
-    /// Recording and row of each sample.
-    pub samples: Vec<(String, usize)>,
-    /// Frame of the tracker.
-    pub tracker: FrameId,
-    /// Frame per link index; `None` for links that no path uses.
-    pub links: Vec<Option<FrameId>>,
-    /// Frame per body that has one.
-    pub bodies: BTreeMap<String, FrameId>,
-    /// Joint edge per joint index.
-    pub joints: Vec<Option<EdgeId>>,
-    /// Origin edge per joint index, where it can change.
-    pub origins: Vec<Option<EdgeId>>,
-    /// `tracker_from_root`.
-    pub root: EdgeId,
-    /// Mount edge per body that has one.
-    pub mounts: BTreeMap<String, EdgeId>,
-    /// Points by body and marker.
-    pub points: BTreeMap<String, BTreeMap<String, PointId>>,
-    /// Touching points by name.
-    pub contact_points: BTreeMap<String, PointId>,
-    /// Places of what is touched, by contact.
-    pub contacts: BTreeMap<String, EdgeId>,
-    /// Regressors are needed at predictions (compliance or coupling is free).
-    pub loaded: bool,
-}
-
-/// A solved problem.
-#[derive(Debug, Clone)]
-pub struct MlFit {
-    /// The problem's names.
-    pub formulation: Formulation,
-    /// What was found.
-    pub solution: Solution,
-    /// The robot that follows.
-    pub calibration: Calibration,
-}
 
 /// States the problem of a profile.
 #[must_use]

@@ -1,0 +1,58 @@
+//! A stated problem with the names of its parts, and what solving it gives.
+
+use std::collections::BTreeMap;
+
+use calib_core::{EdgeId, FrameId, PointId, Problem, Solution};
+
+use crate::formulate::kinematics::Calibration;
+
+/// What to free in a solve: the profile's choice, or the bodies and the robot's place only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FreeSet {
+    /// What the profile says.
+    Profile,
+    /// Mounts and `tracker_from_root` only: the baseline.
+    RegistrationOnly,
+}
+
+/// A stated problem, and how its parts are called there.
+#[derive(Debug, Clone)]
+pub struct Formulation {
+    /// The problem.
+    pub problem: Problem,
+    /// Recording and row of each sample.
+    pub samples: Vec<(String, usize)>,
+    /// Frame of the tracker.
+    pub tracker: FrameId,
+    /// Frame per link index; `None` for links that no path uses.
+    pub links: Vec<Option<FrameId>>,
+    /// Frame per body that has one.
+    pub bodies: BTreeMap<String, FrameId>,
+    /// Joint edge per joint index.
+    pub joints: Vec<Option<EdgeId>>,
+    /// Origin edge per joint index, where it can change.
+    pub origins: Vec<Option<EdgeId>>,
+    /// `tracker_from_root`.
+    pub root: EdgeId,
+    /// Mount edge per body that has one.
+    pub mounts: BTreeMap<String, EdgeId>,
+    /// Points by body and marker.
+    pub points: BTreeMap<String, BTreeMap<String, PointId>>,
+    /// Touching points by name.
+    pub contact_points: BTreeMap<String, PointId>,
+    /// Places of what is touched, by contact.
+    pub contacts: BTreeMap<String, EdgeId>,
+    /// Regressors are needed at predictions (compliance or coupling is free).
+    pub loaded: bool,
+}
+
+/// A solved problem.
+#[derive(Debug, Clone)]
+pub struct MlFit {
+    /// The problem's names.
+    pub formulation: Formulation,
+    /// What was found.
+    pub solution: Solution,
+    /// The robot that follows.
+    pub calibration: Calibration,
+}
