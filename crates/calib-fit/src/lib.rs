@@ -109,7 +109,7 @@ fn answer(text: String, value: &Value, observable: bool) -> Answer {
 
 /// An estimator that there is not, with the nearest there is.
 fn unknown(id: &str, known: &[String], list: &str) -> FitError {
-    let remedy = match calib_urdf::nearest::nearest(id, known.iter().map(String::as_str)) {
+    let remedy = match calib_finding::nearest_word(id, known.iter().map(String::as_str)) {
         Some(near) => format!("did you mean `{near}`? `{list} --list` shows them all"),
         None => format!("`{list} --list` shows what there is"),
     };

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use calib_urdf::nearest::nearest;
+use calib_finding::nearest_word;
 
 use crate::locate::{Place, Places};
 
@@ -117,7 +117,7 @@ pub(crate) fn expected<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>
     if known.is_empty() {
         return "the profile declares none".to_owned();
     }
-    match nearest(wrong, known.iter().copied()) {
+    match nearest_word(wrong, known.iter().copied()) {
         Some(near) => format!("did you mean `{near}`? known: {}", one_of(&known)),
         None => format!("expected {}", one_of(&known)),
     }

@@ -44,7 +44,6 @@ pub mod edit;
 pub mod error;
 pub mod kinematics;
 pub mod model;
-pub mod nearest;
 pub mod read;
 pub mod xacro;
 pub mod yaml;

@@ -1,6 +1,6 @@
 //! The robot as a plain arena: links, joints, typed indices.
 
-use crate::nearest::nearest;
+use calib_finding::nearest_word;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -200,7 +200,7 @@ impl UnknownName {
             robot: robot.to_owned(),
             kind,
             name: name.to_owned(),
-            nearest: nearest(name, known).map(str::to_owned),
+            nearest: nearest_word(name, known).map(str::to_owned),
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::io::{Error, ErrorKind};
 use std::path::Path;
 
-use calib_urdf::nearest::nearest;
+use calib_finding::nearest_word;
 
 /// The remedy for a file that cannot be read; a missing one may have a neighbor that was meant.
 pub(crate) fn reading(path: &Path, source: &Error) -> String {
@@ -36,11 +36,11 @@ fn neighbor(path: &Path) -> Option<String> {
     // Endings are alike anyway: the name before it must be.
     let stem = |name: &str| Path::new(name).file_stem()?.to_str().map(str::to_owned);
     let stems: Vec<String> = names.iter().filter_map(|name| stem(name)).collect();
-    let near = nearest(&stem(wrong)?, stems.iter().map(String::as_str))?;
+    let near = nearest_word(&stem(wrong)?, stems.iter().map(String::as_str))?;
     let alike = names
         .iter()
         .filter(|name| stem(name).as_deref() == Some(near));
-    let near = nearest(wrong, alike.map(String::as_str))?;
+    let near = nearest_word(wrong, alike.map(String::as_str))?;
     Some(folder.join(near).display().to_string())
 }
 

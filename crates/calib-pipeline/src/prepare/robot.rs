@@ -77,7 +77,7 @@ fn known_estimators(profile: &Profile, text: &str, shown: &str) -> Result<(), Pi
             if ids.contains(&wanted.as_str()) {
                 continue;
             }
-            let near = match calib_urdf::nearest::nearest(wanted, ids.iter().copied()) {
+            let near = match calib_finding::nearest_word(wanted, ids.iter().copied()) {
                 Some(near) => format!("did you mean `{near}`? "),
                 None => String::new(),
             };

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use calib_checks::rigid_body::{NotABody, Template, body_poses};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::{Body, BodyKind, Usage};
-use calib_urdf::nearest::nearest;
+use calib_finding::nearest_word;
 use nalgebra::{Isometry3, Point3};
 
 use crate::error::PipelineError;
@@ -85,11 +85,11 @@ fn recorded_as(inputs: &Inputs, name: &str, body: &Body) -> String {
         BodyKind::Pose => {
             let bodies = recordings().flat_map(|r| r.poses.bodies.keys());
             let strangers = bodies.filter(|b| !inputs.robot.profile.bodies.contains_key(*b));
-            nearest(name, strangers.map(String::as_str))
+            nearest_word(name, strangers.map(String::as_str))
         }
         BodyKind::Markers { names, .. } => names.first().and_then(|first| {
             let markers = recordings().flat_map(|r| r.poses.markers.keys());
-            nearest(first, markers.map(String::as_str))
+            nearest_word(first, markers.map(String::as_str))
         }),
     };
     near.map_or_else(String::new, |near| format!("did you mean `{near}`? "))

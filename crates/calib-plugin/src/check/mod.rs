@@ -237,30 +237,13 @@ fn check_loaded(
     table
 }
 
+/// All tests of one offer; a call that hangs ends them.
 fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits) {
-    let title = subject.title.clone();
+    let title = subject.title.as_str();
     let cases = Cases::of(subject, limits.huge);
 
-    let mut hangs = false;
-    for (test, list) in [
-        ("golden cases", &cases.golden),
-        ("degenerate data", &cases.degenerate),
-    ] {
-        if list.is_empty() {
-            table.skip(&title, test, "a reader without an example");
-            continue;
-        }
-        let result = list.iter().try_for_each(|case| {
-            let said = watch::call(subject, &case.input, &Cancel::new(), limits.call)
-                .map_err(|late| late.to_string());
-            hangs |= said.is_err();
-            said.and_then(|reply| (case.judge)(&reply?))
-                .map_err(|problem| format!("{}: {problem}", case.name))
-        });
-        table.note(&title, test, result);
-    }
-    if hangs {
-        table.skip(&title, "the rest", "a call did not return");
+    if check_cases(table, subject, &cases, limits) {
+        table.skip(title, "the rest", "a call did not return");
         return;
     }
     let Some(usual) = cases
@@ -271,10 +254,60 @@ fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits)
     else {
         return;
     };
-
     // Text of the answer with all digits: the same means the same bits.
-    let answer = |subject: &Subject| format!("{:?}", subject.call(&usual, &Control::default()));
-    let first = answer(subject);
+    let answer = || format!("{:?}", subject.call(&usual, &Control::default()));
+    check_repeats(table, title, &answer);
+
+    let stopped = stops_when_cancelled(subject, &cases, limits);
+    let hangs = stopped.is_err();
+    table.note(title, "stops when cancelled", stopped);
+    if hangs {
+        table.skip(title, "huge input", "a call did not stop");
+        table.skip(title, "memory", "a call did not stop");
+        return;
+    }
+    let huge = watch::call(subject, &cases.huge, &Cancel::new(), limits.call)
+        .map_err(|late| late.to_string())
+        .and_then(|reply| reply.map(drop));
+    table.note(title, "huge input", huge);
+
+    match memory::growth(|| drop(answer())) {
+        Ok(result) => table.note(title, "memory", result),
+        Err(why) => table.skip(title, "memory", why),
+    }
+}
+
+/// The golden and the degenerate cases; whether a call did not return.
+fn check_cases(
+    table: &mut Conformance,
+    subject: &Arc<Subject>,
+    cases: &Cases,
+    limits: &Limits,
+) -> bool {
+    let mut hangs = false;
+    for (test, list) in [
+        ("golden cases", &cases.golden),
+        ("degenerate data", &cases.degenerate),
+    ] {
+        if list.is_empty() {
+            table.skip(&subject.title, test, "a reader without an example");
+            continue;
+        }
+        let result = list.iter().try_for_each(|case| {
+            let said = watch::call(subject, &case.input, &Cancel::new(), limits.call)
+                .map_err(|late| late.to_string());
+            hangs |= said.is_err();
+            said.and_then(|reply| (case.judge)(&reply?))
+                .map_err(|problem| format!("{}: {problem}", case.name))
+        });
+        table.note(&subject.title, test, result);
+    }
+    hangs
+}
+
+/// The same call gives the same answer, one after the other and in eight threads at once.
+fn check_repeats(table: &mut Conformance, title: &str, answer: &(impl Fn() -> String + Sync)) {
+    let first = answer();
     let same = |second: String| {
         if second == first {
             Ok(())
@@ -283,14 +316,14 @@ fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits)
         }
     };
     table.note(
-        &title,
+        title,
         "same answer twice",
-        (0..3).try_for_each(|_| same(answer(subject))),
+        (0..3).try_for_each(|_| same(answer())),
     );
 
     let (threads, calls) = THREADS;
     let answers: Vec<String> = std::thread::scope(|scope| {
-        let one = || (0..calls).map(|_| answer(subject)).collect::<Vec<_>>();
+        let one = || (0..calls).map(|_| answer()).collect::<Vec<_>>();
         let running: Vec<_> = (0..threads).map(|_| scope.spawn(one)).collect();
         running
             .into_iter()
@@ -302,16 +335,22 @@ fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits)
             .collect()
     });
     table.note(
-        &title,
+        title,
         "eight threads",
         answers.into_iter().try_for_each(same),
     );
+}
 
+/// A call on huge input returns in time, both cancelled from the start and cancelled while it works.
+fn stops_when_cancelled(
+    subject: &Arc<Subject>,
+    cases: &Cases,
+    limits: &Limits,
+) -> Result<(), String> {
     let cancelled = Cancel::new();
     cancelled.cancel();
-    let in_time = watch::call(subject, &cases.huge, &cancelled, limits.cancel)
+    watch::call(subject, &cases.huge, &cancelled, limits.cancel)
         .and_then(|_| {
-            // Cancelled while it works.
             let cancel = Cancel::new();
             let later = cancel.clone();
             std::thread::spawn(move || {
@@ -326,26 +365,7 @@ fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits)
             )
         })
         .map_err(|late| late.to_string())
-        .and_then(|reply| match reply {
-            Err(broken) => Err(broken),
-            Ok(_) => Ok(()),
-        });
-    let hangs = in_time.is_err();
-    table.note(&title, "stops when cancelled", in_time);
-    if hangs {
-        table.skip(&title, "huge input", "a call did not stop");
-        table.skip(&title, "memory", "a call did not stop");
-        return;
-    }
-    let huge = watch::call(subject, &cases.huge, &Cancel::new(), limits.call)
-        .map_err(|late| late.to_string())
-        .and_then(|reply| reply.map(drop));
-    table.note(&title, "huge input", huge);
-
-    match memory::growth(|| drop(answer(subject))) {
-        Ok(result) => table.note(&title, "memory", result),
-        Err(why) => table.skip(&title, "memory", why),
-    }
+        .and_then(|reply| reply.map(drop))
 }
 
 /// A reply, or the fault of a plugin; a refusal with a reason is a reply.

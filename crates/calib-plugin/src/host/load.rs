@@ -114,6 +114,8 @@ fn open(path: &Path) -> Result<LoadedPlugin, PluginError> {
     unsafe { from_entry(entry, Some(path)) }
 }
 
+/// A loaded plugin with all its offers.
+///
 /// # Safety
 /// `entry` is null or an entry of the contract that lives until the process ends.
 unsafe fn from_entry(
@@ -156,11 +158,6 @@ unsafe fn from_entry(
     let described_in = start.elapsed();
     let description = unsafe { describe::read(descriptor, (major, minor)) }.map_err(broken)?;
 
-    let origin = Origin::Plugin {
-        plugin: description.name.clone(),
-        version: description.version.clone(),
-        path: path.map(Path::to_path_buf),
-    };
     let mut plugin = LoadedPlugin {
         description,
         path: path.map(Path::to_path_buf),
@@ -171,31 +168,44 @@ unsafe fn from_entry(
         report: Vec::new(),
     };
     for offer in plugin.description.offers.clone() {
-        let what = format!("{} `{}`", offer.kind.id(), offer.name);
-        let table = |problem: String| broken(format!("the table of {what}: {problem}"));
-        let missing = |function: &str| broken(format!("the table of {what} lacks {function}()"));
         // Kind and name were texts of the plugin, without zero bytes.
         let kind = CString::new(offer.kind.id()).unwrap_or_default();
         let name = CString::new(offer.name.as_str()).unwrap_or_default();
         let found: *const c_void = unsafe { find(kind.as_ptr(), name.as_ptr()) };
+        unsafe { plugin.take(offer, found) }.map_err(broken)?;
+    }
+    Ok(plugin)
+}
+
+impl LoadedPlugin {
+    /// Adds an offer from its function table; the error is the problem of the table.
+    ///
+    /// # Safety
+    /// `found` is null or the table of the offer's kind, which lives until the process ends.
+    unsafe fn take(&mut self, offer: Offer, found: *const c_void) -> Result<(), String> {
+        let origin = Origin::Plugin {
+            plugin: self.description.name.clone(),
+            version: self.description.version.clone(),
+            path: self.path.clone(),
+        };
+        let what = format!("{} `{}`", offer.kind.id(), offer.name);
+        let table = |problem: String| format!("the table of {what}: {problem}");
+        let missing = |function: &str| format!("the table of {what} lacks {function}()");
+        // SAFETY, for all blocks: as the caller says.
         match offer.kind {
             Kind::Cor => {
                 let raw: abi::Cor1 =
                     unsafe { sized("calib_cor_1", found, size_to!(abi::Cor1, fit)) }
                         .map_err(table)?;
                 let fit = raw.fit.ok_or_else(|| missing("fit"))?;
-                plugin
-                    .cor
-                    .push(Entry::cor(LoadedCor { offer, fit }, origin.clone()));
+                self.cor.push(Entry::cor(LoadedCor { offer, fit }, origin));
             }
             Kind::Aor => {
                 let raw: abi::Aor1 =
                     unsafe { sized("calib_aor_1", found, size_to!(abi::Aor1, fit)) }
                         .map_err(table)?;
                 let fit = raw.fit.ok_or_else(|| missing("fit"))?;
-                plugin
-                    .aor
-                    .push(Entry::aor(LoadedAor { offer, fit }, origin.clone()));
+                self.aor.push(Entry::aor(LoadedAor { offer, fit }, origin));
             }
             Kind::Reader => {
                 let raw: abi::Reader1 =
@@ -208,23 +218,20 @@ unsafe fn from_entry(
                     read,
                     recognizes,
                 };
-                plugin.reader.push(Entry::reader(it, origin.clone()));
+                self.reader.push(Entry::reader(it, origin));
             }
             Kind::Report => {
                 let raw: abi::Report1 =
                     unsafe { sized("calib_report_1", found, size_to!(abi::Report1, write)) }
                         .map_err(table)?;
                 let write = raw.write.ok_or_else(|| missing("write"))?;
-                plugin
-                    .report
-                    .push(Entry::report(LoadedReport { offer, write }, origin.clone()));
+                self.report
+                    .push(Entry::report(LoadedReport { offer, write }, origin));
             }
         }
+        Ok(())
     }
-    Ok(plugin)
-}
 
-impl LoadedPlugin {
     /// Its center estimators.
     #[must_use]
     pub fn cors(&self) -> &[Entry<dyn Cor>] {

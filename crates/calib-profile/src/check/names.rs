@@ -1,6 +1,6 @@
 //! Names, units and limits: what every section of a profile is checked with.
 
-use calib_urdf::nearest::nearest;
+use calib_finding::nearest_word;
 
 use super::*;
 
@@ -96,7 +96,7 @@ impl Checker<'_> {
         };
         let mut meant = BTreeSet::new();
         for stranger in points.keys().filter(|m| !markers.contains(m)) {
-            let near = nearest(stranger, missing());
+            let near = nearest_word(stranger, missing());
             meant.extend(near);
             let help = match near {
                 Some(near) => format!("did you mean `{near}`?"),

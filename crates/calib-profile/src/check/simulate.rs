@@ -1,6 +1,6 @@
 //! The `simulate` section.
 
-use calib_urdf::nearest::nearest;
+use calib_finding::nearest_word;
 
 use super::names::MarkerList;
 use super::*;
@@ -92,7 +92,7 @@ impl Checker<'_> {
         // A mount whose body nobody knows is the mount of the body that it almost names.
         let strangers = raw.mounts.keys().filter(|name| !bodies.contains_key(*name));
         let meant: BTreeSet<&str> = strangers
-            .filter_map(|name| nearest(name, without().map(String::as_str)))
+            .filter_map(|name| nearest_word(name, without().map(String::as_str)))
             .collect();
         for name in without().filter(|name| !meant.contains(name.as_str())) {
             self.key_problem(

@@ -4,9 +4,9 @@ use super::{JOINT_TYPES, RawJoint, Reader, UNSUPPORTED_TYPES};
 use crate::error::{Hint, Problem};
 use crate::kinematics::rpy::rotation_from_rpy;
 use crate::model::{Inertial, JointKind, JointLimits};
-use crate::nearest::nearest;
 use crate::read::numbers::parse_numbers;
 use crate::read::source::{is_element, value_start};
+use calib_finding::nearest_word;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 use roxmltree::Node;
 
@@ -30,7 +30,7 @@ impl Reader<'_> {
     fn required<'a>(&mut self, node: Node<'a, '_>, attribute: &'static str) -> Option<&'a str> {
         let value = node.attribute(attribute);
         if value.is_none() {
-            let near = nearest(attribute, node.attributes().map(|a| a.name()));
+            let near = nearest_word(attribute, node.attributes().map(|a| a.name()));
             let problem = Problem::MissingAttribute {
                 element: node.tag_name().name().to_owned(),
                 attribute,
@@ -142,7 +142,7 @@ impl Reader<'_> {
             return None;
         }
         if !JOINT_TYPES.contains(&written) {
-            let hint = Hint(nearest(written, JOINT_TYPES).map(str::to_owned));
+            let hint = Hint(nearest_word(written, JOINT_TYPES).map(str::to_owned));
             self.report(
                 at,
                 Problem::UnknownJointType {
@@ -254,7 +254,7 @@ impl Reader<'_> {
             if known.contains(&attribute.name()) || attribute.namespace().is_some() {
                 continue;
             }
-            let meant = nearest(attribute.name(), known.iter().copied())
+            let meant = nearest_word(attribute.name(), known.iter().copied())
                 .filter(|name| !node.has_attribute(*name));
             // A typo keeps the letters; other names are extensions.
             let typo = meant.is_some_and(|name| same_letters(name, attribute.name()))

@@ -18,10 +18,10 @@ use crate::error::{Hint, Place, Problem, ReadError, ReadProblem};
 use crate::model::{
     Joint, JointId, JointKind, JointLimits, Link, LinkId, Mimic, MimicLaw, RobotModel,
 };
-use crate::nearest::nearest;
 use crate::read::source::{
     decode, has_quaternions, parse, read_text, top_level, value_start, xacro_evidence,
 };
+use calib_finding::nearest_word;
 use nalgebra::Isometry3;
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
@@ -94,6 +94,20 @@ struct RawJoint<'a, 'b> {
     mimic: Option<(Node<'a, 'b>, f64, f64)>,
 }
 
+/// Links of the file with their places.
+struct ReadLinks<'a, 'b> {
+    all: Vec<Link>,
+    /// Element of each link.
+    nodes: Vec<Node<'a, 'b>>,
+    ids: BTreeMap<String, LinkId>,
+}
+
+/// Joints of the file whose names are not yet ids.
+struct RawJoints<'a, 'b> {
+    all: Vec<RawJoint<'a, 'b>>,
+    ids: BTreeMap<String, JointId>,
+}
+
 /// Collects findings, so that a person sees all of them at once.
 struct Reader<'t> {
     text: &'t str,
@@ -121,83 +135,134 @@ impl Reader<'_> {
         Place::of_byte(self.text, node.range().start).line
     }
 
+    /// The whole robot; `None` when anything was found. Each step needs the one before to be without findings: a link
+    /// that could not be read would turn up again as "does not exist".
     fn robot(&mut self, document: &Document<'_>) -> Option<RobotModel> {
-        let mut links = Vec::new();
-        let mut link_nodes = Vec::new();
-        let mut link_ids = BTreeMap::new();
+        let mut links = self.links(document);
+        let raw = self.raw_joints(document);
+        self.clean()?;
+        let mut joints = self.resolve(&raw, &links.ids);
+        self.clean()?;
+        self.attach(&mut links.all, &joints, &raw.all);
+        self.clean()?;
+        self.circles(&links.all, &joints, &raw.all);
+        let root = self.root(&links);
+        self.follow_mimics(&mut joints, &raw.all);
+        self.clean()?;
+        let root = root?;
+        let from_root = tree::breadth_first(root, &links.all, &joints);
+        let name = document
+            .root_element()
+            .attribute("name")
+            .unwrap_or("")
+            .to_owned();
+        Some(RobotModel {
+            name,
+            links: links.all,
+            joints,
+            root,
+            from_root,
+            link_ids: links.ids,
+            joint_ids: raw.ids,
+        })
+    }
+
+    /// `None` when something was found.
+    fn clean(&self) -> Option<()> {
+        self.found.is_empty().then_some(())
+    }
+
+    /// All links, not yet connected.
+    fn links<'a, 'b>(&mut self, document: &'a Document<'b>) -> ReadLinks<'a, 'b> {
+        let mut links = ReadLinks {
+            all: Vec::new(),
+            nodes: Vec::new(),
+            ids: BTreeMap::new(),
+        };
         for node in top_level(document, "link") {
             let Some(name) = self.name(node) else {
                 continue;
             };
-            if let Some(LinkId(first)) = link_ids.get(name) {
-                let first_line = self.line_of(link_nodes[*first as usize]);
-                self.report(
-                    node.range().start,
-                    Problem::DuplicateName {
-                        kind: "link",
-                        name: name.to_owned(),
-                        first_line,
-                    },
-                );
+            if let Some(LinkId(first)) = links.ids.get(name) {
+                let first = links.nodes[*first as usize];
+                self.duplicate("link", name, node, first);
                 continue;
             }
             let inertial = self.inertial(node, name);
-            link_ids.insert(name.to_owned(), LinkId(links.len() as u32));
-            links.push(Link {
+            let id = LinkId(links.all.len() as u32);
+            links.ids.insert(name.to_owned(), id);
+            links.all.push(Link {
                 name: name.to_owned(),
                 parent_joint: None,
                 child_joints: Vec::new(),
                 inertial,
             });
-            link_nodes.push(node);
+            links.nodes.push(node);
         }
-        if links.is_empty() && self.found.is_empty() {
+        if links.all.is_empty() && self.found.is_empty() {
             self.report(document.root_element().range().start, Problem::NoLinks);
         }
+        links
+    }
 
-        let mut raw_joints: Vec<RawJoint<'_, '_>> = Vec::new();
-        let mut joint_ids = BTreeMap::new();
+    /// All joints, their links still names.
+    fn raw_joints<'a, 'b>(&mut self, document: &'a Document<'b>) -> RawJoints<'a, 'b> {
+        let mut joints = RawJoints {
+            all: Vec::new(),
+            ids: BTreeMap::new(),
+        };
         for node in top_level(document, "joint") {
             let Some(joint) = self.joint(node) else {
                 continue;
             };
-            if let Some(JointId(first)) = joint_ids.get(joint.name) {
-                let first_line = self.line_of(raw_joints[*first as usize].node);
-                let name = joint.name.to_owned();
-                self.report(
-                    node.range().start,
-                    Problem::DuplicateName {
-                        kind: "joint",
-                        name,
-                        first_line,
-                    },
-                );
+            if let Some(JointId(first)) = joints.ids.get(joint.name) {
+                let first = joints.all[*first as usize].node;
+                self.duplicate("joint", joint.name, node, first);
                 continue;
             }
-            joint_ids.insert(joint.name.to_owned(), JointId(raw_joints.len() as u32));
-            raw_joints.push(joint);
+            let id = JointId(joints.all.len() as u32);
+            joints.ids.insert(joint.name.to_owned(), id);
+            joints.all.push(joint);
         }
+        joints
+    }
 
-        // A link or joint that could not be read would turn up again as "does not exist".
-        if !self.found.is_empty() {
-            return None;
-        }
+    /// Two elements of one name: reported at the second.
+    fn duplicate(
+        &mut self,
+        kind: &'static str,
+        name: &str,
+        second: Node<'_, '_>,
+        first: Node<'_, '_>,
+    ) {
+        let problem = Problem::DuplicateName {
+            kind,
+            name: name.to_owned(),
+            first_line: self.line_of(first),
+        };
+        self.report(second.range().start, problem);
+    }
+
+    /// Joints with ids in place of names; each is its own law until the mimics are followed.
+    fn resolve(
+        &mut self,
+        raw_joints: &RawJoints<'_, '_>,
+        link_ids: &BTreeMap<String, LinkId>,
+    ) -> Vec<Joint> {
         let mut joints = Vec::new();
-        for (i, raw) in raw_joints.iter().enumerate() {
-            let parent = self.link_of(raw, raw.parent, "parent", &link_ids);
-            let child = self.link_of(raw, raw.child, "child", &link_ids);
+        for (i, raw) in raw_joints.all.iter().enumerate() {
+            let parent = self.link_of(raw, raw.parent, "parent", link_ids);
+            let child = self.link_of(raw, raw.child, "child", link_ids);
             let mimic = raw.mimic.and_then(|(node, multiplier, offset)| {
-                self.mimic_source(raw, node, &raw_joints, &joint_ids)
-                    .map(|joint| Mimic {
-                        joint,
-                        multiplier,
-                        offset,
-                    })
+                self.mimic_source(raw, node, raw_joints).map(|joint| Mimic {
+                    joint,
+                    multiplier,
+                    offset,
+                })
             });
             let (Some(parent), Some(child)) = (parent, child) else {
                 continue;
             };
-            let id = JointId(i as u32);
             joints.push(Joint {
                 name: raw.name.to_owned(),
                 parent,
@@ -207,65 +272,48 @@ impl Reader<'_> {
                 limits: raw.limits,
                 mimic,
                 law: MimicLaw {
-                    source: id,
+                    source: JointId(i as u32),
                     multiplier: 1.0,
                     offset: 0.0,
                 },
             });
         }
-        if !self.found.is_empty() {
-            return None;
-        }
+        joints
+    }
 
+    /// Connects the links by the joints; a link has at most one parent.
+    fn attach(&mut self, links: &mut [Link], joints: &[Joint], raw: &[RawJoint<'_, '_>]) {
         for (i, joint) in joints.iter().enumerate() {
             let id = JointId(i as u32);
-            if let Some(first) = links[joint.child.index()].parent_joint {
+            let child = &mut links[joint.child.index()];
+            if let Some(first) = child.parent_joint {
                 let problem = Problem::TwoParents {
-                    link: links[joint.child.index()].name.clone(),
+                    link: child.name.clone(),
                     first: joints[first.index()].name.clone(),
-                    first_line: self.line_of(raw_joints[first.index()].node),
+                    first_line: self.line_of(raw[first.index()].node),
                     second: joint.name.clone(),
                 };
-                self.report(raw_joints[i].child.range().start, problem);
+                self.report(raw[i].child.range().start, problem);
                 continue;
             }
-            links[joint.child.index()].parent_joint = Some(id);
+            child.parent_joint = Some(id);
             links[joint.parent.index()].child_joints.push(id);
         }
-        if !self.found.is_empty() {
-            return None;
-        }
-        self.circles(&links, &joints, &raw_joints);
-        let roots: Vec<usize> = (0..links.len())
-            .filter(|i| links[*i].parent_joint.is_none())
+    }
+
+    /// The link without parent; a second one is reported. `None` where all links stand in circles.
+    fn root(&mut self, links: &ReadLinks<'_, '_>) -> Option<LinkId> {
+        let roots: Vec<usize> = (0..links.all.len())
+            .filter(|i| links.all[*i].parent_joint.is_none())
             .collect();
         if roots.len() > 1 {
-            let names = roots.iter().map(|i| links[*i].name.clone()).collect();
+            let names = roots.iter().map(|i| links.all[*i].name.clone()).collect();
             self.report(
-                link_nodes[roots[1]].range().start,
+                links.nodes[roots[1]].range().start,
                 Problem::SeveralRoots { roots: names },
             );
         }
-        self.follow_mimics(&mut joints, &raw_joints);
-        if !self.found.is_empty() {
-            return None;
-        }
-        let root = LinkId(*roots.first()? as u32);
-        let from_root = tree::breadth_first(root, &links, &joints);
-        let name = document
-            .root_element()
-            .attribute("name")
-            .unwrap_or("")
-            .to_owned();
-        Some(RobotModel {
-            name,
-            links,
-            joints,
-            root,
-            from_root,
-            link_ids,
-            joint_ids,
-        })
+        roots.first().map(|root| LinkId(*root as u32))
     }
 
     fn link_of(
@@ -278,7 +326,7 @@ impl Reader<'_> {
         let attribute = node.attribute_node("link")?;
         let id = link_ids.get(attribute.value()).copied();
         if id.is_none() && !self.full() {
-            let near = nearest(attribute.value(), link_ids.keys().map(String::as_str));
+            let near = nearest_word(attribute.value(), link_ids.keys().map(String::as_str));
             let problem = Problem::UnknownLink {
                 joint: joint.name.to_owned(),
                 role,
@@ -294,24 +342,24 @@ impl Reader<'_> {
         &mut self,
         joint: &RawJoint<'_, '_>,
         node: Node<'_, '_>,
-        all: &[RawJoint<'_, '_>],
-        joint_ids: &BTreeMap<String, JointId>,
+        joints: &RawJoints<'_, '_>,
     ) -> Option<JointId> {
         let attribute = node.attribute_node("joint")?;
-        let Some(id) = joint_ids.get(attribute.value()).copied() else {
-            let others = joint_ids
+        let Some(id) = joints.ids.get(attribute.value()).copied() else {
+            let others = joints
+                .ids
                 .keys()
                 .map(String::as_str)
                 .filter(|name| *name != joint.name);
             let problem = Problem::UnknownMimic {
                 joint: joint.name.to_owned(),
                 source_joint: attribute.value().to_owned(),
-                hint: Hint(nearest(attribute.value(), others).map(str::to_owned)),
+                hint: Hint(nearest_word(attribute.value(), others).map(str::to_owned)),
             };
             self.report(value_start(&attribute), problem);
             return None;
         };
-        if all[id.index()].kind == JointKind::Fixed {
+        if joints.all[id.index()].kind == JointKind::Fixed {
             let problem = Problem::MimicOfFixed {
                 joint: joint.name.to_owned(),
                 source_joint: attribute.value().to_owned(),

@@ -19,9 +19,9 @@ use crate::edit::patch::{Patched, PatchedFiles};
 use crate::edit::rotation::rpy_for;
 use crate::error::{Hint, Place};
 use crate::kinematics::rpy::rotation_from_rpy;
-use crate::nearest::nearest;
 use crate::read::numbers::parse_numbers;
 use crate::yaml::{YamlKind, YamlNode, parse};
+use calib_finding::nearest_word;
 use nalgebra::{Isometry3, Translation3, Vector3};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -258,7 +258,7 @@ fn of_joint<'a>(
                 Some(alias) => format!("`{joint}` or `{alias}`"),
                 None => format!("`{joint}`"),
             },
-            hint: Hint(nearest(joint, all.iter().map(|(key, _)| *key)).map(str::to_owned)),
+            hint: Hint(nearest_word(joint, all.iter().map(|(key, _)| *key)).map(str::to_owned)),
         }),
         several => Err(EditError::YamlSeveral {
             file: file.to_owned(),
