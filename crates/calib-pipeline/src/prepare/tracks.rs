@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use calib_checks::rigid_body::{NotABody, Template, body_poses};
+use calib_finding::nearest_word;
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::{Body, BodyKind, Usage};
-use calib_finding::nearest_word;
 use nalgebra::{Isometry3, Point3};
 
 use crate::error::PipelineError;

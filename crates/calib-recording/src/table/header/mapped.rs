@@ -1,0 +1,241 @@
+//! The columns that a column map names.
+
+use super::{BodyPlan, Column, Layout, MarkerPlan, Rotation, SlotKind};
+use crate::column_map::{BodyColumns, ColumnMap, LongColumns};
+use crate::error::Problem;
+use crate::model::JointUnit;
+use calib_finding::nearest_word;
+
+/// Takes the columns that the map names into the layout and marks them in `mapped`.
+pub(super) fn apply(
+    layout: &mut Layout,
+    map: &ColumnMap,
+    mapped: &mut [bool],
+) -> Result<(), Problem> {
+    let mut columns = Mapping {
+        layout,
+        mapped,
+        angle: map.angles.per_radian(),
+        length: map.lengths.per_metre(),
+    };
+    if let Some(time) = &map.time {
+        let scale = time.unit.per_second();
+        let slot = columns.take("time", &time.column, SlotKind::Time, scale)?;
+        columns.layout.time = Some(slot);
+    }
+    columns.robot(map)?;
+    columns.markers(map)?;
+    columns.bodies(map)?;
+    if let Some(long) = &map.long {
+        columns.long(long)?;
+    }
+    columns.labels(&map.labels)?;
+    // Whatever is used now is mapped (the slots of `w`, frame and labels were not marked above).
+    for (used, column) in mapped.iter_mut().zip(&layout.columns) {
+        *used |= *column != Column::Ignore;
+    }
+    layout.conversions.push(
+        format!(
+            "column map: angles in {:?}, lengths in {}",
+            map.angles,
+            map.lengths.name()
+        )
+        .to_lowercase(),
+    );
+    Ok(())
+}
+
+/// A layout while a map is applied.
+struct Mapping<'a> {
+    layout: &'a mut Layout,
+    /// Columns that the map used so far.
+    mapped: &'a mut [bool],
+    /// Units of the map's angles in a radian.
+    angle: f64,
+    /// Units of the map's lengths in a meter.
+    length: f64,
+}
+
+impl Mapping<'_> {
+    /// Where a column stands; `what` needs it.
+    fn position(&self, what: &str, column: &str) -> Result<usize, Problem> {
+        let names = &self.layout.names;
+        names
+            .iter()
+            .position(|name| name == column)
+            .ok_or_else(|| Problem::MissingColumn {
+                what: what.to_string(),
+                column: column.to_string(),
+                nearest: nearest_word(column, names.iter().map(String::as_str)).map(str::to_owned),
+            })
+    }
+
+    /// The slot of a column of numbers that nothing else may use.
+    fn take(
+        &mut self,
+        what: &str,
+        column: &str,
+        kind: SlotKind,
+        scale: f64,
+    ) -> Result<usize, Problem> {
+        let i = self.position(what, column)?;
+        if self.mapped[i] {
+            return Err(Problem::Misfit {
+                found: format!("the map uses column `{column}` again for {what}"),
+                expected: "every column once".to_string(),
+            });
+        }
+        self.mapped[i] = true;
+        Ok(self.layout.slot(i, kind, scale))
+    }
+
+    /// The slots of three columns of the tracker.
+    fn three(
+        &mut self,
+        what: &str,
+        columns: &[String; 3],
+        scale: f64,
+    ) -> Result<[usize; 3], Problem> {
+        let mut slots = [0; 3];
+        for (slot, column) in slots.iter_mut().zip(columns) {
+            *slot = self.take(what, column, SlotKind::Tracker, scale)?;
+        }
+        Ok(slots)
+    }
+
+    /// Joints and torques.
+    fn robot(&mut self, map: &ColumnMap) -> Result<(), Problem> {
+        let named = map.joint_columns.iter().map(|name| (name, name));
+        for (joint, column) in map.joints.iter().chain(named) {
+            self.joint(joint, column, JointUnit::Angle)?;
+        }
+        for (joint, column) in &map.prismatic {
+            self.joint(joint, column, JointUnit::Length)?;
+        }
+        for (joint, column) in &map.torques {
+            let what = format!("torque of `{joint}`");
+            let slot = self.take(&what, column, SlotKind::Robot, 1.0)?;
+            self.layout.torques.push((joint.clone(), slot));
+        }
+        Ok(())
+    }
+
+    fn joint(&mut self, joint: &str, column: &str, unit: JointUnit) -> Result<(), Problem> {
+        let scale = match unit {
+            JointUnit::Angle => self.angle,
+            JointUnit::Length => self.length,
+        };
+        let what = format!("joint `{joint}`");
+        let slot = self.take(&what, column, SlotKind::Robot, scale)?;
+        self.layout.joints.push((joint.to_string(), unit, slot));
+        Ok(())
+    }
+
+    /// Markers by name, or the template of a long table.
+    fn markers(&mut self, map: &ColumnMap) -> Result<(), Problem> {
+        for (name, columns) in &map.markers {
+            let slots = self.three(&format!("marker `{name}`"), columns, self.length)?;
+            self.layout.markers.push(MarkerPlan {
+                name: name.clone(),
+                slots,
+            });
+        }
+        let long = map.long.as_ref().and_then(|long| long.marker.as_ref());
+        if let Some(columns) = long {
+            let slots = self.three("the markers", columns, self.length)?;
+            self.layout.markers.push(MarkerPlan {
+                name: String::new(),
+                slots,
+            });
+        }
+        Ok(())
+    }
+
+    /// Bodies by name, or the template of a long table.
+    fn bodies(&mut self, map: &ColumnMap) -> Result<(), Problem> {
+        let named = map.bodies.iter().map(|(name, c)| (name.as_str(), c));
+        let long = map.long.as_ref().and_then(|long| long.body.as_ref());
+        for (name, columns) in named.chain(long.map(|c| ("", c))) {
+            let what = format!("body `{name}`");
+            let position = self.three(&what, &columns.position, self.length)?;
+            let rotation = self.rotation(&what, columns)?;
+            self.layout.bodies.push(BodyPlan {
+                name: name.to_string(),
+                position,
+                rotation,
+            });
+        }
+        Ok(())
+    }
+
+    /// The one rotation of a body.
+    fn rotation(&mut self, what: &str, columns: &BodyColumns) -> Result<Rotation, Problem> {
+        match columns {
+            BodyColumns {
+                quaternion_xyzw: Some([x, y, z, w]),
+                quaternion_wxyz: None,
+                rotation_vector: None,
+                fixed_xyz: None,
+                ..
+            }
+            | BodyColumns {
+                quaternion_wxyz: Some([w, x, y, z]),
+                quaternion_xyzw: None,
+                rotation_vector: None,
+                fixed_xyz: None,
+                ..
+            } => {
+                let [x, y, z] = self.three(what, &[x.clone(), y.clone(), z.clone()], 1.0)?;
+                let i = self.position(what, w)?;
+                let w = self.layout.slot(i, SlotKind::Tracker, 1.0);
+                Ok(Rotation::Quaternion([x, y, z, w]))
+            }
+            BodyColumns {
+                rotation_vector: Some(columns),
+                quaternion_xyzw: None,
+                quaternion_wxyz: None,
+                fixed_xyz: None,
+                ..
+            } => Ok(Rotation::Vector(self.three(what, columns, self.angle)?)),
+            BodyColumns {
+                fixed_xyz: Some(columns),
+                quaternion_xyzw: None,
+                quaternion_wxyz: None,
+                rotation_vector: None,
+                ..
+            } => Ok(Rotation::FixedXyz(self.three(what, columns, self.angle)?)),
+            _ => Err(Problem::Misfit {
+                found: format!("the column map gives {what} none or several rotations"),
+                expected: "one of quaternion_xyzw, quaternion_wxyz, rotation_vector, fixed_xyz"
+                    .to_string(),
+            }),
+        }
+    }
+
+    /// Names and frames of a long table.
+    fn long(&mut self, long: &LongColumns) -> Result<(), Problem> {
+        let name = self.position("the long table", &long.name)?;
+        let frame = self.position("the long table", &long.frame)?;
+        let layout = &mut *self.layout;
+        layout.entity = Some(name);
+        layout.columns[name] = Column::Entity;
+        layout.counter = Some(layout.slot(frame, SlotKind::Counter, 1.0));
+        if layout.markers.len() + layout.bodies.len() != 1 {
+            return Err(Problem::Misfit {
+                found: "the column map's `long` has none or several kinds of columns".to_string(),
+                expected: "either `marker` or `body` under `long`, and no other markers or bodies"
+                    .to_string(),
+            });
+        }
+        Ok(())
+    }
+
+    fn labels(&mut self, labels: &[String]) -> Result<(), Problem> {
+        for label in labels {
+            let i = self.position("a label", label)?;
+            self.layout.columns[i] = Column::Label(self.layout.labels.len());
+            self.layout.labels.push(label.clone());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,171 @@
+//! What the columns of a table mean: by a column map for the columns it names ([`mapped`]), and by our own naming rules
+//! for the others ([`naming`], [`rules`]).
+
+mod mapped;
+mod naming;
+mod rules;
+
+pub(crate) use naming::is_canonical;
+
+use crate::column_map::ColumnMap;
+use crate::error::{At, Placed, Problem};
+use crate::model::JointUnit;
+use std::collections::BTreeMap;
+
+/// Meaning of one column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Column {
+    Ignore,
+    /// Number into this slot, divided by this: units of the column in the SI unit.
+    Number {
+        slot: usize,
+        scale: f64,
+    },
+    /// Text into this label.
+    Label(usize),
+    /// State of this marker.
+    State(usize),
+    /// Name of the row's entity (long tables).
+    Entity,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SlotKind {
+    Time,
+    Counter,
+    Robot,
+    Tracker,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Slot {
+    pub kind: SlotKind,
+    pub column: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Rotation {
+    /// Slots of x, y, z, w.
+    Quaternion([usize; 4]),
+    Vector([usize; 3]),
+    FixedXyz([usize; 3]),
+}
+
+impl Rotation {
+    pub(super) fn slots(&self) -> &[usize] {
+        match self {
+            Rotation::Quaternion(slots) => slots,
+            Rotation::Vector(slots) | Rotation::FixedXyz(slots) => slots,
+        }
+    }
+}
+
+pub(super) struct MarkerPlan {
+    pub name: String,
+    pub slots: [usize; 3],
+}
+
+pub(super) struct BodyPlan {
+    pub name: String,
+    pub position: [usize; 3],
+    pub rotation: Rotation,
+}
+
+#[derive(Default)]
+pub(super) struct Layout {
+    pub names: Vec<String>,
+    pub columns: Vec<Column>,
+    pub slots: Vec<Slot>,
+    pub time: Option<usize>,
+    /// The clock of the computer that recorded, s.
+    pub received: Option<usize>,
+    pub counter: Option<usize>,
+    pub joints: Vec<(String, JointUnit, usize)>,
+    pub torques: Vec<(String, usize)>,
+    pub markers: Vec<MarkerPlan>,
+    pub bodies: Vec<BodyPlan>,
+    pub labels: Vec<String>,
+    /// Long table: column of the entity's name; the only marker or body plan is its template.
+    pub entity: Option<usize>,
+    pub conversions: Vec<String>,
+}
+
+impl Layout {
+    /// Reads the header.
+    pub(super) fn new(line: u64, names: Vec<String>, map: Option<&ColumnMap>) -> Placed<Layout> {
+        let at = || At::Line(line);
+        check_unique(&names).map_err(|problem| (at(), problem))?;
+        let mut layout = Layout {
+            columns: vec![Column::Ignore; names.len()],
+            names,
+            ..Layout::default()
+        };
+        let mut mapped = vec![false; layout.names.len()];
+        if let Some(map) = map {
+            mapped::apply(&mut layout, map, &mut mapped).map_err(|problem| (at(), problem))?;
+        }
+        layout
+            .by_rules(&mapped, map.is_some())
+            .map_err(|problem| (at(), problem))?;
+        Ok(layout)
+    }
+
+    fn slot(&mut self, column: usize, kind: SlotKind, scale: f64) -> usize {
+        self.slots.push(Slot { kind, column });
+        let slot = self.slots.len() - 1;
+        self.columns[column] = Column::Number { slot, scale };
+        slot
+    }
+
+    /// A joint twice (`a_rad` and `a_deg`), or a long table with other columns than it can carry.
+    fn check_names(&self) -> Result<(), Problem> {
+        let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
+        for (name, _, slot) in &self.joints {
+            let column = self.slots[*slot].column;
+            if let Some(first) = seen.insert(name, column) {
+                return Err(Problem::DuplicateColumn {
+                    name: name.clone(),
+                    first: first + 1,
+                    second: column + 1,
+                });
+            }
+        }
+        if self.entity.is_some() {
+            let only_template = self.markers.len() + self.bodies.len() == 1
+                && self.markers.iter().all(|m| m.name.is_empty())
+                && self.bodies.iter().all(|b| b.name.is_empty());
+            if !only_template || !self.joints.is_empty() || !self.torques.is_empty() {
+                return Err(Problem::Misfit {
+                    found: "a `marker` or `body` column stands beside joints or named markers".to_string(),
+                    expected: "a long table `frame,marker,x_m,y_m,z_m` or `frame,body,x_m,y_m,z_m,qx,qy,qz,qw`; write joints into a wide table".to_string(),
+                });
+            }
+            if self.counter.is_none() && self.time.is_none() {
+                return Err(Problem::MissingColumn {
+                    what: "a long table".to_string(),
+                    column: "frame".to_string(),
+                    nearest: None,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// No column name occurs twice; columns may be without name.
+fn check_unique(names: &[String]) -> Result<(), Problem> {
+    let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
+    for (i, name) in names.iter().enumerate() {
+        if name.is_empty() {
+            continue;
+        }
+        if let Some(first) = seen.insert(name, i) {
+            return Err(Problem::DuplicateColumn {
+                name: name.clone(),
+                first: first + 1,
+                second: i + 1,
+            });
+        }
+    }
+    Ok(())
+}

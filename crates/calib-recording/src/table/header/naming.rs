@@ -1,0 +1,187 @@
+//! How column names read by our own rules.
+//!
+//! The rules, in this order:
+//! 1. `t_s`, `t_ms`, `t_us`: time. `host_s`: the recording computer's clock. `frame`, `pose`, `row`, `sample`, `index`, `config`: a counter.
+//!    `trial`, `group`, `label`, `phase`, `set`, `hold`, `segment`, `note`: text.
+//! 2. `marker` or `body` as a column name: a long table; the row's `x_m,y_m,z_m[,qx,qy,qz,qw]` belong to the
+//!    marker or body named there.
+//! 3. `NAME.x_m` (`_cm`, `_mm`), `NAME.qx`, `NAME.state`: a marker, or with a quaternion a body.
+//! 4. `NAME_x_m`, `NAME_qx`: the same, if `NAME` has another coordinate in this style; a lone `NAME_x_m` is
+//!    a prismatic joint `NAME_x`.
+//! 5. `x_m` or `qx` without a name: the body `body` with a quaternion, the marker `marker` without.
+//! 6. `NAME_rad|_deg`: a revolute joint; `NAME_m|_cm|_mm`: a prismatic one; `NAME_nm`: a torque in N·m.
+//!
+//! Anything else has no meaning here.
+
+use crate::model::JointUnit;
+use crate::units::{AngleUnit, LengthUnit, TimeUnit};
+use calib_finding::nearest_word;
+
+const COUNTERS: [&str; 6] = ["frame", "pose", "row", "sample", "index", "config"];
+const LABELS: [&str; 8] = [
+    "trial", "group", "label", "phase", "set", "hold", "segment", "note",
+];
+/// One coordinate of a marker or body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Part {
+    Axis(usize),
+    Quaternion(usize),
+    State,
+}
+
+/// Splits `x_mm` into part and scale.
+fn part(text: &str) -> Option<(Part, f64)> {
+    match text {
+        "qx" => return Some((Part::Quaternion(0), 1.0)),
+        "qy" => return Some((Part::Quaternion(1), 1.0)),
+        "qz" => return Some((Part::Quaternion(2), 1.0)),
+        "qw" => return Some((Part::Quaternion(3), 1.0)),
+        "state" => return Some((Part::State, 1.0)),
+        _ => {}
+    }
+    let (axis, unit) = text.split_once('_')?;
+    let axis = ["x", "y", "z"].iter().position(|&a| a == axis)?;
+    let unit = length_suffix(unit)?;
+    Some((Part::Axis(axis), unit.per_metre()))
+}
+
+fn length_suffix(unit: &str) -> Option<LengthUnit> {
+    match unit {
+        "m" => Some(LengthUnit::M),
+        "cm" => Some(LengthUnit::Cm),
+        "mm" => Some(LengthUnit::Mm),
+        _ => None,
+    }
+}
+
+/// How a column name reads by the rules of this module.
+pub(super) enum Meaning<'a> {
+    Time(TimeUnit),
+    Received,
+    Counter,
+    Label,
+    Entity,
+    /// `dotted`: cannot be anything else.
+    Part {
+        entity: &'a str,
+        part: Part,
+        scale: f64,
+        dotted: bool,
+    },
+    Joint {
+        name: &'a str,
+        unit: JointUnit,
+        scale: f64,
+    },
+    Torque(&'a str),
+    Unknown,
+}
+
+pub(super) fn meaning(name: &str) -> Meaning<'_> {
+    match name {
+        "t_s" => return Meaning::Time(TimeUnit::S),
+        "t_ms" => return Meaning::Time(TimeUnit::Ms),
+        "t_us" => return Meaning::Time(TimeUnit::Us),
+        "host_s" => return Meaning::Received,
+        "marker" | "body" => return Meaning::Entity,
+        _ if COUNTERS.contains(&name) => return Meaning::Counter,
+        _ if LABELS.contains(&name) => return Meaning::Label,
+        _ => {}
+    }
+    if let Some((part, scale)) = part(name) {
+        return Meaning::Part {
+            entity: "",
+            part,
+            scale,
+            dotted: true,
+        };
+    }
+    if let Some((entity, tail)) = name.rsplit_once('.')
+        && let Some((part, scale)) = part(tail)
+    {
+        return Meaning::Part {
+            entity,
+            part,
+            scale,
+            dotted: true,
+        };
+    }
+    let Some((head, last)) = name.rsplit_once('_') else {
+        return Meaning::Unknown;
+    };
+    if head.is_empty() {
+        return Meaning::Unknown;
+    }
+    if let Some((part @ Part::Quaternion(_), scale)) = part(last) {
+        return Meaning::Part {
+            entity: head,
+            part,
+            scale,
+            dotted: false,
+        };
+    }
+    if let Some(unit) = length_suffix(last) {
+        if let Some((entity, axis)) = head.rsplit_once('_')
+            && !entity.is_empty()
+            && let Some(axis) = ["x", "y", "z"].iter().position(|&a| a == axis)
+        {
+            return Meaning::Part {
+                entity,
+                part: Part::Axis(axis),
+                scale: unit.per_metre(),
+                dotted: false,
+            };
+        }
+        return Meaning::Joint {
+            name: head,
+            unit: JointUnit::Length,
+            scale: unit.per_metre(),
+        };
+    }
+    match last {
+        "rad" => Meaning::Joint {
+            name: head,
+            unit: JointUnit::Angle,
+            scale: AngleUnit::Rad.per_radian(),
+        },
+        "deg" => Meaning::Joint {
+            name: head,
+            unit: JointUnit::Angle,
+            scale: AngleUnit::Deg.per_radian(),
+        },
+        "nm" | "Nm" => Meaning::Torque(head),
+        _ => Meaning::Unknown,
+    }
+}
+
+/// The nearest name that the rules understand: a fixed word, or the same name with a unit.
+pub(super) fn nearest_rule(name: &str) -> Option<String> {
+    if let Some((head, last)) = name.rsplit_once(['_', '.'])
+        && !head.is_empty()
+        && let Some(unit) = nearest_word(last, ["rad", "deg", "mm", "nm"])
+        && last.len() >= 2
+    {
+        return Some(format!("{head}_{unit}"));
+    }
+    let fixed = COUNTERS
+        .iter()
+        .chain(&LABELS)
+        .copied()
+        .chain(["t_s", "t_ms", "host_s", "marker", "body", "x_m", "x_mm"]);
+    nearest_word(name, fixed)
+        .map(str::to_owned)
+        .or_else(|| Some(format!("{name}_rad")))
+}
+
+/// Whether a header line reads as one of our own tables (for the detection of formats).
+pub(crate) fn is_canonical<'a>(names: impl Iterator<Item = &'a str>) -> bool {
+    let (mut known, mut unknown) = (0, 0);
+    for name in names.filter(|name| !name.is_empty()) {
+        match meaning(name) {
+            Meaning::Part { .. } | Meaning::Joint { .. } => known += 1,
+            Meaning::Unknown => unknown += 1,
+            _ => {}
+        }
+    }
+    known > 0 && known >= unknown
+}

@@ -1,0 +1,130 @@
+//! All rows read: streams, timeline and findings.
+
+use super::Rows;
+use crate::error::Placed;
+use crate::model::{
+    BodyStream, JointStream, MarkerSample, MarkerStream, Meta, Recording, TorqueStream,
+};
+use calib_finding::{Fact, Finding, Subject, catalog};
+
+impl Rows<'_> {
+    /// The recording of all rows.
+    pub(in crate::table) fn finish(mut self) -> Placed<Recording> {
+        let n = self.timeline.rows.len();
+        if self.layout.entity.is_some() {
+            let lengths = self
+                .markers
+                .iter()
+                .map(Vec::len)
+                .chain(self.bodies.iter().map(Vec::len));
+            self.dense += lengths.map(|length| n - length).sum::<usize>();
+            self.not_too_sparse(self.timeline.rows.last().copied().unwrap_or_default())?;
+            self.markers
+                .iter_mut()
+                .for_each(|stream| stream.resize(n, MarkerSample::Lost));
+            self.bodies
+                .iter_mut()
+                .for_each(|stream| stream.resize(n, None));
+        }
+        let findings = self.findings();
+        let timed = self.layout.time.is_some();
+        self.timeline.clock = if timed { "t_s" } else { "static poses" }.to_string();
+        self.timeline.t = timed.then_some(self.times);
+        self.timeline.received = self.layout.received.map(|_| self.received);
+        self.timeline.labels = self
+            .layout
+            .labels
+            .iter()
+            .cloned()
+            .zip(self.labels)
+            .collect();
+        let long = self.layout.entity.is_some();
+        let names = |plans: Vec<String>| if long { self.long_names.clone() } else { plans };
+        let marker_names = names(
+            self.layout
+                .markers
+                .iter()
+                .map(|plan| plan.name.clone())
+                .collect(),
+        );
+        let body_names = names(
+            self.layout
+                .bodies
+                .iter()
+                .map(|plan| plan.name.clone())
+                .collect(),
+        );
+        Ok(Recording {
+            meta: Meta {
+                conversions: self.layout.conversions,
+                findings,
+                ..Meta::default()
+            },
+            timelines: vec![self.timeline],
+            joints: self
+                .layout
+                .joints
+                .into_iter()
+                .zip(self.joints)
+                .map(|((name, unit, _), q)| JointStream {
+                    name,
+                    timeline: 0,
+                    unit,
+                    q,
+                })
+                .collect(),
+            torques: self
+                .layout
+                .torques
+                .into_iter()
+                .zip(self.torques)
+                .map(|((name, _), torque)| TorqueStream {
+                    name,
+                    timeline: 0,
+                    torque,
+                })
+                .collect(),
+            bodies: body_names
+                .into_iter()
+                .zip(self.bodies)
+                .map(|(name, tracker_from_body)| BodyStream {
+                    name,
+                    timeline: 0,
+                    tracker_from_body,
+                    quality: Vec::new(),
+                    covariance: Vec::new(),
+                })
+                .collect(),
+            markers: marker_names
+                .into_iter()
+                .zip(self.markers)
+                .map(|(name, samples)| MarkerStream {
+                    name,
+                    body: None,
+                    unlabelled: false,
+                    timeline: 0,
+                    samples,
+                })
+                .collect(),
+        })
+    }
+
+    /// What was read as lost without saying so.
+    fn findings(&mut self) -> Vec<Finding> {
+        let zeros = std::mem::take(&mut self.zeros)
+            .into_iter()
+            .map(|(name, rows)| {
+                Finding::of_kind(catalog::ALL_ZERO_TRIPLET, "lost", Subject::marker(name))
+                    .with("samples", Fact::count(rows.len()))
+                    .at_rows(rows)
+            });
+        let nans = std::mem::take(&mut self.nans)
+            .into_iter()
+            .map(|(column, rows)| {
+                Finding::of_kind(catalog::NOT_A_NUMBER, "cells", Subject::column(column))
+                    .with("count", Fact::count(rows.len()))
+                    .at_rows(rows)
+            });
+        zeros.chain(nans).collect()
+    }
+}
