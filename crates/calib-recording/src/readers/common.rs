@@ -274,6 +274,52 @@ pub(super) fn unique_names(
         .collect()
 }
 
+/// Frame numbers and times of the rows of a tracker file.
+#[derive(Default)]
+pub(super) struct Instants {
+    pub frames: Vec<u64>,
+    pub times: Vec<f64>,
+}
+
+impl Instants {
+    /// Takes a row's frame number and its time, s, which may not run backwards; returns the frame number.
+    pub(super) fn take(&mut self, line: u64, frame: f64, time: f64) -> Placed<u64> {
+        if !is_frame_number(frame) || time.is_nan() {
+            return unexpected(line, "", "a frame number and a time");
+        }
+        self.not_backwards(line, time)?;
+        push(&mut self.frames, frame as u64);
+        push(&mut self.times, time);
+        Ok(frame as u64)
+    }
+
+    /// That this time is not before the last one.
+    pub(super) fn not_backwards(&self, line: u64, time: f64) -> Placed<()> {
+        match self.times.last() {
+            Some(&previous) if time < previous => Err((
+                At::Line(line),
+                Problem::TimeBackwards {
+                    previous,
+                    found: time,
+                },
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Whether a number can be that of a frame.
+pub(super) fn is_frame_number(frame: f64) -> bool {
+    (0.0..1e15).contains(&frame)
+}
+
+/// Name of a tracker's clock, by its rate in Hz where the file states one.
+pub(super) fn tracker_clock(rate: Option<f64>) -> String {
+    rate.map_or("tracker time".to_string(), |rate| {
+        format!("tracker frames at {rate} Hz")
+    })
+}
+
 /// Text of the file's head, as far as it is UTF-8.
 pub(super) fn head_text(head: &[u8]) -> &str {
     let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);

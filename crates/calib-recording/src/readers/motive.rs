@@ -15,8 +15,8 @@
 //! The file does not say which axis is up (Y unless changed at export).
 
 use super::common::{
-    MarkerTrack, Triplet, body_stream, first_cell, numbers, pose, quaternion, triplet, unexpected,
-    unique_names,
+    Instants, MarkerTrack, Triplet, body_stream, first_cell, numbers, pose, quaternion,
+    tracker_clock, triplet, unexpected, unique_names,
 };
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
@@ -24,8 +24,10 @@ use crate::growth::push;
 use crate::model::{BodyStream, Recording, Timeline};
 use crate::text::{Lines, Separator, cells};
 use crate::units::LengthUnit;
-use calib_finding::About;
-use std::io::BufReader;
+use calib_finding::{About, Finding};
+use std::io::{BufRead, BufReader};
+use std::mem::take;
+use std::ops::Range;
 
 pub(super) const READER: Reader = Reader {
     id: "motive_csv",
@@ -78,97 +80,25 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
             "`Length Units` Meters, Centimeters or Millimeters in the first line",
         );
     };
-    let rotation_type = value("Rotation Type").unwrap_or("Quaternion").to_string();
-    let mut rows: Vec<Vec<String>> = Vec::new();
-    let axes = loop {
-        let Some(line) = lines.next()? else {
-            return Err((At::Line(lines.number()), Problem::NoRows));
-        };
-        let row: Vec<String> = cells(line, COMMA).map(str::to_string).collect();
-        if row[0] == "Frame" {
-            break row;
-        }
-        if !row[0].is_empty() || rows.len() > MAX_HEADER_ROWS {
-            let expected =
-                "the rows Type, Name, ID and `Frame,Time,…`; export with the header switched on";
-            return unexpected(lines.number(), &row[0], expected);
-        }
-        if row.iter().any(|cell| !cell.is_empty()) {
-            rows.push(row);
-        }
-    };
-    let header_line = lines.number();
-    let [kinds, names, .., quantities] = rows.as_slice() else {
+    let header = Header::read(&mut lines)?;
+    let rotation_type = value("Rotation Type").unwrap_or("Quaternion");
+    let mut tracks = plan(&header, rotation_type, &mut recording)?;
+    if tracks.markers.is_empty() && tracks.bodies.is_empty() {
         return unexpected(
-            header_line,
-            "a short header",
-            "the rows Type, Name, ID and quantity above `Frame`",
-        );
-    };
-    let plan = plan(
-        header_line,
-        kinds,
-        names,
-        quantities,
-        &axes,
-        &rotation_type,
-        &mut recording,
-    )?;
-    let (mut markers, mut bodies) = plan;
-    if markers.is_empty() && bodies.is_empty() {
-        return unexpected(
-            header_line,
+            header.line,
             "a header without rigid bodies and markers",
             "columns of type Rigid Body or Marker",
         );
     }
-
-    let (mut frames, mut times) = (Vec::new(), Vec::new());
-    let (mut values, per_metre) = (Vec::new(), unit.per_metre());
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next()? else { break };
-        if line.bytes().all(|b| b == b',' || b == b' ') {
-            continue;
-        }
-        numbers(number, line, COMMA, axes.len(), &mut values)?;
-        let (frame, time) = (values[0], values[1]);
-        if !(0.0..1e15).contains(&frame) || time.is_nan() {
-            return unexpected(number, "", "a frame number and a time");
-        }
-        if let Some(&previous) = times.last()
-            && time < previous
-        {
-            return Err((
-                At::Line(number),
-                Problem::TimeBackwards {
-                    previous,
-                    found: time,
-                },
-            ));
-        }
-        push(&mut frames, frame as u64);
-        push(&mut times, time);
-        for marker in &mut markers {
-            marker.read(number, frame as u64, &values, per_metre)?;
-        }
-        for body in &mut bodies {
-            read_body(body, number, &values, per_metre)?;
-        }
-    }
-    if frames.is_empty() {
-        return Err((At::Line(lines.number()), Problem::NoRows));
-    }
+    let width = header.axes.len();
+    let instants = read_rows(&mut lines, width, &mut tracks, unit.per_metre())?;
     let rate = value("Export Frame Rate")
         .or(value("Capture Frame Rate"))
         .and_then(|text| text.parse::<f64>().ok());
-    let clock = rate.map_or("tracker time".to_string(), |rate| {
-        format!("tracker frames at {rate} Hz")
-    });
     recording.timelines.push(Timeline {
-        clock,
-        rows: frames,
-        t: Some(times),
+        clock: tracker_clock(rate),
+        rows: instants.frames,
+        t: Some(instants.times),
         ..Timeline::default()
     });
     recording
@@ -177,90 +107,136 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
         .push(format!("lengths from {}", unit.name()));
     recording.meta.up_axis = options.up_axis.clone();
     let findings = &mut recording.meta.findings;
-    recording.markers = markers
+    recording.markers = tracks
+        .markers
         .into_iter()
         .map(|marker| marker.finish(findings))
         .collect();
-    recording.bodies = bodies.into_iter().map(|body| body.stream).collect();
+    recording.bodies = tracks.bodies.into_iter().map(|body| body.stream).collect();
     Ok(recording)
 }
 
-/// Which columns are whose.
-fn plan(
+/// The rows that say which columns are whose.
+struct Header {
+    /// Line of the `Frame` row.
     line: u64,
-    kinds: &[String],
-    names: &[String],
-    quantities: &[String],
-    axes: &[String],
-    rotation_type: &str,
-    recording: &mut Recording,
-) -> Placed<(Vec<MarkerTrack>, Vec<Body>)> {
-    let cell = |row: &[String], i: usize| row.get(i).cloned().unwrap_or_default();
-    // Type and name of each run of columns.
-    let mut groups: Vec<(String, String, std::ops::Range<usize>)> = Vec::new();
-    for i in 2..axes.len() {
-        let (kind, name) = (cell(kinds, i), cell(names, i));
-        match groups.last_mut() {
-            Some((last_kind, last_name, columns)) if *last_kind == kind && *last_name == name => {
-                columns.end = i + 1
+    kinds: Vec<String>,
+    names: Vec<String>,
+    quantities: Vec<String>,
+    /// The `Frame` row.
+    axes: Vec<String>,
+}
+
+impl Header {
+    fn read<R: BufRead>(lines: &mut Lines<R>) -> Placed<Self> {
+        let mut rows: Vec<Vec<String>> = Vec::new();
+        let axes = loop {
+            let Some(line) = lines.next()? else {
+                return Err((At::Line(lines.number()), Problem::NoRows));
+            };
+            let row: Vec<String> = cells(line, COMMA).map(str::to_string).collect();
+            if row[0] == "Frame" {
+                break row;
             }
-            _ => groups.push((kind, name, i..i + 1)),
-        }
-    }
-    let (mut markers, mut bodies, mut skipped) = (Vec::new(), Vec::new(), Vec::new());
-    for (kind, name, columns) in groups {
-        let find = |quantity: &str, axis: &str| {
-            columns
-                .clone()
-                .find(|&i| cell(quantities, i) == quantity && cell(axes, i) == axis)
+            if !row[0].is_empty() || rows.len() > MAX_HEADER_ROWS {
+                let expected = "the rows Type, Name, ID and `Frame,Time,…`; export with the header switched on";
+                return unexpected(lines.number(), &row[0], expected);
+            }
+            if row.iter().any(|cell| !cell.is_empty()) {
+                rows.push(row);
+            }
         };
-        let position: Option<Vec<usize>> = ["X", "Y", "Z"]
-            .iter()
-            .map(|axis| find("Position", axis))
-            .collect();
-        let position = position.map(|p| [p[0], p[1], p[2]]);
-        match (kind.as_str(), position) {
+        let line = lines.number();
+        let [kinds, names, .., quantities] = rows.as_mut_slice() else {
+            return unexpected(
+                line,
+                "a short header",
+                "the rows Type, Name, ID and quantity above `Frame`",
+            );
+        };
+        Ok(Header {
+            line,
+            kinds: take(kinds),
+            names: take(names),
+            quantities: take(quantities),
+            axes,
+        })
+    }
+
+    /// Runs of columns of one type and name.
+    fn groups(&self) -> Vec<Group> {
+        let cell = |row: &[String], i: usize| row.get(i).cloned().unwrap_or_default();
+        let mut groups: Vec<Group> = Vec::new();
+        for i in 2..self.axes.len() {
+            let (kind, name) = (cell(&self.kinds, i), cell(&self.names, i));
+            match groups.last_mut() {
+                Some(last) if last.kind == kind && last.name == name => last.columns.end = i + 1,
+                _ => groups.push(Group {
+                    kind,
+                    name,
+                    columns: i..i + 1,
+                }),
+            }
+        }
+        groups
+    }
+
+    fn quantity(&self, column: usize) -> &str {
+        self.quantities.get(column).map_or("", String::as_str)
+    }
+
+    /// The columns of one quantity of a group, one per axis; `None` when one is missing.
+    fn find<const N: usize>(
+        &self,
+        group: &Group,
+        quantity: &str,
+        axes: [&str; N],
+    ) -> Option<[usize; N]> {
+        let found = axes.map(|axis| {
+            (group.columns.clone()).find(|&i| self.quantity(i) == quantity && self.axes[i] == axis)
+        });
+        if found.iter().any(Option::is_none) {
+            return None;
+        }
+        Some(found.map(Option::unwrap_or_default))
+    }
+}
+
+/// Columns of one type and name.
+struct Group {
+    kind: String,
+    name: String,
+    columns: Range<usize>,
+}
+
+/// Markers and bodies while they are read.
+#[derive(Default)]
+struct Tracks {
+    markers: Vec<MarkerTrack>,
+    bodies: Vec<Body>,
+}
+
+/// Which columns are whose.
+fn plan(header: &Header, rotation_type: &str, recording: &mut Recording) -> Placed<Tracks> {
+    let (mut tracks, mut skipped) = (Tracks::default(), Vec::new());
+    for group in header.groups() {
+        let position = header.find(&group, "Position", ["X", "Y", "Z"]);
+        match (group.kind.as_str(), position) {
             ("Rigid Body", Some(position)) => {
-                let rotation: Option<Vec<usize>> = ["X", "Y", "Z", "W"]
-                    .iter()
-                    .map(|axis| find("Rotation", axis))
-                    .collect();
-                let Some(rotation) = rotation.filter(|_| rotation_type == "Quaternion") else {
-                    let what = format!("rotation type `{rotation_type}` of rigid body `{name}`");
-                    let remedy = "export with Rotation Type Quaternion".to_string();
-                    return Err((At::Line(line), Problem::Unsupported { what, remedy }));
-                };
-                let error = columns
-                    .clone()
-                    .find(|&i| cell(quantities, i).contains("Error"));
-                let rotation = [rotation[0], rotation[1], rotation[2], rotation[3]];
-                bodies.push(Body {
-                    stream: body_stream(&name),
-                    rotation,
-                    position,
-                    error,
-                });
+                let body = plan_body(header, &group, position, rotation_type)?;
+                tracks.bodies.push(body);
             }
             ("Marker" | "Rigid Body Marker", Some(position)) => {
-                let mut marker = MarkerTrack::new(&name, position, kind != "Marker");
-                marker.stream.unlabelled = name.starts_with("Unlabeled");
-                if kind == "Rigid Body Marker" {
-                    let body = name
-                        .rsplit_once(['_', ':'])
-                        .map(|(body, _)| body.to_string());
-                    marker.stream.body = body;
-                } else if let Some((body, _)) = name
-                    .split_once(':')
-                    .filter(|(body, _)| *body != "Unlabeled")
-                {
-                    marker.stream.body = Some(body.to_string());
-                }
-                markers.push(marker);
+                tracks.markers.push(plan_marker(&group, position));
             }
             ("Rigid Body" | "Marker" | "Rigid Body Marker", None) => {
-                return unexpected(line, &name, "columns Position X, Y, Z below every name");
+                return unexpected(
+                    header.line,
+                    &group.name,
+                    "columns Position X, Y, Z below every name",
+                );
             }
-            _ => skipped.push(format!("{kind} {name}")),
+            _ => skipped.push(format!("{} {}", group.kind, group.name)),
         }
     }
     if !skipped.is_empty() {
@@ -269,38 +245,96 @@ fn plan(
             .conversions
             .push(format!("skipped columns: {}", skipped.join(", ")));
     }
-    if markers.iter().any(|marker| marker.filled) {
+    if tracks.markers.iter().any(|marker| marker.filled) {
         recording
             .meta
             .conversions
             .push("rigid body markers are computed by Motive: read as filled".to_string());
     }
-    let findings = &mut recording.meta.findings;
-    let unique = unique_names(
-        markers
-            .iter()
-            .map(|marker| marker.stream.name.clone())
-            .collect(),
-        About::Marker,
-        findings,
-    );
-    markers
-        .iter_mut()
-        .zip(unique)
-        .for_each(|(marker, name)| marker.stream.name = name);
-    let unique = unique_names(
-        bodies
-            .iter()
-            .map(|body: &Body| body.stream.name.clone())
-            .collect(),
-        About::Body,
-        findings,
-    );
-    bodies
-        .iter_mut()
-        .zip(unique)
-        .for_each(|(body, name)| body.stream.name = name);
-    Ok((markers, bodies))
+    tracks.make_names_unique(&mut recording.meta.findings);
+    Ok(tracks)
+}
+
+/// A rigid body; its rotation has to be a quaternion.
+fn plan_body(
+    header: &Header,
+    group: &Group,
+    position: [usize; 3],
+    rotation_type: &str,
+) -> Placed<Body> {
+    let name = &group.name;
+    let rotation = header.find(group, "Rotation", ["X", "Y", "Z", "W"]);
+    let Some(rotation) = rotation.filter(|_| rotation_type == "Quaternion") else {
+        let what = format!("rotation type `{rotation_type}` of rigid body `{name}`");
+        let remedy = "export with Rotation Type Quaternion".to_string();
+        return Err((At::Line(header.line), Problem::Unsupported { what, remedy }));
+    };
+    let error = (group.columns.clone()).find(|&i| header.quantity(i).contains("Error"));
+    Ok(Body {
+        stream: body_stream(name),
+        rotation,
+        position,
+        error,
+    })
+}
+
+/// A marker, with the body that its name tells.
+fn plan_marker(group: &Group, position: [usize; 3]) -> MarkerTrack {
+    let (kind, name) = (group.kind.as_str(), group.name.as_str());
+    let mut marker = MarkerTrack::new(name, position, kind != "Marker");
+    marker.stream.unlabelled = name.starts_with("Unlabeled");
+    let body = if kind == "Rigid Body Marker" {
+        name.rsplit_once(['_', ':'])
+    } else {
+        name.split_once(':')
+            .filter(|(body, _)| *body != "Unlabeled")
+    };
+    marker.stream.body = body.map(|(body, _)| body.to_string());
+    marker
+}
+
+impl Tracks {
+    fn make_names_unique(&mut self, findings: &mut Vec<Finding>) {
+        let names = self.markers.iter().map(|m| m.stream.name.clone()).collect();
+        let unique = unique_names(names, About::Marker, findings);
+        for (marker, name) in self.markers.iter_mut().zip(unique) {
+            marker.stream.name = name;
+        }
+        let names = self.bodies.iter().map(|b| b.stream.name.clone()).collect();
+        let unique = unique_names(names, About::Body, findings);
+        for (body, name) in self.bodies.iter_mut().zip(unique) {
+            body.stream.name = name;
+        }
+    }
+}
+
+/// Reads the rows of numbers into markers and bodies.
+fn read_rows<R: BufRead>(
+    lines: &mut Lines<R>,
+    width: usize,
+    tracks: &mut Tracks,
+    per_metre: f64,
+) -> Placed<Instants> {
+    let (mut instants, mut values) = (Instants::default(), Vec::new());
+    loop {
+        let number = lines.number() + 1;
+        let Some(line) = lines.next()? else { break };
+        if line.bytes().all(|b| b == b',' || b == b' ') {
+            continue;
+        }
+        numbers(number, line, COMMA, width, &mut values)?;
+        let frame = instants.take(number, values[0], values[1])?;
+        for marker in &mut tracks.markers {
+            marker.read(number, frame, &values, per_metre)?;
+        }
+        for body in &mut tracks.bodies {
+            read_body(body, number, &values, per_metre)?;
+        }
+    }
+    if instants.frames.is_empty() {
+        return Err((At::Line(lines.number()), Problem::NoRows));
+    }
+    Ok(instants)
 }
 
 fn read_body(body: &mut Body, line: u64, values: &[f64], per_metre: f64) -> Placed<()> {

@@ -6,8 +6,8 @@
 //! which: such markers are read as filled.
 
 use super::common::{
-    MarkerTrack, Triplet, all_zero, body_stream, frame_count_differs, head_text, numbers, pose,
-    rotation, triplet, unexpected, unique_names,
+    Instants, MarkerTrack, Triplet, all_zero, body_stream, frame_count_differs, head_text,
+    is_frame_number, numbers, pose, rotation, tracker_clock, triplet, unexpected, unique_names,
 };
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
@@ -15,9 +15,9 @@ use crate::growth::push;
 use crate::model::{BodyStream, Recording, Timeline};
 use crate::text::{Lines, Number, Separator, cells, number};
 use crate::units::LengthUnit;
-use calib_finding::{About, Subject};
+use calib_finding::{About, Finding, Subject};
 use nalgebra::Matrix3;
-use std::io::BufReader;
+use std::io::{BufRead, BufReader};
 
 pub(super) const READER: Reader = Reader {
     id: "qualisys_tsv",
@@ -64,6 +64,8 @@ struct Header {
     rate: Option<f64>,
     frames: Option<u64>,
     comments: Vec<String>,
+    /// The row of column names, where the file has one.
+    columns: Option<Vec<String>>,
 }
 
 struct Body {
@@ -75,26 +77,7 @@ struct Body {
 fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
     let mut lines = Lines::new(BufReader::with_capacity(1 << 16, input));
     let mut header = Header::default();
-    let mut columns: Option<Vec<String>> = None;
-    // The first line that is neither a key nor a row of names is data.
-    let mut pending = loop {
-        let Some(line) = lines.next()? else {
-            return Err((At::Line(lines.number()), Problem::NoRows));
-        };
-        let mut parts = cells(line, TAB);
-        let key = parts.next().unwrap_or("");
-        if KEYS.contains(&key) {
-            let values: Vec<String> = parts.map(str::to_string).collect();
-            header.take(key, values);
-        } else if matches!(number(key), Number::Value(_)) || (key.is_empty() && columns.is_some()) {
-            break Some(line.to_string());
-        } else if columns.is_none() && !key.is_empty() {
-            columns = Some(cells(line, TAB).map(str::to_string).collect());
-        } else if !line.trim().is_empty() {
-            let found = key.to_string();
-            return unexpected(lines.number(), &found, "a header key or a row of numbers");
-        }
-    };
+    let first_row = header.read(&mut lines)?;
     if header.names.is_empty() {
         let expected = if header.six_d {
             "BODY_NAMES in the header"
@@ -103,129 +86,135 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
         };
         return unexpected(lines.number(), "no names", expected);
     }
-    let per_entity = if header.six_d { BODY_COLUMNS } else { 3 };
-    let width = pending
-        .as_deref()
-        .map_or(0, |line| cells(line.trim_end_matches('\t'), TAB).count());
-    let lead = match &columns {
-        Some(columns) => columns
-            .iter()
-            .take(2)
-            .take_while(|name| matches!(name.as_str(), "Frame" | "Time"))
-            .count(),
-        None => width.saturating_sub(per_entity * header.names.len()).min(2),
-    };
-    let total = lead + per_entity * header.names.len();
+    let lead = header.lead(&first_row);
     let mut recording = Recording::default();
-    let names = unique_names(
-        header.names.clone(),
-        if header.six_d {
-            About::Body
-        } else {
-            About::Marker
-        },
-        &mut recording.meta.findings,
-    );
-    let (mut markers, mut bodies) = (Vec::new(), Vec::new());
-    for (k, name) in names.iter().enumerate() {
-        let first = lead + per_entity * k;
-        if header.six_d {
-            bodies.push(Body {
-                stream: body_stream(name),
-                first,
-                zeros: Vec::new(),
-            });
-        } else {
-            let filled = header
-                .types
-                .get(k)
-                .is_some_and(|kind| kind != "Measured" && !kind.is_empty());
-            markers.push(MarkerTrack::new(
-                name,
-                [first, first + 1, first + 2],
-                filled,
-            ));
-        }
-    }
-    let time_column = (lead == 2).then_some(1);
-    if time_column.is_none() && header.rate.is_none() {
+    let mut tracks = Tracks::plan(&header, lead, &mut recording.meta.findings);
+    if lead != 2 && header.rate.is_none() {
         recording
             .meta
             .conversions
             .push("no time column and no frequency: rows without time".to_string());
     }
-    let (mut frames, mut times, mut values): (Vec<u64>, Vec<f64>, Vec<f64>) =
-        (Vec::new(), Vec::new(), Vec::new());
-    let per_metre = LengthUnit::Mm.per_metre();
+    let mut rows = Rows {
+        lead,
+        width: lead + header.columns_per_entity() * header.names.len(),
+        rate: header.rate,
+        instants: Instants::default(),
+        values: Vec::new(),
+    };
+    rows.take(lines.number(), &first_row, &mut tracks)?;
     loop {
-        let line_number = lines.number() + u64::from(pending.is_none());
-        let line = match pending.take() {
-            Some(line) => Some(line),
-            None => lines.next()?.map(str::to_string),
-        };
-        let Some(line) = line else { break };
-        if line.trim().is_empty() {
-            continue;
-        }
-        numbers(line_number, &line, TAB, total, &mut values)?;
-        let frame = if lead > 0 {
-            values[0]
-        } else {
-            frames.len() as f64 + 1.0
-        };
-        if !(0.0..1e15).contains(&frame) {
-            return unexpected(line_number, "", "a frame number");
-        }
-        let time = match (time_column, header.rate) {
-            (Some(column), _) => Some(values[column]),
-            (None, Some(rate)) => Some((frame - 1.0) / rate),
-            (None, None) => None,
-        };
-        if let Some(time) = time {
-            if time.is_nan() {
-                return unexpected(line_number, "", "a time");
-            }
-            if let Some(&previous) = times.last()
-                && time < previous
-            {
-                return Err((
-                    At::Line(line_number),
-                    Problem::TimeBackwards {
-                        previous,
-                        found: time,
-                    },
-                ));
-            }
-            push(&mut times, time);
-        }
-        push(&mut frames, frame as u64);
-        for marker in &mut markers {
-            marker.read(line_number, frame as u64, &values, per_metre)?;
-        }
-        for body in &mut bodies {
-            read_body(body, line_number, frame as u64, &values, per_metre)?;
-        }
+        let number = lines.number() + 1;
+        let Some(line) = lines.next()? else { break };
+        rows.take(number, line, &mut tracks)?;
     }
-    let clock = header.rate.map_or("tracker time".to_string(), |rate| {
-        format!("tracker frames at {rate} Hz")
-    });
+    let Instants { frames, times } = rows.instants;
     let t = (times.len() == frames.len()).then_some(times);
     recording.timelines.push(Timeline {
-        clock,
+        clock: tracker_clock(header.rate),
         rows: frames,
         t,
         ..Timeline::default()
     });
-    finish(recording, header, markers, bodies, options)
+    finish(recording, header, tracks, options)
+}
+
+/// Markers and bodies while they are read.
+#[derive(Default)]
+struct Tracks {
+    markers: Vec<MarkerTrack>,
+    bodies: Vec<Body>,
+}
+
+impl Tracks {
+    /// Which columns are whose, behind `lead` columns of frame and time.
+    fn plan(header: &Header, lead: usize, findings: &mut Vec<Finding>) -> Self {
+        let about = if header.six_d {
+            About::Body
+        } else {
+            About::Marker
+        };
+        let names = unique_names(header.names.clone(), about, findings);
+        let mut tracks = Tracks::default();
+        for (k, name) in names.iter().enumerate() {
+            let first = lead + header.columns_per_entity() * k;
+            if header.six_d {
+                tracks.bodies.push(Body {
+                    stream: body_stream(name),
+                    first,
+                    zeros: Vec::new(),
+                });
+            } else {
+                let filled = header
+                    .types
+                    .get(k)
+                    .is_some_and(|kind| kind != "Measured" && !kind.is_empty());
+                let columns = [first, first + 1, first + 2];
+                tracks.markers.push(MarkerTrack::new(name, columns, filled));
+            }
+        }
+        tracks
+    }
+}
+
+/// The rows of numbers.
+struct Rows {
+    /// Columns of frame and time: none, the frame, or both.
+    lead: usize,
+    width: usize,
+    /// Hz, as the header states it.
+    rate: Option<f64>,
+    instants: Instants,
+    values: Vec<f64>,
+}
+
+impl Rows {
+    /// Reads one row into markers and bodies.
+    fn take(&mut self, number: u64, line: &str, tracks: &mut Tracks) -> Placed<()> {
+        if line.trim().is_empty() {
+            return Ok(());
+        }
+        numbers(number, line, TAB, self.width, &mut self.values)?;
+        let values = &self.values;
+        let frame = if self.lead > 0 {
+            values[0]
+        } else {
+            self.instants.frames.len() as f64 + 1.0
+        };
+        if !is_frame_number(frame) {
+            return unexpected(number, "", "a frame number");
+        }
+        let time = match (self.lead, self.rate) {
+            (2, _) => Some(values[1]),
+            (_, Some(rate)) => Some((frame - 1.0) / rate),
+            (_, None) => None,
+        };
+        if let Some(time) = time {
+            if time.is_nan() {
+                return unexpected(number, "", "a time");
+            }
+            self.instants.not_backwards(number, time)?;
+            push(&mut self.instants.times, time);
+        }
+        push(&mut self.instants.frames, frame as u64);
+        let per_metre = LengthUnit::Mm.per_metre();
+        for marker in &mut tracks.markers {
+            marker.read(number, frame as u64, values, per_metre)?;
+        }
+        for body in &mut tracks.bodies {
+            read_body(body, number, frame as u64, values, per_metre)?;
+        }
+        Ok(())
+    }
 }
 
 fn finish(
     mut recording: Recording,
     header: Header,
-    markers: Vec<MarkerTrack>,
-    bodies: Vec<Body>,
+    tracks: Tracks,
     options: &ReadOptions,
 ) -> Placed<Recording> {
+    let Tracks { markers, bodies } = tracks;
     let meta = &mut recording.meta;
     meta.comments = header.comments;
     meta.up_axis = options.up_axis.clone();
@@ -268,6 +257,50 @@ fn finish(
 }
 
 impl Header {
+    /// Reads the header; returns the first line that is neither a key nor a row of names, which is data.
+    fn read<R: BufRead>(&mut self, lines: &mut Lines<R>) -> Placed<String> {
+        loop {
+            let Some(line) = lines.next()? else {
+                return Err((At::Line(lines.number()), Problem::NoRows));
+            };
+            let mut parts = cells(line, TAB);
+            let key = parts.next().unwrap_or("");
+            let named = self.columns.is_some();
+            if KEYS.contains(&key) {
+                let values: Vec<String> = parts.map(str::to_string).collect();
+                self.take(key, values);
+            } else if matches!(number(key), Number::Value(_)) || (key.is_empty() && named) {
+                return Ok(line.to_string());
+            } else if !named && !key.is_empty() {
+                self.columns = Some(cells(line, TAB).map(str::to_string).collect());
+            } else if !line.trim().is_empty() {
+                let found = key.to_string();
+                return unexpected(lines.number(), &found, "a header key or a row of numbers");
+            }
+        }
+    }
+
+    fn columns_per_entity(&self) -> usize {
+        if self.six_d { BODY_COLUMNS } else { 3 }
+    }
+
+    /// How many columns of frame and time stand before the first marker or body.
+    fn lead(&self, first_row: &str) -> usize {
+        match &self.columns {
+            Some(columns) => columns
+                .iter()
+                .take(2)
+                .take_while(|name| matches!(name.as_str(), "Frame" | "Time"))
+                .count(),
+            None => {
+                let width = cells(first_row.trim_end_matches('\t'), TAB).count();
+                width
+                    .saturating_sub(self.columns_per_entity() * self.names.len())
+                    .min(2)
+            }
+        }
+    }
+
     fn take(&mut self, key: &str, mut values: Vec<String>) {
         while values.last().is_some_and(String::is_empty) {
             values.pop();

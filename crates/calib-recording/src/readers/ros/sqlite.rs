@@ -35,117 +35,139 @@ struct File<'a> {
     budget: u64,
 }
 
+/// Visits every message of the bag with its topic's name and type.
 pub(super) fn messages(input: &mut dyn Input, visit: &mut Visit) -> Placed<()> {
-    let io = |source| (At::File, Problem::Io(source));
-    let length = input.seek(SeekFrom::End(0)).map_err(io)?;
-    input.seek(SeekFrom::Start(0)).map_err(io)?;
-    let header = read_exactly(input, 0, 100, "the header")?;
-    let page_size = match u64::from(u16::from_be_bytes([header[16], header[17]])) {
-        1 => 65_536,
-        size => size,
-    };
-    let usable = page_size.saturating_sub(u64::from(header[20])) as usize;
-    if !page_size.is_power_of_two() || page_size < 512 || usable < 480 {
-        let problem = Problem::Unexpected {
-            found: page_size.to_string(),
-            expected: "a page size of 512 to 65536".into(),
-        };
-        return Err((At::Byte(16), problem));
-    }
-    if header[56..60] != [0, 0, 0, 1] && header[56..60] != [0; 4] {
-        let problem = Problem::Unsupported {
-            what: "a text encoding other than UTF-8".into(),
-            remedy: "convert the bag".into(),
-        };
-        return Err((At::Byte(56), problem));
-    }
-    let pages = length / page_size;
-    let mut file = File {
-        input,
-        page_size,
-        usable,
-        pages,
-        budget: 4 * pages + 16,
-    };
-
-    let mut tables: BTreeMap<String, (u64, Vec<String>)> = BTreeMap::new();
-    file.rows(1, &mut |_, _, record| {
-        if let [
-            Value::Text("table"),
-            Value::Text(name),
-            _,
-            Value::Integer(root),
-            Value::Text(sql),
-            ..,
-        ] = record
-        {
-            tables.insert(
-                name.to_string(),
-                (u64::try_from(*root).unwrap_or(0), columns(sql)),
-            );
-        }
-        Ok(())
-    })?;
-    let table = |name: &str| {
-        tables.get(name).ok_or_else(|| {
-            let found = format!(
-                "tables {}",
-                tables.keys().cloned().collect::<Vec<_>>().join(", ")
-            );
-            (
-                At::File,
-                Problem::Misfit {
-                    found,
-                    expected: format!("a table `{name}` as rosbag2 writes it"),
-                },
-            )
-        })
-    };
-    let ((topics_root, topics_columns), (messages_root, messages_columns)) =
-        (table("topics")?, table("messages")?);
-    let find = |columns: &[String], name: &str| {
-        columns
-            .iter()
-            .position(|column| column == name)
-            .ok_or_else(|| {
-                let found = format!("columns {}", columns.join(", "));
-                (
-                    At::File,
-                    Problem::Misfit {
-                        found,
-                        expected: format!("a column `{name}` as rosbag2 writes it"),
-                    },
-                )
-            })
-    };
-    let (name, kind, format) = (
-        find(topics_columns, "name")?,
-        find(topics_columns, "type")?,
-        find(topics_columns, "serialization_format")?,
-    );
-    let mut topics: BTreeMap<i64, (String, String)> = BTreeMap::new();
-    file.rows(*topics_root, &mut |_, rowid, record| {
-        if let (Some(Value::Text(name)), Some(Value::Text(kind)), Some(Value::Text("cdr"))) =
-            (record.get(name), record.get(kind), record.get(format))
-        {
-            topics.insert(rowid, (name.to_string(), kind.to_string()));
-        }
-        Ok(())
-    })?;
+    let mut file = File::open(input)?;
+    let tables = file.tables()?;
+    let (topics, messages) = (tables.table("topics")?, tables.table("messages")?);
+    let names = file.topics(topics)?;
     let (topic, time, data) = (
-        find(messages_columns, "topic_id")?,
-        find(messages_columns, "timestamp")?,
-        find(messages_columns, "data")?,
+        messages.column("topic_id")?,
+        messages.column("timestamp")?,
+        messages.column("data")?,
     );
-    file.rows(*messages_root, &mut |at, _, record| {
+    file.rows(messages.root, &mut |at, _, record| {
         if let (Some(Value::Integer(topic)), Some(Value::Integer(time)), Some(Value::Blob(data))) =
             (record.get(topic), record.get(time), record.get(data))
-            && let Some((name, kind)) = topics.get(topic)
+            && let Some((name, kind)) = names.get(topic)
         {
             visit(at, name, kind, u64::try_from(*time).unwrap_or(0), data)?;
         }
         Ok(())
     })
+}
+
+/// A table of the bag.
+struct Table {
+    /// Its first page.
+    root: u64,
+    columns: Vec<String>,
+}
+
+impl Table {
+    /// Where a column stands in the table's records.
+    fn column(&self, name: &str) -> Placed<usize> {
+        let found = self.columns.iter().position(|column| column == name);
+        found.ok_or_else(|| {
+            let found = format!("columns {}", self.columns.join(", "));
+            let expected = format!("a column `{name}` as rosbag2 writes it");
+            (At::File, Problem::Misfit { found, expected })
+        })
+    }
+}
+
+/// The tables of the bag by name.
+struct Tables(BTreeMap<String, Table>);
+
+impl Tables {
+    fn table(&self, name: &str) -> Placed<&Table> {
+        self.0.get(name).ok_or_else(|| {
+            let names: Vec<String> = self.0.keys().cloned().collect();
+            let found = format!("tables {}", names.join(", "));
+            let expected = format!("a table `{name}` as rosbag2 writes it");
+            (At::File, Problem::Misfit { found, expected })
+        })
+    }
+}
+
+impl<'a> File<'a> {
+    /// Reads the file's header.
+    fn open(input: &'a mut dyn Input) -> Placed<Self> {
+        let io = |source| (At::File, Problem::Io(source));
+        let length = input.seek(SeekFrom::End(0)).map_err(io)?;
+        input.seek(SeekFrom::Start(0)).map_err(io)?;
+        let header = read_exactly(input, 0, 100, "the header")?;
+        let page_size = match u64::from(u16::from_be_bytes([header[16], header[17]])) {
+            1 => 65_536,
+            size => size,
+        };
+        let usable = page_size.saturating_sub(u64::from(header[20])) as usize;
+        if !page_size.is_power_of_two() || page_size < 512 || usable < 480 {
+            let problem = Problem::Unexpected {
+                found: page_size.to_string(),
+                expected: "a page size of 512 to 65536".into(),
+            };
+            return Err((At::Byte(16), problem));
+        }
+        if header[56..60] != [0, 0, 0, 1] && header[56..60] != [0; 4] {
+            let problem = Problem::Unsupported {
+                what: "a text encoding other than UTF-8".into(),
+                remedy: "convert the bag".into(),
+            };
+            return Err((At::Byte(56), problem));
+        }
+        let pages = length / page_size;
+        Ok(File {
+            input,
+            page_size,
+            usable,
+            pages,
+            budget: 4 * pages + 16,
+        })
+    }
+
+    /// All tables, from the schema on page 1.
+    fn tables(&mut self) -> Placed<Tables> {
+        let mut tables = BTreeMap::new();
+        self.rows(1, &mut |_, _, record| {
+            if let [
+                Value::Text("table"),
+                Value::Text(name),
+                _,
+                Value::Integer(root),
+                Value::Text(sql),
+                ..,
+            ] = record
+            {
+                let table = Table {
+                    root: u64::try_from(*root).unwrap_or(0),
+                    columns: columns(sql),
+                };
+                tables.insert(name.to_string(), table);
+            }
+            Ok(())
+        })?;
+        Ok(Tables(tables))
+    }
+
+    /// Name and type of every topic in CDR, by its number.
+    fn topics(&mut self, table: &Table) -> Placed<BTreeMap<i64, (String, String)>> {
+        let (name, kind, format) = (
+            table.column("name")?,
+            table.column("type")?,
+            table.column("serialization_format")?,
+        );
+        let mut topics = BTreeMap::new();
+        self.rows(table.root, &mut |_, rowid, record| {
+            if let (Some(Value::Text(name)), Some(Value::Text(kind)), Some(Value::Text("cdr"))) =
+                (record.get(name), record.get(kind), record.get(format))
+            {
+                topics.insert(rowid, (name.to_string(), kind.to_string()));
+            }
+            Ok(())
+        })?;
+        Ok(topics)
+    }
 }
 
 /// Column names of a `CREATE TABLE` text.
