@@ -21,12 +21,12 @@ fuzz target:
     CALIB_FUZZ_SEEDS=$PWD/target/corpus cargo test -p calib-recording -p calib-capture fuzz_seeds
     cd fuzz && RUSTC_BOOTSTRAP=1 cargo fuzz run {{target}} ../target/corpus/{{target}} -- -max_total_time=600 -rss_limit_mb=2048 -malloc_limit_mb=1024 -timeout=20
 
-# The book's tests, its generated page made anew, and its HTML where mdbook is installed
+# The book's tests, its generated page regenerated, and its HTML where mdbook is installed
 book:
     UPDATE_BOOK=1 cargo test -p calib-cli --test book
     mdbook build book
 
-# The book's study pages, made anew (a quarter of an hour of two processors)
+# The book's study pages, regenerated (a quarter of an hour of two processors)
 studies:
     cargo run --release -q -p calib-cli -- study cor --trials 1500 --seed 1 --out target/studies
     cargo run --release -q -p calib-cli -- study aor --trials 1500 --seed 1 --out target/studies

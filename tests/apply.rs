@@ -1,5 +1,5 @@
 //! A calibration in other people's files: URDFs, xacros with properties and YAML, the kinematics YAML of a UR arm. Only the
-//! numbers change, everything can be taken back byte for byte, and what several joints share is refused.
+//! numbers change, everything can be reverted byte for byte, and what several joints share is refused.
 
 mod scratch;
 
@@ -80,8 +80,8 @@ fn every_robot_at_hand_takes_a_result_and_gives_it_back() {
         if name.ends_with(".urdf") {
             let model = RobotModel::from_urdf_text(&text, &name).expect("a robot");
             let joints: Vec<&str> = model.joints().iter().map(|j| j.name.as_str()).collect();
-            applied_and_taken_back(&name, &text, &text, &joints);
-            println!("{name}: all {} joints applied and taken back", joints.len());
+            applied_and_reverted(&name, &text, &text, &joints);
+            println!("{name}: all {} joints applied and reverted", joints.len());
             continue;
         }
         let Some(urdf) = expanded else {
@@ -110,12 +110,12 @@ fn every_robot_at_hand_takes_a_result_and_gives_it_back() {
             println!("{name}: {} refused: {said}", joint.name);
         }
         assert!(!taken.is_empty(), "{name}: no joint could be applied");
-        applied_and_taken_back(&name, &text, &urdf, &taken);
-        println!("{name}: applied and taken back: {}", taken.join(", "));
+        applied_and_reverted(&name, &text, &urdf, &taken);
+        println!("{name}: applied and reverted: {}", taken.join(", "));
     }
 }
 
-fn applied_and_taken_back(name: &str, text: &str, urdf: &str, joints: &[&str]) {
+fn applied_and_reverted(name: &str, text: &str, urdf: &str, joints: &[&str]) {
     let file = if name.ends_with(".xacro") {
         "robot.xacro"
     } else {
@@ -164,7 +164,7 @@ const ARM: &str = r#"<robot name="arm">
 "#;
 
 const PROPERTIES: &str = r#"<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
-  <!-- lengths in metres -->
+  <!-- lengths in meters -->
   <xacro:property name="upper_length" value="0.4"/>
   <xacro:property name="calibration" value="${xacro.load_yaml('$(find my_arm)/config/arm.yaml')}"/>
   <xacro:property name="w" value="${calibration['joints']['wrist']}"/>
@@ -186,7 +186,7 @@ const PROPERTIES: &str = r#"<robot name="arm" xmlns:xacro="http://www.ros.org/wi
 </robot>
 "#;
 
-const YAML: &str = "# wrist of cell 3\njoints:\n  wrist: {x: 0.25, y: 0.0, z: 0.0, roll: 0.0, pitch: 0.0, yaw: 0.0} # as drawn\n";
+const YAML: &str = "# wrist of cell 3\njoints:\n  wrist: {x: 0.25, y: 0.0, z: 0.0, roll: 0.0, pitch: 0.0, yaw: 0.0} # at its zero configuration\n";
 
 fn with_xacro(xacro: &str) -> Scratch {
     result(
@@ -221,7 +221,10 @@ fn a_xacro_with_properties_and_a_loaded_yaml() {
         .expect(0);
     assert!(diff.stdout.contains("${side}shoulder"), "{}", diff.stdout);
     let changed = dir.read("my_arm/config/arm.yaml");
-    assert!(changed.starts_with("# wrist of cell 3\n") && changed.ends_with("} # as drawn\n"));
+    assert!(
+        changed.starts_with("# wrist of cell 3\n")
+            && changed.ends_with("} # at its zero configuration\n")
+    );
     for file in [xacro, "my_arm/config/arm.yaml"] {
         dir.calib(["revert", file, "--in-place"]).expect(0);
     }

@@ -289,7 +289,7 @@ fn recordings() {
         3,
     );
     said.run(
-        "millimetres called metres",
+        "millimeters called meters",
         &cells(|_, n, c| {
             if n.ends_with("_m") {
                 c.parse::<f64>()
@@ -390,7 +390,7 @@ fn suspicious_recordings() {
 
 #[test]
 fn robot_descriptions() {
-    let mut said = Refusals::of("robot descriptions");
+    let mut said = Refusals::of("URDF");
     let edited = |from: &str, to: &str| ripley().edit(URDF, from, to);
     said.run("missing", &ripley().without(URDF), 2);
     said.run("empty", &ripley().file(URDF, ""), 2);

@@ -419,7 +419,7 @@ fn profile_reference(schema: &Value) -> String {
     let mut page = String::from(
         "# Profile reference\n\n\
          This page is made from `robots/profile.schema.json`, which is what `calib schema` prints; `UPDATE_BOOK=1 cargo test \
-         -p calib-cli --test book` makes it anew. Unknown keys are errors. Units stand in the key's name; paths are relative to the \
+         -p calib-cli --test book` regenerates it. Unknown keys are errors. Units stand in the key's name; paths are relative to the \
          profile. *none* means that the program estimates it, chooses it, or leaves it out, as the meaning says.\n\n\
          ## profile\n\n",
     );
@@ -478,7 +478,7 @@ fn results_page() -> String {
     let mut page = String::from(
         "# Results of the shipped robots\n\n\
          Printed by the commands shown, on the simulated recordings in `robots/`; a test compares this page with the program, and \
-         `UPDATE_BOOK=1 cargo test -p calib-cli --test book` makes it anew. Errors are positions of tracked bodies or markers on poses \
+         `UPDATE_BOOK=1 cargo test -p calib-cli --test book` regenerates it. Errors are positions of tracked bodies or markers on poses \
          that were not fitted.\n",
     );
     let shelf = Shelf::new();
@@ -538,7 +538,7 @@ fn every_finding_has_its_section() {
         .filter_map(|line| line.strip_prefix("## "))
         .map(|heading| heading.trim_matches('`').to_owned())
         .collect();
-    let ids: BTreeSet<String> = Id::all().iter().map(|id| id.to_string()).collect();
+    let ids: BTreeSet<String> = Id::all().iter().map(ToString::to_string).collect();
     assert_eq!(
         ids, headings,
         "the catalog of calib-finding against book/src/findings.md"

@@ -237,7 +237,7 @@ fn places_and_points_are_found_with_the_offsets() {
             parameter(&report, &name)
         );
     }
-    // The table: z = 50 mm as described, 43 mm below the root's axis in truth, tilted.
+    // The table: z = 50 mm as in the nominal URDF, 43 mm below the root's axis in truth, tilted.
     let table = Isometry3::translation(0.0, 0.0, 0.05);
     let normal = Unit::new_normalize(Vector3::new(0.01, -0.02, 1.0));
     let height = normal.dot(&(Vector3::new(0.0, 0.0, 0.043) - table.translation.vector)) / normal.z;

@@ -5,7 +5,7 @@ mod scratch;
 use scratch::Scratch;
 use serde_json::Value;
 
-/// The robot as it really is: the description with errors of a real arm's size.
+/// The robot as it really is: the nominal URDF with errors of a real arm's size.
 fn true_robot(urdf: &str, longer_mm: f64) -> String {
     let moved = |text: &str, joint: &str, from: &str, to: String| {
         let at = text
@@ -32,7 +32,7 @@ fn true_robot(urdf: &str, longer_mm: f64) -> String {
     )
 }
 
-/// Records the true robot anew (other noise, other poses, bodies mounted elsewhere) and calibrates it.
+/// Records the true robot again (other noise, other poses, bodies mounted elsewhere) and calibrates it.
 fn session(dir: Scratch, name: &str, seed: u32, longer_mm: f64) -> Scratch {
     let profile = dir.read("robots/ripley.yaml");
     let truth = true_robot(&dir.read("robots/ripley/r17.urdf"), longer_mm);

@@ -1,4 +1,4 @@
-//! Joint effects and limits that a profile names: play, measured torque, an origin inside its housing.
+//! Joint effects and limits that a profile names: backlash, measured torque, an origin inside its housing.
 
 mod scratch;
 
@@ -137,12 +137,12 @@ fn says(report: &Value, id: &str) -> bool {
     findings.iter().any(|f| f["id"] == id)
 }
 
-/// Half of joint 2's play, rad.
-const PLAY: f64 = 0.002;
+/// Half of joint 2's backlash, rad.
+const BACKLASH: f64 = 0.002;
 
 #[test]
-fn play_is_found_and_taken_out_of_the_prediction() {
-    let effect: Effect = |joint, approach, _| if joint == 2 { PLAY * approach } else { 0.0 };
+fn backlash_is_found_and_taken_out_of_the_prediction() {
+    let effect: Effect = |joint, approach, _| if joint == 2 { BACKLASH * approach } else { 0.0 };
     let without = laboratory(PROFILE, 0.0, effect);
     without.calib(["run", "arm.yaml", "--out", "out"]).expect(1);
     let rejected = without.json("out/report.json");
@@ -155,7 +155,7 @@ fn play_is_found_and_taken_out_of_the_prediction() {
     let dir = laboratory(&freed, 0.0, effect);
     dir.calib(["run", "arm.yaml", "--out", "out"]).expect(0);
     let report = dir.json("out/report.json");
-    for (joint, truth) in [("j1", 0.0), ("j2", PLAY), ("j3", 0.0)] {
+    for (joint, truth) in [("j1", 0.0), ("j2", BACKLASH), ("j3", 0.0)] {
         let p = parameter(&report, &format!("{joint}.backlash")).expect("freed");
         let (value, sigma) = (number(&p["value"]), number(&p["sigma"]));
         assert!((value - truth).abs() < 4.0 * sigma && sigma < 2e-4, "{p}");
@@ -171,7 +171,7 @@ fn play_is_found_and_taken_out_of_the_prediction() {
 const SOFT: f64 = 1e-4;
 
 #[test]
-fn compliance_follows_measured_torques_where_the_description_has_no_masses() {
+fn compliance_follows_measured_torques_where_the_urdf_has_no_masses() {
     let effect: Effect = |joint, _, torque| if joint == 2 { SOFT * torque } else { 0.0 };
     let freed = PROFILE
         .replace("joint_axes]", "joint_axes, compliance]")

@@ -2,6 +2,9 @@
 //!
 //! Forbidden words are put together at run time, so that this file does not contain them itself.
 
+#[path = "language.rs"]
+mod language;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -205,7 +205,7 @@ fn an_estimator_in_rust_is_named_like_a_built_in_one() {
         .map(|(x, y)| (x - y).powi(2))
         .sum::<f64>()
         .sqrt();
-    // Two estimators of one center from 63 poses at 0.5 mm: within a millimetre, and not the same numbers.
+    // Two estimators of one center from 63 poses at 0.5 mm: within a millimeter, and not the same numbers.
     assert!(distance < 1e-3 && distance > 0.0, "{distance}");
     let off = dir.calib(["run", "robots/justin.yaml", "--no-plugins", "--out", "off"]);
     assert_eq!(off.code, 6);

@@ -101,12 +101,12 @@ solve:
 const BEST_KNOWN: f64 = 2.6e-3;
 
 /// Which rows are spoiled is known from another table: `tiago_frozen/train.csv` holds the same sweep of the same day,
-/// averaged anew from the raw streams over the time in which the arm stood still. Against it the joint values and the
+/// averaged again from the raw streams over the time in which the arm stood still. Against it the joint values and the
 /// markers of a spoiled row do not belong together, by (mm at the hand): line 16 12.0, line 31 9.8, line 20 9.1,
 /// line 7 6.9, line 23 5.7, line 15 2.2; all others agree within 1.5. All that are off by more than 5 mm are named. Lines 16,
-/// 23 and 31 lie on the straight way to a neighbouring posture, so the check can say what happened; 7 and 20 do not, and are named
-/// as off. With them is line 11, which is not spoiled: there `arm_6` stands elsewhere in its 40 mrad of play. Line 15 is within
-/// what that play does to other rows: no check of this table can tell it.
+/// 23 and 31 lie on the straight way to a neighboring posture, so the check can say what happened; 7 and 20 do not, and are named
+/// as off. With them is line 11, which is not spoiled: there `arm_6` stands elsewhere in its 40 mrad of backlash. Line 15 is within
+/// what that backlash does to other rows: no check of this table can tell it.
 #[test]
 fn the_spoiled_table_is_named_line_by_line_and_still_fits() {
     let Some(data) = data() else { return };

@@ -179,7 +179,7 @@ fn shipped(text: &str) -> Vec<Pose> {
         .collect()
 }
 
-/// A robot that sends its joints and a tracker that sees it: the poses of a shipped recording, recorded anew, are
+/// A robot that sends its joints and a tracker that sees it: the poses of a shipped recording, recorded again, are
 /// what `calib run` takes.
 #[test]
 fn what_is_recorded_live_is_what_run_reads() {

@@ -291,7 +291,7 @@ fn the_data_of_the_pages() {
     }
 }
 
-/// A box of 0.2 m as a binary STL, in millimetres: 12 triangles, 12 edges that bend.
+/// A box of 0.2 m as a binary STL, in millimeters: 12 triangles, 12 edges that bend.
 fn box_stl() -> Vec<u8> {
     let corner = |i: usize| [0, 1, 2].map(|k| if i >> k & 1 == 1 { 100.0_f32 } else { -100.0 });
     // Two triangles a face; the diagonal is flat.
@@ -320,7 +320,7 @@ fn box_stl() -> Vec<u8> {
 const TEXT_STL: &str = "solid one\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0.1 0 0\nvertex 0 0.1 0\nendloop\nendfacet\nendsolid\n";
 
 #[test]
-fn shapes_of_the_description_are_drawn_and_missing_meshes_are_told() {
+fn shapes_of_the_urdf_are_drawn_and_missing_meshes_are_told() {
     let visual = |inside: &str| format!("<visual><geometry>{inside}</geometry></visual>");
     let mesh = |file: &str| {
         visual(&format!(
@@ -379,7 +379,7 @@ fn shapes_of_the_description_are_drawn_and_missing_meshes_are_told() {
     };
     assert!(
         ends(0).iter().all(|x| (x.abs() - 0.1).abs() < 1e-9),
-        "scaled to metres"
+        "scaled to meters"
     );
     let report = dir.json("out/report.json");
     let finding = report["findings"]

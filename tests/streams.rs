@@ -153,7 +153,7 @@ fn a_declared_clock_is_believed_and_an_undeclared_one_is_not() {
     assert!(
         clock(&report)["text"]
             .as_str()
-            .is_some_and(|t| t.contains("declared to be one")),
+            .is_some_and(|t| t.contains("stated to be the same")),
     );
     // Two files without a word about time.
     let silent = with_streams(&streams, "{}").edit("robots/ripley.yaml", ", timing: {}", "");

@@ -49,7 +49,7 @@ fn the_books_pages_have_the_shape_of_the_studies() {
         assert_eq!(
             shape(&page),
             shape(&printed),
-            "book/src/studies/{study}.md is old: `just studies` makes it anew"
+            "book/src/studies/{study}.md is old: `just studies` regenerates it"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! The URDF that a run writes: only what was calibrated differs, it says what the report says, and it can be taken back.
+//! The URDF that a run writes: only what was calibrated differs, it says what the report says, and it can be reverted.
 
 mod scratch;
 

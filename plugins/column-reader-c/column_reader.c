@@ -387,7 +387,7 @@ static calib_status read(const calib_call *call, const calib_source *source, con
     return status;
 }
 
-/* ---- The description ------------------------------------------------------------------------------------------ */
+/* ---- The nominal URDF ------------------------------------------------------------------------------------------ */
 
 static const char *const separators[] = {"comma", "semicolon", "tab", "space"};
 

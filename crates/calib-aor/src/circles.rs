@@ -105,7 +105,7 @@ pub(crate) fn linearize(cloud: &Cloud, axis: &Axis) -> Normal {
     total
 }
 
-/// Curvature of f at the modelled circles: levers of the measured points would count their noise as knowledge.
+/// Curvature of f at the modeled circles: levers of the measured points would count their noise as knowledge.
 pub(crate) fn information(cloud: &Cloud, axis: &Axis) -> Matrix4<f64> {
     let mut total = Matrix4::zeros();
     for p in 0..cloud.markers() {
@@ -132,11 +132,11 @@ pub(crate) fn information_of_marker(
         total += weight;
     }
     let middle = axis.point + n * (height / total);
-    let modelled = samples.map(apart).map(|(_, w, weight)| {
+    let modeled = samples.map(apart).map(|(_, w, weight)| {
         let on_circle = w * (radius / total / w.norm().max(f64::MIN_POSITIVE));
         (middle + on_circle, weight)
     });
-    linearize_marker(modelled, axis).hessian
+    linearize_marker(modeled, axis).hessian
 }
 
 /// Which unknowns move.
@@ -207,7 +207,7 @@ impl Problem for CommonLine<'_> {
     }
 }
 
-/// The line (or the direction through a held point) of least f from `start`; `None` where it runs away.
+/// The line (or the direction through a held point) of least f from `start`; `None` where it diverges.
 pub(crate) fn minimize_line(
     cloud: &Cloud,
     start: Axis,
@@ -283,7 +283,7 @@ impl CommonLine<'_> {
     }
 }
 
-/// The axis along a held direction whose circles are nearest to the samples; `start` where it runs away.
+/// The axis along a held direction whose circles are nearest to the samples; `start` where it diverges.
 pub(crate) fn placed(cloud: &Cloud, start: Axis, size: f64) -> Axis {
     minimize_line(cloud, start, Free::Point, size).map_or(start, |(axis, _)| axis)
 }

@@ -23,7 +23,7 @@ use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 /// Halvorsen's line with the pairs of [`Options::separation`].
 ///
 /// # Errors
-/// [`EstimatorError`] for data that are no numbers or of another kind.
+/// [`EstimatorError`] for data that are non-finite or of another kind.
 pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let cloud = cloud_of(input, options)?;

@@ -135,7 +135,7 @@ fn refine(
             .zip(&state.angles)
             .zip(weights)
             .map(|((t, a), w)| {
-                w * (state.modelled(*a).translation.vector - t.translation.vector).norm_squared()
+                w * (state.modeled(*a).translation.vector - t.translation.vector).norm_squared()
             })
             .sum::<f64>();
         let rss = rss * poses.len() as f64 / weights.iter().sum::<f64>();
@@ -236,7 +236,7 @@ impl State {
         UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle) * self.y
     }
 
-    fn modelled(&self, angle: f64) -> Isometry3<f64> {
+    fn modeled(&self, angle: f64) -> Isometry3<f64> {
         self.w * self.at(angle)
     }
 }
@@ -321,7 +321,7 @@ impl<'a> Hinge<'a> {
                 expected[k] += (p * parts[k]).trace();
             }
         }
-        // Between two bodies a turn of one is a shift of the other, and the share of one kind of noise can come out as none: the
+        // Between two bodies a rotation of one is a translation of the other, and the share of one kind of noise can come out as none: the
         // least informative prior that forbids it, p(σ) ∝ σ (Chung et al. 2013), where there is something to share.
         let prior = |k: usize| {
             if self.two_bodies {

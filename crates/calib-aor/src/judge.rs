@@ -1,4 +1,4 @@
-//! Rank checks before a circle fit, and the judgement of a fitted axis.
+//! Rank checks before a circle fit, and the judgment of a fitted axis.
 //!
 //! ```text
 //! κ = (s₂² / (n − P − 1)) / σ̂²  ~  F(n − P − 1, ν)      if the points stay on a line within noise    (1)
@@ -299,12 +299,12 @@ pub(crate) fn weak_direction(
 }
 
 /// The noise that a test compares with, and its degrees of freedom (`None`: stated, exact).
-struct Yardstick {
+struct Reference {
     noise: f64,
     dof: Option<f64>,
 }
 
-impl Yardstick {
+impl Reference {
     /// `None` where nothing tells the noise: all is answered.
     fn of(sigma: f64, dof: usize, options: &Options) -> Option<Self> {
         /// Residual degrees of freedom from which they say more about the noise than the tracker does.
@@ -377,27 +377,27 @@ fn leaves_its_line(
     own_circles: bool,
     options: &Options,
 ) -> Result<Turn, Outcome> {
-    let Some(yardstick) = Yardstick::of(sigma, dof, options) else {
+    let Some(reference) = Reference::of(sigma, dof, options) else {
         return Ok(Turn {
             kappa: f64::INFINITY,
             doubt: None,
         });
     };
     let across = cloud.points.len() - cloud.markers() - 1;
-    let (kappa, chance) = yardstick.test(factor.s[1] * factor.s[1], across);
+    let (kappa, chance) = reference.test(factor.s[1] * factor.s[1], across);
     // A circle of its own through a cloud of noise leaves too little for the noise: κ alone would take one cloud in a hundred for a circle.
     let cloudy = own_circles
-        && yardstick.dof.is_some()
+        && reference.dof.is_some()
         && alike_in_all_directions(factor, across + 1) > options.significance;
     if chance <= options.significance && !cloudy {
         // So few samples cannot be asked whether they scatter alike in all directions; one cloud in a hundred passes.
-        let few = own_circles && yardstick.dof.is_some() && across + 1 < ENOUGH_TO_TELL;
+        let few = own_circles && reference.dof.is_some() && across + 1 < ENOUGH_TO_TELL;
         let doubt = (few && chance > BEYOND_DOUBT * options.significance).then(|| {
             format!(
                 "the marker may rest: its spread across the best line is {:.2} times the noise of {:.3e} (chance {chance:.1e}, beyond \
                  doubt below {:.0e})",
                 kappa.sqrt(),
-                yardstick.noise,
+                reference.noise,
                 BEYOND_DOUBT * options.significance
             )
         });
@@ -406,13 +406,13 @@ fn leaves_its_line(
     let verdict = if cloudy {
         Verdict::Coincident
     } else {
-        yardstick.word(cloud, factor, options)
+        reference.word(cloud, factor, options)
     };
     let reason = format!(
         "the points are {verdict} within their noise: their spread across the best line is {:.2} times the \
          noise of {:.3e} (chance {chance:.1e}, accepted below {:.0e})",
         kappa.sqrt(),
-        yardstick.noise,
+        reference.noise,
         options.significance
     );
     Err(no_plane(estimator, verdict, reason, cloud, factor))
@@ -428,19 +428,19 @@ fn turns(
     gain: f64,
     options: &Options,
 ) -> Result<f64, Outcome> {
-    let Some(yardstick) = Yardstick::of(sigma, dof, options) else {
+    let Some(reference) = Reference::of(sigma, dof, options) else {
         return Ok(f64::INFINITY);
     };
-    let (kappa, chance) = yardstick.test(gain.max(0.0), 2);
-    let verdict = yardstick.word(cloud, factor, options);
+    let (kappa, chance) = reference.test(gain.max(0.0), 2);
+    let verdict = reference.word(cloud, factor, options);
     if chance <= options.significance && verdict == Verdict::Collinear {
         return Ok(kappa);
     }
     let reason = format!(
-        "the points are {verdict} within their noise: a turn of their body explains {:.2} times the noise of \
+        "the points are {verdict} within their noise: a rotation of their body explains {:.2} times the noise of \
          {:.3e} more than a straight motion (chance {chance:.1e}, accepted below {:.0e})",
         kappa.sqrt(),
-        yardstick.noise,
+        reference.noise,
         options.significance
     );
     Err(no_plane(estimator, verdict, reason, cloud, factor))

@@ -6,7 +6,7 @@
 //! circle_ml   the same with one marker: the orthogonal-distance circle in space
 //! ```
 //!
-//! `dir_ml` reports the line that all circles share along its direction: on short arcs own centers run away, and are
+//! `dir_ml` reports the line that all circles share along its direction: on short arcs own centers diverge, and are
 //! named (`weak`) where their σ is beyond a third of their radius.
 //!
 //! The common-line fit starts from the plane normal and one center for all markers; starting from each
@@ -30,7 +30,7 @@ use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 /// A common line for all markers.
 ///
 /// # Errors
-/// [`EstimatorError`] for data that are no numbers or of another kind.
+/// [`EstimatorError`] for data that are non-finite or of another kind.
 pub fn line(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("line_ml", input, options, common_line)
 }
@@ -111,8 +111,8 @@ fn own_centers(estimator: &'static str, cloud: &Cloud, factor: &Factor) -> Optio
         frame: start.frame,
         points,
     })?;
-    // For the covariance the curvature at the modelled circles.
-    let modelled: Vec<Normal> = normals
+    // For the covariance the curvature at the modeled circles.
+    let modeled: Vec<Normal> = normals
         .iter()
         .enumerate()
         .map(|(p, normal)| Normal {
@@ -126,7 +126,7 @@ fn own_centers(estimator: &'static str, cloud: &Cloud, factor: &Factor) -> Optio
             ..normal.clone()
         })
         .collect();
-    let (h, _, own) = problem.reduced(&modelled, 0.0)?;
+    let (h, _, own) = problem.reduced(&modeled, 0.0)?;
     let (n, markers) = (cloud.points.len(), cloud.markers());
     // The reported line is the common one of this direction: a mean of centers is as wild as the flattest arc's.
     // Its noise for a held direction is none of the direction's, which came from what the own centers left over.

@@ -36,7 +36,7 @@ const STEPS: u64 = 2000;
 /// By downhill simplex, center held ([`Options::center`]) or free.
 ///
 /// # Errors
-/// [`EstimatorError`] for data that are no numbers or of another kind.
+/// [`EstimatorError`] for data that are non-finite or of another kind.
 pub fn simplex(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("planar_radial", input, options, walk)
 }

@@ -22,7 +22,7 @@ use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 /// The plane fit on all markers of `input`.
 ///
 /// # Errors
-/// [`EstimatorError`] for data that are no numbers or of another kind.
+/// [`EstimatorError`] for data that are non-finite or of another kind.
 pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let cloud = cloud_of(input, options)?;

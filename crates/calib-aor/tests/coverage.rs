@@ -148,7 +148,7 @@ fn the_line_is_where_its_covariance_says_in_full() {
 
 /// Four flat arcs do not know their own centers, and together they know the line.
 #[test]
-fn a_common_direction_does_not_take_its_line_from_centers_that_ran_away() {
+fn a_common_direction_does_not_take_its_line_from_centers_that_diverged() {
     let hinge = Hinge::slanted();
     let places = hinge.layout(4, 0.1);
     let angles = steps(0.0, 20.0, FRAMES);

@@ -1,4 +1,4 @@
-//! Numbers from an independent implementation (numpy, SciPy, 50-digit arithmetic), in millimetres and rad.
+//! Numbers from an independent implementation (numpy, SciPy, 50-digit arithmetic), in millimeters and rad.
 //!
 //! Read from `CALIB_GOLDEN` (a folder) or `../shared/golden` beside the workspace; never written here.
 
@@ -319,7 +319,7 @@ fn frames() {
         ] {
             let want = &case["expect"][name];
             let options = Options {
-                plane_fit: plane_fit,
+                plane_fit,
                 ..Options::default()
             };
             let center = Center::Given {

@@ -124,7 +124,7 @@ proptest! {
     }
 
     #[test]
-    fn millimetres_give_the_same_axis(scene in a_scene()) {
+    fn millimeters_give_the_same_axis(scene in a_scene()) {
         let mut large = scene.clone();
         for p in large.markers.iter_mut().flatten().flatten() {
             *p *= 1000.0;

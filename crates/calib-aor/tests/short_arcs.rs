@@ -1,7 +1,7 @@
 //! The hinge bundle where its body turns little: what it answers, how good that is, and what no estimator can do better.
 //!
 //! The Cramér–Rao bound of [`bounds::hinge`] takes every frame's angle at its true value when it asks how far the axis's unknowns
-//! can be told apart from it. The markers show an angle only to τ = σ/√Σr², so that an axis is weighed with angles that are
+//! can be distinguished from it. The markers show an angle only to τ = σ/√Σr², so that an axis is weighed with angles that are
 //! wrong. Whoever treats all frames alike cannot do better than if the angles were drawn from their own list (Pfanzagl 1993), and
 //! there the efficient score is (Lindsay 1983; Bickel & Ritov 1987)
 //!
@@ -111,7 +111,7 @@ fn direction_bounds(
             drawn += mean.transpose() * mean / DRAWS as f64;
         }
     }
-    // The zero of the angles is a gauge: a turn of all places about the axis does nothing. Hold it.
+    // The zero of the angles is a gauge: a rotation of all places about the axis does nothing. Hold it.
     let mut gauge = DMatrix::zeros(size, 1);
     for (p, b) in places.iter().enumerate() {
         gauge
@@ -258,7 +258,7 @@ fn unknown_angles_cost_what_their_noise_says() {
             tau2 / s2
         );
         assert!(loss > -1e-9, "{loss}");
-        // Not more than that of normal angles, which are the worst; well-separated angles are told apart.
+        // Not more than that of normal angles, which are the worst; well-separated angles are distinguished.
         assert!(loss < 1.05 * tau2 / s2 + 1e-6, "{loss} {}", tau2 / s2);
         if tau2 / s2 > 0.02 {
             assert!(loss > 0.7 * tau2 / s2, "{loss} {}", tau2 / s2);

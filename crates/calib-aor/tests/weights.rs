@@ -355,7 +355,7 @@ fn weights_that_are_none_are_errors() {
             (vec![1.0; 8], "weights and rows differ in number: 8 and 9"),
             (
                 vec![f64::NAN; 9],
-                "row 0: the weight NaN is no number from 0 up",
+                "row 0: the weight NaN is not a finite number from 0 up",
             ),
         ] {
             let error = fit(info.id, &input, &weighted(&weights)).expect_err(info.id);

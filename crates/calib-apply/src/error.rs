@@ -10,7 +10,7 @@ use calib_urdf::{EditError, ReadError, RevertError};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ApplyError {
-    /// A robot description or a YAML cannot be read.
+    /// A URDF or a YAML cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
     /// The text of the target cannot be changed as asked.

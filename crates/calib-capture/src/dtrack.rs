@@ -18,7 +18,7 @@ pub fn is_ours(bytes: &[u8]) -> bool {
 
 /// The frames of a datagram: one, or none when it carries nothing but a NUL.
 ///
-/// `device` is what the datagram's `ts` or `ts2` says; `ts` begins anew at midnight, which only who has seen the
+/// `device` is what the datagram's `ts` or `ts2` says; `ts` starts over at midnight, which only who has seen the
 /// datagram before can know ([`Order`](crate::Order)).
 ///
 /// # Errors

@@ -10,7 +10,7 @@ use std::time::Duration;
 pub enum Unit {
     /// Radians inside, degrees in the file and on the screen.
     Angle,
-    /// Metres inside, millimetres on the screen.
+    /// Meters inside, millimeters on the screen.
     Length,
 }
 
@@ -27,7 +27,7 @@ impl Unit {
 /// A joint that gets a column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointColumn {
-    /// Its name in the robot description.
+    /// Its name in the URDF.
     pub name: String,
     /// Angle or length.
     pub unit: Unit,

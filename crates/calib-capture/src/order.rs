@@ -4,7 +4,7 @@ use crate::Frame;
 
 const HALF_DAY: f64 = 43_200.0;
 const DAY: f64 = 86_400.0;
-/// That many late frames one after the other are no disorder on the way: the tracker began to count anew.
+/// That many late frames one after the other are no disorder on the way: the tracker began to count again.
 const RESTARTED: u64 = 50;
 
 /// What a frame is in the order of all.

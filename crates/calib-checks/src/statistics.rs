@@ -10,10 +10,10 @@ pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
     Some(0.5 * (values[(n - 1) / 2] + values[n / 2]))
 }
 
-/// σ of a Gaussian from the median absolute deviation about `centre`.
-pub(crate) fn robust_sigma(values: impl Iterator<Item = f64>, centre: f64) -> Option<f64> {
+/// σ of a Gaussian from the median absolute deviation about `center`.
+pub(crate) fn robust_sigma(values: impl Iterator<Item = f64>, center: f64) -> Option<f64> {
     // 1 / Φ⁻¹(3/4)
-    median(values.map(|value| (value - centre).abs()).collect()).map(|mad| 1.4826 * mad)
+    median(values.map(|value| (value - center).abs()).collect()).map(|mad| 1.4826 * mad)
 }
 
 /// Smallest and largest.

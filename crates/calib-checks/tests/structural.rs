@@ -105,12 +105,12 @@ fn faulty(
     let ideal = setting.data(false);
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xfa17);
     let fault = fault(&clean, &mut rng);
-    // Other links and mounts are measured anew, so that their outliers come last; those of a wrong unit come first.
-    let anew = matches!(
+    // Other links and mounts are measured again, so that their outliers come last; those of a wrong unit come first.
+    let again = matches!(
         fault.hypothesis,
         Hypothesis::WrongLink { .. } | Hypothesis::Remounted { .. }
     );
-    let data = if anew {
+    let data = if again {
         with_outliers(with_fault(&setting, &clean, &fault), outliers, seed)
     } else {
         with_fault(&setting, &with_outliers(clean, outliers, seed), &fault)

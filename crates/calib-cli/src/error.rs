@@ -117,7 +117,7 @@ impl CliError {
         match self {
             Self::Pipeline(error) => Some(error.remedy()),
             Self::Apply(ApplyError::Read(_)) => {
-                Some("correct it there, or export the description again")
+                Some("correct it there, or export the nominal URDF again")
             }
             Self::Apply(ApplyError::Edit(_)) => Some("nothing was written; give the expanded URDF"),
             Self::Report(_) => {

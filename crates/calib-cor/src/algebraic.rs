@@ -123,7 +123,7 @@ fn multiplier(factor: &Factor, beta: f64) -> f64 {
 /// Runs a member of the family on all markers of `input`.
 ///
 /// # Errors
-/// [`EstimatorError`] for data that are no numbers or of another kind.
+/// [`EstimatorError`] for data that are non-finite or of another kind.
 pub fn fit(
     member: Algebraic,
     input: &Input<'_>,

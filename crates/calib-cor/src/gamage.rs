@@ -26,7 +26,7 @@ const ROUNDS: usize = 200;
 /// Gamage & Lasenby's linear fit.
 ///
 /// # Errors
-/// [`EstimatorError`] for data that are no numbers or of another kind.
+/// [`EstimatorError`] for data that are non-finite or of another kind.
 pub fn gamage_lasenby(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("gamage_lasenby", input, options, |cloud, factor| {
         solve(cloud, factor, Algebraic::Kasa)
@@ -36,7 +36,7 @@ pub fn gamage_lasenby(input: &Input<'_>, options: &Options) -> Result<Outcome, E
 /// Halvorsen's bias-compensated fit.
 ///
 /// # Errors
-/// [`EstimatorError`] for data that are no numbers or of another kind.
+/// [`EstimatorError`] for data that are non-finite or of another kind.
 pub fn halvorsen(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("halvorsen", input, options, |cloud, factor| {
         let (center, _) = compensate(cloud, factor);
@@ -80,7 +80,7 @@ fn run(
     };
     let outcome = judged(fit(&cloud, &equal_markers));
     if outcome.verdict() == Verdict::Diverged {
-        // The compensation runs away where the spread is noise: say that rather than "diverged".
+        // The compensation diverges where the spread is noise: say that rather than "diverged".
         let linear = judged(solve(&cloud, &equal_markers, Algebraic::Kasa));
         if linear.estimate().is_none() {
             return Ok(linear);

@@ -108,7 +108,7 @@ pub fn hse(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorErr
     })
 }
 
-/// HSA: the same by conjugate gradients on the normal equations, without factorising them.
+/// HSA: the same by conjugate gradients on the normal equations, without factorizing them.
 ///
 /// # Errors
 /// As [`hse`].

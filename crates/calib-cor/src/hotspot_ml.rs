@@ -10,7 +10,7 @@
 //! The gradient of (1) is exact, weights included; the Hessian is Gauss–Newton's. Where σ are not stated
 //! they follow from the residuals: σ_t² = Σ(|q|−|p|)²/(n−2) and
 //! σ_t² + |p|² σ_r² = Σ∠²|q||p|/(2n−4).
-//! Without the test of one axis it runs away along the axis; the test is part of it.
+//! Without the test of one axis it diverges along the axis; the test is part of it.
 
 use calib_estimator::{
     Verdict,
@@ -72,7 +72,7 @@ pub(crate) fn fit_poses(
             sums.body_point(0)
         });
     }
-    let (sigma_t, sigma_r, normal) = maximise(poses, &mut spot, &spread, options);
+    let (sigma_t, sigma_r, normal) = maximize(poses, &mut spot, &spread, options);
     let reach = spot.body_point.norm();
     let start_reach = body_point.norm() + spread.sigmas(spot.sums.n).1;
     let covariance = covariance(&normal, spot.sums.n, options);
@@ -97,7 +97,7 @@ pub(crate) fn fit_poses(
 }
 
 /// Moves `spot` to the maximum; returns σ_t, σ_r and the normal equations there.
-fn maximise(
+fn maximize(
     poses: &[Option<Pose>],
     spot: &mut HotSpot,
     spread: &Spread,

@@ -4,7 +4,7 @@
 //! minimize u'Su  subject to  u'Cu = 1,      u = (a, b, c, d, e)              (paper §3.2.2, Eq. 7)
 //! ```
 //!
-//! The points are centered and scaled to unit mean square first; in raw millimetres the entries of S
+//! The points are centered and scaled to unit mean square first; in raw millimeters the entries of S
 //! span 10¹² and the method stops anywhere. On centered data it equals the closed form to its own
 //! tolerance. It is here because the paper compares it; [`crate::algebraic`] is faster and exact.
 
@@ -33,7 +33,7 @@ const LAST_STEP: f64 = 1e-9;
 /// SFA on all markers of `input` (one marker as in the paper; several share a, b, c, d).
 ///
 /// # Errors
-/// [`EstimatorError`] for data that are no numbers or of another kind.
+/// [`EstimatorError`] for data that are non-finite or of another kind.
 pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let cloud = cloud_of(input, options)?;

@@ -1,4 +1,4 @@
-//! What all sphere fits share: the judgement of a fitted center.
+//! What all sphere fits share: the judgment of a fitted center.
 //!
 //! ```text
 //! σ̂² = Σ w (|x − m| − r_p)² / (n − P − 3)      σ is the noise of a sample of weight 1            (1)

@@ -48,7 +48,7 @@ const FOOT_STEPS: usize = 60;
 /// Sphere by errors in variables, with [`Options::covariances`] or [`Options::noise_per_marker`] or equal noise.
 ///
 /// # Errors
-/// [`EstimatorError`] for data that are no numbers, covariances that are none, or another kind of data.
+/// [`EstimatorError`] for data that are non-finite, covariances that are none, or another kind of data.
 pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     const ID: &str = "sphere_eiv";
     options.check()?;

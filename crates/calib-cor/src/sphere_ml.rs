@@ -33,7 +33,7 @@ const NOISE_ROUNDS: usize = 50;
 /// noise of their marker; otherwise all alike.
 ///
 /// # Errors
-/// [`EstimatorError`] for data that are no numbers, covariances that are none, or another kind of data.
+/// [`EstimatorError`] for data that are non-finite, covariances that are none, or another kind of data.
 pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     options.check()?;
     let cloud = cloud_of(input, options)?;

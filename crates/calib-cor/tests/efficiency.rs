@@ -329,7 +329,7 @@ fn few_samples_with_a_stated_noise() {
     assert!(ratio < 1.8, "{ratio}");
 }
 
-/// rms with 30 % outliers of up to half a metre, over the rms of the same data without them.
+/// rms with 30 % outliers of up to half a meter, over the rms of the same data without them.
 fn outlier_ratio(id: &str, plain: &str, n: usize, known: bool, trials: u64) -> f64 {
     let turns = hand(n);
     let (sigma_t, sigma_r) = (1.0 * MM, 0.5_f64.to_radians());

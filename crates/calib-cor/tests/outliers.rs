@@ -9,7 +9,7 @@ use nalgebra::{Point3, Vector3};
 const CENTER: Vector3<f64> = Vector3::new(1.2, -0.8, 0.9);
 const MM: f64 = 1e-3;
 
-/// Nine points of the hand's range, some of them anywhere within half a metre of where they were.
+/// Nine points of the hand's range, some of them anywhere within half a meter of where they were.
 fn nine(moved: &[usize], seed: u64) -> Vec<Option<Point3<f64>>> {
     let mut noise = Noise::new(seed);
     let mut track = marker(

@@ -167,13 +167,13 @@ proptest! {
     }
 
     #[test]
-    fn millimetres_give_the_same_center(scene in a_scene()) {
+    fn millimeters_give_the_same_center(scene in a_scene()) {
         for info in estimators() {
-            let metres = run(&scene, info.id, info.input);
-            let millimetres = run(&scaled(&scene, 1000.0), info.id, info.input);
-            let off = (millimetres.center.coords / 1000.0 - metres.center.coords).norm();
+            let meters = run(&scene, info.id, info.input);
+            let millimeters = run(&scaled(&scene, 1000.0), info.id, info.input);
+            let off = (millimeters.center.coords / 1000.0 - meters.center.coords).norm();
             prop_assert!(off < slack(info.id), "{}: {off:e}", info.id);
-            let ratio = millimetres.covariance.trace() / metres.covariance.trace() / 1e6;
+            let ratio = millimeters.covariance.trace() / meters.covariance.trace() / 1e6;
             prop_assert!((ratio - 1.0).abs() < 1e-4, "{}: covariance ratio {ratio}", info.id);
         }
     }

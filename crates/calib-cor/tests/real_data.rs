@@ -195,7 +195,7 @@ fn body_poses(columns: &BTreeMap<String, Vec<f64>>, markers: &[&str]) -> Vec<Opt
         .collect()
 }
 
-/// Printed numbers have five decimals, and the answer is stated to a hundredth of a millimetre.
+/// Printed numbers have five decimals, and the answer is stated to a hundredth of a millimeter.
 #[test]
 fn functional_knee_score() {
     let Some(path) = folder("functional_knee") else {

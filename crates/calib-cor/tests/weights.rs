@@ -258,11 +258,11 @@ fn weights_that_are_none_are_errors() {
         (vec![1.0; 8], "weights and rows differ in number: 8 and 9"),
         (
             vec![1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0],
-            "row 2: the weight -1 is no number from 0 up",
+            "row 2: the weight -1 is not a finite number from 0 up",
         ),
         (
             vec![f64::NAN; 9],
-            "row 0: the weight NaN is no number from 0 up",
+            "row 0: the weight NaN is not a finite number from 0 up",
         ),
     ] {
         let options = Options {

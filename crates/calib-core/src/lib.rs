@@ -2,7 +2,7 @@
 //!
 //! Nodes are frames, edges are `parent_from_child(s; x) ∈ SE(3)` for sample `s` (a static pose or an
 //! instant). What a tracker says about the frames at the two ends of a path is a residual; all
-//! residuals of all paths are minimised together:
+//! residuals of all paths are minimized together:
 //!
 //! ```text
 //! T(s; x) = Π_e T_e(s; x)^±1                                                             (1)
@@ -118,7 +118,7 @@
 //! let sigma_m = found.covariance.expect("estimable")[(3, 3)].sqrt();
 //! assert!(sigma_m < 2e-4);
 //!
-//! // Offset and turn of the mount about the same axis cannot be told apart: the fit says so.
+//! // Offset and turn of the mount about the same axis cannot be distinguished: the fit says so.
 //! let offset = solution.parameters.iter().find(|p| p.name == "elbow.offset").expect("named above");
 //! assert_eq!(offset.class, ParameterClass::NotObservable);
 //! # Ok::<(), Error>(())

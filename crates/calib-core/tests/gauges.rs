@@ -335,7 +335,7 @@ fn cases() -> Vec<Case> {
             .origin(2, Chart::position())
             .null(1)
             .says(TranslationAlongAxis, &["j1.origin.z", "j2.origin.z"]),
-        c("slide and turn of full neighbours", arm(&[Z, X, Y]))
+        c("slide and turn of full neighbors", arm(&[Z, X, Y]))
             .origin(1, full.clone())
             .origin(2, full.clone())
             .null(2)
@@ -387,7 +387,7 @@ fn cases() -> Vec<Case> {
             .null(1)
             .says(WorldAgainstBase, &["j2.origin.z", "tracker_from_base.z"]),
         c(
-            "torso turn and arm offset are told apart",
+            "torso turn and arm offset are distinguished",
             arm(&[Z, Z, Y, X]),
         )
         .world()

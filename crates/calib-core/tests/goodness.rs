@@ -1,4 +1,4 @@
-//! Missing physics is named, and disappears when it is modelled; model comparison prefers the truth.
+//! Missing physics is named, and disappears when it is modeled; model comparison prefers the truth.
 
 mod common;
 

@@ -224,11 +224,11 @@ fn problem(postures: &[Posture], level: Level) -> Problem {
                 .zip([a.direction().into_inner(), across[0], across[1]])
         {
             let values: Vec<f64> = torques[j].iter().map(|t| t.dot(&along)).collect();
-            let modelled = match kind {
+            let modeled = match kind {
                 EffectKind::TorqueCompliance => level >= Level::Compliance,
                 _ => level >= Level::Lateral,
             };
-            if modelled {
+            if modeled {
                 p.free_effect_with(joint, kind, values, Some(2e-4));
             } else {
                 p.candidate(joint, kind, values);

@@ -508,10 +508,8 @@ fn several_arms_share_their_torso() {
 
 #[test]
 fn a_builder_call_on_the_wrong_kind_of_edge_is_an_error() {
-    let calls: [(
-        &str,
-        fn(&mut Problem, calib_core::EdgeId, calib_core::EdgeId),
-    ); 8] = [
+    type Call = fn(&mut Problem, calib_core::EdgeId, calib_core::EdgeId);
+    let calls: [(&str, Call); 8] = [
         ("set_role", |p, _, joint| {
             p.set_role(joint, calib_core::Role::Mount, None);
         }),
@@ -569,11 +567,8 @@ fn an_effect_that_needs_its_regressor_is_not_freed_without_it() {
 fn a_direction_that_is_not_finite_is_refused() {
     let bad = nalgebra::Unit::new_unchecked(nalgebra::Vector3::new(f64::NAN, 0.0, 1.0));
     let good = nalgebra::Vector3::z_axis();
-    let measurements: [fn(
-        calib_core::GroupId,
-        calib_core::PointId,
-        [Direction; 2],
-    ) -> MeasurementKind; 3] = [
+    type Make = fn(calib_core::GroupId, calib_core::PointId, [Direction; 2]) -> MeasurementKind;
+    let measurements: [Make; 3] = [
         |noise, _, [fixed, seen]| {
             MeasurementKind::Directions(measurement::Directions {
                 direction: fixed,

@@ -134,7 +134,7 @@ fn both_levels_are_found() {
 #[test]
 fn joint_noise_that_is_not_there_is_found_to_be_small() {
     let d = draw(2, 60, 0.0, true, 0.0);
-    // 0.2 mm on a lever of a metre: 0.1 mrad is the smallest joint noise that could show.
+    // 0.2 mm on a lever of a meter: 0.1 mrad is the smallest joint noise that could show.
     assert!(
         d.solution.noise[1].sigma < 1e-4,
         "{}",
@@ -151,9 +151,9 @@ fn intervals_cover_with_independent_noise() {
 }
 
 #[test]
-fn intervals_cover_with_joint_noise_only_when_it_is_modelled() {
-    let modelled = coverage(40, JOINT, true, 0.0, false);
-    assert!((0.91..0.985).contains(&modelled), "{modelled}");
+fn intervals_cover_with_joint_noise_only_when_it_is_modeled() {
+    let modeled = coverage(40, JOINT, true, 0.0, false);
+    assert!((0.91..0.985).contains(&modeled), "{modeled}");
     let ignored = coverage(40, JOINT, false, 0.0, false);
     assert!(ignored < 0.85, "{ignored}");
     let clusters = coverage(40, JOINT, false, 0.0, true);
@@ -169,8 +169,8 @@ fn study_coverage() {
         ("joint noise, CR2", JOINT, false, 0.0, true, 0.93..0.97),
         ("10 % outliers", 0.0, false, 0.1, false, 0.93..0.97),
     ];
-    for (name, joint, modelled, outliers, robust, expected) in cells {
-        let share = coverage(2000, joint, modelled, outliers, robust);
+    for (name, joint, modeled, outliers, robust, expected) in cells {
+        let share = coverage(2000, joint, modeled, outliers, robust);
         println!("{name}: {share:.4}");
         assert!(expected.contains(&share), "{name}: {share}");
     }

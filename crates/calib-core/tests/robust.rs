@@ -127,7 +127,7 @@ fn thirty_percent_outliers() {
     let (plain, robust) = medians(&Free::frames_and_offsets(6), |h, r| {
         outliers(h, r, 0.3);
     });
-    // Least squares is off by millimetres; the published recipe reaches 0.065 mm against 0.051 clean.
+    // Least squares is off by millimeters; the published recipe reaches 0.065 mm against 0.051 clean.
     assert!(plain > 1e-3, "{plain}");
     assert!(robust < 8e-5, "{robust}");
 }
@@ -140,12 +140,12 @@ fn forty_percent_of_the_frames_with_swapped_markers() {
     assert!(plain > 1e-3, "{plain}");
     assert!(robust < 1e-4, "{robust}");
     let (clean, _) = medians(&Free::frames_and_offsets(6), |_, _| {});
-    let (_, relabelled) = medians(&Free::frames_and_offsets(6), |h, r| {
+    let (_, relabeled) = medians(&Free::frames_and_offsets(6), |h, r| {
         swaps(h, r, 0.4);
         relabel(&mut h.problem, 10.0 * SIGMA);
     });
     // Nothing is lost when the labels are put right: as good as clean.
-    assert!(relabelled < 1.01 * clean, "{relabelled} {clean}");
+    assert!(relabeled < 1.01 * clean, "{relabeled} {clean}");
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn dropouts_outliers_and_swaps_together() {
 }
 
 #[test]
-fn relabelling_restores_the_labels_and_touches_nothing_else() {
+fn relabeling_restores_the_labels_and_touches_nothing_else() {
     let mut c = case(3, 30);
     let before: Vec<PointId> = seen(&mut c.h).iter().map(|o| o.point).collect();
     assert!(relabel(&mut c.h.problem, 10.0 * SIGMA).is_empty());

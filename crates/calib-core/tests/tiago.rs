@@ -60,7 +60,7 @@ fn tool() -> Isometry3<f64> {
         * pose(0.012725, 0.0, 0.0, -FRAC_PI_2, -FRAC_PI_2, 0.0)
 }
 
-/// Masses (kg) and centres (m, link frame) of the URDF; everything behind arm_7 is lumped into its link.
+/// Masses (kg) and centers (m, link frame) of the URDF; everything behind arm_7 is lumped into its link.
 const MASSES: [(f64, [f64; 3]); 8] = [
     (0.0, [0.0, 0.0, 0.0]),
     (1.563, [0.061, -0.022, -0.013]),
@@ -116,8 +116,8 @@ struct Variant {
     offsets: bool,
     geometry: bool,
     compliance: bool,
-    /// Play: the joint rests on the side to which gravity pulls it.
-    play: bool,
+    /// Backlash: the joint rests on the side to which gravity pulls it.
+    backlash: bool,
 }
 
 fn problem(train: &[Posture], test: &[Posture], v: Variant) -> Problem {
@@ -172,16 +172,16 @@ fn problem(train: &[Posture], test: &[Posture], v: Variant) -> Problem {
         }
         if j > 0 {
             let along: Vec<f64> = torque[j].iter().map(|t| t.z).collect();
-            let play: Vec<f64> = along.iter().map(|t| (t / 0.05).tanh()).collect();
+            let backlash: Vec<f64> = along.iter().map(|t| (t / 0.05).tanh()).collect();
             if v.compliance {
                 p.free_effect_with(joint, EffectKind::TorqueCompliance, along, Some(1e-3));
             } else {
                 p.candidate(joint, EffectKind::TorqueCompliance, along);
             }
-            if v.play {
-                p.free_effect_with(joint, EffectKind::Backlash, play, Some(0.02));
+            if v.backlash {
+                p.free_effect_with(joint, EffectKind::Backlash, backlash, Some(0.02));
             } else {
-                p.candidate(joint, EffectKind::Backlash, play);
+                p.candidate(joint, EffectKind::Backlash, backlash);
             }
         }
         last = link;
@@ -273,12 +273,12 @@ fn tiago_frozen() {
             },
         ),
         (
-            "geometry + compliance + play",
+            "geometry + compliance + backlash",
             Variant {
                 offsets: true,
                 geometry: true,
                 compliance: true,
-                play: true,
+                backlash: true,
             },
         ),
     ];

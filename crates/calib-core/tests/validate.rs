@@ -81,7 +81,7 @@ fn a_sample_that_alone_determines_something_is_named() {
         .prior_sigma = None;
     chain.observe(&mut r, &mut h, 1e-4, 0.0);
     let s = solve(&h.problem, &Settings::plain()).unwrap();
-    // All joints rest in a single sample: nothing can be learnt of their origins.
+    // All joints rest in a single sample: nothing can be learned of their origins.
     assert_eq!(s.observability.unmoved.len(), 6);
 }
 

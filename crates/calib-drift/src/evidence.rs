@@ -32,7 +32,7 @@ pub struct Evidence {
     pub file: String,
     /// The robot's name.
     pub robot: String,
-    /// SHA-256 of the description that it started from.
+    /// SHA-256 of the nominal URDF that it started from.
     pub description: String,
     /// Parameters, by column.
     pub parameters: Vec<String>,
@@ -65,7 +65,7 @@ pub(super) const NULL: f64 = calib_core::NULL_TOLERANCE;
 
 fn scale(unit: Unit) -> f64 {
     match unit {
-        Unit::Metre => 0.01,
+        Unit::Meter => 0.01,
         Unit::Radian => 1_f64.to_radians(),
         Unit::Second | Unit::One | Unit::RadianPerSecond => 0.01,
         // Compliances.

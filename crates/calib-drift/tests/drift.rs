@@ -76,7 +76,7 @@ fn session(rng: &mut ChaCha8Rng, robot: &[f64; 6]) -> Report {
             .map(|(i, (name, robot, _))| Parameter {
                 name: (*name).to_owned(),
                 joint: robot.then(|| name.split('.').next().unwrap_or("").to_owned()),
-                unit: Unit::Metre,
+                unit: Unit::Meter,
                 value: found[i],
                 ..Parameter::default()
             })
@@ -91,7 +91,7 @@ fn session(rng: &mut ChaCha8Rng, robot: &[f64; 6]) -> Report {
             quantities: vec![Quantity {
                 name: "zero.elbow".to_owned(),
                 text: "zero of the elbow".to_owned(),
-                unit: Unit::Metre,
+                unit: Unit::Meter,
                 value: found[4] + found[5],
                 gradient: ["elbow.offset", "wrist.turn"]
                     .map(|p| Term {

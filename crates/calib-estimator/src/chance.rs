@@ -37,7 +37,7 @@ pub fn chi2_tail(x: f64, dof: f64) -> f64 {
         let a = 2.0 / (9.0 * dof);
         return normal_tail(((x / dof).cbrt() - (1.0 - a)) / a.sqrt());
     }
-    // The regularised upper gamma underflows to 0 far in the tail, which is the right answer.
+    // The regularized upper gamma underflows to 0 far in the tail, which is the right answer.
     checked_gamma_ur(0.5 * dof, 0.5 * x).unwrap_or(0.0)
 }
 

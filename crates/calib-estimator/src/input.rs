@@ -45,7 +45,10 @@ pub enum Input<'a> {
 
 /// An estimator of a center, run on the poses of the body in the tracker's frame.
 #[derive(Clone, Copy)]
-pub struct CenterBy<'a>(pub &'a dyn Fn(&[Option<Pose>]) -> Option<Point3<f64>>);
+pub struct CenterBy<'a>(pub &'a CenterOfPoses<'a>);
+
+/// The center of rotation that poses have, if one is found: tracker frame, m.
+pub type CenterOfPoses<'a> = dyn Fn(&[Option<Pose>]) -> Option<Point3<f64>> + 'a;
 
 impl std::fmt::Debug for CenterBy<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

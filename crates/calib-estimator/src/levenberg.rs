@@ -45,7 +45,7 @@ pub enum Stop {
 pub struct Minimum<P: Problem> {
     /// The last accepted point.
     pub x: P::Point,
-    /// Its linearisation.
+    /// Its linearization.
     pub normal: P::Normal,
     /// Accepted and rejected steps.
     pub iterations: usize,

@@ -118,7 +118,7 @@ pub struct Cloud {
     pub covariances: Vec<Matrix3<f64>>,
     /// Weight of each point ([`RowWeights`]), or empty where all are alike.
     pub weights: Vec<f64>,
-    /// Largest coordinate magnitude before centring: what rounding is relative to.
+    /// Largest coordinate magnitude before centering: what rounding is relative to.
     pub magnitude: f64,
 }
 
@@ -346,7 +346,7 @@ impl Cloud {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum DataError {
     /// A weight that is negative or no number.
-    #[error("row {row}: the weight {weight} is no number from 0 up")]
+    #[error("row {row}: the weight {weight} is not a finite number from 0 up")]
     NotWeight {
         /// Row of the weight.
         row: usize,

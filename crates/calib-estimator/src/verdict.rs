@@ -31,7 +31,7 @@ pub enum Verdict {
     NotUnique,
     /// Fewer samples than unknowns.
     TooFew,
-    /// The iteration left the neighbourhood of the data.
+    /// The iteration left the neighborhood of the data.
     Diverged,
     /// A sample is NaN or infinite.
     NotFinite,

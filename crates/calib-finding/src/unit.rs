@@ -44,14 +44,6 @@ pub enum Unit {
     MeterPerNewton,
 }
 
-#[allow(non_upper_case_globals, missing_docs)]
-#[doc(hidden)]
-impl Unit {
-    pub const Metre: Unit = Unit::Meter;
-    pub const RadianPerNewtonMetre: Unit = Unit::RadianPerNewtonMeter;
-    pub const MetrePerNewton: Unit = Unit::MeterPerNewton;
-}
-
 impl Unit {
     /// Symbol of the SI unit: `m`, `rad`, `1`.
     #[must_use]

@@ -102,20 +102,26 @@ impl<E: Estimate> Road<'_, E> {
     }
 
     fn not_used(&self, id: Option<&str>, option: OptionId) -> FitError {
-        let who = id.map_or_else(
-            || format!("no estimator of `{}`", self.command),
-            |id| format!("`{id}`"),
-        );
         let users = self.users(option);
         let remedy = if users.is_empty() {
-            "leave it out".to_owned()
+            match self.command {
+                "calib fit cor" => {
+                    "leave it out, or use calib fit aor, whose estimators take more options"
+                }
+                _ => "leave it out",
+            }
+            .to_owned()
         } else {
             format!(
                 "leave it out, or name one that uses it: --estimator {}",
                 users.join(", ")
             )
         };
-        usage(format!("{who} does not use {}", flag(option)), remedy)
+        let finding = match id {
+            Some(id) => format!("`{id}` does not use {}", flag(option)),
+            None => format!("no estimator of `{}` uses {}", self.command, flag(option)),
+        };
+        usage(finding, remedy)
     }
 
     /// Why an estimator did not run, in terms of the command.

@@ -65,7 +65,7 @@ pub struct PencilPair {
 /// Minimum-norm least-squares solution and the rank it used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeastSquares {
-    /// x of least ‖x‖ among the minimisers of ‖Ax − b‖.
+    /// x of least ‖x‖ among the minimizers of ‖Ax − b‖.
     pub x: DVector<f64>,
     /// Singular values that counted.
     pub rank: usize,

@@ -132,7 +132,7 @@ pub fn check_rotation(r: &Matrix3<f64>, limit: f64) -> Result<UnitQuaternion<f64
     }
 }
 
-/// Projection onto SO(3): the rotation that maximises tr(RᵀM) (the chordally nearest one).
+/// Projection onto SO(3): the rotation that maximizes tr(RᵀM) (the chordally nearest one).
 ///
 /// `None` when it is not unique (`s₂ + sign(det) s₃` vanishes against `s₁`) or M is not finite.
 #[must_use]

@@ -12,7 +12,7 @@ pub enum ExitCode {
     Accepted = 0,
     /// Finished; the verdict is not a pass.
     VerdictFail = 1,
-    /// Wrong usage, or a wrong profile or robot description.
+    /// Wrong usage, or a wrong profile or URDF.
     Usage = 2,
     /// The data cannot be read or are not usable.
     Data = 3,
@@ -29,7 +29,7 @@ pub enum ExitCode {
 /// Why a stage stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum PipelineError {
-    /// A profile or robot description cannot be read.
+    /// A profile or URDF cannot be read.
     #[error("{path}: cannot be read: {source}\n  help: {remedy}")]
     Read {
         /// The file.
@@ -39,7 +39,7 @@ pub enum PipelineError {
         /// What to do.
         remedy: String,
     },
-    /// A profile or robot description is not text.
+    /// A profile or URDF is not text.
     #[error(
         "{path}: is not UTF-8 text (byte {offset})\n  help: save it as UTF-8, or name another file"
     )]
@@ -52,7 +52,7 @@ pub enum PipelineError {
     /// The profile is wrong.
     #[error("{0}")]
     Profile(#[from] calib_profile::ProfileError),
-    /// The robot description is wrong.
+    /// The URDF is wrong.
     #[error("{0}")]
     Urdf(#[from] calib_urdf::ReadError),
     /// A recording is wrong.
@@ -79,7 +79,7 @@ pub enum PipelineError {
     /// The solver refused the problem.
     #[error("the estimation problem cannot be stated: {0}")]
     Solve(#[from] calib_core::Error),
-    /// The patched robot description is not what was asked for.
+    /// The patched URDF is not what was asked for.
     #[error("{file}: the URDF cannot be patched: {text}")]
     Patch {
         /// The URDF.
@@ -145,7 +145,7 @@ impl PipelineError {
                 "`calib plugins` lists what there is, `calib plugins check PLUGIN` tests a plugin"
             }
             Self::Patch { .. } => "look at the names under `outputs`, and at the URDF there",
-            Self::Urdf(_) => "correct it there, or export the description again",
+            Self::Urdf(_) => "correct it there, or export the nominal URDF again",
             Self::Edit(_) => "nothing was written; give the expanded URDF",
             Self::Report(_) => {
                 "look at what `calib check` says; the results are not finite or not whole"

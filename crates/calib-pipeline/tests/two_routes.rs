@@ -75,7 +75,7 @@ fn the_calibrated_robot_is_the_solution() {
 }
 
 #[test]
-fn the_load_about_an_axis_is_the_description_s_gravity_torque() {
+fn the_load_about_an_axis_is_the_nominal_urdf_s_gravity_torque() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/justin.yaml");
     let robot = load_robot(&path).expect("shipped");
     let mut q = robot.model.zero_positions();

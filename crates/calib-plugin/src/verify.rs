@@ -8,7 +8,7 @@ use crate::{
 
 /// Entries of RᵀR − I may add up to this much, as for recordings (printed matrices have four decimals).
 const ROTATION_LIMIT: f64 = 1e-4;
-/// A direction may miss unit length by this much: single precision normalises to 10⁻⁷.
+/// A direction may miss unit length by this much: single precision normalizes to 10⁻⁷.
 const UNIT_LIMIT: f64 = 1e-6;
 /// A covariance may be asymmetric, or its correlations exceed one, by this part: rounding of a 6 × 6 inverse.
 const COVARIANCE_LIMIT: f64 = 1e-6;

@@ -1,4 +1,4 @@
-//! One slip of the pen in a real profile is one problem, with the word that was meant, and nothing is concluded from it.
+//! One typo in a real profile is one problem, with the word that was meant, and nothing is concluded from it.
 
 use std::path::Path;
 

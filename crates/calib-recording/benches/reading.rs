@@ -36,7 +36,7 @@ fn nexus(frames: usize) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// Our own table with micrometres.
+/// Our own table with micrometers.
 fn canonical(frames: usize) -> Vec<u8> {
     let mut poses = Poses {
         rows: (0..frames as u64).collect(),

@@ -216,8 +216,8 @@ pub enum Problem {
         /// Samples given.
         samples: usize,
     },
-    /// No reader recognises the file.
-    #[error("no reader recognises this file; known are {known}")]
+    /// No reader recognizes the file.
+    #[error("no reader recognizes this file; known are {known}")]
     UnknownFormat {
         /// Names of the readers.
         known: String,

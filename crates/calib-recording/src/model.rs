@@ -75,7 +75,7 @@ impl Timeline {
 pub enum JointUnit {
     /// Radians inside.
     Angle,
-    /// Metres inside.
+    /// Meters inside.
     Length,
 }
 
@@ -154,12 +154,12 @@ impl MarkerSample {
 /// One marker.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MarkerStream {
-    /// Its name. An unlabelled one keeps the name that the device gave it for the moment.
+    /// Its name. An unlabeled one keeps the name that the device gave it for the moment.
     pub name: String,
     /// The body that the device counts it to.
     pub body: Option<String>,
     /// The device does not know which marker this is: the same name may be another marker later.
-    pub unlabelled: bool,
+    pub unlabeled: bool,
     /// Index into [`Recording::timelines`].
     pub timeline: usize,
     /// Points in the tracker's frame, m.

@@ -34,7 +34,7 @@ pub struct Poses {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NotOneTable {
     /// The streams do not share their sampling instants.
-    #[error("the recording has {} clocks or rates ({}); synchronise them or choose one", .clocks.len(), .clocks.join(", "))]
+    #[error("the recording has {} clocks or rates ({}); synchronize them or choose one", .clocks.len(), .clocks.join(", "))]
     SeveralTimelines {
         /// The clocks.
         clocks: Vec<String>,
@@ -170,7 +170,7 @@ impl Poses {
                 .map(|(name, points)| MarkerStream {
                     name,
                     body: None,
-                    unlabelled: false,
+                    unlabeled: false,
                     timeline: 0,
                     samples: points
                         .into_iter()

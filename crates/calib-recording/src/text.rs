@@ -193,7 +193,7 @@ fn trimmed(cell: &str) -> &str {
 pub(crate) enum Number {
     Value(f64),
     Empty,
-    /// The text says that there is no number: `nan`, `NA`, `NULL`.
+    /// The text says that there is not a finite number: `nan`, `NA`, `NULL`.
     Nan,
     /// Infinite, or beyond what a double can hold.
     Infinite,
@@ -271,7 +271,7 @@ fn leading_decimal(bytes: &[u8], separator: u8) -> Option<(f64, usize)> {
     Some((if negative { -value } else { value }, at))
 }
 
-/// The problem of a cell that is no number.
+/// The problem of a cell that is not a finite number.
 pub(crate) fn not_a_number(cell: &str, kind: Number, expected: &str) -> Problem {
     match kind {
         Number::Infinite | Number::Nan => Problem::NotFinite {
@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_told_apart() {
+    fn what_is_not_finite_is_distinguished() {
         assert_eq!(number("-1.5e-3"), Number::Value(-1.5e-3));
         assert_eq!(number(""), Number::Empty);
         assert_eq!(number("NaN"), Number::Nan);

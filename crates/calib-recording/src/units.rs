@@ -9,18 +9,18 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum LengthUnit {
-    /// Metres.
+    /// Meters.
     #[default]
     M,
-    /// Centimetres.
+    /// Centimeters.
     Cm,
-    /// Millimetres.
+    /// Millimeters.
     Mm,
 }
 
 impl LengthUnit {
     /// Units in a metre.
-    pub fn per_metre(self) -> f64 {
+    pub fn per_meter(self) -> f64 {
         match self {
             LengthUnit::M => 1.0,
             LengthUnit::Cm => 1e2,

@@ -10,7 +10,7 @@
   // The camera looks at `target`; angles in rad, z is up.
   const start = { turn: -0.9, tilt: 0.42, zoom: 1, target: [0, 0, 0] };
   const camera = {};
-  let size = 1, floor = 0, pose = 0, colours = {}, factor = view.magnification;
+  let size = 1, floor = 0, pose = 0, colors = {}, factor = view.magnification;
   const layers = [
     ["calibrated", "Calibrated", "s0", true], ["outlines", "Outlines", "soft", true], ["nominal", "Nominal", "s1", true], ["markers", "Markers", "s3", true],
     ["residuals", "Errors", "bad", true], ["sweeps", "Sweeps", "soft", true], ["joints", "Spheres, circles, axes", "s2", true], ["names", "Names", "ink", false],
@@ -46,7 +46,7 @@
     draw();
   }
 
-  // World to picture: [x, y, pixels per metre at that depth], or null behind the camera.
+  // World to picture: [x, y, pixels per meter at that depth], or null behind the camera.
   function project(p) {
     const x = p[0] - camera.target[0], y = p[1] - camera.target[1], z = p[2] - camera.target[2];
     const ct = Math.cos(camera.turn), st = Math.sin(camera.turn), ce = Math.cos(camera.tilt), se = Math.sin(camera.tilt);
@@ -61,21 +61,21 @@
     return [v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx];
   }
   function add(a, b, k) { return [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]]; }
-  function line(a, b, colour, width, dash) {
+  function line(a, b, color, width, dash) {
     const p = project(a), q = project(b);
     if (!p || !q) return;
-    ink.strokeStyle = colour; ink.lineWidth = width; ink.setLineDash(dash || []);
+    ink.strokeStyle = color; ink.lineWidth = width; ink.setLineDash(dash || []);
     ink.beginPath(); ink.moveTo(p[0], p[1]); ink.lineTo(q[0], q[1]); ink.stroke();
   }
-  function dot(a, colour, radius, hollow) {
+  function dot(a, color, radius, hollow) {
     const p = project(a);
     if (!p) return;
     ink.setLineDash([]); ink.beginPath(); ink.arc(p[0], p[1], radius, 0, 7);
-    if (hollow) { ink.strokeStyle = colour; ink.lineWidth = 1.5; ink.stroke(); } else { ink.fillStyle = colour; ink.fill(); }
+    if (hollow) { ink.strokeStyle = color; ink.lineWidth = 1.5; ink.stroke(); } else { ink.fillStyle = color; ink.fill(); }
   }
-  function text(a, words, colour) {
+  function text(a, words, color) {
     const p = project(a);
-    if (p) { ink.fillStyle = colour; ink.fillText(words, p[0] + 6, p[1] - 5); }
+    if (p) { ink.fillStyle = color; ink.fillText(words, p[0] + 6, p[1] - 5); }
   }
   function across(n) {
     const helper = Math.abs(n[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0];
@@ -83,9 +83,9 @@
     return [a, cross(n, a)];
   }
   function cross(a, b) { return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]; }
-  function ring(center, normal, radius, colour, width, dash) {
+  function ring(center, normal, radius, color, width, dash) {
     const [u, v] = across(normal);
-    ink.strokeStyle = colour; ink.lineWidth = width; ink.setLineDash(dash || []); ink.beginPath();
+    ink.strokeStyle = color; ink.lineWidth = width; ink.setLineDash(dash || []); ink.beginPath();
     for (let i = 0; i <= 48; i++) {
       const t = i / 48 * 2 * Math.PI, p = project(add(add(center, u, radius * Math.cos(t)), v, radius * Math.sin(t)));
       if (!p) return;
@@ -93,8 +93,8 @@
     }
     ink.stroke();
   }
-  function arrow(from, to, colour) {
-    line(from, to, colour, 2);
+  function arrow(from, to, color) {
+    line(from, to, color, 2);
     const p = project(from), q = project(to);
     if (!p || !q) return;
     const dx = q[0] - p[0], dy = q[1] - p[1], length = Math.hypot(dx, dy);
@@ -107,23 +107,23 @@
     const step = Math.pow(10, Math.floor(Math.log10(size / 2))), half = Math.ceil(size / step / 2) * step;
     const cx = Math.round(start.target[0] / step) * step, cy = Math.round(start.target[1] / step) * step;
     for (let k = -half; k <= half + step / 2; k += step) {
-      line([cx + k, cy - half, floor], [cx + k, cy + half, floor], colours.line, 1);
-      line([cx - half, cy + k, floor], [cx + half, cy + k, floor], colours.line, 1);
+      line([cx + k, cy - half, floor], [cx + k, cy + half, floor], colors.line, 1);
+      line([cx - half, cy + k, floor], [cx + half, cy + k, floor], colors.line, 1);
     }
   }
-  function drawRobot(rows, colour, width, dash) {
+  function drawRobot(rows, color, width, dash) {
     view.frames.forEach(function (frame, i) {
-      if (frame.parent !== null) line(rows[frame.parent], rows[i], colour, width, dash);
+      if (frame.parent !== null) line(rows[frame.parent], rows[i], color, width, dash);
     });
   }
   function drawOutlines(rows) {
     for (const outline of view.outlines) {
       const row = rows[outline.frame], q = row.slice(3);
-      for (const l of outline.lines) line(add(row, rotate(q, l.slice(0, 3)), 1), add(row, rotate(q, l.slice(3)), 1), colours.soft, 0.7);
+      for (const l of outline.lines) line(add(row, rotate(q, l.slice(0, 3)), 1), add(row, rotate(q, l.slice(3)), 1), colors.soft, 0.7);
     }
   }
   function drawAxes(rows) {
-    const long = size * 0.035, names = [colours.bad, colours.s2, colours.s0];
+    const long = size * 0.035, names = [colors.bad, colors.s2, colors.s0];
     rows.forEach(function (row) {
       for (let k = 0; k < 3; k++) { const e = [0, 0, 0]; e[k] = long; line(row, add(row, rotate(row.slice(3), e), 1), names[k], 1.5); }
     });
@@ -136,53 +136,53 @@
   }
   function drawJoints() {
     for (const s of view.spheres) {
-      for (const n of [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) ring(s.center, n, s.radius, colours.s2, 0.7);
-      dot(s.center, colours.s2, 3);
-      if (s.sigma) for (const n of [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) ring(s.center, n, factor * s.sigma, colours.bad, 1, [3, 3]);
-      if (shown.names) text(s.center, s.name, colours.s2);
+      for (const n of [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) ring(s.center, n, s.radius, colors.s2, 0.7);
+      dot(s.center, colors.s2, 3);
+      if (s.sigma) for (const n of [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) ring(s.center, n, factor * s.sigma, colors.bad, 1, [3, 3]);
+      if (shown.names) text(s.center, s.name, colors.s2);
     }
-    for (const c of view.circles) ring(c.center, c.normal, c.radius, colours.s2, 1);
+    for (const c of view.circles) ring(c.center, c.normal, c.radius, colors.s2, 1);
     for (const axis of view.axes) {
       const a = inWorld(axis);
       if (!a) continue;
       const ends = [-1, 1].map(function (sign) { return add(a.point, a.direction, sign * a.half_length); });
-      line(ends[0], ends[1], colours.s2, 2);
+      line(ends[0], ends[1], colors.s2, 2);
       const sigma = Math.hypot(a.sigma_point || 0, (a.sigma_direction || 0) * a.half_length);
       if (sigma > 0) {
-        for (const end of ends) ring(end, a.direction, factor * sigma, colours.bad, 1, [3, 3]);
-        ring(a.point, a.direction, factor * (a.sigma_point || 0), colours.bad, 1, [3, 3]);
+        for (const end of ends) ring(end, a.direction, factor * sigma, colors.bad, 1, [3, 3]);
+        ring(a.point, a.direction, factor * (a.sigma_point || 0), colors.bad, 1, [3, 3]);
       }
-      if (shown.names) text(ends[1], a.name, colours.s2);
+      if (shown.names) text(ends[1], a.name, colors.s2);
     }
   }
   function draw() {
     const ratio = window.devicePixelRatio || 1, w = canvas.clientWidth, h = canvas.clientHeight;
     if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) { canvas.width = Math.round(w * ratio); canvas.height = Math.round(h * ratio); }
     ink.setTransform(ratio, 0, 0, ratio, 0, 0);
-    ink.fillStyle = colours.paper; ink.fillRect(0, 0, w, h);
+    ink.fillStyle = colors.paper; ink.fillRect(0, 0, w, h);
     ink.font = "12px system-ui, sans-serif"; ink.lineCap = "round";
     drawFloor();
     if (shown.sweeps) for (const cloud of view.clouds) {
       ink.globalAlpha = 0.55;
-      for (const p of cloud.points) dot(p, colours.soft, 1.3);
+      for (const p of cloud.points) dot(p, colors.soft, 1.3);
       ink.globalAlpha = 1;
     }
     if (shown.joints) drawJoints();
     const now = view.poses[pose];
     if (!now) return;
     if (shown.outlines) drawOutlines(now.calibrated);
-    if (shown.calibrated) { drawRobot(now.calibrated, colours.s0, 4); drawAxes(now.calibrated); for (const row of now.calibrated) dot(row, colours.s0, 3.5); }
-    if (shown.nominal && now.nominal.length) drawRobot(now.nominal, colours.s1, 2, [6, 5]);
+    if (shown.calibrated) { drawRobot(now.calibrated, colors.s0, 4); drawAxes(now.calibrated); for (const row of now.calibrated) dot(row, colors.s0, 3.5); }
+    if (shown.nominal && now.nominal.length) drawRobot(now.nominal, colors.s1, 2, [6, 5]);
     for (const m of now.markers) {
-      if (shown.markers) { if (m.observed) dot(m.observed, colours.s3, 4); dot(m.predicted, colours.s3, 5.5, true); }
-      if (shown.residuals && m.observed) arrow(m.observed, add(m.observed, [0, 1, 2].map(function (i) { return m.predicted[i] - m.observed[i]; }), factor), colours.bad);
+      if (shown.markers) { if (m.observed) dot(m.observed, colors.s3, 4); dot(m.predicted, colors.s3, 5.5, true); }
+      if (shown.residuals && m.observed) arrow(m.observed, add(m.observed, [0, 1, 2].map(function (i) { return m.predicted[i] - m.observed[i]; }), factor), colors.bad);
     }
-    if (shown.names && shown.calibrated) view.frames.forEach(function (frame, i) { text(now.calibrated[i], frame.name, colours.ink); });
+    if (shown.names && shown.calibrated) view.frames.forEach(function (frame, i) { text(now.calibrated[i], frame.name, colors.ink); });
   }
 
-  function readColours() {
+  function readColors() {
     const style = getComputedStyle(document.documentElement);
-    for (const name of ["paper", "ink", "soft", "line", "bad", "s0", "s1", "s2", "s3"]) colours[name] = style.getPropertyValue("--" + name).trim();
+    for (const name of ["paper", "ink", "soft", "line", "bad", "s0", "s1", "s2", "s3"]) colors[name] = style.getPropertyValue("--" + name).trim();
     draw();
   }
   function setPose(i) {
@@ -203,11 +203,11 @@
   }
   function zoom(by) { camera.zoom = Math.max(0.2, Math.min(60, camera.zoom * by)); draw(); }
 
-  for (const [id, name, colour, on] of layers) {
+  for (const [id, name, color, on] of layers) {
     if (id === "outlines" && !view.outlines.length) continue;
     shown[id] = on;
     const label = document.createElement("label"), box = document.createElement("input"), swatch = document.createElement("i");
-    box.type = "checkbox"; box.checked = on; swatch.style.background = "var(--" + colour + ")"; swatch.setAttribute("aria-hidden", "true");
+    box.type = "checkbox"; box.checked = on; swatch.style.background = "var(--" + color + ")"; swatch.setAttribute("aria-hidden", "true");
     box.addEventListener("change", function () { shown[id] = box.checked; draw(); });
     label.append(box, swatch, name);
     document.getElementById("layers").append(label);
@@ -254,11 +254,11 @@
 
   frameAll();
   reset();
-  readColours();
+  readColors();
   setPose(0);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readColours);
-  window.addEventListener("beforeprint", readColours);
-  window.addEventListener("afterprint", readColours);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readColors);
+  window.addEventListener("beforeprint", readColors);
+  window.addEventListener("afterprint", readColors);
   if (window.ResizeObserver) new ResizeObserver(draw).observe(canvas); else window.addEventListener("resize", draw);
   canvas.dataset.ready = "yes";
 })();

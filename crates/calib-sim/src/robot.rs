@@ -1,4 +1,4 @@
-//! The true robot: the description with drawn errors.
+//! The true robot: the nominal URDF with drawn errors.
 
 use std::collections::BTreeMap;
 

@@ -155,8 +155,10 @@ pub fn run(
     }
     let mut plan = study.plan();
     if !options.only.is_empty() {
-        let id = |e: &Box<dyn Experiment>| e.scene().id();
-        plan.retain(|e| options.only.iter().any(|start| id(e).starts_with(start)));
+        plan.retain(|e| {
+            let id = e.scene().id();
+            options.only.iter().any(|start| id.starts_with(start))
+        });
     }
     let state = State::open(study, options)?;
     let threads = options.threads.unwrap_or(0);

@@ -225,15 +225,15 @@ mod tests {
     #[test]
     fn the_control_variate_changes_the_error_and_not_the_answer() {
         let plain = tally(false).cell(&scene(), &row(3.0));
-        let sharp = tally(true).cell(&scene(), &row(3.0));
+        let precise = tally(true).cell(&scene(), &row(3.0));
         let truth = 3.0 / 12.27;
-        for cell in [&plain, &sharp] {
+        for cell in [&plain, &precise] {
             let (value, mc) = (cell.efficiency.unwrap(), cell.efficiency_mc.unwrap());
             assert!((value - truth).abs() < 4.0 * mc, "{value} ± {mc}");
         }
-        assert!(sharp.efficiency_mc.unwrap() < 0.4 * plain.efficiency_mc.unwrap());
-        assert!(sharp.bias_mc.unwrap() < 0.2 * plain.bias_mc.unwrap());
-        assert!(sharp.bias.unwrap() < 4.0 * sharp.bias_mc.unwrap());
+        assert!(precise.efficiency_mc.unwrap() < 0.4 * plain.efficiency_mc.unwrap());
+        assert!(precise.bias_mc.unwrap() < 0.2 * plain.bias_mc.unwrap());
+        assert!(precise.bias.unwrap() < 4.0 * precise.bias_mc.unwrap());
     }
 
     #[test]

@@ -119,14 +119,14 @@ fn finished_scenes_are_kept() {
     fs::write(&path, &marked).expect("written");
     let again = quiet(Study::Aor, &options);
     assert_eq!(again.cells[0].answered, 1, "taken from the file");
-    let anew = quiet(
+    let again = quiet(
         Study::Aor,
         &StudyOptions {
             resume: false,
             ..options
         },
     );
-    assert_eq!(anew.cells[0].answered, 2, "run again");
+    assert_eq!(again.cells[0].answered, 2, "run again");
 }
 
 #[test]
@@ -214,7 +214,7 @@ fn find<'a>(result: &'a StudyResult, scene: &str, method: &str) -> &'a Cell {
 }
 
 /// 40 trials: the control variate leaves a Monte-Carlo error under 0.03 where the estimator is efficient, so that 0.9 is
-/// told from 1 at three errors; HSE's 0.3 is told from 1 without it.
+/// distinguished from 1 at three errors; HSE's 0.3 is distinguished from 1 without it.
 #[test]
 fn efficiencies_are_sane() {
     let scenes = [

@@ -44,7 +44,7 @@ pub enum Problem {
     Unreadable { reason: String },
     #[error("the file is empty")]
     Empty,
-    #[error("the file has {bytes} bytes, more than the {limit} that a robot description may have")]
+    #[error("the file has {bytes} bytes, more than the {limit} that a URDF may have")]
     TooLarge { bytes: u64, limit: u64 },
     #[error("byte {offset} (0x{byte:02x}) is not UTF-8")]
     NotUtf8 { offset: usize, byte: u8 },
@@ -195,9 +195,7 @@ impl Problem {
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Unreadable { .. } => "check the path and that you may read the file",
-            Self::Empty => {
-                "export the robot description again; the copy or download was probably cut off"
-            }
+            Self::Empty => "export the URDF again; the copy or download was probably cut off",
             Self::TooLarge { .. } => {
                 "give the URDF itself; meshes and recordings are files of their own"
             }

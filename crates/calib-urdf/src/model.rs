@@ -137,7 +137,7 @@ pub struct MimicLaw {
 pub struct Inertial {
     /// kg.
     pub mass: f64,
-    /// Centre of mass in the link's frame, m.
+    /// Center of mass in the link's frame, m.
     pub center_of_mass: Point3<f64>,
 }
 

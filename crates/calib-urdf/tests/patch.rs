@@ -181,7 +181,7 @@ fn a_robot_in_one_line() {
 }
 
 #[test]
-fn an_inserted_attribute_takes_the_style_of_its_neighbour() {
+fn an_inserted_attribute_takes_the_style_of_its_neighbor() {
     let text = ARM.replace(
         "            xyz=\"0.25 0 0\"/>",
         "            rpy='0.5 0 0'/>",

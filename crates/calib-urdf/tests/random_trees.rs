@@ -134,7 +134,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 400, rng_seed: RngSeed::Fixed(20), ..ProptestConfig::default() })]
 
     #[test]
-    fn a_patch_says_what_it_should_and_can_be_taken_back(
+    fn a_patch_says_what_it_should_and_can_be_reverted(
         joints in prop::collection::vec(joint(), 1..9),
         hand in hand(),
         wanted in prop::collection::vec(prop::option::of((vector(), rpy())), 9),

@@ -1,4 +1,4 @@
-//! Robot descriptions of other people: read, patched, taken back. Only touched bytes differ.
+//! Robot descriptions of other people: read, patched, reverted. Only touched bytes differ.
 //!
 //! They are not part of the project: the tests run where `CALIB_REAL_DATA` names the folder, or where it lies
 //! beside the project, and say that they were skipped elsewhere.
@@ -47,7 +47,7 @@ fn all_moved(model: &RobotModel) -> Vec<UrdfEdit> {
 }
 
 #[test]
-fn urdfs_are_read_patched_and_taken_back() {
+fn urdfs_are_read_patched_and_reverted() {
     for (name, text) in texts(&[".urdf"]) {
         let model = RobotModel::from_urdf_text(&text, &name).unwrap();
 

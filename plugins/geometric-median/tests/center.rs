@@ -186,7 +186,7 @@ fn a_fifth_of_wrong_samples_does_not_move_the_center() {
     }
 }
 
-/// The stated covariance is the one that repetition shows: the normalised squared error has mean 3.
+/// The stated covariance is the one that repetition shows: the normalized squared error has mean 3.
 #[test]
 fn covariances_are_honest() {
     const RUNS: u64 = 200;

@@ -228,14 +228,14 @@ impl Bundle {
         Some(straight::cost(&self.frames, &self.weights, self.markers)? - hinge)
     }
 
-    /// Information about axis and places at the modelled positions: measured ones would add their noise to every lever arm.
+    /// Information about axis and places at the modeled positions: measured ones would add their noise to every lever arm.
     pub fn information(&self, x: &State) -> Option<DMatrix<f64>> {
         let m = x.axis.frame.matrix();
-        let modelled = |(frame, angle): (&Vec<(usize, Vector3<f64>)>, &f64)| {
+        let modeled = |(frame, angle): (&Vec<(usize, Vector3<f64>)>, &f64)| {
             let place = |p: usize| x.axis.point + m * turned(*angle, &x.places[p]);
             frame.iter().map(|(p, _)| (*p, place(*p))).collect()
         };
-        let frames = self.frames.iter().zip(&x.angles).map(modelled).collect();
+        let frames = self.frames.iter().zip(&x.angles).map(modeled).collect();
         let at = Self {
             frames,
             weights: self.weights.clone(),

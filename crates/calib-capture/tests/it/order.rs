@@ -57,7 +57,7 @@ fn midnight_is_no_restart() {
 }
 
 #[test]
-fn a_tracker_that_begins_anew_is_told_from_disorder() {
+fn a_tracker_that_starts_over_is_distinguished_from_disorder() {
     let mut order = Order::default();
     order.arrives(&frame(Some(5000), None));
     let arrivals: Vec<Arrival> = (0..60)

@@ -82,7 +82,7 @@ fn a_grid_goes_back_and_forth() {
     let found = targets(&[(0.0, 2.0), (0.0, 10.0)], 3);
     assert_eq!(found[..6], expected.map(|t| t.to_vec()));
     assert_eq!(found.len(), 9);
-    // Each neighbour differs in one joint by one step.
+    // Each neighbor differs in one joint by one step.
     for pair in found.windows(2) {
         let far: f64 = pair[0]
             .iter()

@@ -21,7 +21,7 @@ const TOO_CONSTANT: f64 = 1.5e-6;
 const ROWS_FOR_SCATTER: usize = 5;
 /// Rows that are looked at, evenly spread, where all would take long and tell no more.
 const ENOUGH_ROWS: usize = 1000;
-/// A tracked volume is smaller than this, m; more is millimetres taken for metres.
+/// A tracked volume is smaller than this, m; more is millimeters taken for meters.
 const LARGEST_VOLUME: f64 = 60.0;
 
 type Track = [Option<Point3<f64>>];
@@ -217,7 +217,7 @@ fn frozen_bodies(poses: &Poses) -> Vec<Finding> {
 }
 
 /// Whether the marker's usual step from row to row is well above the resolution it is written with: a pin that creeps by
-/// a micrometre a row repeats its value without being frozen.
+/// a micrometer a row repeats its value without being frozen.
 fn steps_show(track: &Track) -> bool {
     let steps: Vec<f64> = track
         .windows(2)
@@ -241,13 +241,13 @@ fn steps_show(track: &Track) -> bool {
 
 /// The coarsest 10⁻ᵏ m, k ≤ 7, of which all coordinates are multiples.
 fn decimal_grid(track: &Track) -> Option<f64> {
-    (2..=7).map(|k| 10f64.powi(k)).find_map(|per_metre| {
-        let on_grid = |x: &f64| ((x * per_metre).round() - x * per_metre).abs() < 1e-4;
+    (2..=7).map(|k| 10f64.powi(k)).find_map(|per_meter| {
+        let on_grid = |x: &f64| ((x * per_meter).round() - x * per_meter).abs() < 1e-4;
         track
             .iter()
             .flatten()
             .all(|point| point.iter().all(on_grid))
-            .then_some(1.0 / per_metre)
+            .then_some(1.0 / per_meter)
     })
 }
 

@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 
 /// Departure of a quaternion's length from 1 that rounding explains.
 const UNIT: f64 = 1e-6;
-/// Turn between neighbouring rows, rad (100°), that is a flip when …
+/// Turn between neighboring rows, rad (100°), that is a flip when …
 const FLIP: f64 = 1.75;
 /// … it is this many times the usual turn between rows.
 const FLIP_RATIO: f64 = 4.0;
@@ -131,7 +131,7 @@ pub(super) fn jumps(poses: &Poses) -> Vec<Finding> {
     });
     let mut findings = Vec::new();
     for (subject, track) in markers.chain(bodies) {
-        // Three neighbouring rows: |p₁ − 2 p₂ + p₃|
+        // Three neighboring rows: |p₁ − 2 p₂ + p₃|
         let bends: Vec<(usize, f64)> = (1..track.len().saturating_sub(1))
             .filter(|&i| together(poses, i - 1, i) && together(poses, i, i + 1))
             .filter_map(|i| Some((i, (track[i - 1]? - track[i]? * 2.0 + track[i + 1]?).norm())))

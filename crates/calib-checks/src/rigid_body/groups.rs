@@ -6,7 +6,7 @@
 //! stop where S > 5 · max(S of the last join, 0.002 · the largest distance)
 //! ```
 //!
-//! A joint changes distances by centimetres, noise and skin by parts of a millimetre to some, and bodies need not be equally stiff: what tells a
+//! A joint changes distances by centimeters, noise and skin by parts of a millimeter to some, and bodies need not be equally stiff: what tells a
 //! joint is the leap. The 80 % quantile bears one bad row in five and still sees a joint that moves in one row of four.
 
 use nalgebra::Point3;
@@ -15,12 +15,12 @@ use nalgebra::Point3;
 const LEAP: f64 = 5.0;
 /// Spread up to which markers are on one body whatever the leap, as a part of the largest distance.
 const STIFF: f64 = 2e-3;
-/// Rows that two markers must share to be told apart.
+/// Rows that two markers must share to be distinguished.
 const MIN_ROWS: usize = 4;
 
 /// The markers in groups that each keep their distances (1), by the first marker of each.
 ///
-/// Two markers that are never seen together are not told apart by their own distance.
+/// Two markers that are never seen together are not distinguished by their own distance.
 #[must_use]
 pub fn rigid_groups(tracks: &[&[Option<Point3<f64>>]]) -> Vec<Vec<usize>> {
     let n = tracks.len();

@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 /// the turn about the line is then 50 times less certain than the others.
 pub(super) const MIN_SPREAD_RATIO: f64 = 0.02;
 
-/// Markers closer than this, m, are one point (a marker's own radius is a few millimetres).
+/// Markers closer than this, m, are one point (a marker's own radius is a few millimeters).
 const MIN_EXTENT: f64 = 1e-3;
 
 /// Rounds of registering and averaging; each divides the error by the number of rows or so, ten are usual.
@@ -315,7 +315,7 @@ pub(super) fn register(a: &[Point3<f64>], b: &[Point3<f64>]) -> Option<Isometry3
 /// Root mean square extent along and across the best line through the points, m.
 pub(super) fn spread(points: &[Point3<f64>]) -> (f64, f64) {
     let n = points.len().max(1) as f64;
-    let centre: Vector3<f64> = points
+    let center: Vector3<f64> = points
         .iter()
         .map(|point| point.coords)
         .sum::<Vector3<f64>>()
@@ -323,7 +323,7 @@ pub(super) fn spread(points: &[Point3<f64>]) -> (f64, f64) {
     let scatter: Matrix3<f64> = points
         .iter()
         .map(|point| {
-            let d = point.coords - centre;
+            let d = point.coords - center;
             d * d.transpose()
         })
         .sum::<Matrix3<f64>>()

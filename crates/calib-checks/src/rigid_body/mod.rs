@@ -15,7 +15,7 @@
 //! p_k = x · exp(ξ) · m_k:   J_k = [ −[m_k]ₓ  I ],   C = σ² ( Σ_k J_kᵀ J_k )⁻¹,   ξ = [ω; v]     (2)
 //! ```
 //!
-//! Gower 1975, Psychometrika 40, 33–51 (generalised Procrustes); Kabsch 1976.
+//! Gower 1975, Psychometrika 40, 33–51 (generalized Procrustes); Kabsch 1976.
 
 mod groups;
 mod learn;

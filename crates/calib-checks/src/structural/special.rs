@@ -114,10 +114,9 @@ fn motion(scan: &Scan<'_>, fit: &Fit, inside: &[bool]) -> Option<Isometry3<f64>>
         }
     }
     let count = pairs.len() as f64;
-    let mean = |pick: fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>| {
-        pairs.iter().map(pick).sum::<Vector3<f64>>() / count.max(1.0)
-    };
-    let (from, to) = (mean(|p| p.0), mean(|p| p.1));
+    let sum_from: Vector3<f64> = pairs.iter().map(|p| p.0).sum();
+    let sum_to: Vector3<f64> = pairs.iter().map(|p| p.1).sum();
+    let (from, to) = (sum_from / count.max(1.0), sum_to / count.max(1.0));
     let spread: Matrix3<f64> = pairs
         .iter()
         .map(|(a, b)| (b - to) * (a - from).transpose())

@@ -101,7 +101,7 @@ pub enum OffsetOutcome {
     TooShort,
 }
 
-/// Angular speed must vary by this, rad/s (1°/s), to be told from a marker cluster's noise.
+/// Angular speed must vary by this, rad/s (1°/s), to be distinguished from a marker cluster's noise.
 const MIN_DEVIATION: f64 = 0.02;
 /// Samples of a track, at least.
 const MIN_SAMPLES: usize = 50;
@@ -373,7 +373,7 @@ fn refine(
 /// Blocks of time for the variance: each much longer than a chord, enough of them to estimate a variance from.
 const BLOCKS: usize = 20;
 
-/// Variance of Σ Jᵀr from the sums over blocks of time. Neighbouring residuals share their chord and, one chord later,
+/// Variance of Σ Jᵀr from the sums over blocks of time. Neighboring residuals share their chord and, one chord later,
 /// share noise with the other sign, which nearly cancels: formulas for independent residuals would be several times
 /// too large.
 fn meat(rows: &[(Vector4<f64>, f64)]) -> Matrix4<f64> {

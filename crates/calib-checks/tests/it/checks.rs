@@ -331,10 +331,10 @@ pub fn faults() -> Vec<(&'static str, &'static str, bool, Fault)> {
                 .flatten()
                 .for_each(|p| p.y = -p.y);
         }),
-        ("unit-mismatch", "millimetres as metres", false, |r, _| {
+        ("unit-mismatch", "millimeters as meters", false, |r, _| {
             scale_all(r, 1e3)
         }),
-        ("unit-mismatch", "metres as millimetres", false, |r, _| {
+        ("unit-mismatch", "meters as millimeters", false, |r, _| {
             scale_all(r, 1e-3)
         }),
         ("unit-mismatch", "degrees as radians", false, |r, _| {

@@ -260,7 +260,7 @@ Made by `cargo test -p calib-checks --test it every_fault -- --nocapture`, which
 
 Each row is one fault, injected into 100 simulated recordings of an arm with three joints: 36 static poses, or 300 samples at
 100 Hz where the fault is about time; four markers on the hand, three on the table, a 6-DoF body, σ = 0.1 mm. Where the fault
-strikes (row, direction, mount, placement of the robot) is drawn anew for each. Found means: the finding of this id is there.
+strikes (row, direction, mount, placement of the robot) is drawn again for each. Found means: the finding of this id is there.
 The size of the fault is part of the row. A smaller one may go unseen, and that is not shown here.
 
 | finding | fault | found |

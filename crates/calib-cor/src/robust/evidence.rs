@@ -9,7 +9,7 @@ use super::Model;
 const DECADES: f64 = 2.22;
 /// −ln of the prior of a scale that the outliers share.
 const SCALE: f64 = 3.0;
-/// An outlier is never more likely than at this many σ: closer ones are not told from the noise.
+/// An outlier is never more likely than at this many σ: closer ones are not distinguished from the noise.
 const NEAREST: f64 = 3.0;
 /// Part of the data's size below which residuals are rounding.
 const EXACT: f64 = 1e-12;

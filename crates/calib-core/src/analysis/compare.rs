@@ -2,7 +2,7 @@
 //! has not seen.
 //!
 //! ```text
-//! loss_s(variant) = −log p(y_s | y₋ₛ)        (density; noise levels count, the sharper test)      (1)
+//! loss_s(variant) = −log p(y_s | y₋ₛ)        (density; noise levels count, the more precise test)      (1)
 //!              or = mean over vectors of |e₋ₛ|²   (position error, m²)                           (2)
 //! worse by = mean_s loss_s − best,  ± its standard error over samples (paired)
 //! ```

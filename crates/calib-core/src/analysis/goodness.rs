@@ -286,11 +286,11 @@ fn candidates(model: &Model) -> Vec<Candidate> {
                 effect: Effect::Joints(vec![(e, kind.lateral(), values)]),
             });
         };
-        let modelled = |kind: EffectKind| joint.effects.iter().any(|f| f.kind == kind);
+        let modeled = |kind: EffectKind| joint.effects.iter().any(|f| f.kind == kind);
         for effect in EFFECTS.iter().filter(|e| e.testable.is_some()) {
             for term in effect.terms.iter().filter(|t| t.source == Source::Reading) {
-                if !modelled(term.kind) && effect.applies_to(&joint.axis) {
-                    let values = joint.q.iter().filter_map(|q| term.kind.from_reading(*q));
+                if !modeled(term.kind) && effect.applies_to(&joint.axis) {
+                    let values = joint.q.iter().filter_map(|q| term.kind.of_reading(*q));
                     add(term.kind, format!("{name}.{}", term.name), values.collect());
                 }
             }
@@ -317,13 +317,13 @@ fn candidates(model: &Model) -> Vec<Candidate> {
     }
     if let Some(times) = &model.problem.times {
         let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
-        let centred: Vec<f64> = times.iter().map(|t| t - mean).collect();
+        let centered: Vec<f64> = times.iter().map(|t| t - mean).collect();
         for (axis, label) in ["x", "y", "z"].iter().enumerate() {
             out.push(Candidate {
                 name: format!("drift.{label}"),
                 joint: None,
                 physics: Physics::Drift,
-                effect: Effect::Drift(axis, centred.clone()),
+                effect: Effect::Drift(axis, centered.clone()),
             });
         }
     }

@@ -1,4 +1,4 @@
-//! What a calibration must be compared with: the robot as drawn, and the robot as drawn but placed where the
+//! What a calibration must be compared with: the robot at its zero configuration, and the robot at its zero configuration but placed where the
 //! tracker sees it.
 
 use std::collections::BTreeSet;

@@ -69,7 +69,7 @@ pub enum EdgeKind {
     Joint(Joint),
     /// A constant that is estimated.
     Unknown(UnknownPose),
-    /// `exp(G u_s)`, `u_s ~ N(0, σ² I)`, drawn anew for every sample and marginalized.
+    /// `exp(G u_s)`, `u_s ~ N(0, σ² I)`, drawn again for every sample and marginalized.
     Random {
         /// Columns of G, twists `[ω; v]`.
         directions: Vec<nalgebra::Vector6<f64>>,
@@ -151,7 +151,7 @@ pub struct Joint {
     pub effects: Vec<JointEffect>,
     /// Effects that are not in the model; the goodness-of-fit test asks whether they should be.
     pub candidates: Vec<Candidate>,
-    /// Noise of the reading itself, drawn anew for every sample.
+    /// Noise of the reading itself, drawn again for every sample.
     pub noise: Option<GroupId>,
 }
 

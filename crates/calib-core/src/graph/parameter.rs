@@ -17,11 +17,11 @@ pub enum Unit {
     /// Angle, rad.
     Radian,
     /// Length, m.
-    Metre,
+    Meter,
     /// Torsional compliance, rad/(N·m).
-    RadianPerNewtonMetre,
+    RadianPerNewtonMeter,
     /// Linear compliance of a prismatic joint, m/N.
-    MetrePerNewton,
+    MeterPerNewton,
     /// Time, s.
     Second,
     /// Ratio without unit.
@@ -34,9 +34,9 @@ impl Unit {
     pub fn symbol(self) -> &'static str {
         match self {
             Self::Radian => "rad",
-            Self::Metre => "m",
-            Self::RadianPerNewtonMetre => "rad/Nm",
-            Self::MetrePerNewton => "m/N",
+            Self::Meter => "m",
+            Self::RadianPerNewtonMeter => "rad/Nm",
+            Self::MeterPerNewton => "m/N",
             Self::Second => "s",
             Self::One => "1",
         }
@@ -47,9 +47,9 @@ impl Unit {
     pub fn key_ending(self) -> &'static str {
         match self {
             Self::Radian => "_rad",
-            Self::Metre => "_m",
-            Self::RadianPerNewtonMetre => "_rad_per_nm",
-            Self::MetrePerNewton => "_m_per_n",
+            Self::Meter => "_m",
+            Self::RadianPerNewtonMeter => "_rad_per_nm",
+            Self::MeterPerNewton => "_m_per_n",
             Self::Second => "_s",
             Self::One => "",
         }
@@ -61,9 +61,9 @@ impl Unit {
     pub fn typical_deviation(self) -> f64 {
         match self {
             Self::Radian => DEFAULT_ROTATION_SIGMA,
-            Self::Metre => DEFAULT_TRANSLATION_SIGMA,
+            Self::Meter => DEFAULT_TRANSLATION_SIGMA,
             // 1e-4 rad/Nm: an arm joint that yields 5 mrad under 50 Nm.
-            Self::RadianPerNewtonMetre | Self::MetrePerNewton => 1e-4,
+            Self::RadianPerNewtonMeter | Self::MeterPerNewton => 1e-4,
             // 10 ms: a tracker frame at 100 Hz.
             Self::Second => 0.01,
             // 1 %: the reading error of an encoder with a wrong gear ratio.

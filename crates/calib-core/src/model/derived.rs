@@ -298,7 +298,7 @@ fn at_configuration(
         joint.q = vec![q];
         for f in &mut joint.effects {
             if f.values.is_some() {
-                let own = f.kind.from_reading(q);
+                let own = f.kind.of_reading(q);
                 let given = || at.regressors.get(&(id, f.kind)).copied().unwrap_or(0.0);
                 let value = own.unwrap_or_else(given);
                 f.values = Some(vec![value]);

@@ -14,7 +14,7 @@ use calib_geometry::decompose;
 const SUPPORTED: f64 = 1e-8;
 /// Entries below this share of the largest are rounding of the null space, not terms.
 pub(crate) const TERM: f64 = 1e-4;
-/// With more blocks than this, triples are only tried among neighbours.
+/// With more blocks than this, triples are only tried among neighbors.
 const ALL_TRIPLES: usize = 14;
 
 /// Columns (n × d) spanning the same space as `null`, each with few terms; `blocks` are the column

@@ -29,7 +29,7 @@ pub(crate) struct CompiledPath {
 
 #[derive(Debug, Clone)]
 pub(crate) enum Step {
-    /// Product of neighbouring constant edges.
+    /// Product of neighboring constant edges.
     Constant(Pose),
     /// (chart coordinate, local column) of the free directions.
     Unknown {

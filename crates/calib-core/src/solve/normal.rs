@@ -46,7 +46,7 @@ pub(crate) struct Workspace {
     pub cache: EdgeCache,
     pub rows: SampleRows,
     pub random: RandomPart,
-    /// The random part of every V_s at the last linearisation, where random effects make V_s depend
+    /// The random part of every V_s at the last linearization, where random effects make V_s depend
     /// on the values: a step is judged by the same V_s that proposed it. (With V_s moving along, the
     /// cost would reward values that only make the noise look larger.)
     factors: Vec<f64>,

@@ -9,7 +9,7 @@
 //!
 //! A whole vector is weighted, never one coordinate, and never a prior. The last fit is unweighted, so
 //! that its covariance means what it says. Where the residuals are larger than the stated noise over
-//! the board (an unmodelled effect), d² is measured against their median: a model that is wrong
+//! the board (an unmodeled effect), d² is measured against their median: a model that is wrong
 //! everywhere must not declare half of its data outliers.
 
 use serde::{Deserialize, Serialize};
@@ -197,7 +197,7 @@ pub(crate) fn clean(
 ) -> Option<(Values, Vec<f64>, usize)> {
     /// Reweighting rounds of (2): the weights settle to 1 % in fewer than ten.
     const HUBER_ROUNDS: usize = 12;
-    /// Linearisations between two reweightings.
+    /// Linearizations between two reweightings.
     const INNER: MinimizeSettings = MinimizeSettings {
         max_iterations: 4,
         decrement: 1e-3,

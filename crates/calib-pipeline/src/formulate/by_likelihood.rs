@@ -64,7 +64,7 @@ fn on_their_limit(fit: &MlFit) -> Vec<Finding> {
         .filter_map(|(found, stated)| {
             let (_, limit) = stated.bounds?;
             let limit = match found.unit {
-                calib_core::Unit::Metre => Fact::meters(limit),
+                calib_core::Unit::Meter => Fact::meters(limit),
                 _ => Fact::radians(limit),
             };
             let about = About::Parameter(found.name.clone());

@@ -19,7 +19,7 @@ pub struct JointEffects {
     pub coupling: BTreeMap<JointIndex, f64>,
 }
 
-/// Index of a joint in its model, serialisable.
+/// Index of a joint in its model, serializable.
 pub type JointIndex = usize;
 
 impl JointEffects {
@@ -46,8 +46,8 @@ impl JointEffects {
 pub struct Calibration {
     /// Geometry: origins without zero offsets.
     pub model: RobotModel,
-    /// The robot as described: loads are computed from it, as in the fit.
-    pub described: RobotModel,
+    /// The robot as in the nominal URDF: loads are computed from it, as in the fit.
+    pub nominal_model: RobotModel,
     /// Effects by joint index.
     pub effects: Vec<JointEffects>,
     /// `tracker_from_root`.
@@ -63,12 +63,12 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// A robot that is exactly as described.
+    /// A robot that is exactly as in the nominal URDF.
     #[must_use]
     pub fn nominal(model: &RobotModel, tracker_from_root: Isometry3<f64>) -> Self {
         Self {
             model: model.clone(),
-            described: model.clone(),
+            nominal_model: model.clone(),
             effects: vec![JointEffects::default(); model.joints().len()],
             tracker_from_root,
             mounts: BTreeMap::new(),
@@ -79,7 +79,7 @@ impl Calibration {
     }
 
     /// `root_from_link` of all links at indicated joint positions (by joint index, rad or m), nothing else being
-    /// known: in the middle of all play, loaded by gravity.
+    /// known: in the middle of all backlash, loaded by gravity.
     #[must_use]
     pub fn root_from_link(&self, q: &[f64]) -> Vec<Isometry3<f64>> {
         self.root_from_link_under(q, &Conditions::default())
@@ -88,7 +88,7 @@ impl Calibration {
     /// The same under known circumstances.
     #[must_use]
     pub fn root_from_link_under(&self, q: &[f64], under: &Conditions) -> Vec<Isometry3<f64>> {
-        let loads = Loads::under(&self.described, q, under);
+        let loads = Loads::under(&self.nominal_model, q, under);
         self.model
             .forward_kinematics_with(|joint| self.motion(joint, q, &loads, under))
     }
@@ -187,7 +187,7 @@ impl Loads {
         loads
     }
 
-    /// From the masses of the description; zero where there are none.
+    /// From the masses of the nominal URDF; zero where there are none.
     #[must_use]
     pub fn at(model: &RobotModel, q: &[f64]) -> Self {
         let n = model.joints().len();

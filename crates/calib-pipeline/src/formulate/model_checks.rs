@@ -3,10 +3,10 @@
 //! Before: a body's motion against that of its link ([`calib_checks::model`]), and where they disagree, which
 //! single mistake would explain it: the sign or the order of joint columns, their unit, another link, joint values
 //! of other rows, the order of a quaternion. After: a row that the robust fit left out is compared with the motion to
-//! its neighbours,
+//! its neighbors,
 //!
 //! ```text
-//! e(q_i + f (q_k − q_i)),   k = i ± 1,   f minimises |e|                                              (1)
+//! e(q_i + f (q_k − q_i)),   k = i ± 1,   f minimizes |e|                                              (1)
 //! ```
 //!
 //! If a fraction f of the way to another row makes the row right, joints and tracker were read at different times, or the
@@ -43,7 +43,7 @@ const ENOUGH_ROWS: usize = 8;
 const LAGS: [isize; 4] = [-2, -1, 1, 2];
 /// What (1) may leave of a row's squared error: by chance a direction of six takes that much in 1 of 150 rows.
 const LEFT: f64 = 0.2;
-/// Largest part of the way to a neighbour: beyond it the row would belong to the other posture.
+/// Largest part of the way to a neighbor: beyond it the row would belong to the other posture.
 const LARGEST_FRACTION: f64 = 0.5;
 /// A row that is off by this many times the usual is named although no motion explains it.
 const FAR_OFF: f64 = 3.0;
@@ -348,7 +348,7 @@ fn spoiled(
 pub struct BadRows {
     /// For the report and for `calib check`.
     pub findings: Vec<Finding>,
-    /// Rows that lie on the way to a neighbour: joints and tracker were not read at the same time.
+    /// Rows that lie on the way to a neighbor: joints and tracker were not read at the same time.
     pub unsettled: Vec<Excluded>,
 }
 
@@ -414,7 +414,7 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
                 recording: recording.clone(),
                 row: *row,
                 body: name.clone(),
-                reason: "not settled: it lies on the way to a neighbouring row".to_owned(),
+                reason: "not settled: it lies on the way to a neighboring row".to_owned(),
             }));
         }
     }
@@ -504,7 +504,7 @@ fn outlier_finding(
     )
 }
 
-/// A row that is right a part of the way to a neighbour.
+/// A row that is right a part of the way to a neighbor.
 struct OnTheWay {
     fraction: f64,
     position: f64,
@@ -626,8 +626,8 @@ impl<'a> BodyError<'a> {
     /// Equation (1).
     fn between_rows(&self, loaded: &'a Loaded, row: usize, usual: Usual) -> Option<OnTheWay> {
         let seen = self.seen(loaded, row)?;
-        let neighbours = [row.checked_sub(1), row.checked_add(1)];
-        let best = neighbours
+        let neighbors = [row.checked_sub(1), row.checked_add(1)];
+        let best = neighbors
             .into_iter()
             .flatten()
             .filter_map(|k| loaded.q.get(k)?.as_ref())

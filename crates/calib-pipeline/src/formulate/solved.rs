@@ -17,7 +17,7 @@ pub struct Solved {
     pub robot: Calibration,
     /// The robot whose forward kinematics the loops are closed with.
     pub fk: Calibration,
-    /// The robot as drawn, with tracker and bodies fitted; `None` with the paper's method.
+    /// The robot at its zero configuration, with tracker and bodies fitted; `None` with the paper's method.
     pub registered: Option<Calibration>,
     /// Transforms found.
     pub found: Vec<Found>,
@@ -38,7 +38,7 @@ impl Solved {
     }
 }
 
-/// The robot as described, with the bodies placed by closed forms.
+/// The robot as in the nominal URDF, with the bodies placed by closed forms.
 pub(crate) fn nominal(inputs: &Inputs, start: &Start) -> Calibration {
     let mut robot = Calibration::nominal(&inputs.robot.model, start.tracker_from_root);
     robot.mounts = start.mounts.clone();

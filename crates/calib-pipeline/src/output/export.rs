@@ -19,7 +19,7 @@ use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::known::Known;
 
-/// The patched robot description.
+/// The patched URDF.
 #[derive(Debug, Clone)]
 pub struct PatchedUrdf {
     /// Its text.
@@ -35,7 +35,7 @@ pub struct PatchedUrdf {
 /// Origins that moved by less than this (m, rad) keep their text: below any tracker and above rounding.
 const UNCHANGED: f64 = 1e-12;
 
-/// Patches the robot description to the calibrated geometry; verifies by re-reading that its forward kinematics is the
+/// Patches the URDF to the calibrated geometry; verifies by re-reading that its forward kinematics is the
 /// solution's to 1e-12 m.
 ///
 /// # Errors
@@ -124,7 +124,7 @@ fn number_changes(
                 for (k, what) in ["x", "y", "z"].into_iter().enumerate() {
                     push(
                         what,
-                        Unit::Metre,
+                        Unit::Meter,
                         old.translation.vector[k],
                         new.translation.vector[k],
                     );
@@ -149,7 +149,7 @@ fn number_changes(
                     changes.push(Change {
                         joint: joint_name.clone(),
                         what: format!("added {name} {what}"),
-                        unit: if k < 3 { Unit::Metre } else { Unit::Radian },
+                        unit: if k < 3 { Unit::Meter } else { Unit::Radian },
                         old: None,
                         new: new[k],
                         delta: None,

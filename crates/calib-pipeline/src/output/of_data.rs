@@ -70,7 +70,7 @@ pub(crate) fn coverage(inputs: &Inputs) -> Vec<JointCoverage> {
         let unit = if joint.kind.turns() {
             Unit::Radian
         } else {
-            Unit::Metre
+            Unit::Meter
         };
         let continuous = matches!(joint.kind, calib_urdf::JointKind::Continuous { .. });
         let range = joint.limits.range().filter(|_| !continuous);
@@ -159,7 +159,7 @@ pub(crate) fn estimators(e: &Evidence<'_>) -> Vec<EstimatorResult> {
                 .covariance
                 .map(|c| (3..6).map(|i| c[(i, i)].max(0.0).sqrt()).collect()),
             agrees: z2.is_some_and(|z2| z2 <= AGREES),
-            unit: Unit::Metre,
+            unit: Unit::Meter,
             distance: Some((pose.translation.vector - found.pose.translation.vector).norm()),
             text: format!(
                 "orientation differs by {}",

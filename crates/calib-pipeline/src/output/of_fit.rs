@@ -22,12 +22,12 @@ pub(crate) fn transform(found: &Found) -> Transform {
 
 pub(crate) fn unit(unit: calib_core::Unit) -> Unit {
     match unit {
-        calib_core::Unit::Metre => Unit::Metre,
+        calib_core::Unit::Meter => Unit::Meter,
         calib_core::Unit::Radian => Unit::Radian,
         calib_core::Unit::Second => Unit::Second,
         calib_core::Unit::One => Unit::One,
-        calib_core::Unit::RadianPerNewtonMetre => Unit::RadianPerNewtonMetre,
-        calib_core::Unit::MetrePerNewton => Unit::MetrePerNewton,
+        calib_core::Unit::RadianPerNewtonMeter => Unit::RadianPerNewtonMeter,
+        calib_core::Unit::MeterPerNewton => Unit::MeterPerNewton,
     }
 }
 
@@ -133,7 +133,7 @@ pub(crate) fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
                 NoiseKind::Scale => calib_report::NoiseKind::Scale,
             },
             unit: match n.kind {
-                NoiseKind::Position => Unit::Metre,
+                NoiseKind::Position => Unit::Meter,
                 _ => Unit::Radian,
             },
             sigma: Some(n.sigma),

@@ -11,8 +11,8 @@ pub(crate) fn limits(limits: &Limits, e: &Evidence<'_>) -> Vec<Limit> {
     let mut held_out = |name: &str, quantity: &str, limit: Option<f64>, value: Option<f64>| {
         let Some(limit) = limit else { return };
         out.push(match value {
-            Some(value) => Limit::evaluated(name, quantity, Unit::Metre, limit, value),
-            None => Limit::not_evaluated(name, quantity, Unit::Metre, limit, "no validation poses"),
+            Some(value) => Limit::evaluated(name, quantity, Unit::Meter, limit, value),
+            None => Limit::not_evaluated(name, quantity, Unit::Meter, limit, "no validation poses"),
         });
     };
     held_out(

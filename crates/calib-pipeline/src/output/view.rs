@@ -27,7 +27,7 @@ const MAGNIFICATION: f64 = 50.0;
 /// What was found, as far as the view shows it.
 #[derive(Debug)]
 pub struct Shown<'a> {
-    /// The robot as described.
+    /// The robot as in the nominal URDF.
     pub nominal: &'a Calibration,
     /// The calibrated robot.
     pub robot: &'a Calibration,

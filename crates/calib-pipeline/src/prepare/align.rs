@@ -26,7 +26,7 @@ use crate::prepare::settled::settle;
 use crate::prepare::streams::Scalars;
 use crate::prepare::timelines::{estimate, tracker_table, tracker_timeline};
 
-/// An offset below this, s, is none: at 0.5 rad/s and 1 m it is a tenth of a millimetre.
+/// An offset below this, s, is none: at 0.5 rad/s and 1 m it is a tenth of a millimeter.
 pub(crate) const SAME_TIME: f64 = 2e-4;
 
 /// Half of the time over which a joint's speed is measured, s: several samples of any controller.

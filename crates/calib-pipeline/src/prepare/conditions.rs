@@ -9,12 +9,12 @@ use crate::prepare::inputs::{Inputs, Loaded};
 /// A joint that moves less than this from one row to the next keeps its direction of approach, rad or m.
 const STILL: f64 = 1e-5;
 
-/// The circumstances of one row. The default knows nothing: the middle of all play, loads by gravity.
+/// The circumstances of one row. The default knows nothing: the middle of all backlash, loads by gravity.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Conditions {
     /// Direction in which each joint moved last, by joint index: +1, −1, or 0 where no row before tells.
     pub approach: Vec<f64>,
-    /// Measured torque about each joint's axis, N m, by joint index; `None`: gravity on the description's masses.
+    /// Measured torque about each joint's axis, N m, by joint index; `None`: gravity on the nominal URDF's masses.
     pub torque: Option<Vec<f64>>,
 }
 

@@ -25,9 +25,9 @@ pub struct RobotProfile {
     pub profile: Profile,
     /// The nominal robot.
     pub model: RobotModel,
-    /// The robot description, byte for byte.
+    /// The URDF, byte for byte.
     pub urdf_text: String,
-    /// Digests of the profile and the description.
+    /// Digests of the profile and the nominal URDF.
     pub digests: Vec<Digest>,
 }
 

@@ -153,7 +153,7 @@ fn check_joint_names(
             .joint_id(&joint.name)
             .map_err(|unknown| PipelineError::Data {
                 file: robot.folder.join(&spec.file).display().to_string(),
-                finding: format!("stream `{}` is no joint: {unknown}", joint.name),
+                finding: format!("stream `{}` is not a joint: {unknown}", joint.name),
                 remedy: "rename it, or map it under `columns`".to_owned(),
             })?;
     }

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Vector3};
 /// Gravity in the frame of the robot's root, m/s². The root is taken to stand upright.
 pub const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 
-/// Whether the description has any mass: without one, compliance cannot be identified from gravity.
+/// Whether the nominal URDF has any mass: without one, compliance cannot be identified from gravity.
 #[must_use]
 pub fn has_masses(model: &RobotModel) -> bool {
     model

@@ -214,7 +214,7 @@ pub fn recording(streams: Streams, source: &str, reader: &str) -> Recording {
             .map(|m| MarkerStream {
                 name: m.name,
                 body: None,
-                unlabelled: false,
+                unlabeled: false,
                 timeline: m.timeline,
                 samples: m.samples.iter().map(sample).collect(),
             })

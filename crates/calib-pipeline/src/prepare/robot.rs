@@ -1,4 +1,4 @@
-//! Reads and checks a profile and its robot description.
+//! Reads and checks a profile and its URDF.
 
 use std::path::{Path, PathBuf};
 
@@ -8,10 +8,10 @@ use calib_urdf::{RobotModel, sha256_hex};
 use crate::error::PipelineError;
 use crate::prepare::inputs::{Digest, RobotProfile};
 
-/// Largest profile or robot description that is read, bytes.
+/// Largest profile or URDF that is read, bytes.
 const LARGEST_TEXT: u64 = 64 << 20;
 
-/// Reads and checks a profile and its robot description.
+/// Reads and checks a profile and its URDF.
 ///
 /// # Errors
 /// [`PipelineError`] with file, place and remedy.

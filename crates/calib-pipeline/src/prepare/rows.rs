@@ -39,7 +39,7 @@ pub(crate) fn prepare(
     for joint in poses.joints.keys() {
         let id = model.joint_id(joint).map_err(|unknown| {
             error(
-                format!("column `{joint}` is no joint: {unknown}"),
+                format!("column `{joint}` is not a joint: {unknown}"),
                 "rename the column, or map it under `columns`".to_owned(),
             )
         })?;

@@ -117,7 +117,7 @@ pub(crate) fn estimate(
     timing: &Timing,
     table: &Poses,
     joints: &BTreeMap<String, Scalars>,
-) -> Result<(String, ClockMap), Finding> {
+) -> Result<(String, ClockMap), Box<Finding>> {
     let settings = OffsetSettings {
         max_offset: timing.max_offset,
         ..OffsetSettings::default()
@@ -159,8 +159,11 @@ pub(crate) fn estimate(
     }
     let outcome = worst.unwrap_or(OffsetOutcome::TooShort);
     best.ok_or_else(|| {
-        alignment(&outcome, SAME_TIME)
-            .unwrap_or_else(|| Finding::of_kind(catalog::CLOCK_LAG, "too_short", About::Clocks))
+        Box::new(
+            alignment(&outcome, SAME_TIME).unwrap_or_else(|| {
+                Finding::of_kind(catalog::CLOCK_LAG, "too_short", About::Clocks)
+            }),
+        )
     })
 }
 

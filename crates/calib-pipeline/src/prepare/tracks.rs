@@ -169,7 +169,7 @@ fn body_track(
     let stated = inputs.robot.profile.tracker.marker_sigma;
     let gathered = gather(names, &fitted);
     let all = body_poses(names, &slices(&gathered), given.clone(), None).map_err(fail)?;
-    // A marker that wanders on its body by more than this is loose or mislabelled.
+    // A marker that wanders on its body by more than this is loose or mislabeled.
     let limit = (8.0 * stated.unwrap_or(0.0005)).max(0.003);
     if let Some((fit, wander)) = all.moving_marker(limit) {
         findings.push(

@@ -97,7 +97,7 @@ pub(crate) fn workspace(inputs: &Inputs, fit: &MlFit) -> Option<Workspace> {
         .map(|w| w.relative_to(&inputs.robot.profile.tracker.frame))
 }
 
-/// What a tool error on a new pose is made of: rms over the held-out poses, in metres.
+/// What a tool error on a new pose is made of: rms over the held-out poses, in meters.
 pub(crate) fn accuracy_limits(
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,

@@ -184,7 +184,7 @@ pub fn joint_values(inputs: &Inputs, recording: &str, row: usize) -> Vec<JointVa
             let unit = if joint.kind.turns() {
                 Unit::Radian
             } else {
-                Unit::Metre
+                Unit::Meter
             };
             JointValue {
                 joint: joint.name.clone(),

@@ -1,8 +1,8 @@
 //! Numbers of a robot that no choice of frames changes: how the axes of its joints lie to each other at zero.
 //!
 //! ```text
-//! two neighbours k, k+1          distance a and angle α between the axes; for parallel axes the distance and two tilts
-//! three neighbours k, k+1, k+2   along axis k+1: the offset d between the feet of the common normals,
+//! two neighbors k, k+1          distance a and angle α between the axes; for parallel axes the distance and two tilts
+//! three neighbors k, k+1, k+2   along axis k+1: the offset d between the feet of the common normals,
 //!                                and the angle θ between these normals, which a zero offset moves
 //! ```
 //!
@@ -20,7 +20,7 @@ pub struct Invariant {
     pub name: String,
     /// In words.
     pub text: String,
-    /// Metres or radians.
+    /// Meters or radians.
     pub unit: Unit,
     /// m or rad.
     pub value: f64,
@@ -117,7 +117,7 @@ fn pair(a: &Line, b: &Line, found: &mut Vec<Invariant>) {
             push(
                 "distance",
                 format!("distance between {axes}"),
-                Unit::Metre,
+                Unit::Meter,
                 between.dot(&(cross / cross.norm())),
             );
         }
@@ -132,7 +132,7 @@ fn pair(a: &Line, b: &Line, found: &mut Vec<Invariant>) {
     push(
         "distance",
         format!("distance between {axes}"),
-        Unit::Metre,
+        Unit::Meter,
         across.norm(),
     );
     push(
@@ -159,7 +159,7 @@ fn triple(a: &Line, b: &Line, c: &Line, found: &mut Vec<Invariant>) {
     found.push(Invariant {
         name: format!("offset.{}", b.name),
         text: format!("offset along {} between {} and {}", b.name, a.name, c.name),
-        unit: Unit::Metre,
+        unit: Unit::Meter,
         value: to_c.0 - to_a.0,
     });
     let sine = b.direction.dot(&to_a.1.cross(&to_c.1));

@@ -94,7 +94,7 @@ fn open(path: &Path) -> Result<LoadedPlugin, PluginError> {
     let shown = path.display().to_string();
     // An absolute path, because the system's loader searches elsewhere for a bare file name.
     let file = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-    // SAFETY: runs the library's initialisers. It is code that the user named; what they do is in the trust model.
+    // SAFETY: runs the library's initializers. It is code that the user named; what they do is in the trust model.
     let library = unsafe { libloading::Library::new(file.as_os_str()) }.map_err(|error| {
         PluginError::Open {
             path: shown.clone(),
@@ -103,7 +103,7 @@ fn open(path: &Path) -> Result<LoadedPlugin, PluginError> {
     })?;
     // SAFETY: only the address is taken; nothing is read through it before the version has been.
     let symbol = unsafe { library.get::<*const abi::Entry>(abi::SYMBOL) }.map(|symbol| *symbol);
-    // Never unloaded: statics, threads and the description may be in use until the process ends.
+    // Never unloaded: statics, threads and the nominal URDF may be in use until the process ends.
     std::mem::forget(library);
     let entry = symbol.map_err(|error| PluginError::NoEntry {
         path: shown,

@@ -232,7 +232,7 @@ fn none() -> BTreeMap<String, Value> {
 }
 
 #[test]
-fn the_description_crosses_whole() {
+fn the_text_of_an_offer_crosses_whole() {
     let plugin = plugin();
     let about = &plugin.description;
     assert_eq!(

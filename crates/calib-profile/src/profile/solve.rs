@@ -37,9 +37,9 @@ pub struct JointException {
     pub sigma_m: Option<f64>,
     /// Prior of its angle numbers, rad.
     pub sigma_rad: Option<f64>,
-    /// Limit of its position numbers about the description, m.
+    /// Limit of its position numbers about the nominal URDF, m.
     pub within_m: Option<f64>,
-    /// Limit of its angle numbers about the description, rad.
+    /// Limit of its angle numbers about the nominal URDF, rad.
     pub within_rad: Option<f64>,
     /// Joints whose motion it follows by an unknown share.
     pub coupled_to: Vec<JointId>,

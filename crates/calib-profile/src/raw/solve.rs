@@ -29,10 +29,10 @@ pub struct RawJointSolve {
     /// Prior standard deviation of its angle numbers, deg.
     #[serde(default)]
     pub sigma_deg: Option<f64>,
-    /// Physical limit: each position number of its origin stays within this of the description, mm.
+    /// Physical limit: each position number of its origin stays within this of the nominal URDF, mm.
     #[serde(default)]
     pub within_mm: Option<f64>,
-    /// Physical limit: each angle number (tilts, turns, zero offset) stays within this of the description, deg.
+    /// Physical limit: each angle number (tilts, turns, zero offset) stays within this of the nominal URDF, deg.
     #[serde(default)]
     pub within_deg: Option<f64>,
     /// The joint also turns by an unknown share of these joints' angles (belt or parallelogram coupling).

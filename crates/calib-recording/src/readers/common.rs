@@ -82,16 +82,16 @@ pub(super) fn triplet(
     line: u64,
     name: &str,
     [x, y, z]: [f64; 3],
-    units_per_metre: f64,
+    units_per_meter: f64,
 ) -> Placed<Triplet> {
     let given = [x, y, z].iter().filter(|value| !value.is_nan()).count();
     match given {
         0 => Ok(Triplet::Lost),
         3 if x == 0.0 && y == 0.0 && z == 0.0 => Ok(Triplet::Zero),
         3 => Ok(Triplet::Point(Point3::new(
-            x / units_per_metre,
-            y / units_per_metre,
-            z / units_per_metre,
+            x / units_per_meter,
+            y / units_per_meter,
+            z / units_per_meter,
         ))),
         given => Err((
             At::Line(line),
@@ -120,7 +120,7 @@ impl MarkerTrack {
         let stream = MarkerStream {
             name: name.to_string(),
             body: None,
-            unlabelled: false,
+            unlabeled: false,
             timeline: 0,
             samples: Vec::new(),
         };
@@ -138,14 +138,14 @@ impl MarkerTrack {
         line: u64,
         row: u64,
         values: &[f64],
-        units_per_metre: f64,
+        units_per_meter: f64,
     ) -> Placed<()> {
         let coordinates = self
             .columns
             .map(|column| values.get(column).copied().unwrap_or(f64::NAN));
         push(
             &mut self.stream.samples,
-            match triplet(line, &self.stream.name, coordinates, units_per_metre)? {
+            match triplet(line, &self.stream.name, coordinates, units_per_meter)? {
                 Triplet::Point(point) if self.filled => MarkerSample::Filled(point),
                 Triplet::Point(point) => MarkerSample::Measured(point),
                 Triplet::Lost => MarkerSample::Lost,

@@ -276,11 +276,11 @@ impl Log {
             let track = if quality < 0.0 {
                 None
             } else {
-                let per_metre = LengthUnit::Mm.per_metre();
+                let per_meter = LengthUnit::Mm.per_meter();
                 let point = Point3::new(
-                    place[0] / per_metre,
-                    place[1] / per_metre,
-                    place[2] / per_metre,
+                    place[0] / per_meter,
+                    place[1] / per_meter,
+                    place[2] / per_meter,
                 );
                 // R = [b0 b3 b6; b1 b4 b7; b2 b5 b8]: by columns, as nalgebra stores it.
                 let matrix = Matrix3::from_column_slice(&matrix);
@@ -352,7 +352,7 @@ impl Log {
         let stream = self.markers.entry(id).or_insert_with(|| MarkerStream {
             name: format!("marker_{id}"),
             body: None,
-            unlabelled: true,
+            unlabeled: true,
             timeline: 0,
             samples: Vec::new(),
         });
@@ -369,8 +369,8 @@ impl Log {
             ));
         }
         stream.samples.resize(sample, MarkerSample::Lost);
-        let per_metre = LengthUnit::Mm.per_metre();
-        let point = Point3::new(x / per_metre, y / per_metre, z / per_metre);
+        let per_meter = LengthUnit::Mm.per_meter();
+        let point = Point3::new(x / per_meter, y / per_meter, z / per_meter);
         push(&mut stream.samples, MarkerSample::Measured(point));
         self.samples += 1;
         self.dense += sample + 1 - length;

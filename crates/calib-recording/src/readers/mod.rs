@@ -1,4 +1,4 @@
-//! The table of readers: what a file can be, how it is recognised, how it is read.
+//! The table of readers: what a file can be, how it is recognized, how it is read.
 
 mod c3d;
 mod canonical;

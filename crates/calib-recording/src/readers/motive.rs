@@ -91,7 +91,7 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
         );
     }
     let width = header.axes.len();
-    let instants = read_rows(&mut lines, width, &mut tracks, unit.per_metre())?;
+    let instants = read_rows(&mut lines, width, &mut tracks, unit.per_meter())?;
     let rate = value("Export Frame Rate")
         .or(value("Capture Frame Rate"))
         .and_then(|text| text.parse::<f64>().ok());
@@ -282,7 +282,7 @@ fn plan_body(
 fn plan_marker(group: &Group, position: [usize; 3]) -> MarkerTrack {
     let (kind, name) = (group.kind.as_str(), group.name.as_str());
     let mut marker = MarkerTrack::new(name, position, kind != "Marker");
-    marker.stream.unlabelled = name.starts_with("Unlabeled");
+    marker.stream.unlabeled = name.starts_with("Unlabeled");
     let body = if kind == "Rigid Body Marker" {
         name.rsplit_once(['_', ':'])
     } else {
@@ -313,7 +313,7 @@ fn read_rows<R: BufRead>(
     lines: &mut Lines<R>,
     width: usize,
     tracks: &mut Tracks,
-    per_metre: f64,
+    per_meter: f64,
 ) -> Placed<Instants> {
     let (mut instants, mut values) = (Instants::default(), Vec::new());
     loop {
@@ -325,10 +325,10 @@ fn read_rows<R: BufRead>(
         numbers(number, line, COMMA, width, &mut values)?;
         let frame = instants.take(number, values[0], values[1])?;
         for marker in &mut tracks.markers {
-            marker.read(number, frame, &values, per_metre)?;
+            marker.read(number, frame, &values, per_meter)?;
         }
         for body in &mut tracks.bodies {
-            read_body(body, number, &values, per_metre)?;
+            read_body(body, number, &values, per_meter)?;
         }
     }
     if instants.frames.is_empty() {
@@ -337,14 +337,14 @@ fn read_rows<R: BufRead>(
     Ok(instants)
 }
 
-fn read_body(body: &mut Body, line: u64, values: &[f64], per_metre: f64) -> Placed<()> {
+fn read_body(body: &mut Body, line: u64, values: &[f64], per_meter: f64) -> Placed<()> {
     let q = body.rotation.map(|i| values[i]);
     let given = q.iter().filter(|value| !value.is_nan()).count();
     let point = match triplet(
         line,
         &body.stream.name,
         body.position.map(|i| values[i]),
-        per_metre,
+        per_meter,
     )? {
         Triplet::Point(point) if given == 4 => Some(point),
         Triplet::Zero if given == 4 && q != [0.0; 4] => Some(nalgebra::Point3::origin()),

@@ -197,12 +197,12 @@ impl Rows {
             push(&mut self.instants.times, time);
         }
         push(&mut self.instants.frames, frame as u64);
-        let per_metre = LengthUnit::Mm.per_metre();
+        let per_meter = LengthUnit::Mm.per_meter();
         for marker in &mut tracks.markers {
-            marker.read(number, frame as u64, values, per_metre)?;
+            marker.read(number, frame as u64, values, per_meter)?;
         }
         for body in &mut tracks.bodies {
-            read_body(body, number, frame as u64, values, per_metre)?;
+            read_body(body, number, frame as u64, values, per_meter)?;
         }
         Ok(())
     }
@@ -323,7 +323,7 @@ impl Header {
     }
 }
 
-fn read_body(body: &mut Body, line: u64, row: u64, values: &[f64], per_metre: f64) -> Placed<()> {
+fn read_body(body: &mut Body, line: u64, row: u64, values: &[f64], per_meter: f64) -> Placed<()> {
     let part = &values[body.first..body.first + BODY_COLUMNS];
     let matrix: Vec<f64> = part[7..16].to_vec();
     let given = matrix.iter().filter(|value| !value.is_nan()).count();
@@ -332,7 +332,7 @@ fn read_body(body: &mut Body, line: u64, row: u64, values: &[f64], per_metre: f6
         line,
         &body.stream.name,
         [part[0], part[1], part[2]],
-        per_metre,
+        per_meter,
     )? {
         Triplet::Point(point) if given == 9 => Some(point),
         Triplet::Zero if given == 9 && !all_zeros => Some(nalgebra::Point3::origin()),

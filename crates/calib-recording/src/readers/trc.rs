@@ -160,7 +160,7 @@ fn read_rows<R: BufRead>(
     unit: LengthUnit,
 ) -> Placed<Instants> {
     let columns = markers.last().map_or(2, |marker| marker.columns[2] + 1);
-    let per_metre = unit.per_metre();
+    let per_meter = unit.per_meter();
     let (mut instants, mut values) = (Instants::default(), Vec::new());
     loop {
         let number = lines.number() + 1;
@@ -171,7 +171,7 @@ fn read_rows<R: BufRead>(
         numbers(number, line, separator, columns, &mut values)?;
         let frame = instants.take(number, values[0], values[1])?;
         for marker in &mut *markers {
-            marker.read(number, frame, &values, per_metre)?;
+            marker.read(number, frame, &values, per_meter)?;
         }
     }
     if instants.frames.is_empty() {

@@ -36,7 +36,7 @@ impl Default for WriteOptions {
 }
 
 impl WriteOptions {
-    /// Micrometres, microradians, and 1e-9 in quaternions: far below any tracker, a third of the bytes.
+    /// Micrometers, microradians, and 1e-9 in quaternions: far below any tracker, a third of the bytes.
     pub fn micro() -> Self {
         WriteOptions {
             decimals: Some(6),

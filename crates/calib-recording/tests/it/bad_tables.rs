@@ -102,7 +102,7 @@ fn what_is_no_text_is_refused() {
         "poses.csv:3: byte 0 of this line is not UTF-8\n  help: save the file as UTF-8"
     );
     assert!(
-        error([0u8; 600]).contains("no reader recognises"),
+        error([0u8; 600]).contains("no reader recognizes"),
         "{}",
         error([0u8; 600])
     );

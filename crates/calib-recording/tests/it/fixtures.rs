@@ -251,7 +251,7 @@ fn dtrack_absence_is_lost_and_midnight_goes_on() {
             .max()
             < 1e-6
     );
-    assert!(recording.markers[0].unlabelled);
+    assert!(recording.markers[0].unlabeled);
 }
 
 #[test]

@@ -102,7 +102,7 @@ fn try_all(bytes: &[u8], own: &str) {
 }
 
 #[test]
-fn every_reader_has_a_fixture_and_recognises_it() {
+fn every_reader_has_a_fixture_and_recognizes_it() {
     for reader in readers() {
         let own: Vec<_> = corpus()
             .into_iter()

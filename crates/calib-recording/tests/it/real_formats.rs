@@ -122,7 +122,7 @@ fn motive_files_of_two_versions() {
         bodies
             .markers
             .iter()
-            .filter(|marker| marker.unlabelled)
+            .filter(|marker| marker.unlabeled)
             .count(),
         6
     );
@@ -135,7 +135,7 @@ fn motive_files_of_two_versions() {
         ),
         (0, 18, 1353)
     );
-    assert!(markers.markers.iter().all(|marker| marker.unlabelled));
+    assert!(markers.markers.iter().all(|marker| marker.unlabeled));
 }
 
 #[test]

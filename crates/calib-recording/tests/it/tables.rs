@@ -318,7 +318,7 @@ proptest! {
     }
 
     #[test]
-    fn micrometres_stay_micrometres(poses in some_poses()) {
+    fn micrometers_stay_micrometers(poses in some_poses()) {
         let text = write_poses(&poses, &WriteOptions::micro()).expect("finite");
         let back = read_bytes("x.csv", text.as_bytes(), &ReadOptions::default()).expect("own table").poses(Filled::Exclude).expect("one");
         for (a, b) in back.markers["m_1"].iter().flatten().zip(poses.markers["m_1"].iter().flatten()) {

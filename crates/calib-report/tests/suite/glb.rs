@@ -6,7 +6,7 @@ use calib_report::{Scene, glb::glb};
 use gltf::animation::util::ReadOutputs;
 use nalgebra::{Isometry3, Matrix4, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-/// Coordinates are 32-bit numbers within two metres, through a chain of seven links, m.
+/// Coordinates are 32-bit numbers within two meters, through a chain of seven links, m.
 const ROUNDING: f64 = 5e-6;
 
 struct Read {

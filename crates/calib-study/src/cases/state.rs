@@ -13,7 +13,7 @@ use super::{CaseError, CaseOptions, RobotResult};
 struct Settings {
     calib_case_study: u32,
     study: String,
-    /// Digests of profile and robot description.
+    /// Digests of profile and URDF.
     inputs: Vec<String>,
     version: String,
 }

@@ -1,7 +1,7 @@
 //! Three tenths of the poses are somewhere else.
 //!
 //! Each trial draws a clean recording, moves exactly 30 % of its poses by up to the reach in every coordinate, and asks: the robust
-//! estimators with all samples, the plain estimator with the clean recording (the yardstick), and the plain estimator
+//! estimators with all samples, the plain estimator with the clean recording (the reference), and the plain estimator
 //! with the moved ones (what happens without protection). Where outliers hide, one who knows
 //! everything about them but which ones they are says what is possible ([`super::mixture`]). With seven tenths left, 1/√0.7 = 1.20 is what perfect
 //! knowledge of them gives on average; with few poses, which ones are lost matters.

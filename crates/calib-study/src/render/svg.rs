@@ -19,8 +19,8 @@ pub struct Figure {
 /// Width and height in user units, and the frame's margins (left, right, top, bottom).
 const SIZE: [f64; 2] = [560.0, 360.0];
 const MARGINS: [f64; 4] = [62.0, 170.0, 34.0, 46.0];
-/// Seven colours that stay apart in print and for the colour-blind (Okabe & Ito 2008).
-const COLOURS: [&str; 7] = [
+/// Seven colors that stay apart in print and for the color-blind (Okabe & Ito 2008).
+const COLORS: [&str; 7] = [
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#333333",
 ];
 
@@ -310,7 +310,7 @@ fn draw(plot: &Plot) -> String {
         }
     }
     for (k, series) in plot.series.iter().enumerate() {
-        let colour = COLOURS[k % COLOURS.len()];
+        let color = COLORS[k % COLORS.len()];
         let dash = if series.dashed {
             " stroke-dasharray=\"5 4\""
         } else {
@@ -324,7 +324,7 @@ fn draw(plot: &Plot) -> String {
                 if !series.dashed {
                     let _ = writeln!(
                         out,
-                        "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{colour}\"/>"
+                        "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{color}\"/>"
                     );
                 }
             }
@@ -332,8 +332,8 @@ fn draw(plot: &Plot) -> String {
         let key = top + 8.0 + 18.0 * k as f64;
         let _ = writeln!(
             out,
-            "<path d=\"{d}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.6\"{dash}/>\
-             <path d=\"M{:.1} {key:.1}h22\" stroke=\"{colour}\" stroke-width=\"1.6\"{dash}/>\
+            "<path d=\"{d}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.6\"{dash}/>\
+             <path d=\"M{:.1} {key:.1}h22\" stroke=\"{color}\" stroke-width=\"1.6\"{dash}/>\
              <text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
             x1 + 10.0,
             x1 + 38.0,

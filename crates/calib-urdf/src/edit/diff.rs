@@ -1,4 +1,4 @@
-//! What differs between two robot descriptions: as numbers, as a table, as lines.
+//! What differs between two URDF: as numbers, as a table, as lines.
 //!
 //! Joints are matched by name. The change of an origin is `a_joint_from_b_joint = a_origin⁻¹ · b_origin`; its
 //! translation is given in the parent link's axes, as the `xyz` of the file is, its rotation as one angle.

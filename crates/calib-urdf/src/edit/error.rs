@@ -73,7 +73,7 @@ pub enum EditError {
         reason: &'static str,
     },
     #[error(
-        "{file}:{place}: `{attribute}` of joint `{joint}` is \"{found}\", which xacro computes, so there is no number to replace\n  help: patch the expanded URDF, or the property that the expression uses"
+        "{file}:{place}: `{attribute}` of joint `{joint}` is \"{found}\", which xacro computes, so there is not a finite number to replace\n  help: patch the expanded URDF, or the property that the expression uses"
     )]
     XacroExpression {
         file: String,

@@ -82,7 +82,7 @@ impl RobotModel {
                 let [(first, a), (second, b)] = [&pair[0], &pair[1]];
                 let angle = a.angle_to(b);
                 let parallel = angle <= angle_tolerance;
-                // Of nearly parallel lines the nearest points run away: the distance at the joint is meant then.
+                // Of nearly parallel lines the nearest points diverge: the distance at the joint is meant then.
                 let distance = if parallel {
                     a.distance_to_point(&b.point)
                 } else {

@@ -117,8 +117,7 @@ fn record(
         SURVEY,
         options.patience,
         screen,
-    )
-    .map_err(CaptureError::from)?;
+    )?;
     let heard = match heard {
         Ok(heard) => heard,
         Err(ended) => {

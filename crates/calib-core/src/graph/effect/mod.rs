@@ -140,10 +140,10 @@ impl Quantity {
     pub fn unit(self, prismatic: bool) -> Unit {
         match (self, prismatic) {
             (Self::Position, false) => Unit::Radian,
-            (Self::Position, true) => Unit::Metre,
+            (Self::Position, true) => Unit::Meter,
             (Self::Ratio, _) => Unit::One,
-            (Self::Compliance, true) => Unit::MetrePerNewton,
-            (Self::Compliance, false) | (Self::LateralCompliance, _) => Unit::RadianPerNewtonMetre,
+            (Self::Compliance, true) => Unit::MeterPerNewton,
+            (Self::Compliance, false) | (Self::LateralCompliance, _) => Unit::RadianPerNewtonMeter,
             (Self::Time, _) => Unit::Second,
         }
     }
@@ -357,7 +357,7 @@ impl EffectKind {
     }
 
     /// F of equation (1) from the reading alone; `None` where it needs more.
-    pub(crate) fn from_reading(self, q: f64) -> Option<f64> {
+    pub(crate) fn of_reading(self, q: f64) -> Option<f64> {
         let term = self.term();
         let state = JointState {
             q,

@@ -71,7 +71,7 @@ impl Problem {
                 let (kind, unit) = if i < 3 {
                     (ParameterKind::Rotation, Unit::Radian)
                 } else {
-                    (ParameterKind::Translation, Unit::Metre)
+                    (ParameterKind::Translation, Unit::Meter)
                 };
                 parameters[i] = Some(self.parameter(Parameter {
                     name: format!("{name}.{}", labels[i]),

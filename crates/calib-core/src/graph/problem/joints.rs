@@ -46,7 +46,7 @@ impl Problem {
     }
 
     /// Frees a term whose regressor follows from the reading (zero offset, gain, eccentricity). The parameter is
-    /// called `<joint>.<term>`. A term that needs more ([`Problem::free_effect_with`]) or an edge that is no joint is
+    /// called `<joint>.<term>`. A term that needs more ([`Problem::free_effect_with`]) or an edge that is not a joint is
     /// reported by [`Model::new`](crate::Model::new).
     pub fn free_effect(
         &mut self,
@@ -56,7 +56,7 @@ impl Problem {
     ) -> ParameterId {
         let values = match self.joint_mut(edge, "free_effect") {
             Some(joint) if kind.term().source != Source::Constant => {
-                joint.q.iter().map(|q| kind.from_reading(*q)).collect()
+                joint.q.iter().map(|q| kind.of_reading(*q)).collect()
             }
             _ => None,
         };
@@ -141,7 +141,7 @@ impl Problem {
         }
     }
 
-    /// Declares an effect that is not modelled, for the goodness-of-fit test.
+    /// Declares an effect that is not modeled, for the goodness-of-fit test.
     pub fn candidate(&mut self, edge: EdgeId, kind: EffectKind, values: Vec<f64>) {
         let name = self.edge_name(edge).to_owned();
         if let Some(joint) = self.joint_mut(edge, "candidate") {
@@ -153,7 +153,7 @@ impl Problem {
         }
     }
 
-    /// Gives a joint's reading its own noise, drawn anew for every sample and marginalized.
+    /// Gives a joint's reading its own noise, drawn again for every sample and marginalized.
     pub fn joint_noise(&mut self, edge: EdgeId, group: GroupId) {
         if let Some(joint) = self.joint_mut(edge, "joint_noise") {
             joint.noise = Some(group);

@@ -34,7 +34,7 @@ impl Problem {
             name: format!("{name}.{axis}"),
             joint: None,
             kind: ParameterKind::Point,
-            unit: Unit::Metre,
+            unit: Unit::Meter,
             nominal: value,
             start: value,
             prior_sigma,

@@ -14,7 +14,7 @@ use crate::error::PipelineError;
 use crate::prepare::estimators::AxisFit;
 
 impl Task<'_> {
-    /// One swept axis: a line, with the point on it and the turn about it taken from the description.
+    /// One swept axis: a line, with the point on it and the turn about it taken from the nominal URDF.
     pub(super) fn single_axis(
         &self,
         found: &BTreeMap<String, OriginEstimate>,
@@ -150,7 +150,7 @@ impl Task<'_> {
                 },
                 Unobservable {
                     direction: [d.x, d.y, d.z, 0.0, 0.0, 0.0],
-                    text: format!("the turn about the axis of `{joint}` is taken from the description"),
+                    text: format!("the turn about the axis of `{joint}` is taken from the nominal URDF"),
                     remedy: "sweep a second joint, or solve with `method: ml`".to_owned(),
                 },
             ]

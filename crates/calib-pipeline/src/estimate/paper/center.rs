@@ -149,7 +149,7 @@ impl Task<'_> {
                             value: None,
                             sigma: None,
                             agrees: false,
-                            unit: Unit::Metre,
+                            unit: Unit::Meter,
                             distance: None,
                             text: reason.clone(),
                         };
@@ -166,7 +166,7 @@ impl Task<'_> {
                     value: Some(point.coords.as_slice().to_vec()),
                     sigma: Some(own.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()),
                     agrees: z2 <= AGREES,
-                    unit: Unit::Metre,
+                    unit: Unit::Meter,
                     distance: Some(difference.norm()),
                     text: String::new(),
                 }
@@ -174,7 +174,7 @@ impl Task<'_> {
             .collect()
     }
 
-    /// A center without axes: the orientation is the description's, relative to a body.
+    /// A center without axes: the orientation is the nominal URDF's, relative to a body.
     pub(super) fn center_only(
         &self,
         findings: &mut Vec<Finding>,
@@ -228,7 +228,7 @@ impl Task<'_> {
     fn assumed_orientation(&self) -> Unobservable {
         Unobservable {
             direction: [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
-            text: "a center has no orientation: it is taken from the description, the robot standing as drawn".to_owned(),
+            text: "a center has no orientation: it is taken from the nominal URDF, the robot standing at its zero configuration".to_owned(),
             remedy: "sweep two axes and name them under `axes`, or solve with `method: ml`".to_owned(),
         }
     }

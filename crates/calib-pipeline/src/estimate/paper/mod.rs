@@ -37,7 +37,7 @@ pub struct OriginEstimate {
     pub covariance: Option<Matrix6<f64>>,
     /// Directions that the sweep does not see; what is reported along them is a choice.
     pub unobservable: Vec<Unobservable>,
-    /// Calibrated, or assumed where its orientation is taken from the description.
+    /// Calibrated, or assumed where its orientation is taken from the nominal URDF.
     pub status: Status,
     /// Center of rotation in the tracker's frame, where there is one.
     pub center: Option<Point3<f64>>,

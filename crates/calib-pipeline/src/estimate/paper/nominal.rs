@@ -62,7 +62,7 @@ impl Task<'_> {
         )
     }
 
-    /// `body_from_child` rotation, with the robot standing in the tracker as the description says.
+    /// `body_from_child` rotation, with the robot standing in the tracker as the nominal URDF says.
     pub(super) fn assumed_rotation(&self) -> Option<UnitQuaternion<f64>> {
         let model = &self.inputs.robot.model;
         let child = model.joint(self.origin.joint).child;

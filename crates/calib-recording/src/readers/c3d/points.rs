@@ -91,7 +91,7 @@ pub(super) fn read(
         .into_iter()
         .zip(points.samples)
         .map(|(name, samples)| MarkerStream {
-            unlabelled: name.starts_with('*'),
+            unlabeled: name.starts_with('*'),
             name,
             body: None,
             timeline: 0,
@@ -128,7 +128,7 @@ fn read_frames(input: &mut dyn Input, shape: &Shape) -> Placed<Points> {
                 points.not_finite += 1;
                 MarkerSample::Lost
             } else {
-                let point = Point3::from(xyz.map(|value| value / shape.units_per_metre));
+                let point = Point3::from(xyz.map(|value| value / shape.units_per_meter));
                 points.any_residual |= w & 0xff != 0;
                 if w & 0xff == 0 {
                     MarkerSample::Filled(point)

@@ -21,7 +21,7 @@ pub(super) struct Shape {
     pub scale: f64,
     pub data_start: u64,
     pub rate: f64,
-    pub units_per_metre: f64,
+    pub units_per_meter: f64,
 }
 
 /// The header block with the parameters that complete it.
@@ -77,7 +77,7 @@ pub(super) fn shape(
         scale: scale.abs(),
         data_start,
         rate,
-        units_per_metre: unit.per_metre(),
+        units_per_meter: unit.per_meter(),
     })
 }
 

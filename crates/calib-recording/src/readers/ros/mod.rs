@@ -358,7 +358,7 @@ impl Group {
             out.markers.push(MarkerStream {
                 name,
                 body: None,
-                unlabelled: false,
+                unlabeled: false,
                 timeline,
                 samples: samples.collect(),
             });

@@ -11,7 +11,7 @@ pub(super) struct Body {
     pub stream: BodyStream,
     pub position: [usize; 3],
     pub rotation: Vec<usize>,
-    pub units_per_metre: f64,
+    pub units_per_meter: f64,
     pub units_per_radian: f64,
     pub zeros: Vec<u64>,
 }
@@ -23,7 +23,7 @@ pub(super) fn read_body(body: &mut Body, line: u64, row: u64, values: &[f64]) ->
         line,
         &name,
         body.position.map(|i| values[i]),
-        body.units_per_metre,
+        body.units_per_meter,
     )?;
     let parts: Vec<f64> = body
         .rotation

@@ -231,7 +231,7 @@ impl Section {
         let mut units: Option<Vec<String>> = None;
         let mut tracks: Option<Tracks> = None;
         let mut values = Vec::new();
-        let mut length = LengthUnit::Mm.per_metre();
+        let mut length = LengthUnit::Mm.per_meter();
         loop {
             let number = lines.number() + 1;
             let Some(line) = lines.next()? else { break };
@@ -256,7 +256,7 @@ impl Section {
                         section: self,
                         units: units.as_deref(),
                     };
-                    length = columns.length_unit()?.per_metre();
+                    length = columns.length_unit()?.per_meter();
                     tracks.insert(columns.plan(options, length, out)?)
                 }
             };
@@ -400,7 +400,7 @@ impl Columns<'_> {
     fn plan(
         &self,
         options: &ReadOptions,
-        units_per_metre: f64,
+        units_per_meter: f64,
         out: &mut Recording,
     ) -> Placed<Tracks> {
         let mut tracks = Tracks::default();
@@ -422,7 +422,7 @@ impl Columns<'_> {
                     stream: body_stream(name),
                     position: [x, y, z],
                     rotation,
-                    units_per_metre,
+                    units_per_meter,
                     units_per_radian: self.angle_unit(a).per_radian(),
                     zeros: Vec::new(),
                 });
@@ -435,9 +435,9 @@ impl Columns<'_> {
             }
         }
         self.choose_rotation_form(options, &mut tracks.bodies, conversions)?;
-        let unit = if units_per_metre == 1e3 {
+        let unit = if units_per_meter == 1e3 {
             "mm"
-        } else if units_per_metre == 1e2 {
+        } else if units_per_meter == 1e2 {
             "cm"
         } else {
             "m"

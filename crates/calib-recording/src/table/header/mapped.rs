@@ -16,7 +16,7 @@ pub(super) fn apply(
         layout,
         mapped,
         angle: map.angles.per_radian(),
-        length: map.lengths.per_metre(),
+        length: map.lengths.per_meter(),
     };
     if let Some(time) = &map.time {
         let scale = time.unit.per_second();

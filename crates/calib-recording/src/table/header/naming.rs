@@ -42,7 +42,7 @@ fn part(text: &str) -> Option<(Part, f64)> {
     let (axis, unit) = text.split_once('_')?;
     let axis = ["x", "y", "z"].iter().position(|&a| a == axis)?;
     let unit = length_suffix(unit)?;
-    Some((Part::Axis(axis), unit.per_metre()))
+    Some((Part::Axis(axis), unit.per_meter()))
 }
 
 fn length_suffix(unit: &str) -> Option<LengthUnit> {
@@ -128,14 +128,14 @@ pub(super) fn meaning(name: &str) -> Meaning<'_> {
             return Meaning::Part {
                 entity,
                 part: Part::Axis(axis),
-                scale: unit.per_metre(),
+                scale: unit.per_meter(),
                 dotted: false,
             };
         }
         return Meaning::Joint {
             name: head,
             unit: JointUnit::Length,
-            scale: unit.per_metre(),
+            scale: unit.per_meter(),
         };
     }
     match last {

@@ -101,7 +101,7 @@ impl Rows<'_> {
                 .map(|(name, samples)| MarkerStream {
                     name,
                     body: None,
-                    unlabelled: false,
+                    unlabeled: false,
                     timeline: 0,
                     samples,
                 })
