@@ -19,7 +19,7 @@ use crate::terminal::{emit, spinner};
 pub struct Run {
     /// The robot's profile
     pub profile: PathBuf,
-    /// Folder to write to [default: results/<profile name>]
+    /// Folder to write to [default: results/PROFILE]
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Method to use instead of the profile's
