@@ -1,10 +1,13 @@
 //! What is not observable: the words of causes, combinations of parameters and degrees of freedom.
 
-use super::prose::{or, sentence, short};
+use super::prose::{or, sentence};
 use crate::{Cause, Meaning, NotObservable, Report, Term, Transform, Unobservable};
 
 /// Parameters of a combination that are named; the rest is counted.
 const NAMED: usize = 4;
+
+/// Items in the short answer, which shares the first screen with eleven others; the rest is counted.
+const ANSWERED: usize = 2;
 
 /// Where nothing is missing.
 pub(crate) const ALL_OBSERVABLE: &str = "All requested quantities are observable.";
@@ -16,12 +19,13 @@ pub(crate) fn unobservable(report: &Report, rest: &str) -> Vec<String> {
     }
     let items = report.not_observable.iter();
     let of = |meaning: Meaning| items.clone().filter(move |item| item.meaning == meaning);
-    let measured: Vec<String> = of(Meaning::NotMeasured)
-        .map(|item| sentence(&item.in_short()))
-        .collect();
-    let mut lines = short(&measured, rest);
-    let open: Vec<&Transform> = report.transforms.iter().filter(|t| !t.observable).collect();
-    lines.extend(open.iter().map(|t| degrees_of_freedom(t)));
+    let measured = of(Meaning::NotMeasured).map(|item| sentence(&item.in_short()));
+    let open = report.transforms.iter().filter(|t| !t.observable);
+    let all: Vec<String> = measured.chain(open.map(degrees_of_freedom)).collect();
+    let mut lines: Vec<String> = all.iter().take(ANSWERED).cloned().collect();
+    if all.len() > ANSWERED {
+        lines.push(format!("… and {} more {rest}.", all.len() - ANSWERED));
+    }
     match of(Meaning::Convention).count() {
         0 => {}
         1 => lines.push(
