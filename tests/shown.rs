@@ -1,6 +1,7 @@
 //! What a person or a program reads, reviewed as snapshots: the summary, the reports, the checks, the help.
 //!
-//! Long tables are cut after three rows, numbers are rounded to what the next machine gives as well.
+//! Long tables are cut after three rows, numbers are rounded to what the next machine gives as well. A long text has
+//! several snapshots, one for each part that a person reviews at once.
 
 #[path = "../crates/calib-report/tests/suite/browser.rs"]
 mod browser;
@@ -11,6 +12,9 @@ use serde_json::{Number, Value, json};
 
 /// Rows of a table, or entries of a list, that a snapshot keeps.
 const KEPT: usize = 3;
+
+/// Lines of an entry from which on a snapshot keeps the first entry of a list only.
+const LONG_ENTRY: usize = 20;
 
 /// Significant digits of a number in running text.
 const DIGITS: usize = 3;
@@ -96,10 +100,11 @@ fn rounded(key: &str, value: &Value) -> Value {
         Value::Array(list) if key == "covariance" => json!(format!("{} rows", list.len())),
         Value::Array(list) => {
             let lengths = list.iter().all(Value::is_number) && list.len() <= 6;
-            let kept = if lengths {
-                list.len()
-            } else {
-                KEPT.min(list.len())
+            let first = list.first().map(|v| rounded(key, v));
+            let kept = match first {
+                _ if lengths => list.len(),
+                Some(entry) if lines_of(&entry) >= LONG_ENTRY => 1,
+                _ => KEPT.min(list.len()),
             };
             let mut out: Vec<Value> = list[..kept].iter().map(|v| rounded(key, v)).collect();
             if kept < list.len() {
@@ -120,6 +125,31 @@ fn rounded(key: &str, value: &Value) -> Value {
         )),
         _ => value.clone(),
     }
+}
+
+fn lines_of(value: &Value) -> usize {
+    serde_json::to_string_pretty(value).map_or(0, |text| text.lines().count())
+}
+
+/// The keys of an object by the snapshots that show them; what no part names is in the last one.
+fn in_parts<'a>(
+    value: &Value,
+    parts: &[(&'a str, &[&str])],
+    rest: &'a str,
+) -> Vec<(&'a str, Value)> {
+    let object = value.as_object().expect("a report is an object");
+    let part_of = |key: &str| {
+        let named = parts.iter().find(|(_, keys)| keys.contains(&key));
+        named.map_or(rest, |(name, _)| *name)
+    };
+    let names = parts.iter().map(|(name, _)| *name).chain([rest]);
+    names
+        .map(|name| {
+            let of_part = object.iter().filter(|(key, _)| part_of(key) == name);
+            let kept = of_part.map(|(key, v)| (key.clone(), rounded(key, v)));
+            (name, Value::Object(kept.collect()))
+        })
+        .collect()
 }
 
 fn rounded_number(key: &str, x: f64) -> Option<Number> {
@@ -163,12 +193,68 @@ fn summaries() {
 fn reports() {
     for robot in ["ripley", "justin"] {
         let run = finished(robot, "ml");
-        insta::assert_snapshot!(
-            format!("report_md_{robot}"),
-            shortened(&run.dir.read("out/report.md"))
-        );
-        insta::assert_json_snapshot!(format!("report_json_{robot}"), rounded("", &run.report));
+        let page = run.dir.read("out/report.md");
+        let (verdict, rest) = page.split_once("\n## Changes").expect("changes");
+        let (changes, data) = rest.split_once("\n## Transforms").expect("transforms");
+        for (part, text) in [
+            ("1_verdict", verdict.to_owned()),
+            ("2_changes", format!("## Changes{changes}")),
+            ("3_data", format!("## Transforms{data}")),
+        ] {
+            insta::assert_snapshot!(format!("report_md_{robot}_{part}"), shortened(&text));
+        }
+        for (part, value) in in_parts(&run.report, REPORT_PARTS, "verdict") {
+            insta::assert_json_snapshot!(format!("report_json_{robot}_{part}"), value);
+        }
     }
+}
+
+/// The keys of `report.json` by snapshot; the others stand with the verdict.
+const REPORT_PARTS: &[(&str, &[&str])] = &[
+    ("estimates", &["transforms", "parameters", "changes"]),
+    (
+        "unobservable",
+        &["not_observable", "workspace", "accuracy_limits"],
+    ),
+    ("checks", &["loops", "estimators", "noise", "clocks"]),
+    ("verification", &["verification"]),
+    ("residuals", &["residuals"]),
+    (
+        "data",
+        &["recordings", "coverage", "rejected", "inputs", "outputs"],
+    ),
+];
+
+/// The longest snapshot that a person reads in full when it changes.
+const MAX_SNAPSHOT_LINES: usize = 200;
+
+#[test]
+fn snapshots_are_short_enough_to_be_reviewed() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut folders = vec![
+        root.join("crates"),
+        root.join("tests"),
+        root.join("plugins"),
+    ];
+    let mut read = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "snap") {
+                let text = std::fs::read_to_string(&path).expect("a snapshot is text");
+                let lines = text.lines().count();
+                assert!(
+                    lines <= MAX_SNAPSHOT_LINES,
+                    "{}: {lines} lines",
+                    path.display()
+                );
+                read += 1;
+            }
+        }
+    }
+    assert!(read > 50, "{read} snapshots were found");
 }
 
 #[test]
@@ -194,24 +280,36 @@ fn checks() {
 #[test]
 fn help() {
     let dir = Scratch::new();
-    insta::assert_snapshot!(help_pages(&dir, &[]));
+    let page = help_page(&dir, &[]);
+    insta::assert_snapshot!("help", page);
+    for name in commands_of(&page) {
+        insta::assert_snapshot!(format!("help_{name}"), help_pages(&dir, &[name]));
+    }
 }
 
-/// The page of a command and the pages of all commands below it.
-fn help_pages(dir: &Scratch, command: &[&str]) -> String {
+fn help_page(dir: &Scratch, command: &[&str]) -> String {
     let asked = [command, &["--help"]].concat();
     let page = dir.calib_with(&asked).expect(0).stdout;
-    let mut text = format!("$ calib {}\n{page}\n", asked.join(" "));
-    let below = page
-        .lines()
+    format!("$ calib {}\n{page}\n", asked.join(" "))
+}
+
+/// The commands that a page of help lists.
+fn commands_of(page: &str) -> Vec<&str> {
+    page.lines()
         .skip_while(|line| *line != "Commands:")
         .skip(1)
         .take_while(|line| !line.is_empty())
         // A description that goes on stands deeper.
         .filter(|line| !line.starts_with("    "))
         .filter_map(|line| line.split_whitespace().next())
-        .filter(|name| *name != "help");
-    for name in below {
+        .filter(|name| *name != "help")
+        .collect()
+}
+
+/// The page of a command and the pages of all commands below it.
+fn help_pages(dir: &Scratch, command: &[&str]) -> String {
+    let mut text = help_page(dir, command);
+    for name in commands_of(&text.clone()) {
         text += &help_pages(dir, &[command, &[name]].concat());
     }
     text
@@ -287,7 +385,9 @@ fn view_data(page: &str) -> Value {
 fn the_data_of_the_pages() {
     for robot in ["ripley", "justin"] {
         let data = view_data(&finished(robot, "ml").dir.read("out/report.html"));
-        insta::assert_json_snapshot!(format!("view_{robot}"), rounded("", &data));
+        for (part, value) in in_parts(&data, &[("poses", &["poses"])], "shapes") {
+            insta::assert_json_snapshot!(format!("view_{robot}_{part}"), value);
+        }
     }
 }
 
