@@ -36,7 +36,7 @@ const LOOKS: [&str; 11] = [
 ];
 
 /// Files that still look into their own words; an entry without need fails.
-const LEFT: [&str; 1] = ["crates/calib-study/src/render/markdown/mod.rs"];
+const LEFT: [&str; 0] = [];
 
 /// Every source of the crates, without their tests, as (path from the root, text), sorted.
 fn sources() -> Vec<(String, String)> {

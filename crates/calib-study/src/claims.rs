@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     cell::{Cell, Part, Quantity},
-    run::Study,
+    settings::Study,
 };
 
 /// A number of this study.

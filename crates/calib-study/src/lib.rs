@@ -35,6 +35,7 @@ mod motion;
 mod noise;
 mod render;
 mod run;
+mod settings;
 mod state;
 mod tally;
 
@@ -42,4 +43,5 @@ pub use cell::{Cell, Part, Quantity, Scene};
 pub use claims::{Claim, Measured};
 pub use held::{Standard, Standing, Worst};
 pub use render::{Figure, csv, json, markdown, svg, write};
-pub use run::{Study, StudyError, StudyOptions, StudyResult, run};
+pub use run::{StudyResult, run};
+pub use settings::{Study, StudyError, StudyOptions};

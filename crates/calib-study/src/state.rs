@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     cell::Cell,
-    run::{Study, StudyError, StudyOptions},
+    settings::{Study, StudyError, StudyOptions},
 };
 
 #[derive(Debug, PartialEq, Serialize, Deserialize)]

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     cell::Cell,
     render::text::{label, probability},
-    run::Study,
+    settings::Study,
 };
 
 /// Monte-Carlo standard errors that a cell may miss its limit by and still count as undecided: among a hundred cells exactly at
@@ -51,6 +51,8 @@ pub struct Standard {
     pub limit: f64,
     /// Whether values must stay above it (efficiencies) or below.
     pub at_least: bool,
+    /// Whether the value is the upper end of a rate's interval, and its error a third of the interval.
+    pub is_rate: bool,
     /// Cells judged.
     pub cells: usize,
     /// Cells that reach the limit.
@@ -92,6 +94,7 @@ fn judge(text: &str, limit: f64, at_least: bool, values: Vec<Value>) -> Standard
         text: text.to_owned(),
         limit,
         at_least,
+        is_rate: false,
         cells,
         held,
         within_error,
@@ -134,7 +137,10 @@ fn rates(
             (format!("{method}: {wrong} of {all}"), high, error)
         })
         .collect();
-    judge(text, limit, false, values)
+    Standard {
+        is_rate: true,
+        ..judge(text, limit, false, values)
+    }
 }
 
 /// The standards of a study.

@@ -2,10 +2,7 @@
 
 use csv::WriterBuilder;
 
-use crate::{
-    cell::Cell,
-    run::{Study, StudyResult},
-};
+use crate::{cell::Cell, run::StudyResult, settings::Study};
 
 /// Columns of the table.
 const HEADER: [&str; 26] = [

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use calib_files::{FileError, replace};
 
-use crate::run::{StudyError, StudyResult};
+use crate::{run::StudyResult, settings::StudyError};
 
 pub use csv::csv;
 pub use markdown::markdown;

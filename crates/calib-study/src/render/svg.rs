@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 use crate::{
     cell::{Cell, Part, Quantity},
-    run::{Study, StudyResult},
+    run::StudyResult,
+    settings::Study,
 };
 
 /// A picture.

@@ -7,10 +7,7 @@ mod table;
 use std::fmt::Write;
 
 use super::text::three;
-use crate::{
-    held::Standing,
-    run::{Study, StudyResult},
-};
+use crate::{held::Standing, run::StudyResult, settings::Study};
 
 /// The whole study as Markdown.
 #[must_use]
@@ -54,7 +51,7 @@ fn standards(out: &mut String, result: &StudyResult) {
             |w| {
                 (
                     w.cell.clone(),
-                    if s.text.ends_with("upper end") {
+                    if s.is_rate {
                         three(w.value)
                     } else {
                         format!("{} ± {}", three(w.value), three(w.mc))
