@@ -288,11 +288,9 @@ const CIRCLES_LEFT: &[&str] = &[
     "calib-aor",
     "calib-checks",
     "calib-cor",
-    "calib-core",
     "calib-estimator",
     "calib-fit",
     "calib-pipeline",
-    "calib-study",
 ];
 
 /// `a/b/mod.rs`, `a/b.rs` → [a, b]; `lib.rs` → [].

@@ -78,7 +78,7 @@
 //! let elbow = problem.joint("elbow", elbow_frame, link2, Axis::Revolute(Vector3::y_axis()), q2.to_vec());
 //! problem.free_effect(elbow, EffectKind::ZeroOffset, Some(0.05));
 //!
-//! // Where the body sits on the last link is known to 1 cm across, but its turn is not.
+//! // Where the body sits on the last link is known to 1 cm across, but its rotation is not.
 //! let mount = problem.unknown("body_mount", link2, body, link_from_body, Chart::full());
 //! problem.set_role(mount, Role::Mount, None);
 //! problem.set_prior(mount, None, Some(0.01));
@@ -118,7 +118,7 @@
 //! let sigma_m = found.covariance.expect("estimable")[(3, 3)].sqrt();
 //! assert!(sigma_m < 2e-4);
 //!
-//! // Offset and turn of the mount about the same axis cannot be distinguished: the fit says so.
+//! // Offset of the joint and rotation of the mount about the same axis cannot be distinguished: the fit says so.
 //! let offset = solution.parameters.iter().find(|p| p.name == "elbow.offset").expect("named above");
 //! assert_eq!(offset.class, ParameterClass::NotObservable);
 //! # Ok::<(), Error>(())
@@ -142,9 +142,10 @@ pub use analysis::observability::{Direction, Observability, Term};
 pub use analysis::sandwich::sandwich;
 pub use analysis::solution::{NoiseEstimate, ParameterClass, ParameterEstimate, Solution};
 pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
+pub use graph::axis::Axis;
 pub use graph::baseline::Baseline;
 pub use graph::chart::Chart;
-pub use graph::edge::{Axis, Candidate, Edge, EdgeKind, Joint, JointEffect, Role, UnknownPose};
+pub use graph::edge::{Candidate, Edge, EdgeKind, Joint, JointEffect, Role, UnknownPose};
 pub use graph::effect::{self, EFFECTS, Effect, EffectKind, JointState};
 pub use graph::error::Error;
 pub use graph::ids::{EdgeId, FrameId, GroupId, MeasurementId, ParameterId, PointId};
@@ -152,10 +153,9 @@ pub use graph::measurement::{
     self, DirectionObservation, MarkerObservation, Measurement, MeasurementKind, PoseNoise,
     PoseObservation,
 };
-pub use graph::parameter::{
-    DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA, Parameter, ParameterKind, Unit,
-};
+pub use graph::parameter::{Parameter, ParameterKind};
 pub use graph::problem::{NoiseGroup, NoiseKind, Point, Problem};
+pub use graph::unit::{DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA, Unit};
 pub use model::derived::{Configuration, DerivedPoint, DerivedPose};
 pub use model::joint::JointMotion;
 pub use model::layout::Model;

@@ -14,9 +14,10 @@ use crate::graph::ids::GroupId;
 use crate::graph::problem::Problem;
 use crate::model::layout::Model;
 use crate::model::values::Values;
+use crate::solve::equations::{Objective, Workspace};
 use crate::solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize_in};
 use crate::solve::noise::{Scoring, score};
-use crate::solve::normal::{Workspace, data_cost};
+use crate::solve::normal::data_cost;
 use crate::solve::robust::{RejectReason, Rejection, RobustSettings, clean, explain, gate};
 use crate::solve::rows::add_block;
 
@@ -116,7 +117,14 @@ pub fn solve(problem: &Problem, settings: &Settings) -> Result<Solution, Error> 
         rejected: explain(&model, values, &theta, &mask, &weights, &mut work),
         iterations: fit.iterations,
         relative_sigma: fit.relative_sigma,
-        chi2_stated: data_cost(&model, values, &weights, &stated, &mut work),
+        chi2_stated: {
+            let objective = Objective {
+                model: &model,
+                weights: &weights,
+                theta: &stated,
+            };
+            data_cost(objective, values, &mut work)
+        },
         weights,
         theta,
     };
@@ -186,7 +194,12 @@ impl Fit<'_> {
             decrement,
             ..self.settings.minimize
         };
-        let minimum = minimize_in(self.model, start, weights, theta, &settings, work);
+        let objective = Objective {
+            model: self.model,
+            weights,
+            theta,
+        };
+        let minimum = minimize_in(objective, start, &settings, work);
         self.iterations += minimum.iterations;
         minimum
     }
@@ -214,11 +227,16 @@ impl Fit<'_> {
             if minimum.status == SolveStatus::NotEvaluable {
                 break;
             }
+            let objective = Objective {
+                model: self.model,
+                weights,
+                theta,
+            };
             let Some(Scoring {
                 theta: next,
                 change,
                 relative_sigma,
-            }) = score(self.model, &minimum.values, weights, theta, work)
+            }) = score(objective, &minimum.values, work)
             else {
                 break;
             };

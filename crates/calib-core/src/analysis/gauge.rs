@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::graph::edge::{EdgeKind, Role};
 use crate::graph::parameter::ParameterKind;
 use crate::graph::problem::Problem;
-use crate::model::cache::EdgeCache;
+use crate::model::cache::{EdgeCache, State};
 use crate::model::layout::Model;
 use crate::model::path::{CompiledPath, Derivatives, Step};
 use crate::model::values::Values;
@@ -109,6 +109,7 @@ impl Axes {
         let probes: Vec<usize> = used.iter().step_by(stride).copied().collect();
         let mut cache = EdgeCache::new(&model.problem, model.trig.clone());
         cache.update(&model.problem, values);
+        let at = State::new(&model.problem, &cache, values);
         let mut joints: Vec<(usize, Vec<Vector3<f64>>)> = Vec::new();
         for path in &model.paths {
             for (k, step) in path.steps.iter().enumerate() {
@@ -119,10 +120,7 @@ impl Axes {
                     let mut before = path.clone();
                     before.steps.truncate(k);
                     let axis = joint.axis.direction().into_inner();
-                    joints.push((
-                        *edge,
-                        directions(model, values, &cache, &before, axis, &probes),
-                    ));
+                    joints.push((*edge, directions(at, &before, axis, &probes)));
                 }
             }
         }
@@ -140,21 +138,14 @@ impl Axes {
 
 /// An axis at the end of a path, in the path's first frame, at several samples.
 fn directions(
-    model: &Model,
-    values: &Values,
-    cache: &EdgeCache,
+    at: State,
     path: &CompiledPath,
     axis: Vector3<f64>,
     samples: &[usize],
 ) -> Vec<Vector3<f64>> {
     let mut buffer = path.buffer();
-    let at = |&s: &usize| {
-        let problem = &model.problem;
-        path.evaluate(problem, cache, values, s, Derivatives::None, &mut buffer)
-            .r
-            * axis
-    };
-    samples.iter().map(at).collect()
+    let mut direction = |&s: &usize| path.evaluate(at, s, Derivatives::None, &mut buffer).r * axis;
+    samples.iter().map(&mut direction).collect()
 }
 
 /// What the parameters of a direction belong to: edges of unknown poses by their role, joints, frames of points.

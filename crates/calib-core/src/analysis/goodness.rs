@@ -18,8 +18,10 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::analysis::solution::Solution;
 use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{EFFECTS, EffectKind, Source};
+use crate::model::cache::State;
 use crate::model::layout::Model;
-use crate::solve::normal::{NormalEquations, Workspace, accumulate};
+use crate::solve::equations::{NormalEquations, Workspace};
+use crate::solve::normal::accumulate;
 use crate::solve::rows::{dot, residual};
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
@@ -122,14 +124,7 @@ impl Solution {
         let n = model.free();
         let mut work = Workspace::new(model);
         let mut system = NormalEquations::new(n);
-        if !accumulate(
-            model,
-            &self.values,
-            &self.weights,
-            &self.theta,
-            &mut work,
-            &mut system,
-        ) {
+        if !accumulate(self.objective(), &self.values, &mut work, &mut system) {
             return None;
         }
         let c = covariance_of(&system)?;
@@ -191,14 +186,7 @@ impl Solution {
         mut see: impl FnMut(&Whitened, &[DVector<f64>]),
     ) {
         for sample in 0..self.model.problem.samples {
-            let Some(s) = whitened(
-                &self.model,
-                &self.values,
-                &self.weights,
-                &self.theta,
-                sample,
-                work,
-            ) else {
+            let Some(s) = whitened(self.objective(), &self.values, sample, work) else {
                 continue;
             };
             let columns = self.effect_rows(candidates, sample, &s.blocks, s.w.len(), work);
@@ -224,13 +212,8 @@ impl Solution {
             let observation = model.observations[o];
             if observation.measurement != measurement {
                 measurement = observation.measurement;
-                pose = model.paths[measurement].effects(
-                    &model.problem,
-                    &work.cache,
-                    &self.values,
-                    sample,
-                    &mut twists,
-                );
+                let at = State::new(&model.problem, &work.cache, &self.values);
+                pose = model.paths[measurement].effects(at, sample, &mut twists);
             }
             let jacobian = residual(model, &self.values, measurement, observation.item, &pose);
             for (k, candidate) in candidates.iter().enumerate() {

@@ -13,10 +13,11 @@ use nalgebra::{DMatrix, DVector};
 
 use calib_geometry::decompose;
 
+use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
-use crate::solve::normal::Workspace;
+use crate::solve::equations::Workspace;
 
 /// A direction whose singular value is below this fraction of the largest is a gauge: rounding
 /// leaves about 1e-14, the weakest physical effect seen on real robots about 1e-6.
@@ -147,14 +148,8 @@ impl Information {
             if model.of_sample[sample].is_empty() {
                 continue;
             }
-            rows.fill(
-                model,
-                &work.cache,
-                values,
-                weights,
-                sample,
-                Derivatives::All,
-            );
+            let at = State::new(&model.problem, &work.cache, values);
+            rows.fill(model, at, weights, sample, Derivatives::All);
             rows.covariance(model, weights, theta);
             rows.factor()?;
             rows.whiten(true);

@@ -13,7 +13,8 @@ use calib_geometry::decompose::symmetric_eigen;
 
 use crate::model::layout::Model;
 use crate::model::values::Values;
-use crate::solve::normal::{NormalEquations, Workspace, accumulate};
+use crate::solve::equations::{NormalEquations, Objective, Workspace};
+use crate::solve::normal::accumulate;
 use crate::solve::whitened::{covariance_of, whitened};
 
 /// An eigenvalue of I − Q below this means a direction with leverage 1, which carries no residual.
@@ -31,7 +32,12 @@ pub fn sandwich(
     let n = model.free();
     let mut work = Workspace::new(model);
     let mut system = NormalEquations::new(n);
-    if !accumulate(model, values, weights, theta, &mut work, &mut system) {
+    let objective = Objective {
+        model,
+        weights,
+        theta,
+    };
+    if !accumulate(objective, values, &mut work, &mut system) {
         return None;
     }
     let c = covariance_of(&system)?;
@@ -43,7 +49,7 @@ pub fn sandwich(
         }
     }
     for sample in 0..model.problem.samples {
-        let Some(s) = whitened(model, values, weights, theta, sample, &mut work) else {
+        let Some(s) = whitened(objective, values, sample, &mut work) else {
             continue;
         };
         let m = s.w.len();

@@ -5,10 +5,12 @@ use serde::{Deserialize, Serialize};
 use crate::analysis::information::{INDETERMINATE, Information};
 use crate::analysis::observability::Observability;
 use crate::graph::ids::{GroupId, ParameterId};
-use crate::graph::parameter::{ParameterKind, Unit};
+use crate::graph::parameter::ParameterKind;
 use crate::graph::problem::NoiseKind;
+use crate::graph::unit::Unit;
 use crate::model::layout::Model;
 use crate::model::values::Values;
+use crate::solve::equations::Objective;
 use crate::solve::minimize::SolveStatus;
 use crate::solve::robust::Rejection;
 
@@ -123,6 +125,17 @@ pub struct Solution {
     pub rejected: Vec<Rejection>,
     /// σ² per noise group, as used.
     pub theta: Vec<f64>,
+}
+
+impl Solution {
+    /// What was minimized in the end, for passes over its rows.
+    pub(crate) fn objective(&self) -> Objective<'_> {
+        Objective {
+            model: &self.model,
+            weights: &self.weights,
+            theta: &self.theta,
+        }
+    }
 }
 
 /// Every parameter of the problem after the fit.

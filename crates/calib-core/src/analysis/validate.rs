@@ -14,7 +14,8 @@ use serde::{Deserialize, Serialize};
 use crate::analysis::solution::Solution;
 use crate::graph::ids::MeasurementId;
 use crate::model::layout::Model;
-use crate::solve::normal::{NormalEquations, Workspace, accumulate};
+use crate::solve::equations::{NormalEquations, Objective, Workspace};
+use crate::solve::normal::accumulate;
 use crate::solve::whitened::{covariance_of, whitened};
 
 /// Prediction of one sample from the others.
@@ -136,16 +137,13 @@ impl Solution {
         let mut work = Workspace::new(model);
         work.cache.update(&model.problem, &self.values);
         let everything = vec![1.0; model.observations.len()];
+        let objective = Objective {
+            weights: &everything,
+            ..self.objective()
+        };
         let mut out = Vec::new();
         for sample in 0..model.problem.samples {
-            let Some(s) = whitened(
-                model,
-                &self.values,
-                &everything,
-                &self.theta,
-                sample,
-                &mut work,
-            ) else {
+            let Some(s) = whitened(objective, &self.values, sample, &mut work) else {
                 continue;
             };
             let e = &s.l * &s.w;
@@ -161,21 +159,17 @@ impl Solution {
         let model = &self.model;
         let mut work = Workspace::new(model);
         let mut system = NormalEquations::new(model.free());
-        if !accumulate(
-            model,
-            &self.values,
-            &self.weights,
-            &self.theta,
-            &mut work,
-            &mut system,
-        ) {
+        if !accumulate(self.objective(), &self.values, &mut work, &mut system) {
             return None;
         }
         let c = covariance_of(&system)?;
+        let included = Objective {
+            weights: include,
+            ..self.objective()
+        };
         let mut out = CrossValidation::default();
         for sample in 0..model.problem.samples {
-            let Some(s) = whitened(model, &self.values, include, &self.theta, sample, &mut work)
-            else {
+            let Some(s) = whitened(included, &self.values, sample, &mut work) else {
                 continue;
             };
             let m = s.w.len();

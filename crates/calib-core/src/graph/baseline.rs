@@ -1,12 +1,11 @@
-//! What a calibration must be compared with: the robot at its zero configuration, and the robot at its zero configuration but placed where the
-//! tracker sees it.
+//! What a calibration must be compared with: the nominal robot, and the nominal robot placed where the tracker sees it.
 
 use std::collections::BTreeSet;
 
 use crate::graph::edge::{EdgeKind, Role};
 use crate::graph::effect::EffectKind;
-use crate::graph::parameter::{DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA};
 use crate::graph::problem::Problem;
+use crate::graph::unit::{DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA};
 
 /// How much of a problem is left free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,8 +1,9 @@
 //! The edges of the frame graph: what lies between two frames, and which of it is unknown.
 
-use nalgebra::{Isometry3, Matrix6, Unit, Vector3};
+use nalgebra::{Isometry3, Matrix6};
 use serde::{Deserialize, Serialize};
 
+use crate::graph::axis::Axis;
 use crate::graph::chart::Chart;
 use crate::graph::effect::EffectKind;
 use crate::graph::ids::{FrameId, GroupId, ParameterId};
@@ -105,38 +106,6 @@ pub struct UnknownPose {
     pub joint: Option<String>,
     /// Parameter per chart coordinate; `None` where the chart is not free.
     pub parameters: [Option<ParameterId>; 6],
-}
-
-/// What a joint's motion is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Axis {
-    /// Rotation about this direction through the joint frame's origin (q in rad).
-    Revolute(Unit<Vector3<f64>>),
-    /// Translation along this direction (q in m).
-    Prismatic(Unit<Vector3<f64>>),
-}
-
-impl Axis {
-    /// The direction, in the joint frame.
-    #[must_use]
-    pub fn direction(&self) -> Unit<Vector3<f64>> {
-        match self {
-            Self::Revolute(a) | Self::Prismatic(a) => *a,
-        }
-    }
-
-    /// Two unit vectors that complete the axis to a right-handed basis (a, e₁, e₂): the axes of
-    /// lateral compliance. For a coordinate axis they are coordinate axes (z: x and y).
-    #[must_use]
-    pub fn across(&self) -> [Vector3<f64>; 2] {
-        let a = self.direction().into_inner();
-        // The coordinate axis after the dominant one, orthogonalized.
-        let k = a.iamax();
-        let mut seed = Vector3::zeros();
-        seed[(k + 1) % 3] = 1.0;
-        let e1 = (seed - a * a.dot(&seed)).normalize();
-        [e1, a.cross(&e1)]
-    }
 }
 
 /// Joint: `exp(S φ_s) · Exp(θ_s)` with `φ_s = q_s + Σ_j F_j(s) c_j` and lateral rotations

@@ -1,5 +1,6 @@
 //! The statement of a problem: frames, edges, unknowns, measurements and their noise.
 
+pub(crate) mod axis;
 pub(crate) mod baseline;
 pub(crate) mod chart;
 pub(crate) mod check;
@@ -10,3 +11,4 @@ pub(crate) mod ids;
 pub mod measurement;
 pub(crate) mod parameter;
 pub(crate) mod problem;
+pub(crate) mod unit;

@@ -4,11 +4,30 @@ use std::sync::Arc;
 
 use nalgebra::Vector6;
 
-use crate::graph::edge::{Axis, EdgeKind, Joint};
+use crate::graph::axis::Axis;
+use crate::graph::edge::{EdgeKind, Joint};
 use crate::graph::problem::Problem;
 use crate::model::joint::JointMotion;
 use crate::model::pose::Pose;
 use crate::model::values::{Values, coordinates};
+
+/// Where a path is evaluated: parameters' values, and what follows from them for all samples.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct State<'a> {
+    pub problem: &'a Problem,
+    pub cache: &'a EdgeCache,
+    pub values: &'a Values,
+}
+
+impl<'a> State<'a> {
+    pub(crate) fn new(problem: &'a Problem, cache: &'a EdgeCache, values: &'a Values) -> Self {
+        Self {
+            problem,
+            cache,
+            values,
+        }
+    }
+}
 
 /// Per edge: (sin q, cos q) of every sample of a revolute joint; empty for the other edges.
 pub(crate) type Trig = Arc<Vec<Vec<(f64, f64)>>>;

@@ -16,7 +16,7 @@ use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{EffectKind, JointState};
 use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId};
-use crate::model::cache::EdgeCache;
+use crate::model::cache::{EdgeCache, State};
 use crate::model::path::{CompiledPath, Derivatives, PathBuffer, Step};
 
 /// Joint readings (rad, m) and regressors of effects at which something is predicted. What is not
@@ -164,16 +164,9 @@ impl Solution {
         let mut cache = EdgeCache::new(&self.model.problem, self.model.trig.clone());
         cache.update(&self.model.problem, &self.values);
         let mut buffer = path.buffer();
-        Ok(path
-            .evaluate(
-                &self.model.problem,
-                &cache,
-                &self.values,
-                sample,
-                Derivatives::None,
-                &mut buffer,
-            )
-            .isometry())
+        let at = State::new(&self.model.problem, &cache, &self.values);
+        let pose = path.evaluate(at, sample, Derivatives::None, &mut buffer);
+        Ok(pose.isometry())
     }
 
     /// What each weak direction ([`Observability::weak`](crate::Observability::weak), same order) costs at
@@ -228,14 +221,8 @@ impl Solution {
         let mut cache = EdgeCache::new(&problem, std::sync::Arc::default());
         cache.update(&problem, &self.values);
         let mut buffer = path.buffer();
-        let pose = path.evaluate(
-            &problem,
-            &cache,
-            &self.values,
-            0,
-            Derivatives::All,
-            &mut buffer,
-        );
+        let at = State::new(&problem, &cache, &self.values);
+        let pose = path.evaluate(at, 0, Derivatives::All, &mut buffer);
         Ok((pose, path, buffer))
     }
 

@@ -15,7 +15,8 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3, Vector
 
 use calib_geometry::so3;
 
-use crate::graph::edge::{Axis, Joint};
+use crate::graph::axis::Axis;
+use crate::graph::edge::Joint;
 use crate::graph::effect::EffectKind;
 use crate::model::pose::Pose;
 

@@ -13,7 +13,7 @@ use nalgebra::Vector6;
 use crate::graph::edge::EdgeKind;
 use crate::graph::ids::EdgeId;
 use crate::graph::problem::Problem;
-use crate::model::cache::EdgeCache;
+use crate::model::cache::State;
 use crate::model::joint::{JointDerivatives, JointPass};
 use crate::model::pose::Pose;
 use crate::model::values::{Slot, Values, coordinates, covariance_directions};
@@ -197,13 +197,16 @@ impl CompiledPath {
     /// `T(s; x)`; derivatives go into `out`. Measured edges must be present at this sample.
     pub(crate) fn evaluate(
         &self,
-        problem: &Problem,
-        cache: &EdgeCache,
-        values: &Values,
+        at: State,
         sample: usize,
         wanted: Derivatives,
         out: &mut PathBuffer,
     ) -> Pose {
+        let State {
+            problem,
+            cache,
+            values,
+        } = at;
         let all = wanted == Derivatives::All;
         let random = wanted != Derivatives::None;
         if all {
@@ -296,12 +299,15 @@ impl CompiledPath {
     /// are not in the model. Returns `T(s; x)`.
     pub(crate) fn effects(
         &self,
-        problem: &Problem,
-        cache: &EdgeCache,
-        values: &Values,
+        at: State,
         sample: usize,
         out: &mut Vec<(usize, [Vector6<f64>; 3])>,
     ) -> Pose {
+        let State {
+            problem,
+            cache,
+            values,
+        } = at;
         out.clear();
         let mut suffix = Pose::identity();
         for step in self.steps.iter().rev() {

@@ -13,7 +13,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::model::layout::Model;
 use crate::model::values::Values;
-use crate::solve::normal::NormalEquations;
+use crate::solve::equations::NormalEquations;
 
 /// Replaces `step` by the solution of (1) when it leaves the box; `false` when the program fails.
 pub(crate) fn bounded_step(

@@ -2,10 +2,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
-use crate::solve::normal::{NormalEquations, Workspace, add_prior};
+use crate::solve::equations::{NormalEquations, Objective, Workspace};
+use crate::solve::normal::add_prior;
 use crate::solve::panel::Local;
 use crate::solve::rows::{SampleRows, add_block};
 use crate::solve::structured::RandomPart;
@@ -204,13 +206,16 @@ impl Weighed {
 /// One pass over the samples; `None` when the model cannot be evaluated. V⁻¹ is the weighing of
 /// [`structured`](crate::solve::structured), equation (3).
 pub(crate) fn sums(
-    model: &Model,
+    objective: Objective,
     values: &Values,
-    weights: &[f64],
-    theta: &[f64],
     groups: &[usize],
     work: &mut Workspace,
 ) -> Option<Sums> {
+    let Objective {
+        model,
+        weights,
+        theta,
+    } = objective;
     let count = groups.len();
     let most = model.max_rows.max(model.slots.len());
     let mut sums = Sums {
@@ -230,7 +235,13 @@ pub(crate) fn sums(
         ..
     } = work;
     for sample in 0..model.problem.samples {
-        rows.fill(model, cache, values, weights, sample, Derivatives::All);
+        rows.fill(
+            model,
+            State::new(&model.problem, cache, values),
+            weights,
+            sample,
+            Derivatives::All,
+        );
         if rows.m == 0 {
             continue;
         }

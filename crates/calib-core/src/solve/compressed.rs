@@ -13,37 +13,32 @@
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::graph::measurement::{Markers, MeasurementKind, Rows};
-use crate::model::cache::EdgeCache;
+use crate::model::cache::{EdgeCache, State};
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
-use crate::solve::normal::{NormalEquations, Workspace};
+use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::panel::Local;
 use crate::solve::rows::{add_block, cholesky6, dot, point_columns, residual};
 
-/// Where the equations are wanted: the values, the weight of each observation, σ² per group, and the edges' poses.
+/// Where the equations are wanted: the objective, the values, and the edges' poses at them.
 struct Pass<'a> {
-    model: &'a Model,
+    objective: Objective<'a>,
     values: &'a Values,
-    weights: &'a [f64],
-    theta: &'a [f64],
     cache: &'a EdgeCache,
 }
 
 /// Adds the data's share of H, g and cost to `out`; the caller clears it and adds the prior.
 pub(crate) fn accumulate_compressed(
-    model: &Model,
+    objective: Objective,
     values: &Values,
-    weights: &[f64],
-    theta: &[f64],
     work: &mut Workspace,
     out: &mut NormalEquations,
 ) -> bool {
+    let model = objective.model;
     let pass = Pass {
-        model,
+        objective,
         values,
-        weights,
-        theta,
         cache: &work.cache,
     };
     for (measurement, stated) in model.problem.measurements.iter().enumerate() {
@@ -85,28 +80,22 @@ impl Pass<'_> {
         local: &mut Local,
         out: &mut NormalEquations,
     ) {
-        let model = self.model;
-        let information = 1.0 / self.theta[kind.noise.index()];
+        let model = self.objective.model;
+        let information = 1.0 / self.objective.theta[kind.noise.index()];
         let path = &model.paths[measurement];
+        let at = State::new(&model.problem, self.cache, self.values);
         let positions = positions(model, self.values);
         let mut sums = Vec::new();
         let mut buffer = path.buffer();
         let mut upper = Upper::default();
         let mut now: Vec<(usize, f64)> = Vec::new();
         for (sample, range) in &model.of_measurement[measurement] {
-            let pose = path.evaluate(
-                &model.problem,
-                self.cache,
-                self.values,
-                *sample,
-                Derivatives::All,
-                &mut buffer,
-            );
+            let pose = path.evaluate(at, *sample, Derivatives::All, &mut buffer);
             now.clear();
             let mut moment = Vector3::zeros();
             let mut force = Vector3::zeros();
             for o in range.clone() {
-                let w = self.weights[o] * information;
+                let w = self.objective.weights[o] * information;
                 if w <= 0.0 {
                     continue;
                 }
@@ -230,21 +219,19 @@ fn upper_product(factor: &[[f64; 6]; 6], twists: &[Vector6<f64>], rows: &mut [f6
 }
 
 /// eᵀV⁻¹e without derivatives; infinite where it cannot be computed.
-pub(crate) fn cost_compressed(
-    model: &Model,
-    values: &Values,
-    weights: &[f64],
-    theta: &[f64],
-    work: &mut Workspace,
-) -> f64 {
-    let pass = Pass {
+pub(crate) fn cost_compressed(objective: Objective, values: &Values, work: &mut Workspace) -> f64 {
+    let Objective {
         model,
-        values,
         weights,
         theta,
+    } = objective;
+    let pass = Pass {
+        objective,
+        values,
         cache: &work.cache,
     };
     let positions = positions(model, values);
+    let at = State::new(&model.problem, pass.cache, values);
     let mut sum = 0.0;
     for (measurement, path) in model.paths.iter().enumerate() {
         let markers = match &model.problem.measurements[measurement].kind {
@@ -253,14 +240,7 @@ pub(crate) fn cost_compressed(
         };
         let mut buffer = path.buffer();
         for (sample, range) in &model.of_measurement[measurement] {
-            let pose = path.evaluate(
-                &model.problem,
-                pass.cache,
-                values,
-                *sample,
-                Derivatives::None,
-                &mut buffer,
-            );
+            let pose = path.evaluate(at, *sample, Derivatives::None, &mut buffer);
             for o in range.clone() {
                 if weights[o] <= 0.0 {
                     continue;
@@ -360,10 +340,10 @@ impl Pass<'_> {
     fn lower(&self, o: usize) -> Option<[[f64; 6]; 6]> {
         let mut l = [[0.0; 6]; 6];
         // V = σ_g² shape / w
-        add_block(self.model, o, |i, j, group, shape| {
-            l[i][j] += self.theta[group] * shape / self.weights[o];
+        add_block(self.objective.model, o, |i, j, group, shape| {
+            l[i][j] += self.objective.theta[group] * shape / self.objective.weights[o];
         });
-        cholesky6(&mut l, self.model.observations[o].rows).then_some(l)
+        cholesky6(&mut l, self.objective.model.observations[o].rows).then_some(l)
     }
 
     /// |L⁻¹e|² of an observation.
@@ -371,7 +351,7 @@ impl Pass<'_> {
     fn cost(&self, o: usize, mut e: [f64; 6]) -> Option<f64> {
         let l = self.lower(o)?;
         let mut sum = 0.0;
-        for i in 0..self.model.observations[o].rows {
+        for i in 0..self.objective.model.observations[o].rows {
             for b in 0..i {
                 e[i] -= l[i][b] * e[b];
             }
@@ -383,20 +363,14 @@ impl Pass<'_> {
 
     /// Any measurement without compression: whitened rows of each observation, over local columns.
     fn general(&self, measurement: usize, local: &mut Local, out: &mut NormalEquations) -> bool {
-        let model = self.model;
+        let model = self.objective.model;
         let path = &model.paths[measurement];
+        let at = State::new(&model.problem, self.cache, self.values);
         let mut buffer = path.buffer();
         for (sample, range) in &model.of_measurement[measurement] {
-            let pose = path.evaluate(
-                &model.problem,
-                self.cache,
-                self.values,
-                *sample,
-                Derivatives::All,
-                &mut buffer,
-            );
+            let pose = path.evaluate(at, *sample, Derivatives::All, &mut buffer);
             for o in range.clone() {
-                if self.weights[o] <= 0.0 {
+                if self.objective.weights[o] <= 0.0 {
                     continue;
                 }
                 let observation = model.observations[o];

@@ -2,10 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
-use crate::solve::normal::Workspace;
+use crate::solve::equations::Workspace;
 use crate::solve::rows::SampleRows;
 
 impl Model {
@@ -63,8 +64,8 @@ impl Model {
         work.cache.update(&self.problem, values);
         let mut first = 0;
         for sample in 0..self.problem.samples {
-            work.rows
-                .fill(self, &work.cache, values, &weights, sample, wanted);
+            let at = State::new(&self.problem, &work.cache, values);
+            work.rows.fill(self, at, &weights, sample, wanted);
             see(first, &work.rows);
             first += work.rows.m;
         }

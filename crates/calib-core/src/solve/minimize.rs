@@ -24,7 +24,8 @@ use crate::graph::edge::EdgeKind;
 use crate::model::layout::Model;
 use crate::model::values::{Values, coordinates};
 use crate::solve::bounded::bounded_step;
-use crate::solve::normal::{NormalEquations, Workspace, accumulate, cost};
+use crate::solve::equations::{NormalEquations, Objective, Workspace};
+use crate::solve::normal::{accumulate, cost};
 
 /// How the minimization ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -183,26 +184,26 @@ pub fn minimize(
     theta: &[f64],
     settings: &MinimizeSettings,
 ) -> Minimum {
-    let mut work = Workspace::new(model);
-    minimize_in(model, start, weights, theta, settings, &mut work)
+    let objective = Objective {
+        model,
+        weights,
+        theta,
+    };
+    minimize_in(objective, start, settings, &mut Workspace::new(model))
 }
 
 pub(crate) fn minimize_in(
-    model: &Model,
+    objective: Objective,
     start: &Values,
-    weights: &[f64],
-    theta: &[f64],
     settings: &MinimizeSettings,
     work: &mut Workspace,
 ) -> Minimum {
-    Descent::new(model, start, weights, theta, settings).run(work)
+    Descent::new(objective, start, settings).run(work)
 }
 
 /// The state of a minimization.
 struct Descent<'a> {
-    model: &'a Model,
-    weights: &'a [f64],
-    theta: &'a [f64],
+    objective: Objective<'a>,
     settings: &'a MinimizeSettings,
     /// Diagonal of S⁻².
     natural: Vec<f64>,
@@ -223,20 +224,13 @@ struct Descent<'a> {
 }
 
 impl<'a> Descent<'a> {
-    fn new(
-        model: &'a Model,
-        start: &Values,
-        weights: &'a [f64],
-        theta: &'a [f64],
-        settings: &'a MinimizeSettings,
-    ) -> Self {
+    fn new(objective: Objective<'a>, start: &Values, settings: &'a MinimizeSettings) -> Self {
+        let model = objective.model;
         let n = model.free();
         let parameters = &model.problem.parameters;
         let columns = model.columns.iter();
         Self {
-            model,
-            weights,
-            theta,
+            objective,
             settings,
             natural: columns
                 .clone()
@@ -259,8 +253,8 @@ impl<'a> Descent<'a> {
     }
 
     fn run(mut self, work: &mut Workspace) -> Minimum {
-        let (model, weights, theta) = (self.model, self.weights, self.theta);
-        self.evaluable = accumulate(model, &self.values, weights, theta, work, &mut self.system);
+        let objective = self.objective;
+        self.evaluable = accumulate(objective, &self.values, work, &mut self.system);
         let status = loop {
             if !self.evaluable {
                 break SolveStatus::NotEvaluable;
@@ -330,7 +324,7 @@ impl<'a> Descent<'a> {
         solved
             && (!self.bounded
                 || bounded_step(
-                    self.model,
+                    self.objective.model,
                     &self.values,
                     &self.system,
                     curvature.known.then_some(curvature.s.as_slice()),
@@ -343,12 +337,12 @@ impl<'a> Descent<'a> {
     /// What becomes of the proposed step; `None` when it does not lower the cost. `before`: decrement of the step
     /// before.
     fn judge(&mut self, before: f64, work: &mut Workspace) -> Option<Step> {
-        let (model, weights, theta) = (self.model, self.weights, self.theta);
+        let objective = self.objective;
         let limit = self.system.cost() * (1.0 + COST_ROUNDING);
         let enough = self.settings.decrement;
         // −gᵀδ
         self.decrement = -dot(&self.system.g, &self.step);
-        retract(model, &self.values, &self.step, &mut self.trial);
+        retract(objective.model, &self.values, &self.step, &mut self.trial);
         // The decrement falls at least in proportion: is the next one already small enough?
         let rate = if before.is_finite() {
             (self.decrement / before).min(1.0)
@@ -357,16 +351,15 @@ impl<'a> Descent<'a> {
         };
         let expected = self.decrement * rate;
         if self.decrement <= enough || (self.constant_noise && expected <= enough) {
-            let fallen =
-                self.decrement <= enough || cost(model, &self.trial, weights, theta, work) <= limit;
+            let fallen = self.decrement <= enough || cost(objective, &self.trial, work) <= limit;
             fallen.then_some(Step::Last)
         } else if self.constant_noise {
             self.iterations += 1;
-            let linearized = accumulate(model, &self.trial, weights, theta, work, &mut self.next);
+            let linearized = accumulate(objective, &self.trial, work, &mut self.next);
             (linearized && self.next.cost() <= limit).then_some(Step::Taken)
-        } else if cost(model, &self.trial, weights, theta, work) <= limit {
+        } else if cost(objective, &self.trial, work) <= limit {
             self.iterations += 1;
-            self.evaluable = accumulate(model, &self.trial, weights, theta, work, &mut self.next);
+            self.evaluable = accumulate(objective, &self.trial, work, &mut self.next);
             Some(Step::Taken)
         } else {
             None

@@ -4,6 +4,7 @@ pub(crate) mod bounded;
 pub(crate) mod components;
 pub(crate) mod compressed;
 pub(crate) mod dense;
+pub(crate) mod equations;
 pub(crate) mod minimize;
 pub(crate) mod noise;
 pub(crate) mod normal;

@@ -17,10 +17,9 @@ use nalgebra::{DMatrix, DVector};
 
 use calib_geometry::decompose::{solve_least_squares, symmetric_eigen};
 
-use crate::model::layout::Model;
 use crate::model::values::Values;
 use crate::solve::components::{Sums, sums};
-use crate::solve::normal::Workspace;
+use crate::solve::equations::{Objective, Workspace};
 use crate::solve::whitened::covariance_of;
 
 /// A σ may fall to this fraction of the stated one before it counts as zero.
@@ -41,12 +40,11 @@ pub(crate) struct Scoring {
 
 /// One step of (2) and (3) at fixed values; `None` when the model cannot be evaluated.
 pub(crate) fn score(
-    model: &Model,
+    objective: Objective,
     values: &Values,
-    weights: &[f64],
-    theta: &[f64],
     work: &mut Workspace,
 ) -> Option<Scoring> {
+    let Objective { model, theta, .. } = objective;
     let groups: Vec<usize> = (0..theta.len())
         .filter(|&g| model.problem.groups[g].estimate)
         .collect();
@@ -58,7 +56,7 @@ pub(crate) fn score(
     if groups.is_empty() {
         return Some(out);
     }
-    let sums = sums(model, values, weights, theta, &groups, work)?;
+    let sums = sums(objective, values, &groups, work)?;
     let c = covariance_of(&sums.normal_equations(model, values))?;
     let (gradient, fisher) = gradient_and_fisher(&sums, &c);
     // Two groups that the data cannot distinguish make (3) singular: least squares shares the step.

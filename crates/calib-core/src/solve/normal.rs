@@ -5,82 +5,31 @@
 //! F = ½ Σ_s e_sᵀ V_s⁻¹ e_s + ½ (x − x₀)ᵀ Λ (x − x₀)                                          (2)
 //! ```
 
-use crate::model::cache::EdgeCache;
+use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
 use crate::solve::compressed::{accumulate_compressed, cost_compressed};
+use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::panel::Local;
-use crate::solve::rows::SampleRows;
-use crate::solve::structured::RandomPart;
-
-/// H (upper triangle, row-major n × n), g, and twice F split into data and prior.
-#[derive(Debug, Clone)]
-pub(crate) struct NormalEquations {
-    pub n: usize,
-    pub h: Vec<f64>,
-    pub g: Vec<f64>,
-    pub data: f64,
-    pub prior: f64,
-}
-
-impl NormalEquations {
-    pub(crate) fn new(n: usize) -> Self {
-        Self {
-            n,
-            h: vec![0.0; n * n],
-            g: vec![0.0; n],
-            data: 0.0,
-            prior: 0.0,
-        }
-    }
-
-    pub(crate) fn cost(&self) -> f64 {
-        self.data + self.prior
-    }
-}
-
-/// Everything that the passes over the samples need; allocated once.
-#[derive(Debug, Clone)]
-pub(crate) struct Workspace {
-    pub cache: EdgeCache,
-    pub rows: SampleRows,
-    pub random: RandomPart,
-    /// The random part of every V_s at the last linearization, where random effects make V_s depend
-    /// on the values: a step is judged by the same V_s that proposed it. (With V_s moving along, the
-    /// cost would reward values that only make the noise look larger.)
-    factors: Vec<f64>,
-}
-
-impl Workspace {
-    pub(crate) fn new(model: &Model) -> Self {
-        Self {
-            cache: EdgeCache::new(&model.problem, model.trig.clone()),
-            rows: SampleRows::new(model),
-            random: RandomPart::default(),
-            factors: Vec::new(),
-        }
-    }
-}
 
 /// Equation (1). `false` when some V_s is not positive definite or a number is not finite.
 pub(crate) fn accumulate(
-    model: &Model,
+    objective: Objective,
     values: &Values,
-    weights: &[f64],
-    theta: &[f64],
     work: &mut Workspace,
     out: &mut NormalEquations,
 ) -> bool {
+    let model = objective.model;
     out.h.fill(0.0);
     out.g.fill(0.0);
     out.data = 0.0;
     work.cache.update(&model.problem, values);
     work.factors.clear();
     let fine = if model.slots.is_empty() {
-        accumulate_compressed(model, values, weights, theta, work, out)
+        accumulate_compressed(objective, values, work, out)
     } else {
-        accumulate_rows(model, values, weights, theta, work, out)
+        accumulate_rows(objective, values, work, out)
     };
     add_prior(model, values, out);
     fine && out.cost().is_finite()
@@ -88,13 +37,16 @@ pub(crate) fn accumulate(
 
 /// The general way: every sample's rows, whitened by its V_s.
 pub(crate) fn accumulate_rows(
-    model: &Model,
+    objective: Objective,
     values: &Values,
-    weights: &[f64],
-    theta: &[f64],
     work: &mut Workspace,
     out: &mut NormalEquations,
 ) -> bool {
+    let Objective {
+        model,
+        weights,
+        theta,
+    } = objective;
     let n = out.n;
     let mut sum = Local::new(n, model.max_rows);
     let Workspace {
@@ -107,7 +59,13 @@ pub(crate) fn accumulate_rows(
         if model.of_sample[sample].is_empty() {
             continue;
         }
-        rows.fill(model, cache, values, weights, sample, Derivatives::All);
+        rows.fill(
+            model,
+            State::new(&model.problem, cache, values),
+            weights,
+            sample,
+            Derivatives::All,
+        );
         if rows
             .whiten_blocks(model, weights, theta, true)
             .and_then(|()| rows.random_part(random))
@@ -151,14 +109,9 @@ pub(crate) fn add_prior(model: &Model, values: &Values, out: &mut NormalEquation
 
 /// Equation (2), doubled, at trial values with the V_s of the last [`accumulate`]; infinite where it
 /// cannot be computed.
-pub(crate) fn cost(
-    model: &Model,
-    values: &Values,
-    weights: &[f64],
-    theta: &[f64],
-    work: &mut Workspace,
-) -> f64 {
-    let mut sum = evaluate_cost(model, values, weights, theta, work, !model.slots.is_empty());
+pub(crate) fn cost(objective: Objective, values: &Values, work: &mut Workspace) -> f64 {
+    let model = objective.model;
+    let mut sum = evaluate_cost(objective, values, work, !model.slots.is_empty());
     for &p in &model.columns {
         let parameter = &model.problem.parameters[p];
         if let Some(sigma) = parameter.prior_sigma {
@@ -170,27 +123,19 @@ pub(crate) fn cost(
 }
 
 /// eᵀV⁻¹e over all samples with V_s at these values; infinite where it cannot be computed.
-pub(crate) fn data_cost(
-    model: &Model,
-    values: &Values,
-    weights: &[f64],
-    theta: &[f64],
-    work: &mut Workspace,
-) -> f64 {
-    evaluate_cost(model, values, weights, theta, work, false)
+pub(crate) fn data_cost(objective: Objective, values: &Values, work: &mut Workspace) -> f64 {
+    evaluate_cost(objective, values, work, false)
 }
 
-fn evaluate_cost(
-    model: &Model,
-    values: &Values,
-    weights: &[f64],
-    theta: &[f64],
-    work: &mut Workspace,
-    stored: bool,
-) -> f64 {
+fn evaluate_cost(objective: Objective, values: &Values, work: &mut Workspace, stored: bool) -> f64 {
+    let Objective {
+        model,
+        weights,
+        theta,
+    } = objective;
     work.cache.update(&model.problem, values);
     if model.slots.is_empty() {
-        return cost_compressed(model, values, weights, theta, work);
+        return cost_compressed(objective, values, work);
     }
     let Workspace {
         cache,
@@ -209,7 +154,13 @@ fn evaluate_cost(
         if model.of_sample[sample].is_empty() {
             continue;
         }
-        rows.fill(model, cache, values, weights, sample, wanted);
+        rows.fill(
+            model,
+            State::new(&model.problem, cache, values),
+            weights,
+            sample,
+            wanted,
+        );
         if rows.whiten_blocks(model, weights, theta, false).is_none() {
             return f64::INFINITY;
         }
@@ -283,13 +234,14 @@ mod tests {
         }
         let mut fast = NormalEquations::new(model.free());
         let mut slow = fast.clone();
-        assert!(accumulate(
-            &model, &values, &weights, &theta, &mut work, &mut fast
-        ));
+        let objective = Objective {
+            model: &model,
+            weights: &weights,
+            theta: &theta,
+        };
+        assert!(accumulate(objective, &values, &mut work, &mut fast));
         work.cache.update(&model.problem, &values);
-        assert!(accumulate_rows(
-            &model, &values, &weights, &theta, &mut work, &mut slow
-        ));
+        assert!(accumulate_rows(objective, &values, &mut work, &mut slow));
         add_prior(&model, &values, &mut slow);
         let size = slow.h.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         for (a, b) in fast.h.iter().zip(&slow.h) {
@@ -299,7 +251,7 @@ mod tests {
             assert!((a - b).abs() < 1e-12 * size, "{a} {b}");
         }
         assert!((fast.cost() - slow.cost()).abs() < 1e-12 * slow.cost());
-        let trial = cost(&model, &values, &weights, &theta, &mut work);
+        let trial = cost(objective, &values, &mut work);
         assert!((trial - slow.cost()).abs() < 1e-12 * slow.cost());
     }
 }

@@ -17,11 +17,12 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::graph::ids::MeasurementId;
 use crate::graph::measurement::{Markers, MeasurementKind};
+use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
+use crate::solve::equations::{Objective, Workspace};
 use crate::solve::minimize::{MinimizeSettings, Minimum, minimize_in};
-use crate::solve::normal::Workspace;
 
 /// Why an observation does not take part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -134,8 +135,8 @@ pub(crate) fn distances(
         if model.of_sample[sample].is_empty() {
             continue;
         }
-        work.rows
-            .fill(model, &work.cache, values, mask, sample, wanted);
+        let at = State::new(&model.problem, &work.cache, values);
+        work.rows.fill(model, at, mask, sample, wanted);
         work.rows.covariance(model, mask, theta);
         let (rows, m) = (&work.rows, work.rows.m);
         for &(o, first, count) in &rows.blocks {
@@ -222,7 +223,14 @@ pub(crate) fn clean(
         if change < 0.01 {
             break;
         }
-        let fit = minimize_in(model, &values, &weights, theta, &INNER, work);
+        let fit = {
+            let objective = Objective {
+                model,
+                weights: &weights,
+                theta,
+            };
+            minimize_in(objective, &values, &INNER, work)
+        };
         iterations += fit.iterations;
         values = fit.values;
     }
@@ -245,7 +253,14 @@ pub(crate) fn clean(
                     weights[o] = (c2 / (d2[o] + c2)).powi(2).max(1e-6);
                 }
             }
-            let fit = minimize_in(model, &values, &weights, theta, &INNER, work);
+            let fit = {
+                let objective = Objective {
+                    model,
+                    weights: &weights,
+                    theta,
+                };
+                minimize_in(objective, &values, &INNER, work)
+            };
             iterations += fit.iterations;
             values = fit.values;
             if mu <= 1.0 {
@@ -348,14 +363,8 @@ fn swapped(
     let seen = &observations[observation.item];
     let path = &model.paths[observation.measurement];
     let mut buffer = path.buffer();
-    let pose = path.evaluate(
-        &model.problem,
-        &work.cache,
-        values,
-        observation.sample,
-        Derivatives::None,
-        &mut buffer,
-    );
+    let at = State::new(&model.problem, &work.cache, values);
+    let pose = path.evaluate(at, observation.sample, Derivatives::None, &mut buffer);
     let frame = model.problem.measurements[observation.measurement].to;
     // Twice the gate: the joints' noise adds to the marker's.
     let limit = (4.0 * limits.gate[3] * theta[noise.index()]).sqrt();

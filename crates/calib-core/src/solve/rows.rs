@@ -10,7 +10,7 @@
 use nalgebra::{Matrix6, Vector6};
 
 use crate::graph::measurement::{At, Rows};
-use crate::model::cache::EdgeCache;
+use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::{Derivatives, PathBuffer};
 use crate::model::pose::Pose;
@@ -62,8 +62,7 @@ impl SampleRows {
     pub(crate) fn fill(
         &mut self,
         model: &Model,
-        cache: &EdgeCache,
-        values: &Values,
+        at: State,
         weights: &[f64],
         sample: usize,
         wanted: Derivatives,
@@ -80,16 +79,10 @@ impl SampleRows {
             let observation = model.observations[o];
             if observation.measurement != measurement {
                 measurement = observation.measurement;
-                pose = model.paths[measurement].evaluate(
-                    &model.problem,
-                    cache,
-                    values,
-                    sample,
-                    wanted,
-                    &mut self.buffers[measurement],
-                );
+                let buffer = &mut self.buffers[measurement];
+                pose = model.paths[measurement].evaluate(at, sample, wanted, buffer);
             }
-            let rows = residual(model, values, measurement, observation.item, &pose);
+            let rows = residual(model, at.values, measurement, observation.item, &pose);
             let first = self.m;
             self.blocks.push((o, first, observation.rows));
             self.m += observation.rows;

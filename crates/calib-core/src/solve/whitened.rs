@@ -6,11 +6,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::layout::Model;
+use crate::model::cache::State;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
+use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::minimize::{cholesky_in_place, solve_in_place};
-use crate::solve::normal::{NormalEquations, Workspace};
 
 /// C of equation (1), (H + tiny ridge)⁻¹: directions that nothing determines have A v = 0 and do not matter in A C Aᵀ.
 pub(crate) fn covariance_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
@@ -68,22 +68,19 @@ pub(crate) struct Whitened {
 
 /// Rows of a sample, whitened by their V; `None` when V is not positive definite or there are none.
 pub(crate) fn whitened(
-    model: &Model,
+    objective: Objective,
     values: &Values,
-    weights: &[f64],
-    theta: &[f64],
     sample: usize,
     work: &mut Workspace,
 ) -> Option<Whitened> {
-    let rows = &mut work.rows;
-    rows.fill(
+    let Objective {
         model,
-        &work.cache,
-        values,
         weights,
-        sample,
-        Derivatives::All,
-    );
+        theta,
+    } = objective;
+    let rows = &mut work.rows;
+    let at = State::new(&model.problem, &work.cache, values);
+    rows.fill(model, at, weights, sample, Derivatives::All);
     if rows.m == 0 {
         return None;
     }

@@ -10,8 +10,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::graph::edge::Axis;
-use crate::graph::parameter::Unit;
+use crate::graph::axis::Axis;
+use crate::graph::unit::Unit;
 
 pub mod backlash;
 pub mod clock_offset;

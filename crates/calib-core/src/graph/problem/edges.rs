@@ -6,8 +6,9 @@ use crate::graph::chart::Chart;
 use crate::graph::edge::{Edge, EdgeKind, Role, UnknownPose};
 use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId, GroupId, ParameterId};
-use crate::graph::parameter::{Parameter, ParameterKind, Unit};
+use crate::graph::parameter::{Parameter, ParameterKind};
 use crate::graph::problem::Problem;
+use crate::graph::unit::Unit;
 
 impl Problem {
     pub(super) fn edge_of(

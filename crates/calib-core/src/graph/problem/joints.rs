@@ -1,6 +1,7 @@
 //! Joints and their effects.
 
-use crate::graph::edge::{Axis, Candidate, EdgeKind, Joint, JointEffect};
+use crate::graph::axis::Axis;
+use crate::graph::edge::{Candidate, EdgeKind, Joint, JointEffect};
 use crate::graph::effect::{EffectKind, JointState, Source};
 use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId, GroupId, ParameterId};

@@ -7,8 +7,9 @@ use crate::graph::measurement::{
     Loop, MarkerObservation, Markers, Measurement, MeasurementKind, PoseNoise, PoseObservation,
     Poses,
 };
-use crate::graph::parameter::{Parameter, ParameterKind, Unit};
+use crate::graph::parameter::{Parameter, ParameterKind};
 use crate::graph::problem::{Point, Problem};
+use crate::graph::unit::Unit;
 
 impl Problem {
     /// A point of known coordinates in `frame`.

@@ -5,7 +5,8 @@ use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 use crate::model::layout::Model;
 use crate::model::values::Values;
 use crate::solve::components::{Sums, sums};
-use crate::solve::normal::{NormalEquations, Workspace, accumulate};
+use crate::solve::equations::{NormalEquations, Objective, Workspace};
+use crate::solve::normal::accumulate;
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
 use crate::*;
 
@@ -79,13 +80,15 @@ impl Case {
 
     fn system(&mut self) -> NormalEquations {
         let mut system = NormalEquations::new(self.model.free());
-        let (model, values, work) = (&self.model, &self.values, &mut self.work);
+        let objective = Objective {
+            model: &self.model,
+            weights: &self.weights,
+            theta: &self.theta,
+        };
         assert!(accumulate(
-            model,
-            values,
-            &self.weights,
-            &self.theta,
-            work,
+            objective,
+            &self.values,
+            &mut self.work,
             &mut system
         ));
         system
@@ -95,8 +98,13 @@ impl Case {
     fn dense(&mut self, theta: &[f64]) -> Vec<Whitened> {
         let (model, values, work) = (&self.model, &self.values, &mut self.work);
         work.cache.update(&model.problem, values);
+        let objective = Objective {
+            model,
+            weights: &self.weights,
+            theta,
+        };
         (0..model.problem.samples)
-            .map(|s| whitened(model, values, &self.weights, theta, s, work).unwrap())
+            .map(|s| whitened(objective, values, s, work).unwrap())
             .collect()
     }
 
@@ -135,16 +143,12 @@ fn unequal_weights(observation: usize) -> f64 {
 }
 
 fn sums_of(case: &mut Case) -> Sums {
-    let (model, values) = (&case.model, &case.values);
-    sums(
-        model,
-        values,
-        &case.weights,
-        &case.theta,
-        &GROUPS,
-        &mut case.work,
-    )
-    .unwrap()
+    let objective = Objective {
+        model: &case.model,
+        weights: &case.weights,
+        theta: &case.theta,
+    };
+    sums(objective, &case.values, &GROUPS, &mut case.work).unwrap()
 }
 
 #[test]
@@ -234,7 +238,11 @@ fn dense_and_structured_whitening_give_the_same_normal_equations() {
     }
     assert!((system.data - cost).abs() < 1e-11 * cost);
     // A step is judged by the V that proposed it.
-    let (model, values, work) = (&case.model, &case.values, &mut case.work);
-    let again = crate::solve::normal::cost(model, values, &case.weights, &case.theta, work);
+    let objective = Objective {
+        model: &case.model,
+        weights: &case.weights,
+        theta: &case.theta,
+    };
+    let again = crate::solve::normal::cost(objective, &case.values, &mut case.work);
     assert!((again - system.cost()).abs() < 1e-11 * cost);
 }

@@ -1,0 +1,66 @@
+//! What the passes over the samples share: the function to be minimized, the sums of its linearization, and the
+//! memory that they reuse.
+
+use crate::model::cache::EdgeCache;
+use crate::model::layout::Model;
+use crate::solve::rows::SampleRows;
+use crate::solve::structured::RandomPart;
+
+/// The function to be minimized, but for the values that it is taken at.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Objective<'a> {
+    pub model: &'a Model,
+    /// One weight per observation; 0: rejected.
+    pub weights: &'a [f64],
+    /// σ² per noise group.
+    pub theta: &'a [f64],
+}
+
+/// H (upper triangle, row-major n × n), g, and twice F split into data and prior.
+#[derive(Debug, Clone)]
+pub(crate) struct NormalEquations {
+    pub n: usize,
+    pub h: Vec<f64>,
+    pub g: Vec<f64>,
+    pub data: f64,
+    pub prior: f64,
+}
+
+impl NormalEquations {
+    pub(crate) fn new(n: usize) -> Self {
+        Self {
+            n,
+            h: vec![0.0; n * n],
+            g: vec![0.0; n],
+            data: 0.0,
+            prior: 0.0,
+        }
+    }
+
+    pub(crate) fn cost(&self) -> f64 {
+        self.data + self.prior
+    }
+}
+
+/// Everything that the passes over the samples need; allocated once.
+#[derive(Debug, Clone)]
+pub(crate) struct Workspace {
+    pub cache: EdgeCache,
+    pub rows: SampleRows,
+    pub random: RandomPart,
+    /// The random part of every V_s at the last linearization, where random effects make V_s depend
+    /// on the values: a step is judged by the same V_s that proposed it. (With V_s moving along, the
+    /// cost would reward values that only make the noise look larger.)
+    pub factors: Vec<f64>,
+}
+
+impl Workspace {
+    pub(crate) fn new(model: &Model) -> Self {
+        Self {
+            cache: EdgeCache::new(&model.problem, model.trig.clone()),
+            rows: SampleRows::new(model),
+            random: RandomPart::default(),
+            factors: Vec::new(),
+        }
+    }
+}
