@@ -290,7 +290,6 @@ const CIRCLES_LEFT: &[&str] = &[
     "calib-cor",
     "calib-estimator",
     "calib-fit",
-    "calib-pipeline",
 ];
 
 /// `a/b/mod.rs`, `a/b.rs` → [a, b]; `lib.rs` → [].

@@ -1,8 +1,16 @@
 //! What can go wrong, and with which exit code the program ends.
+//!
+//! A variant holds ids and values; the sentences stand here and in [`data`], and nowhere else
+//! (book/src/decisions/errors.md).
 
+mod data;
+mod file;
+
+use std::error::Error as _;
 use std::path::Path;
 
-use crate::prepare::paths;
+pub use data::{DataProblem, NotATrack};
+pub use file::{NamedBy, UnreadFile, WhyUnread};
 
 /// Exit codes of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,15 +37,11 @@ pub enum ExitCode {
 /// Why a stage stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum PipelineError {
-    /// A profile or URDF cannot be read.
-    #[error("{path}: cannot be read: {source}\n  help: {remedy}")]
+    /// A file cannot be read.
+    #[error("{file}\n  help: {}", file.remedy())]
     Read {
-        /// The file.
-        path: String,
-        /// Why.
-        source: std::io::Error,
-        /// What to do.
-        remedy: String,
+        /// The file, who named it, and why.
+        file: Box<UnreadFile>,
     },
     /// A profile or URDF is not text.
     #[error(
@@ -59,53 +63,44 @@ pub enum PipelineError {
     #[error("{0}")]
     Recording(#[from] calib_recording::Error),
     /// Recordings do not hold what the profile asks of them.
-    #[error("{file}: {finding}\n  help: {remedy}")]
+    #[error("{file}: {problem}\n  help: {}", problem.remedy())]
     Data {
         /// The file.
         file: String,
         /// What was found.
-        finding: String,
-        /// What to do.
-        remedy: String,
+        problem: Box<DataProblem>,
     },
-    /// The profile asks for something that does not go together.
-    #[error("{finding}\n  help: {remedy}")]
-    Usage {
-        /// What was found.
-        finding: String,
-        /// What to do.
-        remedy: String,
+    /// A recording of the profile that is to be simulated is not among the tables.
+    #[error("recording `{recording}` is not simulated\n  help: add it under `simulate.recordings`")]
+    NotSimulated {
+        /// The recording.
+        recording: String,
+    },
+    /// An estimator does not take the data of an origin.
+    #[error("origin `{origin}`: {cause}\n  help: check the poses of the body")]
+    Origin {
+        /// The origin.
+        origin: String,
+        /// What the estimator says.
+        cause: calib_aor::EstimatorError,
     },
     /// The solver refused the problem.
     #[error("the estimation problem cannot be stated: {0}")]
     Solve(#[from] calib_core::Error),
     /// The patched URDF is not what was asked for.
-    #[error("{file}: the URDF cannot be patched: {text}")]
+    #[error("{file}: the URDF cannot be patched: {cause}")]
     Patch {
         /// The URDF.
         file: String,
         /// Why.
-        text: String,
+        cause: calib_urdf::EditError,
     },
     /// A text of a robot's description cannot be changed as asked.
     #[error("{0}")]
     Edit(calib_urdf::EditError),
-    /// What was asked for should not be done with this result.
-    #[error("{finding}\n  help: {remedy}")]
-    Refused {
-        /// What was found.
-        finding: String,
-        /// What to do.
-        remedy: String,
-    },
     /// A plugin or an estimator failed, or is not what the profile needs.
-    #[error("{text}")]
-    Plugin {
-        /// What was found and what was needed.
-        text: String,
-        /// Usage, data or plugin: whose fault it is.
-        code: ExitCode,
-    },
+    #[error("{}", chain(.0))]
+    Plugin(calib_plugin::PluginError),
     /// The report or scene could not be rendered.
     #[error("the report cannot be written: {0}")]
     Report(#[from] calib_report::ReportError),
@@ -118,20 +113,44 @@ impl From<calib_urdf::EditError> for PipelineError {
     }
 }
 
+impl From<calib_plugin::PluginError> for PipelineError {
+    fn from(error: calib_plugin::PluginError) -> Self {
+        Self::Plugin(error)
+    }
+}
+
+/// An error and its causes in one line.
+fn chain(error: &calib_plugin::PluginError) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        text.push_str(&format!(": {cause}"));
+        source = cause.source();
+    }
+    text
+}
+
 impl PipelineError {
     /// The exit code of this error.
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Read { .. }
-            | Self::NotText { .. }
+            Self::Read { file } => match file.named_by {
+                NamedBy::Caller | NamedBy::Urdf { .. } => ExitCode::Usage,
+                NamedBy::Recording(_) | NamedBy::RobotLog(_) => ExitCode::Data,
+            },
+            Self::NotText { .. }
             | Self::Profile(_)
             | Self::Urdf(_)
-            | Self::Usage { .. } => ExitCode::Usage,
+            | Self::NotSimulated { .. }
+            | Self::Origin { .. } => ExitCode::Usage,
             Self::Recording(_) | Self::Data { .. } => ExitCode::Data,
-            Self::Refused { .. } => ExitCode::VerdictFail,
             Self::Solve(_) => ExitCode::NotConverged,
-            Self::Plugin { code, .. } => *code,
+            Self::Plugin(error) => match error.exit_code() {
+                2 => ExitCode::Usage,
+                3 => ExitCode::Data,
+                _ => ExitCode::Plugin,
+            },
             Self::Edit(_) | Self::Patch { .. } | Self::Report(_) => ExitCode::NotWritten,
         }
     }
@@ -141,7 +160,7 @@ impl PipelineError {
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Solve(_) => "look at what `calib check` says of the profile and the recordings",
-            Self::Plugin { .. } => {
+            Self::Plugin(_) => {
                 "`calib plugins` lists what there is, `calib plugins check PLUGIN` tests a plugin"
             }
             Self::Patch { .. } => "look at the names under `outputs`, and at the URDF there",
@@ -154,11 +173,16 @@ impl PipelineError {
         }
     }
 
-    pub(crate) fn read(path: &Path, source: std::io::Error) -> Self {
+    pub(crate) fn data(file: impl Into<String>, problem: DataProblem) -> Self {
+        Self::Data {
+            file: file.into(),
+            problem: Box::new(problem),
+        }
+    }
+
+    pub(crate) fn read(path: &Path, named_by: NamedBy, why: WhyUnread) -> Self {
         Self::Read {
-            remedy: paths::reading(path, &source),
-            path: path.display().to_string(),
-            source,
+            file: Box::new(UnreadFile::new(path, named_by, why)),
         }
     }
 }

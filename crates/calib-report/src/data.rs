@@ -82,8 +82,35 @@ pub struct Rejected {
     pub subject: String,
     /// Rows, counted from 1 without the header.
     pub rows: Vec<u64>,
-    /// Why.
+    /// Why, as an id.
+    #[serde(default)]
+    pub cause: RejectedFor,
+    /// Why, in words.
     pub reason: String,
+}
+
+/// Why a sample did not take part in the fit.
+#[derive(
+    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum RejectedFor {
+    /// It lies on the way to a neighboring row.
+    OnTheWay,
+    /// Its hold drifts or scatters.
+    RestlessHold,
+    /// The whole body is off, markers together.
+    NotSettled,
+    /// A pose needed to predict it was lost.
+    Occlusion,
+    /// It is off by more than noise explains.
+    Outlier,
+    /// It lies where another marker of the same body should be.
+    Swap,
+    /// Not stated: a report of an earlier version.
+    #[default]
+    Unstated,
 }
 
 /// The noise of a group of observations.

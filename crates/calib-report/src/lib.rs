@@ -48,7 +48,7 @@ mod words;
 pub use calib_finding::{Finding, Severity, Unit};
 pub use data::{
     AccuracyLimit, Clock, FitSummary, Input, JointCoverage, Lost, Noise, Output, RecordingSummary,
-    RecordingUse, Rejected, Workspace, WorkspacePoint,
+    RecordingUse, Rejected, RejectedFor, Workspace, WorkspacePoint,
 };
 pub use error::ReportError;
 pub use facts::{

@@ -18,45 +18,81 @@ pub fn wrapped(text: &str, first: &str, rest: &str) -> String {
 /// The summary; `color` adds ANSI styles (the caller checks what the terminal supports).
 #[must_use]
 pub fn summary(report: &Report, color: bool) -> String {
-    let paint = |style: Style, text: &str| {
-        if color {
+    let mut screen = Screen {
+        report,
+        color,
+        text: String::new(),
+    };
+    screen.verdict();
+    screen.limits();
+    screen.held_out();
+    screen.transforms();
+    screen.changes();
+    screen.answers();
+    screen.findings();
+    screen.files();
+    screen.text
+}
+
+/// A summary that is being written.
+struct Screen<'a> {
+    report: &'a Report,
+    color: bool,
+    text: String,
+}
+
+impl Screen<'_> {
+    fn paint(&self, style: Style, text: &str) -> String {
+        if self.color {
             format!("{style}{text}{style:#}")
         } else {
             text.to_owned()
         }
-    };
-    let heading = |text: &str| format!("\n{}\n", paint(Style::new().bold(), text));
-    let mut text = wrap(
-        &format!(
-            "calib {} · {} · {} · method {}",
-            report.version,
-            report.robot,
-            report.profile,
-            report.method.name()
-        ),
-        COLUMNS,
-        "",
-        "  ",
-    );
-
-    text += &paint(
-        verdict_style(report.verdict),
-        &report.verdict.word().to_uppercase(),
-    );
-    text.push('\n');
-    // The table of limits already lists what was met.
-    let listed = report.verdict == Verdict::Accepted && !report.limits.is_empty();
-    for reason in report.reasons.iter().filter(|_| !listed) {
-        text += &wrap(&sentence(reason), COLUMNS, "- ", "  ");
-    }
-    for scope in &report.scope {
-        text += &wrap(&full_stop(scope), COLUMNS, "  valid for: ", "             ");
     }
 
-    if !report.limits.is_empty() {
-        text += &heading("Limits");
+    fn heading(&mut self, text: &str) {
+        let title = self.paint(Style::new().bold(), text);
+        self.text += &format!("\n{title}\n");
+    }
+
+    /// What was calibrated, the verdict, its reasons, and what it holds for.
+    fn verdict(&mut self) {
+        self.text = wrap(
+            &format!(
+                "calib {} · {} · {} · method {}",
+                self.report.version,
+                self.report.robot,
+                self.report.profile,
+                self.report.method.name()
+            ),
+            COLUMNS,
+            "",
+            "  ",
+        );
+
+        self.text += &self.paint(
+            verdict_style(self.report.verdict),
+            &self.report.verdict.word().to_uppercase(),
+        );
+        self.text.push('\n');
+        // The table of limits already lists what was met.
+        let listed = self.report.verdict == Verdict::Accepted && !self.report.limits.is_empty();
+        for reason in self.report.reasons.iter().filter(|_| !listed) {
+            self.text += &wrap(&sentence(reason), COLUMNS, "- ", "  ");
+        }
+        for scope in &self.report.scope {
+            self.text += &wrap(&full_stop(scope), COLUMNS, "  valid for: ", "             ");
+        }
+    }
+
+    /// Limits and whether they are met.
+    fn limits(&mut self) {
+        if self.report.limits.is_empty() {
+            return;
+        }
+        self.heading("Limits");
         let mut table = Table::new(&["<", "<", ">value", ">limit"]);
-        for limit in &report.limits {
+        for limit in &self.report.limits {
             let value = number::plain_or_unknown(limit.value, limit.unit);
             table.row([
                 limit.outcome.word().to_owned(),
@@ -65,13 +101,14 @@ pub fn summary(report: &Report, color: bool) -> String {
                 number::plain(limit.limit, limit.unit),
             ]);
         }
-        text += &table.plain(COLUMNS);
-        for limit in report
+        self.text += &table.plain(COLUMNS);
+        for limit in self
+            .report
             .limits
             .iter()
             .filter(|limit| limit.outcome == Outcome::NotEvaluated)
         {
-            text += &wrap(
+            self.text += &wrap(
                 &format!("{}: {}", limit.name, limit.reason),
                 COLUMNS,
                 "  ",
@@ -80,8 +117,12 @@ pub fn summary(report: &Report, color: bool) -> String {
         }
     }
 
-    if let Some(held_out) = &report.verification.held_out {
-        text += &heading(&format!("Held-out errors [mm], {} values", held_out.n));
+    /// Errors on poses that were not fitted.
+    fn held_out(&mut self) {
+        let Some(held_out) = &self.report.verification.held_out else {
+            return;
+        };
+        self.heading(&format!("Held-out errors [mm], {} values", held_out.n));
         let mut table = Table::new(&["<", ">mean", ">rms", ">95 %", ">max"]);
         for (name, stats) in [
             ("nominal", held_out.nominal),
@@ -93,7 +134,7 @@ pub fn summary(report: &Report, color: bool) -> String {
                 .map(|m| number::bare(m, Unit::Meter));
             table.row([name.to_owned()].into_iter().chain(cells));
         }
-        text += &table.plain(COLUMNS);
+        self.text += &table.plain(COLUMNS);
         if let Some(expected) = &held_out.expected {
             let length = |m| number::plain(m, Unit::Meter);
             let line = format!(
@@ -103,7 +144,7 @@ pub fn summary(report: &Report, color: bool) -> String {
                 length(expected.low_m),
                 length(expected.high_m)
             );
-            text += &wrap(&line, COLUMNS, "  ", "  ");
+            self.text += &wrap(&line, COLUMNS, "  ", "  ");
         }
         if let Some(angle) = held_out.orientation.and_then(|o| o.calibrated) {
             let line = format!(
@@ -111,14 +152,18 @@ pub fn summary(report: &Report, color: bool) -> String {
                 number::plain(angle.rms_rad, Unit::Radian),
                 number::plain(angle.max_rad, Unit::Radian)
             );
-            text += &wrap(&line, COLUMNS, "  ", "  ");
+            self.text += &wrap(&line, COLUMNS, "  ", "  ");
         }
     }
 
-    if !report.transforms.is_empty() {
-        text += &heading("Transforms [mm]");
+    /// Transforms that were asked for.
+    fn transforms(&mut self) {
+        if self.report.transforms.is_empty() {
+            return;
+        }
+        self.heading("Transforms [mm]");
         let mut table = Table::new(&["<", ">x", ">y", ">z", "<"]);
-        for transform in &report.transforms {
+        for transform in &self.report.transforms {
             let sigma = |i: usize| transform.sigma_translation_m.map(|sigma| sigma[i]);
             let cell = |i: usize| {
                 number::bare_with_sigma(transform.translation_m[i], sigma(i), Unit::Meter)
@@ -136,18 +181,26 @@ pub fn summary(report: &Report, color: bool) -> String {
                 status.to_owned(),
             ]);
         }
-        text += &table.plain(COLUMNS);
+        self.text += &table.plain(COLUMNS);
     }
 
-    if !report.changes.is_empty() {
-        let weak = report
+    /// Numbers of the URDF that changed.
+    fn changes(&mut self) {
+        if self.report.changes.is_empty() {
+            return;
+        }
+        let weak = self
+            .report
             .parameters
             .iter()
             .filter(|parameter| parameter.class != Class::Solid)
             .count();
-        text += &heading(&format!("URDF: {} values changed", report.changes.len()));
+        self.heading(&format!(
+            "URDF: {} values changed",
+            self.report.changes.len()
+        ));
         let mut table = Table::new(&["<", "<", ">change", ">data share"]);
-        for change in report.changes.iter().take(CHANGES) {
+        for change in self.report.changes.iter().take(CHANGES) {
             let delta = change.delta.map_or_else(
                 || "added".to_owned(),
                 |delta| number::change(delta, change.sigma, change.unit),
@@ -155,80 +208,89 @@ pub fn summary(report: &Report, color: bool) -> String {
             let share = change.data_share.map_or_else(String::new, number::percent);
             table.row([change.joint.clone(), change.what.clone(), delta, share]);
         }
-        text += &table.plain(COLUMNS);
-        if report.changes.len() > CHANGES {
-            text += &format!(
+        self.text += &table.plain(COLUMNS);
+        if self.report.changes.len() > CHANGES {
+            self.text += &format!(
                 "  … and {} more in the report.\n",
-                report.changes.len() - CHANGES
+                self.report.changes.len() - CHANGES
             );
         }
         if weak > 0 {
-            text += &format!(
+            self.text += &format!(
                 "  {weak} of {} parameters depend on their priors: see the report.\n",
-                report.parameters.len()
+                self.report.parameters.len()
             );
         }
     }
 
-    let all = answers_in(report, "in the report");
-    for (id, title) in [("unobservable", "Not observable"), ("rejected", "Rejected")] {
-        if let Some(answer) = all.iter().find(|answer| answer.id == id) {
-            text += &heading(title);
-            for line in &answer.lines {
-                text += &wrap(line, COLUMNS, "  ", "    ");
+    /// What is not observable, and what was rejected.
+    fn answers(&mut self) {
+        let all = answers_in(self.report, "in the report");
+        for (id, title) in [("unobservable", "Not observable"), ("rejected", "Rejected")] {
+            if let Some(answer) = all.iter().find(|answer| answer.id == id) {
+                self.heading(title);
+                for line in &answer.lines {
+                    self.text += &wrap(line, COLUMNS, "  ", "    ");
+                }
             }
         }
     }
 
-    let findings: Vec<_> = report
-        .findings
-        .iter()
-        .filter(|finding| finding.severity > Severity::Info)
-        .collect();
-    if !findings.is_empty() {
-        text += &heading("Findings");
-        for finding in findings {
-            let style = if finding.severity == Severity::Error {
-                AnsiColor::Red
-            } else {
-                AnsiColor::Yellow
-            };
-            let line = wrap(
-                &format!(
-                    "{} {}: {} {}",
-                    finding.severity.word(),
-                    finding.subject,
-                    finding.text(),
-                    finding.remedy()
-                ),
-                COLUMNS,
-                "  ",
-                "    ",
-            );
-            // Only the first word is colored: a color over several lines breaks pagers.
-            let word = finding.severity.word();
-            text += &line.replacen(word, &paint(style.on_default(), word), 1);
+    /// Warnings and errors.
+    fn findings(&mut self) {
+        let findings: Vec<_> = self
+            .report
+            .findings
+            .iter()
+            .filter(|finding| finding.severity > Severity::Info)
+            .collect();
+        if !findings.is_empty() {
+            self.heading("Findings");
+            for finding in findings {
+                let style = if finding.severity == Severity::Error {
+                    AnsiColor::Red
+                } else {
+                    AnsiColor::Yellow
+                };
+                let line = wrap(
+                    &format!(
+                        "{} {}: {} {}",
+                        finding.severity.word(),
+                        finding.subject,
+                        finding.text(),
+                        finding.remedy()
+                    ),
+                    COLUMNS,
+                    "  ",
+                    "    ",
+                );
+                // Only the first word is colored: a color over several lines breaks pagers.
+                let word = finding.severity.word();
+                self.text += &line.replacen(word, &self.paint(style.on_default(), word), 1);
+            }
         }
     }
 
-    if !report.next_steps.is_empty() {
-        text += &heading("Next steps");
-        for step in &report.next_steps {
-            text += &wrap(&sentence(step), COLUMNS, "  - ", "    ");
+    /// What to do next, what was written, and how to undo it.
+    fn files(&mut self) {
+        if !self.report.next_steps.is_empty() {
+            self.heading("Next steps");
+            for step in &self.report.next_steps {
+                self.text += &wrap(&sentence(step), COLUMNS, "  - ", "    ");
+            }
+        }
+        if !self.report.outputs.is_empty() {
+            self.heading("Written");
+            let mut table = Table::new(&["<", "<"]);
+            for output in &self.report.outputs {
+                table.row([output.path.clone(), output.what.clone()]);
+            }
+            self.text += &table.plain(COLUMNS);
+        }
+        for command in &self.report.undo {
+            self.text += &wrap(&format!("undo: {command}"), COLUMNS, "  ", "    ");
         }
     }
-    if !report.outputs.is_empty() {
-        text += &heading("Written");
-        let mut table = Table::new(&["<", "<"]);
-        for output in &report.outputs {
-            table.row([output.path.clone(), output.what.clone()]);
-        }
-        text += &table.plain(COLUMNS);
-    }
-    for command in &report.undo {
-        text += &wrap(&format!("undo: {command}"), COLUMNS, "  ", "    ");
-    }
-    text
 }
 
 /// Changes shown: a screen has 24 lines.

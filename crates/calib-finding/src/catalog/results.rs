@@ -3,9 +3,21 @@
 super::topic! {
     /// A sweep does not determine an origin.
     ORIGIN_NOT_OBSERVABLE = "origin-not-observable" {
-        "": Error,
-            "The sweep `{sweep}` does not determine the origin ({verdict}): {reason}.",
+        "center": Error,
+            "The sweep `{sweep}` does not determine the origin: `{estimator}` finds no center ({said}).",
             "Sweep two joints whose axes meet in the origin over more of their range, or ask for a line with one axis.";
+        "axis": Error,
+            "The sweep `{sweep}` does not determine the origin: `{estimator}` finds no axis ({said}).",
+            "Sweep the joint over more of its range.";
+        "frame": Error,
+            "The sweep `{sweep}` does not determine the origin: the two axes give no frame ({said}).",
+            "Sweep two joints whose axes meet in the origin over more of their range, or ask for a line with one axis.";
+        "orientation": Error,
+            "The sweep `{sweep}` does not determine the origin: the orientation that the nominal URDF would give, or the reference point along the axis, is not known.",
+            "Name two axes, or a reference point that is known.";
+        "mean_axis": Error,
+            "The sweep `{sweep}` does not determine the origin: the axis has no mean direction in the body.",
+            "Check the poses of the body in the sweep.";
     }
     /// What the method `paper` assumes.
     PAPER_ASSUMPTIONS = "paper-assumptions" {
@@ -22,13 +34,31 @@ super::topic! {
     /// The residuals show an effect that is not in the model.
     MISSING_PHYSICS = "missing-physics" {
         "": Warning,
-            "{pattern}.",
+            "{physics} (`{parameter}`): explains {explains:percent} of χ², p = {p_value}.",
             "Enable the effect under `solve.free` or `solve.joints`, and compare the held-out errors.";
     }
     /// Shapes that the 3-D view lacks.
     SHAPE_NOT_DRAWN = "shape-not-drawn" {
-        "": Info,
-            "{missing} of {total:shape} of the links are missing in the 3-D view: {shapes}[[, and {more} more]].",
-            "Convert meshes to STL and name their package under `robot.packages` to see them. No number depends on it.";
+        "not_stl": Info,
+            "{missing} of {total:shape} of the links are missing in the 3-D view: not in STL format: {shapes:code}[[ and {more} more]].",
+            "Convert the meshes to STL to see them. No number depends on it.";
+        "no_package": Info,
+            "{missing} of {total:shape} of the links are missing in the 3-D view: their package is neither around the URDF nor under `robot.packages`: {shapes:code}[[ and {more} more]].",
+            "Name the package under `robot.packages` to see them. No number depends on it.";
+        "scheme": Info,
+            "{missing} of {total:shape} of the links are missing in the 3-D view: only `file://`, `package://` and `model://` are read: {shapes:code}[[ and {more} more]].",
+            "Name the files by a path to see them. No number depends on it.";
+        "unreadable": Info,
+            "{missing} of {total:shape} of the links are missing in the 3-D view: the files cannot be read: {shapes:code}[[ and {more} more]].",
+            "Correct the paths to see them. No number depends on it.";
+        "too_large": Info,
+            "{missing} of {total:shape} of the links are missing in the 3-D view: the files have more than 128 MB: {shapes:code}[[ and {more} more]].",
+            "Reduce the meshes to see them. No number depends on it.";
+        "damaged": Info,
+            "{missing} of {total:shape} of the links are missing in the 3-D view: the files are no whole STL mesh: {shapes:code}[[ and {more} more]].",
+            "Export the meshes again to see them. No number depends on it.";
+        "undefined": Info,
+            "{missing} of {total:shape} of the links are missing in the 3-D view: a shape of the link is none that the URDF format defines: {shapes:code}[[ and {more} more]].",
+            "Correct the `<visual>` elements to see them. No number depends on it.";
     }
 }

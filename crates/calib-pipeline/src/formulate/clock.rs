@@ -9,12 +9,12 @@
 //!
 //! so one c₀ and one c₁ are shared by all joints of a recording ([`calib_core::EffectKind::ClockOffset`]).
 
-use calib_core::{EffectKind, Parameter, ParameterId, ParameterKind, Unit};
+use calib_core::{EffectKind, Parameter, ParameterId, ParameterKind, Problem, Unit};
 use calib_profile::Usage;
 use calib_report::{Clock, ClockCheck};
 
-use crate::formulate::formulation::{Formulation, FreeSet, MlFit};
-use crate::prepare::align::ClockState;
+use crate::formulate::formulation::{ClockParameters, Formulation, FreeSet, MlFit};
+use crate::prepare::aligned::ClockState;
 use crate::prepare::inputs::{Inputs, Loaded};
 
 /// Prior σ of c₀ and c₁, s: ten times what the alignment leaves on a bad recording.
@@ -31,14 +31,6 @@ pub struct ClockEstimate {
     pub drift: f64,
     /// Its standard deviation.
     pub drift_sigma: Option<f64>,
-}
-
-fn offset_name(recording: &str) -> String {
-    format!("{recording}.clock_offset")
-}
-
-fn drift_name(recording: &str) -> String {
-    format!("{recording}.clock_drift")
 }
 
 /// First and last time, s, of the rows; `None` without time or with one row.
@@ -66,7 +58,6 @@ pub fn add_clocks(formulation: &mut Formulation, inputs: &Inputs, free_set: Free
             continue;
         };
         let found = matches!(alignment.clocks, ClockState::Found { .. });
-        let mut parameters: Option<[ParameterId; 2]> = None;
         for (joint, speeds) in &loaded.velocities {
             let Some(edge) = inputs
                 .robot
@@ -94,31 +85,44 @@ pub fn add_clocks(formulation: &mut Formulation, inputs: &Inputs, free_set: Free
             }
             let linear = regressor(&|row| position(loaded, row).unwrap_or(0.0));
             let problem = &mut formulation.problem;
-            let [offset, drift] = *parameters.get_or_insert_with(|| {
-                [offset_name(name), drift_name(name)].map(|name| {
-                    problem.parameter(Parameter {
-                        name,
-                        joint: None,
-                        kind: ParameterKind::Effect(EffectKind::ClockOffset),
-                        unit: Unit::Second,
-                        nominal: 0.0,
-                        start: 0.0,
-                        prior_sigma: Some(PRIOR),
-                        bounds: None,
-                        fixed: false,
-                    })
-                })
-            });
+            let clock = formulation.clocks.entry(name.clone());
+            let ClockParameters { offset, drift } =
+                *clock.or_insert_with(|| clock_parameters(problem, name));
             problem.share_effect(edge, EffectKind::ClockOffset, Some(constant), offset);
             problem.share_effect(edge, EffectKind::ClockOffset, Some(linear), drift);
         }
     }
 }
 
-/// Value and σ of a parameter.
-fn estimate(fit: &MlFit, name: &str) -> Option<(f64, Option<f64>)> {
-    let found = fit.solution.parameters.iter().find(|p| p.name == name)?;
-    Some((found.value, found.sigma))
+/// c₀ and c₁ of a recording.
+fn clock_parameters(problem: &mut Problem, recording: &str) -> ClockParameters {
+    let mut parameter = |what: &str| {
+        problem.parameter(Parameter {
+            name: format!("{recording}.{what}"),
+            joint: None,
+            kind: ParameterKind::Effect(EffectKind::ClockOffset),
+            unit: Unit::Second,
+            nominal: 0.0,
+            start: 0.0,
+            prior_sigma: Some(PRIOR),
+            bounds: None,
+            fixed: false,
+        })
+    };
+    ClockParameters {
+        offset: parameter("clock_offset"),
+        drift: parameter("clock_drift"),
+    }
+}
+
+/// Values and σ of c₀ and c₁ of a recording; `None` where the fit does not estimate them.
+fn estimates(fit: &MlFit, recording: &str) -> Option<[(f64, Option<f64>); 2]> {
+    let clock = fit.formulation.clocks.get(recording)?;
+    let estimate = |id: ParameterId| {
+        let found = &fit.solution.parameters[id.index()];
+        (found.value, found.sigma)
+    };
+    Some([clock.offset, clock.drift].map(estimate))
 }
 
 /// The clocks of a recording: from the fit where it estimates them, else from the alignment; `None` where nothing was
@@ -137,11 +141,7 @@ pub fn clock_estimate(loaded: &Loaded, fit: Option<&MlFit>) -> Option<ClockEstim
     let (Some(fit), Some((first, last))) = (fit, span(loaded)) else {
         return Some(aligned);
     };
-    let both = (
-        estimate(fit, &offset_name(&loaded.name)),
-        estimate(fit, &drift_name(&loaded.name)),
-    );
-    let (Some((c0, sigma)), Some((c1, drift_sigma))) = both else {
+    let Some([(c0, sigma), (c1, drift_sigma)]) = estimates(fit, &loaded.name) else {
         return Some(aligned);
     };
     let (middle, half) = (0.5 * (first + last), 0.5 * (last - first));
@@ -159,10 +159,7 @@ pub fn corrected(inputs: &Inputs, fit: &MlFit) -> Inputs {
     let mut inputs = inputs.clone();
     let model = &inputs.robot.model;
     for (name, loaded) in &mut inputs.recordings {
-        let (Some((c0, _)), Some((c1, _))) = (
-            estimate(fit, &offset_name(name)),
-            estimate(fit, &drift_name(name)),
-        ) else {
+        let Some([(c0, _), (c1, _)]) = estimates(fit, name) else {
             continue;
         };
         let places: Vec<Option<f64>> = (0..loaded.q.len())

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::{EdgeId, FrameId, PointId, Problem, Solution};
+use calib_core::{EdgeId, FrameId, GroupId, ParameterId, PointId, Problem, Solution};
 
 use crate::formulate::kinematics::Calibration;
 
@@ -42,8 +42,32 @@ pub struct Formulation {
     pub contact_points: BTreeMap<String, PointId>,
     /// Places of what is touched, by contact.
     pub contacts: BTreeMap<String, EdgeId>,
+    /// What is left of the clocks' offset, by recording.
+    pub clocks: BTreeMap<String, ClockParameters>,
+    /// Noise levels that the problem has.
+    pub noise: NoiseGroups,
     /// Regressors are needed at predictions (compliance or coupling is free).
     pub loaded: bool,
+}
+
+/// What is left of the clocks' offset of one recording: offset in its middle, s, and change to its end, s.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ClockParameters {
+    /// In the middle of the recording.
+    pub offset: ParameterId,
+    /// From there to its end.
+    pub drift: ParameterId,
+}
+
+/// Noise levels of a problem.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct NoiseGroups {
+    /// Positions of markers.
+    pub marker: Option<GroupId>,
+    /// Positions of bodies.
+    pub body_position: Option<GroupId>,
+    /// Joint readings.
+    pub joint: Option<GroupId>,
 }
 
 /// A solved problem.

@@ -79,7 +79,7 @@ impl Calibration {
     }
 
     /// `root_from_link` of all links at indicated joint positions (by joint index, rad or m), nothing else being
-    /// known: in the middle of all backlash, loaded by gravity.
+    /// known: every joint in the middle of its backlash, loaded by gravity.
     #[must_use]
     pub fn root_from_link(&self, q: &[f64]) -> Vec<Isometry3<f64>> {
         self.root_from_link_under(q, &Conditions::default())

@@ -414,7 +414,7 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
                 recording: recording.clone(),
                 row: *row,
                 body: name.clone(),
-                reason: "not settled: it lies on the way to a neighboring row".to_owned(),
+                cause: calib_report::RejectedFor::OnTheWay,
             }));
         }
     }

@@ -140,7 +140,7 @@ pub fn table(ranked: &[RankedVariant]) -> String {
         if !chosen.noise_parameters.is_empty() {
             let _ = writeln!(
                 text,
-                "  {} parameters are not distinguished from zero (under two sigma); --json names them",
+                "  {} parameters are not significantly different from zero (< 2σ); --json names them",
                 chosen.noise_parameters.len()
             );
         }

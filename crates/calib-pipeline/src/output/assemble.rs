@@ -1,14 +1,12 @@
 //! Everything that was found, as the report's data. Renderers compute nothing; this does.
 
-use calib_core::SolveStatus;
 use calib_profile::Method;
 use calib_report::{
-    FitEnd, Input, Limit, MissingPhysics, NextStep, Output, Report, Residuals, Scope, Verdict,
+    Input, Limit, MissingPhysics, NextStep, Output, Report, Residuals, Scope, Verdict,
     Verification, judge,
 };
 
-use crate::formulate::formulation::MlFit;
-use crate::output::evidence::Evidence;
+use crate::output::evidence::{Evidence, fit_end};
 use crate::output::of_data::{coverage, estimators, findings, recordings, rejected};
 use crate::output::of_fit::{
     fit_summary, missing_physics, noise, not_observable, parameters, transform,
@@ -148,15 +146,6 @@ fn reproduce(e: &Evidence<'_>) -> String {
         method if method == e.inputs.robot.profile.solve.method => format!("calib run {file}"),
         Method::Paper => format!("calib run {file} --method paper"),
         Method::Ml => format!("calib run {file} --method ml"),
-    }
-}
-
-pub(crate) fn fit_end(fit: &MlFit) -> FitEnd {
-    match fit.solution.status {
-        SolveStatus::Converged => FitEnd::Converged,
-        SolveStatus::Stalled => FitEnd::Stalled,
-        SolveStatus::MaxIterations => FitEnd::MaxIterations,
-        SolveStatus::NotEvaluable => FitEnd::NotEvaluable,
     }
 }
 

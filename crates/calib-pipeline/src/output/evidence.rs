@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use calib_core::SolveStatus;
 use calib_files::OutputFile;
 use calib_finding::Finding;
 use calib_profile::Method;
-use calib_report::{HeldOut, LoopClosure, ResidualRow};
+use calib_report::{FitEnd, HeldOut, LoopClosure, ResidualRow};
 
 use crate::estimate::paper::OriginEstimate;
 use crate::formulate::formulation::MlFit;
@@ -44,4 +45,14 @@ pub struct Evidence<'a> {
     pub written: &'a [(OutputFile, String)],
     /// Residuals of the fit.
     pub residuals: &'a [ResidualRow],
+}
+
+/// How the solver ended.
+pub(crate) fn fit_end(fit: &MlFit) -> FitEnd {
+    match fit.solution.status {
+        SolveStatus::Converged => FitEnd::Converged,
+        SolveStatus::Stalled => FitEnd::Stalled,
+        SolveStatus::MaxIterations => FitEnd::MaxIterations,
+        SolveStatus::NotEvaluable => FitEnd::NotEvaluable,
+    }
 }

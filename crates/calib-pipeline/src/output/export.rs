@@ -9,15 +9,15 @@ use calib_geometry::so3;
 use calib_report::scene::{Provenance, SceneBody, SceneFrame, SceneMarker, SceneRobot};
 use calib_report::{Change, Input, Scene, Status, Unit};
 use calib_urdf::rpy::rpy_from_rotation;
-use calib_urdf::{ChangeRecord, RobotModel, UrdfEdit, patch};
-use nalgebra::{Isometry3, Matrix6};
+use calib_urdf::{ChangeRecord, JointId, RobotModel, UrdfEdit, patch};
+use nalgebra::{Isometry3, Matrix6, Point3};
 
 use crate::error::PipelineError;
 use crate::formulate::found::Found;
 use crate::formulate::kinematics::Calibration;
-use crate::prepare::inputs::Inputs;
+use crate::prepare::inputs::{Digest, Inputs};
 use crate::prepare::tracks::BodyTrack;
-use crate::verify::known::Known;
+use crate::verify::known::{Known, Number};
 
 /// The patched URDF.
 #[derive(Debug, Clone)]
@@ -43,7 +43,7 @@ const UNCHANGED: f64 = 1e-12;
 pub fn patch_urdf(
     inputs: &Inputs,
     robot: &Calibration,
-    known: &BTreeMap<String, Known>,
+    known: &BTreeMap<Number, Known>,
 ) -> Result<PatchedUrdf, PipelineError> {
     let nominal = &inputs.robot.model;
     let target = robot.urdf_model();
@@ -72,9 +72,9 @@ pub fn patch_urdf(
         }
     }
     let file = &inputs.robot.profile.urdf;
-    let fail = |e: calib_urdf::EditError| PipelineError::Patch {
+    let fail = |cause: calib_urdf::EditError| PipelineError::Patch {
         file: file.clone(),
-        text: e.to_string(),
+        cause,
     };
     let original = &inputs.robot.urdf_text;
     let patched = patch(original, file, &edits).map_err(fail)?;
@@ -95,7 +95,7 @@ fn number_changes(
     nominal: &RobotModel,
     target: &RobotModel,
     edits: &[UrdfEdit],
-    known: &BTreeMap<String, Known>,
+    known: &BTreeMap<Number, Known>,
 ) -> Vec<Change> {
     let mut changes = Vec::new();
     for edit in edits {
@@ -106,12 +106,12 @@ fn number_changes(
                 };
                 let old = nominal.joint(id).parent_link_from_joint;
                 let new = target.joint(id).parent_link_from_joint;
-                let mut push = |what: &str, unit: Unit, old: f64, new: f64| {
+                let mut push = |k: usize, unit: Unit, old: f64, new: f64| {
                     if (new - old).abs() > UNCHANGED {
-                        let known = known.get(&format!("{joint}.{what}"));
+                        let known = known.get(&Number::Origin(id, k));
                         changes.push(Change {
                             joint: joint.clone(),
-                            what: what.to_owned(),
+                            what: ORIGIN_NUMBERS[k].to_owned(),
                             unit,
                             old: Some(old),
                             new,
@@ -121,21 +121,18 @@ fn number_changes(
                         });
                     }
                 };
-                for (k, what) in ["x", "y", "z"].into_iter().enumerate() {
+                for k in 0..3 {
                     push(
-                        what,
+                        k,
                         Unit::Meter,
                         old.translation.vector[k],
                         new.translation.vector[k],
                     );
                 }
-                // Roll, pitch and yaw jump near pitch ±90°: the turn itself is what changed.
-                let turn = so3::log(&(old.rotation.inverse() * new.rotation));
-                for (k, what) in ["turn about x", "turn about y", "turn about z"]
-                    .into_iter()
-                    .enumerate()
-                {
-                    push(what, Unit::Radian, 0.0, turn[k]);
+                // Roll, pitch and yaw jump near pitch ±90°: the rotation itself is what changed.
+                let rotation = so3::log(&(old.rotation.inverse() * new.rotation));
+                for k in 0..3 {
+                    push(3 + k, Unit::Radian, 0.0, rotation[k]);
                 }
             }
             UrdfEdit::AddFixedFrame {
@@ -145,7 +142,7 @@ fn number_changes(
                 ..
             } => {
                 let new = numbers(parent_from_frame);
-                for (k, what) in ["x", "y", "z", "roll", "pitch", "yaw"].iter().enumerate() {
+                for (k, what) in MOUNT_NUMBERS.iter().enumerate() {
                     changes.push(Change {
                         joint: joint_name.clone(),
                         what: format!("added {name} {what}"),
@@ -153,7 +150,7 @@ fn number_changes(
                         old: None,
                         new: new[k],
                         delta: None,
-                        sigma: known.get(&format!("{name}.{what}")).map(|k| k.sigma),
+                        sigma: known.get(&Number::Mount(name.clone(), k)).map(|k| k.sigma),
                         data_share: None,
                     });
                 }
@@ -163,6 +160,19 @@ fn number_changes(
     }
     changes
 }
+
+/// The numbers of [`Number::Origin`] in words.
+const ORIGIN_NUMBERS: [&str; 6] = [
+    "x",
+    "y",
+    "z",
+    "rotation about x",
+    "rotation about y",
+    "rotation about z",
+];
+
+/// The numbers of [`Number::Mount`] in words.
+const MOUNT_NUMBERS: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
 
 fn numbers(pose: &Isometry3<f64>) -> [f64; 6] {
     let t = pose.translation.vector;
@@ -254,11 +264,32 @@ pub fn scene(
             Status::Calibrated,
         ),
     ];
-    for joint in model.joints() {
-        // At zero the child link stands where the joint's origin is.
-        let status = if joint.parent_link_from_joint
-            == inputs.robot.model.joints()[joint_index(&model, &joint.name)].parent_link_from_joint
-        {
+    frames.extend(link_frames(inputs, &model));
+    frames.extend(body_frames(inputs, robot, &model));
+    frames.extend(origin_frames(inputs, robot, &model, found));
+    Scene {
+        name: inputs.robot.file.clone(),
+        robot: SceneRobot {
+            name: profile.robot.clone(),
+            urdf: profile.outputs.urdf.clone(),
+            base: root,
+            joints: Vec::new(),
+        },
+        frames,
+        bodies: scene_bodies(inputs, tracks, robot, &model),
+        objects: Vec::new(),
+        provenance: provenance(inputs),
+        ..Scene::default()
+    }
+}
+
+/// The links; at zero a child link stands where its joint's origin is.
+fn link_frames(inputs: &Inputs, model: &RobotModel) -> Vec<SceneFrame> {
+    let nominal = &inputs.robot.model;
+    let frame = |id: JointId| {
+        let joint = model.joint(id);
+        let same = joint.parent_link_from_joint == nominal.joint(id).parent_link_from_joint;
+        let status = if same {
             Status::Assumed
         } else {
             Status::Calibrated
@@ -270,78 +301,89 @@ pub fn scene(
             None,
             status,
         );
-        frames.push(frame.in_urdf());
-    }
-    for (name, mount) in &robot.mounts {
-        let body = &profile.bodies[name];
+        frame.in_urdf()
+    };
+    model.joint_ids().map(frame).collect()
+}
+
+/// The bodies on their links.
+fn body_frames(inputs: &Inputs, robot: &Calibration, model: &RobotModel) -> Vec<SceneFrame> {
+    let frame = |(name, mount): (&String, &Isometry3<f64>)| {
+        let body = &inputs.robot.profile.bodies[name];
         let status = if body.mount.is_some() {
             Status::Assumed
         } else {
             Status::Calibrated
         };
-        frames.push(SceneFrame::new(
-            body_frame(&model, name),
+        SceneFrame::new(
+            body_frame(model, name),
             model.link(body.link).name.clone(),
             mount,
             None,
             status,
-        ));
-    }
-    for f in found
-        .iter()
-        .filter(|f| profile.origins.contains_key(&f.child) && robot.mounts.contains_key(&f.parent))
-    {
-        frames.push(SceneFrame::new(
+        )
+    };
+    robot.mounts.iter().map(frame).collect()
+}
+
+/// The origins that the profile asks for, in their bodies.
+fn origin_frames(
+    inputs: &Inputs,
+    robot: &Calibration,
+    model: &RobotModel,
+    found: &[Found],
+) -> Vec<SceneFrame> {
+    let origins = &inputs.robot.profile.origins;
+    let asked = |f: &&Found| origins.contains_key(&f.child) && robot.mounts.contains_key(&f.parent);
+    let frame = |f: &Found| {
+        SceneFrame::new(
             format!("{}_origin", f.child),
-            body_frame(&model, &f.parent),
+            body_frame(model, &f.parent),
             &f.pose,
             f.covariance.as_ref(),
             f.status,
-        ));
-    }
-    let bodies = robot
-        .mounts
-        .keys()
-        .map(|name| SceneBody {
-            name: body_frame(&model, name),
-            link: model.link(profile.bodies[name].link).name.clone(),
-            markers: tracks[name].template.as_ref().map_or_else(Vec::new, |t| {
-                t.names
-                    .iter()
-                    .zip(&t.points)
-                    .map(|(n, p)| SceneMarker {
-                        name: n.clone(),
-                        xyz_m: p.coords.into(),
-                    })
-                    .collect()
-            }),
-        })
-        .collect();
-    Scene {
-        name: inputs.robot.file.clone(),
-        robot: SceneRobot {
-            name: profile.robot.clone(),
-            urdf: profile.outputs.urdf.clone(),
-            base: root,
-            joints: Vec::new(),
-        },
-        frames,
-        bodies,
-        objects: Vec::new(),
-        provenance: Provenance {
-            tool: "calib".to_owned(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            profile: inputs.robot.file.clone(),
-            inputs: inputs
-                .digests
-                .iter()
-                .map(|d| Input {
-                    path: d.path.clone(),
-                    sha256: d.sha256.clone(),
-                })
-                .collect(),
-        },
-        ..Scene::default()
+        )
+    };
+    found.iter().filter(asked).map(frame).collect()
+}
+
+/// The bodies with their markers.
+fn scene_bodies(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    robot: &Calibration,
+    model: &RobotModel,
+) -> Vec<SceneBody> {
+    let markers = |name: &String| {
+        let template = tracks[name].template.iter();
+        let named = template.flat_map(|t| t.names.iter().zip(&t.points));
+        let marker = |(name, point): (&String, &Point3<f64>)| SceneMarker {
+            name: name.clone(),
+            xyz_m: point.coords.into(),
+        };
+        named.map(marker).collect()
+    };
+    let body = |name: &String| SceneBody {
+        name: body_frame(model, name),
+        link: model
+            .link(inputs.robot.profile.bodies[name].link)
+            .name
+            .clone(),
+        markers: markers(name),
+    };
+    robot.mounts.keys().map(body).collect()
+}
+
+fn provenance(inputs: &Inputs) -> Provenance {
+    let input = |d: &Digest| Input {
+        path: d.path.clone(),
+        sha256: d.sha256.clone(),
+    };
+    Provenance {
+        tool: "calib".to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        profile: inputs.robot.file.clone(),
+        inputs: inputs.digests.iter().map(input).collect(),
     }
 }
 
@@ -352,8 +394,4 @@ fn body_frame(model: &RobotModel, body: &str) -> String {
     } else {
         body.to_owned()
     }
-}
-
-fn joint_index(model: &RobotModel, name: &str) -> usize {
-    model.joint_id(name).map_or(0, calib_urdf::JointId::index)
 }

@@ -7,7 +7,7 @@ use calib_finding::{About, Fact, Finding, catalog};
 use calib_profile::{Method, Usage};
 use calib_report::{
     EstimatorResult, JointCoverage, Lost, MissingPhysics, RecordingSummary, RecordingUse, Rejected,
-    Unit, number,
+    RejectedFor, Unit, number,
 };
 
 use crate::formulate::formulation::MlFit;
@@ -80,12 +80,12 @@ pub(crate) fn coverage(inputs: &Inputs) -> Vec<JointCoverage> {
 }
 
 pub(crate) fn rejected(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Rejected> {
-    let mut groups: BTreeMap<(String, String, &str), Vec<u64>> = BTreeMap::new();
+    let mut groups: BTreeMap<(String, String, RejectedFor), Vec<u64>> = BTreeMap::new();
     for out in &inputs.excluded {
         let row = inputs.recordings.get(&out.recording);
         if let Some(row) = row.and_then(|r| r.poses.rows.get(out.row)) {
             groups
-                .entry((out.recording.clone(), out.body.clone(), &out.reason))
+                .entry((out.recording.clone(), out.body.clone(), out.cause))
                 .or_default()
                 .push(*row);
         }
@@ -95,39 +95,33 @@ pub(crate) fn rejected(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Rejected> {
         .flat_map(|fit| fit.solution.rejected.iter().map(move |r| (fit, r)))
     {
         let (recording, row) = &fit.formulation.samples[r.sample];
-        let reason = match r.reason {
-            RejectReason::Swap => "swapped with another marker of the body",
-            RejectReason::Occlusion => "occlusion: a pose needed to predict it was lost",
-            RejectReason::Outlier => "outlier: residual too large for the noise",
-            RejectReason::NotSettled => {
-                "not settled: the whole body is displaced, or a joint reading is wrong"
-            }
+        let cause = match r.reason {
+            RejectReason::Swap => RejectedFor::Swap,
+            RejectReason::Occlusion => RejectedFor::Occlusion,
+            RejectReason::Outlier => RejectedFor::Outlier,
+            RejectReason::NotSettled => RejectedFor::NotSettled,
         };
         let row = inputs.recordings[recording].poses.rows[*row];
+        let subject = subject(fit, r.measurement, r.item);
         groups
-            .entry((
-                recording.clone(),
-                subject(fit, r.measurement, r.item),
-                reason,
-            ))
+            .entry((recording.clone(), subject, cause))
             .or_default()
             .push(row);
     }
     groups
         .into_iter()
-        .map(|((recording, subject, reason), rows)| Rejected {
-            recording,
-            subject,
-            rows,
-            reason: reason.to_owned(),
-        })
+        .map(|((recording, subject, cause), rows)| Rejected::new(recording, subject, rows, cause))
         .collect()
 }
 
 pub(crate) fn findings(e: &Evidence<'_>, missing: &[MissingPhysics]) -> Vec<Finding> {
     let mut findings = e.findings.to_vec();
     findings.extend(missing.iter().map(|m| {
-        Finding::new(catalog::MISSING_PHYSICS, About::Fit).with("pattern", Fact::name(m.evidence()))
+        Finding::new(catalog::MISSING_PHYSICS, About::Fit)
+            .with("physics", Fact::choice(m.physics.words()))
+            .with("parameter", Fact::name(&m.parameter))
+            .with("explains", Fact::ratio(m.explains))
+            .with("p_value", Fact::ratio(m.p_value.max(f64::MIN_POSITIVE)))
     }));
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     findings

@@ -5,8 +5,7 @@ use calib_report::{Cause, FitSummary, NotObservable, Parameter, Term, Transform,
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::found::Found;
-use crate::output::assemble::fit_end;
-use crate::output::evidence::Evidence;
+use crate::output::evidence::{Evidence, fit_end};
 
 pub(crate) fn transform(found: &Found) -> Transform {
     Transform::new(

@@ -1,7 +1,8 @@
 //! The look of the links for the 3-D view: shapes of the URDF, meshes where their files are at hand.
 //!
-//! A picture decides nothing: what cannot be drawn is left out and named in one finding.
+//! A picture decides nothing: what cannot be drawn is left out and named, in one finding per cause.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use calib_finding::{About, Fact, Finding, catalog};
@@ -17,9 +18,35 @@ const MAX_BYTES: u64 = 128 << 20;
 /// Shapes left out that the finding names.
 const NAMED: usize = 3;
 
+/// Why a shape is not drawn; each is a form of [`catalog::SHAPE_NOT_DRAWN`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum NotDrawn {
+    NoPackage,
+    Scheme,
+    NotStl,
+    Unreadable,
+    TooLarge,
+    Damaged,
+    Undefined,
+}
+
+impl NotDrawn {
+    fn form(self) -> &'static str {
+        match self {
+            Self::NoPackage => "no_package",
+            Self::Scheme => "scheme",
+            Self::NotStl => "not_stl",
+            Self::Unreadable => "unreadable",
+            Self::TooLarge => "too_large",
+            Self::Damaged => "damaged",
+            Self::Undefined => "undefined",
+        }
+    }
+}
+
 /// The outlines of all links, and the mesh files that were read for them.
 ///
-/// A finding tells what was left out, and why.
+/// Findings tell what was left out, and why.
 #[must_use]
 pub fn outlines(robot: &RobotProfile, findings: &mut Vec<Finding>) -> (Vec<Outline>, Vec<Digest>) {
     let (mut outlines, mut read) = (Vec::new(), Vec::new());
@@ -29,10 +56,11 @@ pub fn outlines(robot: &RobotProfile, findings: &mut Vec<Finding>) -> (Vec<Outli
         return (outlines, read);
     };
     let count = shapes.len() + faults.len();
-    let mut left_out: Vec<String> = faults
-        .iter()
-        .map(|fault| format!("line {} ({}): {}", fault.place.line, fault.link, fault.text))
-        .collect();
+    let mut left_out: BTreeMap<NotDrawn, Vec<String>> = BTreeMap::new();
+    for fault in faults {
+        let links = left_out.entry(NotDrawn::Undefined).or_default();
+        links.push(fault.link);
+    }
     for shape in &shapes {
         let Ok(link) = robot.model.link_id(&shape.link) else {
             continue;
@@ -42,29 +70,31 @@ pub fn outlines(robot: &RobotProfile, findings: &mut Vec<Finding>) -> (Vec<Outli
                 outlines.push(outline);
                 read.extend(digest.filter(|d| !read.contains(d)));
             }
-            Err(why) => left_out.push(format!("{}: {why}", shape.link)),
+            Err((mesh, why)) => left_out.entry(why).or_default().push(mesh),
         }
     }
-    if !left_out.is_empty() {
-        let n = left_out.len();
-        let more = (n > NAMED).then(|| Fact::count(n - NAMED));
-        left_out.truncate(NAMED);
+    for (why, mut names) in left_out {
+        let missing = names.len();
+        let more = (missing > NAMED).then(|| Fact::count(missing - NAMED));
+        names.truncate(NAMED);
+        let about = About::File(file.clone());
         findings.push(
-            Finding::new(catalog::SHAPE_NOT_DRAWN, About::File(file.clone()))
-                .with("missing", Fact::count(n))
+            Finding::of_kind(catalog::SHAPE_NOT_DRAWN, why.form(), about)
+                .with("missing", Fact::count(missing))
                 .with("total", Fact::count(count))
-                .with("shapes", Fact::names(left_out))
+                .with("shapes", Fact::names(names))
                 .with_some("more", more),
         );
     }
     (outlines, read)
 }
 
+/// One shape and the file that was read for it; else the file, and why it is not drawn.
 fn outline(
     robot: &RobotProfile,
     frame: usize,
     shape: &Visual,
-) -> Result<(Outline, Option<Digest>), String> {
+) -> Result<(Outline, Option<Digest>), (String, NotDrawn)> {
     let at = &shape.link_from_visual;
     Ok(match &shape.geometry {
         Geometry::Box { size } => (Outline::cuboid(frame, at, *size), None),
@@ -73,23 +103,10 @@ fn outline(
         }
         Geometry::Sphere { radius } => (Outline::ball(frame, at, *radius), None),
         Geometry::Mesh { filename, scale } => {
-            let told = |why: &str| format!("`{filename}`: {why}");
-            let path = resolve(robot, filename).map_err(|why| told(&why))?;
-            let is_stl = path
-                .extension()
-                .is_some_and(|e| e.eq_ignore_ascii_case("stl"));
-            if !is_stl {
-                return Err(told("only STL meshes are drawn"));
-            }
-            let size = std::fs::metadata(&path)
-                .map_err(|e| told(&e.kind().to_string()))?
-                .len();
-            if size > MAX_BYTES {
-                return Err(told("the file has more than 128 MB"));
-            }
-            let bytes = std::fs::read(&path).map_err(|e| told(&e.kind().to_string()))?;
-            let outline =
-                Outline::from_stl(frame, at, *scale, &bytes).map_err(|e| told(&e.to_string()))?;
+            let named = |why: NotDrawn| (filename.clone(), why);
+            let bytes = mesh(robot, filename).map_err(named)?;
+            let outline = Outline::from_stl(frame, at, *scale, &bytes)
+                .map_err(|_| named(NotDrawn::Damaged))?;
             let digest = Digest {
                 path: filename.clone(),
                 sha256: sha256_hex(&bytes),
@@ -99,8 +116,24 @@ fn outline(
     })
 }
 
+/// The bytes of an STL file.
+fn mesh(robot: &RobotProfile, filename: &str) -> Result<Vec<u8>, NotDrawn> {
+    let path = resolve(robot, filename)?;
+    let is_stl = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("stl"));
+    if !is_stl {
+        return Err(NotDrawn::NotStl);
+    }
+    let file = std::fs::metadata(&path).map_err(|_| NotDrawn::Unreadable)?;
+    if file.len() > MAX_BYTES {
+        return Err(NotDrawn::TooLarge);
+    }
+    std::fs::read(&path).map_err(|_| NotDrawn::Unreadable)
+}
+
 /// The file that a URDF names: relative to the URDF, or in a package.
-fn resolve(robot: &RobotProfile, filename: &str) -> Result<PathBuf, String> {
+fn resolve(robot: &RobotProfile, filename: &str) -> Result<PathBuf, NotDrawn> {
     let urdf = robot.folder.join(&robot.profile.urdf);
     let beside = urdf.parent().unwrap_or(Path::new(""));
     if let Some(path) = filename.strip_prefix("file://") {
@@ -108,18 +141,16 @@ fn resolve(robot: &RobotProfile, filename: &str) -> Result<PathBuf, String> {
     }
     for scheme in ["package://", "model://"] {
         if let Some(rest) = filename.strip_prefix(scheme) {
-            let (package, rest) = rest.split_once('/').ok_or("no path in the package")?;
+            let (package, rest) = rest.split_once('/').ok_or(NotDrawn::NoPackage)?;
             let folder = match robot.profile.packages.get(package) {
                 Some(folder) => robot.folder.join(folder),
-                None => find_package(beside, package).ok_or_else(|| {
-                    format!("the package `{package}` is neither around the URDF nor under `robot.packages`")
-                })?,
+                None => find_package(beside, package).ok_or(NotDrawn::NoPackage)?,
             };
             return Ok(folder.join(rest));
         }
     }
     match filename.split_once("://") {
-        Some((scheme, _)) => Err(format!("`{scheme}://` is not read")),
+        Some(_) => Err(NotDrawn::Scheme),
         // An absolute path stays one.
         None => Ok(beside.join(filename)),
     }

@@ -13,40 +13,21 @@
 use std::collections::BTreeMap;
 
 use calib_checks::model::alignment;
-use calib_checks::sync::{ClockMap, OffsetOutcome};
+use calib_checks::sync::OffsetOutcome;
 use calib_checks::{Expectations, checks};
 use calib_finding::{Finding, Severity, Subject};
 use calib_profile::{Clocks, RecordingSpec, TimedPoses, Timing};
 use calib_recording::{Poses, Recording};
 
-use crate::error::PipelineError;
-use crate::prepare::aligned::{Aligned, Alignment};
+use crate::error::{DataProblem, PipelineError};
+use crate::prepare::aligned::{Aligned, Alignment, ClockState, SAME_TIME};
 use crate::prepare::inputs::RobotProfile;
 use crate::prepare::settled::settle;
 use crate::prepare::streams::Scalars;
 use crate::prepare::timelines::{estimate, tracker_table, tracker_timeline};
 
-/// An offset below this, s, is none: at 0.5 rad/s and 1 m it is a tenth of a millimeter.
-pub(crate) const SAME_TIME: f64 = 2e-4;
-
 /// Half of the time over which a joint's speed is measured, s: several samples of any controller.
 const HALF_CHORD: f64 = 0.02;
-
-/// What is known of two clocks.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ClockState {
-    /// They are one: the streams name the same clock.
-    One,
-    /// The profile declares them to be one.
-    Declared,
-    /// Found from the motion of a body.
-    Found {
-        /// The body.
-        body: String,
-        /// Equation (1), tracker from robot.
-        map: ClockMap,
-    },
-}
 
 /// The table of a timed recording, and of the robot's own log where that is another file.
 ///
@@ -59,89 +40,69 @@ pub fn align(
     timing: &Timing,
     recording: &Recording,
 ) -> Result<Aligned, PipelineError> {
-    let fail = |finding: String, remedy: &str| PipelineError::Data {
-        file: robot.folder.join(&spec.file).display().to_string(),
-        finding,
-        remedy: remedy.to_owned(),
-    };
-    let tracker_line = tracker_timeline(recording).ok_or_else(|| {
-        fail(
-            "no stream of a marker or body".to_owned(),
-            "name the tracker's file under `file`",
-        )
-    })?;
-    let tracker = recording
-        .timelines
-        .get(tracker_line)
-        .ok_or_else(|| fail("a stream has no time line".to_owned(), "correct the reader"))?;
-    let times = tracker.t.clone().ok_or_else(|| {
-        fail(
-            "`timing` is given, the tracker's rows have no time".to_owned(),
-            "add a column `t_s`, or remove `timing`: static poses need none",
-        )
-    })?;
-    let joints = Scalars::of_joints(recording);
-    let robot_line = joints.values().map(|j| j.timeline).next();
-    let robot_clock = robot_line
-        .and_then(|line| recording.timelines.get(line))
-        .map_or_else(|| tracker.clock.clone(), |line| line.clock.clone());
-    if joints.values().any(|j| j.t.is_empty()) {
-        return Err(fail(
-            "the joints' rows have no time".to_owned(),
-            "add a column `t_s` to the robot's log",
-        ));
-    }
-    let mut full = tracker_table(recording, tracker_line, &times)
-        .map_err(|e| fail(e, "give every stream a name of its own"))?;
+    let file = || robot.folder.join(&spec.file).display().to_string();
+    aligned(robot, name, spec, timing, recording)
+        .map_err(|problem| PipelineError::data(file(), problem))
+}
+
+/// Speed of each joint per row, rad/s or m/s.
+type Velocities = BTreeMap<String, Vec<Option<f64>>>;
+
+/// The streams of a recording and the tracker's times.
+struct Streams<'a> {
+    recording: &'a Recording,
+    /// The tracker's time line.
+    line: usize,
+    times: Vec<f64>,
+    joints: BTreeMap<String, Scalars>,
+    tracker_clock: &'a str,
+    robot_clock: &'a str,
+}
+
+fn aligned(
+    robot: &RobotProfile,
+    name: &str,
+    spec: &RecordingSpec,
+    timing: &Timing,
+    recording: &Recording,
+) -> Result<Aligned, DataProblem> {
+    let streams = Streams::of(recording)?;
+    let mut full =
+        tracker_table(recording, streams.line, &streams.times).map_err(DataProblem::NotATrack)?;
     let mut findings: Vec<Finding> = checks(&full, &Expectations::default())
         .into_iter()
         .filter(|f| f.severity != Severity::Error)
         .map(|f| f.in_recording(name))
         .collect();
-    let one_line = robot_line.is_none_or(|line| line == tracker_line);
-    let clocks = if one_line || robot_clock == tracker.clock {
-        ClockState::One
-    } else if timing.clock == Clocks::Shared {
-        ClockState::Declared
-    } else {
-        let (body, map) = estimate(robot, spec, timing, &full, &joints)
-            .map_err(|f| fail(format!("recording `{name}`: {}", f.text()), &f.remedy()))?;
-        findings.extend(
-            alignment(&OffsetOutcome::Found(map), SAME_TIME).map(|mut finding| {
+    let clocks = match streams.stated_clocks(timing) {
+        Some(stated) => stated,
+        None => {
+            let (body, map) =
+                estimate(robot, spec, timing, &full, &streams.joints).map_err(|why| {
+                    DataProblem::Clocks {
+                        recording: name.to_owned(),
+                        why,
+                    }
+                })?;
+            let found = alignment(&OffsetOutcome::Found(map), SAME_TIME);
+            findings.extend(found.map(|mut finding| {
                 finding.subject = Subject::body(&body).in_recording(name);
                 finding
-            }),
-        );
-        ClockState::Found { body, map }
-    };
-    let at_robot = |t: f64| match &clocks {
-        ClockState::Found { map, .. } => map.to_b(t),
-        ClockState::One | ClockState::Declared => t,
-    };
-    let mut velocities = BTreeMap::new();
-    for (joint, stream) in &joints {
-        let q = times.iter().map(|t| stream.at(at_robot(*t))).collect();
-        full.joints.insert(joint.clone(), q);
-        if let Some(unit) = stream.unit {
-            full.joint_units.insert(joint.clone(), unit);
+            }));
+            ClockState::Found { body, map }
         }
-        let speed = times.iter().map(|t| stream.speed(at_robot(*t), HALF_CHORD));
-        velocities.insert(joint.clone(), speed.collect::<Vec<_>>());
-    }
-    for (joint, stream) in Scalars::of_torques(recording) {
-        let torque = times.iter().map(|t| stream.at(at_robot(*t))).collect();
-        full.torques.insert(joint, torque);
-    }
+    };
+    let velocities = streams.add_robot(&mut full, &clocks);
     let mut aligned = Aligned {
         poses: Poses::default(),
         velocities: BTreeMap::new(),
         shapes: BTreeMap::new(),
         alignment: Alignment {
-            tracker_clock: tracker.clock.clone(),
-            robot_clock,
+            tracker_clock: streams.tracker_clock.to_owned(),
+            robot_clock: streams.robot_clock.to_owned(),
             clocks,
             holds: None,
-            samples: times.len(),
+            samples: streams.times.len(),
         },
         findings,
         excluded: Vec::new(),
@@ -150,17 +111,14 @@ pub fn align(
         TimedPoses::Settle => {
             settle(name, timing, &robot.profile.tracker, &full, &mut aligned);
             if aligned.poses.is_empty() {
-                return Err(fail(
-                    format!(
-                        "recording `{name}`: nothing stands still for {} s",
-                        timing.hold
-                    ),
-                    "hold each posture for a second, or take rows of the motion: `timing: {poses: continuous}`",
-                ));
+                return Err(DataProblem::NothingStandsStill {
+                    recording: name.to_owned(),
+                    hold: timing.hold,
+                });
             }
         }
         TimedPoses::Continuous => {
-            let rows = thinned(&full, &times, timing.rate);
+            let rows = thinned(&full, &streams.times, timing.rate);
             aligned.poses = full.select(&rows);
             aligned.velocities = velocities
                 .into_iter()
@@ -169,6 +127,65 @@ pub fn align(
         }
     }
     Ok(aligned)
+}
+
+impl<'a> Streams<'a> {
+    fn of(recording: &'a Recording) -> Result<Self, DataProblem> {
+        let line = tracker_timeline(recording).ok_or(DataProblem::NothingTracked)?;
+        let timelines = &recording.timelines;
+        let tracker = timelines.get(line).ok_or(DataProblem::NoTimeline)?;
+        let times = tracker.t.clone().ok_or(DataProblem::NoTrackerTime)?;
+        let joints = Scalars::of_joints(recording);
+        if joints.values().any(|j| j.t.is_empty()) {
+            return Err(DataProblem::NoJointTime);
+        }
+        let of_robot = joints.values().next();
+        let robot_clock = of_robot
+            .and_then(|j| timelines.get(j.timeline))
+            .map_or(&tracker.clock, |line| &line.clock);
+        Ok(Self {
+            recording,
+            line,
+            times,
+            joints,
+            tracker_clock: &tracker.clock,
+            robot_clock,
+        })
+    }
+
+    /// What is known of the clocks without looking at the motion.
+    fn stated_clocks(&self, timing: &Timing) -> Option<ClockState> {
+        let of_robot = self.joints.values().next();
+        let one_line = of_robot.is_none_or(|j| j.timeline == self.line);
+        if one_line || self.robot_clock == self.tracker_clock {
+            Some(ClockState::One)
+        } else if timing.clock == Clocks::Shared {
+            Some(ClockState::Declared)
+        } else {
+            None
+        }
+    }
+
+    /// Adds joint positions and torques at the tracker's times to its table; gives the joints' speeds.
+    fn add_robot(&self, full: &mut Poses, clocks: &ClockState) -> Velocities {
+        let mut velocities = BTreeMap::new();
+        let at_robot = |t: &f64| clocks.at_robot(*t);
+        for (joint, stream) in &self.joints {
+            let q = self.times.iter().map(|t| stream.at(at_robot(t))).collect();
+            full.joints.insert(joint.clone(), q);
+            if let Some(unit) = stream.unit {
+                full.joint_units.insert(joint.clone(), unit);
+            }
+            let times = self.times.iter();
+            let speed = times.map(|t| stream.speed(at_robot(t), HALF_CHORD));
+            velocities.insert(joint.clone(), speed.collect());
+        }
+        for (joint, stream) in Scalars::of_torques(self.recording) {
+            let torque = self.times.iter().map(|t| stream.at(at_robot(t))).collect();
+            full.torques.insert(joint, torque);
+        }
+        velocities
+    }
 }
 
 /// Rows at the wanted rate, of those with all joints and anything tracked.

@@ -2,12 +2,42 @@
 
 use std::collections::BTreeMap;
 
+use calib_checks::sync::ClockMap;
 use calib_finding::Finding;
 use calib_recording::Poses;
 use nalgebra::Matrix3;
 
-use crate::prepare::align::ClockState;
 use crate::prepare::excluded::Excluded;
+
+/// An offset below this, s, is none: at 0.5 rad/s and 1 m it is a tenth of a millimeter.
+pub(crate) const SAME_TIME: f64 = 2e-4;
+
+/// What is known of two clocks.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ClockState {
+    /// They are one: the streams name the same clock.
+    One,
+    /// The profile declares them to be one.
+    Declared,
+    /// Found from the motion of a body.
+    Found {
+        /// The body.
+        body: String,
+        /// Equation (1) of [`mod@crate::prepare::align`], tracker from robot.
+        map: ClockMap,
+    },
+}
+
+impl ClockState {
+    /// The robot's time of a tracker's time, s.
+    #[must_use]
+    pub fn at_robot(&self, t: f64) -> f64 {
+        match self {
+            Self::Found { map, .. } => map.to_b(t),
+            Self::One | Self::Declared => t,
+        }
+    }
+}
 
 /// How the clocks of one recording go together.
 #[derive(Debug, Clone, PartialEq)]

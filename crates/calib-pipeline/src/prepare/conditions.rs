@@ -9,7 +9,7 @@ use crate::prepare::inputs::{Inputs, Loaded};
 /// A joint that moves less than this from one row to the next keeps its direction of approach, rad or m.
 const STILL: f64 = 1e-5;
 
-/// The circumstances of one row. The default knows nothing: the middle of all backlash, loads by gravity.
+/// The circumstances of one row. The default knows nothing: every joint in the middle of its backlash, loads by gravity.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Conditions {
     /// Direction in which each joint moved last, by joint index: +1, −1, or 0 where no row before tells.

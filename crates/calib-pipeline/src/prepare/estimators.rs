@@ -6,13 +6,13 @@
 use std::collections::BTreeMap;
 
 use calib_cor::{InputKind, Pose, Shape as CorShape};
-use calib_estimator::{OptionId, parameter};
+use calib_estimator::{Estimate, EstimatorInfo, OptionId, Outcome, parameter};
 use calib_plugin::{
     Answer, AorFit, AxisLine, ByFn, Call, Control, CorFit, Entry, Failure, Host, Kind, Motion,
-    MotionData, Offer, PluginError, SearchPath, Shape, Tables, Value,
+    MotionData, Offer, SearchPath, Shape, Tables, Value,
 };
 use calib_profile::Profile;
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Point3, SMatrix, Vector3};
 
 use crate::error::PipelineError;
 use crate::prepare::readers;
@@ -190,23 +190,6 @@ pub fn values(given: &BTreeMap<String, calib_profile::ParameterValue>) -> BTreeM
         .collect()
 }
 
-impl From<PluginError> for PipelineError {
-    fn from(error: PluginError) -> Self {
-        let mut text = error.to_string();
-        let mut source = std::error::Error::source(&error);
-        while let Some(cause) = source {
-            text.push_str(&format!(": {cause}"));
-            source = cause.source();
-        }
-        let code = match error.exit_code() {
-            2 => crate::ExitCode::Usage,
-            3 => crate::ExitCode::Data,
-            _ => crate::ExitCode::Plugin,
-        };
-        Self::Plugin { text, code }
-    }
-}
-
 fn shapes(input: InputKind) -> Vec<Shape> {
     let shape = |kind: &InputKind| match kind {
         InputKind::Points => Some(Shape::Points),
@@ -234,9 +217,13 @@ fn poses(motion: &Motion<'_>, track: usize) -> Vec<Option<Pose>> {
     motion.poses(track).map(|p| p.map(pose)).collect()
 }
 
-/// The options that a profile can set, as parameters of the offer.
-fn with_parameters(offer: Offer, options: &[OptionId]) -> Offer {
-    let described = options.iter().filter_map(|o| parameter::parameter(*o));
+/// An entry with the options that a profile can set, as parameters of the offer.
+fn offer<E: Estimate>(kind: Kind, info: &EstimatorInfo<E>) -> Offer {
+    let offer = Offer::new(kind, info.id, info.summary)
+        .from_source(info.source)
+        .takes(&shapes(info.input));
+    let options = info.options.iter();
+    let described = options.filter_map(|o| parameter::parameter(*o));
     described.fold(offer, |offer, p| {
         offer.with(calib_plugin::Parameter {
             name: p.name,
@@ -278,11 +265,24 @@ fn set_parameters(
     Ok(())
 }
 
+fn why_not<E: Estimate>(outcome: &Outcome<E>) -> String {
+    let (verdict, reason) = (outcome.verdict(), outcome.reason());
+    format!("{verdict}: {}", reason.unwrap_or(""))
+}
+
+/// Why an estimate is weak.
+fn doubt<E: Estimate>(outcome: &Outcome<E>) -> Option<String> {
+    let reason = outcome.reason().unwrap_or("");
+    (!outcome.is_observable()).then(|| reason.to_owned())
+}
+
+/// A matrix by rows, as it crosses the border.
+fn rows<const N: usize>(matrix: &SMatrix<f64, N, N>) -> [[f64; N]; N] {
+    std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
+}
+
 fn built_in_cor(info: &'static calib_cor::EstimatorInfo) -> Entry<dyn calib_plugin::Cor> {
-    let offer = Offer::new(Kind::Cor, info.id, info.summary)
-        .from_source(info.source)
-        .takes(&shapes(info.input));
-    let offer = with_parameters(offer, info.options);
+    let offer = offer(Kind::Cor, info);
     Entry::built_in_cor(ByFn::new(
         offer,
         move |motion: &Motion<'_>, call: &Call<'_>| {
@@ -308,11 +308,7 @@ fn built_in_cor(info: &'static calib_cor::EstimatorInfo) -> Entry<dyn calib_plug
                 .run(&input, &options.only(info.options))
                 .map_err(|e| Failure::BadInput(e.to_string()))?;
             let Some(e) = outcome.estimate() else {
-                return Ok(Answer::NotObservable(format!(
-                    "{}: {}",
-                    outcome.verdict().as_str(),
-                    outcome.reason().unwrap_or("")
-                )));
+                return Ok(Answer::NotObservable(why_not(&outcome)));
             };
             let (radii_m, body_points_m) = match &e.shape {
                 CorShape::Radii { radii, .. } => (radii.clone(), Vec::new()),
@@ -331,25 +327,20 @@ fn built_in_cor(info: &'static calib_cor::EstimatorInfo) -> Entry<dyn calib_plug
             };
             Ok(Answer::Found(CorFit {
                 center_m: e.center.coords.into(),
-                covariance_m2: Some(std::array::from_fn(|i| {
-                    std::array::from_fn(|j| e.covariance[(i, j)])
-                })),
+                covariance_m2: Some(rows(&e.covariance)),
                 body_points_m,
                 radii_m,
                 rms_m: e.rms,
                 used: e.used,
                 rejected: e.rejected.iter().map(|r| [r.marker, r.row]).collect(),
-                weak: (!outcome.is_observable()).then(|| e.reason.clone().unwrap_or_default()),
+                weak: doubt(&outcome),
             }))
         },
     ))
 }
 
 fn built_in_aor(info: &'static calib_aor::EstimatorInfo) -> Entry<dyn calib_plugin::Aor> {
-    let offer = Offer::new(Kind::Aor, info.id, info.summary)
-        .from_source(info.source)
-        .takes(&shapes(info.input));
-    let offer = with_parameters(offer, info.options);
+    let offer = offer(Kind::Aor, info);
     Entry::built_in_aor(ByFn::new(
         offer,
         move |motion: &Motion<'_>, call: &Call<'_>| {
@@ -376,11 +367,7 @@ fn built_in_aor(info: &'static calib_aor::EstimatorInfo) -> Entry<dyn calib_plug
                 .run(&input, &options.only(info.options))
                 .map_err(|e| Failure::BadInput(e.to_string()))?;
             let Some(e) = outcome.estimate() else {
-                return Ok(Answer::NotObservable(format!(
-                    "{}: {}",
-                    outcome.verdict().as_str(),
-                    outcome.reason().unwrap_or("")
-                )));
+                return Ok(Answer::NotObservable(why_not(&outcome)));
             };
             let line = |l: &calib_geometry::Line| AxisLine {
                 point_m: l.point.coords.into(),
@@ -388,14 +375,12 @@ fn built_in_aor(info: &'static calib_aor::EstimatorInfo) -> Entry<dyn calib_plug
             };
             Ok(Answer::Found(AorFit {
                 line: line(&e.line),
-                covariance: Some(std::array::from_fn(|i| {
-                    std::array::from_fn(|j| e.covariance[(i, j)])
-                })),
+                covariance: Some(rows(&e.covariance)),
                 in_child: e.in_child.as_ref().map(line),
                 rms_m: e.rms,
                 used: e.used,
                 rejected: e.rejected.iter().map(|row| [0, *row]).collect(),
-                weak: (!outcome.is_observable()).then(|| e.reason.clone().unwrap_or_default()),
+                weak: doubt(&outcome),
             }))
         },
     ))

@@ -1,5 +1,7 @@
 //! What of a recording takes no part in the fit.
 
+use calib_report::RejectedFor;
+
 /// A body or marker of one row that takes no part in the fit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Excluded {
@@ -10,5 +12,5 @@ pub struct Excluded {
     /// The body or marker.
     pub body: String,
     /// Why.
-    pub reason: String,
+    pub cause: RejectedFor,
 }

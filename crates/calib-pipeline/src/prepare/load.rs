@@ -8,12 +8,12 @@ use calib_profile::{RecordingSpec, RobotLog};
 use calib_recording::{ColumnMap, Filled, Meta, Poses, ReadOptions, Recording};
 use calib_urdf::sha256_hex;
 
-use crate::error::PipelineError;
+use crate::error::{DataProblem, NamedBy, PipelineError, WhyUnread};
 use crate::prepare::align::align;
 use crate::prepare::estimators::{Estimators, values};
+use crate::prepare::readers;
 use crate::prepare::rows::prepare;
 use crate::prepare::timelines::with_robot_log;
-use crate::prepare::{paths, readers};
 
 pub use crate::prepare::excluded::Excluded;
 pub use crate::prepare::inputs::{Digest, Inputs, Loaded, RobotProfile};
@@ -31,13 +31,8 @@ pub fn load_recordings(robot: RobotProfile, plugins: bool) -> Result<Inputs, Pip
     let mut excluded = Vec::new();
     for (name, spec) in &robot.profile.recordings {
         let path = robot.folder.join(&spec.file);
-        let bytes = std::fs::read(&path).map_err(|e| PipelineError::Data {
-            file: path.display().to_string(),
-            finding: format!("recording `{name}` cannot be read: {e}"),
-            remedy: format!(
-                "{} `file` starts from the profile's folder",
-                paths::reading(&path, &e)
-            ),
+        let bytes = std::fs::read(&path).map_err(|e| {
+            PipelineError::read(&path, NamedBy::Recording(name.clone()), WhyUnread::Io(e))
         })?;
         digests.push(Digest {
             path: spec.file.clone(),
@@ -53,12 +48,7 @@ pub fn load_recordings(robot: RobotProfile, plugins: bool) -> Result<Inputs, Pip
             None => {
                 let poses = recording
                     .poses(Filled::Exclude)
-                    .map_err(|e| PipelineError::Data {
-                        file: shown.clone(),
-                        finding: e.to_string(),
-                        remedy: "add `timing: {}` to the recording in the profile: holds become poses, and the clocks are brought together"
-                            .to_owned(),
-                    })?;
+                    .map_err(|e| PipelineError::data(&shown, DataProblem::NotOneTable(e)))?;
                 prepare(&robot, name, spec, poses, recording.meta, &mut findings)?
             }
             Some(timing) => {
@@ -100,13 +90,8 @@ fn read_robot_log(
 ) -> Result<Recording, PipelineError> {
     let path = robot.folder.join(&log.file);
     let shown = path.display().to_string();
-    let bytes = std::fs::read(&path).map_err(|e| PipelineError::Data {
-        file: shown.clone(),
-        finding: format!("the robot's log of recording `{name}` cannot be read: {e}"),
-        remedy: format!(
-            "{} `robot_log: {{file: …}}` starts from the profile's folder",
-            paths::reading(&path, &e)
-        ),
+    let bytes = std::fs::read(&path).map_err(|e| {
+        PipelineError::read(&path, NamedBy::RobotLog(name.to_owned()), WhyUnread::Io(e))
     })?;
     digests.push(Digest {
         path: log.file.clone(),
@@ -122,12 +107,7 @@ fn read_robot_log(
     };
     let recording = read(&own, &shown, &bytes, estimators)?;
     if recording.joints.is_empty() {
-        return Err(PipelineError::Data {
-            file: shown,
-            finding: "the robot's log has no joints".to_owned(),
-            remedy: "name the columns as the robot's joints with their unit (`elbow_rad`), or map them under `columns`"
-                .to_owned(),
-        });
+        return Err(PipelineError::data(shown, DataProblem::NoJointsInLog));
     }
     Ok(recording)
 }
@@ -148,14 +128,11 @@ fn check_joint_names(
         recording.joints.retain(|j| known(&j.name));
     }
     for joint in &recording.joints {
-        robot
-            .model
-            .joint_id(&joint.name)
-            .map_err(|unknown| PipelineError::Data {
-                file: robot.folder.join(&spec.file).display().to_string(),
-                finding: format!("stream `{}` is not a joint: {unknown}", joint.name),
-                remedy: "rename it, or map it under `columns`".to_owned(),
-            })?;
+        robot.model.joint_id(&joint.name).map_err(|unknown| {
+            let file = robot.folder.join(&spec.file).display().to_string();
+            let stream = joint.name.clone();
+            PipelineError::data(file, DataProblem::StreamNotAJoint { stream, unknown })
+        })?;
     }
     Ok(())
 }
@@ -172,10 +149,10 @@ pub fn of_tables(
     let mut recordings = BTreeMap::new();
     let mut findings = Vec::new();
     for (name, spec) in &robot.profile.recordings {
-        let poses = tables.remove(name).ok_or_else(|| PipelineError::Usage {
-            finding: format!("recording `{name}` is not simulated"),
-            remedy: "add it under `simulate.recordings`".to_owned(),
-        })?;
+        let missing = || PipelineError::NotSimulated {
+            recording: name.clone(),
+        };
+        let poses = tables.remove(name).ok_or_else(missing)?;
         let meta = Meta {
             source: spec.file.clone(),
             format: "simulated".to_owned(),

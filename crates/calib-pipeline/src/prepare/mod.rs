@@ -9,7 +9,6 @@ pub mod excluded;
 pub mod inputs;
 pub mod load;
 pub mod loads;
-pub(crate) mod paths;
 pub mod readers;
 pub mod relabel;
 pub mod robot;

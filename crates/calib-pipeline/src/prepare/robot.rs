@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use calib_profile::{Profile, ProfileError};
 use calib_urdf::{RobotModel, sha256_hex};
 
-use crate::error::PipelineError;
+use crate::error::{NamedBy, PipelineError, WhyUnread};
 use crate::prepare::inputs::{Digest, RobotProfile};
 
 /// Largest profile or URDF that is read, bytes.
@@ -17,24 +17,16 @@ const LARGEST_TEXT: u64 = 64 << 20;
 /// [`PipelineError`] with file, place and remedy.
 pub fn load_robot(profile_path: &Path) -> Result<RobotProfile, PipelineError> {
     let shown = profile_path.display().to_string();
-    let text = read_text(profile_path)?;
+    let text = read_text(profile_path, &NamedBy::Caller)?;
     let raw = calib_profile::parse(&text, &shown)?;
     let folder = profile_path
         .parent()
         .map_or_else(PathBuf::new, Path::to_path_buf);
     let urdf_path = folder.join(&raw.robot.urdf);
-    let urdf_text = read_text(&urdf_path).map_err(|error| match error {
-        PipelineError::Read {
-            path,
-            source,
-            remedy,
-        } => PipelineError::Read {
-            path,
-            source,
-            remedy: format!("{remedy} `robot: urdf` in {shown} starts from the profile's folder"),
-        },
-        other => other,
-    })?;
+    let named_by = NamedBy::Urdf {
+        profile: shown.clone(),
+    };
+    let urdf_text = read_text(&urdf_path, &named_by)?;
     let model = RobotModel::from_urdf_text(&urdf_text, &urdf_path.display().to_string())?;
     let profile = calib_profile::check(&raw, &text, &shown, &model)?;
     known_estimators(&profile, &text, &shown)?;
@@ -94,24 +86,16 @@ fn known_estimators(profile: &Profile, text: &str, shown: &str) -> Result<(), Pi
     Ok(())
 }
 
-fn read_text(path: &Path) -> Result<String, PipelineError> {
-    let size = std::fs::metadata(path).map_err(|e| PipelineError::read(path, e))?;
+fn read_text(path: &Path, named_by: &NamedBy) -> Result<String, PipelineError> {
+    let unread = |why: WhyUnread| PipelineError::read(path, named_by.clone(), why);
+    let size = std::fs::metadata(path).map_err(|e| unread(WhyUnread::Io(e)))?;
     if size.is_dir() {
-        return Err(PipelineError::read(
-            path,
-            std::io::Error::other("it is a folder"),
-        ));
+        return Err(unread(WhyUnread::Folder));
     }
     if size.len() > LARGEST_TEXT {
-        return Err(PipelineError::read(
-            path,
-            std::io::Error::other(format!(
-                "{} bytes are too many for a profile or URDF",
-                size.len()
-            )),
-        ));
+        return Err(unread(WhyUnread::TooLarge(size.len())));
     }
-    let bytes = std::fs::read(path).map_err(|e| PipelineError::read(path, e))?;
+    let bytes = std::fs::read(path).map_err(|e| unread(WhyUnread::Io(e)))?;
     String::from_utf8(bytes).map_err(|e| PipelineError::NotText {
         path: path.display().to_string(),
         offset: e.utf8_error().valid_up_to(),

@@ -7,7 +7,7 @@ use calib_profile::RecordingSpec;
 use calib_recording::{JointUnit, Meta, Poses};
 use calib_urdf::RobotModel;
 
-use crate::error::PipelineError;
+use crate::error::{DataProblem, PipelineError};
 use crate::prepare::inputs::{Loaded, RobotProfile};
 
 /// Checks the names of a table against robot and profile and makes its joint vectors.
@@ -20,16 +20,11 @@ pub(crate) fn prepare(
     findings: &mut Vec<Finding>,
 ) -> Result<Loaded, PipelineError> {
     let model = &robot.model;
-    let error = |finding: String, remedy: String| PipelineError::Data {
-        file: robot.folder.join(&spec.file).display().to_string(),
-        finding,
-        remedy,
+    let error = |problem: DataProblem| {
+        PipelineError::data(robot.folder.join(&spec.file).display().to_string(), problem)
     };
     if poses.is_empty() {
-        return Err(error(
-            "has no poses".to_owned(),
-            "record at least one row".to_owned(),
-        ));
+        return Err(error(DataProblem::NoPoses));
     }
     findings.extend(meta.findings.iter().cloned().map(|mut finding| {
         finding.subject = finding.subject.in_file(&spec.file);
@@ -38,32 +33,26 @@ pub(crate) fn prepare(
     ignore_unmapped(robot, name, spec, &mut poses, findings);
     for joint in poses.joints.keys() {
         let id = model.joint_id(joint).map_err(|unknown| {
-            error(
-                format!("column `{joint}` is not a joint: {unknown}"),
-                "rename the column, or map it under `columns`".to_owned(),
-            )
+            error(DataProblem::ColumnNotAJoint {
+                column: joint.clone(),
+                unknown,
+            })
         })?;
-        let robot_joint = model.joint(id);
-        let turns = robot_joint.kind.turns();
+        let kind = model.joint(id).kind;
         let is_angle = poses
             .joint_units
             .get(joint)
             .is_none_or(|u| *u == JointUnit::Angle);
-        if turns != is_angle {
-            let units = if turns { "an angle" } else { "a length" };
-            return Err(error(
-                format!(
-                    "joint `{joint}` is {}, its column is not {units}",
-                    robot_joint.kind.name()
-                ),
-                "correct the unit in the column name".to_owned(),
-            ));
+        if kind.turns() != is_angle {
+            return Err(error(DataProblem::JointUnit {
+                joint: joint.clone(),
+                kind,
+            }));
         }
         if spec.hold.contains_key(&id) {
-            return Err(error(
-                format!("joint `{joint}` is in the file and held by the profile"),
-                "remove it from `hold`".to_owned(),
-            ));
+            return Err(error(DataProblem::HeldAndRecorded {
+                joint: joint.clone(),
+            }));
         }
     }
     let q = joint_vectors(model, spec, &poses);

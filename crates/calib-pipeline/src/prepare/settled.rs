@@ -6,6 +6,7 @@ use calib_checks::sync::{HoldSettings, holds, static_poses};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::{Timing, Tracker};
 use calib_recording::Poses;
+use calib_report::RejectedFor;
 use nalgebra::Matrix3;
 
 use crate::prepare::aligned::Aligned;
@@ -113,7 +114,7 @@ pub(crate) fn settle(
                     recording: name.to_owned(),
                     row,
                     body: stream.clone(),
-                    reason: "not settled: the hold drifts or scatters".to_owned(),
+                    cause: RejectedFor::RestlessHold,
                 }));
         }
     }

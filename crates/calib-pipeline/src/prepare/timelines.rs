@@ -10,7 +10,8 @@ use calib_profile::{BodyKind, RecordingSpec, Timing};
 use calib_recording::{Filled, Poses, Recording};
 use nalgebra::{Isometry3, Point3};
 
-use crate::prepare::align::SAME_TIME;
+use crate::error::NotATrack;
+use crate::prepare::aligned::SAME_TIME;
 use crate::prepare::inputs::RobotProfile;
 use crate::prepare::streams::{Scalars, interpolated_body, interpolated_point};
 
@@ -61,7 +62,7 @@ pub(crate) fn tracker_table(
     recording: &Recording,
     line: usize,
     times: &[f64],
-) -> Result<Poses, String> {
+) -> Result<Poses, NotATrack> {
     let own = &recording.timelines[line];
     let mut poses = Poses {
         rows: own.rows.clone(),
@@ -69,7 +70,12 @@ pub(crate) fn tracker_table(
         labels: own.labels.clone(),
         ..Poses::default()
     };
-    let no_time = |what: &str| format!("`{what}` has no time");
+    let no_time = |stream: &str| NotATrack::NoTime {
+        stream: stream.to_owned(),
+    };
+    let twice = |stream: &str| NotATrack::NameTwice {
+        stream: stream.to_owned(),
+    };
     for marker in &recording.markers {
         let points: Vec<Option<Point3<f64>>> = marker
             .samples
@@ -89,7 +95,7 @@ pub(crate) fn tracker_table(
                 .collect()
         };
         if poses.markers.insert(marker.name.clone(), track).is_some() {
-            return Err(format!("`{}` is the name of two streams", marker.name));
+            return Err(twice(&marker.name));
         }
     }
     for body in &recording.bodies {
@@ -104,7 +110,7 @@ pub(crate) fn tracker_table(
             times.iter().map(at).collect()
         };
         if poses.bodies.insert(body.name.clone(), track).is_some() {
-            return Err(format!("`{}` is the name of two streams", body.name));
+            return Err(twice(&body.name));
         }
     }
     Ok(poses)

@@ -8,7 +8,7 @@ use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::{Body, BodyKind, Usage};
 use nalgebra::{Isometry3, Point3};
 
-use crate::error::PipelineError;
+use crate::error::{DataProblem, PipelineError};
 use crate::prepare::inputs::{Inputs, Loaded};
 
 /// One body over all recordings.
@@ -79,7 +79,7 @@ fn slices(tracks: &[Vec<Option<Point3<f64>>>]) -> Vec<&[Option<Point3<f64>>]> {
 }
 
 /// What the recordings have that is called almost like the body, or like its first marker.
-fn recorded_as(inputs: &Inputs, name: &str, body: &Body) -> String {
+fn recorded_as(inputs: &Inputs, name: &str, body: &Body) -> Option<String> {
     let recordings = || inputs.recordings.values();
     let near = match &body.kind {
         BodyKind::Pose => {
@@ -92,7 +92,7 @@ fn recorded_as(inputs: &Inputs, name: &str, body: &Body) -> String {
             nearest_word(first, markers.map(String::as_str))
         }),
     };
-    near.map_or_else(String::new, |near| format!("did you mean `{near}`? "))
+    near.map(str::to_owned)
 }
 
 fn body_track(
@@ -108,13 +108,12 @@ fn body_track(
         marker_sigma: None,
         poses: BTreeMap::new(),
     };
-    let not_seen = || PipelineError::Data {
-        file: inputs.robot.file.clone(),
-        finding: format!("no recording that is fitted shows body `{name}`"),
-        remedy: format!(
-            "{}record it, check the column names, or remove it from the profile",
-            recorded_as(inputs, name, body)
-        ),
+    let not_seen = || {
+        let problem = DataProblem::BodyNotSeen {
+            body: name.to_owned(),
+            meant: recorded_as(inputs, name, body),
+        };
+        PipelineError::data(&inputs.robot.file, problem)
     };
     let names = match &body.kind {
         BodyKind::Pose => {
@@ -154,10 +153,9 @@ fn body_track(
     if names.len() < 3 {
         return Ok(track);
     }
-    let fail = |error: NotABody| PipelineError::Data {
-        file: fitted[0].spec.file.clone(),
-        finding: format!("body `{name}`: {error}"),
-        remedy: "mount at least three markers that span a plane, and check their names".to_owned(),
+    let fail = |why: NotABody| {
+        let body = name.to_owned();
+        PipelineError::data(&fitted[0].spec.file, DataProblem::NotABody { body, why })
     };
     let given = match &body.kind {
         BodyKind::Markers {

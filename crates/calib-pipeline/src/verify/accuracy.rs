@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::Configuration;
+use calib_core::{Configuration, GroupId};
 use calib_geometry::so3;
 use calib_profile::Usage;
 use calib_report::{AccuracyLimit, ErrorSource, HeldOut, Workspace, WorkspacePoint};
@@ -19,7 +19,7 @@ use crate::prepare::tracks::BodyTrack;
 pub(crate) fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configuration {
     let model = &inputs.robot.model;
     let mut at = Configuration::zero();
-    // The middle of all backlash.
+    // Every joint in the middle of its backlash.
     let unknown = Conditions::default();
     let loads = fit.formulation.loaded.then(|| Loads::at(model, q));
     for joint in model.joint_ids() {
@@ -108,20 +108,18 @@ pub(crate) fn accuracy_limits(
     let Some(measured) = held_out.and_then(|h| h.calibrated) else {
         return Vec::new();
     };
-    let sigma_of = |name: &str| {
-        fit.solution
-            .noise
-            .iter()
-            .find(|n| n.name == name)
-            .map(|n| n.sigma)
+    let groups = fit.formulation.noise;
+    let sigma_of = |group: Option<GroupId>| {
+        let level = fit.solution.noise.iter().find(|n| Some(n.id) == group)?;
+        Some(level.sigma)
     };
     let parameters = workspace.map_or(0.0, |w| w.rms_sigma_m);
     let tracker = tracker_sigma(
         (inputs, tracks),
-        sigma_of("marker"),
-        sigma_of("body position"),
+        sigma_of(groups.marker),
+        sigma_of(groups.body_position),
     );
-    let joints = sigma_of("joint").unwrap_or(0.0) * joint_lever(inputs);
+    let joints = sigma_of(groups.joint).unwrap_or(0.0) * joint_lever(inputs);
     let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
     let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
     let total = explained + rest.powi(2);

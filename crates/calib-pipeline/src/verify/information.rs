@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::formulate::formulation::MlFit;
 use crate::prepare::inputs::Inputs;
-use crate::verify::invariants::invariants;
+use crate::verify::invariants::{Invariant, invariants};
 
 /// The square root of the data's information and the gauge-free numbers of the robot, with their derivatives.
 #[must_use]
@@ -85,8 +85,9 @@ fn quantities(inputs: &Inputs, fit: &MlFit) -> Vec<Quantity> {
         };
         let (plus, minus) = (shifted(STEP), shifted(-STEP));
         for (quantity, name) in quantities.iter_mut().zip(&found) {
-            let value = |of: &[crate::verify::invariants::Invariant]| {
-                of.iter().find(|q| q.name == name.name).map(|q| q.value)
+            let value = |of: &[Invariant]| {
+                let same = |q: &&Invariant| (q.kind, q.joints) == (name.kind, name.joints);
+                of.iter().find(same).map(|q| q.value)
             };
             let (Some(high), Some(low)) = (value(&plus), value(&minus)) else {
                 continue;
@@ -107,7 +108,7 @@ fn quantities(inputs: &Inputs, fit: &MlFit) -> Vec<Quantity> {
 }
 
 /// `high − low`, an angle by the shorter way round.
-fn difference(of: &crate::verify::invariants::Invariant, high: f64, low: f64) -> f64 {
+fn difference(of: &Invariant, high: f64, low: f64) -> f64 {
     let plain = high - low;
     if of.is_angle() {
         plain.sin().atan2(plain.cos())

@@ -13,9 +13,43 @@ use calib_report::Unit;
 use calib_urdf::{JointId, RobotModel};
 use nalgebra::{Point3, Unit as UnitVector, Vector3};
 
+/// Which of the numbers between neighboring axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum InvariantKind {
+    /// Angle between two axes.
+    Angle,
+    /// Distance between two axes.
+    Distance,
+    /// Tilt of a parallel axis in the plane of both.
+    Tilt,
+    /// Tilt of a parallel axis out of that plane.
+    Twist,
+    /// Offset along the middle one of three axes.
+    Offset,
+    /// Angle between the common normals of three axes.
+    Zero,
+}
+
+impl InvariantKind {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Angle => "angle",
+            Self::Distance => "distance",
+            Self::Tilt => "tilt",
+            Self::Twist => "twist",
+            Self::Offset => "offset",
+            Self::Zero => "zero",
+        }
+    }
+}
+
 /// A number that no choice of frames changes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Invariant {
+    /// Which number.
+    pub kind: InvariantKind,
+    /// Of which joints: two neighbors, or the middle one twice.
+    pub joints: [JointId; 2],
     /// `distance.shoulder.elbow`
     pub name: String,
     /// In words.
@@ -41,6 +75,7 @@ const ONE_LINE: f64 = 1e-3;
 
 /// An axis of a joint at zero, in the root's frame.
 struct Line {
+    id: JointId,
     name: String,
     slides: bool,
     point: Point3<f64>,
@@ -57,6 +92,7 @@ pub fn invariants(model: &RobotModel) -> Vec<Invariant> {
         // At zero the child stands where the joint's origin is.
         let at = poses[joint.child.index()];
         Some(Line {
+            id,
             name: joint.name.clone(),
             slides: !joint.kind.turns(),
             point: at.translation.vector.into(),
@@ -96,9 +132,11 @@ fn pair(a: &Line, b: &Line, found: &mut Vec<Invariant>) {
     let between = b.point - a.point;
     // Two lines that slide have directions only.
     let places = !(a.slides || b.slides);
-    let mut push = |kind: &str, text: String, unit: Unit, value: f64| {
+    let mut push = |kind: InvariantKind, text: String, unit: Unit, value: f64| {
         found.push(Invariant {
-            name: format!("{kind}.{}.{}", a.name, b.name),
+            kind,
+            joints: [a.id, b.id],
+            name: format!("{}.{}.{}", kind.word(), a.name, b.name),
             text,
             unit,
             value,
@@ -107,7 +145,7 @@ fn pair(a: &Line, b: &Line, found: &mut Vec<Invariant>) {
     let axes = format!("the axes of {} and {}", a.name, b.name);
     if cross.norm() > PARALLEL {
         push(
-            "angle",
+            InvariantKind::Angle,
             format!("angle between {axes}"),
             Unit::Radian,
             cross.norm().atan2(a.direction.dot(&b.direction)),
@@ -115,7 +153,7 @@ fn pair(a: &Line, b: &Line, found: &mut Vec<Invariant>) {
         if places {
             // Signed along a × b: smooth also where the axes meet.
             push(
-                "distance",
+                InvariantKind::Distance,
                 format!("distance between {axes}"),
                 Unit::Meter,
                 between.dot(&(cross / cross.norm())),
@@ -130,19 +168,19 @@ fn pair(a: &Line, b: &Line, found: &mut Vec<Invariant>) {
     let towards = across / across.norm();
     let sign = a.direction.dot(&b.direction).signum();
     push(
-        "distance",
+        InvariantKind::Distance,
         format!("distance between {axes}"),
         Unit::Meter,
         across.norm(),
     );
     push(
-        "tilt",
+        InvariantKind::Tilt,
         format!("tilt of {} towards {}", b.name, a.name),
         Unit::Radian,
         (sign * b.direction.dot(&towards)).asin(),
     );
     push(
-        "twist",
+        InvariantKind::Twist,
         format!("twist of {} against {}", b.name, a.name),
         Unit::Radian,
         (sign * b.direction.dot(&a.direction.cross(&towards))).asin(),
@@ -157,6 +195,8 @@ fn triple(a: &Line, b: &Line, c: &Line, found: &mut Vec<Invariant>) {
         return;
     };
     found.push(Invariant {
+        kind: InvariantKind::Offset,
+        joints: [b.id; 2],
         name: format!("offset.{}", b.name),
         text: format!("offset along {} between {} and {}", b.name, a.name, c.name),
         unit: Unit::Meter,
@@ -164,6 +204,8 @@ fn triple(a: &Line, b: &Line, c: &Line, found: &mut Vec<Invariant>) {
     });
     let sine = b.direction.dot(&to_a.1.cross(&to_c.1));
     found.push(Invariant {
+        kind: InvariantKind::Zero,
+        joints: [b.id; 2],
         name: format!("zero.{}", b.name),
         text: format!("zero angle of {} between {} and {}", b.name, a.name, c.name),
         unit: Unit::Radian,

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::Configuration;
-use calib_urdf::Joint;
+use calib_core::{Configuration, EdgeKind, EffectKind, ParameterId};
+use calib_urdf::{Joint, JointId};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 
 use crate::formulate::formulation::MlFit;
@@ -18,14 +18,23 @@ pub struct Known {
     pub data_share: Option<f64>,
 }
 
-/// What is known of every number of every calibrated origin and every added body, by `<joint>.<x|y|z|turn about x|y|z>`
-/// or `<body>.<x|y|z|roll|pitch|yaw>` (m, rad).
+/// A number of the patched URDF.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Number {
+    /// Of a joint's origin: x, y, z (m), rotation about x, y, z (rad).
+    Origin(JointId, usize),
+    /// Of a body's mount: x, y, z (m), roll, pitch, yaw (rad).
+    Mount(String, usize),
+}
+
+/// What is known of every number of every calibrated origin and every added body.
 #[must_use]
-pub fn known_numbers(inputs: &Inputs, fit: &MlFit) -> BTreeMap<String, Known> {
+pub fn known_numbers(inputs: &Inputs, fit: &MlFit) -> BTreeMap<Number, Known> {
     let model = &inputs.robot.model;
     let zero = Configuration::zero();
     let mut known = BTreeMap::new();
-    for joint in model.joints() {
+    for id in model.joint_ids() {
+        let joint = model.joint(id);
         let (Some(parent), Some(child)) = (
             fit.formulation.links[joint.parent.index()],
             fit.formulation.links[joint.child.index()],
@@ -38,12 +47,12 @@ pub fn known_numbers(inputs: &Inputs, fit: &MlFit) -> BTreeMap<String, Known> {
         let Some(covariance) = derived.covariance else {
             continue;
         };
-        let prior = number_variances(&derived.pose, &prior(fit, joint));
+        let prior = number_variances(&derived.pose, &prior(fit, id, joint));
         let posterior = number_variances(&derived.pose, &covariance);
-        for (k, what) in NUMBERS.into_iter().enumerate() {
+        for k in 0..6 {
             let share = 1.0 - posterior[k] / prior[k];
             known.insert(
-                format!("{}.{what}", joint.name),
+                Number::Origin(id, k),
                 Known {
                     sigma: posterior[k].sqrt(),
                     data_share: (prior[k] > 0.0).then(|| share.clamp(0.0, 1.0)),
@@ -62,34 +71,24 @@ pub fn known_numbers(inputs: &Inputs, fit: &MlFit) -> BTreeMap<String, Known> {
             continue;
         };
         let position = number_variances(&pose, &covariance);
-        let mut put = |what: &str, sigma: f64| {
+        let mut put = |k: usize, sigma: f64| {
             let known_number = Known {
                 sigma,
                 data_share: None,
             };
-            known.insert(format!("{name}.{what}"), known_number);
+            known.insert(Number::Mount(name.clone(), k), known_number);
         };
-        for (k, what) in ["x", "y", "z"].into_iter().enumerate() {
-            put(what, position[k].sqrt());
+        for (k, variance) in position.iter().enumerate().take(3) {
+            put(k, variance.sqrt());
         }
         if let Some(sigmas) = rpy_sigmas(&pose, &covariance.fixed_view::<3, 3>(0, 0).into()) {
-            for (what, sigma) in ["roll", "pitch", "yaw"].into_iter().zip(sigmas) {
-                put(what, sigma);
+            for (k, sigma) in (3..).zip(sigmas) {
+                put(k, sigma);
             }
         }
     }
     known
 }
-
-/// The six numbers of an origin, as the report calls them.
-const NUMBERS: [&str; 6] = [
-    "x",
-    "y",
-    "z",
-    "turn about x",
-    "turn about y",
-    "turn about z",
-];
 
 /// Variances of a child's place along the parent's axes (m²) and of its turns about its own (rad²).
 fn number_variances(pose: &Isometry3<f64>, covariance: &Matrix6<f64>) -> [f64; 6] {
@@ -108,22 +107,39 @@ fn number_variances(pose: &Isometry3<f64>, covariance: &Matrix6<f64>) -> [f64; 6
 }
 
 /// What was known of `parent_from_child` at zero before the data, `[ω; v]` of the child: its origin's six numbers, and the
-/// zero offset as a turn about the axis.
-fn prior(fit: &MlFit, joint: &Joint) -> Matrix6<f64> {
-    let variance = |name: &str| {
-        fit.formulation
-            .problem
-            .parameters()
-            .iter()
-            .find(|p| !p.fixed && p.name == format!("{}.{name}", joint.name))
-            .map_or(0.0, |p| p.scale().powi(2))
+/// zero offset as a rotation about the axis.
+fn prior(fit: &MlFit, id: JointId, joint: &Joint) -> Matrix6<f64> {
+    let problem = &fit.formulation.problem;
+    let variance = |parameter: ParameterId| {
+        let p = &problem.parameters()[parameter.index()];
+        if p.fixed { 0.0 } else { p.scale().powi(2) }
     };
     let mut prior = Matrix6::zeros();
-    for (k, what) in ["rx", "ry", "rz", "x", "y", "z"].into_iter().enumerate() {
-        prior[(k, k)] = variance(&format!("origin.{what}"));
+    if let Some(edge) = fit.formulation.origins[id.index()] {
+        for (k, parameter) in problem.edge_parameters(edge) {
+            prior[(k, k)] = variance(parameter);
+        }
+        if let EdgeKind::Unknown(origin) = &problem.edges()[edge.index()].kind {
+            // From the axes of the chart to those of the child.
+            let q = origin.chart.child_from_chart().to_rotation_matrix();
+            let mut turned = Matrix6::zeros();
+            for at in [0, 3] {
+                let block = q.matrix() * prior.fixed_view::<3, 3>(at, at) * q.matrix().transpose();
+                turned.fixed_view_mut::<3, 3>(at, at).copy_from(&block);
+            }
+            prior = turned;
+        }
     }
+    let offset = fit.formulation.joints[id.index()].and_then(|edge| {
+        let EdgeKind::Joint(moving) = &problem.edges()[edge.index()].kind else {
+            return None;
+        };
+        let effects = moving.effects.iter();
+        let mut offsets = effects.filter(|e| e.kind == EffectKind::ZeroOffset);
+        Some(variance(offsets.next()?.parameter))
+    });
     if let Some(axis) = joint.kind.axis() {
-        let along = axis.into_inner() * axis.transpose() * variance("offset");
+        let along = axis.into_inner() * axis.transpose() * offset.unwrap_or(0.0);
         let turns = joint.kind.turns();
         let at = if turns { 0 } else { 3 };
         let mut block = prior.fixed_view_mut::<3, 3>(at, at);

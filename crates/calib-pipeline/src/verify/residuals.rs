@@ -4,14 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use calib_core::{MeasurementId, MeasurementKind};
 use calib_geometry::so3;
-use calib_profile::{BodyKind, Usage};
+use calib_profile::{BodyKind, Contact, Usage};
 use calib_report::ResidualRow;
+use nalgebra::{Isometry3, Vector3};
 
 use crate::formulate::contacts::miss;
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::Calibration;
 use crate::prepare::conditions::conditions;
-use crate::prepare::inputs::Inputs;
+use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::held_out::joint_values;
 
@@ -52,14 +53,6 @@ pub fn residual_rows(
     fit: Option<&MlFit>,
 ) -> Vec<ResidualRow> {
     let left_out = fit.map(left_out).unwrap_or_default();
-    // Points computed from one body are one measurement: it is left out under the body's name.
-    let body_of = |subject: &str| {
-        let holds = |body: &&String| match &inputs.robot.profile.bodies[*body].kind {
-            BodyKind::Markers { names, .. } => names.iter().any(|m| m == subject),
-            BodyKind::Pose => false,
-        };
-        inputs.robot.profile.bodies.keys().find(holds).cloned()
-    };
     let mut rows = Vec::new();
     for (name, loaded) in inputs
         .recordings
@@ -71,79 +64,131 @@ pub fn residual_rows(
         for (row, q) in loaded.q.iter().enumerate() {
             let Some(q) = q else { continue };
             let root_from_link = robot.root_from_link_under(q, &under[row]);
-            let joints = joint_values(inputs, name, row);
-            let is_out = |row: usize, subject: &str| {
-                let key = |subject: &str| (name.clone(), row, subject.to_owned());
-                left_out.contains(&key(subject))
-                    || body_of(subject).is_some_and(|body| left_out.contains(&key(&body)))
+            let sample = Sample {
+                inputs,
+                tracks,
+                robot,
+                loaded,
+                row,
+                tracker_from_link: root_from_link
+                    .iter()
+                    .map(|link| robot.tracker_from_root * link)
+                    .collect(),
             };
-            let mut push =
-                |subject: &str, residual: nalgebra::Vector3<f64>, rotation_rad: Option<f64>| {
-                    rows.push(ResidualRow {
-                        recording: name.clone(),
-                        row: loaded.poses.rows[row],
-                        time_s: loaded.poses.t.as_ref().map(|t| t[row]),
-                        subject: subject.to_owned(),
-                        residual_m: residual.into(),
-                        rotation_rad,
-                        normalized: None,
-                        used: !is_out(row, subject),
-                        joints: joints.clone(),
-                    });
-                };
-            for (contact_name, contact) in &inputs.robot.profile.contacts {
-                if contact.recordings.contains(name)
-                    && let Some(off) = miss(inputs, contact_name, robot, &root_from_link)
-                {
-                    push(contact_name, off, None);
-                }
-            }
-            for (body_name, body) in &inputs.robot.profile.bodies {
-                let tracker_from_link = robot.tracker_from_root * root_from_link[body.link.index()];
-                match &body.kind {
-                    BodyKind::Pose => {
-                        let seen = tracks[body_name]
-                            .in_recording(name)
-                            .get(row)
-                            .copied()
-                            .flatten();
-                        if let (Some(mount), Some(seen)) = (robot.mounts.get(body_name), seen) {
-                            let predicted = tracker_from_link * mount;
-                            let turn =
-                                so3::log(&(seen.rotation.inverse() * predicted.rotation)).norm();
-                            push(
-                                body_name,
-                                predicted.translation.vector - seen.translation.vector,
-                                Some(turn),
-                            );
-                        }
-                    }
-                    BodyKind::Markers { names, .. } => {
-                        for (i, marker) in names.iter().enumerate() {
-                            let seen = loaded.poses.markers.get(marker).and_then(|t| t[row]);
-                            let from_points = robot
-                                .points
-                                .get(body_name)
-                                .and_then(|p| p.get(marker))
-                                .copied();
-                            let from_template = || {
-                                let template = tracks[body_name].template.as_ref()?;
-                                Some(robot.mounts.get(body_name)? * template.points.get(i)?)
-                            };
-                            if let (Some(on_link), Some(seen)) =
-                                (from_points.or_else(from_template), seen)
-                            {
-                                push(
-                                    marker,
-                                    (tracker_from_link * on_link).coords - seen.coords,
-                                    None,
-                                );
-                            }
-                        }
-                    }
-                }
-            }
+            let joints = joint_values(inputs, name, row);
+            let differences = sample.contacts(&root_from_link).into_iter();
+            let differences = differences.chain(sample.bodies());
+            rows.extend(differences.map(|d| ResidualRow {
+                recording: name.clone(),
+                row: loaded.poses.rows[row],
+                time_s: loaded.poses.t.as_ref().map(|t| t[row]),
+                used: !sample.is_out(&left_out, &d.subject),
+                subject: d.subject,
+                residual_m: d.position.into(),
+                rotation_rad: d.rotation,
+                normalized: None,
+                joints: joints.clone(),
+            }));
         }
     }
     rows
+}
+
+/// One row of a recording, and where the robot's links are then.
+struct Sample<'a> {
+    inputs: &'a Inputs,
+    tracks: &'a BTreeMap<String, BodyTrack>,
+    robot: &'a Calibration,
+    loaded: &'a Loaded,
+    row: usize,
+    tracker_from_link: Vec<Isometry3<f64>>,
+}
+
+/// Predicted − measured.
+struct Difference {
+    /// The marker, body or contact.
+    subject: String,
+    /// m, in the tracker's frame.
+    position: Vector3<f64>,
+    /// rad, for a body's pose.
+    rotation: Option<f64>,
+}
+
+impl Sample<'_> {
+    /// Whether the solver left the marker, body or contact out.
+    fn is_out(&self, left_out: &BTreeSet<(String, usize, String)>, subject: &str) -> bool {
+        let key = |subject: &str| (self.loaded.name.clone(), self.row, subject.to_owned());
+        // Points computed from one body are one measurement: it is left out under the body's name.
+        let holds = |body: &&String| match &self.inputs.robot.profile.bodies[*body].kind {
+            BodyKind::Markers { names, .. } => names.iter().any(|m| m == subject),
+            BodyKind::Pose => false,
+        };
+        left_out.contains(&key(subject))
+            || (self.inputs.robot.profile.bodies.keys())
+                .find(holds)
+                .is_some_and(|body| left_out.contains(&key(body)))
+    }
+
+    /// How far each touch misses.
+    fn contacts(&self, root_from_link: &[Isometry3<f64>]) -> Vec<Difference> {
+        let contacts = self.inputs.robot.profile.contacts.iter();
+        let touched = contacts.filter(|(_, c)| c.recordings.contains(&self.loaded.name));
+        let missed = |(name, _): (&String, &Contact)| {
+            Some(Difference {
+                subject: name.clone(),
+                position: miss(self.inputs, name, self.robot, root_from_link)?,
+                rotation: None,
+            })
+        };
+        touched.filter_map(missed).collect()
+    }
+
+    fn bodies(&self) -> Vec<Difference> {
+        let bodies = self.inputs.robot.profile.bodies.iter();
+        bodies
+            .flat_map(|(name, body)| {
+                let tracker_from_link = &self.tracker_from_link[body.link.index()];
+                match &body.kind {
+                    BodyKind::Pose => Vec::from_iter(self.body_pose(name, tracker_from_link)),
+                    BodyKind::Markers { names, .. } => self.markers(name, names, tracker_from_link),
+                }
+            })
+            .collect()
+    }
+
+    fn body_pose(&self, name: &str, tracker_from_link: &Isometry3<f64>) -> Option<Difference> {
+        let poses = self.tracks[name].in_recording(&self.loaded.name);
+        let seen = poses.get(self.row).copied().flatten()?;
+        let predicted = tracker_from_link * self.robot.mounts.get(name)?;
+        let rotation = so3::log(&(seen.rotation.inverse() * predicted.rotation));
+        Some(Difference {
+            subject: name.to_owned(),
+            position: predicted.translation.vector - seen.translation.vector,
+            rotation: Some(rotation.norm()),
+        })
+    }
+
+    fn markers(
+        &self,
+        body: &str,
+        names: &[String],
+        tracker_from_link: &Isometry3<f64>,
+    ) -> Vec<Difference> {
+        let points = self.robot.points.get(body);
+        let difference = |(i, marker): (usize, &String)| {
+            let seen = self.loaded.poses.markers.get(marker)?[self.row]?;
+            let from_points = points.and_then(|p| p.get(marker)).copied();
+            let from_template = || {
+                let template = self.tracks[body].template.as_ref()?;
+                Some(self.robot.mounts.get(body)? * template.points.get(i)?)
+            };
+            let on_link = from_points.or_else(from_template)?;
+            Some(Difference {
+                subject: marker.clone(),
+                position: (tracker_from_link * on_link).coords - seen.coords,
+                rotation: None,
+            })
+        };
+        names.iter().enumerate().filter_map(difference).collect()
+    }
 }

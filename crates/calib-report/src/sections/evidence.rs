@@ -10,6 +10,19 @@ const ROWS: usize = 8;
 
 pub(super) fn data(page: &mut Page, report: &Report) {
     page.section("data", "Data");
+    recordings(page, report);
+    conversions(page, report);
+    joint_ranges(page, report);
+    noise(page, report);
+    page.text(format!(
+        "Were the clocks synchronized? {}",
+        words::clock::clocks(report, "below").join(" ")
+    ));
+    rejected(page, report);
+    findings(page, report);
+}
+
+fn recordings(page: &mut Page, report: &Report) {
     let mut table = Table::new(&[
         "<recording",
         "<for",
@@ -40,7 +53,9 @@ pub(super) fn data(page: &mut Page, report: &Report) {
         ]);
     }
     page.table("", table);
+}
 
+fn conversions(page: &mut Page, report: &Report) {
     let mut table = Table::new(&["<recording", "<conversion"]);
     for recording in &report.recordings {
         let up = recording.up_axis.as_ref();
@@ -50,7 +65,9 @@ pub(super) fn data(page: &mut Page, report: &Report) {
         }
     }
     page.table("Conversions on reading:", table);
+}
 
+fn joint_ranges(page: &mut Page, report: &Report) {
     let mut table = Table::new(&["<joint", ">from", ">to", ">limits", ">covered", ">samples"]);
     for joint in &report.coverage {
         let limits = match (joint.lower_limit, joint.upper_limit) {
@@ -74,7 +91,9 @@ pub(super) fn data(page: &mut Page, report: &Report) {
         ]);
     }
     page.table("Joint ranges in the data:", table);
+}
 
+fn noise(page: &mut Page, report: &Report) {
     let mut table = Table::new(&[
         "<noise",
         ">estimated σ",
@@ -94,12 +113,9 @@ pub(super) fn data(page: &mut Page, report: &Report) {
         ]);
     }
     page.table("Noise per component:", table);
+}
 
-    page.text(format!(
-        "Were the clocks synchronized? {}",
-        words::clock::clocks(report, "below").join(" ")
-    ));
-
+fn rejected(page: &mut Page, report: &Report) {
     let mut table = Table::new(&["<recording", "<subject", "<rows", "<reason"]);
     for rejected in &report.rejected {
         let what = if rejected.subject.is_empty() {
@@ -115,7 +131,9 @@ pub(super) fn data(page: &mut Page, report: &Report) {
         ]);
     }
     page.table("Rejected from the fit:", table);
+}
 
+fn findings(page: &mut Page, report: &Report) {
     let mut table = Table::new(&[
         "<severity",
         "<finding",

@@ -15,6 +15,7 @@ pub(crate) mod noise;
 pub(crate) mod observability;
 mod physics;
 pub(crate) mod prose;
+mod rejected_for;
 pub(crate) mod rejection;
 mod scope;
 mod terms;

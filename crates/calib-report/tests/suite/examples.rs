@@ -12,9 +12,9 @@ use calib_report::{
     AccuracyLimit, Change, Class, Clock, ClockCheck, ErrorSource, ErrorStats, EstimatorResult,
     FitEnd, FitSummary, HeldOut, Input, JointCoverage, JointValue, Limit, LoopClosure, LoopGroup,
     Lost, Method, Noise, NoiseKind, NotObservable, Outcome, Output, Parameter, PoseError,
-    RecordingSummary, RecordingUse, Rejected, Report, ResidualRow, Residuals, Scene, Stats, Status,
-    Term, Transform, Unit, Unobservable, Verdict, Verification, View3d, Workspace, WorkspacePoint,
-    judge, scene::SceneFrame,
+    RecordingSummary, RecordingUse, Rejected, RejectedFor, Report, ResidualRow, Residuals, Scene,
+    Stats, Status, Term, Transform, Unit, Unobservable, Verdict, Verification, View3d, Workspace,
+    WorkspacePoint, judge, scene::SceneFrame,
 };
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use rand::SeedableRng;
@@ -409,8 +409,8 @@ pub fn accepted() -> Report {
         ],
         coverage,
         rejected: vec![
-            Rejected { recording: "arm_sweep".into(), subject: String::new(), rows: vec![23], reason: "the body was lost".into() },
-            Rejected { recording: "arm_sweep".into(), subject: "gripM_1".into(), rows: vec![18], reason: "14 σ: swapped marker".into() },
+            Rejected::new("arm_sweep", "", vec![23], RejectedFor::NotSettled),
+            Rejected::new("arm_sweep", "gripM_1", vec![18], RejectedFor::Swap),
         ],
         workspace: Workspace::of("gripper", "base", places),
         accuracy_limits: vec![
@@ -579,12 +579,12 @@ pub fn rejected() -> Report {
             samples: 0,
             text: "the closed forms do not estimate it".into(),
         }],
-        rejected: vec![Rejected {
-            recording: "hand_sweep".into(),
-            subject: "haT".into(),
-            rows: (3..=20).collect(),
-            reason: "moving while the clocks are not synchronized".into(),
-        }],
+        rejected: vec![Rejected::new(
+            "hand_sweep",
+            "haT",
+            (3..=20).collect(),
+            RejectedFor::OnTheWay,
+        )],
         findings: vec![
             Finding::of_kind(catalog::JOINT_NEVER_MOVED, "still", Subject::joint("arm_7"))
                 .with("at", Fact::radians(0.007)),

@@ -9,12 +9,12 @@ use calib_profile::PointChoice;
 use calib_report::{Status, Unobservable};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use super::{OriginEstimate, Row, Task, body_pose, transported};
+use super::{OriginEstimate, Refusal, Row, Task, body_pose, transported};
 use crate::error::PipelineError;
 use crate::prepare::estimators::AxisFit;
 
 impl Task<'_> {
-    /// One swept axis: a line, with the point on it and the turn about it taken from the nominal URDF.
+    /// One swept axis: a line, with the point on it and the rotation about it taken from the nominal URDF.
     pub(super) fn single_axis(
         &self,
         found: &BTreeMap<String, OriginEstimate>,
@@ -29,15 +29,11 @@ impl Task<'_> {
             .axis(&self.origin.axis, &parameters, &motion)?
         {
             Ok(axis) => axis,
-            Err(reason) => return Ok(self.refused(findings, "axis", &reason)),
+            Err(reason) => return Ok(self.refused(findings, Refusal::Axis(reason))),
         };
         let Some((rotation, slide)) = self.assumed_rotation().zip(self.slide(&axis.line, found))
         else {
-            return Ok(self.refused(
-                findings,
-                "no_rotation",
-                "the assumed orientation or the reference point is not known",
-            ));
+            return Ok(self.refused(findings, Refusal::Orientation));
         };
         // The measured axis in the body, averaged over the sweep.
         let directions: Vec<_> = rows
@@ -46,11 +42,7 @@ impl Task<'_> {
             .collect();
         let expected = rotation * swept.direction;
         let Ok(direction) = calib_geometry::mean::axis_mean(&directions, Some(expected)) else {
-            return Ok(self.refused(
-                findings,
-                "not_unique",
-                "the axis has no mean direction in the body",
-            ));
+            return Ok(self.refused(findings, Refusal::MeanAxis));
         };
         let align = UnitQuaternion::rotation_between_axis(&expected, &direction)
             .unwrap_or_else(UnitQuaternion::identity);
@@ -150,7 +142,7 @@ impl Task<'_> {
                 },
                 Unobservable {
                     direction: [d.x, d.y, d.z, 0.0, 0.0, 0.0],
-                    text: format!("the turn about the axis of `{joint}` is taken from the nominal URDF"),
+                    text: format!("the rotation about the axis of `{joint}` is taken from the nominal URDF"),
                     remedy: "sweep a second joint, or solve with `method: ml`".to_owned(),
                 },
             ]

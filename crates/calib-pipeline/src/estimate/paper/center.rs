@@ -8,7 +8,7 @@ use calib_profile::BodyKind;
 use calib_report::{EstimatorResult, Status, Unit, Unobservable};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::{OriginEstimate, Task, body_pose, transported};
+use super::{OriginEstimate, Refusal, Task, body_pose, transported};
 use crate::error::PipelineError;
 use crate::prepare::estimators::CenterFit;
 
@@ -182,15 +182,11 @@ impl Task<'_> {
         let Centers { chosen, others } = self.center()?;
         let estimate = match chosen {
             Ok(estimate) => estimate,
-            Err(reason) => return Ok(self.refused(findings, "center", &reason)),
+            Err(reason) => return Ok(self.refused(findings, Refusal::Center(reason))),
         };
         let (point, covariance) = self.center_in_body(&estimate);
         let Some(rotation) = self.assumed_rotation() else {
-            return Ok(self.refused(
-                findings,
-                "no_rotation",
-                "the assumed orientation contradicts itself",
-            ));
+            return Ok(self.refused(findings, Refusal::Orientation));
         };
         // body_from_child: the center of the swept joints lies at c in the child's frame.
         let child = Isometry3::from_parts(Translation3::from(point.coords), rotation)
@@ -228,8 +224,11 @@ impl Task<'_> {
     fn assumed_orientation(&self) -> Unobservable {
         Unobservable {
             direction: [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
-            text: "a center has no orientation: it is taken from the nominal URDF, the robot standing at its zero configuration".to_owned(),
-            remedy: "sweep two axes and name them under `axes`, or solve with `method: ml`".to_owned(),
+            text:
+                "a center has no orientation: it is taken from the URDF at its zero configuration"
+                    .to_owned(),
+            remedy: "sweep two axes and name them under `axes`, or solve with `method: ml`"
+                .to_owned(),
         }
     }
 }

@@ -7,7 +7,7 @@ use calib_finding::Finding;
 use calib_report::Status;
 
 use super::{
-    OriginEstimate, Task,
+    OriginEstimate, Refusal, Task,
     center::{Centers, center_sigma},
     transported,
 };
@@ -22,7 +22,7 @@ impl Task<'_> {
         let Centers { chosen, others } = self.center()?;
         let estimate = match chosen {
             Ok(estimate) => estimate,
-            Err(reason) => return Ok(self.refused(findings, "center", &reason)),
+            Err(reason) => return Ok(self.refused(findings, Refusal::Center(reason))),
         };
         let [proximal, distal] = [self.origin.axes[0], self.origin.axes[1]];
         let rows = self.rows();
@@ -49,14 +49,18 @@ impl Task<'_> {
             point: estimate.center,
             covariance: self.covariance_of(&estimate),
         };
-        let outcome = algorithm1(&samples, center, &options).map_err(|e| PipelineError::Usage {
-            finding: format!("origin `{}`: {e}", self.name),
-            remedy: "check the poses of the body".to_owned(),
-        })?;
+        let outcome =
+            algorithm1(&samples, center, &options).map_err(|cause| PipelineError::Origin {
+                origin: self.name.to_owned(),
+                cause,
+            })?;
         let frame = match outcome {
             FrameOutcome::Estimate(frame) => frame,
             FrameOutcome::NotObservable(n) => {
-                return Ok(self.refused(findings, n.verdict.as_str(), &n.reason));
+                return Ok(self.refused(
+                    findings,
+                    Refusal::Frame(format!("{}: {}", n.verdict, n.reason)),
+                ));
             }
         };
         let canonical_from_origin =

@@ -60,7 +60,8 @@ struct Row<'a> {
 /// All origins of the profile, by name. A failed origin is a finding, not an error.
 ///
 /// # Errors
-/// [`PipelineError::Usage`] for an estimator that does not exist or does not fit the data.
+/// [`PipelineError::Plugin`] for an estimator that does not exist or does not fit the data, [`PipelineError::Origin`] for
+/// poses that make no frame.
 pub fn origins(
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
@@ -135,24 +136,29 @@ impl Task<'_> {
         }
     }
 
-    fn refused(&self, findings: &mut Vec<Finding>, verdict: &str, reason: &str) -> OriginEstimate {
-        findings.push(
-            Finding::new(
-                catalog::ORIGIN_NOT_OBSERVABLE,
-                About::Origin(self.name.to_owned()),
-            )
+    fn refused(&self, findings: &mut Vec<Finding>, why: Refusal) -> OriginEstimate {
+        let about = About::Origin(self.name.to_owned());
+        let (form, estimator, said) = match why {
+            Refusal::Center(said) => ("center", Some(&self.origin.center), Some(said)),
+            Refusal::Axis(said) => ("axis", Some(&self.origin.axis), Some(said)),
+            Refusal::Frame(said) => ("frame", None, Some(said)),
+            Refusal::Orientation => ("orientation", None, None),
+            Refusal::MeanAxis => ("mean_axis", None, None),
+        };
+        let finding = Finding::of_kind(catalog::ORIGIN_NOT_OBSERVABLE, form, about)
             .with("sweep", Fact::name(&self.origin.sweep))
-            .with("verdict", Fact::name(verdict))
-            .with("reason", Fact::name(reason)),
-        );
+            .with_some("estimator", estimator.map(Fact::name))
+            .with_some("said", said.map(Fact::name));
+        let unobservable = Unobservable {
+            direction: [0.0; 6],
+            text: finding.text(),
+            remedy: finding.remedy(),
+        };
+        findings.push(finding);
         OriginEstimate {
             pose: None,
             covariance: None,
-            unobservable: vec![Unobservable {
-                direction: [0.0; 6],
-                text: format!("{verdict}: {reason}"),
-                remedy: "sweep a second joint through the origin".to_owned(),
-            }],
+            unobservable: vec![unobservable],
             status: Status::Assumed,
             center: None,
             center_sigma: None,
@@ -161,6 +167,20 @@ impl Task<'_> {
             estimators: Vec::new(),
         }
     }
+}
+
+/// Why a sweep does not determine an origin. An estimator, which may be a plugin's, says its reason itself.
+enum Refusal {
+    /// No center.
+    Center(String),
+    /// No axis.
+    Axis(String),
+    /// Two axes give no frame.
+    Frame(String),
+    /// The assumed orientation, or the reference point along the axis, is not known.
+    Orientation,
+    /// The axis has no mean direction in the body.
+    MeanAxis,
 }
 
 /// Covariance of `a_from_c = a_from_b · b_from_c` from that of `a_from_b`: `Ad(c_from_b) C Ad(c_from_b)ᵀ`.

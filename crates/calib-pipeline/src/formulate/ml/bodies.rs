@@ -135,6 +135,10 @@ fn noise_groups(
             !known,
         ),
     });
+    formulation.noise.marker = marker_noise;
+    if let Some(PoseNoise::Split { position, .. }) = &body_noise {
+        formulation.noise.body_position = Some(*position);
+    }
     (marker_noise, body_noise)
 }
 

@@ -11,7 +11,7 @@ use joints::{Row, add_joint, joint_noise_group, used_joints};
 use crate::error::PipelineError;
 use crate::estimate::start::Start;
 use crate::formulate::contacts::add_contacts;
-use crate::formulate::formulation::{Formulation, FreeSet, MlFit};
+use crate::formulate::formulation::{Formulation, FreeSet, MlFit, NoiseGroups};
 use crate::formulate::kinematics::Loads;
 use crate::prepare::conditions::{Conditions, conditions};
 use crate::prepare::inputs::Inputs;
@@ -86,11 +86,14 @@ pub fn state(
         points: BTreeMap::new(),
         contact_points: BTreeMap::new(),
         contacts: BTreeMap::new(),
+        clocks: BTreeMap::new(),
+        noise: NoiseGroups::default(),
         loaded: false,
         samples,
     };
     formulation.links[model.root().index()] = Some(root_frame);
     let joint_noise = joint_noise_group(&mut formulation.problem, profile);
+    formulation.noise.joint = joint_noise;
     for joint in used_joints(inputs, model) {
         add_joint(
             &mut formulation,

@@ -1,0 +1,188 @@
+//! What the recordings lack that the profile asks of them.
+
+use calib_checks::rigid_body::NotABody;
+use calib_finding::{Finding, Severity};
+use calib_recording::NotOneTable;
+use calib_urdf::{JointKind, UnknownName};
+
+/// What the recordings lack that the profile asks of them.
+#[derive(Debug, thiserror::Error)]
+pub enum DataProblem {
+    /// The data checks found errors.
+    #[error("the data checks found {} error(s)\n{}", errors(.0).count(), listed(.0))]
+    Checks(Vec<Finding>),
+    /// A table without a row.
+    #[error("has no poses")]
+    NoPoses,
+    /// Streams of several clocks in a recording without `timing`.
+    #[error("{0}")]
+    NotOneTable(NotOneTable),
+    /// A column that is not a joint of the robot.
+    #[error("column `{column}` is not a joint: {unknown}")]
+    ColumnNotAJoint {
+        /// The column.
+        column: String,
+        /// The nearest joint.
+        unknown: UnknownName,
+    },
+    /// A stream that is not a joint of the robot.
+    #[error("stream `{stream}` is not a joint: {unknown}")]
+    StreamNotAJoint {
+        /// The stream.
+        stream: String,
+        /// The nearest joint.
+        unknown: UnknownName,
+    },
+    /// An angle for a joint that slides, or a length for one that turns.
+    #[error(
+        "joint `{joint}` is {}, its column is not {}",
+        kind.name(),
+        if kind.turns() { "an angle" } else { "a length" }
+    )]
+    JointUnit {
+        /// The joint.
+        joint: String,
+        /// What the robot has.
+        kind: JointKind,
+    },
+    /// A joint that is recorded and held.
+    #[error("joint `{joint}` is in the file and held by the profile")]
+    HeldAndRecorded {
+        /// The joint.
+        joint: String,
+    },
+    /// A robot's log without joints.
+    #[error("the robot's log has no joints")]
+    NoJointsInLog,
+    /// A timed recording without a tracker.
+    #[error("no stream of a marker or body")]
+    NothingTracked,
+    /// A stream that names a time line that is not there.
+    #[error("a stream has no time line")]
+    NoTimeline,
+    /// `timing` for a tracker without time.
+    #[error("`timing` is given, the tracker's rows have no time")]
+    NoTrackerTime,
+    /// `timing` for joints without time.
+    #[error("the joints' rows have no time")]
+    NoJointTime,
+    /// The tracker's streams make no table.
+    #[error("{0}")]
+    NotATrack(NotATrack),
+    /// The clocks cannot be brought together.
+    #[error("recording `{recording}`: {}", why.text())]
+    Clocks {
+        /// The recording.
+        recording: String,
+        /// What was found.
+        why: Box<Finding>,
+    },
+    /// No hold.
+    #[error("recording `{recording}`: nothing stands still for {hold} s")]
+    NothingStandsStill {
+        /// The recording.
+        recording: String,
+        /// Time that a hold must last, s.
+        hold: f64,
+    },
+    /// A body that no fitted recording shows.
+    #[error("no recording that is fitted shows body `{body}`")]
+    BodyNotSeen {
+        /// The body.
+        body: String,
+        /// What the recordings have that is called almost like it, or like its first marker.
+        meant: Option<String>,
+    },
+    /// Markers that make no body.
+    #[error("body `{body}`: {why}")]
+    NotABody {
+        /// The body.
+        body: String,
+        /// Why.
+        why: NotABody,
+    },
+}
+
+/// Why the tracker's streams make no table.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotATrack {
+    /// A stream without time.
+    #[error("`{stream}` has no time")]
+    NoTime {
+        /// The stream.
+        stream: String,
+    },
+    /// Two streams of one name.
+    #[error("`{stream}` is the name of two streams")]
+    NameTwice {
+        /// The stream.
+        stream: String,
+    },
+}
+
+impl DataProblem {
+    /// What to do.
+    #[must_use]
+    pub fn remedy(&self) -> String {
+        let text = match self {
+            Self::Checks(_) => "correct the data, or go on at your own risk with --force",
+            Self::NoPoses => "record at least one row",
+            Self::NotOneTable(_) => {
+                "add `timing: {}` to the recording in the profile: holds become poses, and the clocks are brought together"
+            }
+            Self::ColumnNotAJoint { .. } => "rename the column, or map it under `columns`",
+            Self::StreamNotAJoint { .. } => "rename it, or map it under `columns`",
+            Self::JointUnit { .. } => "correct the unit in the column name",
+            Self::HeldAndRecorded { .. } => "remove it from `hold`",
+            Self::NoJointsInLog => {
+                "name the columns as the robot's joints with their unit (`elbow_rad`), or map them under `columns`"
+            }
+            Self::NothingTracked => "name the tracker's file under `file`",
+            Self::NoTimeline => "correct the reader",
+            Self::NoTrackerTime => "add a column `t_s`, or remove `timing`: static poses need none",
+            Self::NoJointTime => "add a column `t_s` to the robot's log",
+            Self::NotATrack(_) => "give every stream a name of its own",
+            Self::Clocks { why, .. } => return why.remedy(),
+            Self::NothingStandsStill { .. } => {
+                "hold each posture for a second, or take rows of the motion: `timing: {poses: continuous}`"
+            }
+            Self::BodyNotSeen { meant, .. } => {
+                let meant = meant.as_ref();
+                let near = meant.map_or_else(String::new, |m| format!("did you mean `{m}`? "));
+                return format!(
+                    "{near}record it, check the column names, or remove it from the profile"
+                );
+            }
+            Self::NotABody { .. } => {
+                "mount at least three markers that span a plane, and check their names"
+            }
+        };
+        text.to_owned()
+    }
+}
+
+fn errors(findings: &[Finding]) -> impl Iterator<Item = &Finding> {
+    findings.iter().filter(|f| f.severity == Severity::Error)
+}
+
+/// Errors with their rows and remedies, one below the other.
+fn listed(findings: &[Finding]) -> String {
+    /// Rows that a line names; `calib check` lists more.
+    const ROWS: usize = 5;
+    let one = |f: &Finding| {
+        let rows: Vec<String> = f.rows.iter().take(ROWS).map(u64::to_string).collect();
+        let at = if rows.is_empty() {
+            String::new()
+        } else {
+            format!(" (rows {})", rows.join(", "))
+        };
+        format!(
+            "{} [{}]{at}: {}\n  help: {}",
+            f.subject,
+            f.id,
+            f.text(),
+            f.remedy()
+        )
+    };
+    errors(findings).map(one).collect::<Vec<_>>().join("\n")
+}

@@ -1,0 +1,40 @@
+//! Why samples did not take part in the fit.
+
+use crate::{Rejected, RejectedFor};
+
+impl RejectedFor {
+    /// The reason, without a full stop.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::OnTheWay => "not settled: it lies on the way to a neighboring row",
+            Self::RestlessHold => "not settled: the hold drifts or scatters",
+            Self::NotSettled => {
+                "not settled: the whole body is displaced, or a joint reading is wrong"
+            }
+            Self::Occlusion => "occlusion: a pose needed to predict it was lost",
+            Self::Outlier => "outlier: residual too large for the noise",
+            Self::Swap => "swapped with another marker of the body",
+            Self::Unstated => "rejected",
+        }
+    }
+}
+
+impl Rejected {
+    /// Rows of a body or marker, with the words of their cause.
+    #[must_use]
+    pub fn new(
+        recording: impl Into<String>,
+        subject: impl Into<String>,
+        rows: Vec<u64>,
+        cause: RejectedFor,
+    ) -> Self {
+        Self {
+            recording: recording.into(),
+            subject: subject.into(),
+            rows,
+            cause,
+            reason: cause.words().to_owned(),
+        }
+    }
+}
