@@ -93,14 +93,14 @@ pub enum PipelineError {
         /// The URDF.
         file: String,
         /// Why.
-        cause: calib_urdf::EditError,
+        cause: Box<calib_urdf::EditError>,
     },
     /// A text of a robot's description cannot be changed as asked.
     #[error("{0}")]
-    Edit(calib_urdf::EditError),
+    Edit(Box<calib_urdf::EditError>),
     /// A plugin or an estimator failed, or is not what the profile needs.
     #[error("{}", chain(.0))]
-    Plugin(calib_plugin::PluginError),
+    Plugin(Box<calib_plugin::PluginError>),
     /// The report or scene could not be rendered.
     #[error("the report cannot be written: {0}")]
     Report(#[from] calib_report::ReportError),
@@ -109,13 +109,13 @@ pub enum PipelineError {
 // Not a `#[from]`: the message is the cause's own, which would then be said twice.
 impl From<calib_urdf::EditError> for PipelineError {
     fn from(error: calib_urdf::EditError) -> Self {
-        Self::Edit(error)
+        Self::Edit(Box::new(error))
     }
 }
 
 impl From<calib_plugin::PluginError> for PipelineError {
     fn from(error: calib_plugin::PluginError) -> Self {
-        Self::Plugin(error)
+        Self::Plugin(Box::new(error))
     }
 }
 

@@ -74,7 +74,7 @@ pub fn patch_urdf(
     let file = &inputs.robot.profile.urdf;
     let fail = |cause: calib_urdf::EditError| PipelineError::Patch {
         file: file.clone(),
-        cause,
+        cause: Box::new(cause),
     };
     let original = &inputs.robot.urdf_text;
     let patched = patch(original, file, &edits).map_err(fail)?;
