@@ -41,6 +41,48 @@ pub fn chi2_tail(x: f64, dof: f64) -> f64 {
     checked_gamma_ur(0.5 * dof, 0.5 * x).unwrap_or(0.0)
 }
 
+/// The value that an F(d1, ν) variable exceeds with probability `tail`; a χ²(d1)/d1 variable where ν is `None`, that is, where the noise
+/// was stated.
+///
+/// ```
+/// use calib_estimator::chance::f_quantile;
+/// // Printed tables: F(3, 10) at 5 % is 3.708, χ²(3) at 5 % is 7.815.
+/// assert!((f_quantile(0.05, 3.0, Some(10.0)) - 3.708).abs() < 1e-3);
+/// assert!((3.0 * f_quantile(0.05, 3.0, None) - 7.815).abs() < 1e-3);
+/// ```
+#[must_use]
+pub fn f_quantile(tail: f64, d1: f64, degrees_of_freedom: Option<f64>) -> f64 {
+    let chance = |x: f64| match degrees_of_freedom {
+        Some(d2) => f_tail(x, d1, d2),
+        None => chi2_tail(x * d1, d1),
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    while chance(high) > tail && high < 1e12 {
+        low = high;
+        high *= 4.0;
+    }
+    // Bisection to the last digits: the tail falls monotonically.
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if chance(middle) > tail {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Half width, in standard deviations, of the interval that a Student variable leaves with probability `tail` on both sides together;
+/// of the normal where the noise was stated.
+#[must_use]
+pub fn t_quantile(tail: f64, degrees_of_freedom: Option<f64>) -> f64 {
+    f_quantile(tail, 1.0, degrees_of_freedom).sqrt()
+}
+
 /// P(Z ≥ z) of a standard normal variable.
 fn normal_tail(z: f64) -> f64 {
     0.5 * erfc(z / std::f64::consts::SQRT_2)
@@ -49,6 +91,14 @@ fn normal_tail(z: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn students_quantiles() {
+        // Printed tables: t(5) 2.5706, t(2) 4.3027, normal 1.9600, all at 95 %.
+        for (dof, value) in [(Some(5.0), 2.5706), (Some(2.0), 4.3027), (None, 1.9600)] {
+            assert!((t_quantile(0.05, dof) - value).abs() < 1e-4, "{dof:?}");
+        }
+    }
 
     #[test]
     fn quantiles_of_the_tables() {

@@ -1,7 +1,10 @@
 //! Input that no estimator can read, and options that do not fit.
 
 use crate::{
-    input::InputKind, measured::DataError, options::OptionId, registry::Kind, verdict::Verdict,
+    kind::{InputKind, Kind},
+    measured::DataError,
+    option_id::OptionId,
+    verdict::Verdict,
 };
 
 /// What an option must be.

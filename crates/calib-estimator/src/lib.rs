@@ -83,8 +83,10 @@ mod error;
 pub mod factor;
 mod frame;
 mod input;
+mod kind;
 pub mod levenberg;
 pub mod measured;
+mod option_id;
 mod options;
 mod outcome;
 pub mod parameter;
@@ -94,12 +96,14 @@ pub mod verdict;
 
 pub use error::{EstimatorError, Rule};
 pub use frame::{FrameAxes, FrameAxis, FrameSample, PlaneFit};
-pub use input::{CenterBy, Input, InputKind, cloud_of};
+pub use input::{CenterBy, Input, cloud_of};
+pub use kind::{InputKind, Kind};
 pub use nalgebra;
-pub use options::{OptionId, Options};
+pub use option_id::OptionId;
+pub use options::Options;
 pub use outcome::{Estimate, NotObservable, Outcome};
 pub use parameter::{Parameter, Value};
-pub use registry::{EstimatorInfo, Fit, Kind, find};
+pub use registry::{EstimatorInfo, Fit, find};
 pub use verdict::Verdict;
 
 /// The README's example is a test.

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Point3, Unit, Vector3};
 use crate::{
     error::{EstimatorError, Rule},
     frame::{FrameAxes, PlaneFit},
+    option_id::OptionId,
 };
 
 /// Settings; [`Options::default`] needs no knowledge of the tracker.
@@ -79,93 +80,6 @@ impl Default for Options {
             axes: FrameAxes::default(),
             plane_fit: PlaneFit::PlanarRadial,
             same_angle: 0.01,
-        }
-    }
-}
-
-/// One field of [`Options`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[non_exhaustive]
-pub enum OptionId {
-    /// [`Options::sigma_t`].
-    SigmaT,
-    /// [`Options::sigma_r`].
-    SigmaR,
-    /// [`Options::covariances`].
-    Covariances,
-    /// [`Options::weights`].
-    Weights,
-    /// [`Options::noise_per_marker`].
-    NoisePerMarker,
-    /// [`Options::center`].
-    Center,
-    /// [`Options::angles`].
-    Angles,
-    /// [`Options::towards`].
-    Towards,
-    /// [`Options::separation`].
-    Separation,
-    /// [`Options::significance`].
-    Significance,
-    /// [`Options::weak_fraction`].
-    WeakFraction,
-    /// [`Options::weak_angle`].
-    WeakAngle,
-    /// [`Options::seed`].
-    Seed,
-    /// [`Options::subsets`].
-    Subsets,
-    /// [`Options::axes`].
-    Axes,
-    /// [`Options::plane_fit`].
-    PlaneFit,
-    /// [`Options::same_angle`].
-    SameAngle,
-}
-
-impl OptionId {
-    /// All, in the order of the fields.
-    pub const ALL: [Self; 17] = [
-        Self::SigmaT,
-        Self::SigmaR,
-        Self::Covariances,
-        Self::Weights,
-        Self::NoisePerMarker,
-        Self::Center,
-        Self::Angles,
-        Self::Towards,
-        Self::Separation,
-        Self::Significance,
-        Self::WeakFraction,
-        Self::WeakAngle,
-        Self::Seed,
-        Self::Subsets,
-        Self::Axes,
-        Self::PlaneFit,
-        Self::SameAngle,
-    ];
-
-    /// The name of the field.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::SigmaT => "sigma_t",
-            Self::SigmaR => "sigma_r",
-            Self::Covariances => "covariances",
-            Self::Weights => "weights",
-            Self::NoisePerMarker => "noise_per_marker",
-            Self::Center => "center",
-            Self::Angles => "angles",
-            Self::Towards => "towards",
-            Self::Separation => "separation",
-            Self::Significance => "significance",
-            Self::WeakFraction => "weak_fraction",
-            Self::WeakAngle => "weak_angle",
-            Self::Seed => "seed",
-            Self::Subsets => "subsets",
-            Self::Axes => "axes",
-            Self::PlaneFit => "plane_fit",
-            Self::SameAngle => "same_angle",
         }
     }
 }

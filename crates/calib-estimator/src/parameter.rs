@@ -1,9 +1,6 @@
 //! Options as parameters that a profile can set by name.
 
-use crate::{
-    frame::PlaneFit,
-    options::{OptionId, Options},
-};
+use crate::{frame::PlaneFit, option_id::OptionId, options::Options};
 
 /// The value of a parameter.
 #[derive(Debug, Clone, PartialEq)]

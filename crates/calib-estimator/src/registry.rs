@@ -2,34 +2,12 @@
 
 use crate::{
     error::EstimatorError,
-    input::{Input, InputKind},
-    options::{OptionId, Options},
+    input::Input,
+    kind::{InputKind, Kind},
+    option_id::OptionId,
+    options::Options,
     outcome::{Estimate, Outcome},
 };
-
-/// What an estimator finds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Kind {
-    /// A center of rotation.
-    Center,
-    /// An axis of rotation.
-    Axis,
-    /// The frame of a joint with two axes.
-    Frame,
-    /// The two fixed transforms between two pairs of frames.
-    HandEye,
-}
-
-impl std::fmt::Display for Kind {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Center => "center",
-            Self::Axis => "axis",
-            Self::Frame => "frame",
-            Self::HandEye => "hand-eye",
-        })
-    }
-}
 
 /// The entry point of an estimator.
 pub type Fit<E> = fn(&Input<'_>, &Options) -> Result<Outcome<E>, EstimatorError>;
