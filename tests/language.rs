@@ -128,13 +128,17 @@ const WITH_Z: &[&str] = &[
     "priorit",
 ];
 
-/// Words that files written elsewhere contain, and a column that programs read: (part of the path, word).
+/// Words that files written elsewhere contain, a column that programs read, and what plugins say of their offers:
+/// (part of the path, word).
 const KEPT: &[(&str, &str)] = &[
     ("calib-recording/src/units.rs", "metre"),
     ("calib-recording/src/units.rs", "metres"),
     ("calib-recording/src/units.rs", "millimetre"),
     ("calib-recording/src/units.rs", "millimetres"),
     ("calib-report/src/csv.rs", "normalised"),
+    ("crates/calib-plugin/", "the description"),
+    ("plugins/column-reader-c/", "the description"),
+    ("book/src/plugins/", "the description"),
 ];
 
 fn root() -> PathBuf {

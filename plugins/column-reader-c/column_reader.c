@@ -387,7 +387,7 @@ static calib_status read(const calib_call *call, const calib_source *source, con
     return status;
 }
 
-/* ---- The nominal URDF ------------------------------------------------------------------------------------------ */
+/* ---- The description of the reader ----------------------------------------------------------------------------- */
 
 static const char *const separators[] = {"comma", "semicolon", "tab", "space"};
 

@@ -85,6 +85,11 @@ pub use parameters::{ParameterError, schema, validate};
 #[cfg(feature = "host")]
 pub use registry::{Bound, Entry, Origin, Registry, Tables};
 
+/// The README's example is a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 /// The contract as text: `calib_plugin.h`.
 #[cfg(feature = "host")]
 pub const HEADER: &str = include_str!("../include/calib_plugin.h");

@@ -1,4 +1,4 @@
-//! The nominal URDF as C structs, built once from the safe one.
+//! The description of a plugin's offers as C structs, built once from the safe one.
 
 use std::{
     ffi::{CStr, CString, c_char, c_void},

@@ -3,8 +3,7 @@
 use std::ffi::c_void;
 
 use super::{
-    call::{Got, across},
-    cor::{Target, raw, rejected},
+    estimator::{Fitted, Target, fitted, rejected},
     raw::{size_to, sized},
 };
 use crate::{
@@ -31,35 +30,22 @@ impl Aor for LoadedAor {
     }
 
     fn fit(&self, motion: &Motion<'_>, call: &Call<'_>) -> Result<Answer<AorFit>, Failure> {
-        let mut target: Target<AorFit> = Target {
-            got: Got::Nothing,
-            tracks: motion.tracks,
-            rows: motion.tracks * motion.samples,
-        };
-        let sink = abi::AorSink {
-            struct_size: abi::size::<abi::AorSink>(),
-            reserved: 0,
-            context: (&raw mut target).cast(),
-            result: Some(take),
-        };
-        let raw = raw(motion);
-        // SAFETY: all arguments are alive until the function returns. Sizes were verified by `Bound`, the only way here.
-        let ended = across(call, |call| unsafe {
-            (self.fit)(call, &raw const raw, &raw const sink)
-        });
-        Ok(match ended.with(target.got)? {
-            Err(reason) => Answer::NotObservable(reason),
-            Ok((mut fit, text)) => {
-                if fit.weak.is_some() {
-                    fit.weak = Some(if text.is_empty() {
-                        "the plugin gave no reason".into()
-                    } else {
-                        text
-                    });
-                }
-                Answer::Found(fit)
-            }
+        fitted(motion, call, |call, motion, target| {
+            let sink = abi::AorSink {
+                struct_size: abi::size::<abi::AorSink>(),
+                reserved: 0,
+                context: target.cast(),
+                result: Some(take),
+            };
+            // SAFETY: all arguments are alive until the function returns. Sizes were verified by `Bound`, the only way here.
+            unsafe { (self.fit)(call, motion, &raw const sink) }
         })
+    }
+}
+
+impl Fitted for AorFit {
+    fn weak(&mut self) -> Option<&mut String> {
+        self.weak.as_mut()
     }
 }
 

@@ -3,7 +3,7 @@
 use std::ffi::c_void;
 
 use super::{
-    call::{Got, across},
+    estimator::{Fitted, Target, fitted, rejected},
     raw::{array, size_to, sized},
 };
 use crate::{
@@ -24,80 +24,28 @@ pub(super) struct LoadedCor {
     pub fit: Fit,
 }
 
-/// Where a result goes; the sizes that it may have.
-pub(super) struct Target<T> {
-    pub got: Got<T>,
-    pub tracks: usize,
-    pub rows: usize,
-}
-
 impl Cor for LoadedCor {
     fn offer(&self) -> Offer {
         self.offer.clone()
     }
 
     fn fit(&self, motion: &Motion<'_>, call: &Call<'_>) -> Result<Answer<CorFit>, Failure> {
-        let mut target: Target<CorFit> = Target {
-            got: Got::Nothing,
-            tracks: motion.tracks,
-            rows: motion.tracks * motion.samples,
-        };
-        let sink = abi::CorSink {
-            struct_size: abi::size::<abi::CorSink>(),
-            reserved: 0,
-            context: (&raw mut target).cast(),
-            result: Some(take),
-        };
-        let raw = raw(motion);
-        // SAFETY: all arguments are alive until the function returns. Sizes were verified by `Bound`, the only way here.
-        let ended = across(call, |call| unsafe {
-            (self.fit)(call, &raw const raw, &raw const sink)
-        });
-        Ok(match ended.with(target.got)? {
-            Err(reason) => Answer::NotObservable(reason),
-            Ok((mut fit, text)) => {
-                if fit.weak.is_some() {
-                    fit.weak = Some(if text.is_empty() {
-                        "the plugin gave no reason".into()
-                    } else {
-                        text
-                    });
-                }
-                Answer::Found(fit)
-            }
+        fitted(motion, call, |call, motion, target| {
+            let sink = abi::CorSink {
+                struct_size: abi::size::<abi::CorSink>(),
+                reserved: 0,
+                context: target.cast(),
+                result: Some(take),
+            };
+            // SAFETY: all arguments are alive until the function returns. Sizes were verified by `Bound`, the only way here.
+            unsafe { (self.fit)(call, motion, &raw const sink) }
         })
     }
 }
 
-/// The arrays of a motion that was verified.
-pub(super) fn raw(motion: &Motion<'_>) -> abi::Motion {
-    fn pointer<T>(values: &[T]) -> *const f64 {
-        if values.is_empty() {
-            std::ptr::null()
-        } else {
-            values.as_ptr().cast()
-        }
-    }
-    fn vector(vector: Option<&[f64; 3]>) -> *const f64 {
-        vector.map_or(std::ptr::null(), |v| v.as_ptr())
-    }
-    abi::Motion {
-        struct_size: abi::size::<abi::Motion>(),
-        shape: motion.shape as u32,
-        tracks: motion.tracks,
-        samples: motion.samples,
-        seen: motion.seen.as_ptr(),
-        points_m: pointer(motion.points_m),
-        rotations: pointer(motion.rotations),
-        translations_m: pointer(motion.translations_m),
-        covariances_m2: motion.covariances_m2.map_or(std::ptr::null(), pointer),
-        angles_rad: motion.angles_rad.map_or(std::ptr::null(), pointer),
-        center_m: vector(motion.center_m.as_ref()),
-        towards: vector(motion.towards.as_ref()),
-        sigma_t_m: motion.sigma_t_m.unwrap_or(0.0),
-        sigma_r_rad: motion.sigma_r_rad.unwrap_or(0.0),
-        significance: motion.significance,
-        seed: motion.seed,
+impl Fitted for CorFit {
+    fn weak(&mut self) -> Option<&mut String> {
+        self.weak.as_mut()
     }
 }
 
@@ -154,20 +102,4 @@ unsafe fn read(
         rejected: unsafe { rejected(raw.rejected, raw.rejected_count, rows)? },
         weak: (raw.weak != 0).then(String::new),
     })
-}
-
-/// Pairs (track, sample).
-///
-/// # Safety
-/// `pairs` is null or valid for `2 · count` numbers.
-pub(super) unsafe fn rejected(
-    pairs: *const usize,
-    count: usize,
-    rows: usize,
-) -> Result<Vec<[usize; 2]>, String> {
-    if count > rows {
-        return Err(format!("{count} samples rejected of {rows}"));
-    }
-    // SAFETY: as the caller says.
-    Ok(unsafe { array("rejected", pairs.cast::<[usize; 2]>(), count)? }.to_vec())
 }

@@ -103,7 +103,7 @@ fn open(path: &Path) -> Result<LoadedPlugin, PluginError> {
     })?;
     // SAFETY: only the address is taken; nothing is read through it before the version has been.
     let symbol = unsafe { library.get::<*const abi::Entry>(abi::SYMBOL) }.map(|symbol| *symbol);
-    // Never unloaded: statics, threads and the nominal URDF may be in use until the process ends.
+    // Never unloaded: statics, threads and the description of the plugin may be in use until the process ends.
     std::mem::forget(library);
     let entry = symbol.map_err(|error| PluginError::NoEntry {
         path: shown,

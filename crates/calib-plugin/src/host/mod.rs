@@ -6,6 +6,7 @@ mod call;
 mod cor;
 mod describe;
 mod error;
+mod estimator;
 mod load;
 mod pin;
 mod raw;
