@@ -169,17 +169,13 @@ pub fn estimator(id: &str) -> Result<&'static EstimatorInfo, EstimatorError> {
     find(Kind::Axis, TABLE, id)
 }
 
-/// Runs the estimator called `id`. Options that it does not use say what is known of the recording and are left aside;
-/// [`calib_estimator::EstimatorInfo::run`] refuses them.
+/// Runs the estimator called `id`.
 ///
 /// # Errors
-/// [`EstimatorError`] for an unknown name, data of another kind, or data that are not finite.
+/// [`EstimatorError`] for an unknown name, data of another kind, data that are not finite, or an option that the estimator does not
+/// use ([`Options::only`] keeps those that it uses).
 pub fn fit(id: &str, input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
-    let info = estimator(id)?;
-    if !input.serves(info.input) {
-        return Err(input.wrong(info.input));
-    }
-    Ok((info.fit)(input, options)?.checked())
+    estimator(id)?.run(input, options)
 }
 
 /// One estimator of a frame.

@@ -73,7 +73,8 @@ impl Recording {
             InputKind::OneOrTwoBodies => Input::Poses(&self.poses),
             _ => Input::Markers(&self.markers),
         };
-        fit(info.id, &input, options).expect(info.id)
+        info.run(&input, &options.only(info.options))
+            .expect(info.id)
     }
 
     fn estimate(&self, info: &EstimatorInfo, options: &Options) -> AorEstimate {

@@ -3,8 +3,8 @@
 
 mod common;
 
-use calib_cor::{Input, Options, Pose, Tracks, bounds, fit};
-use common::{Noise, Tally, grid, hand, head, marker, poses, sweep};
+use calib_cor::{Input, Options, Pose, Tracks, bounds};
+use common::{Noise, Tally, fit, grid, hand, head, marker, poses, sweep};
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 
 const CENTER: Vector3<f64> = Vector3::new(1.2, -0.8, 0.9);

@@ -2,7 +2,7 @@
 //!
 //! Read from `CALIB_GOLDEN` (a folder) or `../shared/golden` beside the workspace; never written here.
 
-use calib_cor::{Input, InputKind, Known, Options, Outcome, Pose, Shape, fit};
+use calib_cor::{Input, InputKind, Known, Options, Outcome, Pose, Shape, estimator, fit};
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3};
 use serde_json::Value;
 
@@ -199,7 +199,9 @@ fn hot_spots() {
             ("hotspot_ml", "hotspot_ml_adaptive", &unknown),
         ] {
             let what = format!("{} {ours} as {theirs}", id(&case));
-            let outcome = fit(ours, &input, options).expect(&what);
+            let info = estimator(ours).expect(ours);
+            let own = options.only(info.options);
+            let outcome = info.run(&input, &own).expect(&what);
             assert_eq!(
                 outcome.verdict().as_str(),
                 verdict,

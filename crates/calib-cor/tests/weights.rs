@@ -74,7 +74,8 @@ impl Recording {
             },
             _ => Input::Markers(&self.markers),
         };
-        fit(info.id, &input, options).expect(info.id)
+        info.run(&input, &options.only(info.options))
+            .expect(info.id)
     }
 
     fn estimate(&self, info: &EstimatorInfo, options: &Options) -> CorEstimate {

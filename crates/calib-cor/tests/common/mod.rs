@@ -1,11 +1,17 @@
 //! Simulated joints with a fixed seed: the paper's grids, noise of markers and poses.
 #![allow(dead_code)] // Each test binary uses its part.
 
-use calib_cor::Pose;
+use calib_cor::{EstimatorError, Input, Options, Outcome, Pose, estimator};
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+
+/// Runs an estimator with those of the options that it uses.
+pub fn fit(id: &str, input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
+    let info = estimator(id)?;
+    info.run(input, &options.only(info.options))
+}
 
 pub struct Noise(ChaCha8Rng);
 

@@ -75,7 +75,9 @@ fn mean_axis(
     let mut found = Vec::new();
     for track in planes.into_values() {
         let tracks = [track];
-        let outcome = calib_aor::fit("planar_radial_gn", &Input::Points(&tracks), options).ok()?;
+        let circle = calib_aor::estimator("planar_radial_gn").ok()?;
+        let options = options.only(circle.options);
+        let outcome = circle.run(&Input::Points(&tracks), &options).ok()?;
         found.extend(outcome.estimate().map(|e| e.line.direction));
     }
     axis_mean(&found, Some(*towards)).ok()

@@ -79,7 +79,7 @@ impl Method {
         let [direction, offset] = tallies else {
             return;
         };
-        let outcome = match (self.info.fit)(input, &self.options) {
+        let outcome = match self.info.run(input, &self.options.only(self.info.options)) {
             Ok(outcome) => outcome,
             Err(_) => {
                 direction.verdict(false, false);

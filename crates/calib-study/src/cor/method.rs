@@ -64,7 +64,7 @@ pub(crate) fn record(
     (truth, linear): (Vector3<f64>, Option<Vector3<f64>>),
     tally: &mut Tally,
 ) {
-    match (info.fit)(input, options) {
+    match info.run(input, &options.only(info.options)) {
         Ok(outcome) => match outcome.estimate() {
             Some(e) => tally.error(
                 outcome.is_observable(),

@@ -175,7 +175,7 @@ impl Experiment for OneAxis {
                 Given::Poses => Input::Poses(&poses),
             };
             let options = if one.known { &stated } else { &unstated };
-            match (one.info.fit)(&input, options) {
+            match one.info.run(&input, &options.only(one.info.options)) {
                 Ok(o) => tally.verdict(o.estimate().is_some(), o.is_observable()),
                 Err(_) => tally.verdict(false, false),
             }
