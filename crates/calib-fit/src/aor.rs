@@ -2,73 +2,71 @@
 
 use std::fmt::Write as _;
 
+use calib_aor::AorEstimate;
+use calib_estimator::{Kind, Verdict};
 use serde_json::json;
 
-use crate::comparison::comparison;
+use crate::TableRequest;
+use crate::answer::{Answer, answer, coordinates, doubt, matrix};
+use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
-use crate::road::{self, Road};
+use crate::road::{self, Command, Data, Road, Wish};
 use crate::table::Table;
-use crate::{Answer, TableRequest, answer, coordinates, doubt, listed, matrix, not_observable};
+
+fn command() -> Command<AorEstimate> {
+    Command {
+        name: "calib fit aor",
+        kind: Kind::Axis,
+        estimators: calib_aor::estimators(),
+        quantity: Quantity::Direction("direction"),
+        found: |e| Found {
+            value: e.line.direction.into_inner(),
+            sigma: e.sigma_direction,
+        },
+    }
+}
 
 /// `calib fit aor`.
 ///
 /// # Errors
 /// As [`crate::cor`].
 pub fn aor(request: &TableRequest) -> Result<Answer, FitError> {
+    let command = command();
     if request.list {
-        let rows = calib_aor::estimators()
-            .iter()
-            .map(|e| (e.id, e.input.to_string(), e.name, e.source));
-        return Ok(listed(rows));
+        return Ok(command.list());
     }
     let table = Table::read(request)?;
-    let options = road::options(request, &table)?;
     let tracks = table.tracks();
     let road = Road {
-        table: &table,
-        tracks: &tracks,
-        options: &options,
-        estimators: calib_aor::estimators(),
-        command: "calib fit aor",
+        command: &command,
+        file: &table.file,
+        data: Data::Table(&table, &tracks),
+        options: &road::options(request, &table)?,
     };
-    road.check()?;
-    if request.all {
-        let mut lines = Vec::new();
-        for info in calib_aor::estimators() {
-            if let Ok(outcome) = road.run_with_its_own(info) {
-                let axis = outcome
-                    .estimate()
-                    .map(|e| (e.line.direction.into_inner(), e.sigma_direction));
-                lines.push((
-                    info.id,
-                    outcome.verdict().as_str(),
-                    outcome.reason().unwrap_or("").to_owned(),
-                    axis,
-                ));
-            }
-        }
-        return Ok(comparison("direction", &lines));
-    }
-    let default = if table.pair.is_some() {
+    let wish = Wish {
+        estimator: request.estimator.as_deref(),
+        all: request.all,
+    };
+    road.answer(
+        wish,
+        |_| preferred(&table),
+        |id, e| aor_answer(request, &table, id, e),
+    )
+}
+
+/// The estimator for a table where none was named.
+fn preferred(table: &Table) -> &'static str {
+    if table.pair.is_some() || table.origin_only {
         "sara"
-    } else if table.body.is_some() && !table.origin_only {
+    } else if table.body.is_some() {
         "hinge_bundle"
-    } else if table.origin_only {
-        "sara"
     } else {
         "planar_radial"
-    };
-    let id = request.estimator.as_deref().unwrap_or(default);
-    let outcome = calib_aor::estimator(id)
-        .and_then(|info| road.run(info))
-        .map_err(|e| road.refusal(id, &e))?;
-    let Some(e) = outcome.estimate() else {
-        return Ok(not_observable(
-            id,
-            outcome.verdict().as_str(),
-            outcome.reason().unwrap_or(""),
-        ));
-    };
+    }
+}
+
+fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) -> Answer {
+    let observable = e.verdict == Verdict::Ok;
     let rejected: Vec<u64> = e
         .rejected
         .iter()
@@ -77,13 +75,13 @@ pub fn aor(request: &TableRequest) -> Result<Answer, FitError> {
     let frame = axis_frame(request);
     let value = json!({
         "estimator": id,
-        "observable": outcome.is_observable(),
-        "verdict": outcome.verdict().as_str(),
+        "observable": observable,
+        "verdict": e.verdict.as_str(),
         "reason": e.reason,
         "frame": frame,
         "point_m": e.line.point.coords.as_slice(),
         "direction": e.line.direction.as_slice(),
-        "covariance": matrix(e.covariance.row_iter().map(|r| r.iter().copied().collect()).collect()),
+        "covariance": matrix(&e.covariance),
         "rms_m": e.rms,
         "used": e.used,
         "rejected": rejected,
@@ -106,7 +104,7 @@ pub fn aor(request: &TableRequest) -> Result<Answer, FitError> {
         e.used,
         rejected.len()
     );
-    Ok(answer(text, &value, outcome.is_observable()))
+    answer(text, &value, observable)
 }
 
 /// The frame that an axis is given in: the tracker's, or the parent's when two bodies move.

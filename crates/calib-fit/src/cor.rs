@@ -3,74 +3,65 @@
 use std::fmt::Write as _;
 
 use calib_cor::{CorEstimate, Shape};
+use calib_estimator::{Kind, Verdict};
 use serde_json::json;
 
-use crate::comparison::comparison;
+use crate::TableRequest;
+use crate::answer::{Answer, answer, coordinates, doubt, matrix};
+use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
-use crate::road::{self, Road};
+use crate::road::{self, Command, Data, Road, Wish};
 use crate::table::Table;
-use crate::{Answer, TableRequest, answer, coordinates, doubt, listed, matrix, not_observable};
 
 /// Without a named estimator, rows that raise the residuals by more than this factor are rejected: they are not noise.
 const GROSS: f64 = 3.0;
+
+fn command() -> Command<CorEstimate> {
+    Command {
+        name: "calib fit cor",
+        kind: Kind::Center,
+        estimators: calib_cor::estimators(),
+        quantity: Quantity::Place("center_m"),
+        found: |e| Found {
+            value: e.center.coords,
+            sigma: e.covariance.trace().max(0.0).sqrt(),
+        },
+    }
+}
 
 /// `calib fit cor`.
 ///
 /// # Errors
 /// [`FitError`] for tables that cannot be read and estimators that do not fit them.
 pub fn cor(request: &TableRequest) -> Result<Answer, FitError> {
+    let command = command();
     if request.list {
-        let rows = calib_cor::estimators()
-            .iter()
-            .map(|e| (e.id, e.input.to_string(), e.name, e.source));
-        return Ok(listed(rows));
+        return Ok(command.list());
     }
     let table = Table::read(request)?;
-    let options = road::options(request, &table)?;
     let tracks = table.tracks();
     let road = Road {
-        table: &table,
-        tracks: &tracks,
-        options: &options,
-        estimators: calib_cor::estimators(),
-        command: "calib fit cor",
+        command: &command,
+        file: &table.file,
+        data: Data::Table(&table, &tracks),
+        options: &road::options(request, &table)?,
     };
-    road.check()?;
-    if request.all {
-        let mut lines = Vec::new();
-        for info in calib_cor::estimators() {
-            if let Ok(outcome) = road.run_with_its_own(info) {
-                let point = outcome
-                    .estimate()
-                    .map(|e| (e.center.coords, e.covariance.trace().max(0.0).sqrt()));
-                lines.push((
-                    info.id,
-                    outcome.verdict().as_str(),
-                    outcome.reason().unwrap_or("").to_owned(),
-                    point,
-                ));
-            }
-        }
-        return Ok(comparison("center_m", &lines));
-    }
-    let id = match &request.estimator {
-        Some(id) => id.as_str(),
-        None => preferred(&road),
+    let wish = Wish {
+        estimator: request.estimator.as_deref(),
+        all: request.all,
     };
-    let outcome = calib_cor::estimator(id)
-        .and_then(|info| road.run(info))
-        .map_err(|e| road.refusal(id, &e))?;
-    Ok(cor_answer(&table, id, &outcome))
+    let preferred = |road: &Road<'_, _>| preferred(road, &table);
+    road.answer(wish, preferred, |id, e| cor_answer(&table, id, e))
 }
 
 /// The estimator for a table where none was named.
-fn preferred(road: &Road<'_, CorEstimate>) -> &'static str {
+fn preferred(road: &Road<'_, CorEstimate>, table: &Table) -> &'static str {
     let options = road.options;
     if options.noise_per_marker || !options.covariances.is_empty() {
         "sphere_eiv"
-    } else if road.table.pair.is_some() {
+    } else if table.pair.is_some() {
         "score"
-    } else if road.table.body.is_some() {
+    } else if table.body.is_some() {
         // A rigid body: pivot calibration as everybody else does it. `--all` shows the likelihood estimates beside it.
         let rms = |id: &str| {
             let outcome = road.run_with_its_own(calib_cor::estimator(id).ok()?).ok()?;
@@ -85,14 +76,8 @@ fn preferred(road: &Road<'_, CorEstimate>) -> &'static str {
     }
 }
 
-fn cor_answer(table: &Table, id: &str, outcome: &calib_cor::Outcome) -> Answer {
-    let Some(e) = outcome.estimate() else {
-        return not_observable(
-            id,
-            outcome.verdict().as_str(),
-            outcome.reason().unwrap_or(""),
-        );
-    };
+fn cor_answer(table: &Table, id: &str, e: &CorEstimate) -> Answer {
+    let observable = e.verdict == Verdict::Ok;
     let rejected: Vec<u64> = e
         .rejected
         .iter()
@@ -100,8 +85,8 @@ fn cor_answer(table: &Table, id: &str, outcome: &calib_cor::Outcome) -> Answer {
         .collect();
     let mut value = json!({
         "estimator": id,
-        "observable": outcome.is_observable(),
-        "verdict": outcome.verdict().as_str(),
+        "observable": observable,
+        "verdict": e.verdict.as_str(),
         "reason": e.reason,
         "center_m": e.center.coords.as_slice(),
     });
@@ -153,12 +138,7 @@ fn cor_answer(table: &Table, id: &str, outcome: &calib_cor::Outcome) -> Answer {
         }
         _ => {}
     }
-    value["covariance"] = matrix(
-        e.covariance
-            .row_iter()
-            .map(|r| r.iter().copied().collect())
-            .collect(),
-    );
+    value["covariance"] = matrix(&e.covariance);
     value["rms_m"] = json!(e.rms);
     value["used"] = json!(e.used);
     value["rejected"] = json!(rejected);
@@ -169,5 +149,5 @@ fn cor_answer(table: &Table, id: &str, outcome: &calib_cor::Outcome) -> Answer {
         e.used,
         rejected.len()
     );
-    answer(text, &value, outcome.is_observable())
+    answer(text, &value, observable)
 }

@@ -1,24 +1,44 @@
 //! `calib fit frame`.
 
-use calib_aor::{FrameAxes, FrameAxis, FrameEstimate, FrameOutcome, FrameSample, Options};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use calib_aor::{FrameAxes, FrameAxis, FrameEstimate, FrameSample, Options};
 use calib_cor::Pose;
-use calib_estimator::{CenterBy, EstimatorError, Input};
+use calib_estimator::{CenterBy, Input, Kind, Verdict};
 use calib_recording::ReadOptions;
 use serde_json::json;
 
+use crate::answer::{Answer, answer, doubt, matrix, pose_text, pose_value};
+use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
-use crate::table::{it_has, read_poses};
-use crate::{
-    Answer, FrameRequest, answer, data, doubt, matrix, noise, not_observable, pose_text,
-    pose_value, usage,
-};
+use crate::road::{Command, Data, Road, Wish};
+use crate::table::{it_has, no_table, read_poses};
+use crate::{FrameRequest, data, noise, usage};
+
+fn command() -> Command<FrameEstimate> {
+    Command {
+        name: "calib fit frame",
+        kind: Kind::Frame,
+        estimators: calib_aor::frame_estimators(),
+        quantity: Quantity::Place("translation_m"),
+        found: |f| Found {
+            value: f.body_from_joint.translation.vector,
+            sigma: f.covariance.diagonal().rows(3, 3).sum().max(0.0).sqrt(),
+        },
+    }
+}
 
 /// `calib fit frame`.
 ///
 /// # Errors
 /// As [`crate::cor`]; also for joints that the table does not have.
 pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
-    let file = &request.file;
+    let command = command();
+    if request.list {
+        return Ok(command.list());
+    }
+    let file = request.file.as_deref().ok_or_else(no_table)?;
     let poses = read_poses(file, &ReadOptions::default())?;
     let (proximal_letter, proximal) = axis_of(&request.proximal)?;
     let (distal_letter, distal) = axis_of(&request.distal)?;
@@ -31,7 +51,7 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
             )
         })
     };
-    let body = body_of(request, &poses.bodies)?;
+    let body = body_of(file, request.body.as_deref(), &poses.bodies)?;
     let (a, b) = (column(proximal)?, column(distal)?);
     let weights = noise::weights(request.weights.as_deref(), poses.rows.len())?;
     let samples: Vec<FrameSample> = a
@@ -69,42 +89,28 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
         samples: &samples,
         center: Some(CenterBy(&center)),
     };
-    let info = calib_aor::frame_estimator(&request.estimator).map_err(|error| match &error {
-        // This command has no `--list`: the names fit in the remedy.
-        EstimatorError::Unknown { id, known, .. } => usage(
-            format!("there is no estimator `{id}`"),
-            format!("use one of {}", known.join(", ")),
-        ),
-        error => usage(error.to_string(), "correct the option"),
-    })?;
-    let outcome = info.run(&input, &options).map_err(|error| match error {
-        EstimatorError::BadOption { .. } | EstimatorError::Ignored { .. } => {
-            usage(error.to_string(), "correct the option")
-        }
-        error => data(file, error.to_string(), "correct or remove the row"),
-    })?;
-    let f = match outcome {
-        FrameOutcome::Estimate(f) => f,
-        FrameOutcome::NotObservable(n) => {
-            return Ok(not_observable(
-                &request.estimator,
-                n.verdict.as_str(),
-                &n.reason,
-            ));
-        }
+    let road = Road {
+        command: &command,
+        file,
+        data: Data::Only(input),
+        options: &options,
     };
-    Ok(frame_answer(&request.estimator, &f))
+    let wish = Wish {
+        estimator: request.estimator.as_deref(),
+        all: request.all,
+    };
+    road.answer(wish, |_| "algorithm1", frame_answer)
 }
 
 fn frame_answer(id: &str, f: &FrameEstimate) -> Answer {
-    let observable = f.verdict == calib_estimator::Verdict::Ok;
+    let observable = f.verdict == Verdict::Ok;
     let value = json!({
         "estimator": id,
         "observable": observable,
         "verdict": f.verdict.as_str(),
         "reason": f.reason,
         "body_from_joint": pose_value(&f.body_from_joint),
-        "covariance": matrix(f.covariance.row_iter().map(|r| r.iter().copied().collect()).collect()),
+        "covariance": matrix(&f.covariance),
         "orthogonality_defect_rad": f.orthogonality_defect,
         "rms_m": f.rms_t,
         "rms_rad": f.rms_r,
@@ -149,11 +155,11 @@ fn axis_of(text: &str) -> Result<(FrameAxis, &str), FitError> {
 
 /// The body that the request names, or the only one.
 fn body_of<'a, T>(
-    request: &FrameRequest,
-    bodies: &'a std::collections::BTreeMap<String, T>,
+    file: &Path,
+    named: Option<&str>,
+    bodies: &'a BTreeMap<String, T>,
 ) -> Result<&'a T, FitError> {
-    let file = &request.file;
-    match (&request.body, bodies.len()) {
+    match (named, bodies.len()) {
         (Some(name), _) => bodies
             .get(name)
             .ok_or_else(|| data(file, format!("has no body `{name}`"), "correct --body")),

@@ -11,7 +11,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Point3};
 
 use crate::error::FitError;
-use crate::{TableRequest, data, table::Track, usage};
+use crate::{TableRequest, Track, data, usage};
 
 /// The entries of a symmetric matrix in a file of covariances.
 const ENTRIES: [(&str, usize, usize); 6] = [

@@ -8,10 +8,7 @@ use calib_recording::{Filled, Poses, ReadOptions, read_path};
 use nalgebra::{Isometry3, Matrix3, Point3};
 
 use crate::error::FitError;
-use crate::{TableRequest, data, noise, usage};
-
-/// Markers of one name and its samples, row by row.
-pub(crate) type Track = (String, Vec<Option<Point3<f64>>>);
+use crate::{TableRequest, Track, data, noise, usage};
 
 /// What the estimators are given.
 pub(crate) struct Table {
@@ -39,10 +36,7 @@ pub(crate) struct Table {
 impl Table {
     pub fn read(request: &TableRequest) -> Result<Self, FitError> {
         let Some(file) = &request.file else {
-            return Err(usage(
-                "no table was given",
-                "name a CSV of points or poses, or --list the estimators",
-            ));
+            return Err(no_table());
         };
         let mut poses = read_poses(file, &ReadOptions::default())?;
         let mut weights = noise::weights(request.weights.as_deref(), poses.rows.len())?;
@@ -216,6 +210,14 @@ fn travel(markers: &[Track], group: &[usize]) -> f64 {
         squares.sum::<f64>() / n
     };
     group.iter().map(of).sum::<f64>() / group.len().max(1) as f64
+}
+
+/// A request without a file.
+pub(crate) fn no_table() -> FitError {
+    usage(
+        "no table was given",
+        "name a CSV of points or poses, or --list the estimators",
+    )
 }
 
 /// What a table has instead of what was asked for.

@@ -18,8 +18,11 @@
 //! body-frame noise is the business of a solver over a graph of frames (one pose measurement per row); (1) is the
 //! quadratic cost that can be certified.
 //!
-//! What this does not protect against: poses of both sides that were not taken at the same instant, and a body that
-//! slips on the flange. Both show in the residuals only.
+//! The estimators of the table ([`estimators`]) also judge: noise and covariance from the residuals, rows with gross errors, and
+//! structural mistakes of the tables (order of quaternions, inverted poses, units, shifted rows), each verified by applying its correction.
+//!
+//! What this does not protect against: a body that slips on the flange shows in the residuals only, and swapped tables not
+//! even there: X and Z come out as their inverses.
 //!
 //! ```
 //! use calib_handeye::{HandEyeWeights, solve_ax_zb};
@@ -38,20 +41,31 @@
 //! # Ok::<(), calib_handeye::HandEyeError>(())
 //! ```
 
+mod by_input;
 mod certificate;
+mod correction;
+mod gross;
 mod input;
+mod judge;
+mod minimum;
 mod moving;
+mod outcome;
 mod problem;
 mod registry;
 mod relative;
+mod residuals;
 mod start;
+mod structure;
 
+pub use correction::{Correction, Explanation, Side};
 pub use input::HandEyeError;
-pub use moving::{HandEye, solve_ax_zb};
+pub use moving::solve_ax_zb;
 pub use nalgebra;
+pub use outcome::{Covariance, HandEye, HandEyeNoise};
 pub use problem::HandEyeWeights;
 pub use registry::{HandEyeInfo, estimator, estimators};
 pub use relative::{relative_motions, solve_ax_xb};
+pub use residuals::Residuals;
 
 /// The README's example is a test.
 #[cfg(doctest)]

@@ -105,19 +105,26 @@ fn triple(text: &str) -> Result<[f64; 3], String> {
 #[derive(Debug, Args)]
 pub struct FitFrame {
     /// The table: poses of one body and two joint columns
-    pub file: PathBuf,
+    #[arg(required_unless_present = "list")]
+    pub file: Option<PathBuf>,
     /// Joint closer to the base, as `axis=joint` (`z=pan`)
-    #[arg(long)]
-    pub proximal: String,
+    #[arg(long, required_unless_present = "list")]
+    pub proximal: Option<String>,
     /// Joint closer to the body, as `axis=joint` (`x=tilt`)
-    #[arg(long)]
-    pub distal: String,
+    #[arg(long, required_unless_present = "list")]
+    pub distal: Option<String>,
     /// The body, if the table has several
     #[arg(long)]
     pub body: Option<String>,
-    /// Estimator: `algorithm1` or `frame_ml`
-    #[arg(long, default_value = "algorithm1")]
-    pub estimator: String,
+    /// Estimator to use; `algorithm1` if none is named
+    #[arg(long)]
+    pub estimator: Option<String>,
+    /// Run all estimators, and compare them
+    #[arg(long)]
+    pub all: bool,
+    /// List the estimators
+    #[arg(long)]
+    pub list: bool,
     /// Noise of one coordinate, mm (standard deviation)
     #[arg(long)]
     pub sigma_mm: Option<f64>,
@@ -136,13 +143,29 @@ pub struct FitFrame {
 #[derive(Debug, Args)]
 pub struct FitHandEye {
     /// The table: poses of two bodies in each row
-    pub file: PathBuf,
+    #[arg(required_unless_present = "list")]
+    pub file: Option<PathBuf>,
     /// Prefix of the columns of the first pose (robot flange), e.g. `flange`
     #[arg(long, default_value = "flange")]
     pub robot: String,
     /// Prefix of the columns of the second pose (measurement), e.g. `meas`
     #[arg(long, default_value = "meas")]
     pub measured: String,
+    /// Estimator to use; `handeye` if none is named
+    #[arg(long)]
+    pub estimator: Option<String>,
+    /// Run all estimators, and compare them
+    #[arg(long)]
+    pub all: bool,
+    /// List the estimators
+    #[arg(long)]
+    pub list: bool,
+    /// Noise of one coordinate, mm (standard deviation)
+    #[arg(long)]
+    pub sigma_mm: Option<f64>,
+    /// Noise of the orientation about each axis, deg (standard deviation)
+    #[arg(long)]
+    pub sigma_deg: Option<f64>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
@@ -154,7 +177,7 @@ pub fn run(options: &FitCommand) -> Result<ExitCode, CliError> {
         Fit::Cor(table) => fit::cor(&table.request())?,
         Fit::Aor(table) => fit::aor(&table.request())?,
         Fit::Frame(frame) => fit::frame(&frame.request())?,
-        Fit::Handeye(f) => fit::handeye(&f.file, &f.robot, &f.measured)?,
+        Fit::Handeye(pairs) => fit::handeye(&pairs.request())?,
     };
     let json = match &options.what {
         Fit::Cor(t) | Fit::Aor(t) => t.json,
@@ -173,13 +196,30 @@ impl FitFrame {
     fn request(&self) -> fit::FrameRequest {
         fit::FrameRequest {
             file: self.file.clone(),
-            proximal: self.proximal.clone(),
-            distal: self.distal.clone(),
+            proximal: self.proximal.clone().unwrap_or_default(),
+            distal: self.distal.clone().unwrap_or_default(),
             body: self.body.clone(),
             estimator: self.estimator.clone(),
+            all: self.all,
+            list: self.list,
             sigma_m: self.sigma_mm.map(|s| s * 1e-3),
             sigma_rad: self.sigma_deg.map(f64::to_radians),
             weights: self.weights.clone(),
+        }
+    }
+}
+
+impl FitHandEye {
+    fn request(&self) -> fit::HandEyeRequest {
+        fit::HandEyeRequest {
+            file: self.file.clone(),
+            robot: self.robot.clone(),
+            measured: self.measured.clone(),
+            estimator: self.estimator.clone(),
+            all: self.all,
+            list: self.list,
+            sigma_m: self.sigma_mm.map(|s| s * 1e-3),
+            sigma_rad: self.sigma_deg.map(f64::to_radians),
         }
     }
 }

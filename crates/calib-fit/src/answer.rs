@@ -1,0 +1,98 @@
+//! An answer for people and for machines, and the parts that all answers share.
+
+use std::fmt::Write as _;
+
+use calib_estimator::{Estimate, EstimatorInfo, NotObservable, chance::t_quantile};
+use nalgebra::{Isometry3, SMatrix};
+use serde_json::{Value, json};
+
+/// An answer in both forms.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Answer {
+    /// For people.
+    pub text: String,
+    /// For machines.
+    pub json: String,
+    /// The quantity is determined by the data.
+    pub observable: bool,
+}
+
+pub(crate) fn answer(text: String, value: &Value, observable: bool) -> Answer {
+    let json = calib_report::json::pretty(&calib_report::json::rounded(value.clone())) + "\n";
+    Answer {
+        text,
+        json,
+        observable,
+    }
+}
+
+/// The line of an answer that is not to be relied upon.
+pub(crate) fn doubt(reason: Option<&str>) -> String {
+    reason.map_or_else(String::new, |why| format!("  weak: {why}\n"))
+}
+
+/// How far the intervals of 95 % reach: σ times Student's quantile, which few degrees of freedom widen.
+pub(crate) fn freedom(degrees_of_freedom: Option<f64>) -> String {
+    match degrees_of_freedom {
+        Some(dof) => format!(
+            "  95 % intervals: {:.2} sigma ({dof:.0} degrees of freedom)\n",
+            t_quantile(0.05, degrees_of_freedom)
+        ),
+        None => String::new(),
+    }
+}
+
+/// The data do not answer.
+pub(crate) fn not_observable<K>(id: &str, why: &NotObservable<K>) -> Answer {
+    let (verdict, reason) = (why.verdict.as_str(), &why.reason);
+    let value =
+        json!({ "estimator": id, "observable": false, "verdict": verdict, "reason": reason });
+    answer(
+        format!("{id}: not observable ({verdict}): {reason}\n"),
+        &value,
+        false,
+    )
+}
+
+/// The estimators of a command.
+pub(crate) fn listed<E: Estimate>(estimators: &[EstimatorInfo<E>]) -> Answer {
+    let mut text = String::new();
+    let mut values = Vec::new();
+    for EstimatorInfo {
+        id,
+        input,
+        name,
+        source,
+        ..
+    } in estimators
+    {
+        let input = input.to_string();
+        let _ = writeln!(text, "{id:<16} {input:<10} {name} ({source})");
+        values.push(json!({ "id": id, "input": input, "name": name, "source": source }));
+    }
+    answer(text, &Value::Array(values), true)
+}
+
+pub(crate) fn coordinates(values: &[f64]) -> String {
+    let shown: Vec<String> = values.iter().map(|v| format!("{v:.6}")).collect();
+    format!("[{}]", shown.join(", "))
+}
+
+/// The rows of a matrix.
+pub(crate) fn matrix<const N: usize>(m: &SMatrix<f64, N, N>) -> Value {
+    let rows = m.row_iter().map(|r| r.iter().copied().collect());
+    json!(rows.collect::<Vec<Vec<f64>>>())
+}
+
+pub(crate) fn pose_value(pose: &Isometry3<f64>) -> Value {
+    json!({ "translation_m": pose.translation.vector.as_slice(), "rotation_xyzw": pose.rotation.coords.as_slice() })
+}
+
+pub(crate) fn pose_text(pose: &Isometry3<f64>) -> String {
+    format!(
+        "xyz {} m, xyzw {}",
+        coordinates(pose.translation.vector.as_slice()),
+        coordinates(pose.rotation.coords.as_slice())
+    )
+}

@@ -1,0 +1,119 @@
+//! The road from the input of an estimator to a judged pair of transforms, the same for all of them.
+//!
+//! Structural mistakes come first, rows with gross errors are blamed only where none explains the residuals.
+
+use calib_estimator::{
+    EstimatorError, Input, InputKind, Options, Outcome, Verdict, measured::DataError,
+};
+use nalgebra::Isometry3;
+
+use crate::{
+    gross,
+    input::{HandEyeError, check, check_axes},
+    judge::{judged, plausible, verdict},
+    minimum::{Minimum, minimized},
+    outcome::HandEye,
+    problem::{HandEyeWeights, Weights},
+    residuals::spread,
+    structure,
+};
+
+/// Least squares over both transforms.
+pub(crate) fn certified(
+    input: &Input<'_>,
+    options: &Options,
+) -> Result<Outcome<HandEye>, EstimatorError> {
+    run("handeye", input, options, |a, b, w| Ok(minimized(a, b, w)))
+}
+
+/// From poses of both sides and weights to both transforms.
+pub(crate) trait Solve:
+    Fn(&[Isometry3<f64>], &[Isometry3<f64>], Weights) -> Result<Minimum, HandEyeError>
+{
+}
+
+impl<F> Solve for F where
+    F: Fn(&[Isometry3<f64>], &[Isometry3<f64>], Weights) -> Result<Minimum, HandEyeError>
+{
+}
+
+/// Solves, after the data were checked, and judges; the noise that is stated gives the weights.
+pub(crate) fn run(
+    estimator: &'static str,
+    input: &Input<'_>,
+    options: &Options,
+    solve: impl Solve,
+) -> Result<Outcome<HandEye>, EstimatorError> {
+    options.check()?;
+    let Input::PosePairs { robot, measured } = *input else {
+        return Err(input.wrong(InputKind::PosePairs));
+    };
+    let none = HandEyeWeights::default();
+    let w = Weights::of(HandEyeWeights {
+        sigma_rotation: options.sigma_r.unwrap_or(none.sigma_rotation),
+        sigma_translation: options.sigma_t.unwrap_or(none.sigma_translation),
+    });
+    let solved = check(robot, measured, 3)
+        .and_then(|()| check_axes(robot))
+        .and_then(|()| check_axes(measured))
+        .and_then(|()| fitted(estimator, [robot, measured], w, &solve, options));
+    match solved {
+        Ok(mut found) => {
+            let size = [spread(robot), spread(measured)];
+            verdict(&mut found, size, robot.len(), options);
+            Ok(Outcome::Estimate(Box::new(found)))
+        }
+        Err(error) => refused(estimator, &error),
+    }
+}
+
+fn fitted(
+    estimator: &'static str,
+    [robot, measured]: [&[Isometry3<f64>]; 2],
+    w: Weights,
+    solve: &impl Solve,
+    options: &Options,
+) -> Result<HandEye, HandEyeError> {
+    let explanation = structure::explanation(robot, measured, w, |left, a, b| {
+        plausible(left, [spread(a), spread(b)])
+    });
+    if explanation.is_some() {
+        let found = solve(robot, measured, w)?;
+        return Ok(HandEye {
+            explanation,
+            ..judged(estimator, [robot, measured], &found, w, options)
+        });
+    }
+    let keep = gross::kept(robot, measured, w);
+    let chosen = |poses: &[Isometry3<f64>]| -> Vec<Isometry3<f64>> {
+        keep.iter().map(|&i| poses[i]).collect()
+    };
+    let (a, b) = (chosen(robot), chosen(measured));
+    let found = solve(&a, &b, w)?;
+    Ok(HandEye {
+        rejected: (0..robot.len()).filter(|i| !keep.contains(i)).collect(),
+        ..judged(estimator, [&a, &b], &found, w, options)
+    })
+}
+
+fn refused(
+    estimator: &'static str,
+    error: &HandEyeError,
+) -> Result<Outcome<HandEye>, EstimatorError> {
+    let none = |verdict| Ok(Outcome::none(estimator, verdict, error.to_string(), ()));
+    match *error {
+        HandEyeError::TooFew { .. } => none(Verdict::TooFew),
+        HandEyeError::OneAxis { .. } => none(Verdict::SingleAxis),
+        HandEyeError::Lengths { a, b } => Err(DataError::Lengths {
+            what: "poses of the robot and of the tracker",
+            left: a,
+            right: b,
+        }
+        .into()),
+        HandEyeError::NotFinite { index } => Err(DataError::NotFinite {
+            marker: 0,
+            row: index,
+        }
+        .into()),
+    }
+}
