@@ -9,6 +9,7 @@ use calib_pipeline::{ExitCode, PipelineError};
 use calib_plugin::NewProjectError;
 use calib_study::StudyError;
 use calib_study::cases::CaseError;
+use calib_study::faults::FaultError;
 
 use crate::commands::record::error::RecordError;
 
@@ -72,6 +73,9 @@ pub enum CliError {
     /// Of `calib study justin` and `ripley`.
     #[error(transparent)]
     Cases(#[from] CaseError),
+    /// The study of faults failed.
+    #[error(transparent)]
+    Faults(#[from] FaultError),
     /// `calib record` was asked for what does not go together.
     #[error("{0}")]
     Record(#[from] RecordError),
@@ -106,6 +110,7 @@ impl CliError {
             | Self::Fit(_)
             | Self::Study(_)
             | Self::Cases(_)
+            | Self::Faults(_)
             | Self::Record(_)
             | Self::NewPlugin(_) => ExitCode::Usage,
         }

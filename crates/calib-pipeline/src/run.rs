@@ -13,7 +13,7 @@ use crate::formulate::by_closed_forms::{paper_assumptions, paper_result};
 use crate::formulate::by_likelihood::likelihood;
 use crate::formulate::checked::check_data;
 use crate::formulate::formulation::MlFit;
-use crate::formulate::solved::nominal;
+use crate::formulate::solved::{Solved, nominal};
 use crate::output::assemble::assemble;
 use crate::output::evidence::Evidence;
 use crate::output::export::{patch_urdf, scene};
@@ -48,6 +48,8 @@ pub struct RunOutput {
     pub files: Vec<OutputFile>,
     /// How the program should end.
     pub exit: ExitCode,
+    /// The calibrated robot, with the fit that it comes from.
+    pub solved: Solved,
 }
 
 /// Runs a profile; `progress` is told the name of each stage as it begins. Writes nothing.
@@ -148,6 +150,7 @@ pub fn run_on(
         report,
         files,
         exit,
+        solved,
     })
 }
 

@@ -29,6 +29,7 @@ mod cell;
 mod claims;
 mod cor;
 mod experiment;
+pub mod faults;
 mod held;
 mod linear;
 mod motion;

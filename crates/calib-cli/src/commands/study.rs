@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use calib_files::{OutputFile, write_results};
 use calib_pipeline::ExitCode;
-use calib_study::{Study, StudyOptions, cases};
+use calib_study::{Study, StudyOptions, cases, faults};
 use clap::{Args, ValueEnum};
 
 use crate::error::CliError;
@@ -16,7 +16,7 @@ pub struct StudyRun {
     /// Which study
     #[arg(value_enum)]
     study: StudyName,
-    /// Trials of an ordinary cell [cor, aor: 1500], or robots drawn [justin, ripley: 100]
+    /// Trials of an ordinary cell [cor, aor: 1500], robots drawn [justin, ripley: 100], or cases of each cell [faults: 4]
     #[arg(long)]
     trials: Option<u64>,
     /// Seed of the random numbers
@@ -50,6 +50,8 @@ enum StudyName {
     Justin,
     /// Case study over many simulated robots, paper §6: Table 2
     Ripley,
+    /// Faults of robots, recordings and profiles: what `calib run` says of each
+    Faults,
 }
 
 /// Runs a study.
@@ -59,6 +61,7 @@ pub fn run(quiet: bool, study: &StudyRun) -> Result<ExitCode, CliError> {
         StudyName::Aor => estimators(quiet, study, Study::Aor),
         StudyName::Justin => robots(quiet, study, "justin"),
         StudyName::Ripley => robots(quiet, study, "ripley"),
+        StudyName::Faults => of_faults(quiet, study),
     }
 }
 
@@ -123,6 +126,39 @@ fn robots(quiet: bool, study: &StudyRun, name: &str) -> Result<ExitCode, CliErro
             OutputFile::text(format!("{name}.json"), json),
             OutputFile::text(format!("{name}.md"), text),
             OutputFile::text(format!("{name}.svg"), cases::svg(&result)),
+        ];
+        for path in write_results(out, &files)? {
+            eprintln!("wrote {}", path.display());
+        }
+    }
+    Ok(ExitCode::Accepted)
+}
+
+/// The matrix of faults.
+fn of_faults(quiet: bool, study: &StudyRun) -> Result<ExitCode, CliError> {
+    let default = faults::FaultOptions::default();
+    let options = faults::FaultOptions {
+        cases: study.trials.unwrap_or(default.cases),
+        seed: study.seed.unwrap_or(default.seed),
+        threads: study.threads,
+        out: study.out.clone(),
+        resume: !study.restart,
+        only: Vec::new(),
+    };
+    let bar = count_bar(quiet, "cases");
+    let result = faults::run_faults(&options, &|done, total| {
+        bar.set_length(total);
+        bar.set_position(done);
+    })?;
+    bar.finish_and_clear();
+    let json = faults::json(&result)?;
+    let text = faults::markdown(&result);
+    emit(if study.json { &json } else { &text });
+    if let Some(out) = &study.out {
+        let files = [
+            OutputFile::text("faults.csv", faults::csv(&result)),
+            OutputFile::text("faults.json", json),
+            OutputFile::text("faults.md", text),
         ];
         for path in write_results(out, &files)? {
             eprintln!("wrote {}", path.display());

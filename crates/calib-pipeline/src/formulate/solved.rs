@@ -11,7 +11,7 @@ use crate::formulate::kinematics::Calibration;
 use crate::prepare::inputs::Inputs;
 
 /// What either method hands on.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Solved {
     /// The calibrated robot.
     pub robot: Calibration,

@@ -1,0 +1,539 @@
+//! One case: a robot, a design, a body and a fault, as the tables and the profile that a user would have.
+
+use std::collections::BTreeMap;
+
+use calib_recording::{JointUnit, Poses};
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::design::{Body, Design, Validation, random};
+use super::fault::Fault;
+use super::robot::{BIG, Robot, SMALL, Transmission};
+use crate::noise::Noise;
+
+/// Tracker noise of each coordinate, m.
+pub(crate) const SIGMA: f64 = 3e-4;
+/// Orientation noise of a 6-DoF body, rad.
+const SIGMA_ORIENTATION: f64 = 1e-3;
+/// Noise of the joints from pose to pose, rad (0.01°).
+const SIGMA_JOINT: f64 = 1.75e-4;
+/// Postures at which a result is compared with the truth.
+const EVALUATED: usize = 24;
+
+/// Which case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Cell {
+    /// What is wrong.
+    pub fault: Fault,
+    /// How the fitted poses were chosen.
+    pub design: Design,
+    /// How the held-out poses were chosen.
+    pub validation: Validation,
+    /// What the tracker sees.
+    pub body: Body,
+    /// The nominal robot is off by 1°, 5 mm instead of 0.3°, 1 mm.
+    pub big: bool,
+}
+
+/// What changes on the table, in the workcell or in the file: drawn once per case.
+#[derive(Debug, Clone)]
+pub(crate) struct Disturbance {
+    pub faults: Vec<Fault>,
+    /// The joint that is concerned, and another one.
+    pub joint: usize,
+    pub other: usize,
+    pub transmission: Transmission,
+    /// A step of a pose: 2 mm for slips and bumps.
+    pub step: Isometry3<f64>,
+    /// Pose by which a body was mounted anew, or the tracker moved.
+    pub moved: Isometry3<f64>,
+    /// Row from which a change holds, as a share of the first recording.
+    pub from: f64,
+    /// Rows by which joints lag: ±1.
+    pub lag: isize,
+    /// Degrees as rad rather than rad as degrees; mm as m rather than m as mm.
+    pub up: bool,
+}
+
+/// A case, drawn.
+pub(crate) struct Case {
+    pub cell: Cell,
+    pub robot: Robot,
+    pub disturbance: Disturbance,
+    tracker_from_root: Isometry3<f64>,
+    tip_from_body: Isometry3<f64>,
+    markers: Vec<Point3<f64>>,
+    readings: Vec<(&'static str, Vec<Vec<f64>>)>,
+    evaluated: Vec<Vec<f64>>,
+}
+
+/// The last recording, in time.
+const LAST: &str = "checks";
+
+impl Case {
+    /// Case `number` of a cell.
+    pub fn draw(cell: Cell, number: u64, noise: &mut Noise) -> Self {
+        let robot = Robot::draw(number, if cell.big { BIG } else { SMALL }, noise);
+        let mut readings = cell.design.readings(&robot, noise);
+        if let Some(held_out) = cell.validation.readings(cell.design, &robot, noise) {
+            readings.push((LAST, held_out));
+        }
+        let evaluated = random(&robot, EVALUATED, noise);
+        let markers = (0..cell.body.markers())
+            .map(|_| {
+                Point3::new(
+                    noise.between(-0.06, 0.06),
+                    noise.between(-0.06, 0.06),
+                    noise.between(-0.06, 0.06),
+                )
+            })
+            .collect();
+        let (side, off) = (
+            noise.between(0.0, std::f64::consts::TAU),
+            noise.between(0.05, 0.12),
+        );
+        let mount = Translation3::new(
+            off * side.cos(),
+            off * side.sin(),
+            noise.between(0.05, 0.15),
+        );
+        let tip_from_body = Isometry3::from_parts(mount, noise.turn(2.0));
+        let tracker_from_root = Isometry3::from_parts(noise.vector(1.5).into(), noise.turn(2.0));
+        let disturbance = Disturbance::draw(cell.fault, &robot, noise);
+        Self {
+            cell,
+            robot,
+            disturbance,
+            tracker_from_root,
+            tip_from_body,
+            markers,
+            readings,
+            evaluated,
+        }
+    }
+
+    fn has(&self, fault: Fault) -> bool {
+        self.disturbance.faults.contains(&fault)
+    }
+
+    /// Whether the held-out rows take part, and the recordings by name, in time's order.
+    pub fn tables(&self, noise: &mut Noise) -> BTreeMap<String, Poses> {
+        let mut tables = BTreeMap::new();
+        let total: usize = self.readings.iter().map(|(_, rows)| rows.len()).sum();
+        let mut before = 0;
+        for (name, rows) in &self.readings {
+            let first = before == 0;
+            let seen: Vec<Seen> = self.seen(name, rows, (before, total), first, noise);
+            before += rows.len();
+            tables.insert((*name).to_owned(), self.written(name, rows, &seen, noise));
+        }
+        if self.has(Fault::HeldOutCopies)
+            && let Some(first) = self.readings.first().map(|(name, _)| tables[*name].clone())
+        {
+            let mut copy = first;
+            for p in copy.markers.values_mut().flatten().flatten() {
+                p.coords += noise.vector(1e-6);
+            }
+            tables.insert(LAST.to_owned(), copy);
+        }
+        tables
+    }
+
+    /// What the tracker would see at new readings without noise, as the profile's user would compare it.
+    pub fn truth(&self) -> Vec<(Vec<f64>, Seen)> {
+        let now = State {
+            late: true,
+            ..State::default()
+        };
+        let of = |q: &Vec<f64>| {
+            let mut seen = self.ideal(q, &now);
+            self.misread(&mut seen, false);
+            (self.reported(q, false, true), seen)
+        };
+        self.evaluated.iter().map(of).collect()
+    }
+
+    fn seen(
+        &self,
+        name: &str,
+        rows: &[Vec<f64>],
+        (before, total): (usize, usize),
+        first: bool,
+        noise: &mut Noise,
+    ) -> Vec<Seen> {
+        let repeats = if self.has(Fault::RepeatedFrames) && name != LAST {
+            10
+        } else {
+            1
+        };
+        let change = (self.disturbance.from * rows.len() as f64) as usize;
+        let mut memory = vec![Vector3::zeros(); self.markers.len().max(1)];
+        let mut out = Vec::new();
+        for (i, q) in rows.iter().enumerate() {
+            let state = State {
+                late: !first || i >= change,
+                last: name == LAST,
+                share: (before + i) as f64 / total as f64,
+            };
+            let moving: Vec<f64> = q
+                .iter()
+                .map(|q| q + SIGMA_JOINT * noise.vector(1.0).x)
+                .collect();
+            let ideal = self.ideal(&moving, &state);
+            for _ in 0..repeats {
+                let mut seen = ideal.clone();
+                self.disturb(&mut seen, &mut memory, noise);
+                self.misread(&mut seen, self.in_one(name));
+                out.push(seen);
+            }
+        }
+        out
+    }
+
+    /// The body as a perfect tracker would see it.
+    fn ideal(&self, q: &[f64], state: &State) -> Seen {
+        let d = &self.disturbance;
+        let mut transmission = d.transmission;
+        if self.has(Fault::OffsetStep) && state.late {
+            transmission.offset = Some((d.joint, 0.3_f64.to_radians()));
+        }
+        let bent: Vec<f64> = if self.has(Fault::Compliance) {
+            let torque = self.robot.gravity(q);
+            let per_nm = 0.02_f64.to_radians();
+            let bend = |(j, q): (usize, &f64)| {
+                if self.robot.joints[j].prismatic {
+                    *q
+                } else {
+                    q + per_nm * torque[j]
+                }
+            };
+            q.iter().enumerate().map(bend).collect()
+        } else {
+            q.to_vec()
+        };
+        let mut tracker = self.tracker_from_root;
+        let mut mount = self.tip_from_body;
+        if self.has(Fault::Bump) && state.late {
+            tracker = d.step * tracker;
+        }
+        if self.has(Fault::Drift) {
+            let share = if state.late && state.share == 0.0 {
+                1.0
+            } else {
+                state.share
+            };
+            tracker = Translation3::from(d.step.translation.vector * share) * tracker;
+        }
+        if self.has(Fault::TrackerMoved) && state.last {
+            tracker = d.moved * tracker;
+        }
+        if self.has(Fault::Slip) && state.late {
+            mount *= d.step;
+        }
+        if self.has(Fault::Remounted) && state.last {
+            mount *= d.moved;
+        }
+        let links = self.robot.links(&bent, &transmission);
+        let body = tracker * links[self.robot.joints.len()] * mount;
+        Seen {
+            points: self.markers.iter().map(|m| body * m).collect(),
+            body,
+        }
+    }
+
+    fn disturb(&self, seen: &mut Seen, memory: &mut [Vector3<f64>], noise: &mut Noise) {
+        let rho: f64 = if self.has(Fault::Memory) { 0.9 } else { 0.0 };
+        let error = |memory: &mut Vector3<f64>, noise: &mut Noise| {
+            *memory = *memory * rho + noise.vector(SIGMA * (1.0 - rho * rho).sqrt());
+            let gross = self.has(Fault::Outliers) && noise.uniform() < 0.05;
+            let jump = if gross {
+                noise.direction() * noise.between(0.01, 0.1)
+            } else {
+                Vector3::zeros()
+            };
+            *memory + jump
+        };
+        for (point, memory) in seen.points.iter_mut().zip(memory.iter_mut()) {
+            *point += error(memory, noise);
+        }
+        if seen.points.is_empty() {
+            seen.body.translation.vector += error(&mut memory[0], noise);
+            seen.body.rotation *= noise.turn(SIGMA_ORIENTATION);
+        }
+    }
+
+    /// What the file makes of it.
+    fn misread(&self, seen: &mut Seen, in_one: bool) {
+        if self.has(Fault::Mirrored) {
+            for p in &mut seen.points {
+                p.y = -p.y;
+            }
+            let q = seen.body.rotation.quaternion();
+            let mirrored = Quaternion::new(q.w, -q.i, q.j, -q.k);
+            seen.body.rotation = UnitQuaternion::new_normalize(mirrored);
+            seen.body.translation.y = -seen.body.translation.y;
+        }
+        if self.has(Fault::QuaternionOrder) {
+            let q = seen.body.rotation.quaternion();
+            seen.body.rotation = UnitQuaternion::new_normalize(Quaternion::new(q.k, q.w, q.i, q.j));
+        }
+        if self.has(Fault::InversePoses) {
+            seen.body = seen.body.inverse();
+        }
+        if (self.has(Fault::TrackerUnitInOne) && in_one) || self.has(Fault::TrackerUnit) {
+            let scale = if self.disturbance.up { 1e3 } else { 1e-3 };
+            seen.points.iter_mut().for_each(|p| p.coords *= scale);
+            seen.body.translation.vector *= scale;
+        }
+    }
+
+    /// Whether a fault of one recording holds in this one.
+    fn in_one(&self, name: &str) -> bool {
+        self.readings.last().is_some_and(|(last, _)| *last == name)
+    }
+
+    /// The readings as the file has them; `later`: as the robot will report them in use.
+    fn reported(&self, q: &[f64], in_one: bool, later: bool) -> Vec<f64> {
+        let d = &self.disturbance;
+        let mut q = q.to_vec();
+        if self.has(Fault::Sign) || (self.has(Fault::SignInOne) && in_one && !later) {
+            q[d.joint] = -q[d.joint];
+        }
+        if self.has(Fault::Exchange) || (self.has(Fault::ExchangeInOne) && in_one && !later) {
+            q.swap(d.joint, d.other);
+        }
+        if self.has(Fault::JointUnit) {
+            q[d.joint] = if d.up {
+                q[d.joint].to_degrees()
+            } else {
+                q[d.joint].to_radians()
+            };
+        }
+        q
+    }
+
+    fn written(&self, name: &str, rows: &[Vec<f64>], seen: &[Seen], noise: &mut Noise) -> Poses {
+        let d = &self.disturbance;
+        let repeats = seen.len() / rows.len().max(1);
+        let mut q: Vec<Vec<f64>> = rows
+            .iter()
+            .map(|q| self.reported(q, self.in_one(name), false))
+            .collect();
+        if self.has(Fault::RowShift) {
+            let shifted = |i: usize| {
+                i.checked_add_signed(d.lag)
+                    .and_then(|k| q.get(k))
+                    .unwrap_or(&q[i])
+                    .clone()
+            };
+            q = (0..q.len()).map(shifted).collect();
+        }
+        let copies = if self.has(Fault::CopiedRows) && name != LAST {
+            3
+        } else {
+            1
+        };
+        let order: Vec<usize> = (0..seen.len())
+            .flat_map(|i| std::iter::repeat_n(i, copies))
+            .collect();
+        // Copies differ by what a text file rounds.
+        let mut round = |p: &Point3<f64>| p + noise.vector(1e-7);
+        let n = self.robot.joints.len();
+        let mut table = Poses {
+            rows: (0..order.len() as u64).map(|i| i + 2).collect(),
+            ..Poses::default()
+        };
+        for j in (0..n).filter(|j| !(self.has(Fault::MissingColumn) && *j == d.joint)) {
+            let name = format!("j{}", j + 1);
+            let unit = if self.robot.joints[j].prismatic {
+                JointUnit::Length
+            } else {
+                JointUnit::Angle
+            };
+            let column = order.iter().map(|i| Some(q[i / repeats][j])).collect();
+            table.joints.insert(name.clone(), column);
+            table.joint_units.insert(name, unit);
+        }
+        for m in 0..self.markers.len() {
+            let column = order
+                .iter()
+                .map(|i| Some(round(&seen[*i].points[m])))
+                .collect();
+            table.markers.insert(format!("tip_{}", m + 1), column);
+        }
+        if self.markers.is_empty() {
+            let column = order.iter().map(|i| Some(seen[*i].body)).collect();
+            table.bodies.insert("tip".to_owned(), column);
+        }
+        table
+    }
+
+    /// The profile, as a careful person would write it who does not know of the fault.
+    pub fn profile(&self) -> String {
+        let n = self.robot.joints.len();
+        let link = if self.has(Fault::WrongLink) { n - 1 } else { n };
+        let markers: Vec<String> = (1..=self.markers.len())
+            .map(|m| format!("tip_{m}"))
+            .collect();
+        let body = if markers.is_empty() {
+            "pose: true".to_owned()
+        } else {
+            format!("markers: [{}]", markers.join(", "))
+        };
+        let recordings: Vec<String> = self
+            .readings
+            .iter()
+            .map(|(name, _)| {
+                let usage = if *name == LAST {
+                    "validation"
+                } else {
+                    "static"
+                };
+                format!("  {name}: {{file: {name}.csv, use: {usage}}}")
+            })
+            .collect();
+        let sigma = if self.cell.big {
+            "{position_mm: 5, angle_deg: 1, offset_deg: 1}"
+        } else {
+            "{position_mm: 2, angle_deg: 0.5, offset_deg: 0.5}"
+        };
+        let tracker = if markers.is_empty() {
+            format!(
+                "body_sigma_mm: {}, body_sigma_deg: {:.4}",
+                SIGMA * 1e3,
+                SIGMA_ORIENTATION.to_degrees()
+            )
+        } else {
+            format!("marker_sigma_mm: {}", SIGMA * 1e3)
+        };
+        format!(
+            "calib: 1\nrobot: {{name: arm, urdf: arm.urdf}}\ntracker: {{frame: lab, {tracker}}}\nbodies:\n  tip: {{link: l{link}, {body}}}\n\
+             recordings:\n{}\nsolve:\n  free: [bodies, tracker, joint_offsets, joint_axes]\n  prior: {sigma}\n  \
+             limits: {{held_out_rms_mm: {LIMIT_MM}, held_out_max_mm: {}}}\noutputs: {{urdf: arm.calibrated.urdf}}\n",
+            recordings.join("\n"),
+            4.0 * LIMIT_MM,
+        )
+    }
+}
+
+/// Largest rms error that the profiles of the study accept, mm.
+pub(crate) const LIMIT_MM: f64 = 2.0;
+
+/// One sample of the body.
+#[derive(Debug, Clone)]
+pub(crate) struct Seen {
+    pub points: Vec<Point3<f64>>,
+    pub body: Isometry3<f64>,
+}
+
+/// When a sample was taken.
+#[derive(Debug, Clone, Copy, Default)]
+struct State {
+    /// After a change.
+    late: bool,
+    /// In the last recording.
+    last: bool,
+    /// Share of all rows before it.
+    share: f64,
+}
+
+impl Disturbance {
+    fn draw(fault: Fault, robot: &Robot, noise: &mut Noise) -> Self {
+        let n = robot.joints.len();
+        let joint = noise.below(n);
+        // Exchanged columns are of one unit.
+        let alike: Vec<usize> = (0..n)
+            .filter(|k| *k != joint && robot.joints[*k].prismatic == robot.joints[joint].prismatic)
+            .collect();
+        let revolute: Vec<usize> = (0..n).filter(|k| !robot.joints[*k].prismatic).collect();
+        let (joint, other) = match alike.get(noise.below(alike.len().max(1))) {
+            Some(other) => (joint, *other),
+            None => (revolute[0], revolute[1]),
+        };
+        let side = if noise.uniform() < 0.5 { 1.0 } else { -1.0 };
+        let step = |mm: f64, noise: &mut Noise| {
+            Isometry3::from_parts(
+                Translation3::from(noise.direction() * mm * 1e-3),
+                noise.turn(mm * 2e-3),
+            )
+        };
+        let pairs = [
+            Fault::Sign,
+            Fault::Exchange,
+            Fault::JointUnit,
+            Fault::RowShift,
+            Fault::WrongLink,
+            Fault::Coupling,
+        ];
+        let faults = if fault == Fault::Pair {
+            let first = noise.below(pairs.len());
+            let second = (first + 1 + noise.below(pairs.len() - 1)) % pairs.len();
+            vec![pairs[first], pairs[second]]
+        } else {
+            vec![fault]
+        };
+        let mut transmission = Transmission::default();
+        let turning = if robot.joints[joint].prismatic {
+            revolute[0]
+        } else {
+            joint
+        };
+        for fault in &faults {
+            match fault {
+                Fault::Gain => transmission.gain = Some((joint, 0.01 * side)),
+                Fault::Coupling => transmission.coupling = Some((joint, other, side)),
+                Fault::Crosstalk => transmission.coupling = Some((joint, other, 0.02 * side)),
+                Fault::Eccentricity => {
+                    transmission.eccentricity = Some((turning, 0.5_f64.to_radians() * side))
+                }
+                Fault::QuarterTurn => {
+                    let quarter = std::f64::consts::FRAC_PI_2;
+                    let by = [quarter, -quarter, 2.0 * quarter][noise.below(3)];
+                    transmission.offset = Some((turning, by));
+                }
+                _ => {}
+            }
+        }
+        let joint = match fault {
+            Fault::JointUnit | Fault::OffsetStep | Fault::Pair => turning,
+            _ => joint,
+        };
+        let other = if other == joint {
+            revolute
+                .iter()
+                .copied()
+                .find(|k| *k != joint)
+                .unwrap_or(other)
+        } else {
+            other
+        };
+        Self {
+            faults,
+            joint,
+            other,
+            transmission,
+            step: step(2.0, noise),
+            moved: step(40.0, noise),
+            from: noise.between(0.3, 0.7),
+            lag: if noise.uniform() < 0.5 { 1 } else { -1 },
+            up: noise.uniform() < 0.5,
+        }
+    }
+}
+
+impl Cell {
+    /// The cell's name: fault, design, held-out design, body, size of the nominal errors.
+    pub(crate) fn id(&self) -> String {
+        format!(
+            "{:?}/{:?}/{:?}/{:?}/{}",
+            self.fault, self.design, self.validation, self.body, self.big
+        )
+    }
+}
+
+impl Case {
+    /// The profile names a link before the last.
+    pub fn wrong_link(&self) -> bool {
+        self.has(Fault::WrongLink)
+    }
+}

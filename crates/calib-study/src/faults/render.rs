@@ -1,0 +1,168 @@
+//! The study as Markdown, CSV and JSON.
+
+use std::fmt::Write as _;
+
+use super::design::{Body, Design};
+use super::fault::{Class, Fault};
+use super::outcome::{CaseResult, Outcome};
+use super::run::{FaultError, FaultResult};
+
+/// How many cases ended how.
+#[derive(Debug, Clone, Copy, Default)]
+struct Count {
+    cases: u64,
+    named: u64,
+    stopped: u64,
+    harmless: u64,
+    wrong: u64,
+}
+
+impl Count {
+    fn of<'a>(results: impl Iterator<Item = &'a CaseResult>) -> Self {
+        let mut count = Self::default();
+        for result in results {
+            count.cases += 1;
+            match result.outcome {
+                Outcome::Named => count.named += 1,
+                Outcome::Stopped => count.stopped += 1,
+                Outcome::Harmless => count.harmless += 1,
+                Outcome::Wrong => count.wrong += 1,
+            }
+        }
+        count
+    }
+
+    fn row(&self, name: &str) -> String {
+        let share = |n: u64| format!("{:.1} %", 100.0 * n as f64 / self.cases.max(1) as f64);
+        format!(
+            "| {name} | {} | {} | {} | {} | {} |\n",
+            self.cases,
+            share(self.named),
+            share(self.stopped),
+            share(self.harmless),
+            self.wrong
+        )
+    }
+}
+
+/// The tables of the book's page.
+#[must_use]
+pub fn markdown(result: &FaultResult) -> String {
+    let mut text = String::new();
+    let all = &result.results;
+    let faulty = || all.iter().filter(|r| r.cell.fault.class() != Class::Clean);
+    let clean: Vec<&CaseResult> = all
+        .iter()
+        .filter(|r| r.cell.fault.class() == Class::Clean)
+        .collect();
+    let wrong = Count::of(faulty()).wrong;
+    let n = faulty().count();
+    // Writing into a string cannot fail.
+    let _ = writeln!(
+        text,
+        "{n} cases with a fault, {} without; seed {}.\n",
+        clean.len(),
+        result.seed
+    );
+    let _ = writeln!(text, "Wrong: {wrong} of {n}{}.\n", upper(wrong, n));
+    let alarms = clean.iter().filter(|r| r.false_alarm()).count();
+    let _ = writeln!(
+        text,
+        "Good data not accepted without reserve: {alarms} of {}.\n",
+        clean.len()
+    );
+    text += &table(
+        "fault",
+        Fault::ALL.map(|fault| {
+            (
+                word(&fault),
+                Count::of(all.iter().filter(|r| r.cell.fault == fault)),
+            )
+        }),
+    );
+    text += &table(
+        "design",
+        Design::ALL.map(|design| {
+            (
+                word(&design),
+                Count::of(faulty().filter(|r| r.cell.design == design)),
+            )
+        }),
+    );
+    text += &table(
+        "body",
+        Body::ALL.map(|body| {
+            (
+                word(&body),
+                Count::of(faulty().filter(|r| r.cell.body == body)),
+            )
+        }),
+    );
+    text
+}
+
+/// Upper 95 % limit where nothing happened: equation (1) of the module.
+fn upper(events: u64, n: usize) -> String {
+    if events > 0 || n == 0 {
+        return String::new();
+    }
+    let limit = 1.0 - 0.05_f64.powf(1.0 / n as f64);
+    format!(" (upper 95 % limit {:.2} %)", 100.0 * limit)
+}
+
+fn table<const N: usize>(first: &str, rows: [(String, Count); N]) -> String {
+    let mut text = format!(
+        "| {first} | cases | named | stopped | harmless | wrong |\n|---|---|---|---|---|---|\n"
+    );
+    for (name, count) in rows.iter().filter(|(_, count)| count.cases > 0) {
+        text += &count.row(name);
+    }
+    text + "\n"
+}
+
+/// The word of a value in JSON, as the files have it.
+fn word(value: &impl serde::Serialize) -> String {
+    match serde_json::to_value(value) {
+        Ok(serde_json::Value::String(word)) => word.replace('_', " "),
+        _ => String::new(),
+    }
+}
+
+/// One line per case.
+#[must_use]
+pub fn csv(result: &FaultResult) -> String {
+    let mut text = String::from(
+        "fault,design,validation,body,big,number,outcome,named,verdict,rms_mm,worst_z,findings\n",
+    );
+    for r in &result.results {
+        let number = |x: Option<f64>, scale: f64| {
+            x.map_or_else(String::new, |x| format!("{:.4}", x * scale))
+        };
+        let findings: Vec<&str> = r.findings.iter().map(String::as_str).collect();
+        let _ = writeln!(
+            text,
+            "{},{},{},{},{},{},{},{},{},{},{},{}",
+            word(&r.cell.fault),
+            word(&r.cell.design),
+            word(&r.cell.validation),
+            word(&r.cell.body),
+            r.cell.big,
+            r.number,
+            word(&r.outcome),
+            r.named,
+            r.verdict,
+            number(r.rms_m, 1e3),
+            number(r.worst_z, 1.0),
+            findings.join(" ")
+        );
+    }
+    text
+}
+
+/// Every case as JSON.
+///
+/// # Errors
+/// [`FaultError::Unwritable`] for numbers that JSON does not have.
+pub fn json(result: &FaultResult) -> Result<String, FaultError> {
+    Ok(serde_json::to_string_pretty(result)? + "\n")
+}

@@ -1,0 +1,174 @@
+//! Runs the matrix: cells in parallel, finished cases kept on disk.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::case::Cell;
+use super::design::{Body, Design, Validation};
+use super::fault::{Class, Fault};
+use super::outcome::{CaseResult, run_case};
+use super::state::State;
+
+/// Settings of the study.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FaultOptions {
+    /// Cases of each cell; clean cells have four times as many.
+    pub cases: u64,
+    /// Seed of all draws.
+    pub seed: u64,
+    /// Threads; `None`: as many as there are processors.
+    pub threads: Option<usize>,
+    /// Folder of the state file, where finished cases are kept; `None`: nothing is written.
+    pub out: Option<PathBuf>,
+    /// Keep the finished cases of an earlier run with the same settings.
+    pub resume: bool,
+    /// Only these faults; empty: all.
+    pub only: Vec<Fault>,
+}
+
+impl Default for FaultOptions {
+    fn default() -> Self {
+        Self {
+            cases: 4,
+            seed: 1,
+            threads: None,
+            out: None,
+            resume: false,
+            only: Vec::new(),
+        }
+    }
+}
+
+/// A finished study.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FaultResult {
+    /// Version of this layout.
+    pub calib_fault_study: u32,
+    /// Seed of all draws.
+    pub seed: u64,
+    /// Cases of each cell with a fault.
+    pub cases: u64,
+    /// Every case, in the order of the matrix.
+    pub results: Vec<CaseResult>,
+}
+
+/// A study that cannot be run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FaultError {
+    /// No cases.
+    #[error(
+        "a study needs at least 1 case of each cell, got {got}\n  help: give --trials 1 or more"
+    )]
+    NoCases {
+        /// Cases asked for.
+        got: u64,
+    },
+    /// Threads cannot be started.
+    #[error("cannot start {threads} threads: {source}\n  help: ask for fewer")]
+    Threads {
+        /// Threads asked for (0: one for each processor).
+        threads: usize,
+        /// Why.
+        source: rayon::ThreadPoolBuildError,
+    },
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] calib_files::FileError),
+    /// A result has no JSON form.
+    #[error("a result cannot be written: {0}\n  help: report this as a defect")]
+    Unwritable(#[from] serde_json::Error),
+}
+
+/// Cells of the matrix: every fault in every design it can have, with every body; the held-out design and the size of the
+/// nominal errors alternate, so that each occurs with each.
+pub(super) fn matrix(only: &[Fault]) -> Vec<Cell> {
+    let validations = [Validation::Combined, Validation::Alike, Validation::Absent];
+    let mut cells = Vec::new();
+    let faults = Fault::ALL
+        .iter()
+        .filter(|f| only.is_empty() || only.contains(f));
+    for (f, fault) in faults.enumerate() {
+        for (d, design) in Design::ALL.into_iter().enumerate() {
+            for (b, body) in Body::ALL.into_iter().enumerate() {
+                let first = validations[(f + d + b) % 3];
+                let order = std::iter::once(first).chain(validations);
+                let fits = |v: &Validation| fault.applies(design, body, *v);
+                if let Some(validation) = order.into_iter().find(fits) {
+                    let big = (f + d + 2 * b) % 3 == 0;
+                    cells.push(Cell {
+                        fault: *fault,
+                        design,
+                        validation,
+                        body,
+                        big,
+                    });
+                }
+            }
+        }
+    }
+    cells
+}
+
+/// Runs the study. `progress(done, total)` counts cases and is called from any thread.
+///
+/// # Errors
+/// [`FaultError`] for no cases, threads that cannot be started, and a state file that cannot be used. A run that stops is a
+/// result, not an error.
+pub fn run_faults(
+    options: &FaultOptions,
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<FaultResult, FaultError> {
+    if options.cases == 0 {
+        return Err(FaultError::NoCases { got: 0 });
+    }
+    let clean = |cell: &Cell| {
+        if cell.fault.class() == Class::Clean {
+            4
+        } else {
+            1
+        }
+    };
+    let plan: Vec<(Cell, u64)> = matrix(&options.only)
+        .into_iter()
+        .flat_map(|cell| (0..options.cases * clean(&cell)).map(move |k| (cell, k)))
+        .collect();
+    let state = Mutex::new(State::open(options)?);
+    let threads = options.threads.unwrap_or(0);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|source| FaultError::Threads { threads, source })?;
+    let done = AtomicU64::new(0);
+    let total = plan.len() as u64;
+    let lock = || state.lock().unwrap_or_else(PoisonError::into_inner);
+    let results = pool.install(|| {
+        plan.par_iter()
+            .with_max_len(1)
+            .map(|&(cell, number)| {
+                let known = lock().finished(cell, number);
+                let result = match known {
+                    Some(result) => result,
+                    None => {
+                        let result = run_case(cell, number, options.seed);
+                        lock().append(&result)?;
+                        result
+                    }
+                };
+                progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+                Ok(result)
+            })
+            .collect::<Result<Vec<_>, FaultError>>()
+    })?;
+    lock().close(&results)?;
+    Ok(FaultResult {
+        calib_fault_study: 1,
+        seed: options.seed,
+        cases: options.cases,
+        results,
+    })
+}

@@ -1,0 +1,93 @@
+//! The matrix of faults: a small part with fixed seeds, and what must hold of any part of it.
+
+use calib_study::faults::{
+    Class, Fault, FaultOptions, FaultResult, Outcome, csv, markdown, run_faults,
+};
+
+fn part(only: &[Fault], cases: u64) -> FaultResult {
+    let options = FaultOptions {
+        cases,
+        only: only.to_vec(),
+        ..FaultOptions::default()
+    };
+    run_faults(&options, &|_, _| {}).expect("a study")
+}
+
+#[test]
+fn the_result_does_not_depend_on_the_number_of_threads_nor_on_an_interruption() {
+    let only = vec![Fault::TrackerMoved];
+    let folder = tempfile::tempdir().expect("a folder");
+    let options = |threads, out: Option<&std::path::Path>| FaultOptions {
+        cases: 1,
+        only: only.clone(),
+        threads: Some(threads),
+        out: out.map(Into::into),
+        resume: true,
+        ..FaultOptions::default()
+    };
+    let one = run_faults(&options(1, None), &|_, _| {}).expect("a study");
+    let two = run_faults(&options(2, Some(folder.path())), &|_, _| {}).expect("a study");
+    assert_eq!(one, two);
+    let state = folder.path().join("faults.state.jsonl");
+    let whole = std::fs::read_to_string(&state).expect("a state file");
+    // Three finished cases and a line that was cut off.
+    let mut cut: String = whole.lines().take(4).map(|l| format!("{l}\n")).collect();
+    cut += "{\"cell\":";
+    std::fs::write(&state, cut).expect("writable");
+    let resumed = run_faults(&options(2, Some(folder.path())), &|_, _| {}).expect("a study");
+    assert_eq!(one, resumed);
+    assert_eq!(
+        std::fs::read_to_string(&state).expect("a state file"),
+        whole
+    );
+}
+
+#[test]
+fn good_data_are_accepted_or_say_what_is_missing_and_are_never_wrong() {
+    let result = part(&[Fault::None], 1);
+    assert!(
+        result
+            .results
+            .iter()
+            .all(|r| r.cell.fault.class() == Class::Clean)
+    );
+    let wrong: Vec<_> = result
+        .results
+        .iter()
+        .filter(|r| r.outcome == Outcome::Wrong)
+        .collect();
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn a_fault_is_never_accepted_as_a_wrong_result() {
+    // One case of every cell of the discrete faults that recordings of every design can have.
+    let result = part(
+        &[
+            Fault::Sign,
+            Fault::Exchange,
+            Fault::JointUnit,
+            Fault::WrongLink,
+        ],
+        1,
+    );
+    let wrong: Vec<_> = result
+        .results
+        .iter()
+        .filter(|r| r.outcome == Outcome::Wrong)
+        .collect();
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert!(result.results.len() >= 90, "{}", result.results.len());
+}
+
+#[test]
+fn tables_count_every_case_once() {
+    let result = part(&[Fault::HeldOutCopies], 1);
+    assert_eq!(csv(&result).lines().count(), 1 + result.results.len());
+    let text = markdown(&result);
+    let first = format!(
+        "{} cases with a fault, 0 without; seed 1.",
+        result.results.len()
+    );
+    assert!(text.starts_with(&first), "{text}");
+}
