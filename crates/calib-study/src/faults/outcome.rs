@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use calib_finding::{Finding, Severity};
+use calib_pipeline::error::DataProblem;
 use calib_pipeline::formulate::solved::Solved;
 use calib_pipeline::prepare::load::{RobotProfile, of_tables};
 use calib_pipeline::run::{RunOptions, RunOutput, run_on};
@@ -76,35 +77,38 @@ pub(crate) fn run_case(cell: Cell, number: u64, seed: u64) -> CaseResult {
     let mut noise = Noise::of_trial(seed, &cell.id(), number);
     let case = Case::draw(cell, number, &mut noise);
     let tables = case.tables(&mut noise);
-    let run = |force: bool| {
-        let robot = robot_profile(&case.profile(), &case.robot.urdf())?;
-        let options = RunOptions {
-            force,
-            ..RunOptions::default()
-        };
-        run_on(of_tables(robot, tables.clone())?, &options, &mut |_| {})
-    };
-    match run(false) {
+    let ran = robot_profile(&case.profile(), &case.robot.urdf())
+        .and_then(|robot| of_tables(robot, tables))
+        .and_then(|inputs| run_on(inputs, &RunOptions::default(), &mut |_| {}));
+    match ran {
         Ok(output) => judged(&case, number, &output),
-        // What stopped it is in the report of a forced run.
-        Err(_) => {
-            let findings = run(true).map_or_else(|_| Vec::new(), |forced| forced.report.findings);
-            let named = findings.iter().any(|f| names_the_cause(&case, f));
-            CaseResult {
-                cell,
-                number,
-                outcome: if named {
-                    Outcome::Named
-                } else {
-                    Outcome::Stopped
-                },
-                named,
-                verdict: "stopped".to_owned(),
-                findings: ids(&findings),
-                rms_m: None,
-                worst_z: None,
-            }
-        }
+        Err(error) => stopped(&case, number, error),
+    }
+}
+
+/// A run without a result: what stopped it names the cause, or does not.
+fn stopped(case: &Case, number: u64, error: PipelineError) -> CaseResult {
+    let findings = match error {
+        PipelineError::Data { problem, .. } => match *problem {
+            DataProblem::Checks(findings) => findings,
+            _ => Vec::new(),
+        },
+        _ => Vec::new(),
+    };
+    let named = findings.iter().any(|f| names_the_cause(case, f));
+    CaseResult {
+        cell: case.cell,
+        number,
+        outcome: if named {
+            Outcome::Named
+        } else {
+            Outcome::Stopped
+        },
+        named,
+        verdict: "stopped".to_owned(),
+        findings: ids(&findings),
+        rms_m: None,
+        worst_z: None,
     }
 }
 
