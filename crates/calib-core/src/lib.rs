@@ -141,6 +141,7 @@ pub use analysis::information::{Information, NULL_TOLERANCE};
 pub use analysis::observability::{Direction, Observability, Term};
 pub use analysis::sandwich::sandwich;
 pub use analysis::solution::{NoiseEstimate, ParameterClass, ParameterEstimate, Solution};
+pub use analysis::spread::{LinearPoint, Placement, PostureSpread, SizeSpread, SpreadDirection};
 pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
 pub use graph::axis::Axis;
 pub use graph::baseline::Baseline;
@@ -156,7 +157,7 @@ pub use graph::measurement::{
 pub use graph::parameter::{Parameter, ParameterKind};
 pub use graph::problem::{NoiseGroup, NoiseKind, Point, Problem};
 pub use graph::unit::{DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA, Unit};
-pub use model::derived::{Configuration, DerivedPoint, DerivedPose};
+pub use model::derived::{Configuration, DerivedPoint, DerivedPose, Target};
 pub use model::joint::JointMotion;
 pub use model::layout::Model;
 pub use model::values::Values;

@@ -43,6 +43,7 @@ mod table;
 pub mod terminal;
 mod verification;
 pub mod view3d;
+mod weak;
 mod words;
 
 pub use calib_finding::{Finding, Severity, Unit};
@@ -69,4 +70,5 @@ pub use verification::{
     PoseError, Stats, Verification,
 };
 pub use view3d::View3d;
+pub use weak::{HELD_BY_PRIOR, OpenDirection, RobotSize, WeakDirections, WeakTerm};
 pub use words::answers::{Answer, answers};

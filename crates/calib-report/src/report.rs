@@ -1,7 +1,7 @@
 use crate::{
     AccuracyLimit, Change, Clock, DataInformation, EstimatorResult, Finding, FitSummary, Input,
     JointCoverage, LoopClosure, Noise, NotObservable, Output, Parameter, RecordingSummary,
-    Rejected, Residuals, Transform, Unit, Verification, Workspace,
+    Rejected, Residuals, Transform, Unit, Verification, WeakDirections, Workspace,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -75,6 +75,9 @@ pub struct Report {
     /// The predicted uncertainty of the tool over the workspace.
     #[serde(default)]
     pub workspace: Option<Workspace>,
+    /// What the data leave open at the tool. Null with `method: paper`.
+    #[serde(default)]
+    pub weak_directions: Option<WeakDirections>,
     /// What limits the accuracy, largest share first.
     #[serde(default)]
     pub accuracy_limits: Vec<AccuracyLimit>,

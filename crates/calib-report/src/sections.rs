@@ -5,6 +5,7 @@
 mod evidence;
 mod robot;
 mod verdict;
+mod weak;
 
 use crate::table::Table;
 use crate::words::prose::code;
@@ -43,6 +44,7 @@ pub(crate) fn sections(report: &Report) -> Vec<Section> {
     robot::estimators(&mut page, report);
     evidence::data(&mut page, report);
     evidence::residuals(&mut page, report);
+    weak::directions(&mut page, report);
     evidence::accuracy(&mut page, report);
     robot::parameters(&mut page, report);
     evidence::files(&mut page, report);

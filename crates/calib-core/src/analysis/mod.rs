@@ -10,4 +10,5 @@ pub(crate) mod information;
 pub(crate) mod observability;
 pub(crate) mod sandwich;
 pub(crate) mod solution;
+pub(crate) mod spread;
 pub(crate) mod validate;

@@ -12,10 +12,11 @@ use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Point3};
 use calib_geometry::{Twist, so3};
 
 use crate::analysis::solution::Solution;
+use crate::analysis::spread::LinearPoint;
 use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{EffectKind, JointState};
 use crate::graph::error::Error;
-use crate::graph::ids::{EdgeId, FrameId};
+use crate::graph::ids::{EdgeId, FrameId, PointId};
 use crate::model::cache::{EdgeCache, State};
 use crate::model::path::{CompiledPath, Derivatives, PathBuffer, Step};
 
@@ -80,6 +81,15 @@ pub struct DerivedPoint {
     pub estimable: bool,
 }
 
+/// What is seen at a posture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// The origin of a frame.
+    Frame(FrameId),
+    /// A point of the problem, in the frame that it is fixed in.
+    Point(PointId),
+}
+
 /// F n below this (rad, m, for n of one prior σ) is rounding: prior σ are about 1e-2, null vectors
 /// are accurate to about 1e-9.
 const ESTIMABLE: f64 = 1e-8;
@@ -139,6 +149,45 @@ impl Solution {
                 .inherit(&f)
                 .map(|c| Matrix3::from_iterator(c.iter().copied())),
             estimable: self.unseen(&f).ncols() == 0,
+        })
+    }
+
+    /// A target as seen from `from` at a configuration, and how it follows the free parameters: those of the edges between
+    /// and, of a point, its own coordinates.
+    ///
+    /// # Errors
+    /// As [`Solution::relative_pose`].
+    pub fn linear_point(
+        &self,
+        from: FrameId,
+        target: Target,
+        at: &Configuration,
+    ) -> Result<LinearPoint, Error> {
+        let (to, known) = match target {
+            Target::Frame(frame) => (frame, None),
+            Target::Point(id) => {
+                let point = &self.model.problem.points[id.index()];
+                (point.frame, Some(point))
+            }
+        };
+        let own = known.and_then(|p| p.parameters);
+        let local = match (known, own) {
+            (_, Some(own)) => Point3::from(own.map(|p| self.values.0[p.index()])),
+            (Some(point), None) => point.position,
+            (None, None) => Point3::origin(),
+        };
+        let (pose, path, buffer) = self.evaluate(from, to, at)?;
+        let mut jacobian = point_rows(&pose, &local) * self.expand(&path, &buffer);
+        for (k, parameter) in own.into_iter().flatten().enumerate() {
+            // ∂(R p + t)/∂p_k = R e_k
+            if let Some(column) = self.model.column_of[parameter.index()] {
+                let mut column = jacobian.column_mut(column);
+                column += pose.r.column(k);
+            }
+        }
+        Ok(LinearPoint {
+            position: Point3::from(pose.r * local.coords + pose.t),
+            jacobian,
         })
     }
 

@@ -12,6 +12,7 @@ use crate::output::of_fit::{
     fit_summary, missing_physics, noise, not_observable, parameters, transform,
 };
 use crate::output::verdict::{limits, next_steps, scope};
+use crate::output::weak::weak_directions;
 use crate::verify::accuracy::{accuracy_limits, workspace};
 
 /// The report of a run.
@@ -113,6 +114,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
                 workspace.as_ref(),
             )
         }),
+        weak_directions: e.fit.and_then(|fit| weak_directions(e.inputs, fit)),
         workspace,
         findings,
         inputs: e

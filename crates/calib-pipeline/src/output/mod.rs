@@ -9,3 +9,4 @@ mod of_fit;
 pub mod shapes;
 mod verdict;
 pub mod view;
+pub mod weak;

@@ -20,3 +20,4 @@ pub(crate) mod rejection;
 mod scope;
 mod terms;
 pub(crate) mod verdict;
+pub(crate) mod weak;

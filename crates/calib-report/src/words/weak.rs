@@ -1,0 +1,84 @@
+//! What the data leave open at the tool.
+
+use super::prose::code;
+use crate::{OpenDirection, RobotSize, Unit, WeakDirections, number};
+
+impl RobotSize {
+    /// "The size of the robot: ±0.6 %, 3.2 mm at the reach of 540 mm, 98 % from the prior."
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        format!(
+            "The size of the robot: ±{}, {} at the reach of {}; {} of this is held by the priors.",
+            relative(self.sigma),
+            number::plain(self.at_reach_m(), Unit::Meter),
+            number::plain(self.reach_m, Unit::Meter),
+            number::percent(self.prior_share)
+        )
+    }
+
+    /// What to do where the data do not see it.
+    #[must_use]
+    pub fn remedy(&self) -> &'static str {
+        "Provide one length: a ball bar, two places at a known distance, or a tracked body on the robot."
+    }
+}
+
+/// A ratio in percent with two digits.
+fn relative(ratio: f64) -> String {
+    let percent = 100.0 * ratio;
+    let decimals = if percent >= 1.0 {
+        1
+    } else if percent >= 0.1 {
+        2
+    } else {
+        3
+    };
+    format!("{percent:.decimals$} %")
+}
+
+/// What was predicted where, and how much of its uncertainty the data decided.
+pub(crate) fn summary(weak: &WeakDirections) -> Vec<String> {
+    let length = |m| number::plain(m, Unit::Meter);
+    let seen = if weak.placed {
+        "in the tracker's frame"
+    } else {
+        "up to a rigid motion of the whole robot"
+    };
+    let recorded = weak.recorded_rms_sigma_m.map_or_else(String::new, |m| {
+        format!(" (fitted postures: {} rms)", length(m))
+    });
+    let mut lines = vec![format!(
+        "Predicted position of {} {seen}, over {} postures spread over the recorded joint ranges, joints combined freely: σ = {} rms, {} maximum{recorded}. The priors alone hold {} of the variance, {} rms.",
+        code(&weak.point),
+        weak.postures,
+        length(weak.rms_sigma_m),
+        length(weak.max_sigma_m),
+        number::percent(weak.prior_share),
+        length(weak.held_by_prior_m())
+    )];
+    if weak.unbounded {
+        lines.push(
+            "A combination of parameters that neither data nor priors determine moves it as well: the numbers here leave it out."
+                .to_owned(),
+        );
+    }
+    if let Some(size) = weak.size.filter(|size| size.sigma > 0.0) {
+        let mut line = size.sentence();
+        if size.is_unseen() {
+            line += " The data do not see it. ";
+            line += size.remedy();
+        }
+        lines.push(line);
+    }
+    lines
+}
+
+/// "`j2.origin.z` +1.2 mm, `tip.x` −0.8 mm"
+pub(crate) fn terms(direction: &OpenDirection) -> String {
+    let term = |t: &crate::WeakTerm| {
+        let change = number::change(t.change, None, t.unit);
+        format!("{} {change}", code(&t.parameter))
+    };
+    let all: Vec<String> = direction.terms.iter().map(term).collect();
+    all.join(", ")
+}
