@@ -82,6 +82,10 @@ pub struct PostureSpread {
 /// Displacements of a unit deviation below this (m) are rounding.
 const NOTHING: f64 = 1e-8;
 
+/// A direction of one scale that nothing determines and that moves the point by more than this (m) makes it unknown; null
+/// vectors are accurate to about 1e-9.
+const OPEN: f64 = 1e-6;
+
 /// Parameters named per direction.
 const TERMS: usize = 6;
 
@@ -174,7 +178,7 @@ impl Solution {
             open.row_mut(i).scale_mut(*s);
         }
         let moved = g * open;
-        moved.column_iter().any(|c| c.norm() / root > NOTHING)
+        moved.column_iter().any(|c| c.norm() / root > OPEN)
     }
 
     /// The parameters that a direction moves most, in units of their scale.

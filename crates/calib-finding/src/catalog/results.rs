@@ -61,4 +61,28 @@ super::topic! {
             "{missing} of {total:shape} of the links are missing in the 3-D view: a shape of the link is none that the URDF format defines: {shapes:code}[[ and {more} more]].",
             "Correct the `<visual>` elements to see them. No number depends on it.";
     }
+    /// The data do not see how large the robot is.
+    SIZE_NOT_SEEN = "size-not-seen" {
+        "contacts": Error,
+            "The data do not see the size of the robot: it is known to ±{sigma:percent} from the priors alone, {at_reach} at the reach of {reach:m}. Contacts close as well on a robot of another size, so held-out contacts cannot tell.",
+            "Provide one length: a ball bar, two places at a known distance, or a tracked body on the robot; or state lengths that were measured with their σ.";
+        "tracked": Warning,
+            "The data do not see the size of the robot: it is known to ±{sigma:percent} from the priors alone, {at_reach} at the reach of {reach:m}.",
+            "Record poses in which the joints move together over their ranges.";
+    }
+    /// Priors, not data, hold what matters at the tool.
+    HELD_BY_PRIORS = "held-by-priors" {
+        "contacts": Error,
+            "Over the joint ranges the priors alone hold {held} rms at the tool, more than the limit of {limit}: held-out contacts cannot tell.",
+            "Touch more things, in postures spread over the joint ranges, or measure lengths and state them with their σ.";
+        "tracked": Warning,
+            "Over the joint ranges the priors alone hold {held} rms at the tool, more than the limit of {limit}.",
+            "Record poses in which the joints move together over their ranges.";
+        "open_contacts": Error,
+            "A combination of parameters that neither data nor priors determine moves the tool: its position is unknown.",
+            "State a σ for the places that are touched and for what is free, or touch more things.";
+        "open_tracked": Warning,
+            "A combination of parameters that neither data nor priors determine moves the tool in other postures.",
+            "Record poses in which the joints move together over their ranges, or keep the priors.";
+    }
 }

@@ -1,5 +1,6 @@
 //! Everything that was found, as the report's data. Renderers compute nothing; this does.
 
+use calib_finding::{Finding, Severity};
 use calib_profile::Method;
 use calib_report::{
     Input, Limit, MissingPhysics, NextStep, Output, Report, Residuals, Scope, Verdict,
@@ -12,7 +13,7 @@ use crate::output::of_fit::{
     fit_summary, missing_physics, noise, not_observable, parameters, transform,
 };
 use crate::output::verdict::{limits, next_steps, scope};
-use crate::output::weak::weak_directions;
+use crate::output::weak::{self, weak_directions};
 use crate::verify::accuracy::{accuracy_limits, workspace};
 
 /// The report of a run.
@@ -62,7 +63,13 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         .map(missing_physics)
         .collect();
     let workspace = e.fit.and_then(|fit| workspace(e.inputs, fit));
-    let findings = findings(e, &missing);
+    let weak = e.fit.and_then(|fit| weak_directions(e.inputs, fit));
+    let open = weak::findings(e.inputs, weak.as_ref(), e.held_out.as_ref());
+    if verdict == Verdict::Accepted && open.iter().any(|f| f.severity == Severity::Error) {
+        verdict = Verdict::NotEvaluated;
+        reasons.splice(0..0, open.iter().map(Finding::text));
+    }
+    let findings = findings(e, &missing, open);
     Report {
         profile: file.clone(),
         robot: profile.robot.clone(),
@@ -114,7 +121,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
                 workspace.as_ref(),
             )
         }),
-        weak_directions: e.fit.and_then(|fit| weak_directions(e.inputs, fit)),
+        weak_directions: weak,
         workspace,
         findings,
         inputs: e

@@ -114,8 +114,13 @@ pub(crate) fn rejected(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Rejected> {
         .collect()
 }
 
-pub(crate) fn findings(e: &Evidence<'_>, missing: &[MissingPhysics]) -> Vec<Finding> {
+pub(crate) fn findings(
+    e: &Evidence<'_>,
+    missing: &[MissingPhysics],
+    open: Vec<Finding>,
+) -> Vec<Finding> {
     let mut findings = e.findings.to_vec();
+    findings.extend(open);
     findings.extend(missing.iter().map(|m| {
         Finding::new(catalog::MISSING_PHYSICS, About::Fit)
             .with("physics", Fact::choice(m.physics.words()))

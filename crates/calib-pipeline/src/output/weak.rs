@@ -5,8 +5,9 @@
 //! record few of them. The point is the tool that was measured: a body, a marker, or a touching point.
 
 use calib_core::{LinearPoint, Placement, PostureSpread, SpreadDirection, Target};
+use calib_finding::{About, Fact, Finding, catalog};
 use calib_profile::Usage;
-use calib_report::{OpenDirection, RobotSize, WeakDirections, WeakTerm};
+use calib_report::{HeldOut, OpenDirection, RobotSize, WeakDirections, WeakTerm};
 use calib_urdf::{JointId, LinkId};
 
 use crate::formulate::formulation::MlFit;
@@ -92,6 +93,47 @@ pub fn weak_directions(inputs: &Inputs, fit: &MlFit) -> Option<WeakDirections> {
             .map(direction)
             .collect(),
     })
+}
+
+/// What the data leave open that a verdict on them must not pass over: the size of the robot, or more than the limit of the profile.
+#[must_use]
+pub(crate) fn findings(
+    inputs: &Inputs,
+    weak: Option<&WeakDirections>,
+    held_out: Option<&HeldOut>,
+) -> Vec<Finding> {
+    let Some(weak) = weak else {
+        return Vec::new();
+    };
+    let form = if weak.placed { "tracked" } else { "contacts" };
+    let measured = held_out.and_then(|h| h.calibrated).map(|c| c.rms_m);
+    // What is smaller than the errors that were measured cannot be a surprise.
+    let matters = |size: &RobotSize| measured.is_none_or(|rms| size.at_reach_m() > rms);
+    if let Some(size) = weak.size.filter(|s| s.is_unseen() && matters(s)) {
+        return vec![
+            Finding::of_kind(catalog::SIZE_NOT_SEEN, form, About::Fit)
+                .with("sigma", Fact::ratio(size.sigma))
+                .with("at_reach", Fact::meters(size.at_reach_m()))
+                .with("reach", Fact::meters(size.reach_m))
+                .with("prior_share", Fact::ratio(size.prior_share)),
+        ];
+    }
+    if weak.unbounded {
+        let form = if weak.placed {
+            "open_tracked"
+        } else {
+            "open_contacts"
+        };
+        return vec![Finding::of_kind(catalog::HELD_BY_PRIORS, form, About::Fit)];
+    }
+    let limit = inputs.robot.profile.solve.limits.held_out_rms;
+    let beyond = limit.filter(|limit| weak.held_by_prior_m() > *limit);
+    let finding = |limit: f64| {
+        Finding::of_kind(catalog::HELD_BY_PRIORS, form, About::Fit)
+            .with("held", Fact::meters(weak.held_by_prior_m()))
+            .with("limit", Fact::meters(limit))
+    };
+    beyond.map(finding).into_iter().collect()
 }
 
 /// The measured point that most moving joints carry: a body's frame, a marker, or a touching point.
