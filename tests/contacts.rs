@@ -383,13 +383,12 @@ fn is_honest(design: &Design, seed: u64) -> Result<(), String> {
     let share = weak["size"]["prior_share"].as_f64().ok_or("no size")?;
     let rms = weak["rms_sigma_m"].as_f64().ok_or("no σ")?;
     let said = format!(
-        "{} {seed}: {verdict}, size {share:.2} from priors, σ {rms:.5} m",
-        design.name
+        "{} {seed}: {verdict}, size {share:.2} from priors, σ {rms:.5} m, {} {}",
+        design.name, report["reasons"], report["verification"]["held_out"]["calibrated"]
     );
     println!("{said}");
-    let unseen = report["verdict_reasons"]
-        .to_string()
-        .contains("size-not-seen");
+    let findings = report["findings"].as_array().ok_or("no findings")?;
+    let unseen = findings.iter().any(|f| f["id"] == "size-not-seen");
     match design.known_length {
         false if verdict.starts_with("accepted") || share < 0.5 || !unseen => Err(said),
         true if share > 0.5 || unseen => Err(said),

@@ -1,7 +1,7 @@
 //! What the data leave open at the tool.
 
 use super::prose::code;
-use crate::{OpenDirection, RobotSize, Unit, WeakDirections, number};
+use crate::{OpenDirection, RobotSize, Unit, WeakDirections, WeakTerm, number};
 
 impl RobotSize {
     /// "The size of the robot: ±0.6 %, 3.2 mm at the reach of 540 mm, 98 % from the prior."
@@ -73,12 +73,20 @@ pub(crate) fn summary(weak: &WeakDirections) -> Vec<String> {
     lines
 }
 
-/// "`j2.origin.z` +1.2 mm, `tip.x` −0.8 mm"
+/// "`j2.origin.z` +1.2 mm, `tip.x` −0.8 mm"; of what is neither a length nor an angle, the name.
 pub(crate) fn terms(direction: &OpenDirection) -> String {
-    let term = |t: &crate::WeakTerm| {
-        let change = number::change(t.change, None, t.unit);
-        format!("{} {change}", code(&t.parameter))
+    let term = |t: &WeakTerm| match t.unit {
+        Unit::Meter | Unit::Radian => {
+            let change = number::change(t.change, None, t.unit);
+            format!("{} {change}", code(&t.parameter))
+        }
+        _ => code(&t.parameter),
     };
-    let all: Vec<String> = direction.terms.iter().map(term).collect();
-    all.join(", ")
+    let all: Vec<String> = direction.terms.iter().take(TERMS).map(term).collect();
+    let more = direction.terms.len().saturating_sub(TERMS);
+    let more = if more > 0 { ", …" } else { "" };
+    all.join(", ") + more
 }
+
+/// Parameters named per combination; `report.json` has more.
+const TERMS: usize = 4;
