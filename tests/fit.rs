@@ -918,3 +918,57 @@ fn frames_and_hand_eyes_go_the_road_of_all_estimators() {
     ]);
     assert_eq!(frame.code, 0, "{}", frame.stderr);
 }
+
+/// The paper's own noise is 1 to 5 mm: markers of a body that scatter by as much are one body.
+#[test]
+fn noise_of_millimeters_does_not_split_a_body() {
+    let layout = [
+        [0.1, 0.02, 0.0],
+        [0.07, -0.06, 0.05],
+        [0.09, 0.05, -0.05],
+        [0.05, 0.0, 0.09],
+    ];
+    for sigma in [1e-3, 2.5e-3, 5e-3] {
+        let names: Vec<String> = (0..4)
+            .flat_map(|m| ["x", "y", "z"].map(|a| format!("m{m}.{a}_m")))
+            .collect();
+        let mut table = names.join(",") + "\n";
+        for k in 0..36_usize {
+            let (a, b) = (0.5 * (k % 6) as f64 - 1.2, 0.4 * (k / 6) as f64 - 1.0);
+            let turn = nalgebra::UnitQuaternion::from_euler_angles(a, b, 0.3 * (a + b));
+            let cells: Vec<String> = layout
+                .iter()
+                .enumerate()
+                .flat_map(|(m, p)| {
+                    let x = turn * nalgebra::Vector3::from(*p);
+                    // Four even numbers are nearly a normal one of variance 4/3.
+                    let noise = |i: usize| -> f64 {
+                        let at = 4 * (12 * k + 3 * m + i);
+                        (0..4).map(|j| jitter(at + j)).sum::<f64>() * sigma * 0.866
+                    };
+                    [0, 1, 2].map(|i| format!("{}", x[i] + noise(i) + 0.5))
+                })
+                .collect();
+            table += &(cells.join(",") + "\n");
+        }
+        let dir = Scratch::new().file("body.csv", table);
+        let ran = dir.calib(["fit", "cor", "body.csv", "--json"]);
+        assert!(matches!(ran.code, 0 | 4), "{sigma}: {}", ran.stderr);
+        let mm = format!("{}", sigma * 1e3);
+        let stated = dir.calib([
+            "fit",
+            "cor",
+            "body.csv",
+            "--estimator",
+            "sfe",
+            "--sigma-mm",
+            &mm,
+            "--json",
+        ]);
+        let center = numbers(&stated.expect(0).json()["center_m"]);
+        assert!(
+            center.iter().all(|x| (x - 0.5).abs() < 4.0 * sigma),
+            "{sigma}: {center:?}"
+        );
+    }
+}

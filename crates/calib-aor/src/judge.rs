@@ -13,6 +13,7 @@
 //! ```
 
 use calib_estimator::factor::{Factor, rank_verdict};
+use calib_estimator::noise::Level;
 use calib_estimator::{Verdict, chance, measured::Cloud};
 use calib_geometry::{Line, decompose::symmetric_eigen_small};
 use nalgebra::{Matrix2, Matrix3, Matrix6, Point3, Unit, Vector3};
@@ -127,12 +128,18 @@ pub(crate) fn judge(
         held,
         gain_by_turning,
     } = candidate;
-    let estimated = if dof > 0 {
-        (cost / dof as f64).sqrt()
-    } else {
-        0.0
+    let estimated = (cost / dof.max(1) as f64).sqrt();
+    let level = match (dof, options.sigma_t) {
+        // As many residuals as unknowns: any noise would fit.
+        (0, None) => {
+            let of = "samples where no noise is stated (of markers seen at least twice)";
+            let got = cloud.points.len();
+            return Outcome::too_few(estimator, got, got + 1, of);
+        }
+        (0, Some(stated)) => Level::stated(stated),
+        (_, stated) => Level::of(stated, estimated, dof as f64, options.significance),
     };
-    let sigma = options.sigma_t.unwrap_or(estimated);
+    let sigma = level.sigma;
     let test = match gain_by_turning {
         Some(gain) => turns(estimator, cloud, factor, estimated, dof, gain, options)
             .map(|kappa| Turn { kappa, doubt: None }),
@@ -192,6 +199,8 @@ pub(crate) fn judge(
         tau,
         circles,
         sigma,
+        degrees_of_freedom: level.degrees_of_freedom,
+        contradicts: level.contradicts,
         rms: (cost / residuals.max(1) as f64 * per_weight).sqrt(),
         used: cloud.points.len(),
         rejected: Vec::new(),

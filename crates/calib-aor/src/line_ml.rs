@@ -80,7 +80,11 @@ fn run(
     }
 }
 
-fn common_line(estimator: &'static str, cloud: &Cloud, factor: &Factor) -> Option<Candidate> {
+pub(crate) fn common_line(
+    estimator: &'static str,
+    cloud: &Cloud,
+    factor: &Factor,
+) -> Option<Candidate> {
     let start = plane::start(cloud, factor, &Options::default());
     let (axis, normal) = minimize_line(cloud, start, Free::Line, factor.s[0])?;
     let unit = information(cloud, &axis).try_inverse()?;

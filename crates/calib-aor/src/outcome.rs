@@ -1,6 +1,6 @@
 //! What an estimator answers: an axis with its uncertainty, or why there is none.
 
-use calib_estimator::{Estimate, Verdict};
+use calib_estimator::{Estimate, Verdict, noise::Contradiction};
 use calib_geometry::Line;
 use nalgebra::{Matrix6, Point3, Unit, Vector3};
 use serde::Serialize;
@@ -37,11 +37,16 @@ pub struct AorEstimate {
     pub circles: Vec<Circle>,
     /// Position noise behind the covariance (for poses: of the axis residual).
     pub sigma: f64,
+    /// Degrees of freedom behind that noise, for the quantiles of Student's t and of F ([`calib_estimator::chance`]); `None` where the
+    /// noise was stated, whose quantiles are those of the normal.
+    pub degrees_of_freedom: Option<f64>,
+    /// A stated noise that the residuals exceed: the covariance is then that of the residuals.
+    pub contradicts: Option<Contradiction>,
     /// Root mean square of the residuals (two for each point; three coordinates for each pose).
     pub rms: f64,
     /// Samples used.
     pub used: usize,
-    /// Rows left out. No estimator of this crate rejects samples; kept for readers of results.
+    /// Rows with rejected samples.
     pub rejected: Vec<usize>,
     /// [`Verdict::Ok`], or [`Verdict::Weak`] with the reason beside it.
     pub verdict: Verdict,

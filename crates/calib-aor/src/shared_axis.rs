@@ -61,6 +61,10 @@ pub(crate) fn run(
     let n = sums.n as f64;
     let two_bodies = matches!(input, Input::TwoBodies { .. });
     let dof = 2.0 * n - 4.0;
+    if dof <= 0.0 && options.sigma_r.is_none() {
+        let of = "poses where no orientation noise is stated";
+        return Ok(Outcome::too_few(estimator, sums.n, 3, of));
+    }
     // Spread about the weakest direction is noise alone: λ_min = 2 s₆² ~ σ_r² χ²(2n − 4).
     let spread = if two_bodies { 2.0 } else { 1.0 };
     let estimated = if dof > 0.0 {
@@ -130,6 +134,8 @@ pub(crate) fn run(
         tau: 0.0,
         circles: Vec::new(),
         sigma,
+        degrees_of_freedom: (dof > 0.0).then_some(dof),
+        contradicts: None,
         rms: (rss / (3.0 * sums.total)).sqrt(),
         used: sums.n,
         rejected: Vec::new(),

@@ -260,7 +260,13 @@ fn axes_of_poses() {
         let tolerance = case["tol"].as_f64().expect("tol");
         for (ours, theirs) in [("sara", "sara"), ("rotation_axis", "rotation_only")] {
             let what = format!("{} {ours}", case["id"]);
-            let outcome = fit(ours, &Input::Poses(&data), &Options::default());
+            // Two poses leave nothing to see the noise in: answered only where it is stated.
+            let options = if data.len() == 2 {
+                Options::default().with_sigma_r(1e-9)
+            } else {
+                Options::default()
+            };
+            let outcome = fit(ours, &Input::Poses(&data), &options);
             if case["expect"]["verdict"] == "not_rotation" {
                 let error = outcome.expect_err("a scaled matrix");
                 assert_eq!(error.verdict(), Some(Verdict::NotRotation));

@@ -10,6 +10,7 @@
 //! line to the center; that direction is left out. It uses all that raw markers say: a fitted pose per frame and
 //! then a hot spot reach 0.88–1.0 of it, the centroid's sphere as little as 0.07.
 
+use calib_estimator::noise::Level;
 use calib_estimator::{
     Verdict,
     levenberg::{Problem, Stop, minimize},
@@ -56,10 +57,21 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorErr
     };
     let end = minimize(&problem, start, MAX_STEPS);
     let dof = problem.degrees_of_freedom(&end.x);
-    let sigma = options
-        .sigma_t
-        .unwrap_or_else(|| (end.normal.cost / dof.max(1) as f64).sqrt());
     let residual_sigma = (end.normal.cost / dof.max(1) as f64).sqrt();
+    let level = match (dof, options.sigma_t) {
+        (0, None) => {
+            let of = "samples where no noise is stated, for all unknowns of the body";
+            return Ok(Outcome::too_few(
+                ID,
+                cloud.points.len(),
+                cloud.points.len() + 1,
+                of,
+            ));
+        }
+        (0, Some(stated)) => Level::stated(stated),
+        (_, stated) => Level::of(stated, residual_sigma, dof as f64, options.significance),
+    };
+    let sigma = level.sigma;
     let Spread { kappa, doubt } =
         match leaves_its_plane(ID, &cloud, &factor, residual_sigma, dof, options) {
             Ok(spread) => spread,
@@ -91,7 +103,13 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorErr
         center: Point3::from(cloud.origin + end.x.center),
         covariance,
         shape: Shape::Radii { bias: vec![0.0; radii.len()], radii },
-        noise: Noise { sigma_t: sigma, sigma_r: None, estimated: options.sigma_t.is_none() },
+        noise: Noise {
+            sigma_t: sigma,
+            sigma_r: None,
+            estimated: level.degrees_of_freedom.is_some(),
+            contradicts: level.contradicts,
+        },
+        degrees_of_freedom: level.degrees_of_freedom,
         rms: (end.normal.cost / (3.0 * cloud.total(0..cloud.points.len()))).sqrt(),
         used: cloud.points.len(),
         rejected: Vec::new(),

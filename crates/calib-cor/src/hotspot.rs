@@ -155,11 +155,9 @@ pub(crate) fn linear(
     let drawn = drawn(&spot, options.sigma_r.map_or(sigma_r2.max(0.0), |s| s * s));
     let covariance =
         sandwich(&spot, &spread, sigma_along, sigma_across) + drawn * drawn.transpose();
-    let noise = Noise {
-        sigma_t: sigma_along,
-        sigma_r: (sigma_r2 > 0.0 && sigma_r2.is_finite()).then(|| sigma_r2.sqrt()),
-        estimated: true,
-    };
+    let of_rotation = (sigma_r2 > 0.0 && sigma_r2.is_finite()).then(|| sigma_r2.sqrt());
+    let noise = Noise::seen(sigma_along, of_rotation);
+    let noise = (noise, Some(3.0 * spot.sums.n as f64 - 6.0));
     Ok(finish(
         estimator, &spot, &spread, covariance, noise, rejected, options,
     ))
@@ -315,7 +313,7 @@ pub(crate) fn finish(
     spot: &HotSpot,
     spread: &Spread,
     covariance: Matrix6<f64>,
-    noise: Noise,
+    (noise, degrees_of_freedom): (Noise, Option<f64>),
     rejected: Vec<Rejected>,
     options: &Options,
 ) -> Outcome {
@@ -349,6 +347,7 @@ pub(crate) fn finish(
             covariance,
         },
         noise,
+        degrees_of_freedom,
         rms: ((spread.along + spread.across) / (3.0 * spot.sums.total)).sqrt(),
         used: n,
         rejected,

@@ -14,14 +14,16 @@
 
 use calib_estimator::{
     Verdict,
-    levenberg::{Problem, Stop, minimize},
+    levenberg::{Stop, minimize},
     measured::Pose,
 };
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::Matrix6;
 
 use crate::{
     hotspot::{HotSpot, Spread, finish, poses_of, prepare, single_axis, stack, weighed},
+    noise_ratio,
     outcome::{Known, Noise, NotObservable, Outcome, Rejected},
+    pivot::{Likelihood, Normal},
 };
 use calib_estimator::{EstimatorError, Input, Options};
 
@@ -29,6 +31,8 @@ use calib_estimator::{EstimatorError, Input, Options};
 const MAX_STEPS: usize = 200;
 /// Rounds of re-estimating σ_t and σ_r.
 const NOISE_ROUNDS: usize = 200;
+/// Poses up to which the ratio of both noises is integrated over ([`crate::noise_ratio`]); beyond, their maximum likelihood is as good.
+const FEW: usize = 64;
 /// Distance between body and center, in σ_t, below which the angle at the center means nothing.
 const AT_THE_CENTER: f64 = 5.0;
 /// σ_t as a part of the geometry's size below which data count as exact.
@@ -75,7 +79,17 @@ pub(crate) fn fit_poses(
     let (sigma_t, sigma_r, normal) = maximize(poses, &mut spot, &spread, options);
     let reach = spot.body_point.norm();
     let start_reach = body_point.norm() + spread.sigmas(spot.sums.n).1;
-    let covariance = covariance(&normal, spot.sums.n, options);
+    let estimated = options.sigma_t.is_none() || options.sigma_r.is_none();
+    let (covariance, freedom) = if estimated && spot.sums.n <= FEW {
+        let seen: Vec<(&Pose, f64)> = weighed(poses, options).collect();
+        let mixture = noise_ratio::mixture(&seen, &spot, options);
+        mixture.map_or((None, None), |m| {
+            (Some(m.about(&spot)), m.degrees_of_freedom)
+        })
+    } else {
+        let freedom = estimated.then_some(3.0 * spot.sums.n as f64 - 6.0);
+        (covariance(&normal, spot.sums.n, options), freedom)
+    };
     let (Some(covariance), true) = (covariance, reach.is_finite() && reach < 100.0 * start_reach)
     else {
         return Ok(Outcome::NotObservable(NotObservable {
@@ -88,8 +102,10 @@ pub(crate) fn fit_poses(
     let noise = Noise {
         sigma_t,
         sigma_r: Some(sigma_r),
-        estimated: options.sigma_t.is_none() || options.sigma_r.is_none(),
+        estimated,
+        contradicts: None,
     };
+    let noise = (noise, freedom);
     let spread = Spread::of(weighed(poses, options), &spot.body_point, &spot.center);
     Ok(finish(
         estimator, &spot, &spread, covariance, noise, rejected, options,
@@ -186,142 +202,4 @@ fn covariance(normal: &Normal, n: usize, options: &Options) -> Option<Matrix6<f6
             .cholesky()?
             .inverse(),
     )
-}
-
-struct Likelihood<'a> {
-    poses: Vec<(&'a Pose, f64)>,
-    /// Centers are relative to it.
-    origin: Vector3<f64>,
-    sigma_t: f64,
-    sigma_r: f64,
-    /// Size of the unknowns.
-    scale: f64,
-}
-
-struct Normal {
-    hessian: Matrix6<f64>,
-    /// The part of the Hessian that the distances |q| contribute.
-    of_radial: Matrix6<f64>,
-    gradient: Vector6<f64>,
-    cost: f64,
-    /// Σ (|q| − |p|)².
-    radial: f64,
-    /// Σ ∠² |q||p|: squared arcs.
-    arc: f64,
-}
-
-impl Problem for Likelihood<'_> {
-    type Point = Vector6<f64>;
-    type Normal = Normal;
-    type Step = Vector6<f64>;
-
-    fn linearize(&self, x: &Vector6<f64>) -> Normal {
-        let (o, p): (Vector3<f64>, Vector3<f64>) =
-            (x.fixed_rows::<3>(0).into(), x.fixed_rows::<3>(3).into());
-        let (t2, r2) = (self.sigma_t * self.sigma_t, self.sigma_r * self.sigma_r);
-        let length_p = p.norm();
-        let unit_p = p / length_p;
-        let across_p = Matrix3::identity() - unit_p * unit_p.transpose();
-        let (mut turned, mut turned2) = (Vector3::zeros(), Matrix3::zeros());
-        let (mut sum_b, mut sum_bww) = (0.0, Matrix3::zeros());
-        let (mut sum_cr, mut sum_w) = (Matrix3::zeros(), 0.0);
-        let (mut g_o, mut g_q, mut along_p) = (Vector3::zeros(), Vector3::zeros(), 0.0);
-        let (mut n, mut cost, mut radial, mut arc, mut sum_e) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for &(pose, row) in &self.poses {
-            // In the world: ŵ = R q̂ needs no rotation.
-            let d = o - (pose.translation - self.origin);
-            let length_q = d.norm();
-            let unit_w = d / length_q;
-            let unit_q = pose.rotation.tr_mul(&unit_w);
-            let e = length_q - length_p;
-            // ∠ from sine and cosine: accurate at both ends
-            let (sine, cosine) = (unit_q.cross(&unit_p).norm(), unit_q.dot(&unit_p));
-            let phi = sine.atan2(cosine);
-            let ratio = if sine > 1e-9 { phi / sine } else { 1.0 };
-            let product = length_q * length_p;
-            // A row of weight `row` has both noises smaller by its root.
-            let e_row = row * e;
-            let w_alone = 1.0 / (r2 + t2 / product);
-            let w = row * w_alone;
-            n += row;
-            cost += e_row * e / t2 + phi * phi * w;
-            radial += e_row * e;
-            arc += row * phi * phi * product;
-            // ∇_q ∠²/2 = φ/sin φ (cos φ q̂ − p̂)/|q|, and likewise for p; ∂w/∂|q| = w² σ_t²/(|q|²|p|)
-            let pull = 0.5 * phi * phi * w * w_alone * t2 / product;
-            let swing = ratio * w;
-            g_o += unit_w * (e_row / t2 + (pull + swing * cosine) / length_q)
-                - pose.rotation * unit_p * (swing / length_q);
-            g_q += unit_q * swing;
-            along_p += pull + swing * cosine;
-            // Gauss–Newton blocks: radial q̂, p̂; tangential (I − q̂q̂ᵀ)/|q|, (I − p̂p̂ᵀ)/|p|
-            let b = w / (length_q * length_q);
-            let c = w / product;
-            let ww = unit_w * unit_w.transpose();
-            turned += unit_w * row;
-            turned2 += ww * row;
-            sum_b += b;
-            sum_bww += ww * b;
-            sum_cr += (pose.rotation - unit_w * unit_q.transpose()) * c;
-            sum_w += w;
-            sum_e += e_row;
-        }
-        let g_p = unit_p * (along_p / length_p - sum_e / t2) - g_q / length_p;
-        let h_oo = turned2 / t2 + Matrix3::identity() * sum_b - sum_bww;
-        let h_op = -(turned * unit_p.transpose()) / t2 - sum_cr * across_p;
-        let h_pp =
-            unit_p * unit_p.transpose() * (n / t2) + across_p * (sum_w / (length_p * length_p));
-        let mut hessian = Matrix6::zeros();
-        hessian.fixed_view_mut::<3, 3>(0, 0).copy_from(&h_oo);
-        hessian.fixed_view_mut::<3, 3>(0, 3).copy_from(&h_op);
-        hessian
-            .fixed_view_mut::<3, 3>(3, 0)
-            .copy_from(&h_op.transpose());
-        hessian.fixed_view_mut::<3, 3>(3, 3).copy_from(&h_pp);
-        // Σ (R q̂, −p̂)(R q̂, −p̂)ᵀ / σ_t²
-        let mut of_radial = Matrix6::zeros();
-        let side = -turned * unit_p.transpose() / t2;
-        of_radial
-            .fixed_view_mut::<3, 3>(0, 0)
-            .copy_from(&(turned2 / t2));
-        of_radial.fixed_view_mut::<3, 3>(0, 3).copy_from(&side);
-        of_radial
-            .fixed_view_mut::<3, 3>(3, 0)
-            .copy_from(&side.transpose());
-        of_radial
-            .fixed_view_mut::<3, 3>(3, 3)
-            .copy_from(&(unit_p * unit_p.transpose() * (n / t2)));
-        Normal {
-            hessian,
-            of_radial,
-            gradient: stack(&g_o, &g_p),
-            cost,
-            radial,
-            arc,
-        }
-    }
-
-    fn cost(&self, normal: &Normal) -> f64 {
-        normal.cost
-    }
-
-    fn solve(&self, normal: &Normal, damping: f64) -> Option<(Vector6<f64>, f64)> {
-        let mut h = normal.hessian;
-        for k in 0..6 {
-            h[(k, k)] *= 1.0 + damping;
-        }
-        let step = -h.cholesky()?.solve(&normal.gradient);
-        Some((
-            step,
-            -(step.dot(&normal.gradient) * 2.0 + step.dot(&(normal.hessian * step))),
-        ))
-    }
-
-    fn retract(&self, x: &Vector6<f64>, step: &Vector6<f64>) -> Vector6<f64> {
-        x + step
-    }
-
-    fn is_negligible(&self, _: &Vector6<f64>, step: &Vector6<f64>) -> bool {
-        step.norm() <= 1e-15 * self.scale
-    }
 }

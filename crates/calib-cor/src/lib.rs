@@ -41,7 +41,9 @@ pub mod gamage;
 pub mod hotspot;
 pub mod hotspot_ml;
 pub mod hyper_n;
+mod noise_ratio;
 mod outcome;
+mod pivot;
 mod registry;
 pub mod robust;
 pub mod score;
@@ -50,6 +52,7 @@ pub mod sfa;
 mod sphere;
 pub mod sphere_eiv;
 pub mod sphere_ml;
+mod systematic;
 
 pub use calib_estimator::measured::{DataError, Pose, Tracks};
 pub use calib_estimator::{EstimatorError, Input, InputKind, OptionId, Options, Verdict};

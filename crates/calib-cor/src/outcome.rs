@@ -1,6 +1,6 @@
 //! What an estimator answers: an estimate with its uncertainty, or why there is none.
 
-use calib_estimator::{Estimate, Verdict};
+use calib_estimator::{Estimate, Verdict, noise::Contradiction};
 use calib_geometry::Line;
 use nalgebra::{Matrix3, Matrix6, Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
@@ -41,6 +41,20 @@ pub struct Noise {
     pub sigma_r: Option<f64>,
     /// True when estimated from the residuals, false when stated by the caller.
     pub estimated: bool,
+    /// A stated noise that the residuals exceed: the covariance is then that of the residuals.
+    pub contradicts: Option<Contradiction>,
+}
+
+impl Noise {
+    /// Levels that the residuals show.
+    pub(crate) fn seen(sigma_t: f64, sigma_r: Option<f64>) -> Self {
+        Self {
+            sigma_t,
+            sigma_r,
+            estimated: true,
+            contradicts: None,
+        }
+    }
 }
 
 /// What the estimator learned beside the center.
@@ -91,6 +105,9 @@ pub struct CorEstimate {
     pub shape: Shape,
     /// Noise level the covariance rests on.
     pub noise: Noise,
+    /// Degrees of freedom behind that noise, for the quantiles of Student's t and of F ([`calib_estimator::chance`]); `None` where the
+    /// noise was stated, whose quantiles are those of the normal.
+    pub degrees_of_freedom: Option<f64>,
     /// Root mean square of the residuals (points: radial; poses: per coordinate; bodies: per coordinate).
     pub rms: f64,
     /// Samples used.

@@ -108,7 +108,9 @@ pub fn fit(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorErr
             covariance,
             mean_gap: gaps / n as f64,
         },
-        noise: Noise { sigma_t: sigma2.sqrt(), sigma_r: None, estimated: true },
+        noise: Noise::seen(sigma2.sqrt(), None),
+        // Across the levers orientation noise is added: two of three residuals of a pose carry most of the error.
+        degrees_of_freedom: Some(2.0 * n as f64 - 4.0),
         rms: (rss / (3.0 * sums.total)).sqrt(),
         used: n,
         rejected: Vec::new(),

@@ -10,6 +10,7 @@
 //! (2) compares the spread across the best planes (s₃, [`calib_estimator::factor`]) with the noise.
 
 use calib_estimator::factor::{Factor, rank_verdict};
+use calib_estimator::noise::Level;
 use calib_estimator::{
     Verdict,
     chance::{chi2_tail, f_tail},
@@ -22,6 +23,7 @@ use calib_geometry::{
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 use crate::outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Rejected, Shape};
+use crate::systematic::Systematic;
 use calib_estimator::Options;
 
 /// Chance, in units of the significance, up to which a doubtful recording still gets its answer, called weak, where it has fewer than
@@ -132,13 +134,8 @@ pub(crate) fn judge(
         rejected,
     } = candidate;
     let (n, markers) = (cloud.points.len(), cloud.markers());
-    let scatter = factor.s[0];
-    if !center.iter().all(|x| x.is_finite()) || center.norm() > 1e6 * scatter {
-        let reason = format!(
-            "the estimate diverged: the center is {:.1e} away from points that spread {scatter:.1e}",
-            center.norm()
-        );
-        return Outcome::none(estimator, Verdict::Diverged, reason, Known::Nothing);
+    if let Some(answer) = diverged(estimator, &center, factor.s[0]) {
+        return answer;
     }
     let Sums {
         information,
@@ -146,49 +143,49 @@ pub(crate) fn judge(
         weighted_rss,
     } = sums(cloud, &center, &radii, &weights);
     let dof = n - markers - 3;
-    let estimated = if dof > 0 {
-        (weighted_rss / dof as f64).sqrt()
-    } else {
-        0.0
+    let seen = (weighted_rss / dof.max(1) as f64).sqrt();
+    let Some(level) = level(cloud, absolute, seen, dof, options) else {
+        // As many samples as unknowns: any noise would fit.
+        let of = "samples where no noise is stated (of markers seen at least twice)";
+        return Outcome::too_few(estimator, n, n + 1, of);
     };
-    let (sigma, from_data) = match options.sigma_t {
-        _ if absolute => (1.0, false),
-        Some(stated) => (stated, false),
-        None => (estimated, true),
-    };
+    let sigma = level.sigma;
     let eigen = symmetric_eigen_small(&information);
     if eigen.values[0] <= 0.0 || !eigen.values[0].is_finite() {
         let reason = "the directions from the center to the points span no volume".to_string();
         return not_observable(estimator, Verdict::Coplanar, reason, cloud, factor);
     }
 
-    let plain_sigma = if dof > 0 {
-        (rss / dof as f64).sqrt()
-    } else {
-        0.0
-    };
+    let plain_sigma = (rss / dof.max(1) as f64).sqrt();
     let Spread { kappa, doubt } =
         match leaves_its_plane(estimator, cloud, factor, plain_sigma, dof, options) {
             Ok(spread) => spread,
             Err(answer) => return answer,
         };
 
-    let covariance = inflated(&eigen, sigma, kappa) + known_bias * known_bias.transpose();
+    // Noise that differs by direction bends a sphere itself, to second order.
+    let systematic = if cloud.covariances.is_empty() {
+        Systematic::of(cloud, &center, &weights, dof, options.significance)
+    } else {
+        None
+    };
+    let shift = systematic.as_ref().map_or(Vector3::zeros(), |s| s.shift);
+    let covariance = inflated(&eigen, sigma, kappa)
+        + known_bias * known_bias.transpose()
+        + shift * shift.transpose();
     // σ_weakest² = σ²/(λ₀(1 − 1/κ)) + (bias · v₀)²
     let weakest = sigma / (eigen.values[0] * (1.0 - 1.0 / kappa)).sqrt();
-    let weakest = weakest.hypot(known_bias.dot(&eigen.vectors.column(0)));
+    let weakest = weakest
+        .hypot(known_bias.dot(&eigen.vectors.column(0)))
+        .hypot(shift.norm());
     let radius = radii.iter().sum::<f64>() / markers as f64;
-    let (verdict, reason) = if weakest > options.weak_fraction * radius {
+    let imprecise = (weakest > options.weak_fraction * radius).then(|| {
         let axis = eigen.vectors.column(0).into_owned();
-        (
-            Verdict::Weak,
-            Some(too_weak(weakest, &axis, radius, options)),
-        )
-    } else if doubt.is_some() {
-        (Verdict::Weak, doubt)
-    } else {
-        (Verdict::Ok, None)
-    };
+        too_weak(weakest, &axis, radius, options)
+    });
+    let reason = imprecise
+        .or(doubt)
+        .or_else(|| systematic.and_then(|s| s.reason()));
     let point_sigma = if absolute { plain_sigma } else { sigma };
     let bias: Vec<f64> = radii
         .iter()
@@ -205,14 +202,52 @@ pub(crate) fn judge(
         noise: Noise {
             sigma_t: point_sigma,
             sigma_r: None,
-            estimated: from_data,
+            estimated: level.degrees_of_freedom.is_some(),
+            contradicts: level.contradicts,
         },
+        degrees_of_freedom: level.degrees_of_freedom,
         rms: (rss / cloud.total(0..n)).sqrt(),
         used: n,
         rejected,
-        verdict,
+        verdict: if reason.is_some() {
+            Verdict::Weak
+        } else {
+            Verdict::Ok
+        },
         reason,
     }))
+}
+
+fn diverged(estimator: &'static str, center: &Vector3<f64>, scatter: f64) -> Option<Outcome> {
+    if center.iter().all(|x| x.is_finite()) && center.norm() <= 1e6 * scatter {
+        return None;
+    }
+    let reason = format!(
+        "the estimate diverged: the center is {:.1e} away from points that spread {scatter:.1e}",
+        center.norm()
+    );
+    Some(Outcome::none(
+        estimator,
+        Verdict::Diverged,
+        reason,
+        Known::Nothing,
+    ))
+}
+
+/// The noise in units of the weights: stated, or `seen` with `dof` degrees of freedom; `None` where neither is there.
+fn level(cloud: &Cloud, absolute: bool, seen: f64, dof: usize, options: &Options) -> Option<Level> {
+    let stated = match (absolute, cloud.covariances.is_empty()) {
+        (true, false) => Some(1.0),
+        // One noise for each marker was estimated so that the residuals have the variance 1.
+        (true, true) => {
+            return (dof > 0).then(|| Level::of(None, 1.0, dof as f64, options.significance));
+        }
+        (false, _) => options.sigma_t,
+    };
+    match (dof, stated) {
+        (0, stated) => stated.map(Level::stated),
+        _ => Some(Level::of(stated, seen, dof as f64, options.significance)),
+    }
 }
 
 /// Information of the center and sums of squares about the fitted spheres.

@@ -20,6 +20,7 @@ const RANK: f64 = 1e-9;
 
 /// The factor (1) of a cloud.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Factor {
     /// Singular values of the centered cloud, descending.
     pub s: Vector3<f64>,

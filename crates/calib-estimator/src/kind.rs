@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// What an estimator finds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum Kind {
     /// A center of rotation.
     Center,

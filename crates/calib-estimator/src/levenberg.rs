@@ -31,6 +31,7 @@ pub trait Problem {
 
 /// Why the loop ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Stop {
     /// The step, or the decrease still to be had, is below rounding.
     Converged,
@@ -42,6 +43,7 @@ pub enum Stop {
 
 /// Where the loop ended.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Minimum<P: Problem> {
     /// The last accepted point.
     pub x: P::Point,

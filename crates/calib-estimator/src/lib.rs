@@ -6,6 +6,7 @@
 //! * [`EstimatorInfo`]: one entry of a table of estimators, with the options that it uses; [`mod@parameter`] says which of them a
 //!   profile can set.
 //! * [`mod@factor`], [`pose_sums`]: the sums that planes, spheres and shared axes need.
+//! * [`mod@noise`]: a noise level, stated or seen, and whether both agree.
 //! * [`levenberg`]: the minimizer of small problems on a manifold. [`chance`]: tail probabilities.
 //!
 //! # One registry
@@ -86,6 +87,7 @@ mod input;
 mod kind;
 pub mod levenberg;
 pub mod measured;
+pub mod noise;
 mod option_id;
 mod options;
 mod outcome;

@@ -344,6 +344,7 @@ impl Cloud {
 
 /// Data that no estimator can read.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DataError {
     /// A weight that is negative or no number.
     #[error("row {row}: the weight {weight} is not a finite number from 0 up")]

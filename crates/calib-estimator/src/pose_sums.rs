@@ -30,6 +30,7 @@ const WORST_SIGMA_R: f64 = 0.0873;
 
 /// Sums over poses, and the linear solution.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct PoseSums {
     /// Poses.
     pub n: usize,

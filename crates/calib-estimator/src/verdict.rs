@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 /// quantity, whatever a formula would return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Verdict {
     /// Determined by the data.
     Ok,

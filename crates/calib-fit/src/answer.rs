@@ -2,7 +2,9 @@
 
 use std::fmt::Write as _;
 
-use calib_estimator::{Estimate, EstimatorInfo, NotObservable, chance::t_quantile};
+use calib_estimator::{
+    Estimate, EstimatorInfo, NotObservable, chance::t_quantile, noise::Contradiction,
+};
 use nalgebra::{Isometry3, SMatrix};
 use serde_json::{Value, json};
 
@@ -41,6 +43,16 @@ pub(crate) fn freedom(degrees_of_freedom: Option<f64>) -> String {
         ),
         None => String::new(),
     }
+}
+
+/// A stated noise that the residuals exceed.
+pub(crate) fn contradicted(found: Option<&Contradiction>) -> String {
+    found.map_or_else(String::new, |c| {
+        format!(
+            "  noise: the residuals show {:.2} times what was stated (chance {:.1e}); sigma follows the residuals\n",
+            c.ratio, c.chance
+        )
+    })
 }
 
 /// The data do not answer.

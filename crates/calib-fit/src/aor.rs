@@ -7,7 +7,7 @@ use calib_estimator::{Kind, Verdict};
 use serde_json::json;
 
 use crate::TableRequest;
-use crate::answer::{Answer, answer, coordinates, doubt, matrix};
+use crate::answer::{Answer, answer, contradicted, coordinates, doubt, freedom, matrix};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
 use crate::road::{self, Command, Data, Road, Wish};
@@ -82,6 +82,8 @@ fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) 
         "point_m": e.line.point.coords.as_slice(),
         "direction": e.line.direction.as_slice(),
         "covariance": matrix(&e.covariance),
+        "degrees_of_freedom": e.degrees_of_freedom,
+        "contradicts": e.contradicts,
         "rms_m": e.rms,
         "used": e.used,
         "rejected": rejected,
@@ -92,6 +94,8 @@ fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) 
     );
     text += &doubt(e.reason.as_deref());
     let _ = writeln!(text, "  sigma {:.4} deg", e.sigma_direction.to_degrees());
+    text += &freedom(e.degrees_of_freedom);
+    text += &contradicted(e.contradicts.as_ref());
     let _ = writeln!(
         text,
         "  through {} m",

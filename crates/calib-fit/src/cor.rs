@@ -7,7 +7,7 @@ use calib_estimator::{Kind, Verdict};
 use serde_json::json;
 
 use crate::TableRequest;
-use crate::answer::{Answer, answer, coordinates, doubt, matrix};
+use crate::answer::{Answer, answer, contradicted, coordinates, doubt, freedom, matrix};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
 use crate::road::{self, Command, Data, Road, Wish};
@@ -101,6 +101,8 @@ fn cor_answer(table: &Table, id: &str, e: &CorEstimate) -> Answer {
         "  sigma  {:.4}, {:.4}, {:.4} mm",
         sigma.x, sigma.y, sigma.z
     );
+    text += &freedom(e.degrees_of_freedom);
+    text += &contradicted(e.noise.contradicts.as_ref());
     match &e.shape {
         Shape::Radii { radii, .. } => {
             value["radius_m"] = if radii.len() == 1 {
@@ -139,6 +141,8 @@ fn cor_answer(table: &Table, id: &str, e: &CorEstimate) -> Answer {
         _ => {}
     }
     value["covariance"] = matrix(&e.covariance);
+    value["contradicts"] = json!(e.noise.contradicts);
+    value["degrees_of_freedom"] = json!(e.degrees_of_freedom);
     value["rms_m"] = json!(e.rms);
     value["used"] = json!(e.used);
     value["rejected"] = json!(rejected);

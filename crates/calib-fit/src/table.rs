@@ -46,8 +46,8 @@ impl Table {
         };
         let pair = match (request.parent.is_empty(), request.child.is_empty()) {
             (false, false) => Some([
-                side(file, &poses, &request.parent)?,
-                side(file, &poses, &request.child)?,
+                side(file, &poses, &request.parent, request.sigma_m)?,
+                side(file, &poses, &request.child, request.sigma_m)?,
             ]),
             (true, true) => None,
             _ => {
@@ -74,7 +74,7 @@ impl Table {
             .map(|(name, track)| (name.clone(), track.clone()))
             .collect();
         let bodies: Vec<&String> = poses.bodies.keys().filter(|n| wanted(n)).collect();
-        let groups = rigid(&markers);
+        let groups = rigid(&markers, request.sigma_m);
         // Two markers make no body: each has a sphere or a circle of its own.
         if markers.len() >= 3 && groups.len() > 1 && request.only.is_empty() && pair.is_none() {
             return Err(several_bodies(file, &markers, &groups));
@@ -167,9 +167,9 @@ fn keep_rows_with(
     Ok(column.into_iter().flatten().collect())
 }
 
-fn rigid(markers: &[Track]) -> Vec<Vec<usize>> {
+fn rigid(markers: &[Track], sigma: Option<f64>) -> Vec<Vec<usize>> {
     let tracks: Vec<&[Option<Point3<f64>>]> = markers.iter().map(|(_, t)| t.as_slice()).collect();
-    rigid_groups(&tracks)
+    rigid_groups(&tracks, sigma)
 }
 
 /// Refuses the table, and names the group that moves most: most likely the one that was meant.
@@ -257,7 +257,12 @@ fn poses_of_markers(file: &Path, markers: &[Track]) -> Result<Vec<Option<Pose>>,
 }
 
 /// One side of a joint: a body of the table, or its markers as one.
-fn side(file: &Path, poses: &Poses, names: &[String]) -> Result<Vec<Option<Pose>>, FitError> {
+fn side(
+    file: &Path,
+    poses: &Poses,
+    names: &[String],
+    sigma: Option<f64>,
+) -> Result<Vec<Option<Pose>>, FitError> {
     if let [body] = names
         && let Some(track) = poses.bodies.get(body)
     {
@@ -274,7 +279,7 @@ fn side(file: &Path, poses: &Poses, names: &[String]) -> Result<Vec<Option<Pose>
         })?;
         markers.push((name.clone(), track.clone()));
     }
-    let groups = rigid(&markers);
+    let groups = rigid(&markers, sigma);
     if groups.len() > 1 {
         return Err(several_bodies(file, &markers, &groups));
     }

@@ -7,7 +7,10 @@
 //!
 //! The weights of (1) need not be those of the noise: (5) is the covariance of least squares with any weights.
 
-use calib_estimator::{Options, Verdict, chance::chi2_tail};
+use calib_estimator::{
+    Options, Verdict,
+    noise::{Contradiction, Level},
+};
 use nalgebra::Isometry3;
 
 use crate::{
@@ -80,7 +83,7 @@ pub(crate) fn judged(
         noise: HandEyeNoise {
             sigma_t: position.sigma,
             sigma_r: rotation.sigma,
-            degrees_of_freedom: match (position.freedom, rotation.freedom) {
+            degrees_of_freedom: match (position.degrees_of_freedom, rotation.degrees_of_freedom) {
                 (Some(t), Some(r)) => Some(t.min(r)),
                 (one, other) => one.or(other),
             },
@@ -99,50 +102,15 @@ pub(crate) fn judged(
     }
 }
 
-/// The level of one kind of noise.
-struct Level {
-    sigma: f64,
-    /// `None`: stated.
-    freedom: Option<f64>,
-    /// What was stated, and the chance of residuals as large, where they contradict it.
-    contradicts: Option<(f64, f64)>,
-}
-
-impl Level {
-    /// The stated level, unless the residuals show that the noise is larger.
-    fn of(stated: Option<f64>, seen: f64, freedom: f64, significance: f64) -> Self {
-        let seen = Self {
-            sigma: seen,
-            freedom: Some(freedom),
-            contradicts: None,
-        };
-        let Some(stated) = stated else {
-            return seen;
-        };
-        let chance = chi2_tail((seen.sigma / stated).powi(2) * freedom, freedom);
-        if chance < significance {
-            return Self {
-                contradicts: Some((stated, chance)),
-                ..seen
-            };
-        }
-        Self {
-            sigma: stated,
-            freedom: None,
-            contradicts: None,
-        }
-    }
-}
-
 fn contradicted(position: &Level, rotation: &Level) -> Option<String> {
-    if let Some((stated, chance)) = position.contradicts {
+    if let Some(Contradiction { stated, chance, .. }) = position.contradicts {
         return Some(format!(
             "the residuals show a position noise of {:.3} mm, {:.3} mm was stated (chance {chance:.1e})",
             position.sigma * 1e3,
             stated * 1e3
         ));
     }
-    let (stated, chance) = rotation.contradicts?;
+    let Contradiction { stated, chance, .. } = rotation.contradicts?;
     Some(format!(
         "the residuals show an orientation noise of {:.4}°, {:.4}° was stated (chance {chance:.1e})",
         rotation.sigma.to_degrees(),

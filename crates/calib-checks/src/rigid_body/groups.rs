@@ -3,8 +3,10 @@
 //! ```text
 //! s_jk = q₈₀(|d_jk − median d_jk|) / 1.28        spread of the distance of two markers over the rows that show both
 //! S_AB = max s_jk over j ∈ A, k ∈ B              groups are joined in the order of S (complete linkage)              (1)
-//! stop where S > 5 · max(S of the last join, 0.002 · the largest distance)
+//! stop where S > max(5 · S of the last join, 0.01 · the largest distance, 2.5 · √2 σ)
 //! ```
+//!
+//! σ is the noise of one coordinate: stated, or what the stiffest pair shows, up to 5 mm; beyond, markers are not on one body whatever the noise.
 //!
 //! A joint changes distances by centimeters, noise and skin by parts of a millimeter to some, and bodies need not be equally stiff: what tells a
 //! joint is the leap. The 80 % quantile bears one bad row in five and still sees a joint that moves in one row of four.
@@ -15,23 +17,28 @@ use nalgebra::Point3;
 const LEAP: f64 = 5.0;
 /// Spread up to which markers are on one body whatever the leap, as a part of the largest distance.
 const STIFF: f64 = 2e-3;
+/// Noise of a coordinate, m, up to which the spread of the stiffest pair counts as noise where none is stated.
+const PLAUSIBLE_NOISE: f64 = 5e-3;
+/// Spread of a pair, in units of its noise, up to which it is noise: that of four rows, the fewest, exceeds it once in a thousand.
+const NOISY: f64 = 2.5;
 /// Rows that two markers must share to be distinguished.
 const MIN_ROWS: usize = 4;
 
 /// The markers in groups that each keep their distances (1), by the first marker of each.
 ///
-/// Two markers that are never seen together are not distinguished by their own distance.
+/// Two markers that are never seen together are not distinguished by their own distance. `sigma`: noise of a coordinate, m, where it is stated.
 #[must_use]
-pub fn rigid_groups(tracks: &[&[Option<Point3<f64>>]]) -> Vec<Vec<usize>> {
+pub fn rigid_groups(tracks: &[&[Option<Point3<f64>>]], sigma: Option<f64>) -> Vec<Vec<usize>> {
     let n = tracks.len();
     let mut spread = vec![vec![0.0; n]; n];
-    let mut extent = 0.0_f64;
+    let (mut extent, mut stiffest) = (0.0_f64, f64::INFINITY);
     for j in 0..n {
         for k in 0..j {
             if let Some((median, wide)) = distance(tracks[j], tracks[k]) {
                 spread[j][k] = wide;
                 spread[k][j] = wide;
                 extent = extent.max(median);
+                stiffest = stiffest.min(wide);
             }
         }
     }
@@ -43,12 +50,16 @@ pub fn rigid_groups(tracks: &[&[Option<Point3<f64>>]]) -> Vec<Vec<usize>> {
     };
     let mut groups: Vec<Vec<usize>> = (0..n).map(|j| vec![j]).collect();
     let mut last = STIFF * extent;
+    // The distance of two markers has the noise of both.
+    let of_noise = sigma.map_or(stiffest.min(PLAUSIBLE_NOISE * f64::sqrt(2.0)), |s| {
+        s * f64::sqrt(2.0)
+    });
     while let Some((nearest, a, b)) = (0..groups.len())
         .flat_map(|b| (0..b).map(move |a| (a, b)))
         .map(|(a, b)| (apart(&groups[a], &groups[b]), a, b))
         .min_by(|x, y| x.0.total_cmp(&y.0))
     {
-        if nearest > LEAP * last {
+        if nearest > (LEAP * last).max(NOISY * of_noise) {
             break;
         }
         last = last.max(nearest);
@@ -121,7 +132,7 @@ mod tests {
 
     fn groups(tracks: &[Vec<Option<Point3<f64>>>]) -> Vec<Vec<usize>> {
         let tracks: Vec<&[Option<Point3<f64>>]> = tracks.iter().map(Vec::as_slice).collect();
-        rigid_groups(&tracks)
+        rigid_groups(&tracks, None)
     }
 
     #[test]
@@ -140,6 +151,49 @@ mod tests {
                 "{shake}"
             );
         }
+    }
+
+    #[test]
+    fn noise_of_millimeters_splits_no_body() {
+        let layout = [
+            [0.0, 0.0, 0.0],
+            [0.06, 0.0, 0.0],
+            [0.0, 0.05, 0.0],
+            [0.04, 0.05, 0.03],
+        ];
+        // SplitMix64, and twelve uniform numbers for a normal one.
+        let mut state = 0_u64;
+        let mut normal = || -> f64 {
+            let uniform = |_| {
+                state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+                let mut z = state;
+                z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+                z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+                ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+            };
+            (0..12).map(uniform).sum::<f64>() - 6.0
+        };
+        let mut split = 0;
+        for trial in 0..200 {
+            let rows = [8, 16, 63][trial % 3];
+            let sigma = [1e-3, 2.5e-3, 5e-3][trial % 3];
+            let tracks: Vec<Vec<_>> = layout
+                .iter()
+                .map(|p| {
+                    let seen = |row: usize| {
+                        let turn =
+                            Rotation3::from_axis_angle(&Vector3::z_axis(), 0.05 * row as f64);
+                        let noise = Vector3::new(normal(), normal(), normal()) * sigma;
+                        Some(turn * Point3::from(*p) + noise)
+                    };
+                    (0..rows).map(seen).collect()
+                })
+                .collect();
+            split += usize::from(groups(&tracks).len() > 1);
+            let slices: Vec<&[_]> = tracks.iter().map(Vec::as_slice).collect();
+            split += usize::from(rigid_groups(&slices, Some(sigma)).len() > 1);
+        }
+        assert!(split <= 2, "{split} of 400");
     }
 
     #[test]

@@ -398,7 +398,7 @@ mod tests {
             .map(f64::from)
             .map(|i| {
                 let (a, b) = (0.9 * (1.7 * i).sin(), 0.9 * (2.3 * i).cos());
-                let r = 1.0 + 1e-3 * (5.1 * i).sin();
+                let r = 1.0 + 1e-3 * (12.9898 * i * i).sin();
                 Some([r * a.sin() * b.cos(), r * b.sin(), r * a.cos() * b.cos()])
             })
             .collect();
