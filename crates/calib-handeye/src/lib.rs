@@ -44,6 +44,7 @@
 mod by_input;
 mod certificate;
 mod correction;
+mod dual_quaternion;
 mod gross;
 mod input;
 mod judge;
