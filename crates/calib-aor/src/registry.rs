@@ -4,13 +4,13 @@ use crate::{
     frame::FrameEstimate,
     frame_ml, frame_planes, halvorsen, hinge_bundle, hinge_poses, line_ml,
     outcome::{AorEstimate, Outcome},
-    planar_radial, plane, shared_axis,
+    planar_radial, plane, robust_line, shared_axis,
 };
 use calib_estimator::{
     EstimatorError, Input, InputKind, Kind, OptionId,
     OptionId::{
-        Angles, Axes, Center, PlaneFit, SameAngle, Separation, SigmaR, SigmaT, Significance,
-        Towards, WeakAngle, WeakFraction, Weights,
+        Angles, Axes, Center, PlaneFit, SameAngle, Seed, Separation, SigmaR, SigmaT, Significance,
+        Subsets, Towards, WeakAngle, WeakFraction, Weights,
     },
     Options, find,
 };
@@ -29,6 +29,17 @@ const CENTERED: &[OptionId] = &[
     Towards,
     Significance,
     WeakAngle,
+];
+/// Random subsets of samples.
+const RANDOM: &[OptionId] = &[
+    SigmaT,
+    Weights,
+    Angles,
+    Towards,
+    Significance,
+    WeakAngle,
+    Seed,
+    Subsets,
 ];
 /// Pairs of samples.
 const PAIRS: &[OptionId] = &[
@@ -152,6 +163,15 @@ const TABLE: &[EstimatorInfo] = &[
         summary: "bisecting planes of pairs of samples",
         source: "Halvorsen et al. 1999",
         fit: halvorsen::fit,
+    },
+    EstimatorInfo {
+        id: "robust_line",
+        name: "common line with outliers",
+        input: InputKind::Points,
+        options: RANDOM,
+        summary: "least trimmed squares over random subsets, then maximum likelihood of the samples that belong",
+        source: "Rousseeuw & Van Driessen 1999",
+        fit: robust_line::fit,
     },
 ];
 

@@ -1,11 +1,11 @@
-//! Few samples, noise estimated: how often the stated region of 95 % holds the direction, for every estimator of an axis.
+//! Few samples, noise estimated: how often the stated region of 95 % holds the direction, for every estimator of an axis; and outliers.
 
 mod common;
 
 use calib_aor::{Input, InputKind, Options, estimator, estimators};
 use calib_estimator::{Verdict, chance::f_quantile};
 use common::{Hinge, Noise, steps};
-use nalgebra::{Isometry3, Matrix2, Matrix3, SMatrix, Vector3};
+use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, SMatrix, Vector3};
 
 const MM: f64 = 1e-3;
 
@@ -87,4 +87,58 @@ fn regions_hold_the_direction_from_six_samples_up() {
 #[ignore = "study: 2 000 trials in every cell"]
 fn regions_hold_the_direction_from_six_samples_up_in_full() {
     study(2000);
+}
+
+/// A tenth and a fifth of the samples anywhere within 50 mm.
+#[test]
+fn outliers_do_no_harm_to_the_robust_line() {
+    let hinge = Hinge::slanted();
+    let places = hinge.layout(3, 0.1);
+    let angles = steps(0.0, 90.0, 20);
+    for every in [10, 5] {
+        let (mut inside, mut worst, mut plain) = (0, 0.0_f64, 0.0_f64);
+        const TRIALS: u64 = 20;
+        for seed in 0..TRIALS {
+            let mut noise = Noise::new(900 + seed);
+            let mut tracks = hinge.tracks(&places, &angles, 0.3 * MM, &mut noise);
+            let mut bad = Vec::new();
+            for (m, track) in tracks.iter_mut().enumerate() {
+                for (row, sample) in track.iter_mut().enumerate() {
+                    if (row + 7 * m + seed as usize).is_multiple_of(every) {
+                        let d = Vector3::from_fn(|_, _| noise.normal()).normalize();
+                        *sample = sample.map(|p: Point3<f64>| p + d * 0.05);
+                        bad.push(row);
+                    }
+                }
+            }
+            let angle = |id: &str| {
+                let info = estimator(id).expect(id);
+                let outcome = info
+                    .run(&Input::Points(&tracks), &Options::default())
+                    .expect(id);
+                let e = outcome.estimate().expect("a line").clone();
+                let off = e.line.direction.cross(&hinge.axis).norm();
+                (off, e)
+            };
+            let (off, e) = angle("robust_line");
+            assert!(
+                e.rejected
+                    .iter()
+                    .all(|row| bad.contains(row) || e.rejected.len() <= bad.len())
+            );
+            let axis = e.line.direction.into_inner();
+            let turned = axis * axis.dot(&hinge.axis).signum() - hinge.axis.into_inner();
+            let c: Matrix3<f64> = e.covariance.fixed_view::<3, 3>(0, 0).into();
+            let limit = 2.0 * f_quantile(0.05, 2.0, e.degrees_of_freedom);
+            inside += u64::from(mahalanobis(&c, &axis, &turned) <= limit);
+            worst = worst.max(off);
+            plain = plain.max(angle("line_ml").0);
+        }
+        println!(
+            "one in {every}: worst {worst:.5}, plain {plain:.5}, covered {inside} of {TRIALS}"
+        );
+        assert!(worst < 0.1 * plain, "one in {every}: {worst} {plain}");
+        // P(fewer than 16 of 20 at 95 %) is 0.3 %.
+        assert!(inside >= 16, "one in {every}: {inside} of {TRIALS}");
+    }
 }
