@@ -39,6 +39,7 @@ pub mod bend;
 pub mod bounds;
 pub mod gamage;
 pub mod hotspot;
+pub mod hotspot_mixture;
 pub mod hotspot_ml;
 pub mod hyper_n;
 mod noise_ratio;

@@ -2,7 +2,7 @@
 
 use crate::{
     algebraic::{self, Algebraic},
-    ball_bundle, gamage, hotspot, hotspot_ml, hyper_n,
+    ball_bundle, gamage, hotspot, hotspot_mixture, hotspot_ml, hyper_n,
     outcome::{CorEstimate, Outcome},
     robust, score, sfa, sphere_eiv, sphere_ml,
 };
@@ -163,6 +163,15 @@ const TABLE: &[EstimatorInfo] = &[
         summary: "weighs orientation against position noise, stated or estimated",
         source: "joint likelihood, see the book",
         fit: hotspot_ml::fit,
+    },
+    EstimatorInfo {
+        id: "hotspot_mixture",
+        name: "hot spot, over all noise ratios",
+        input: InputKind::Poses,
+        options: POSES,
+        summary: "hotspot_ml with the ratio of both noises integrated over, for few poses",
+        source: "joint likelihood, half-Cauchy prior on the ratio, see the book",
+        fit: hotspot_mixture::fit,
     },
     EstimatorInfo {
         id: "score",
