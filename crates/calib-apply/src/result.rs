@@ -40,6 +40,13 @@ pub fn find(path: &Path, force: bool) -> Result<Calibrated, ApplyError> {
     let mut notes = Vec::new();
     match report.as_ref().map(|r| r.verdict) {
         Some(Verdict::Accepted) => {}
+        Some(Verdict::AcceptedWithWarnings) => {
+            let line = report.as_ref().map(Report::verdict_line);
+            notes.push(format!(
+                "this calibration was {}: see its report.md",
+                line.unwrap_or_default()
+            ));
+        }
         Some(verdict) if force => notes.push(format!(
             "the verdict of this calibration is \"{}\", and --force was given",
             verdict.word()

@@ -26,6 +26,7 @@ use crate::prepare::robot::load_robot;
 use crate::verify::closure::close_loops;
 use crate::verify::held_out;
 use crate::verify::known::known_numbers;
+use crate::verify::left_out;
 use crate::verify::residuals::residual_rows;
 
 /// How to run.
@@ -35,6 +36,8 @@ pub struct RunOptions {
     pub method: Option<Method>,
     /// Go on although the data checks found errors.
     pub force: bool,
+    /// End with the exit code of a verdict that is not a pass where the verdict has warnings.
+    pub strict: bool,
     /// Load no plugin; a profile that names one fails.
     pub no_plugins: bool,
 }
@@ -106,13 +109,13 @@ pub fn run_on(
     let tracks = &checked.tracks;
     let (robot, fit) = (&solved.robot, solved.fit.as_ref());
     let loops = close_loops(&inputs, tracks, &solved.body_from_origin(), &solved.fk);
-    let held_out = held_out::held_out(
-        &inputs,
-        tracks,
-        Some(&nominal),
-        solved.registered.as_ref(),
-        robot,
-    );
+    let robots = held_out::Robots {
+        nominal: Some(&nominal),
+        registered: solved.registered.as_ref(),
+        calibrated: robot,
+    };
+    let held_out = held_out::held_out(&inputs, tracks, &robots, fit)
+        .or_else(|| left_out::left_out(&inputs, tracks, &robots, fit?));
     let known = fit.map_or_else(BTreeMap::new, |fit| known_numbers(&inputs, fit));
     let residuals = residual_rows(&inputs, tracks, robot, fit);
     progress("patch the URDF");
@@ -145,7 +148,7 @@ pub fn run_on(
         residuals: &residuals,
     });
     let files = files(&inputs, &report, &scene, written, &view)?;
-    let exit = exit_code(&report, fit, &origins);
+    let exit = exit_code(&report, options.strict, fit, &origins);
     Ok(RunOutput {
         report,
         files,
@@ -156,6 +159,7 @@ pub fn run_on(
 
 fn exit_code(
     report: &Report,
+    strict: bool,
     fit: Option<&MlFit>,
     origins: &BTreeMap<String, OriginEstimate>,
 ) -> ExitCode {
@@ -167,6 +171,8 @@ fn exit_code(
     }
     match report.verdict {
         Verdict::Accepted => ExitCode::Accepted,
+        Verdict::AcceptedWithWarnings if !strict => ExitCode::Accepted,
+        Verdict::AcceptedWithWarnings => ExitCode::VerdictFail,
         Verdict::Rejected | Verdict::NotEvaluated => ExitCode::VerdictFail,
     }
 }

@@ -48,10 +48,19 @@ pub struct RecordingSummary {
     pub used_for: RecordingUse,
     /// Rows in the file.
     pub rows: usize,
-    /// Rows that took part.
+    /// Rows of which something took part: in the fit, or in the verification where the recording is held out.
     pub used: usize,
-    /// Rows that were rejected.
+    /// Rows of which everything that was seen was rejected. Rows used, rejected, excluded and lost add up to `rows`.
     pub rejected: usize,
+    /// Rows of which everything that was not rejected was excluded before the fit.
+    #[serde(default)]
+    pub excluded: usize,
+    /// Rows without a joint reading or anything that was seen.
+    #[serde(default)]
+    pub rows_lost: usize,
+    /// The same of the single measurements: markers, measured bodies and contacts of the profile.
+    #[serde(default)]
+    pub measurements: Fates,
     /// Samples that the tracker or encoder lost.
     pub lost: Vec<Lost>,
     /// Conversions on reading: units, rotation conventions, ignored columns. One clause each.
@@ -60,6 +69,21 @@ pub struct RecordingSummary {
     /// The axis that points up, where the file states it (`+Z`).
     #[serde(default)]
     pub up_axis: Option<String>,
+}
+
+/// What became of measurements: `used`, `rejected`, `excluded` and `lost` add up to `of`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Fates {
+    /// All.
+    pub of: usize,
+    /// Took part in the fit, or in the verification where their recording is held out.
+    pub used: usize,
+    /// Rejected by the fit, or screened out of the verification.
+    pub rejected: usize,
+    /// Excluded before the fit.
+    pub excluded: usize,
+    /// Not seen by the tracker, or without a joint reading.
+    pub lost: usize,
 }
 
 /// Lost samples of one marker, body or joint.
@@ -82,6 +106,9 @@ pub struct Rejected {
     pub subject: String,
     /// Rows, counted from 1 without the header.
     pub rows: Vec<u64>,
+    /// How many measurements these are: an excluded body counts once per marker that was seen.
+    #[serde(default)]
+    pub measurements: usize,
     /// Why, as an id.
     #[serde(default)]
     pub cause: RejectedFor,
@@ -108,6 +135,8 @@ pub enum RejectedFor {
     Outlier,
     /// It lies where another marker of the same body should be.
     Swap,
+    /// It is a gross outlier among the held-out errors.
+    Screened,
     /// Not stated: a report of an earlier version.
     #[default]
     Unstated,
@@ -261,8 +290,15 @@ pub struct FitSummary {
     pub observations: usize,
     /// Scalar unknowns.
     pub unknowns: usize,
-    /// χ² per degree of freedom: about 1 when the noise explains the residuals; null for the closed forms.
+    /// χ² per degree of freedom with the noise that the profile states, and with the noise that was found where it states
+    /// none: about 1 when the noise explains the residuals; null for the closed forms.
     pub chi2_per_dof: Option<f64>,
+    /// The same with the noise that the stated uncertainty is made of; 1 by construction where all noise was estimated.
+    #[serde(default)]
+    pub chi2_used_per_dof: Option<f64>,
+    /// Groups of observations whose noise the profile states; empty: `chi2_per_dof` is 1 by construction.
+    #[serde(default)]
+    pub stated_noise: Vec<String>,
 }
 
 /// The predicted uncertainty of the tool over the workspace.

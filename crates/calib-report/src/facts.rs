@@ -14,6 +14,24 @@ pub enum Scope {
     },
     /// The contacts that were recorded.
     Contacts,
+    /// Only one joint at a time moved, away from the postures of the recordings.
+    SingleJointMotions,
+    /// Only positions: no orientation of the last body was measured.
+    PositionsOnly,
+    /// Where the held-out poses lie against the joint ranges of the fit.
+    HeldOutPoses {
+        /// Postures.
+        postures: usize,
+        /// Those with a joint outside of the fitted range.
+        outside: usize,
+        /// Joints that they hardly move, although the fit did.
+        still: Vec<String>,
+    },
+    /// Every pose was left out in turn: no pose is independent of the recordings of the fit.
+    LeftOutPoses {
+        /// Postures.
+        postures: usize,
+    },
     /// Only together with the joint effects in this file.
     EffectsOf {
         /// The file that holds them.
@@ -93,6 +111,35 @@ pub enum FitEnd {
     /// Not recorded.
     #[default]
     Unknown,
+}
+
+impl FitEnd {
+    /// Every end and its word in data.
+    const IDS: [(Self, &str); 5] = [
+        (Self::Converged, "converged"),
+        (Self::Stalled, "stalled"),
+        (Self::MaxIterations, "max_iterations"),
+        (Self::NotEvaluable, "not_evaluable"),
+        (Self::Unknown, "unknown"),
+    ];
+
+    /// The word in data, as in JSON.
+    #[must_use]
+    pub fn id(self) -> &'static str {
+        let ids = Self::IDS.iter();
+        ids.into_iter()
+            .find(|(end, _)| *end == self)
+            .map_or("unknown", |(_, id)| id)
+    }
+
+    /// The end of a word in data.
+    #[must_use]
+    pub fn of_id(id: &str) -> Self {
+        let ids = Self::IDS.iter();
+        ids.into_iter()
+            .find(|(_, known)| *known == id)
+            .map_or(Self::Unknown, |(end, _)| *end)
+    }
 }
 
 /// What a noise level is the noise of.

@@ -116,6 +116,7 @@ pub fn html(report: &Report, view: Option<&View3d>) -> Result<String, ReportErro
     });
     let (verdict_class, verdict_mark) = match report.verdict {
         Verdict::Accepted => ("accepted", "✓"),
+        Verdict::AcceptedWithWarnings => ("warned", "!"),
         Verdict::Rejected => ("rejected", "✗"),
         Verdict::NotEvaluated => ("open", "?"),
     };

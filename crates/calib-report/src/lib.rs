@@ -12,7 +12,8 @@
 //! [`Report`] holds them as a plain struct (SI: m, rad, s); [`markdown`], [`terminal`], [`json`], [`csv`] and [`html`] turn the
 //! struct into text: they change units and round ([`number`]), and compute nothing else. What has to be
 //! *summarized* (quantiles, bins, a verdict from limits) is a constructor of the data, next to its type: [`Stats::of`],
-//! [`ErrorStats::of`], [`HeldOut::from_poses`], [`Residuals::from_rows`], [`JointCoverage::of`], [`judge`].
+//! [`ErrorStats::of`], [`HeldOut::from_poses`], [`Residuals::from_rows`], [`JointCoverage::of`], [`judge`], which
+//! maps the facts of a result to its verdict.
 //!
 //! [`Scene`] is the calibrated world for a situation model: frames with covariance and status, markers, robot, provenance;
 //! [`Scene::json`] keeps every bit, [`Scene::ros_launch`] and [`Scene::sdf`] are derived and lossy.
@@ -25,6 +26,7 @@ mod data;
 mod error;
 mod facts;
 pub mod glb;
+mod held_out;
 pub mod html;
 pub mod json;
 pub mod markdown;
@@ -41,6 +43,7 @@ mod sections;
 mod svg;
 mod table;
 pub mod terminal;
+pub mod verdict;
 mod verification;
 pub mod view3d;
 mod weak;
@@ -48,16 +51,17 @@ mod words;
 
 pub use calib_finding::{Finding, Severity, Unit};
 pub use data::{
-    AccuracyLimit, Clock, FitSummary, Input, JointCoverage, Lost, Noise, Output, RecordingSummary,
-    RecordingUse, Rejected, RejectedFor, Workspace, WorkspacePoint,
+    AccuracyLimit, Clock, Fates, FitSummary, Input, JointCoverage, Lost, Noise, Output,
+    RecordingSummary, RecordingUse, Rejected, RejectedFor, Workspace, WorkspacePoint,
 };
 pub use error::ReportError;
 pub use facts::{
     ClockCheck, ErrorSource, FitEnd, MissingPhysics, NextStep, NoiseKind, Physics, Scope,
 };
+pub use held_out::{Distance, ExpectedError, HeldOut, OrientationErrors, PoseError, screen};
 pub use quantity::JointValue;
 pub use read::{NotAReport, REPORT, read_report, report_path};
-pub use report::{FormatVersion, Limit, Method, Outcome, Report, Verdict, judge};
+pub use report::{FormatVersion, Limit, Limited, Method, Outcome, Report, Verdict};
 pub use residuals::{JointResiduals, ResidualBin, ResidualGroup, ResidualRow, Residuals};
 pub use results::{
     Cause, Change, Class, DataInformation, EstimatorResult, Meaning, NotObservable, Parameter,
@@ -65,10 +69,11 @@ pub use results::{
 };
 pub use scene::Scene;
 pub use schema::{report_schema, scene_schema};
-pub use verification::{
-    AngleStats, ErrorStats, ExpectedError, HeldOut, LoopClosure, LoopGroup, OrientationErrors,
-    PoseError, Stats, Verification,
+pub use verdict::{
+    Compared, Effect, Goodness, ImplausibleChange, Improvement, Judgment, Orientation, Part,
+    Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver, Validation, VerdictFacts, judge,
 };
+pub use verification::{AngleStats, ErrorStats, LoopClosure, LoopGroup, Stats, Verification};
 pub use view3d::View3d;
 pub use weak::{HELD_BY_PRIOR, OpenDirection, RobotSize, WeakDirections, WeakTerm};
 pub use words::answers::{Answer, answers};

@@ -1,3 +1,4 @@
+use crate::verdict::{Effect, Judgment, Reason, ReasonId};
 use crate::{
     AccuracyLimit, Change, Clock, DataInformation, EstimatorResult, Finding, FitSummary, Input,
     JointCoverage, LoopClosure, Noise, NotObservable, Output, Parameter, RecordingSummary,
@@ -23,6 +24,12 @@ pub struct Report {
     pub verdict: Verdict,
     /// The reasons: one sentence each, the most important first.
     pub reasons: Vec<String>,
+    /// The ids of the reasons, in the same order.
+    #[serde(default)]
+    pub reason_ids: Vec<ReasonId>,
+    /// What each reason does to the verdict, and its values, in the same order.
+    #[serde(default)]
+    pub reason_facts: Vec<Reason>,
     /// What the verdict is valid for: one sentence each (tool point, joint ranges, load).
     #[serde(default)]
     pub scope: Vec<String>,
@@ -104,6 +111,38 @@ pub struct Report {
     pub version: String,
 }
 
+impl Report {
+    /// The same with a verdict and its reasons.
+    #[must_use]
+    pub fn judged(self, judgment: Judgment) -> Self {
+        let reasons = &judgment.reasons;
+        Self {
+            verdict: judgment.verdict,
+            reasons: reasons.iter().map(Reason::sentence).collect(),
+            reason_ids: reasons.iter().map(|reason| reason.id).collect(),
+            reason_facts: judgment.reasons,
+            ..self
+        }
+    }
+
+    /// How many reasons warn.
+    #[must_use]
+    pub fn warnings(&self) -> usize {
+        let warns = |reason: &&Reason| reason.effect == Effect::Warns;
+        self.reason_facts.iter().filter(warns).count()
+    }
+
+    /// Sentences of the reasons that speak against the result; all of them where a report states no effects.
+    pub fn objections(&self) -> impl Iterator<Item = &String> {
+        let supports = |i: usize| {
+            let reason = self.reason_facts.get(i);
+            reason.is_some_and(|reason| reason.effect == Effect::Supports)
+        };
+        let reasons = self.reasons.iter().enumerate();
+        reasons.filter(move |(i, _)| !supports(*i)).map(|(_, r)| r)
+    }
+}
+
 /// Version of the report's format: 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
@@ -141,11 +180,13 @@ impl Method {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Every limit was evaluated and met.
+    /// Every rule holds.
     Accepted,
-    /// A limit was exceeded, or a requested quantity is not observable.
+    /// Nothing speaks against the result, but some rules hold only in part: every limit is met by its estimate.
+    AcceptedWithWarnings,
+    /// A rule says that the result is wrong: a limit was exceeded, or a requested quantity is not observable.
     Rejected,
-    /// No limit was exceeded, but not every limit could be evaluated. Not accepted.
+    /// Nothing says that the result is wrong, and the evidence that it is right does not suffice. Not accepted.
     #[default]
     NotEvaluated,
 }
@@ -163,57 +204,70 @@ pub struct Limit {
     pub limit: f64,
     /// The value; `None` when it could not be evaluated.
     pub value: Option<f64>,
-    /// Met, exceeded, or not evaluated.
+    /// Lower end of the value's 95 % interval; `None` where the value is exact.
+    #[serde(default)]
+    pub low: Option<f64>,
+    /// Upper end of the same.
+    #[serde(default)]
+    pub high: Option<f64>,
+    /// Met, exceeded, undecided, or not evaluated.
     pub outcome: Outcome,
     /// Why it was not evaluated; empty otherwise.
     pub reason: String,
 }
 
+/// What a limit is about.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Limited {
+    /// The profile's key, `held_out_rms_mm`.
+    pub name: String,
+    /// The quantity, in words.
+    pub quantity: String,
+    /// SI unit.
+    pub unit: Unit,
+}
+
 impl Limit {
-    /// A limit that was evaluated. A value that is not finite meets no limit.
+    /// A limit against a value and its interval; without one the value is exact. A value that is not finite meets no limit.
     #[must_use]
-    pub fn evaluated(
-        name: impl Into<String>,
-        quantity: impl Into<String>,
-        unit: Unit,
-        limit: f64,
-        value: f64,
-    ) -> Self {
-        let outcome = if value <= limit {
+    pub fn compared(of: Limited, limit: f64, value: f64, interval: Option<(f64, f64)>) -> Self {
+        let (low, high) = interval.unwrap_or((value, value));
+        let outcome = if high <= limit {
             Outcome::Met
+        } else if low <= limit {
+            Outcome::Undecided
         } else {
             Outcome::Exceeded
         };
-        let value = value.is_finite().then_some(value);
         Self {
-            name: name.into(),
-            quantity: quantity.into(),
-            unit,
+            name: of.name,
+            quantity: of.quantity,
+            unit: of.unit,
             limit,
-            value,
+            value: value.is_finite().then_some(value),
+            low: interval.map(|i| i.0),
+            high: interval.map(|i| i.1),
             outcome,
             reason: String::new(),
         }
     }
 
+    /// A limit against an exact value.
+    #[must_use]
+    pub fn evaluated(of: Limited, limit: f64, value: f64) -> Self {
+        Self::compared(of, limit, value, None)
+    }
+
     /// A limit that could not be evaluated, and why.
     #[must_use]
-    pub fn not_evaluated(
-        name: impl Into<String>,
-        quantity: impl Into<String>,
-        unit: Unit,
-        limit: f64,
-        reason: impl Into<String>,
-    ) -> Self {
-        let outcome = Outcome::NotEvaluated;
+    pub fn not_evaluated(of: Limited, limit: f64, reason: impl Into<String>) -> Self {
         Self {
-            name: name.into(),
-            quantity: quantity.into(),
-            unit,
+            name: of.name,
+            quantity: of.quantity,
+            unit: of.unit,
             limit,
-            value: None,
-            outcome,
             reason: reason.into(),
+            ..Self::default()
         }
     }
 }
@@ -222,34 +276,15 @@ impl Limit {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// value ≤ limit.
+    /// The value, and the upper end of its interval where it has one, is at most the limit.
     Met,
-    /// value > limit, or not a number.
+    /// The value, and the lower end of its interval where it has one, is above the limit, or is not a number.
     Exceeded,
+    /// The limit lies within the interval of the value.
+    Undecided,
     /// No data to evaluate it with. Never accepted.
     #[default]
     NotEvaluated,
-}
-
-/// The verdict that the limits alone give: exceeded beats not evaluated beats met, and no limit at all is not evaluated.
-///
-/// The caller adds further reasons for rejection (a requested quantity that is not observable, a solver that stalled).
-#[must_use]
-pub fn judge(limits: &[Limit]) -> Verdict {
-    if limits
-        .iter()
-        .any(|limit| limit.outcome == Outcome::Exceeded)
-    {
-        Verdict::Rejected
-    } else if limits.is_empty()
-        || limits
-            .iter()
-            .any(|limit| limit.outcome == Outcome::NotEvaluated)
-    {
-        Verdict::NotEvaluated
-    } else {
-        Verdict::Accepted
-    }
 }
 
 #[cfg(test)]
@@ -257,23 +292,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_limit_that_was_not_evaluated_is_never_met() {
-        let met = Limit::evaluated("a", "", Unit::Meter, 1.0, 1.0);
-        let exceeded = Limit::evaluated("b", "", Unit::Meter, 1.0, 1.0 + 1e-12);
-        let not_a_number = Limit::evaluated("c", "", Unit::Meter, 1.0, f64::NAN);
-        let open = Limit::not_evaluated("d", "", Unit::Meter, 1.0, "no validation poses");
-        assert_eq!(not_a_number.outcome, Outcome::Exceeded);
-        assert_eq!(not_a_number.value, None);
-        let table = [
-            (vec![], Verdict::NotEvaluated),
-            (vec![met.clone()], Verdict::Accepted),
-            (vec![met.clone(), open.clone()], Verdict::NotEvaluated),
-            (vec![open.clone(), exceeded.clone()], Verdict::Rejected),
-            (vec![met, not_a_number], Verdict::Rejected),
-            (vec![open], Verdict::NotEvaluated),
-        ];
-        for (limits, verdict) in table {
-            assert_eq!(judge(&limits), verdict, "{limits:?}");
+    fn a_limit_is_compared_with_the_interval() {
+        let limit = |value, interval| Limit::compared(named(), 1.0, value, interval).outcome;
+        assert_eq!(limit(0.9, Some((0.8, 1.0))), Outcome::Met);
+        assert_eq!(limit(0.9, Some((0.8, 1.1))), Outcome::Undecided);
+        assert_eq!(limit(1.1, Some((0.9, 1.3))), Outcome::Undecided);
+        assert_eq!(limit(1.2, Some((1.1, 1.3))), Outcome::Exceeded);
+        assert_eq!(limit(1.0, None), Outcome::Met);
+        assert_eq!(limit(1.0 + 1e-12, None), Outcome::Exceeded);
+        assert_eq!(limit(f64::NAN, None), Outcome::Exceeded);
+        assert_eq!(Limit::compared(named(), 1.0, f64::NAN, None).value, None);
+    }
+
+    fn named() -> Limited {
+        Limited {
+            name: "a".into(),
+            quantity: String::new(),
+            unit: Unit::Meter,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The summary for a terminal: the verdict, its numbers, what is not observable. At most 80 columns.
 
 use crate::table::{Table, wrap};
+use crate::words;
 use crate::words::answers::answers_in;
 use crate::words::prose::{full_stop, sentence};
 use crate::{Class, Outcome, Report, Severity, Unit, Verdict, number};
@@ -72,12 +73,11 @@ impl Screen<'_> {
 
         self.text += &self.paint(
             verdict_style(self.report.verdict),
-            &self.report.verdict.word().to_uppercase(),
+            &self.report.verdict_line().to_uppercase(),
         );
         self.text.push('\n');
         // The table of limits already lists what was met.
-        let listed = self.report.verdict == Verdict::Accepted && !self.report.limits.is_empty();
-        for reason in self.report.reasons.iter().filter(|_| !listed) {
+        for reason in self.report.objections() {
             self.text += &wrap(&sentence(reason), COLUMNS, "- ", "  ");
         }
         for scope in &self.report.scope {
@@ -122,7 +122,8 @@ impl Screen<'_> {
         let Some(held_out) = &self.report.verification.held_out else {
             return;
         };
-        self.heading(&format!("Held-out errors [mm], {} values", held_out.n));
+        let title = words::held_out::heading(held_out);
+        self.heading(&title);
         let mut table = Table::new(&["<", ">mean", ">rms", ">95 %", ">max"]);
         for (name, stats) in [
             ("nominal", held_out.nominal),
@@ -135,15 +136,7 @@ impl Screen<'_> {
             table.row([name.to_owned()].into_iter().chain(cells));
         }
         self.text += &table.plain(COLUMNS);
-        if let Some(expected) = &held_out.expected {
-            let length = |m| number::plain(m, Unit::Meter);
-            let line = format!(
-                "Expected on a new pose: {} rms ({} interval {} to {}).",
-                length(expected.rms_m),
-                number::percent(expected.confidence),
-                length(expected.low_m),
-                length(expected.high_m)
-            );
+        for line in words::held_out::expected_lines(held_out) {
             self.text += &wrap(&line, COLUMNS, "  ", "  ");
         }
         if let Some(angle) = held_out.orientation.and_then(|o| o.calibrated) {
@@ -299,6 +292,7 @@ const CHANGES: usize = 8;
 fn verdict_style(verdict: Verdict) -> Style {
     match verdict {
         Verdict::Accepted => AnsiColor::Green.on_default().bold(),
+        Verdict::AcceptedWithWarnings => AnsiColor::Yellow.on_default().bold(),
         Verdict::Rejected => AnsiColor::Red.on_default().bold(),
         Verdict::NotEvaluated => AnsiColor::Yellow.on_default().bold(),
     }

@@ -28,6 +28,9 @@ pub struct Run {
     /// Continue although the data checks found errors
     #[arg(long)]
     pub force: bool,
+    /// Exit with 1 where the result is accepted with warnings
+    #[arg(long)]
+    pub strict: bool,
     /// Rank models by how well they predict each fitted pose from the others; writes nothing
     #[arg(long)]
     pub compare_models: bool,
@@ -69,6 +72,7 @@ pub fn run(quiet: bool, verbose: bool, options: &Run) -> Result<ExitCode, CliErr
             MethodName::Ml => calib_profile::Method::Ml,
         }),
         force: options.force,
+        strict: options.strict,
         no_plugins: options.no_plugins,
     };
     let output = run_profile(&options.profile, &run_options, &mut progress)?;

@@ -10,8 +10,9 @@ use crate::graph::problem::NoiseKind;
 use crate::graph::unit::Unit;
 use crate::model::layout::Model;
 use crate::model::values::Values;
-use crate::solve::equations::Objective;
+use crate::solve::equations::{Objective, Workspace};
 use crate::solve::minimize::SolveStatus;
+use crate::solve::normal::data_cost;
 use crate::solve::robust::Rejection;
 
 /// How well a parameter is identifiable.
@@ -135,6 +136,23 @@ impl Solution {
             weights: &self.weights,
             theta: &self.theta,
         }
+    }
+
+    /// eᵀV⁻¹e of the kept observations with these noise levels instead (σ per group, in the order of the problem).
+    /// `None` when there are not as many levels as groups or the model cannot be evaluated with them.
+    #[must_use]
+    pub fn chi2_with(&self, sigma: &[f64]) -> Option<f64> {
+        if sigma.len() != self.theta.len() {
+            return None;
+        }
+        let theta: Vec<f64> = sigma.iter().map(|s| s * s).collect();
+        let objective = Objective {
+            theta: &theta,
+            ..self.objective()
+        };
+        let mut work = Workspace::new(&self.model);
+        let chi2 = data_cost(objective, &self.values, &mut work);
+        chi2.is_finite().then_some(chi2)
     }
 }
 

@@ -113,7 +113,13 @@ impl Solution {
     /// Leave-one-sample-out by equation (1). `None` when the model cannot be evaluated.
     #[must_use]
     pub fn leave_one_out(&self) -> Option<CrossValidation> {
-        self.each_prediction(&self.weights, true)
+        self.leave_out(|_| true)
+    }
+
+    /// The same for the wanted samples only: what each costs grows with the square of the parameters.
+    #[must_use]
+    pub fn leave_out(&self, wanted: impl Fn(usize) -> bool) -> Option<CrossValidation> {
+        self.each_prediction(&self.weights, true, &wanted)
     }
 
     /// Predictions of the held-out samples by equation (2), whatever their weight in the fit was.
@@ -125,7 +131,7 @@ impl Solution {
             .iter()
             .map(|o| f64::from(u8::from(self.model.is_held_out(o.sample))))
             .collect();
-        self.each_prediction(&held, false)
+        self.each_prediction(&held, false, &|_| true)
     }
 
     /// Residuals `predicted ⊟ observed` of every observation at the solution, used, rejected and held out
@@ -155,7 +161,12 @@ impl Solution {
         Some(out)
     }
 
-    fn each_prediction(&self, include: &[f64], left_out: bool) -> Option<CrossValidation> {
+    fn each_prediction(
+        &self,
+        include: &[f64],
+        left_out: bool,
+        wanted: &dyn Fn(usize) -> bool,
+    ) -> Option<CrossValidation> {
         let model = &self.model;
         let mut work = Workspace::new(model);
         let mut system = NormalEquations::new(model.free());
@@ -168,7 +179,7 @@ impl Solution {
             ..self.objective()
         };
         let mut out = CrossValidation::default();
-        for sample in 0..model.problem.samples {
+        for sample in (0..model.problem.samples).filter(|sample| wanted(*sample)) {
             let Some(s) = whitened(included, &self.values, sample, &mut work) else {
                 continue;
             };

@@ -1,61 +1,29 @@
 //! Everything that was found, as the report's data. Renderers compute nothing; this does.
 
-use calib_finding::{Finding, Severity};
 use calib_profile::Method;
 use calib_report::{
-    Input, Limit, MissingPhysics, NextStep, Output, Report, Residuals, Scope, Verdict,
+    HeldOut, Input, MissingPhysics, NextStep, Output, Report, Residuals, Scope, Verdict,
     Verification, judge,
 };
 
-use crate::output::evidence::{Evidence, fit_end};
+use crate::formulate::formulation::MlFit;
+use crate::output::counts::fates;
+use crate::output::evidence::Evidence;
+use crate::output::facts::facts;
 use crate::output::of_data::{coverage, estimators, findings, recordings, rejected};
 use crate::output::of_fit::{
     fit_summary, missing_physics, noise, not_observable, parameters, transform,
 };
 use crate::output::verdict::{limits, next_steps, scope};
 use crate::output::weak::{self, weak_directions};
-use crate::verify::accuracy::{accuracy_limits, workspace};
+use crate::verify::accuracy::{accuracy_limits, tracker_sigma, workspace};
+use crate::verify::motions::motions;
 
 /// The report of a run.
 #[must_use]
 pub fn assemble(e: &Evidence<'_>) -> Report {
     let profile = &e.inputs.robot.profile;
     let file = &e.inputs.robot.file;
-    let limits = limits(&profile.solve.limits, e);
-    let mut verdict = judge(&limits);
-    // What decided: with an exceeded limit the others do not matter.
-    let decided = |l: &&Limit| match verdict {
-        Verdict::Accepted => true,
-        Verdict::Rejected => l.outcome == calib_report::Outcome::Exceeded,
-        Verdict::NotEvaluated => l.outcome == calib_report::Outcome::NotEvaluated,
-    };
-    let mut reasons: Vec<String> = limits.iter().filter(decided).map(Limit::sentence).collect();
-    if limits.is_empty() {
-        reasons.push(
-            "The profile sets no limits (`solve.limits`), so nothing could be accepted.".to_owned(),
-        );
-    }
-    for (name, origin) in e.origins {
-        if origin.pose.is_none() && e.method == Method::Paper {
-            verdict = Verdict::Rejected;
-            reasons.insert(
-                0,
-                format!("Origin `{name}` is not observable in its sweep."),
-            );
-        }
-    }
-    if let Some(fit) = e.fit
-        && !fit.solution.status.is_converged()
-    {
-        verdict = Verdict::Rejected;
-        reasons.insert(
-            0,
-            format!(
-                "The solver did not converge: it {}.",
-                fit_end(fit).after(fit.solution.iterations)
-            ),
-        );
-    }
     let goodness = e.fit.and_then(|fit| fit.solution.goodness_of_fit());
     let missing: Vec<MissingPhysics> = goodness
         .iter()
@@ -65,21 +33,21 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
     let workspace = e.fit.and_then(|fit| workspace(e.inputs, fit));
     let weak = e.fit.and_then(|fit| weak_directions(e.inputs, fit));
     let open = weak::findings(e.inputs, weak.as_ref(), e.held_out.as_ref());
-    if verdict == Verdict::Accepted && open.iter().any(|f| f.severity == Severity::Error) {
-        verdict = Verdict::NotEvaluated;
-        reasons.splice(0..0, open.iter().map(Finding::text));
-    }
     let findings = findings(e, &missing, open);
-    Report {
+    let joint_sigma = e.fit.and_then(joint_sigma).unwrap_or(0.0);
+    let motions = motions(e.inputs, joint_sigma);
+    let tracks = fates(e.inputs, e.tracks, e.fit, e.held_out.as_ref());
+    let limits = limits(&profile.solve.limits, e);
+    let judgment = judge(&facts(e, &findings, &limits, &motions, &tracks));
+    let verdict = judgment.verdict;
+    let report = Report {
         profile: file.clone(),
         robot: profile.robot.clone(),
         method: match e.method {
             Method::Paper => calib_report::Method::Paper,
             Method::Ml => calib_report::Method::Ml,
         },
-        verdict,
-        reasons,
-        scope: scope(e).iter().map(Scope::sentence).collect(),
+        scope: scope(e, &motions).iter().map(Scope::sentence).collect(),
         limits,
         next_steps: next_steps(e, verdict, &missing)
             .iter()
@@ -92,10 +60,12 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         not_observable: e.fit.map_or_else(Vec::new, not_observable),
         loops: e.loops.clone(),
         verification: Verification {
-            held_out: e.held_out.clone(),
+            held_out: held_out(e),
             outcome: match (&e.held_out, verdict) {
                 (None, _) | (_, Verdict::NotEvaluated) => calib_report::Outcome::NotEvaluated,
-                (_, Verdict::Accepted) => calib_report::Outcome::Met,
+                (_, Verdict::Accepted | Verdict::AcceptedWithWarnings) => {
+                    calib_report::Outcome::Met
+                }
                 (_, Verdict::Rejected) => calib_report::Outcome::Exceeded,
             },
             reason: if e.held_out.is_none() {
@@ -105,21 +75,15 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             },
         },
         estimators: estimators(e),
-        fit: e.fit.map(fit_summary),
+        fit: e.fit.map(|fit| fit_summary(profile, fit)),
         residuals: Residuals::from_rows(e.residuals),
         noise: e.fit.map_or_else(Vec::new, |fit| noise(e, fit)),
         clocks: crate::formulate::clock::clocks(e.inputs, e.fit),
-        recordings: recordings(e),
+        recordings: recordings(e.inputs, &tracks),
         coverage: coverage(e.inputs),
-        rejected: rejected(e.inputs, e.fit),
+        rejected: rejected(e.inputs, e.fit, e.held_out.as_ref()),
         accuracy_limits: e.fit.map_or_else(Vec::new, |fit| {
-            accuracy_limits(
-                e.inputs,
-                e.tracks,
-                e.held_out.as_ref(),
-                fit,
-                workspace.as_ref(),
-            )
+            accuracy_limits(e.inputs, e.held_out.as_ref(), fit, workspace.as_ref())
         }),
         weak_directions: weak,
         workspace,
@@ -145,7 +109,23 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             .map(|fit| crate::verify::information::data_information(e.inputs, fit)),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         ..Report::default()
+    };
+    report.judged(judgment)
+}
+
+/// The held-out errors with the share of the tracker's noise.
+fn held_out(e: &Evidence<'_>) -> Option<HeldOut> {
+    let mut held_out = e.held_out.clone()?;
+    if let Some(expected) = &mut held_out.expected {
+        expected.tracker_m = e.fit.and_then(tracker_sigma);
     }
+    Some(held_out)
+}
+
+/// Noise of the joint readings that was found, rad.
+fn joint_sigma(fit: &MlFit) -> Option<f64> {
+    let of_joints = |n: &&calib_core::NoiseEstimate| n.kind == calib_core::NoiseKind::Joint;
+    fit.solution.noise.iter().find(of_joints).map(|n| n.sigma)
 }
 
 /// The command that gives this report again, with the method where it is not the profile's.

@@ -1,8 +1,10 @@
 //! What a run leaves: the URDF, the scene, the pictures, the report as data, and the files.
 
 pub mod assemble;
+mod counts;
 pub mod evidence;
 pub mod export;
+mod facts;
 pub(crate) mod files;
 mod of_data;
 mod of_fit;

@@ -6,35 +6,22 @@ use calib_core::RejectReason;
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_profile::{Method, Usage};
 use calib_report::{
-    EstimatorResult, JointCoverage, Lost, MissingPhysics, RecordingSummary, RecordingUse, Rejected,
-    RejectedFor, Unit, number,
+    EstimatorResult, HeldOut, JointCoverage, Lost, MissingPhysics, PoseError, RecordingSummary,
+    RecordingUse, Rejected, RejectedFor, Unit, number,
 };
 
 use crate::formulate::formulation::MlFit;
+use crate::output::counts::{Tracks, count, rows};
 use crate::output::evidence::Evidence;
-use crate::prepare::inputs::Inputs;
+use crate::prepare::inputs::{Inputs, Loaded};
 use crate::verify::residuals::subject;
 
-pub(crate) fn recordings(e: &Evidence<'_>) -> Vec<RecordingSummary> {
+pub(crate) fn recordings(inputs: &Inputs, tracks: &Tracks) -> Vec<RecordingSummary> {
     let mut out = Vec::new();
-    for (name, r) in &e.inputs.recordings {
-        let mut lost = Vec::new();
-        for (marker, track) in &r.poses.markers {
-            lost.push(Lost {
-                subject: marker.clone(),
-                lost: track.iter().filter(|p| p.is_none()).count(),
-                of: track.len(),
-            });
-        }
-        for (body, track) in &r.poses.bodies {
-            lost.push(Lost {
-                subject: body.clone(),
-                lost: track.iter().filter(|p| p.is_none()).count(),
-                of: track.len(),
-            });
-        }
-        lost.retain(|l| l.lost > 0);
-        let whole_rows = r.q.iter().filter(|q| q.is_none()).count();
+    for (name, r) in &inputs.recordings {
+        let of_profile = &tracks[name];
+        let rows = count(rows(of_profile, r.poses.len()));
+        let fates = of_profile.iter().flat_map(|t| t.fates.iter().copied());
         out.push(RecordingSummary {
             name: name.clone(),
             path: r.spec.file.clone(),
@@ -43,15 +30,46 @@ pub(crate) fn recordings(e: &Evidence<'_>) -> Vec<RecordingSummary> {
                 Usage::Static => RecordingUse::Static,
                 Usage::Validation => RecordingUse::Validation,
             },
-            rows: r.poses.len(),
-            used: r.poses.len() - whole_rows,
-            rejected: whole_rows,
-            lost,
+            rows: rows.of,
+            used: rows.used,
+            rejected: rows.rejected,
+            excluded: rows.excluded,
+            rows_lost: rows.lost,
+            measurements: count(fates),
+            lost: lost(inputs, name),
             conversions: r.meta.conversions.clone(),
             up_axis: r.meta.up_axis.clone(),
         });
     }
     out
+}
+
+/// Samples that the tracker did not see, by marker and body of the file; what was excluded had been seen.
+fn lost(inputs: &Inputs, recording: &str) -> Vec<Lost> {
+    let poses = &inputs.recordings[recording].poses;
+    let markers = poses.markers.iter().map(|(name, track)| {
+        let seen: Vec<bool> = track.iter().map(Option::is_some).collect();
+        (name, seen)
+    });
+    let bodies = poses.bodies.iter().map(|(name, track)| {
+        let seen: Vec<bool> = track.iter().map(Option::is_some).collect();
+        (name, seen)
+    });
+    let taken_out = |row: usize, subject: &str| {
+        let key = (recording.to_owned(), row, subject.to_owned());
+        inputs.taken_out.contains(&key)
+    };
+    markers
+        .chain(bodies)
+        .map(|(subject, seen)| Lost {
+            subject: subject.clone(),
+            lost: (0..seen.len())
+                .filter(|row| !seen[*row] && !taken_out(*row, subject))
+                .count(),
+            of: seen.len(),
+        })
+        .filter(|l| l.lost > 0)
+        .collect()
 }
 
 pub(crate) fn coverage(inputs: &Inputs) -> Vec<JointCoverage> {
@@ -79,39 +97,77 @@ pub(crate) fn coverage(inputs: &Inputs) -> Vec<JointCoverage> {
     out
 }
 
-pub(crate) fn rejected(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Rejected> {
-    let mut groups: BTreeMap<(String, String, RejectedFor), Vec<u64>> = BTreeMap::new();
+/// Recording, body or marker, and why.
+type Cause = (String, String, RejectedFor);
+
+/// What took no part, by cause: excluded before the fit, rejected by it, screened out of the held-out errors.
+pub(crate) fn rejected(
+    inputs: &Inputs,
+    fit: Option<&MlFit>,
+    held_out: Option<&HeldOut>,
+) -> Vec<Rejected> {
+    let mut groups: BTreeMap<Cause, (Vec<u64>, usize)> = BTreeMap::new();
+    let mut add = |recording: &str, subject: &str, cause: RejectedFor, row: usize, measurements| {
+        let rows = inputs.recordings.get(recording).map(|r| &r.poses.rows);
+        let Some(row) = rows.and_then(|rows| rows.get(row)) else {
+            return;
+        };
+        let cause = (recording.to_owned(), subject.to_owned(), cause);
+        let group = groups.entry(cause).or_default();
+        group.0.push(*row);
+        group.1 += measurements;
+    };
     for out in &inputs.excluded {
-        let row = inputs.recordings.get(&out.recording);
-        if let Some(row) = row.and_then(|r| r.poses.rows.get(out.row)) {
-            groups
-                .entry((out.recording.clone(), out.body.clone(), out.cause))
-                .or_default()
-                .push(*row);
-        }
+        let seen = inputs.taken_out_of(out);
+        add(&out.recording, &out.body, out.cause, out.row, seen);
     }
     for (fit, r) in fit
         .into_iter()
         .flat_map(|fit| fit.solution.rejected.iter().map(move |r| (fit, r)))
     {
         let (recording, row) = &fit.formulation.samples[r.sample];
-        let cause = match r.reason {
-            RejectReason::Swap => RejectedFor::Swap,
-            RejectReason::Occlusion => RejectedFor::Occlusion,
-            RejectReason::Outlier => RejectedFor::Outlier,
-            RejectReason::NotSettled => RejectedFor::NotSettled,
-        };
-        let row = inputs.recordings[recording].poses.rows[*row];
         let subject = subject(fit, r.measurement, r.item);
-        groups
-            .entry((recording.clone(), subject, cause))
-            .or_default()
-            .push(row);
+        add(recording, &subject, cause(r.reason), *row, 1);
+    }
+    // Errors of left-out poses repeat what the fit rejected.
+    let screened = held_out
+        .into_iter()
+        .filter(|h| !h.left_out)
+        .flat_map(|h| &h.poses)
+        .filter(|pose| pose.screened);
+    for (recording, row, subject) in screened.filter_map(|pose| place(inputs, pose)) {
+        add(recording, subject, RejectedFor::Screened, row, 1);
     }
     groups
         .into_iter()
-        .map(|((recording, subject, cause), rows)| Rejected::new(recording, subject, rows, cause))
+        .map(
+            |((recording, subject, cause), (rows, measurements))| Rejected {
+                measurements,
+                ..Rejected::new(recording, subject, rows, cause)
+            },
+        )
         .collect()
+}
+
+fn cause(reason: RejectReason) -> RejectedFor {
+    match reason {
+        RejectReason::Swap => RejectedFor::Swap,
+        RejectReason::Occlusion => RejectedFor::Occlusion,
+        RejectReason::Outlier => RejectedFor::Outlier,
+        RejectReason::NotSettled => RejectedFor::NotSettled,
+    }
+}
+
+/// Recording, row from 0 and subject of an error.
+fn place<'a>(inputs: &'a Inputs, pose: &'a PoseError) -> Option<(&'a str, usize, &'a str)> {
+    let validation = |r: &&Loaded| r.spec.usage == Usage::Validation;
+    let mut recordings = inputs.recordings.values().filter(validation);
+    recordings.find_map(|r| {
+        let rows = r.poses.rows.iter();
+        let mut labels = rows.map(|row| format!("{}:{row}", r.name));
+        let row = labels.position(|label| label == pose.pose)?;
+        Some((r.name.as_str(), row, pose.subject.as_str()))
+    })
 }
 
 pub(crate) fn findings(

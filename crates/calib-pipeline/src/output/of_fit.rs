@@ -1,6 +1,7 @@
 //! The fit as the report's data.
 
 use calib_core::{Gauge, NoiseKind};
+use calib_profile::Profile;
 use calib_report::{Cause, FitSummary, NotObservable, Parameter, Term, Transform, Unit};
 
 use crate::formulate::formulation::MlFit;
@@ -99,8 +100,15 @@ fn cause(gauge: Gauge) -> Cause {
     }
 }
 
-pub(crate) fn fit_summary(fit: &MlFit) -> FitSummary {
+pub(crate) fn fit_summary(profile: &Profile, fit: &MlFit) -> FitSummary {
     let s = &fit.solution;
+    // Against what the profile states, where it states something; what was found explains itself.
+    let levels = s
+        .noise
+        .iter()
+        .map(|n| stated_sigma(profile, &n.name).unwrap_or(n.sigma));
+    let chi2 = s.chi2_with(&levels.collect::<Vec<_>>()).unwrap_or(s.chi2);
+    let groups = s.noise.iter().map(|n| &n.name);
     FitSummary {
         ended: fit_end(fit),
         status: fit_end(fit).after(s.iterations),
@@ -108,18 +116,28 @@ pub(crate) fn fit_summary(fit: &MlFit) -> FitSummary {
         iterations: s.iterations,
         observations: s.weights.iter().filter(|w| **w > 0.0).count(),
         unknowns: s.model.free(),
-        chi2_per_dof: Some(s.chi2_stated / s.degrees_of_freedom.max(1.0)),
+        chi2_per_dof: Some(chi2 / s.degrees_of_freedom.max(1.0)),
+        chi2_used_per_dof: Some(s.chi2 / s.degrees_of_freedom.max(1.0)),
+        stated_noise: groups
+            .filter(|name| stated_sigma(profile, name).is_some())
+            .cloned()
+            .collect(),
+    }
+}
+
+/// The noise level that the profile states for a group of observations.
+pub(crate) fn stated_sigma(profile: &Profile, group: &str) -> Option<f64> {
+    match group {
+        "marker" => profile.tracker.marker_sigma,
+        "body position" => profile.tracker.body_sigma,
+        "body orientation" => profile.tracker.body_sigma_rad,
+        "joint" => profile.solve.noise.joint,
+        _ => None,
     }
 }
 
 pub(crate) fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
     let profile = &e.inputs.robot.profile;
-    let stated = |name: &str| match name {
-        "marker" => profile.tracker.marker_sigma,
-        "body position" => profile.tracker.body_sigma,
-        "body orientation" => profile.tracker.body_sigma_rad,
-        _ => profile.solve.noise.joint,
-    };
     fit.solution
         .noise
         .iter()
@@ -136,7 +154,7 @@ pub(crate) fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
                 _ => Unit::Radian,
             },
             sigma: Some(n.sigma),
-            stated: stated(&n.name),
+            stated: stated_sigma(profile, &n.name),
             samples: n.samples,
             text: calib_report::Noise::method(n.estimated).to_owned(),
         })

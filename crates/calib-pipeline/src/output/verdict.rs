@@ -1,58 +1,74 @@
-//! The limits of the profile against what was measured, and what to do next.
+//! The limits of the profile against what was measured, the scope, and what to do next.
 
 use calib_profile::{Limits, Method};
-use calib_report::{Limit, MissingPhysics, NextStep, Scope, Unit, Verdict};
+use calib_report::{HeldOut, Limit, Limited, MissingPhysics, NextStep, Scope, Verdict};
 
 use crate::output::evidence::Evidence;
+use crate::verify::motions::Motions;
 
 pub(crate) fn limits(limits: &Limits, e: &Evidence<'_>) -> Vec<Limit> {
-    let calibrated = e.held_out.as_ref().and_then(|h| h.calibrated);
     let mut out = Vec::new();
-    let mut held_out = |name: &str, quantity: &str, limit: Option<f64>, value: Option<f64>| {
+    // (limit, what it is about, value and its interval)
+    type Value = Option<(f64, Option<(f64, f64)>)>;
+    let mut compare = |limit: Option<f64>, of: Limited, value: Value| {
         let Some(limit) = limit else { return };
         out.push(match value {
-            Some(value) => Limit::evaluated(name, quantity, Unit::Meter, limit, value),
-            None => Limit::not_evaluated(name, quantity, Unit::Meter, limit, "no validation poses"),
+            Some((value, interval)) => Limit::compared(of, limit, value, interval),
+            None => of.unknown(limit),
         });
     };
-    held_out(
-        "held_out_rms_mm",
-        "rms position error on held-out poses",
+    let held_out = e.held_out.as_ref();
+    let left_out = held_out.is_some_and(|h| h.left_out);
+    let position = held_out.and_then(|h| h.calibrated);
+    let angle = held_out
+        .and_then(|h| h.orientation)
+        .and_then(|o| o.calibrated);
+    let expected = held_out
+        .and_then(|h| h.expected)
+        .map(|x| (x.low_m, x.high_m));
+    let of_angle = held_out.and_then(|h: &HeldOut| h.orientation_interval_rad);
+    compare(
         limits.held_out_rms,
-        calibrated.map(|c| c.rms_m),
+        Limited::position_rms(left_out),
+        position.map(|p| (p.rms_m, expected)),
     );
-    held_out(
-        "held_out_max_mm",
-        "largest position error on held-out poses",
+    compare(
         limits.held_out_max,
-        calibrated.map(|c| c.max_m),
+        Limited::position_max(left_out),
+        position.map(|p| (p.max_m, None)),
+    );
+    compare(
+        limits.held_out_rms_rad,
+        Limited::orientation_rms(left_out),
+        angle.map(|a| (a.rms_rad, of_angle.map(|[low, high]| (low, high)))),
+    );
+    compare(
+        limits.held_out_max_rad,
+        Limited::orientation_max(left_out),
+        angle.map(|a| (a.max_rad, None)),
     );
     for (name, limit) in &limits.loop_mean {
         let closed = e.loops.iter().find(|l| l.name == *name);
-        held_out(
-            &format!("loop_mean_mm.{name}"),
-            &format!("mean translation error of loop `{name}`"),
-            Some(*limit),
-            closed.map(|l| l.translation_m.mean),
-        );
+        let mean = closed.map(|l| {
+            let interval = l.translation_m.mean_interval(l.samples);
+            (l.translation_m.mean, interval)
+        });
+        compare(Some(*limit), Limited::loop_mean(name), mean);
     }
-    if let Some(limit) = limits.origin_sigma {
-        for f in e.found {
-            let sigma = f
-                .covariance
-                .map(|c| c.fixed_view::<3, 3>(3, 3).trace().max(0.0).sqrt());
-            held_out(
-                "origin_sigma_mm",
-                &format!("standard deviation of the position of `{}`", f.name),
-                Some(limit),
-                sigma,
-            );
-        }
+    for f in e.found.iter().filter(|_| limits.origin_sigma.is_some()) {
+        let sigma = f
+            .covariance
+            .map(|c| c.fixed_view::<3, 3>(3, 3).trace().max(0.0).sqrt());
+        compare(
+            limits.origin_sigma,
+            Limited::origin_sigma(&f.name),
+            sigma.map(|sigma| (sigma, None)),
+        );
     }
     out
 }
 
-pub(crate) fn scope(e: &Evidence<'_>) -> Vec<Scope> {
+pub(crate) fn scope(e: &Evidence<'_>, motions: &Motions) -> Vec<Scope> {
     let profile = &e.inputs.robot.profile;
     let mut scope = vec![if profile.bodies.is_empty() {
         Scope::Contacts
@@ -61,6 +77,25 @@ pub(crate) fn scope(e: &Evidence<'_>) -> Vec<Scope> {
             frame: profile.tracker.frame.clone(),
         }
     }];
+    if motions.fitted_one_by_one {
+        scope.push(Scope::SingleJointMotions);
+    }
+    match &e.held_out {
+        Some(held_out) if held_out.left_out => scope.push(Scope::LeftOutPoses {
+            postures: held_out.postures,
+        }),
+        Some(held_out) => {
+            scope.push(Scope::HeldOutPoses {
+                postures: motions.postures,
+                outside: motions.outside,
+                still: motions.still.clone(),
+            });
+            if held_out.orientation.is_none() {
+                scope.push(Scope::PositionsOnly);
+            }
+        }
+        None => {}
+    }
     if e.robot.effects.iter().any(|j| !j.fits_into_urdf()) {
         scope.push(Scope::EffectsOf {
             file: crate::output::export::calibration_name(&profile.outputs.urdf),
@@ -77,12 +112,14 @@ pub(crate) fn next_steps(
     verdict: Verdict,
     missing: &[MissingPhysics],
 ) -> Vec<NextStep> {
+    let has_limits = e.inputs.robot.profile.solve.limits != Limits::default();
+    let has_validation = e.held_out.as_ref().is_some_and(|h| !h.left_out);
     let mut steps = vec![match verdict {
-        Verdict::Accepted => NextStep::Use {
+        Verdict::Accepted | Verdict::AcceptedWithWarnings => NextStep::Use {
             urdf: e.inputs.robot.profile.outputs.urdf.clone(),
         },
-        Verdict::Rejected => NextStep::FixProblems,
-        Verdict::NotEvaluated => NextStep::AddValidation,
+        Verdict::NotEvaluated if !has_limits || !has_validation => NextStep::AddValidation,
+        Verdict::Rejected | Verdict::NotEvaluated => NextStep::FixProblems,
     }];
     if let Some(first) = missing.first() {
         steps.push(NextStep::EnableEffect {

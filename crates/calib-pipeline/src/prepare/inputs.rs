@@ -1,6 +1,6 @@
 //! A robot and its recordings, ready for the estimators.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -72,6 +72,8 @@ pub struct Inputs {
     pub findings: Vec<Finding>,
     /// What of the recordings takes no part, found before the fit.
     pub excluded: Vec<Excluded>,
+    /// The measurements that this took out: recording, row from 0, marker or body.
+    pub taken_out: BTreeSet<(String, usize, String)>,
     /// Digests of all files read, profile first.
     pub digests: Vec<Digest>,
     /// Estimators, readers and writers that the profile can name.
@@ -82,6 +84,10 @@ impl Inputs {
     /// Takes bodies and markers of single rows out, as if the tracker had lost them, and remembers why.
     pub fn exclude(&mut self, excluded: Vec<Excluded>) {
         for out in &excluded {
+            let taken_out = &mut self.taken_out;
+            let mut remember = |subject: &str| {
+                taken_out.insert((out.recording.clone(), out.row, subject.to_owned()));
+            };
             let markers = match self.robot.profile.bodies.get(&out.body).map(|b| &b.kind) {
                 Some(BodyKind::Markers { names, .. }) => names.clone(),
                 Some(BodyKind::Pose) | None => vec![out.body.clone()],
@@ -89,21 +95,36 @@ impl Inputs {
             let Some(loaded) = self.recordings.get_mut(&out.recording) else {
                 continue;
             };
-            if let Some(pose) = loaded
-                .poses
-                .bodies
-                .get_mut(&out.body)
-                .and_then(|track| track.get_mut(out.row))
-            {
-                *pose = None;
+            let bodies = &mut loaded.poses.bodies;
+            let track = bodies.get_mut(&out.body);
+            let pose = track.and_then(|track| track.get_mut(out.row));
+            if pose.is_some_and(|pose| pose.take().is_some()) {
+                remember(&out.body);
             }
             for marker in markers {
                 let track = loaded.poses.markers.get_mut(&marker);
-                if let Some(point) = track.and_then(|track| track.get_mut(out.row)) {
-                    *point = None;
+                let point = track.and_then(|track| track.get_mut(out.row));
+                if point.is_some_and(|point| point.take().is_some()) {
+                    remember(&marker);
                 }
             }
         }
         self.excluded.extend(excluded);
+    }
+
+    /// How many measurements this took out: markers of a body, or a body or stream of its own.
+    #[must_use]
+    pub fn taken_out_of(&self, excluded: &Excluded) -> usize {
+        let body = self.robot.profile.bodies.get(&excluded.body);
+        let markers = body.map(|body| match &body.kind {
+            BodyKind::Markers { names, .. } => names.as_slice(),
+            BodyKind::Pose => &[],
+        });
+        let seen = |subject: &String| {
+            let key = (excluded.recording.clone(), excluded.row, subject.clone());
+            self.taken_out.contains(&key)
+        };
+        let subjects = markers.unwrap_or_default().iter().chain([&excluded.body]);
+        subjects.filter(|subject| seen(subject)).count()
     }
 }

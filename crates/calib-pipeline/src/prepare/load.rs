@@ -1,6 +1,6 @@
 //! Reads the profile, the robot and the recordings. No other stage opens a file.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use calib_plugin::{Control, Source};
@@ -72,6 +72,7 @@ pub fn load_recordings(robot: RobotProfile, plugins: bool) -> Result<Inputs, Pip
         recordings,
         findings,
         excluded: Vec::new(),
+        taken_out: BTreeSet::new(),
         digests,
         estimators: Arc::new(estimators),
     };
@@ -163,6 +164,7 @@ pub fn of_tables(
     }
     Ok(Inputs {
         excluded: Vec::new(),
+        taken_out: BTreeSet::new(),
         digests: robot.digests.clone(),
         robot,
         recordings,

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::{Configuration, GroupId};
+use calib_core::{Configuration, GroupId, NoiseKind};
 use calib_geometry::so3;
-use calib_profile::Usage;
+use calib_profile::{BodyKind, Usage};
 use calib_report::{AccuracyLimit, ErrorSource, HeldOut, Workspace, WorkspacePoint};
 use calib_urdf::LinkId;
 use nalgebra::Matrix6;
@@ -97,10 +97,15 @@ pub(crate) fn workspace(inputs: &Inputs, fit: &MlFit) -> Option<Workspace> {
         .map(|w| w.relative_to(&inputs.robot.profile.tracker.frame))
 }
 
+/// The noise level of a group that was found.
+fn noise_level(fit: &MlFit, group: Option<GroupId>) -> Option<f64> {
+    let level = fit.solution.noise.iter().find(|n| Some(n.id) == group)?;
+    Some(level.sigma)
+}
+
 /// What a tool error on a new pose is made of: rms over the held-out poses, in meters.
 pub(crate) fn accuracy_limits(
     inputs: &Inputs,
-    tracks: &BTreeMap<String, BodyTrack>,
     held_out: Option<&HeldOut>,
     fit: &MlFit,
     workspace: Option<&Workspace>,
@@ -109,16 +114,9 @@ pub(crate) fn accuracy_limits(
         return Vec::new();
     };
     let groups = fit.formulation.noise;
-    let sigma_of = |group: Option<GroupId>| {
-        let level = fit.solution.noise.iter().find(|n| Some(n.id) == group)?;
-        Some(level.sigma)
-    };
+    let sigma_of = |group| noise_level(fit, group);
     let parameters = workspace.map_or(0.0, |w| w.rms_sigma_m);
-    let tracker = tracker_sigma(
-        (inputs, tracks),
-        sigma_of(groups.marker),
-        sigma_of(groups.body_position),
-    );
+    let tracker = tracker_sigma(fit).unwrap_or(0.0);
     let joints = sigma_of(groups.joint).unwrap_or(0.0) * joint_lever(inputs);
     let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
     let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
@@ -143,19 +141,47 @@ pub(crate) fn accuracy_limits(
     limits
 }
 
-/// σ of one measured position, as the held-out errors count it (m): of a body by its origin, otherwise of a marker.
-fn tracker_sigma(
-    (inputs, tracks): (&Inputs, &BTreeMap<String, BodyTrack>),
-    marker: Option<f64>,
-    body: Option<f64>,
-) -> f64 {
-    let of_template = tool_link(inputs).and_then(|tool| {
-        let bodies = &inputs.robot.profile.bodies;
-        let (name, _) = bodies.iter().find(|(_, b)| b.link == tool)?;
-        let template = tracks.get(name)?.template.as_ref()?;
-        // Fit of a pose to n markers: information JᵀJ/σ² with J_i = [−[p_i]ₓ, 1], and the part of the origin.
-        let information: Matrix6<f64> = template
-            .points
+/// The body that the longest chain of joints carries.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ToolBody<'a> {
+    name: &'a String,
+    kind: &'a BodyKind,
+}
+
+pub(crate) fn tool_body(inputs: &Inputs) -> Option<ToolBody<'_>> {
+    let tool = tool_link(inputs)?;
+    let mut bodies = inputs.robot.profile.bodies.iter();
+    let (name, body) = bodies.find(|(_, body)| body.link == tool)?;
+    let kind = &body.kind;
+    Some(ToolBody { name, kind })
+}
+
+impl ToolBody<'_> {
+    /// What its errors are listed under: its markers, or its own name.
+    pub(crate) fn subjects(&self) -> Vec<&String> {
+        match self.kind {
+            BodyKind::Markers { names, .. } => names.iter().chain([self.name]).collect(),
+            BodyKind::Pose => vec![self.name],
+        }
+    }
+
+    /// rms angle that the noise of one measurement of its orientation makes, rad; `None` where none is measured.
+    pub(crate) fn orientation_noise(
+        &self,
+        tracks: &BTreeMap<String, BodyTrack>,
+        fit: Option<&MlFit>,
+    ) -> Option<f64> {
+        let fit = fit?;
+        let groups = fit.formulation.noise;
+        let track = tracks.get(self.name)?;
+        if *self.kind == BodyKind::Pose || track.is_computed() {
+            let mut noise = fit.solution.noise.iter();
+            let level = noise.find(|n| n.kind == NoiseKind::Orientation)?;
+            return Some(level.sigma * 3.0_f64.sqrt());
+        }
+        // Fit of a pose to n markers: information JᵀJ/σ² with J_i = [−[p_i]ₓ, 1], and the part of the rotation.
+        let points = &track.template.as_ref()?.points;
+        let information: Matrix6<f64> = points
             .iter()
             .map(|p| {
                 let mut j = nalgebra::Matrix3x6::zeros();
@@ -166,12 +192,17 @@ fn tracker_sigma(
             })
             .sum();
         let covariance = nalgebra::Cholesky::new(information)?.inverse();
-        Some(covariance.fixed_view::<3, 3>(3, 3).trace().max(0.0).sqrt())
-    });
-    match (marker, of_template) {
-        (Some(sigma), Some(factor)) => sigma * factor,
-        (sigma, _) => sigma.or(body).unwrap_or(0.0) * 3.0_f64.sqrt(),
+        let rotation = covariance.fixed_view::<3, 3>(0, 0).trace().max(0.0).sqrt();
+        Some(noise_level(fit, groups.marker)? * rotation)
     }
+}
+
+/// Noise of one measured position, rms of its length (m), as the held-out errors count it: by marker, else by body.
+pub(crate) fn tracker_sigma(fit: &MlFit) -> Option<f64> {
+    let groups = fit.formulation.noise;
+    let sigma =
+        noise_level(fit, groups.marker).or_else(|| noise_level(fit, groups.body_position))?;
+    Some(sigma * 3.0_f64.sqrt())
 }
 
 /// Root sum of squares over the joints of how far the tool moves per radian, rms over held-out poses, m.

@@ -1,196 +1,145 @@
 //! Position and orientation errors on poses that were not fitted: nominal, registration only, calibrated.
+//!
+//! All measurements count: every marker of every body that a joint moves, the pose of a body that is measured as one, and
+//! the orientation of every body whose markers define it. Gross outliers are screened by the rule of the fit
+//! ([`calib_report::screen`]).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_profile::{BodyKind, Usage};
-use calib_report::{HeldOut, JointValue, PoseError, Unit};
-use nalgebra::{Isometry3, Vector3};
+use calib_report::{Distance, HeldOut, PoseError};
 
-use crate::formulate::contacts::miss;
+use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::Calibration;
-use crate::prepare::conditions::conditions;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
+use crate::verify::deviations::{Deviation, Key, deviations, joint_values};
+use crate::verify::residuals::subject;
 
-/// Predicted minus measured position of one body or marker in one row, tracker frame, m.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Deviation {
-    /// Recording.
-    pub recording: String,
-    /// Row in its table, from 0.
-    pub row: usize,
-    /// Body, marker or contact.
-    pub subject: String,
-    /// Predicted − measured, m.
-    pub vector: Vector3<f64>,
-    /// Angle between predicted and measured orientation, rad; `None` for a marker.
-    pub angle: Option<f64>,
+/// The robots whose errors stand side by side.
+#[derive(Debug, Clone, Copy)]
+pub struct Robots<'a> {
+    /// As in the nominal URDF, bodies placed by closed forms.
+    pub nominal: Option<&'a Calibration>,
+    /// The same after the fit of tracker and bodies.
+    pub registered: Option<&'a Calibration>,
+    /// The calibrated robot.
+    pub calibrated: &'a Calibration,
 }
 
-/// Deviations of a robot from what the tracker saw of every body that a joint moves, in recordings of one use.
-///
-/// A body with a frame counts once, by its origin; a body without one counts once per marker.
-#[must_use]
-pub fn deviations(
-    inputs: &Inputs,
-    tracks: &BTreeMap<String, BodyTrack>,
-    robot: &Calibration,
-    usage: impl Fn(Usage) -> bool,
-) -> Vec<Deviation> {
-    let model = &inputs.robot.model;
-    let mut out = Vec::new();
-    for (name, loaded) in inputs
-        .recordings
-        .iter()
-        .filter(|(_, r)| usage(r.spec.usage))
-    {
-        let under = conditions(loaded, model, inputs.robot.profile.solve.load);
-        for (row, q) in loaded.q.iter().enumerate() {
-            let Some(q) = q else { continue };
-            let root_from_link = robot.root_from_link_under(q, &under[row]);
-            for (contact_name, contact) in &inputs.robot.profile.contacts {
-                if contact.recordings.contains(name)
-                    && let Some(off) = miss(inputs, contact_name, robot, &root_from_link)
-                {
-                    out.push(Deviation {
-                        recording: name.clone(),
-                        row,
-                        subject: contact_name.clone(),
-                        vector: off,
-                        angle: None,
-                    });
-                }
-            }
-            for (body_name, body) in &inputs.robot.profile.bodies {
-                if model
-                    .chain(model.root(), body.link)
-                    .iter()
-                    .all(|s| model.joint(s.joint).kind.axis().is_none())
-                {
-                    continue;
-                }
-                let tracker_from_link = robot.tracker_from_root * root_from_link[body.link.index()];
-                let mut push = |subject: &str, vector: Vector3<f64>, angle: Option<f64>| {
-                    out.push(Deviation {
-                        recording: name.clone(),
-                        row,
-                        subject: subject.to_owned(),
-                        vector,
-                        angle,
-                    });
-                };
-                let track = &tracks[body_name];
-                let seen: Option<Isometry3<f64>> =
-                    track.in_recording(name).get(row).copied().flatten();
-                if let (Some(mount), Some(seen)) = (robot.mounts.get(body_name), seen) {
-                    let predicted = tracker_from_link * mount;
-                    push(
-                        body_name,
-                        predicted.translation.vector - seen.translation.vector,
-                        Some(predicted.rotation.angle_to(&seen.rotation)),
-                    );
-                } else if let (BodyKind::Markers { names, .. }, None) =
-                    (&body.kind, &track.template)
-                {
-                    for marker in names {
-                        let on_link = robot.points.get(body_name).and_then(|p| p.get(marker));
-                        let seen = loaded.poses.markers.get(marker).and_then(|t| t[row]);
-                        if let (Some(on_link), Some(seen)) = (on_link, seen) {
-                            push(marker, tracker_from_link * on_link - seen, None);
-                        }
-                    }
-                }
-            }
-        }
-    }
-    out
-}
-
-/// Held-out errors of up to three robots side by side; `None` without validation rows.
+/// Errors in the validation recordings; `None` without validation rows.
 #[must_use]
 pub fn held_out(
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
-    nominal: Option<&Calibration>,
-    registration_only: Option<&Calibration>,
-    calibrated: &Calibration,
+    robots: &Robots<'_>,
+    fit: Option<&MlFit>,
 ) -> Option<HeldOut> {
     let validation = |usage| usage == Usage::Validation;
     let of = |robot: Option<&Calibration>| {
-        robot.map_or_else(Vec::new, |r| deviations(inputs, tracks, r, validation))
+        robot.map_or_else(BTreeMap::new, |r| {
+            by_key(deviations(inputs, tracks, r, validation))
+        })
     };
-    let (nominal, registered) = (of(nominal), of(registration_only));
-    let length = |d: &[Deviation], i: usize| d.get(i).map(|d| d.vector.norm());
-    let angle = |d: &[Deviation], i: usize| d.get(i).and_then(|d| d.angle);
-    let best = deviations(inputs, tracks, calibrated, validation);
+    let (nominal, registered) = (of(robots.nominal), of(robots.registered));
+    let distances = fit.map(distances).unwrap_or_default();
+    let best = deviations(inputs, tracks, robots.calibrated, validation);
     if best.is_empty() {
         return None;
     }
-    let poses = best
+    let mut poses: Vec<PoseError> = best
         .iter()
-        .enumerate()
-        .map(|(i, d)| {
-            let loaded = &inputs.recordings[&d.recording];
-            let group = loaded
-                .spec
-                .group
-                .as_ref()
-                .and_then(|g| loaded.poses.labels.get(g));
+        .map(|d| {
+            let key = d.key();
+            let length = |of: &BTreeMap<Key, Deviation>| of.get(&key).map(|d| d.vector.norm());
+            let angle = |of: &BTreeMap<Key, Deviation>| of.get(&key).and_then(|d| d.angle);
             PoseError {
-                pose: format!("{}:{}", d.recording, loaded.poses.rows[d.row]),
-                subject: d.subject.clone(),
-                group: group.map_or_else(String::new, |g| g[d.row].clone()),
-                joints: joint_values(inputs, &d.recording, d.row),
-                nominal_m: length(&nominal, i),
-                registration_only_m: length(&registered, i),
+                nominal_m: length(&nominal),
+                registration_only_m: length(&registered),
                 calibrated_m: Some(d.vector.norm()),
                 vector_m: Some(d.vector.into()),
-                nominal_rad: angle(&nominal, i),
-                registration_only_rad: angle(&registered, i),
+                nominal_rad: angle(&nominal),
+                registration_only_rad: angle(&registered),
                 calibrated_rad: d.angle,
+                distance: distances.get(&key).copied(),
+                ..labeled(inputs, &key)
             }
         })
         .collect();
-    let touched = |contact: &calib_profile::Contact| {
-        let mut used = contact.recordings.iter();
-        used.any(|r| validation(inputs.recordings[r].spec.usage))
-    };
-    let touches = inputs.robot.profile.contacts.values().any(touched);
-    Some(HeldOut::from_poses(
-        if touches {
-            "position of the tracked bodies, and how far touches miss"
-        } else {
-            "position of the tracked bodies"
-        },
-        poses,
-    ))
+    calib_report::screen(&mut poses);
+    without_spoiled_orientations(inputs, &mut poses);
+    Some(HeldOut::from_poses(quantity(inputs, validation), poses))
 }
 
-/// Recorded joint positions of a row.
-#[must_use]
-pub fn joint_values(inputs: &Inputs, recording: &str, row: usize) -> Vec<JointValue> {
-    let model = &inputs.robot.model;
-    let Some(loaded) = inputs.recordings.get(recording) else {
-        return Vec::new();
-    };
-    let Some(q) = loaded.q.get(row).and_then(Option::as_ref) else {
-        return Vec::new();
-    };
-    model
-        .independent_joints()
-        .filter(|id| loaded.poses.joints.contains_key(&model.joint(*id).name))
-        .map(|id| {
-            let joint = model.joint(id);
-            let unit = if joint.kind.turns() {
-                Unit::Radian
-            } else {
-                Unit::Meter
-            };
-            JointValue {
-                joint: joint.name.clone(),
-                value: q[id.index()],
-                unit,
-            }
+/// A marker that was screened out spoils the orientation of its body in that posture: it is not counted either.
+fn without_spoiled_orientations(inputs: &Inputs, poses: &mut [PoseError]) {
+    let bodies = inputs.robot.profile.bodies.values();
+    let bodies: Vec<&Vec<String>> = bodies
+        .filter_map(|body| match &body.kind {
+            BodyKind::Markers { names, .. } => Some(names),
+            BodyKind::Pose => None,
         })
-        .collect()
+        .collect();
+    let of_body = |subject: &String| bodies.iter().position(|names| names.contains(subject));
+    let screened = poses.iter().filter(|pose| pose.screened);
+    let spoiled: BTreeSet<(String, usize)> = screened
+        .filter_map(|pose| Some((pose.pose.clone(), of_body(&pose.subject)?)))
+        .collect();
+    for pose in poses.iter_mut().filter(|pose| !pose.screened) {
+        let body = of_body(&pose.subject);
+        if body.is_some_and(|body| spoiled.contains(&(pose.pose.clone(), body))) {
+            pose.nominal_rad = None;
+            pose.registration_only_rad = None;
+            pose.calibrated_rad = None;
+        }
+    }
+}
+
+/// An error without numbers: where it was seen.
+pub(crate) fn labeled(inputs: &Inputs, (recording, row, subject): &Key) -> PoseError {
+    let loaded = &inputs.recordings[recording];
+    let group = loaded.spec.group.as_ref();
+    let group = group.and_then(|g| loaded.poses.labels.get(g));
+    PoseError {
+        pose: format!("{recording}:{}", loaded.poses.rows[*row]),
+        subject: subject.clone(),
+        group: group.map_or_else(String::new, |g| g[*row].clone()),
+        joints: joint_values(inputs, recording, *row),
+        ..PoseError::default()
+    }
+}
+
+pub(crate) fn by_key(deviations: Vec<Deviation>) -> BTreeMap<Key, Deviation> {
+    deviations.into_iter().map(|d| (d.key(), d)).collect()
+}
+
+/// Errors of the held-out samples in units of what the fit predicts: noise and parameters.
+fn distances(fit: &MlFit) -> BTreeMap<Key, Distance> {
+    let predicted = fit.solution.held_out().into_iter();
+    let samples = predicted.flat_map(|p| p.samples);
+    let mut out = BTreeMap::new();
+    for sample in samples {
+        let (recording, row) = &fit.formulation.samples[sample.sample];
+        for v in sample.vectors {
+            let key = (recording.clone(), *row, subject(fit, v.measurement, v.item));
+            let distance = Distance {
+                z: v.z,
+                rows: v.error.len(),
+            };
+            out.insert(key, distance);
+        }
+    }
+    // A distance that is not finite has no JSON form, and no prediction.
+    out.retain(|_, distance| distance.z.is_finite());
+    out
+}
+
+/// What is measured in recordings of one use.
+pub(crate) fn quantity(inputs: &Inputs, usage: impl Fn(Usage) -> bool) -> &'static str {
+    let touched = |contact: &calib_profile::Contact| {
+        let mut used = contact.recordings.iter();
+        used.any(|r| usage(inputs.recordings[r].spec.usage))
+    };
+    let touches = inputs.robot.profile.contacts.values().any(touched);
+    HeldOut::quantity_of(!inputs.robot.profile.bodies.is_empty(), touches)
 }

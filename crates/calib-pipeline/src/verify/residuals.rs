@@ -14,7 +14,7 @@ use crate::formulate::kinematics::Calibration;
 use crate::prepare::conditions::conditions;
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::tracks::BodyTrack;
-use crate::verify::held_out::joint_values;
+use crate::verify::deviations::joint_values;
 
 /// What the solver left out: recording, row and marker or body.
 #[must_use]

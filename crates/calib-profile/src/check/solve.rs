@@ -86,6 +86,8 @@ impl Checker<'_> {
         Limits {
             held_out_rms: raw.held_out_rms_mm.map(|l| l * MM),
             held_out_max: raw.held_out_max_mm.map(|l| l * MM),
+            held_out_rms_rad: raw.held_out_rms_deg.map(f64::to_radians),
+            held_out_max_rad: raw.held_out_max_deg.map(f64::to_radians),
             loop_mean: raw
                 .loop_mean_mm
                 .iter()

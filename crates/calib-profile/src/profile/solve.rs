@@ -187,6 +187,10 @@ pub struct Limits {
     pub held_out_rms: Option<f64>,
     /// Largest position error on held-out poses, m.
     pub held_out_max: Option<f64>,
+    /// rms orientation error on held-out poses, rad.
+    pub held_out_rms_rad: Option<f64>,
+    /// Largest orientation error on held-out poses, rad.
+    pub held_out_max_rad: Option<f64>,
     /// Mean translation error by loop, m.
     pub loop_mean: BTreeMap<String, f64>,
     /// Standard deviation of an origin's observable position, m.

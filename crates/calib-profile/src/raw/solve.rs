@@ -63,7 +63,8 @@ pub struct RawNoise {
     pub known: bool,
 }
 
-/// Limits of the verdict. A limit that could not be evaluated is never a pass.
+/// Limits of the verdict, compared with the 95 % interval of what was measured. A limit that could not be evaluated is
+/// never a pass. Without validation recordings every fitted pose is left out in turn.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawLimits {
@@ -73,6 +74,12 @@ pub struct RawLimits {
     /// Largest accepted position error on held-out poses, mm.
     #[serde(default)]
     pub held_out_max_mm: Option<f64>,
+    /// Largest accepted rms orientation error on held-out poses, deg.
+    #[serde(default)]
+    pub held_out_rms_deg: Option<f64>,
+    /// Largest accepted orientation error on held-out poses, deg.
+    #[serde(default)]
+    pub held_out_max_deg: Option<f64>,
     /// Largest accepted mean translation error of a loop, by loop, mm.
     #[serde(default)]
     pub loop_mean_mm: BTreeMap<String, f64>,

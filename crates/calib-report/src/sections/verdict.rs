@@ -13,15 +13,13 @@ const POSES: usize = 10;
 pub(super) fn head(page: &mut Page, report: &Report) {
     page.section(
         "verdict",
-        format!("Calibration of {}: {}", report.robot, report.verdict.word()),
+        format!("Calibration of {}: {}", report.robot, report.verdict_line()),
     );
     if report.verdict == Verdict::NotEvaluated {
-        page.text("No limit was exceeded, but not every limit could be evaluated: the result is not accepted.");
+        page.text("Nothing says that the result is wrong, and the evidence that it is right does not suffice: it is not accepted.");
     }
     // The table of limits already lists what was met.
-    if report.verdict != Verdict::Accepted || report.limits.is_empty() {
-        page.list(report.reasons.iter().map(|reason| sentence(reason)));
-    }
+    page.list(report.objections().map(|reason| sentence(reason)));
     let mut limits = Table::new(&["<limit", ">value", ">limit", "<", "<reason"]);
     for limit in &report.limits {
         limits.row([

@@ -18,10 +18,15 @@ impl FitEnd {
     }
 }
 
-/// `converged after 7 iterations (354 measured poses and points, 89 unknowns, χ²/dof 1.03)`
+/// `converged after 7 iterations (354 measured poses and points, 89 unknowns, χ²/dof 1.03 (at the stated noise: marker))`
 pub(crate) fn summary(fit: &FitSummary) -> String {
+    let against = if fit.stated_noise.is_empty() {
+        "1 by construction: the profile states no noise".to_owned()
+    } else {
+        format!("at the stated noise: {}", fit.stated_noise.join(", "))
+    };
     let chi2 = fit.chi2_per_dof.map_or_else(String::new, |chi2| {
-        format!(", χ²/dof {}", number::fixed(chi2, 2))
+        format!(", χ²/dof {} ({against})", number::fixed(chi2, 2))
     });
     format!(
         "{} ({} measured poses and points, {} unknowns{chi2})",

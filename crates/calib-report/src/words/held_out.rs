@@ -1,7 +1,7 @@
 //! Errors on poses that were not fitted.
 
 use super::prose::{capital, counted, full_stop};
-use crate::{HeldOut, JointValue, PoseError, Report, Unit, number};
+use crate::{ExpectedError, HeldOut, JointValue, PoseError, Report, Unit, number};
 
 /// Joints of the worst pose in an answer: an arm and a torso.
 const JOINTS: usize = 14;
@@ -14,6 +14,67 @@ pub(crate) fn missing(report: &Report) -> String {
     }
 }
 
+/// `0.51 mm rms (95 % interval 0.42 mm to 0.63 mm)`
+fn rms(expected: &ExpectedError) -> String {
+    let length = |m| number::plain(m, Unit::Meter);
+    format!(
+        "{} rms ({} interval {} to {})",
+        length(expected.rms_m),
+        number::percent(expected.confidence),
+        length(expected.low_m),
+        length(expected.high_m),
+    )
+}
+
+/// `; the tracker's noise is 0.5 mm of it, 0.1 mm remain without`
+fn tracker(expected: &ExpectedError) -> String {
+    let length = |m| number::plain(m, Unit::Meter);
+    match (expected.tracker_m, expected.without_tracker()) {
+        (Some(tracker), Some(without)) => format!(
+            "; the noise of one tracker measurement, {}, is included: {} without it",
+            length(tracker),
+            length(without)
+        ),
+        _ => String::new(),
+    }
+}
+
+/// What a screening left out, and the error with it.
+fn screened(held_out: &HeldOut) -> Option<String> {
+    let with = held_out.with_screened.as_ref()?;
+    let why = if held_out.left_out {
+        "were rejected by the fit"
+    } else {
+        "were screened out as gross outliers"
+    };
+    Some(format!(
+        "{} of {} {why}; counted, the error is {} rms, {} maximum.",
+        held_out.screened,
+        counted(held_out.n + held_out.screened, "error"),
+        number::plain(with.rms_m, Unit::Meter),
+        number::plain(with.max_m, Unit::Meter)
+    ))
+}
+
+/// Above the table of a terminal: `Held-out errors [mm], 20 values`.
+pub(crate) fn heading(held_out: &HeldOut) -> String {
+    let which = if held_out.left_out {
+        "Errors of poses left out in turn"
+    } else {
+        "Held-out errors"
+    };
+    format!("{which} [mm], {} values", held_out.n)
+}
+
+/// Below that table.
+pub(crate) fn expected_lines(held_out: &HeldOut) -> Vec<String> {
+    let expected = held_out.expected.iter();
+    expected
+        .map(|e| format!("Expected on a new pose: {}{}.", rms(e), tracker(e)))
+        .chain(screened(held_out))
+        .collect()
+}
+
 pub(crate) fn expected_error(report: &Report) -> Vec<String> {
     let Some(held_out) = &report.verification.held_out else {
         return vec![missing(report)];
@@ -22,13 +83,9 @@ pub(crate) fn expected_error(report: &Report) -> Vec<String> {
     let length = |m| number::plain(m, Unit::Meter);
     let basis = basis(held_out);
     match (&held_out.expected, &held_out.calibrated) {
-        (Some(expected), _) => lines.push(format!(
-            "{} rms ({} interval {} to {}): {basis}.",
-            length(expected.rms_m),
-            number::percent(expected.confidence),
-            length(expected.low_m),
-            length(expected.high_m),
-        )),
+        (Some(expected), _) => {
+            lines.push(format!("{}: {basis}{}.", rms(expected), tracker(expected)));
+        }
         (None, Some(calibrated)) => lines.push(format!(
             "{} rms: {basis}, too few for an interval.",
             length(calibrated.rms_m),
@@ -49,6 +106,7 @@ pub(crate) fn expected_error(report: &Report) -> Vec<String> {
             length(registration.rms_m)
         ));
     }
+    lines.extend(screened(held_out));
     lines
 }
 
@@ -59,14 +117,19 @@ fn basis(held_out: &HeldOut) -> String {
     } else {
         format!("{}, ", held_out.quantity)
     };
+    let poses = if held_out.left_out {
+        "left-out pose"
+    } else {
+        "held-out pose"
+    };
     let n = if held_out.postures > 0 && held_out.postures != held_out.n {
         format!(
             "{} in {}",
             counted(held_out.n, "error"),
-            counted(held_out.postures, "held-out pose")
+            counted(held_out.postures, poses)
         )
     } else {
-        counted(held_out.n, "held-out pose")
+        counted(held_out.n, poses)
     };
     quantity + &n
 }
@@ -127,6 +190,16 @@ pub(crate) fn joints(joints: &[JointValue]) -> String {
 }
 
 impl HeldOut {
+    /// What is measured where bodies are tracked, things are touched, or both.
+    #[must_use]
+    pub fn quantity_of(bodies: bool, touches: bool) -> &'static str {
+        match (bodies, touches) {
+            (false, _) => "how far touches miss",
+            (true, true) => "position of the tracked bodies, and how far touches miss",
+            (true, false) => "position of the tracked bodies",
+        }
+    }
+
     /// The errors of one pose, by body, for the 3-D view: `Error of gripM: 0.31 mm and 0.2°; of linkM: 0.42 mm`. Empty
     /// where the pose has none.
     #[must_use]

@@ -15,6 +15,7 @@ impl RejectedFor {
             Self::Occlusion => "occlusion: a pose needed to predict it was lost",
             Self::Outlier => "outlier: residual too large for the noise",
             Self::Swap => "swapped with another marker of the body",
+            Self::Screened => "gross outlier among the held-out errors",
             Self::Unstated => "rejected",
         }
     }
@@ -32,6 +33,7 @@ impl Rejected {
         Self {
             recording: recording.into(),
             subject: subject.into(),
+            measurements: rows.len(),
             rows,
             cause,
             reason: cause.words().to_owned(),

@@ -1,7 +1,24 @@
 //! Samples that did not take part in the fit.
 
 use super::prose::{counted, or, short};
-use crate::{Rejected, Report};
+use crate::{RecordingSummary, RecordingUse, Rejected, Report, number};
+
+/// Share of good measurements that the fit's gate rejects by chance.
+const BY_CHANCE: f64 = 0.001;
+
+/// How many measurements of the fit the gate rejected, and how many it rejects by chance alone.
+fn by_chance(report: &Report) -> Option<String> {
+    let fitted = |r: &&RecordingSummary| r.used_for != RecordingUse::Validation;
+    let counts = || report.recordings.iter().filter(fitted);
+    let rejected: usize = counts().map(|r| r.measurements.rejected).sum();
+    let tested: usize = counts().map(|r| r.measurements.used).sum::<usize>() + rejected;
+    (rejected > 0).then(|| {
+        format!(
+            "{rejected} of {tested} fitted measurements were rejected; about {} of as many good ones are, by chance.",
+            number::fixed(BY_CHANCE * tested as f64, 1)
+        )
+    })
+}
 
 pub(crate) fn rejected(report: &Report, rest: &str) -> Vec<String> {
     let line = |rejected: &Rejected| {
@@ -19,6 +36,7 @@ pub(crate) fn rejected(report: &Report, rest: &str) -> Vec<String> {
     };
     let lines: Vec<String> = report.rejected.iter().map(line).collect();
     let mut lines = or(short(&lines, rest), "Nothing.");
+    lines.extend(by_chance(report));
     let recordings = report.recordings.iter();
     let lost: usize = recordings.flat_map(|r| &r.lost).map(|lost| lost.lost).sum();
     match lost {

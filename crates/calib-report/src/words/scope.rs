@@ -1,5 +1,6 @@
 //! What a result is valid for.
 
+use super::prose::{code, counted};
 use crate::Scope;
 
 impl Scope {
@@ -14,6 +15,37 @@ impl Scope {
                 "The recorded contacts, within the recorded joint ranges and at the recorded load."
                     .to_owned()
             }
+            Self::SingleJointMotions => {
+                "Motions of one joint at a time from the recorded postures: no recording moves several joints."
+                    .to_owned()
+            }
+            Self::PositionsOnly => {
+                "Positions only: the orientation of the last body was not measured.".to_owned()
+            }
+            Self::HeldOutPoses {
+                postures,
+                outside,
+                still,
+            } => {
+                let range = match outside {
+                    0 => "all of them within the joint ranges of the fit".to_owned(),
+                    n => format!("{n} of them beyond the joint ranges of the fit"),
+                };
+                let joints: Vec<String> = still.iter().map(|joint| code(joint)).collect();
+                let still = if joints.is_empty() {
+                    String::new()
+                } else {
+                    format!("; they hardly move {}", joints.join(", "))
+                };
+                format!(
+                    "Verified on {}, {range}{still}.",
+                    counted(*postures, "held-out posture")
+                )
+            }
+            Self::LeftOutPoses { postures } => format!(
+                "Verified on {} of the fit, each left out in turn: poses like those, on the same day.",
+                counted(*postures, "posture")
+            ),
             Self::EffectsOf { file } => format!(
                 "Only together with the joint effects in `{file}`: a URDF cannot represent them."
             ),

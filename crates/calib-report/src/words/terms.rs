@@ -8,6 +8,7 @@ impl Verdict {
     pub fn word(self) -> &'static str {
         match self {
             Self::Accepted => "accepted",
+            Self::AcceptedWithWarnings => "accepted with warnings",
             Self::Rejected => "rejected",
             Self::NotEvaluated => "not decided",
         }
@@ -21,6 +22,7 @@ impl Outcome {
         match self {
             Self::Met => "met",
             Self::Exceeded => "exceeded",
+            Self::Undecided => "undecided",
             Self::NotEvaluated => "not evaluated",
         }
     }

@@ -1,34 +1,423 @@
 //! The verdict and its reasons.
 
-use super::prose::{sentences, short};
-use crate::{Limit, Outcome, Report, Verdict, number};
+use calib_finding::Fact;
+
+use super::prose::{code, counted, or, sentences, short};
+use crate::{
+    Effect, FitEnd, Limit, Limited, Outcome, Reason, ReasonId, Report, Unit, Verdict, number,
+};
+
+impl Report {
+    /// The verdict in a few words: `accepted with 2 warnings`.
+    #[must_use]
+    pub fn verdict_line(&self) -> String {
+        match self.verdict {
+            Verdict::AcceptedWithWarnings if self.warnings() > 0 => {
+                format!("accepted with {}", counted(self.warnings(), "warning"))
+            }
+            verdict => verdict.word().to_owned(),
+        }
+    }
+}
 
 pub(crate) fn trust(report: &Report, rest: &str) -> Vec<String> {
     let verdict = match report.verdict {
-        Verdict::Accepted => "Yes: accepted. Every limit was evaluated and met.",
-        Verdict::Rejected => "No: rejected.",
-        Verdict::NotEvaluated => "Not decided.",
+        Verdict::Accepted => "Yes: accepted. Every rule of the verdict holds.".to_owned(),
+        Verdict::AcceptedWithWarnings => {
+            format!("Yes, with care: {}.", report.verdict_line())
+        }
+        Verdict::Rejected => "No: rejected.".to_owned(),
+        Verdict::NotEvaluated => "Not decided.".to_owned(),
     };
-    std::iter::once(verdict.to_owned())
-        .chain(short(&sentences(&report.reasons), rest))
+    let against: Vec<String> = report.objections().cloned().collect();
+    let reasons = if against.is_empty() {
+        report.reasons.clone()
+    } else {
+        against
+    };
+    std::iter::once(verdict)
+        .chain(short(&sentences(&reasons), rest))
         .collect()
 }
 
+/// What the limits of the profile are about.
+impl Limited {
+    /// rms position error; `left_out` where each fitted pose was left out in turn.
+    #[must_use]
+    pub fn position_rms(left_out: bool) -> Self {
+        Self::held_out(
+            "held_out_rms_mm",
+            "rms position error",
+            Unit::Meter,
+            left_out,
+        )
+    }
+
+    /// Largest position error.
+    #[must_use]
+    pub fn position_max(left_out: bool) -> Self {
+        Self::held_out(
+            "held_out_max_mm",
+            "largest position error",
+            Unit::Meter,
+            left_out,
+        )
+    }
+
+    /// rms orientation error.
+    #[must_use]
+    pub fn orientation_rms(left_out: bool) -> Self {
+        Self::held_out(
+            "held_out_rms_deg",
+            "rms orientation error",
+            Unit::Radian,
+            left_out,
+        )
+    }
+
+    /// Largest orientation error.
+    #[must_use]
+    pub fn orientation_max(left_out: bool) -> Self {
+        Self::held_out(
+            "held_out_max_deg",
+            "largest orientation error",
+            Unit::Radian,
+            left_out,
+        )
+    }
+
+    /// Mean translation error of a loop.
+    #[must_use]
+    pub fn loop_mean(name: &str) -> Self {
+        Self {
+            name: format!("loop_mean_mm.{name}"),
+            quantity: format!("mean translation error of loop `{name}`"),
+            unit: Unit::Meter,
+        }
+    }
+
+    /// Standard deviation of the position of a transform.
+    #[must_use]
+    pub fn origin_sigma(name: &str) -> Self {
+        Self {
+            name: "origin_sigma_mm".to_owned(),
+            quantity: format!("standard deviation of the position of `{name}`"),
+            unit: Unit::Meter,
+        }
+    }
+
+    fn held_out(name: &str, quantity: &str, unit: Unit, left_out: bool) -> Self {
+        let poses = if left_out {
+            "poses left out in turn"
+        } else {
+            "held-out poses"
+        };
+        Self {
+            name: name.to_owned(),
+            quantity: format!("{quantity} on {poses}"),
+            unit,
+        }
+    }
+
+    /// The limit where nothing was measured that it speaks of.
+    #[must_use]
+    pub fn unknown(self, limit: f64) -> Limit {
+        let reason = match self.unit {
+            Unit::Radian => "no measured orientation on validation poses",
+            _ => "no validation poses",
+        };
+        Limit::not_evaluated(self, limit, reason)
+    }
+}
+
 impl Limit {
-    /// The limit as a reason for the verdict: value, limit and outcome.
+    /// The limit as a reason for the verdict: value, interval, limit and outcome.
     #[must_use]
     pub fn sentence(&self) -> String {
+        let plain = |value| number::plain(value, self.unit);
+        let interval = match (self.low, self.high) {
+            (Some(low), Some(high)) => {
+                format!(" (95 % interval {} to {})", plain(low), plain(high))
+            }
+            _ => String::new(),
+        };
         match (self.outcome, self.value) {
             (Outcome::NotEvaluated, _) | (_, None) => {
                 format!("{}: not evaluated ({}).", self.quantity, self.reason)
             }
             (outcome, Some(value)) => format!(
-                "{}: {}, limit {} ({}).",
+                "{}: {}{interval}, limit {} ({}).",
                 self.quantity,
-                number::plain(value, self.unit),
-                number::plain(self.limit, self.unit),
+                plain(value),
+                plain(self.limit),
                 outcome.word()
             ),
         }
+    }
+}
+
+/// The values of a reason, in the words of people.
+struct Values<'a>(&'a Reason);
+
+impl Values<'_> {
+    fn get(&self, key: &str) -> Option<&Fact> {
+        self.0.values.get(key)
+    }
+
+    /// A number with its unit.
+    fn number(&self, key: &str) -> String {
+        match self.get(key) {
+            Some(Fact::Number { value, unit }) => number::plain(*value, *unit),
+            _ => number::UNKNOWN.to_owned(),
+        }
+    }
+
+    fn count(&self, key: &str) -> usize {
+        self.get(key).and_then(Fact::value).unwrap_or(0.0) as usize
+    }
+
+    fn name(&self, key: &str) -> &str {
+        self.get(key).and_then(Fact::word).unwrap_or_default()
+    }
+
+    /// A name as code.
+    fn code(&self, key: &str) -> String {
+        code(self.name(key))
+    }
+
+    /// `12 of 80 (15 %)`
+    fn share(&self, part: &str, of: &str) -> String {
+        let (part, of) = (self.count(part), self.count(of));
+        let share = number::percent(part as f64 / of.max(1) as f64);
+        format!("{part} of {of} ({share})")
+    }
+}
+
+impl Reason {
+    /// The reason as a sentence.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let v = Values(self);
+        match self.id {
+            ReasonId::LimitMet
+            | ReasonId::LimitExceeded
+            | ReasonId::LimitUndecided
+            | ReasonId::LimitNotEvaluated
+            | ReasonId::NoLimits => of_limit(self, &v),
+            ReasonId::NotConverged
+            | ReasonId::OriginNotDetermined
+            | ReasonId::GoodnessOfFit
+            | ReasonId::NoiseAboveStated
+            | ReasonId::UnresolvedError
+            | ReasonId::WarningFinding => of_fit(self, &v),
+            ReasonId::RejectedPart | ReasonId::RejectedShare | ReasonId::ScreenedHeldOut => {
+                of_rejection(self, &v)
+            }
+            ReasonId::ImplausibleChange | ReasonId::ReversedAxis => of_change(self, &v),
+            _ => of_validation(self, &v),
+        }
+    }
+}
+
+fn of_limit(reason: &Reason, v: &Values<'_>) -> String {
+    if reason.id == ReasonId::NoLimits {
+        return "The profile sets no limits (`solve.limits`), so nothing could be accepted."
+            .to_owned();
+    }
+    let (quantity, limit) = (v.name("quantity"), v.number("limit"));
+    let interval = match (v.get("low"), v.get("high")) {
+        (Some(_), Some(_)) => format!(
+            " (95 % interval {} to {})",
+            v.number("low"),
+            v.number("high")
+        ),
+        _ => String::new(),
+    };
+    match reason.id {
+        ReasonId::LimitNotEvaluated => {
+            format!(
+                "{quantity}: not evaluated ({}), limit {limit}.",
+                v.name("because")
+            )
+        }
+        ReasonId::LimitUndecided => format!(
+            "{quantity}: {}{interval}, limit {limit}: met by the estimate, undecided by its interval.",
+            v.number("value")
+        ),
+        ReasonId::LimitExceeded => format!(
+            "{quantity}: {}{interval}, limit {limit} (exceeded).",
+            v.number("value")
+        ),
+        _ => format!(
+            "{quantity}: {}{interval}, limit {limit} (met).",
+            v.number("value")
+        ),
+    }
+}
+
+fn of_fit(reason: &Reason, v: &Values<'_>) -> String {
+    match reason.id {
+        ReasonId::NotConverged => format!(
+            "The solver did not converge: it {}.",
+            FitEnd::of_id(v.name("ended")).after(v.count("iterations"))
+        ),
+        ReasonId::OriginNotDetermined => {
+            format!(
+                "Origin {} is not observable in its sweep.",
+                v.code("origin")
+            )
+        }
+        ReasonId::GoodnessOfFit => {
+            let what = match reason.effect {
+                Effect::Warns => "the residuals are smaller than the noise that is assumed",
+                _ => {
+                    "the residuals are larger than the noise explains, and the stated uncertainty does not include the excess"
+                }
+            };
+            format!(
+                "χ²/dof {} is outside {} to {}: {what}.",
+                v.number("value"),
+                v.number("low"),
+                v.number("high")
+            )
+        }
+        ReasonId::NoiseAboveStated => format!(
+            "The noise of {} that was found is {} times the stated one: the model lacks something; the stated uncertainty includes it.",
+            v.name("group"),
+            v.number("factor")
+        ),
+        ReasonId::UnresolvedError => format!(
+            "An error of the data or the model is not resolved: {}.",
+            finding(v)
+        ),
+        _ => format!("The data or the model have a warning: {}.", finding(v)),
+    }
+}
+
+/// "`body-slip` (2 findings)"
+fn finding(v: &Values<'_>) -> String {
+    match v.count("times") {
+        0 | 1 => v.code("finding"),
+        n => format!("{} ({})", v.code("finding"), counted(n, "finding")),
+    }
+}
+
+fn of_rejection(reason: &Reason, v: &Values<'_>) -> String {
+    match reason.id {
+        ReasonId::RejectedPart => {
+            let what = if v.get("joint").is_some() {
+                format!(
+                    "of the measurements with {} from {} to {}",
+                    v.code("joint"),
+                    v.number("from"),
+                    v.number("to")
+                )
+            } else if v.get("subject").is_some() {
+                format!(
+                    "of the measurements of {} in recording {}",
+                    v.code("subject"),
+                    v.code("recording")
+                )
+            } else {
+                format!("of the measurements of recording {}", v.code("recording"))
+            };
+            let share = v.share("rejected", "of");
+            format!(
+                "{share} {what} were rejected: the model contradicts that part of the data as a whole."
+            )
+        }
+        ReasonId::RejectedShare => format!(
+            "{} fitted measurements were rejected.",
+            v.share("rejected", "of")
+        ),
+        _ => format!(
+            "{} held-out measurements were screened out as gross outliers.",
+            v.share("screened", "of")
+        ),
+    }
+}
+
+fn of_change(reason: &Reason, v: &Values<'_>) -> String {
+    let more = match v.count("more") {
+        0 => String::new(),
+        n => format!(" (and {n} more)"),
+    };
+    let what = match reason.id {
+        ReasonId::ReversedAxis => format!(
+            "The axis of {}{more} was rotated by {}: its sign in the URDF or in the recordings is wrong.",
+            v.code("name"),
+            v.number("change")
+        ),
+        _ => format!(
+            "{} changed by {}, {} standard deviations of its prior{more}: check the drawing.",
+            v.code("name"),
+            v.number("change"),
+            v.number("sigmas")
+        ),
+    };
+    match reason.effect {
+        Effect::Warns => format!("{what} Held-out poses confirm it."),
+        _ => format!("{what} No held-out poses in which the joints move together confirm it."),
+    }
+}
+
+fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
+    let postures = || counted(v.count("postures"), "posture");
+    match reason.id {
+        ReasonId::WorseThanRegistration => format!(
+            "Calibrated {} rms, with registration only {} rms ({}): the calibration made it worse.",
+            v.number("calibrated"),
+            v.number("registration"),
+            postures()
+        ),
+        ReasonId::NotBetterThanRegistration => format!(
+            "Calibrated {} rms, with registration only {} rms ({}, p = {}): no significant improvement.",
+            v.number("calibrated"),
+            v.number("registration"),
+            postures(),
+            v.number("p")
+        ),
+        ReasonId::NoValidation => "Nothing was verified on poses that were not fitted.".to_owned(),
+        ReasonId::ValidationRepeatsFit => format!(
+            "{} held-out postures repeat fitted ones: they do not test the model.",
+            v.share("repeated", "postures")
+        ),
+        ReasonId::LeaveOneOut => format!(
+            "No recording is held out: each of {} was predicted from the others, which is not independent of them.",
+            postures()
+        ),
+        ReasonId::OrientationOff => format!(
+            "Orientation error: {} rms, {} accepted without a limit in the profile (`held_out_rms_deg`).",
+            v.number("rms"),
+            v.number("accepted")
+        ),
+        ReasonId::OrientationNotMeasured => {
+            "The orientation of the last body was not measured: only positions were verified."
+                .to_owned()
+        }
+        ReasonId::SingleJointData => {
+            let data = match v.name("data") {
+                "fitted" => "the fitted recordings",
+                "held_out" => "the held-out poses",
+                _ => "all recordings",
+            };
+            format!(
+                "One joint at a time moved in {data}: poses in which several joints move were not tested."
+            )
+        }
+        ReasonId::JointsNotVerified => {
+            let joints = match v.get("joints") {
+                Some(Fact::Names(names)) => names.clone(),
+                _ => Vec::new(),
+            };
+            format!(
+                "The held-out poses hardly move {}: what was found there is not verified.",
+                or(joints.iter().map(|j| code(j)).collect(), "a joint").join(", ")
+            )
+        }
+        _ => format!(
+            "Reason {} of another version of the program.",
+            code(reason.id.as_str())
+        ),
     }
 }

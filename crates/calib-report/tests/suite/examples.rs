@@ -10,10 +10,11 @@ use calib_report::view3d::{
 };
 use calib_report::{
     AccuracyLimit, Change, Class, Clock, ClockCheck, ErrorSource, ErrorStats, EstimatorResult,
-    FitEnd, FitSummary, HeldOut, Input, JointCoverage, JointValue, Limit, LoopClosure, LoopGroup,
-    Lost, Method, Noise, NoiseKind, NotObservable, Outcome, Output, Parameter, PoseError,
-    RecordingSummary, RecordingUse, Rejected, RejectedFor, Report, ResidualRow, Residuals, Scene,
-    Stats, Status, Term, Transform, Unit, Unobservable, Verdict, Verification, View3d, Workspace,
+    FitEnd, FitSummary, HeldOut, Improvement, Input, JointCoverage, JointValue, Judgment, Limit,
+    Limited, LoopClosure, LoopGroup, Lost, Method, Noise, NoiseKind, NotObservable, Orientation,
+    Outcome, Output, Parameter, PoseError, RecordingSummary, RecordingUse, Rejected, RejectedFor,
+    Report, ResidualRow, Residuals, Scene, Solver, Stats, Status, Term, Transform, Unit,
+    Unobservable, Validation, Verdict, VerdictFacts, Verification, View3d, Workspace,
     WorkspacePoint, judge, scene::SceneFrame,
 };
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
@@ -177,6 +178,28 @@ fn inputs() -> Vec<Input> {
     ]
 }
 
+/// The judgment on a fit that freed the robot, with these limits and held-out errors.
+fn judged(limits: &[Limit], held_out: Option<&HeldOut>, ended: FitEnd) -> Judgment {
+    judge(&VerdictFacts {
+        limits: limits.to_vec(),
+        solver: Some(Solver {
+            ended,
+            iterations: 7,
+        }),
+        freed: true,
+        improvements: held_out.map(Improvement::of).unwrap_or_default(),
+        validation: held_out.map_or(Validation::None, |h| Validation::Recordings {
+            postures: h.postures,
+            repeated: 0,
+        }),
+        orientation: Orientation {
+            rms: Some(0.004),
+            expected: Some(0.003),
+        },
+        ..VerdictFacts::default()
+    })
+}
+
 /// Every limit is met; one origin is only observable as a line, as the profile expects.
 pub fn accepted() -> Report {
     let mut draw = Draw::new(3);
@@ -185,13 +208,14 @@ pub fn accepted() -> Report {
         held_out_poses().into_iter().map(|pose| pose.1).collect(),
     );
     let calibrated = held_out.calibrated.expect("ten poses");
-    let limits = vec![Limit::evaluated(
-        "held_out_rms_mm",
-        "held-out rms error",
-        Unit::Meter,
+    let expected = held_out.expected.expect("ten poses");
+    let limits = vec![Limit::compared(
+        Limited::position_rms(false),
         0.005,
         calibrated.rms_m,
+        Some((expected.low_m, expected.high_m)),
     )];
+    let judgment = judged(&limits, Some(&held_out), FitEnd::Converged);
     let parent_from_child = |x: f64, y: f64, z: f64, yaw: f64| {
         Isometry3::new(Vector3::new(x, y, z), Vector3::z() * yaw)
     };
@@ -329,8 +353,6 @@ pub fn accepted() -> Report {
         profile: "robots/ripley.yaml".into(),
         robot: "ripley".into(),
         method: Method::Ml,
-        verdict: judge(&limits),
-        reasons: vec!["The held-out error is below its limit and well below the error with registration only.".into()],
         scope: vec![
             "Position of gripM, within the recorded joint ranges.".into(),
             "No load: compliance was not modeled.".into(),
@@ -379,6 +401,8 @@ pub fn accepted() -> Report {
             observations: 357,
             unknowns: 31,
             chi2_per_dof: Some(1.0612),
+            chi2_used_per_dof: Some(1.0),
+            stated_noise: vec!["marker".into()],
         }),
         residuals: Residuals::from_rows(&residual_rows()),
         noise: vec![
@@ -438,6 +462,7 @@ pub fn accepted() -> Report {
         version: "0.1.0".into(),
         ..Report::default()
     }
+    .judged(judgment)
 }
 
 /// The paper's table of five torso positions; the wrist hardly moved, two parameters are confounded.
@@ -485,30 +510,14 @@ pub fn rejected() -> Report {
         .calibrated
         .map_or(f64::NAN, |stats: ErrorStats| stats.rms_m);
     let limits = vec![
-        Limit::evaluated(
-            "held_out_rms_mm",
-            "held-out rms error",
-            Unit::Meter,
-            0.004,
-            rms,
-        ),
-        Limit::not_evaluated(
-            "drift_deg",
-            "drift since the last calibration",
-            Unit::Radian,
-            0.001,
-            "no earlier report",
-        ),
+        Limit::evaluated(Limited::position_rms(false), 0.004, rms),
+        Limited::orientation_max(false).unknown(0.001),
     ];
+    let judgment = judged(&limits, Some(&held_out), FitEnd::Converged);
     Report {
         profile: "robots/justin.yaml".into(),
         robot: "justin".into(),
         method: Method::Paper,
-        verdict: judge(&limits),
-        reasons: vec![
-            "The held-out rms error exceeds its limit.".into(),
-            "Two quantities that the profile requests are not observable.".into(),
-        ],
         limits,
         next_steps: vec![
             "Move arm_7 over at least 30° and record again.".into(),
@@ -594,22 +603,16 @@ pub fn rejected() -> Report {
         version: "0.1.0".into(),
         ..Report::default()
     }
+    .judged(judgment)
 }
 
 /// No validation poses: nothing can be decided.
 pub fn not_evaluated() -> Report {
-    let limits = vec![Limit::not_evaluated(
-        "held_out_rms_mm",
-        "held-out rms error",
-        Unit::Meter,
-        0.005,
-        "the profile has no recording with `use: validation`",
-    )];
+    let limits = vec![Limited::position_rms(false).unknown(0.005)];
+    let judgment = judged(&limits, None, FitEnd::Converged);
     Report {
         profile: "robots/arm.yaml".into(),
         robot: "arm | <six>".into(),
-        verdict: judge(&limits),
-        reasons: vec!["No poses were held out, so the error on new poses is unknown.".into()],
         limits,
         next_steps: vec![
             "Record ten separate poses and list them in the profile with `use: validation`.".into(),
@@ -630,6 +633,7 @@ pub fn not_evaluated() -> Report {
         version: "0.1.0".into(),
         ..Report::default()
     }
+    .judged(judgment)
 }
 
 pub fn all() -> [(&'static str, Report); 3] {

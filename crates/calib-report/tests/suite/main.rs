@@ -7,3 +7,4 @@ mod page;
 mod parts;
 mod renderers;
 mod scenes;
+mod verdicts;

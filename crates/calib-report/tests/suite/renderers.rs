@@ -43,6 +43,7 @@ fn json_of_the_examples() {
         report.residuals.by_joint.truncate(1);
         let cuts: &[&str] = match name {
             "accepted" => &[
+                "  \"transforms\"",
                 "  \"parameters\"",
                 "  \"verification\"",
                 "  \"estimators\"",
@@ -51,7 +52,7 @@ fn json_of_the_examples() {
                 "  \"noise\"",
                 "  \"rejected\"",
             ],
-            "rejected" => &["  \"verification\"", "  \"estimators\""],
+            "rejected" => &["  \"transforms\"", "  \"verification\"", "  \"estimators\""],
             _ => &[],
         };
         let text = json::report_json(&report).expect("finite");

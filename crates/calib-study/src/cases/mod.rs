@@ -148,6 +148,7 @@ fn one_robot(robot: &RobotProfile, seed: u64) -> Result<Vec<RobotResult>, CaseEr
         let options = RunOptions {
             method: Some(method),
             force: true,
+            strict: false,
             no_plugins: false,
         };
         let ran = of_tables(robot.clone(), simulated.recordings.clone())

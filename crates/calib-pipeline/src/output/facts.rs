@@ -1,0 +1,172 @@
+//! The facts that the verdict depends on.
+
+use std::collections::BTreeSet;
+
+use calib_core::NoiseKind;
+use calib_finding::{Finding, Severity, catalog};
+use calib_report::{
+    Goodness, ImplausibleChange, Improvement, Limit, Orientation, Share, SingleJoint, Solver, Unit,
+    Validation, VerdictFacts,
+};
+use nalgebra::UnitVector3;
+
+use crate::formulate::formulation::MlFit;
+use crate::formulate::kinematics::motion_axis;
+use crate::output::counts::{Tracks, rejected_parts, rejected_share};
+use crate::output::evidence::{Evidence, fit_end};
+use crate::output::of_fit::{stated_sigma, unit};
+use crate::verify::accuracy::tool_body;
+use crate::verify::motions::Motions;
+
+/// Everything that the rules of the verdict look at.
+pub(crate) fn facts(
+    e: &Evidence<'_>,
+    findings: &[Finding],
+    limits: &[Limit],
+    motions: &Motions,
+    tracks: &Tracks,
+) -> VerdictFacts {
+    let held_out = e.held_out.as_ref();
+    let left_out = held_out.is_some_and(|h| h.left_out);
+    let undetermined = e.origins.iter();
+    let undetermined = undetermined.filter(|(_, origin)| origin.pose.is_none() && e.fit.is_none());
+    VerdictFacts {
+        limits: limits.to_vec(),
+        solver: e.fit.map(|fit| Solver {
+            ended: fit_end(fit),
+            iterations: fit.solution.iterations,
+        }),
+        undetermined_origins: undetermined.map(|(name, _)| name.clone()).collect(),
+        errors: of_severity(findings, Severity::Error),
+        warnings: of_severity(findings, Severity::Warning),
+        rejected: rejected_share(e.inputs, tracks),
+        rejected_parts: rejected_parts(e.inputs, tracks),
+        screened: held_out
+            .filter(|h| !h.left_out)
+            .map_or_else(Share::default, |h| Share {
+                part: h.screened,
+                of: h.n + h.screened,
+            }),
+        freed: e.fit.is_some_and(frees_the_robot),
+        improvements: held_out.map(Improvement::of).unwrap_or_default(),
+        changes: e.fit.map(|fit| changes(e, fit)).unwrap_or_default(),
+        validation: match held_out {
+            None => Validation::None,
+            Some(h) if h.left_out => Validation::LeaveOneOut {
+                postures: h.postures,
+            },
+            Some(_) => Validation::Recordings {
+                postures: motions.postures,
+                repeated: motions.repeated,
+            },
+        },
+        orientation: orientation(e),
+        single_joint: SingleJoint {
+            fitted: motions.fitted_one_by_one,
+            held_out: motions.held_out_one_by_one && !left_out && held_out.is_some(),
+        },
+        not_verified: motions.still.clone(),
+        goodness: e.fit.map(|fit| goodness(e, fit)),
+    }
+}
+
+/// Ids of the findings of one severity. What a rule of its own judges better is left to it.
+fn of_severity(findings: &[Finding], severity: Severity) -> Vec<String> {
+    let judged = |f: &&Finding| {
+        f.severity == severity
+            && !(severity == Severity::Warning && f.id == catalog::HELD_OUT_IN_TRAINING)
+    };
+    let of = findings.iter().filter(judged);
+    of.map(|f| f.id.as_str().to_owned()).collect()
+}
+
+/// Whether anything of the robot itself was free, beyond where it and the bodies are.
+fn frees_the_robot(fit: &MlFit) -> bool {
+    let parameters = fit.formulation.problem.parameters().iter();
+    parameters
+        .into_iter()
+        .any(|p| p.joint.is_some() && !p.fixed)
+}
+
+/// A change beyond this many standard deviations of its prior is one that the prior did not expect.
+const IMPLAUSIBLE: f64 = 5.0;
+/// An axis that turned by more than this was reversed, rad (150°).
+const REVERSED: f64 = 150.0 * std::f64::consts::PI / 180.0;
+
+/// Numbers far from their nominal values. Along directions that a gauge leaves open the priors hold the nominal values, so
+/// that whatever is far off was moved by the data.
+fn changes(e: &Evidence<'_>, fit: &MlFit) -> Vec<ImplausibleChange> {
+    let model = &e.inputs.robot.model;
+    let found = fit.calibration.urdf_model();
+    let mut out = Vec::new();
+    let mut reversed = BTreeSet::new();
+    for joint in model.joint_ids() {
+        let place = |of: &calib_urdf::RobotModel| of.joint(joint).parent_link_from_joint.rotation;
+        let before = place(model);
+        let off = before.angle_to(&place(&found));
+        let axis = |axis: UnitVector3<f64>| (before * axis).angle(&(place(&found) * axis));
+        let of_axis = motion_axis(model, joint).map(|a| axis(a.direction()));
+        // A rotation about the axis itself is a zero offset: 180° of it are a sign, too.
+        if off > REVERSED || of_axis.is_some_and(|angle| angle > REVERSED) {
+            let name = &model.joint(joint).name;
+            reversed.insert(name.clone());
+            out.push(ImplausibleChange {
+                name: name.clone(),
+                change: of_axis.map_or(off, |angle| angle.max(off)),
+                unit: Unit::Radian,
+                sigmas: None,
+            });
+        }
+    }
+    let stated = fit.formulation.problem.parameters();
+    for (p, stated) in fit.solution.parameters.iter().zip(stated) {
+        let of_reversed = p.joint.as_ref().is_some_and(|j| reversed.contains(j));
+        let Some(prior) = stated.prior_sigma.filter(|s| *s > 0.0) else {
+            continue;
+        };
+        let sigmas = (p.value - p.nominal).abs() / prior;
+        if !stated.fixed && !of_reversed && sigmas > IMPLAUSIBLE {
+            out.push(ImplausibleChange {
+                name: p.name.clone(),
+                change: p.value - p.nominal,
+                unit: unit(p.unit),
+                sigmas: Some(sigmas),
+            });
+        }
+    }
+    out
+}
+
+/// Orientation of the last body on held-out poses.
+fn orientation(e: &Evidence<'_>) -> Orientation {
+    let Some(tool) = tool_body(e.inputs) else {
+        return Orientation::default();
+    };
+    let subjects = tool.subjects();
+    let errors = e.held_out.iter().flat_map(|h| &h.poses);
+    let angles: Vec<f64> = errors
+        .filter(|pose| !pose.screened && subjects.contains(&&pose.subject))
+        .filter_map(|pose| pose.calibrated_rad)
+        .collect();
+    let squares: f64 = angles.iter().map(|angle| angle * angle).sum();
+    Orientation {
+        rms: (!angles.is_empty()).then(|| (squares / angles.len() as f64).sqrt()),
+        expected: tool.orientation_noise(e.tracks, e.fit),
+    }
+}
+
+fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
+    let s = &fit.solution;
+    /// Levels from fewer samples say little.
+    const ENOUGH: usize = 20;
+    let above = s.noise.iter().filter_map(|n| {
+        let stated = stated_sigma(&e.inputs.robot.profile, &n.name).filter(|s| *s > 0.0)?;
+        let known = n.estimated && n.samples >= ENOUGH && n.kind != NoiseKind::Scale;
+        known.then(|| (n.name.clone(), n.sigma / stated))
+    });
+    Goodness {
+        used: s.chi2 / s.degrees_of_freedom.max(1.0),
+        band: Goodness::band_of(s.degrees_of_freedom),
+        above_stated: above.max_by(|a, b| a.1.total_cmp(&b.1)),
+    }
+}

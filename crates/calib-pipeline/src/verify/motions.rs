@@ -1,0 +1,161 @@
+//! Where the joints were: what the fitted recordings move, and what the held-out poses can verify of it.
+
+use calib_profile::Usage;
+use calib_urdf::JointId;
+
+use crate::prepare::inputs::{Inputs, Loaded};
+
+/// Smallest motion of a joint that counts, rad or m: 2°, 35 mm.
+const MOVED: f64 = 0.035;
+/// Recordings in which a smaller share of the rows has two joints away from their usual places move one at a time.
+const COMBINED: f64 = 0.1;
+/// Held-out poses verify a joint that they move over at least this share of its fitted range.
+const VERIFIED: f64 = 0.1;
+/// Joint readings closer than this are one posture, rad or m: three encoder steps of a good robot.
+const SAME: f64 = 1e-3;
+/// Readings of one posture differ by less than this many standard deviations of their noise.
+const WITHIN: f64 = 4.0;
+
+/// What moved.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Motions {
+    /// One joint at a time moved in all fitted recordings, although several joints moved.
+    pub(crate) fitted_one_by_one: bool,
+    /// The same of the held-out poses.
+    pub(crate) held_out_one_by_one: bool,
+    /// Joints that the fitted recordings move and the held-out poses hardly do.
+    pub(crate) still: Vec<String>,
+    /// Held-out postures.
+    pub(crate) postures: usize,
+    /// Those with a joint beyond the fitted range.
+    pub(crate) outside: usize,
+    /// Those that repeat a fitted posture within the noise of the readings.
+    pub(crate) repeated: usize,
+}
+
+/// Of all recordings; `joint_sigma` is the noise of the readings that was found, rad.
+pub(crate) fn motions(inputs: &Inputs, joint_sigma: f64) -> Motions {
+    let model = &inputs.robot.model;
+    let of = |validation: bool| -> Vec<&Loaded> {
+        let recordings = inputs.recordings.values();
+        recordings
+            .filter(|r| (r.spec.usage == Usage::Validation) == validation)
+            .collect()
+    };
+    let (fitted, held_out) = (of(false), of(true));
+    let moved: Vec<(JointId, (f64, f64))> = model
+        .independent_joints()
+        .filter_map(|joint| Some((joint, range(&fitted, joint)?)))
+        .filter(|(_, (low, high))| high - low > MOVED)
+        .collect();
+    let joints: Vec<JointId> = moved.iter().map(|(joint, _)| *joint).collect();
+    let held_out_rows = rows(&held_out);
+    let one_by_one = |recordings: &[&Loaded]| {
+        joints.len() > 1
+            && recordings.iter().any(|r| r.q.iter().flatten().count() > 1)
+            && combined_share(recordings, &joints) < COMBINED
+    };
+    let beyond = |q: &&&Vec<f64>| {
+        moved.iter().any(|(joint, (low, high))| {
+            let at = q[joint.index()];
+            at < low - MOVED || at > high + MOVED
+        })
+    };
+    let still = moved.iter().filter(|(joint, (low, high))| {
+        let verified = range(&held_out, *joint).map_or(0.0, |(l, h)| h - l);
+        verified < VERIFIED * (high - low)
+    });
+    let still = still.map(|(joint, _)| model.joint(*joint).name.clone());
+    Motions {
+        fitted_one_by_one: one_by_one(&fitted),
+        held_out_one_by_one: one_by_one(&held_out),
+        still: if held_out_rows.is_empty() {
+            Vec::new()
+        } else {
+            still.collect()
+        },
+        postures: held_out_rows.len(),
+        outside: held_out_rows.iter().filter(beyond).count(),
+        repeated: repeated(
+            &held_out_rows,
+            rows(&fitted),
+            &model.independent_joints().collect::<Vec<_>>(),
+            SAME.max(WITHIN * joint_sigma),
+        ),
+    }
+}
+
+fn rows<'a>(recordings: &[&'a Loaded]) -> Vec<&'a Vec<f64>> {
+    let rows = recordings.iter().flat_map(|r| r.q.iter().flatten());
+    rows.collect()
+}
+
+/// Smallest and largest position of a joint, where any is known.
+fn range(recordings: &[&Loaded], joint: JointId) -> Option<(f64, f64)> {
+    let positions = rows(recordings).into_iter().map(|q| q[joint.index()]);
+    positions
+        .filter(|q| q.is_finite())
+        .fold(None, |range, q| match range {
+            None => Some((q, q)),
+            Some((low, high)) => Some((q.min(low), q.max(high))),
+        })
+}
+
+/// Share of the rows in which two joints are away from where they usually are in their recording.
+fn combined_share(recordings: &[&Loaded], joints: &[JointId]) -> f64 {
+    let (mut combined, mut all) = (0_usize, 0_usize);
+    for loaded in recordings {
+        let rows: Vec<&Vec<f64>> = loaded.q.iter().flatten().collect();
+        let usual: Vec<f64> = joints
+            .iter()
+            .map(|joint| {
+                let mut places: Vec<f64> = rows.iter().map(|q| q[joint.index()]).collect();
+                places.sort_by(f64::total_cmp);
+                places.get(places.len() / 2).copied().unwrap_or(0.0)
+            })
+            .collect();
+        all += rows.len();
+        for q in &rows {
+            let away = joints.iter().zip(&usual);
+            let away = away.filter(|(joint, usual)| (q[joint.index()] - **usual).abs() > MOVED);
+            combined += usize::from(away.count() > 1);
+        }
+    }
+    combined as f64 / all.max(1) as f64
+}
+
+/// How many of `rows` have a posture of `known` within `tolerance` in every joint.
+fn repeated(
+    rows: &[&Vec<f64>],
+    mut known: Vec<&Vec<f64>>,
+    joints: &[JointId],
+    tolerance: f64,
+) -> usize {
+    // Sorted by the joint that moves most, few are left to compare.
+    let spread = |joint: &JointId| {
+        let at = known.iter().map(|q| q[joint.index()]);
+        let (low, high) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
+            (l.min(q), h.max(q))
+        });
+        high - low
+    };
+    let Some(key) = joints
+        .iter()
+        .max_by(|a, b| spread(a).total_cmp(&spread(b)))
+        .map(|joint| joint.index())
+    else {
+        return 0;
+    };
+    known.sort_by(|a, b| a[key].total_cmp(&b[key]));
+    let repeats = |q: &&&Vec<f64>| {
+        let first = known.partition_point(|k| k[key] < q[key] - tolerance);
+        let near = known[first..]
+            .iter()
+            .take_while(|k| k[key] <= q[key] + tolerance);
+        near.into_iter().any(|k| {
+            let mut differences = joints.iter().map(|j| (k[j.index()] - q[j.index()]).abs());
+            differences.all(|difference| difference <= tolerance)
+        })
+    };
+    rows.iter().filter(repeats).count()
+}

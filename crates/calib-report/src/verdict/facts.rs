@@ -1,0 +1,192 @@
+//! What a verdict depends on.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::verdict::Improvement;
+use crate::{FitEnd, Limit, Unit};
+
+/// Everything that the rules look at. The default is a run that found nothing and knows nothing: not accepted.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Facts {
+    /// The limits of the profile against what was measured.
+    pub limits: Vec<Limit>,
+    /// How the solver ended; `None` with the closed forms.
+    pub solver: Option<Solver>,
+    /// Origins that the profile asks for and that were not determined.
+    pub undetermined_origins: Vec<String>,
+    /// Ids of the findings that are errors, one per finding.
+    pub errors: Vec<String>,
+    /// Ids of the findings that are warnings, one per finding.
+    pub warnings: Vec<String>,
+    /// Fitted measurements that the fit or the checks rejected.
+    pub rejected: Share,
+    /// What was rejected as a whole.
+    pub rejected_parts: Vec<RejectedPart>,
+    /// Held-out measurements that were screened out.
+    pub screened: Share,
+    /// Whether anything of the robot itself was estimated.
+    pub freed: bool,
+    /// Held-out errors, calibrated against registration only, quantity by quantity.
+    pub improvements: Vec<Improvement>,
+    /// Numbers far from their nominal values.
+    pub changes: Vec<Change>,
+    /// What the result was verified with.
+    pub validation: Validation,
+    /// Orientation of the last body on held-out poses.
+    pub orientation: Orientation,
+    /// Where one joint at a time moved.
+    pub single_joint: SingleJoint,
+    /// Joints that the fit moved and the held-out poses hardly move.
+    pub not_verified: Vec<String>,
+    /// Goodness of fit; `None` with the closed forms.
+    pub goodness: Option<Goodness>,
+}
+
+/// How the solver ended.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Solver {
+    /// How.
+    pub ended: FitEnd,
+    /// After how many iterations.
+    pub iterations: usize,
+}
+
+/// A part of a whole, counted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Share {
+    /// The part.
+    pub part: usize,
+    /// The whole.
+    pub of: usize,
+}
+
+impl Share {
+    /// Part of the whole, in [0, 1]; 0 of nothing.
+    #[must_use]
+    pub fn ratio(self) -> f64 {
+        if self.of == 0 {
+            0.0
+        } else {
+            self.part as f64 / self.of as f64
+        }
+    }
+}
+
+/// What was rejected as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RejectedPart {
+    /// What it is.
+    pub part: Part,
+    /// How many of its measurements were rejected.
+    pub rejected: Share,
+}
+
+/// A part of the fitted data.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Part {
+    /// A body or marker in one recording.
+    Subject {
+        /// The recording.
+        recording: String,
+        /// The body or marker.
+        subject: String,
+    },
+    /// A whole recording.
+    Recording(String),
+    /// A range of a joint.
+    Range {
+        /// The joint.
+        joint: String,
+        /// Lower end, rad or m.
+        from: f64,
+        /// Upper end, rad or m.
+        to: f64,
+        /// Unit of both.
+        unit: Unit,
+    },
+}
+
+/// A number that moved far from its nominal value.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// The parameter, or the joint whose axis was turned round.
+    pub name: String,
+    /// Found − nominal.
+    pub change: f64,
+    /// Its unit.
+    pub unit: Unit,
+    /// |change| in standard deviations of the prior; `None` where an axis was turned round.
+    pub sigmas: Option<f64>,
+}
+
+/// What a result was verified with.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Validation {
+    /// Nothing.
+    #[default]
+    None,
+    /// Fitted poses, each left out in turn.
+    LeaveOneOut {
+        /// How many.
+        postures: usize,
+    },
+    /// Recordings that were held out.
+    Recordings {
+        /// Postures in them.
+        postures: usize,
+        /// Those that repeat a fitted posture within the noise of the joint readings.
+        repeated: usize,
+    },
+}
+
+impl Validation {
+    /// Postures that were verified.
+    #[must_use]
+    pub fn postures(self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::LeaveOneOut { postures } | Self::Recordings { postures, .. } => postures,
+        }
+    }
+}
+
+/// Orientation of the last body on held-out poses.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Orientation {
+    /// rms error, rad; `None` where no orientation is measured.
+    pub rms: Option<f64>,
+    /// What noise alone would show, rad.
+    pub expected: Option<f64>,
+}
+
+/// Where one joint at a time moved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct SingleJoint {
+    /// In all fitted recordings.
+    pub fitted: bool,
+    /// In all held-out poses.
+    pub held_out: bool,
+}
+
+impl Goodness {
+    /// Where χ²/dof lies in 99.9 % of the fits whose noise is as assumed.
+    #[must_use]
+    pub fn band_of(degrees_of_freedom: f64) -> (f64, f64) {
+        let of = ChiSquared::new(degrees_of_freedom);
+        of.map_or((0.0, f64::INFINITY), |of| {
+            let end = |p: f64| of.inverse_cdf(p) / degrees_of_freedom;
+            (end(0.0005), end(0.9995))
+        })
+    }
+}
+
+/// χ² of the fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Goodness {
+    /// χ² per degree of freedom at the noise that the stated uncertainty is made of.
+    pub used: f64,
+    /// 99.9 % band of that number.
+    pub band: (f64, f64),
+    /// The group whose noise is furthest above what the profile states, and by which factor.
+    pub above_stated: Option<(String, f64)>,
+}

@@ -1,0 +1,469 @@
+//! Every rule of the verdict from both sides, and the table of the book.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use calib_report::{
+    Compared, Effect, FitEnd, Goodness, ImplausibleChange, Improvement, Limit, Limited,
+    Orientation, Part, Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver, Unit,
+    Validation, Verdict, VerdictFacts, judge,
+};
+
+/// A result against which nothing speaks.
+fn clean() -> VerdictFacts {
+    VerdictFacts {
+        limits: vec![Limit::compared(
+            Limited::position_rms(false),
+            0.001,
+            0.0005,
+            Some((0.0004, 0.0007)),
+        )],
+        solver: Some(Solver {
+            ended: FitEnd::Converged,
+            iterations: 9,
+        }),
+        rejected: Share { part: 3, of: 2930 },
+        screened: Share { part: 0, of: 80 },
+        freed: true,
+        improvements: vec![improvement(0.004, 0.0005, 0.001, 0.999)],
+        validation: Validation::Recordings {
+            postures: 20,
+            repeated: 0,
+        },
+        orientation: Orientation {
+            rms: Some(0.004),
+            expected: Some(0.004),
+        },
+        goodness: Some(Goodness {
+            used: 1.0,
+            band: Goodness::band_of(800.0),
+            above_stated: Some(("marker".into(), 1.1)),
+        }),
+        ..VerdictFacts::default()
+    }
+}
+
+fn improvement(registration: f64, calibrated: f64, p_better: f64, p_worse: f64) -> Improvement {
+    Improvement {
+        quantity: Compared::Position,
+        registration,
+        calibrated,
+        postures: 20,
+        p_better,
+        p_worse,
+    }
+}
+
+fn limit(value: f64, interval: Option<(f64, f64)>) -> Vec<Limit> {
+    vec![Limit::compared(
+        Limited::position_rms(false),
+        0.001,
+        value,
+        interval,
+    )]
+}
+
+/// Clean facts with one thing changed.
+fn with(change: impl FnOnce(&mut VerdictFacts)) -> VerdictFacts {
+    let mut facts = clean();
+    change(&mut facts);
+    facts
+}
+
+fn change(sigmas: Option<f64>) -> ImplausibleChange {
+    ImplausibleChange {
+        name: "elbow.origin.x".into(),
+        change: 0.03,
+        unit: Unit::Meter,
+        sigmas,
+    }
+}
+
+fn part(part: Part) -> Vec<RejectedPart> {
+    let rejected = Share { part: 40, of: 41 };
+    vec![RejectedPart { part, rejected }]
+}
+
+/// Facts that break a rule, and what must come of it. Where a rule has two effects both stand here.
+fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
+    use Effect::{LeavesOpen, Rejects, Supports, Warns};
+    let unconfirmed = |facts: &mut VerdictFacts| facts.single_joint.held_out = true;
+    let repeats = |repeated| {
+        with(|f| {
+            f.validation = Validation::Recordings {
+                postures: 20,
+                repeated,
+            }
+        })
+    };
+    let share = |part| Share { part, of: 100 };
+    vec![
+        (ReasonId::LimitMet, Supports, clean()),
+        (
+            ReasonId::NotConverged,
+            Rejects,
+            with(|f| {
+                f.solver = Some(Solver {
+                    ended: FitEnd::Stalled,
+                    iterations: 3,
+                });
+            }),
+        ),
+        (
+            ReasonId::OriginNotDetermined,
+            Rejects,
+            with(|f| f.undetermined_origins = vec!["base".into()]),
+        ),
+        (
+            ReasonId::LimitExceeded,
+            Rejects,
+            with(|f| f.limits = limit(0.0012, Some((0.0011, 0.0014)))),
+        ),
+        // The interval reaches below the limit, the estimate does not.
+        (
+            ReasonId::LimitExceeded,
+            Rejects,
+            with(|f| f.limits = limit(0.0012, Some((0.0009, 0.0014)))),
+        ),
+        (
+            ReasonId::LimitUndecided,
+            Warns,
+            with(|f| f.limits = limit(0.0009, Some((0.0007, 0.0012)))),
+        ),
+        (
+            ReasonId::LimitNotEvaluated,
+            LeavesOpen,
+            with(|f| {
+                f.limits.push(Limited::orientation_rms(false).unknown(0.01));
+            }),
+        ),
+        (ReasonId::NoLimits, LeavesOpen, with(|f| f.limits.clear())),
+        (
+            ReasonId::WorseThanRegistration,
+            Rejects,
+            with(|f| {
+                f.improvements = vec![improvement(0.0005, 0.001, 0.99, 0.01)];
+            }),
+        ),
+        (
+            ReasonId::NotBetterThanRegistration,
+            Warns,
+            with(|f| {
+                f.improvements = vec![improvement(0.0006, 0.0005, 0.2, 0.8)];
+            }),
+        ),
+        (
+            ReasonId::RejectedPart,
+            Rejects,
+            with(|f| f.rejected_parts = part(Part::Recording("sweep".into()))),
+        ),
+        (
+            ReasonId::RejectedPart,
+            Rejects,
+            with(|f| {
+                f.rejected_parts = part(Part::Subject {
+                    recording: "sweep".into(),
+                    subject: "hand".into(),
+                });
+            }),
+        ),
+        (
+            ReasonId::RejectedPart,
+            Rejects,
+            with(|f| {
+                f.rejected_parts = part(Part::Range {
+                    joint: "elbow".into(),
+                    from: 0.0,
+                    to: 0.5,
+                    unit: Unit::Radian,
+                });
+            }),
+        ),
+        (
+            ReasonId::RejectedShare,
+            Warns,
+            with(|f| f.rejected = share(5)),
+        ),
+        (
+            ReasonId::RejectedShare,
+            LeavesOpen,
+            with(|f| f.rejected = share(11)),
+        ),
+        (
+            ReasonId::ScreenedHeldOut,
+            Supports,
+            with(|f| f.screened = share(1)),
+        ),
+        (
+            ReasonId::ScreenedHeldOut,
+            Warns,
+            with(|f| f.screened = share(6)),
+        ),
+        (
+            ReasonId::ScreenedHeldOut,
+            LeavesOpen,
+            with(|f| f.screened = share(11)),
+        ),
+        (
+            ReasonId::OrientationOff,
+            Rejects,
+            with(|f| f.orientation.rms = Some(2.5)),
+        ),
+        // Found noise that has swallowed the fault does not excuse it.
+        (
+            ReasonId::OrientationOff,
+            Rejects,
+            with(|f| {
+                f.orientation = Orientation {
+                    rms: Some(2.5),
+                    expected: Some(2.5),
+                };
+            }),
+        ),
+        (
+            ReasonId::OrientationNotMeasured,
+            Warns,
+            with(|f| f.orientation.rms = None),
+        ),
+        (
+            ReasonId::UnresolvedError,
+            LeavesOpen,
+            with(|f| f.errors = vec!["joint-sign".into()]),
+        ),
+        (
+            ReasonId::WarningFinding,
+            Warns,
+            with(|f| f.warnings = vec!["missing-physics".into()]),
+        ),
+        (
+            ReasonId::NoValidation,
+            LeavesOpen,
+            with(|f| f.validation = Validation::None),
+        ),
+        (
+            ReasonId::LeaveOneOut,
+            Warns,
+            with(|f| f.validation = Validation::LeaveOneOut { postures: 40 }),
+        ),
+        (ReasonId::ValidationRepeatsFit, Warns, repeats(2)),
+        (ReasonId::ValidationRepeatsFit, LeavesOpen, repeats(10)),
+        (
+            ReasonId::ImplausibleChange,
+            Warns,
+            with(|f| f.changes = vec![change(Some(6.0))]),
+        ),
+        (
+            ReasonId::ImplausibleChange,
+            LeavesOpen,
+            with(|f| {
+                f.changes = vec![change(Some(6.0))];
+                unconfirmed(f);
+            }),
+        ),
+        (
+            ReasonId::ReversedAxis,
+            Warns,
+            with(|f| f.changes = vec![change(None)]),
+        ),
+        (
+            ReasonId::ReversedAxis,
+            LeavesOpen,
+            with(|f| {
+                f.changes = vec![change(None)];
+                unconfirmed(f);
+            }),
+        ),
+        (
+            ReasonId::GoodnessOfFit,
+            Warns,
+            with(|f| f.goodness.as_mut().expect("there").used = 0.3),
+        ),
+        (
+            ReasonId::GoodnessOfFit,
+            LeavesOpen,
+            with(|f| f.goodness.as_mut().expect("there").used = 1.7),
+        ),
+        (
+            ReasonId::NoiseAboveStated,
+            Warns,
+            with(|f| {
+                f.goodness.as_mut().expect("there").above_stated = Some(("marker".into(), 2.5));
+            }),
+        ),
+        (
+            ReasonId::SingleJointData,
+            Warns,
+            with(|f| {
+                f.single_joint = SingleJoint {
+                    fitted: true,
+                    held_out: false,
+                };
+            }),
+        ),
+        (
+            ReasonId::JointsNotVerified,
+            Warns,
+            with(|f| f.not_verified = vec!["elbow".into()]),
+        ),
+    ]
+}
+
+fn verdict_of(effect: Effect) -> Verdict {
+    match effect {
+        Effect::Supports => Verdict::Accepted,
+        Effect::Warns => Verdict::AcceptedWithWarnings,
+        Effect::LeavesOpen => Verdict::NotEvaluated,
+        Effect::Rejects => Verdict::Rejected,
+    }
+}
+
+#[test]
+fn every_rule_speaks_where_it_is_broken_and_decides() {
+    let mut seen = BTreeSet::new();
+    for (id, effect, facts) in broken() {
+        let judgment = judge(&facts);
+        let of_id: Vec<&Reason> = judgment.reasons.iter().filter(|r| r.id == id).collect();
+        assert_eq!(of_id.len(), 1, "{id:?}: {:?}", judgment.reasons);
+        assert_eq!(of_id[0].effect, effect, "{id:?}");
+        let gravest = judgment.reasons.iter().map(|r| r.effect).max();
+        assert_eq!(
+            Some(judgment.reasons[0].effect),
+            gravest,
+            "the gravest is first"
+        );
+        // A change that nothing confirms comes with the reason for that.
+        assert!(
+            judgment.verdict == verdict_of(effect),
+            "{id:?}: {:?}",
+            judgment.verdict
+        );
+        seen.insert((id, effect));
+    }
+    for id in ReasonId::ALL {
+        for effect in id.effects() {
+            assert!(
+                seen.contains(&(*id, *effect)),
+                "no facts for {id:?} {effect:?}"
+            );
+        }
+    }
+    for (id, effect) in seen {
+        assert!(id.effects().contains(&effect), "{id:?} has no {effect:?}");
+    }
+}
+
+#[test]
+fn every_rule_is_silent_on_the_other_side() {
+    let judgment = judge(&clean());
+    assert_eq!(judgment.verdict, Verdict::Accepted);
+    let ids: Vec<ReasonId> = judgment.reasons.iter().map(|r| r.id).collect();
+    assert_eq!(ids, [ReasonId::LimitMet]);
+    // Just below each threshold.
+    let near = with(|f| {
+        f.limits = limit(0.0009, Some((0.0008, 0.001)));
+        f.rejected = Share { part: 49, of: 1000 };
+        f.improvements = vec![improvement(0.001, 0.0009, 0.049, 0.96)];
+        f.validation = Validation::Recordings {
+            postures: 20,
+            repeated: 1,
+        };
+        f.orientation = Orientation {
+            rms: Some(0.05),
+            expected: None,
+        };
+        let goodness = f.goodness.as_mut().expect("there");
+        goodness.used = 1.45;
+        goodness.above_stated = Some(("marker".into(), 2.0));
+    });
+    assert_eq!(
+        judge(&near).verdict,
+        Verdict::Accepted,
+        "{:?}",
+        judge(&near).reasons
+    );
+    // A limit of the profile speaks of the orientation: then it decides.
+    let limited = with(|f| {
+        f.orientation.rms = Some(0.3);
+        f.limits
+            .push(Limit::evaluated(Limited::orientation_rms(false), 0.5, 0.3));
+    });
+    assert_eq!(judge(&limited).verdict, Verdict::Accepted);
+    // Nothing of the robot was free: there is nothing to be better at.
+    let held = with(|f| {
+        f.freed = false;
+        f.improvements = vec![improvement(0.001, 0.001, 1.0, 1.0)];
+    });
+    assert_eq!(judge(&held).verdict, Verdict::Accepted);
+}
+
+#[test]
+fn facts_that_know_nothing_are_never_accepted() {
+    assert_eq!(
+        judge(&VerdictFacts::default()).verdict,
+        Verdict::NotEvaluated
+    );
+}
+
+#[test]
+fn every_reason_is_a_sentence_with_its_values() {
+    let mut sentences = Vec::new();
+    for (id, _, facts) in broken() {
+        let judgment = judge(&facts);
+        let reason = judgment.reasons.iter().find(|r| r.id == id).expect("there");
+        let sentence = reason.sentence();
+        assert!(
+            sentence.ends_with('.') && !sentence.contains('—'),
+            "{sentence}"
+        );
+        assert!(
+            !sentence.contains("  ") && !sentence.contains("another version"),
+            "{sentence}"
+        );
+        sentences.push(format!("{} ({:?}): {sentence}", id.as_str(), reason.effect));
+    }
+    insta::assert_snapshot!("reasons", sentences.join("\n"));
+}
+
+#[test]
+fn a_reason_reads_back_and_one_of_another_version_too() {
+    for (_, _, facts) in broken() {
+        for reason in judge(&facts).reasons {
+            let json = serde_json::to_string(&reason).expect("finite");
+            let read: Reason = serde_json::from_str(&json).expect("a reason");
+            assert_eq!(read, reason);
+        }
+    }
+    let later = r#"{"id": "not-yet-known", "effect": "warns", "values": {}}"#;
+    let read: Reason = serde_json::from_str(later).expect("a reason");
+    assert_eq!(read.id, ReasonId::Unknown);
+}
+
+/// The book's table has a row for every id, with its effects in words, in the order of the code.
+#[test]
+fn the_book_lists_every_rule() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../book/src/verdict.md");
+    let page = std::fs::read_to_string(page).expect("the page on the verdict");
+    let rows: Vec<(String, String)> = page
+        .lines()
+        .filter_map(|line| {
+            let mut cells = line.strip_prefix("| `")?.split(" | ");
+            let id = cells.next()?.trim_end_matches('`').to_owned();
+            Some((id, cells.next()?.trim().to_owned()))
+        })
+        .filter(|(id, _)| !id.contains(' ') && id.contains('-'))
+        .collect();
+    let word = |effect: &Effect| match effect {
+        Effect::Supports => "noted",
+        Effect::Warns => "warning",
+        Effect::LeavesOpen => "not evaluated",
+        Effect::Rejects => "rejected",
+    };
+    let expected: Vec<(String, String)> = ReasonId::ALL
+        .iter()
+        .map(|id| {
+            let effects: Vec<&str> = id.effects().iter().map(word).collect();
+            (id.as_str().to_owned(), effects.join(", "))
+        })
+        .collect();
+    assert_eq!(rows, expected);
+}
