@@ -40,6 +40,9 @@ pub struct RobotSize {
     pub reach_m: f64,
     /// Share of the prior in what is known of it, in [0, 1].
     pub prior_share: f64,
+    /// How much larger the found robot is than the nominal one, 1; null where the nominal place of the tool is not known.
+    #[serde(default)]
+    pub change: Option<f64>,
 }
 
 /// One independent direction of the parameters' uncertainty.

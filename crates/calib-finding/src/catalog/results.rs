@@ -64,10 +64,10 @@ super::topic! {
     /// The data do not see how large the robot is.
     SIZE_NOT_SEEN = "size-not-seen" {
         "contacts": Error,
-            "The data do not see the size of the robot: it is known to ±{sigma:percent} from the priors alone, {at_reach} at the reach of {reach:m}. Contacts close as well on a robot of another size, so held-out contacts cannot tell.",
+            "The data do not see the size of the robot: contacts close as well on a robot of another size, so held-out contacts cannot tell. The priors alone hold it to ±{sigma:percent}, {at_reach} at the reach of {reach:m}[[, and the fit changed it by {change:percent}, which no measurement supports]].",
             "Provide one length: a ball bar, two places at a known distance, or a tracked body on the robot; or state lengths that were measured with their σ.";
         "tracked": Warning,
-            "The data do not see the size of the robot: it is known to ±{sigma:percent} from the priors alone, {at_reach} at the reach of {reach:m}.",
+            "The data do not see the size of the robot: the priors alone hold it to ±{sigma:percent}, {at_reach} at the reach of {reach:m}.",
             "Record poses in which the joints move together over their ranges.";
     }
     /// Priors, not data, hold what matters at the tool.

@@ -9,6 +9,7 @@ use calib_finding::{About, Fact, Finding, catalog};
 use calib_profile::Usage;
 use calib_report::{HeldOut, OpenDirection, RobotSize, WeakDirections, WeakTerm};
 use calib_urdf::{JointId, LinkId};
+use nalgebra::{Point3, Vector3};
 
 use crate::formulate::formulation::MlFit;
 use crate::output::of_fit::unit;
@@ -72,6 +73,12 @@ pub fn weak_directions(inputs: &Inputs, fit: &MlFit) -> Option<WeakDirections> {
             })
             .collect(),
     };
+    let size = spread.size.map(|size| RobotSize {
+        sigma: size.sigma,
+        reach_m: reach,
+        prior_share: size.prior_share,
+        change: size_change(inputs, &name, &box_of, &points),
+    });
     Some(WeakDirections {
         point: name,
         placed: placement == Placement::Counts,
@@ -81,11 +88,7 @@ pub fn weak_directions(inputs: &Inputs, fit: &MlFit) -> Option<WeakDirections> {
         recorded_rms_sigma_m: recorded,
         prior_share: spread.prior_share,
         unbounded: spread.unbounded,
-        size: spread.size.map(|size| RobotSize {
-            sigma: size.sigma,
-            reach_m: reach,
-            prior_share: size.prior_share,
-        }),
+        size,
         directions: spread
             .directions
             .iter()
@@ -115,7 +118,8 @@ pub(crate) fn findings(
                 .with("sigma", Fact::ratio(size.sigma))
                 .with("at_reach", Fact::meters(size.at_reach_m()))
                 .with("reach", Fact::meters(size.reach_m))
-                .with("prior_share", Fact::ratio(size.prior_share)),
+                .with("prior_share", Fact::ratio(size.prior_share))
+                .with_some("change", size.change.map(Fact::ratio)),
         ];
     }
     if weak.unbounded {
@@ -134,6 +138,32 @@ pub(crate) fn findings(
             .with("limit", Fact::meters(limit))
     };
     beyond.map(finding).into_iter().collect()
+}
+
+/// How much larger the touching point's places lie around their center than on the nominal robot; `None` for a body, whose
+/// mount has no nominal value.
+fn size_change(
+    inputs: &Inputs,
+    name: &str,
+    postures: &[Vec<f64>],
+    found: &[LinearPoint],
+) -> Option<f64> {
+    let tip = inputs.robot.profile.points.get(name)?;
+    let model = &inputs.robot.model;
+    let nominal = postures
+        .iter()
+        .map(|q| model.root_from_link(q, tip.link) * tip.at);
+    let nominal = spread_of(&nominal.collect::<Vec<_>>());
+    let found = spread_of(&found.iter().map(|p| p.position).collect::<Vec<_>>());
+    (nominal > 0.0).then(|| (found / nominal).sqrt() - 1.0)
+}
+
+/// Σ|p − p̄|², m²
+fn spread_of(points: &[Point3<f64>]) -> f64 {
+    let sum: Vector3<f64> = points.iter().map(|p| p.coords).sum();
+    let center = sum / points.len().max(1) as f64;
+    let off = points.iter().map(|p| (p.coords - center).norm_squared());
+    off.sum()
 }
 
 /// The measured point that most moving joints carry: a body's frame, a marker, or a touching point.

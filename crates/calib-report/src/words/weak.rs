@@ -36,6 +36,12 @@ fn relative(ratio: f64) -> String {
     format!("{percent:.decimals$} %")
 }
 
+/// The same with its sign.
+fn signed(ratio: f64) -> String {
+    let sign = if ratio < 0.0 { "−" } else { "+" };
+    format!("{sign}{}", relative(ratio.abs()))
+}
+
 /// What was predicted where, and how much of its uncertainty the data decided.
 pub(crate) fn summary(weak: &WeakDirections) -> Vec<String> {
     let length = |m| number::plain(m, Unit::Meter);
@@ -65,7 +71,14 @@ pub(crate) fn summary(weak: &WeakDirections) -> Vec<String> {
     if let Some(size) = weak.size.filter(|size| size.sigma > 0.0) {
         let mut line = size.sentence();
         if size.is_unseen() {
-            line += " The data do not see it. ";
+            line += " The data do not see it.";
+            if let Some(change) = size.change {
+                line += &format!(
+                    " The fit changed it by {}, which no measurement supports.",
+                    signed(change)
+                );
+            }
+            line.push(' ');
             line += size.remedy();
         }
         lines.push(line);

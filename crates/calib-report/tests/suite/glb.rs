@@ -1,4 +1,4 @@
-//! The glTF file: read again by a reader that shares nothing with the writer, and placed pose by pose where the view says.
+//! The glTF file: read again by a reader of its own, which checks it against the specification, and placed pose by pose where the view says.
 
 use crate::examples;
 use calib_report::view3d::{View3d, ViewPose, pose_row};
