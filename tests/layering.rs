@@ -284,7 +284,7 @@ fn stages_of_the_pipeline_use_earlier_stages_only() {
 }
 
 /// Crates whose files still import each other in circles: the list may only become shorter.
-const CIRCLES_LEFT: &[&str] = &["calib-checks"];
+const CIRCLES_LEFT: &[&str] = &[];
 
 /// `a/b/mod.rs`, `a/b.rs` → [a, b]; `lib.rs` → [].
 fn module(file: &str) -> Vec<String> {

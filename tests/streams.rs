@@ -175,9 +175,13 @@ fn the_log_of_another_motion_is_refused() {
     let refused = dir.calib(["run", "robots/ripley.yaml", "--out", "out"]);
     assert_eq!(refused.code, 3, "{}", refused.stdout);
     assert!(
-        ["correlate", "equally well", "does not move with"]
-            .iter()
-            .any(|words| refused.stderr.contains(words)),
+        [
+            "correlate",
+            "equally well",
+            "disagree with the nominal robot"
+        ]
+        .iter()
+        .any(|words| refused.stderr.contains(words)),
         "{}",
         refused.stderr
     );

@@ -17,100 +17,20 @@
 
 use crate::statistics::median;
 use crate::sync::OffsetOutcome;
-use calib_finding::{About, Fact, Finding, Subject, Unit, catalog};
-use calib_recording::Poses;
-use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
+use calib_finding::{About, Fact, Finding, Unit, catalog};
+use nalgebra::{Isometry3, Vector3};
 
 /// Disagreement, rad (1°), below which the model is not blamed: nominal robots are that good.
-pub const GOOD_ENOUGH: f64 = 0.0175;
-/// Median disagreement, rad (11°), that no error of a nominal URDF reaches.
-const NOT_ITS_MOTION: f64 = 0.2;
-/// Another explanation must be this many times better.
-const MUCH_BETTER: f64 = 4.0;
+const GOOD_ENOUGH: f64 = 0.0175;
 /// A row that disagrees with the others by this many times their usual disagreement does not belong to them.
 const SPOILED_RATIO: f64 = 6.0;
 /// Rows within this part of the worst leave together with it.
 const NEARLY_WORST: f64 = 0.7;
-/// Disagreement, rad (34°), that no motion between two readings explains.
-const FLIPPED: f64 = 0.6;
 /// Turn that counts, rad: pairs of rows that turned less say nothing.
 const TURNED: f64 = 0.05;
 
 /// Angles, rad, between which a motion's axis is known to about its rotation noise; at π its sign is open.
 const WELL_TURNED: std::ops::Range<f64> = 0.4..2.9;
-
-/// What may be wrong, where the nominal prediction does not explain a body's motion.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Mistake {
-    /// A joint has the opposite sign.
-    JointSign {
-        /// The joint.
-        joint: String,
-    },
-    /// Two joints' columns are exchanged.
-    JointOrder {
-        /// One joint.
-        joint: String,
-        /// The other joint.
-        other: String,
-    },
-    /// All joint angles are degrees that were read as radians.
-    AnglesInDegrees,
-    /// All joint angles are radians that were read as degrees.
-    AnglesInRadians,
-    /// The tracker's lengths are a thousand times too large.
-    LengthsTooLarge,
-    /// The tracker's lengths are a thousand times too small.
-    LengthsTooSmall,
-    /// The body is on another link.
-    OtherLink {
-        /// That link.
-        link: String,
-    },
-    /// The joint values belong to another row.
-    OtherRow {
-        /// Rows from the tracker's row to that of the joint values.
-        by: isize,
-    },
-}
-
-impl Mistake {
-    fn finding(&self, body: &str) -> Finding {
-        let unit = |kind| Finding::of_kind(catalog::UNIT_MISMATCH, kind, Subject::body(body));
-        match self {
-            Mistake::JointSign { joint } => Finding::new(catalog::JOINT_SIGN, Subject::body(body))
-                .with("joint", Fact::name(joint)),
-            Mistake::JointOrder { joint, other } => {
-                Finding::new(catalog::JOINT_ORDER, Subject::body(body))
-                    .with("joint", Fact::name(joint))
-                    .with("other", Fact::name(other))
-            }
-            Mistake::AnglesInDegrees => unit("all_degrees"),
-            Mistake::AnglesInRadians => unit("all_radians"),
-            Mistake::LengthsTooLarge => unit("lengths_too_large"),
-            Mistake::LengthsTooSmall => unit("lengths_too_small"),
-            Mistake::OtherLink { link } => {
-                Finding::of_kind(catalog::WRONG_MOUNT, "other_link", Subject::body(body))
-                    .with("other", Fact::name(link))
-            }
-            Mistake::OtherRow { by } => {
-                let kind = if *by < 0 { "rows_before" } else { "rows_after" };
-                Finding::of_kind(catalog::CLOCK_LAG, kind, Subject::body(body))
-                    .with("rows", Fact::count(by.unsigned_abs()))
-            }
-        }
-    }
-}
-
-/// Predictions under one assumption, for the rows of a table.
-#[derive(Clone, Debug)]
-pub struct Prediction {
-    /// What is assumed to be wrong.
-    pub mistake: Mistake,
-    /// `base_from_link` per row, m.
-    pub base_from_link: Vec<Isometry3<f64>>,
-}
 
 /// Median disagreement of the motions (1) over pairs of rows, rad; `None` when no pair turned.
 pub fn disagreement(
@@ -181,73 +101,6 @@ fn screw(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, Option<f64>) {
     )
 }
 
-/// Whether one of `alternatives` explains a body's track much better than `base_from_link` of its link in the
-/// profile does.
-pub fn better_explanation(
-    body: &str,
-    link: &str,
-    tracker_from_body: &[Option<Isometry3<f64>>],
-    base_from_link: &[Isometry3<f64>],
-    alternatives: &[Prediction],
-) -> Option<Finding> {
-    let as_claimed = disagreement(tracker_from_body, base_from_link)?;
-    if as_claimed < GOOD_ENOUGH {
-        return None;
-    }
-    let judged = alternatives.iter().filter_map(|other| {
-        Some((
-            disagreement(tracker_from_body, &other.base_from_link)?,
-            other,
-        ))
-    });
-    let (off, best) = judged.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    if off * MUCH_BETTER > as_claimed {
-        return None;
-    }
-    Some(
-        best.mistake
-            .finding(body)
-            .with("link", Fact::name(link))
-            .with("claimed", Fact::radians(as_claimed))
-            .with("explained", Fact::radians(off)),
-    )
-}
-
-/// A body whose motion has nothing to do with that of its link, and that no single mistake explains.
-pub fn moves_alone(body: &str, link: &str, disagreement: f64) -> Option<Finding> {
-    (disagreement > NOT_ITS_MOTION).then(|| {
-        Finding::of_kind(catalog::WRONG_MOUNT, "no_link", Subject::body(body))
-            .with("link", Fact::name(link))
-            .with("claimed", Fact::radians(disagreement))
-    })
-}
-
-/// Whether a body's quaternions were written scalar first and read scalar last: then the exchanged ones explain the
-/// robot's motion and these do not.
-pub fn quaternion_order(
-    body: &str,
-    tracker_from_body: &[Option<Isometry3<f64>>],
-    base_from_link: &[Isometry3<f64>],
-) -> Option<Finding> {
-    let as_read = disagreement(tracker_from_body, base_from_link)?;
-    let exchange = |pose: &Isometry3<f64>| {
-        // The file's w, x, y, z were taken for x, y, z, w.
-        let c = pose.rotation.coords;
-        let q = UnitQuaternion::from_quaternion(Quaternion::new(c.x, c.y, c.z, c.w));
-        Isometry3::from_parts(pose.translation, q)
-    };
-    let exchanged: Vec<_> = tracker_from_body
-        .iter()
-        .map(|pose| pose.as_ref().map(exchange))
-        .collect();
-    let other = disagreement(&exchanged, base_from_link)?;
-    (as_read > GOOD_ENOUGH && other * MUCH_BETTER < as_read).then(|| {
-        Finding::new(catalog::QUATERNION_ORDER, Subject::body(body))
-            .with("claimed", Fact::radians(as_read))
-            .with("explained", Fact::radians(other))
-    })
-}
-
 /// Whether the tracker's up axis can be the one declared (`+Z`, `-Y`, …): the robot's base stands upright to within
 /// `tilt`, rad, so its z axis must be there. `None` also when the text names no axis.
 pub fn up_axis(declared: &str, tracker_from_base: &Isometry3<f64>, tilt: f64) -> Option<Finding> {
@@ -312,18 +165,30 @@ pub fn alignment(outcome: &OffsetOutcome, tolerance: f64) -> Option<Finding> {
     })
 }
 
-/// Rows that disagree with all others while the others agree among themselves: the body flipped (`body-flip`), or the
-/// robot had not settled, or the two were read at different times (`unsettled-rows`).
+/// A row that disagrees with the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpoiledRow {
+    /// Row of the table.
+    pub row: usize,
+    /// Disagreement (1) with the other rows, median, rad.
+    pub off: f64,
+}
+
+/// Rows that disagree with all others while the others agree among themselves.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Spoiled {
+    /// In order.
+    pub rows: Vec<SpoiledRow>,
+    /// Usual disagreement, rad.
+    pub usual: f64,
+}
+
+/// The rows whose motions disagree with all others. Where the others disagree as well, none is named.
 pub fn spoiled_rows(
-    poses: &Poses,
-    body: &str,
     tracker_from_body: &[Option<Isometry3<f64>>],
     base_from_link: &[Isometry3<f64>],
-) -> Vec<Finding> {
-    let n = tracker_from_body
-        .len()
-        .min(base_from_link.len())
-        .min(poses.len());
+) -> Spoiled {
+    let n = tracker_from_body.len().min(base_from_link.len());
     // Disagreement of the rows taken out, rad.
     let mut spoiled: Vec<Option<f64>> = vec![None; n];
     let mut usual = 0.0;
@@ -359,20 +224,10 @@ pub fn spoiled_rows(
             spoiled[row] = Some(angle);
         }
     }
-    let of_rows = |id, flipped: bool| {
-        let rows: Vec<usize> = (0..n)
-            .filter(|&i| spoiled[i].is_some_and(|angle| (angle > FLIPPED) == flipped))
-            .collect();
-        let worst = rows.iter().filter_map(|&i| spoiled[i]).fold(0.0, f64::max);
-        (!rows.is_empty()).then(|| {
-            Finding::of_kind(id, "model", Subject::body(body))
-                .with("count", Fact::count(rows.len()))
-                .with("worst", Fact::radians(worst))
-                .with("usual", Fact::radians(usual))
-                .at_rows(rows.into_iter().map(|i| poses.rows[i]))
-        })
-    };
-    let flips = of_rows(catalog::BODY_FLIP, true);
-    let unsettled = of_rows(catalog::UNSETTLED_ROWS, false);
-    flips.into_iter().chain(unsettled).collect()
+    let rows = spoiled.into_iter().enumerate();
+    let rows = rows.filter_map(|(row, off)| Some(SpoiledRow { row, off: off? }));
+    Spoiled {
+        rows: rows.collect(),
+        usual,
+    }
 }

@@ -7,7 +7,7 @@ use calib_finding::{Finding, Severity, catalog};
 
 use crate::error::{ExitCode, PipelineError};
 use crate::estimate::start::start;
-use crate::formulate::model_checks;
+use crate::formulate::{bad_rows, model_checks};
 use crate::prepare::checks;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
@@ -38,18 +38,16 @@ pub fn check(profile: &Path) -> Result<Checked, PipelineError> {
     }
     let of_data = checks::check(&inputs);
     // A column written twice does not keep the others from being compared with the robot, row by row.
-    let wrong = of_data
-        .iter()
-        .any(|f| f.severity == Severity::Error && f.id != catalog::DUPLICATE_COLUMN);
+    let is_wrong = |f: &Finding| f.severity == Severity::Error && f.id != catalog::DUPLICATE_COLUMN;
+    let wrong = of_data.iter().any(is_wrong);
     findings.extend(of_data);
     match body_tracks(&inputs, &mut findings) {
         Ok(tracks) => {
             let start = start(&inputs, &tracks);
-            let of_model = model_checks::before_the_fit(&inputs, &tracks, &start);
-            let wrong = wrong || checks::stops(&of_model);
-            findings.extend(of_model);
+            model_checks::before_the_fit(&inputs, &tracks, &start, &mut findings);
+            let wrong = findings.iter().any(is_wrong);
             if !wrong && inputs.robot.profile.solve.robust {
-                findings.extend(model_checks::bad_rows_of_inputs(&inputs, &tracks)?.findings);
+                findings.extend(bad_rows::bad_rows_of_inputs(&inputs, &tracks)?.findings);
             }
         }
         // What the data checks found is the reason.

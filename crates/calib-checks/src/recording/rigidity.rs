@@ -21,6 +21,10 @@ const ALL_PERMUTATIONS: usize = 5;
 
 /// Part of the rows from which bad rows are the body's nature, not mistakes of the tracker.
 const BENDING: f64 = 0.15;
+/// Gross outliers strike all markers alike: one marker in this part of the bad rows is its own fault.
+const ALWAYS_THE_SAME: f64 = 0.9;
+/// The least of a few scatters, each from n rows, is below σ: by up to 1 + this over n.
+const FEW_ROWS: f64 = 24.0;
 
 /// One body's markers over all rows.
 struct Body<'a> {
@@ -135,11 +139,14 @@ impl<'a> Body<'a> {
         sigmas.sort_by(f64::total_cmp);
         let quiet = sigmas[(sigmas.len() - 1) / 4];
         // A distance has the noise of two coordinates along the line between the markers.
-        let sigma = quiet.max(
-            expected
-                .marker_sigma
-                .map_or(0.0, |sigma| sigma * std::f64::consts::SQRT_2),
-        );
+        let sigma = match expected.marker_sigma {
+            Some(stated) => quiet.max(stated * std::f64::consts::SQRT_2),
+            None => {
+                let rows = tracks.iter().map(|track| track.iter().flatten().count());
+                let rows = rows.min().unwrap_or(0).max(ROWS) as f64;
+                quiet * (1.0 + FEW_ROWS / rows)
+            }
+        };
         let tolerance = (SIGMAS * sigma).max(SMALLEST_FAULT);
         Some(Body {
             name,
@@ -233,6 +240,8 @@ impl<'a> Body<'a> {
     fn bad_rows(&self, poses: &Poses) -> Vec<Finding> {
         let mut swapped: Vec<(u64, Vec<&str>)> = Vec::new();
         let mut outliers: Vec<(u64, String, f64)> = Vec::new();
+        // Markers each of which alone explains a bad row.
+        let mut alone: Vec<Vec<usize>> = Vec::new();
         for row in 0..poses.len() {
             let points: Vec<Option<Point3<f64>>> =
                 self.tracks.iter().map(|track| track[row]).collect();
@@ -243,6 +252,7 @@ impl<'a> Body<'a> {
             match self.exchange(&points) {
                 Some(exchanged) => swapped.push((poses.rows[row], exchanged)),
                 None => {
+                    alone.push(self.explained_by_one(&points));
                     let (marker, off) = self.out_of_place(&points);
                     outliers.push((poses.rows[row], marker, off));
                 }
@@ -257,7 +267,7 @@ impl<'a> Body<'a> {
                     .at_rows(swapped.iter().map(|(row, _)| *row)),
             );
         }
-        if outliers.len() as f64 > BENDING * poses.len() as f64 {
+        if self.bends(&alone, poses.len()) {
             findings.extend(self.bending(outliers.iter().map(|(row, _, _)| *row).collect()));
             return findings;
         }
@@ -271,6 +281,28 @@ impl<'a> Body<'a> {
             );
         }
         findings
+    }
+
+    /// The markers without which the distances of a row are right.
+    fn explained_by_one(&self, points: &[Option<Point3<f64>>]) -> Vec<usize> {
+        let without = |k: &usize| {
+            let mut rest = points.to_vec();
+            rest[*k] = None;
+            self.deviation(&rest) <= self.tolerance
+        };
+        (0..points.len()).filter(without).collect()
+    }
+
+    /// Bad rows that are too many for rare mistakes, and that no marker explains, or always the same one.
+    fn bends(&self, alone: &[Vec<usize>], rows: usize) -> bool {
+        let many = |count: usize| count >= ROWS && count as f64 > BENDING * rows as f64;
+        let unexplained = alone.iter().filter(|markers| markers.is_empty()).count();
+        let of_marker = |k: usize| alone.iter().filter(|markers| markers.contains(&k)).count();
+        let most = (0..self.markers.len()).map(of_marker).max().unwrap_or(0);
+        let same = most as f64 > ALWAYS_THE_SAME * alone.len() as f64;
+        // Two outliers meet in a row far less often than one stands alone.
+        let bent = many(unexplained) && 2 * unexplained > alone.len();
+        bent || (same && many(alone.len()))
     }
 
     /// Many rows, none of them a rare mistake: the body bends.
@@ -409,7 +441,7 @@ impl<'a> Body<'a> {
         };
         let (plain, mirrored) = (rms(&known)?, rms(&mirror)?);
         (plain > self.tolerance && mirrored < self.tolerance && plain > 5.0 * mirrored).then(|| {
-            self.finding(catalog::MIRRORED)
+            self.finding_of(catalog::MIRRORED, "template")
                 .with("mirrored", Fact::meters(mirrored))
                 .with("plain", Fact::meters(plain))
         })

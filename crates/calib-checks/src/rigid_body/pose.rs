@@ -1,6 +1,7 @@
 //! The pose of a body in every row, how certain it is, and how rigid the body was.
 
 use super::learn::{MarkerFit, NotABody, Template, register};
+use crate::statistics::median;
 use calib_finding::nearest_word;
 use calib_recording::Poses;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3};
@@ -212,30 +213,28 @@ fn symmetric(m: Matrix6<f64>) -> Matrix6<f64> {
     (m + m.transpose()) * 0.5
 }
 
-/// For each marker the lower median, over the others, of the standard deviation of their distance.
+/// For each marker the lower median, over the others, of the scatter of their distance. The scatter is σ of a Gaussian
+/// from the 80 % quantile: gross outliers in a tenth of the samples of each marker do not count.
 fn wandering(tracks: &[&[Option<Point3<f64>>]], rows: usize) -> Vec<f64> {
+    /// Φ⁻¹(0.9), the 80 % quantile of |x|.
+    const QUANTILE: f64 = 1.2816;
     let count = tracks.len();
-    let mut deviations = vec![Vec::new(); count];
+    let mut scatters = vec![Vec::new(); count];
     for i in 0..count {
         for j in 0..i {
-            let (mut n, mut mean, mut sum) = (0.0, 0.0, 0.0);
-            for row in 0..rows {
-                if let (Some(a), Some(b)) = (tracks[i][row], tracks[j][row]) {
-                    let distance = (a - b).norm();
-                    n += 1.0;
-                    let before: f64 = distance - mean;
-                    mean += before / n;
-                    sum += before * (distance - mean);
-                }
-            }
-            if n >= 2.0 {
-                let deviation = f64::sqrt(sum / (n - 1.0));
-                deviations[i].push(deviation);
-                deviations[j].push(deviation);
-            }
+            let both = (0..rows).filter_map(|row| Some((tracks[i][row]?, tracks[j][row]?)));
+            let distances: Vec<f64> = both.map(|(a, b)| (a - b).norm()).collect();
+            let Some(middle) = median(distances.clone()).filter(|_| distances.len() >= 2) else {
+                continue;
+            };
+            let mut off: Vec<f64> = distances.iter().map(|d| (d - middle).abs()).collect();
+            off.sort_by(f64::total_cmp);
+            let scatter = off[(off.len() - 1) * 4 / 5] / QUANTILE;
+            scatters[i].push(scatter);
+            scatters[j].push(scatter);
         }
     }
-    deviations
+    scatters
         .into_iter()
         .map(|mut all: Vec<f64>| {
             all.sort_by(f64::total_cmp);

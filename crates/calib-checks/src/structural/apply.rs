@@ -1,10 +1,9 @@
 //! Corrections applied to data.
 
-use nalgebra::Point3;
-
-use super::data::{Body, Data, Measured};
-use super::hypothesis::{Hypothesis, Scope, Scoped};
-use super::ids::{BodyIndex, RecordingIndex};
+use super::correct::correct;
+use super::data::Data;
+use super::hypothesis::{Hypothesis, Scoped};
+use super::special;
 
 /// The data as they would be had the mistake not been made.
 ///
@@ -12,29 +11,10 @@ use super::ids::{BodyIndex, RecordingIndex};
 /// readings) from the data.
 #[must_use]
 pub fn apply(scoped: &Scoped, data: &Data) -> Data {
-    let mut corrected = data.clone();
-    let h = &scoped.hypothesis;
-    let inside: Vec<bool> = data
-        .recording
-        .iter()
-        .map(|r| scoped.scope.contains(*r))
-        .collect();
-    match *h {
-        Hypothesis::RowShift { rows } => shift(&mut corrected, data, &inside, rows),
-        Hypothesis::WrongLink { body, link } => corrected.bodies[body.0].link = link,
-        Hypothesis::ExchangedBodies { first, second } => {
-            exchange_bodies(&mut corrected, scoped.scope, &inside, first, second)
-        }
-        Hypothesis::Remounted { body } => remount(&mut corrected, scoped.scope, body),
-        Hypothesis::TrackerMoved | Hypothesis::MissingColumn { .. } => {
-            return super::special::apply(scoped, data);
-        }
-        _ => {
-            correct_readings(&mut corrected, h, &inside);
-            correct_measured(&mut corrected, h, &inside);
-        }
+    match scoped.hypothesis {
+        Hypothesis::TrackerMoved | Hypothesis::MissingColumn { .. } => special::apply(scoped, data),
+        _ => correct(scoped, data),
     }
-    corrected
 }
 
 /// All corrections, one after the other.
@@ -43,138 +23,4 @@ pub fn apply_all(corrections: &[Scoped], data: &Data) -> Data {
     corrections
         .iter()
         .fold(data.clone(), |data, scoped| apply(scoped, &data))
-}
-
-fn correct_readings(data: &mut Data, h: &Hypothesis, inside: &[bool]) {
-    for (row, _) in data
-        .readings
-        .iter_mut()
-        .zip(inside)
-        .filter(|(_, inside)| **inside)
-    {
-        if let Hypothesis::Exchange { first, second } = *h {
-            row.swap(first.0, second.0);
-        }
-        if let Some(a) = h.affine() {
-            let source = row[a.source].unwrap_or(0.0);
-            // An empty column stays empty unless something is added to it.
-            let added = a.coupling * source + a.offset;
-            row[a.joint] = match row[a.joint] {
-                Some(q) => Some(a.factor * q + added),
-                None if added != 0.0 => Some(added),
-                None => None,
-            };
-        }
-    }
-}
-
-fn correct_measured(data: &mut Data, h: &Hypothesis, inside: &[bool]) {
-    for (b, body) in data.bodies.iter_mut().enumerate() {
-        match &mut body.measured {
-            Measured::Markers(points) => {
-                for (row, _) in points.iter_mut().zip(inside).filter(|(_, inside)| **inside) {
-                    for point in row.iter_mut().flatten() {
-                        if let Some(p) = h.point(&point.coords) {
-                            *point = Point3::from(p);
-                        }
-                    }
-                }
-            }
-            Measured::Poses {
-                tracker_from_body, ..
-            } => {
-                for (pose, _) in tracker_from_body
-                    .iter_mut()
-                    .zip(inside)
-                    .filter(|(_, inside)| **inside)
-                {
-                    if let Some(old) = pose
-                        && let Some(new) = h.pose(BodyIndex(b), old)
-                    {
-                        *pose = Some(new);
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// The row whose readings row i needs under a shift; `None` at the ends of its recording.
-pub(crate) fn shifted_row(recording: &[RecordingIndex], i: usize, rows: i8) -> Option<usize> {
-    let from = i.checked_add_signed(-isize::from(rows))?;
-    (recording.get(from)? == &recording[i]).then_some(from)
-}
-
-fn shift(corrected: &mut Data, data: &Data, inside: &[bool], rows: i8) {
-    for i in (0..inside.len()).filter(|&i| inside[i]) {
-        corrected.readings[i] = match shifted_row(&data.recording, i, rows) {
-            Some(from) => data.readings[from].clone(),
-            // No partner: a row without readings is not used.
-            None => vec![None; data.readings[i].len()],
-        };
-    }
-}
-
-fn exchange_bodies(
-    data: &mut Data,
-    scope: Scope,
-    inside: &[bool],
-    first: BodyIndex,
-    second: BodyIndex,
-) {
-    if scope == Scope::All {
-        let link = data.bodies[first.0].link;
-        data.bodies[first.0].link = data.bodies[second.0].link;
-        data.bodies[second.0].link = link;
-        return;
-    }
-    let (head, tail) = data.bodies.split_at_mut(second.0);
-    for i in (0..inside.len()).filter(|&i| inside[i]) {
-        match (&mut head[first.0].measured, &mut tail[0].measured) {
-            (Measured::Markers(a), Measured::Markers(b)) => std::mem::swap(&mut a[i], &mut b[i]),
-            (
-                Measured::Poses {
-                    tracker_from_body: a,
-                    ..
-                },
-                Measured::Poses {
-                    tracker_from_body: b,
-                    ..
-                },
-            ) => {
-                std::mem::swap(&mut a[i], &mut b[i]);
-            }
-            _ => {}
-        }
-    }
-}
-
-/// Gives the recordings of the scope a mount of their own.
-pub(crate) fn remount(data: &mut Data, scope: Scope, body: BodyIndex) {
-    let recordings = data.recordings();
-    let old: Vec<u32> = (0..recordings)
-        .map(|r| data.mount(body, RecordingIndex(r)))
-        .collect();
-    let next = old.iter().max().map_or(1, |m| m + 1);
-    let new = old.iter().enumerate();
-    data.bodies[body.0].mounts = new
-        .map(|(r, m)| {
-            if scope.contains(RecordingIndex(r)) {
-                next
-            } else {
-                *m
-            }
-        })
-        .collect();
-}
-
-/// Can the two bodies' samples be exchanged in a single recording?
-pub(crate) fn same_shape(a: &Body, b: &Body) -> bool {
-    match (&a.measured, &b.measured) {
-        (Measured::Markers(a), Measured::Markers(b)) => {
-            a.first().map(Vec::len) == b.first().map(Vec::len)
-        }
-        (Measured::Poses { .. }, Measured::Poses { .. }) => true,
-        _ => false,
-    }
 }

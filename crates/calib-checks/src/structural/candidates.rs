@@ -1,7 +1,6 @@
 //! Which hypotheses are tried on given data, and in which scopes.
 
-use super::apply::same_shape;
-use super::chain::Motion;
+use super::correct::same_shape;
 use super::data::{Data, Measured};
 use super::hypothesis::{Hypothesis, PoseMistake, QuarterTurns, Scope, UnitMistake};
 use super::ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex};
@@ -10,6 +9,9 @@ use super::ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex};
 const MOVES: f64 = 1e-6;
 /// With more recordings a fault in all but one is left to the pairs: the scopes would outnumber the hypotheses.
 const MOST_RECORDINGS_EXCEPT: usize = 6;
+
+/// Rows by which the readings of a table may lag.
+const LAGS: [i8; 4] = [1, -1, 2, -2];
 
 /// A hypothesis with its scopes.
 pub(crate) type Candidate = (Hypothesis, Vec<Scope>);
@@ -47,15 +49,6 @@ fn parts(present: &[RecordingIndex]) -> Vec<Scope> {
     parts
 }
 
-/// The joint turns (or slides) something itself.
-fn turns(data: &Data, joint: JointIndex) -> Option<bool> {
-    match data.chain.joints()[joint.0].motion {
-        Motion::Fixed => None,
-        Motion::Revolute(_) => Some(true),
-        Motion::Prismatic(_) => Some(false),
-    }
-}
-
 /// The largest difference of a joint's readings.
 pub(crate) fn span(data: &Data, joint: JointIndex) -> f64 {
     let values = || data.readings.iter().map(|row| row[joint.0].unwrap_or(0.0));
@@ -69,7 +62,7 @@ fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
     let joints = data.relevant_joints();
     let mut add = |h: Hypothesis| list.push((h, scopes.to_vec()));
     for &joint in &joints {
-        let Some(revolute) = turns(data, joint) else {
+        let Some(revolute) = data.chain.turns(joint.0) else {
             continue;
         };
         if span(data, joint) > MOVES {
@@ -102,7 +95,7 @@ fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
     }
     for &joint in &joints {
         for &source in &joints {
-            let alike = joint != source && turns(data, joint) == turns(data, source);
+            let alike = joint != source && data.chain.turns(joint.0) == data.chain.turns(source.0);
             if alike && span(data, source) > MOVES {
                 for factor in [1.0, -1.0] {
                     add(Hypothesis::Coupling {
@@ -114,7 +107,23 @@ fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
             }
         }
     }
-    for rows in [1, -1] {
+    // With a single moving column of a kind its own unit is the same hypothesis.
+    let moving = |turning| {
+        let of_kind = |j: &&JointIndex| data.chain.turns(j.0) == Some(turning);
+        let moves = |j: &&JointIndex| span(data, **j) > MOVES;
+        joints.iter().filter(of_kind).filter(moves).count()
+    };
+    for mistake in [
+        DegreesReadAsRadians,
+        RadiansReadAsDegrees,
+        MillimetersReadAsMeters,
+        MetersReadAsMillimeters,
+    ] {
+        if moving(mistake.of_angles()) > 1 {
+            add(Hypothesis::Units { mistake });
+        }
+    }
+    for rows in LAGS {
         add(Hypothesis::RowShift { rows });
     }
 }
@@ -211,7 +220,7 @@ fn of_missing(data: &Data, list: &mut Vec<Candidate>) {
     let present = recordings_present(data);
     for joint in data.relevant_joints() {
         let at: Vec<RecordingIndex> = empty.iter().filter(|e| e.0 == joint).map(|e| e.1).collect();
-        if turns(data, joint).is_none() || at.is_empty() {
+        if data.chain.turns(joint.0).is_none() || at.is_empty() {
             continue;
         }
         let scopes = if at.len() == present.len() {

@@ -193,6 +193,19 @@ impl Chain {
         readings
     }
 
+    /// Whether the reading of a joint moves a link.
+    pub(crate) fn reads(&self, link: LinkIndex, joint: usize) -> bool {
+        let mut at = link;
+        while let Some(own) = self.joints.iter().find(|own| own.child == at) {
+            let term = |term: &(JointIndex, f64)| term.0.0 == joint && term.1 != 0.0;
+            if own.motion != Motion::Fixed && own.law.iter().any(term) {
+                return true;
+            }
+            at = own.parent;
+        }
+        false
+    }
+
     /// The link at the root side of all fixed joints above a link: links with the same one move together.
     pub(crate) fn rigid_group(&self, link: LinkIndex) -> LinkIndex {
         let mut at = link;
@@ -203,6 +216,15 @@ impl Chain {
             at = joint.parent;
         }
         at
+    }
+
+    /// Whether the joint turns (or slides) something itself; `None` for a fixed one.
+    pub(crate) fn turns(&self, joint: usize) -> Option<bool> {
+        match self.joints[joint].motion {
+            Motion::Fixed => None,
+            Motion::Revolute(_) => Some(true),
+            Motion::Prismatic(_) => Some(false),
+        }
     }
 
     /// The position of a joint (rad or m).

@@ -9,6 +9,7 @@ use super::ids::{JointIndex, SampleIndex};
 use super::linear;
 use super::outcome::{Correction, Decision, Design, Evidence, Named, Options, Outcome};
 use super::scan::{Scan, Score, Scored};
+use super::score::score;
 use super::screen::screen;
 use super::twin::twin;
 
@@ -21,6 +22,10 @@ const SCREENED_LEADERS: usize = 5;
 /// Only hypotheses with a residual up to this many times the winner's can be equivalent to it: equivalents differ by what
 /// the nominal errors do to them.
 const EQUIVALENT_WITHIN: f64 = 1.5;
+/// A hypothesis with a residual of this many times that of the data as they are explains nothing: a bound of it will do.
+const BEYOND: f64 = 2.0;
+/// The same in m, where the data are free of noise.
+const LEAST_BEYOND: f64 = 1e-4;
 /// Residuals that agree to this are those of one and the same correction.
 const SAME: f64 = 1e-6;
 
@@ -34,7 +39,8 @@ impl Ranking {
     fn of(data: &Data, candidates: &[Candidate], screened: &[SampleIndex]) -> Self {
         let scan = Scan::new(data, screened);
         let none = scan.none();
-        let mut scored = scan.score(candidates);
+        let enough = (BEYOND * none.rms).max(LEAST_BEYOND);
+        let mut scored = score(&scan, candidates, enough);
         scored.retain(|s| s.score.score.is_finite());
         scored.sort_by(|a, b| a.score.score.total_cmp(&b.score.score));
         Self { none, scored }
@@ -100,7 +106,9 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
         } => named.correction.clone(),
         _ => Vec::new(),
     };
-    outcome.continuous = linear::continuous(&apply_all(&correction, work), &screened, options);
+    if options.score_tests {
+        outcome.continuous = linear::continuous(&apply_all(&correction, work), &screened, options);
+    }
     outcome.screened = screened
         .iter()
         .map(|s| SampleIndex {
@@ -109,6 +117,12 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
         })
         .collect();
     Ok(outcome)
+}
+
+/// The data that [`explain`] scores: at most `most` rows.
+#[must_use]
+pub fn thin(data: &Data, most: usize) -> Data {
+    data.select(&thinned(data, most))
 }
 
 /// Residual of the registration of the data as they are, rms, m: all samples count.
@@ -186,8 +200,7 @@ fn on_twin(
         .iter()
         .map(|s| (s.hypothesis, vec![s.scope]))
         .collect();
-    let fits = scan
-        .score(&list)
+    let fits = score(&scan, &list, f64::INFINITY)
         .into_iter()
         .filter(|s| s.score.score < options.twin_tolerance);
     fits.map(|s| s.scoped).collect()
@@ -419,19 +432,27 @@ fn undoes(first: &Scoped, second: &Scoped) -> bool {
     first == second || (same_kind && own)
 }
 
-/// Evenly spaced rows of every recording.
+/// Evenly spaced rows of every recording. Recordings share the rows; what a short one leaves is for the longer ones.
 fn thinned(data: &Data, most: usize) -> Vec<usize> {
-    let n = data.readings.len();
-    if n <= most {
-        return (0..n).collect();
+    if data.readings.len() <= most {
+        return (0..data.readings.len()).collect();
     }
-    let step = n as f64 / most.max(1) as f64;
-    let mut rows: Vec<usize> = (0..most.max(1))
-        .map(|k| (step * (k as f64 + 0.5)) as usize)
-        .collect();
-    rows.retain(|&i| i < n);
-    rows.dedup();
-    rows
+    let mut recordings: Vec<Vec<usize>> = vec![Vec::new(); data.recordings()];
+    for (i, recording) in data.recording.iter().enumerate() {
+        recordings[recording.0].push(i);
+    }
+    recordings.retain(|rows| !rows.is_empty());
+    recordings.sort_by_key(Vec::len);
+    let (count, mut left) = (recordings.len(), most);
+    let mut kept = Vec::new();
+    for (k, rows) in recordings.iter().enumerate() {
+        let take = rows.len().min((left / (count - k)).max(1));
+        let step = rows.len() as f64 / take as f64;
+        kept.extend((0..take).map(|n| rows[(step * (n as f64 + 0.5)) as usize]));
+        left = left.saturating_sub(take);
+    }
+    kept.sort_unstable();
+    kept
 }
 
 fn design(data: &Data) -> Design {

@@ -22,6 +22,15 @@ pub enum UnitMistake {
 }
 
 impl UnitMistake {
+    /// Whether it is a unit of angle.
+    #[must_use]
+    pub fn of_angles(self) -> bool {
+        matches!(
+            self,
+            Self::DegreesReadAsRadians | Self::RadiansReadAsDegrees
+        )
+    }
+
     /// What the value that was read must be multiplied by.
     #[must_use]
     pub fn factor(self) -> f64 {
@@ -93,6 +102,11 @@ pub enum Hypothesis {
         /// Which unit for which.
         mistake: UnitMistake,
     },
+    /// The unit of all joint columns of its kind was misread: of all angles, or of all lengths.
+    Units {
+        /// Which unit for which.
+        mistake: UnitMistake,
+    },
     /// The joint also moves with another joint's reading: `reading_joint += factor · reading_source`.
     Coupling {
         /// Joint that moves too.
@@ -118,7 +132,7 @@ pub enum Hypothesis {
     },
     /// Readings and tracker data are paired one row off: row i needs the readings of row i − `rows`.
     RowShift {
-        /// +1 or −1.
+        /// ±1 or ±2.
         rows: i8,
     },
     /// The joint moved although its column is empty.

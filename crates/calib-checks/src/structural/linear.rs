@@ -176,7 +176,8 @@ impl<'a> Model<'a> {
                 }
             }
             observations += 3.0 * seen.iter().map(|&k| self.share(k).powi(2)).sum::<f64>();
-            gram.gemm_tr(1.0, &block, &block, 1.0);
+            // The product of a transpose has no fast kernel.
+            gram.gemm(1.0, &block.transpose(), &block, 1.0);
         }
         Sums {
             gram,
@@ -369,22 +370,11 @@ pub(crate) fn continuous(
     if tests.is_empty() {
         return None;
     }
-    let (best_model, deviation, mut sigma) = relinearized(data, &tests, screened, options)?;
-    let model = Model::new(&best_model, &tests, screened);
-    let mut best: Option<(Sums, Map)> = None;
-    for lambda in NOISE_RATIOS {
-        let sums = model.sums(lambda);
-        let mut map = solve(&model, &sums, sigma, &deviation, options)?;
-        sigma = map.sigma;
-        map = solve(&model, &sums, sigma, &deviation, options)?;
-        if best
-            .as_ref()
-            .is_none_or(|b| map.log_likelihood > b.1.log_likelihood)
-        {
-            best = Some((sums, map));
-        }
-    }
-    let (sums, map) = best?;
+    let (at_map, deviation, sigma) = relinearized(data, screened, options)?;
+    let (lambda, sigma) = noise_ratio(&at_map, &deviation, sigma, screened, options)?;
+    let model = Model::new(&at_map, &tests, screened);
+    let sums = model.sums(lambda);
+    let map = solve(&model, &sums, sigma, &deviation, options)?;
     let mut scored = score_tests(&model, &sums, &map);
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
     let &(which, statistic, factor, h) = scored.first()?;
@@ -392,11 +382,14 @@ pub(crate) fn continuous(
         return None;
     }
     let threshold = threshold(options.false_alarm / tests.len() as f64, map.freedom);
+    if statistic < threshold {
+        return None;
+    }
     let plain = model.sums(0.0);
     let first = model.registration + 6 * model.geometry.len() + which;
     let moved = projected(&plain.gram, model.registration, first, 1)?[(0, 0)].max(0.0);
     let effect = factor.abs() * (3.0 * moved / plain.observations).sqrt();
-    if statistic < threshold || effect < options.least_effect {
+    if effect < options.least_effect {
         return None;
     }
     let alternatives = scored[1..].iter().take_while(|s| statistic - s.1 < AS_GOOD);
@@ -408,6 +401,27 @@ pub(crate) fn continuous(
         effect,
         alternatives: alternatives.map(|s| tests[s.0].hypothesis(s.2)).collect(),
     })
+}
+
+/// The noise ratio λ of the largest restricted likelihood, and σ under it.
+fn noise_ratio(
+    data: &Data,
+    deviation: &DVector<f64>,
+    mut sigma: f64,
+    screened: &[SampleIndex],
+    options: &Options,
+) -> Option<(f64, f64)> {
+    let model = Model::new(data, &[], screened);
+    let mut best: Option<(f64, f64, f64)> = None;
+    for lambda in NOISE_RATIOS {
+        let sums = model.sums(lambda);
+        sigma = solve(&model, &sums, sigma, deviation, options)?.sigma;
+        let map = solve(&model, &sums, sigma, deviation, options)?;
+        if best.is_none_or(|b| map.log_likelihood > b.0) {
+            best = Some((map.log_likelihood, lambda, sigma));
+        }
+    }
+    best.map(|(_, lambda, sigma)| (lambda, sigma))
 }
 
 fn tests(data: &Data) -> Vec<Test> {
@@ -455,7 +469,6 @@ fn threshold(level: f64, freedom: f64) -> f64 {
 /// The data with the chain at its MAP geometry, how far that is from nominal, and σ.
 fn relinearized(
     data: &Data,
-    tests: &[Test],
     screened: &[SampleIndex],
     options: &Options,
 ) -> Option<(Data, DVector<f64>, f64)> {
@@ -466,7 +479,7 @@ fn relinearized(
     let mut sigma = options.sigma;
     for _ in 0..RELINEARIZATIONS {
         let x = {
-            let model = Model::new(&data, tests, screened);
+            let model = Model::new(&data, &[], screened);
             let sums = model.sums(NOISE_RATIOS[2]);
             let map = solve(&model, &sums, sigma, &deviation, options)?;
             sigma = map.sigma;

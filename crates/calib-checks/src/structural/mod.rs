@@ -36,7 +36,7 @@
 //! noise-free twins and named with it. Gross outliers are screened under the leading hypotheses, by the one with
 //! the smallest robust scale, never under one alone. Gains and fractional couplings are found by score tests.
 //!
-//! What this module does not do: it fits no geometry, blames no row, and writes no sentence; the outcome is data.
+//! What this module does not do: it fits no geometry and writes no sentence; it lists the rows that deviate ([`deviations`]), and the caller judges them; the outcome is data.
 //!
 //! ```
 //! use calib_checks::structural::{explain, Data, DataError, Decision, Options};
@@ -51,6 +51,7 @@ mod apply;
 mod candidates;
 mod chain;
 mod channels;
+mod correct;
 mod data;
 mod decide;
 mod expected;
@@ -60,7 +61,9 @@ mod linear;
 mod moments;
 mod outcome;
 mod rotation;
+mod rows;
 mod scan;
+mod score;
 mod screen;
 mod special;
 mod twin;
@@ -68,10 +71,11 @@ mod twin;
 pub use apply::{apply, apply_all};
 pub use chain::{Chain, ChainError, ChainJoint, Motion};
 pub use data::{Body, Data, DataError, Measured};
-pub use decide::{explain, registration_residual};
+pub use decide::{explain, registration_residual, thin};
 pub use hypothesis::{
     Hypothesis, PoseMistake, QuarterTurns, Scope, Scoped, UnitMistake, axes_rotation,
 };
 pub use ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex, SampleIndex};
 pub use linear::Continuous;
 pub use outcome::{Correction, Decision, Design, Evidence, Expected, Named, Options, Outcome};
+pub use rows::{Deviation, Deviations, deviations};

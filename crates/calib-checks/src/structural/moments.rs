@@ -142,8 +142,13 @@ impl Normal {
         self.points += 1;
     }
 
-    /// Eliminates c and minimizes over the rotations.
-    pub(crate) fn solve(&self) -> Registration {
+    /// A lower bound of the cost: its least value over all matrices Q.
+    pub(crate) fn least(&self) -> f64 {
+        self.reduced().0.least()
+    }
+
+    /// The quadratic of the rotation, with c eliminated, and what gives c.
+    fn reduced(&self) -> (Quadratic, SMatrix<f64, 9, 3>, Matrix3<f64>, Vector3<f64>) {
         let h_qq: Mat9 = self.h.fixed_view::<9, 9>(0, 0).into_owned();
         let h_qc: SMatrix<f64, 9, 3> = self.h.fixed_view::<9, 3>(0, 9).into_owned();
         let h_cc: Matrix3<f64> = self.h.fixed_view::<3, 3>(9, 9).into_owned();
@@ -159,6 +164,12 @@ impl Normal {
             b: g_q - h_qc * inverse * g_c,
             d: self.d - g_c.dot(&(inverse * g_c)),
         };
+        (reduced, h_qc, inverse, g_c)
+    }
+
+    /// Eliminates c and minimizes over the rotations.
+    pub(crate) fn solve(&self) -> Registration {
+        let (reduced, h_qc, inverse, g_c) = self.reduced();
         let (q, f) = reduced.minimum();
         let x_q = super::rotation::vec9(&q);
         let c = -(inverse * (h_qc.transpose() * x_q + g_c));

@@ -35,6 +35,8 @@ pub struct Options {
     pub most_rows: usize,
     /// List the hypotheses that this design cannot distinguish from correct data.
     pub list_invisible: bool,
+    /// Test gains and fractional couplings.
+    pub score_tests: bool,
 }
 
 impl Default for Options {
@@ -52,6 +54,7 @@ impl Default for Options {
             beam: 6,
             most_rows: 400,
             list_invisible: true,
+            score_tests: true,
         }
     }
 }

@@ -49,12 +49,22 @@ impl Quadratic {
         (best.0, best.1.max(0.0))
     }
 
-    /// The unconstrained minimum `−(A + εI)⁻¹ b`, projected on the rotations.
-    fn linear_start(&self) -> Option<Matrix3<f64>> {
+    /// The unconstrained minimum `−(A + εI)⁻¹ b`.
+    fn unconstrained(&self) -> Option<Vec9> {
         let ridge = 1e-12 * self.a.trace().max(f64::MIN_POSITIVE);
-        let q = -(self.a + Mat9::identity() * ridge)
-            .cholesky()?
-            .solve(&self.b);
+        let factor = (self.a + Mat9::identity() * ridge).cholesky()?;
+        Some(-factor.solve(&self.b))
+    }
+
+    /// The least value over all matrices: no rotation has a smaller one.
+    pub(crate) fn least(&self) -> f64 {
+        self.unconstrained()
+            .map_or(0.0, |q| (q.dot(&self.b) + self.d).max(0.0))
+    }
+
+    /// The unconstrained minimum, projected on the rotations.
+    fn linear_start(&self) -> Option<Matrix3<f64>> {
+        let q = self.unconstrained()?;
         let rotation = so3::nearest_rotation(&mat3(&q))?;
         Some(rotation.to_rotation_matrix().into_inner())
     }

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::apply::{apply, remount, shifted_row};
 use super::chain::{Pose, Walk};
 use super::channels::{Channel, channels_of, mounts, point};
+use super::correct::{correct, remount, shifted_row};
 use super::data::{Data, Measured};
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{LinkIndex, RecordingIndex, SampleIndex};
@@ -152,7 +152,7 @@ impl<'a> Scan<'a> {
             self.add_row(
                 &mut sums,
                 i,
-                |body| self.poses[i * self.data.bodies.len() + body],
+                |body| Some(self.poses[i * self.data.bodies.len() + body]),
                 &self.points,
             );
         }
@@ -168,15 +168,17 @@ impl<'a> Scan<'a> {
         &self,
         sums: &mut [Moments],
         i: usize,
-        pose: impl Fn(usize) -> Pose,
+        pose: impl Fn(usize) -> Option<Pose>,
         points: &[Vector3<f64>],
     ) {
         let n = self.channels.len();
         let recording = self.data.recording[i].0;
         for (k, channel) in self.channels.iter().enumerate() {
             let w = self.weights[i * n + k];
-            if w > 0.0 {
-                sums[recording * n + k].add(&points[i * n + k], &pose(channel.body), w);
+            if w > 0.0
+                && let Some(pose) = pose(channel.body)
+            {
+                sums[recording * n + k].add(&points[i * n + k], &pose, w);
             }
         }
     }
@@ -186,25 +188,27 @@ impl<'a> Scan<'a> {
         self.combine(&self.sums, Scope::All).1
     }
 
-    /// Every hypothesis in every scope that is allowed for it.
-    pub(crate) fn score(&self, candidates: &[(Hypothesis, Vec<Scope>)]) -> Vec<Scored> {
-        let mut scored = Vec::with_capacity(candidates.iter().map(|c| c.1.len()).sum());
-        let mut buffer = Vec::new();
-        for (hypothesis, scopes) in candidates {
-            let sums = self.moved_sums(hypothesis, &mut buffer);
-            for &scope in scopes {
-                let scoped = Scoped {
-                    hypothesis: *hypothesis,
-                    scope,
-                };
-                let score = match &sums {
-                    Some(sums) => self.combine(sums, scope).1,
-                    None => self.fit(Some(&scoped)).score,
-                };
-                scored.push(Scored { scoped, score });
-            }
-        }
-        scored
+    /// A hypothesis in each of the scopes, which share the sums; not one that estimates something of its own. Where a lower
+    /// bound of the residual is beyond `enough`, m, the bound is the score.
+    pub(crate) fn score(
+        &self,
+        hypothesis: &Hypothesis,
+        scopes: &[Scope],
+        enough: f64,
+    ) -> Vec<Scored> {
+        let sums = self.moved_sums(hypothesis, &mut Vec::new());
+        let one = |scope: &Scope| {
+            let scoped = Scoped {
+                hypothesis: *hypothesis,
+                scope: *scope,
+            };
+            let score = match &sums {
+                Some(sums) => self.bounded(sums, *scope, enough),
+                None => self.fit(Some(&scoped)).score,
+            };
+            Scored { scoped, score }
+        };
+        scopes.iter().map(one).collect()
     }
 
     /// The sums under a hypothesis that changes readings or links alone.
@@ -213,34 +217,48 @@ impl<'a> Scan<'a> {
             || matches!(
                 h,
                 Hypothesis::Exchange { .. }
+                    | Hypothesis::Units { .. }
                     | Hypothesis::RowShift { .. }
                     | Hypothesis::WrongLink { .. }
             );
         if !changes {
             return None;
         }
-        let mut links: Vec<LinkIndex> = self.data.bodies.iter().map(|b| b.link).collect();
+        // Bodies that the hypothesis does not move keep their sums.
+        let mut links: Vec<Option<LinkIndex>> = (0..self.data.bodies.len())
+            .map(|b| self.moves(h, b).then(|| self.data.bodies[b].link))
+            .collect();
         if let Hypothesis::WrongLink { body, link } = *h {
-            links[body.0] = link;
+            links[body.0] = Some(link);
         }
-        let mut walk = match h {
-            Hypothesis::WrongLink { .. } => Walk::new(&self.data.chain, &links),
-            _ => self.walk.clone(),
-        };
-        let mut sums = vec![Moments::ZERO; self.recordings * self.channels.len()];
+        let moved: Vec<LinkIndex> = links.iter().copied().flatten().collect();
+        let mut walk = Walk::new(&self.data.chain, &moved);
+        let mut sums = self.sums.clone();
+        let n = self.channels.len();
+        for (at, sum) in sums.iter_mut().enumerate() {
+            if links[self.channels[at % n].body].is_some() {
+                *sum = Moments::ZERO;
+            }
+        }
         for i in 0..self.data.readings.len() {
             if !self.moved_readings(h, i, row) {
                 continue;
             }
             walk.go(&self.data.chain, row);
-            self.add_row(
-                &mut sums,
-                i,
-                |body| walk.root_from_link[links[body].0],
-                &self.points,
-            );
+            let pose = |body: usize| links[body].map(|link| walk.root_from_link[link.0]);
+            self.add_row(&mut sums, i, pose, &self.points);
         }
         Some(sums)
+    }
+
+    /// Whether a hypothesis about readings or links moves a body.
+    fn moves(&self, h: &Hypothesis, body: usize) -> bool {
+        let reads = |joint: usize| self.data.chain.reads(self.data.bodies[body].link, joint);
+        match *h {
+            Hypothesis::Exchange { first, second } => reads(first.0) || reads(second.0),
+            Hypothesis::WrongLink { body: moved, .. } => moved.0 == body,
+            _ => h.affine().is_none_or(|a| reads(a.joint)),
+        }
     }
 
     /// The corrected readings of a row; false where the correction leaves it without any.
@@ -257,6 +275,13 @@ impl<'a> Scan<'a> {
         if let Hypothesis::Exchange { first, second } = *h {
             out.swap(first.0, second.0);
         }
+        if let Hypothesis::Units { mistake } = *h {
+            for (joint, q) in out.iter_mut().enumerate() {
+                if self.data.chain.turns(joint) == Some(mistake.of_angles()) {
+                    *q *= mistake.factor();
+                }
+            }
+        }
         if let Some(a) = h.affine() {
             out[a.joint] = a.factor * out[a.joint] + a.coupling * out[a.source] + a.offset;
         }
@@ -265,17 +290,35 @@ impl<'a> Scan<'a> {
 
     /// Solves with the corrected sums inside the scope and the uncorrected ones outside.
     fn combine(&self, sums: &[Moments], scope: Scope) -> (Registration, Score) {
-        self.solve(
-            |r, k| {
-                let source = if scope.contains(RecordingIndex(r)) {
-                    sums
-                } else {
-                    &self.sums
-                };
-                &source[r * self.channels.len() + k]
-            },
-            self.data,
-        )
+        self.solve(self.scoped(sums, scope), self.data)
+    }
+
+    /// The corrected sums inside the scope and the uncorrected ones outside, by recording and channel.
+    fn scoped<'s>(
+        &'s self,
+        sums: &'s [Moments],
+        scope: Scope,
+    ) -> impl Fn(usize, usize) -> &'s Moments {
+        move |r, k| {
+            let source = if scope.contains(RecordingIndex(r)) {
+                sums
+            } else {
+                &self.sums
+            };
+            &source[r * self.channels.len() + k]
+        }
+    }
+
+    /// As [`combine`](Self::combine), or a lower bound beyond `enough`.
+    fn bounded(&self, sums: &[Moments], scope: Scope, enough: f64) -> Score {
+        let normal = self.normal(self.scoped(sums, scope), self.data);
+        let bound = rms(normal.least(), normal.w, normal.points);
+        let rms = if bound > enough {
+            bound
+        } else {
+            rms(normal.solve().f, normal.w, normal.points)
+        };
+        Score { rms, score: rms }
     }
 
     fn solve<'s>(
@@ -283,6 +326,14 @@ impl<'a> Scan<'a> {
         sum: impl Fn(usize, usize) -> &'s Moments,
         data: &Data,
     ) -> (Registration, Score) {
+        let normal = self.normal(sum, data);
+        let registration = normal.solve();
+        let rms = rms(registration.f, normal.w, normal.points);
+        (registration, Score { rms, score: rms })
+    }
+
+    /// The cost of all points with the sums of a recording and a channel.
+    fn normal<'s>(&self, sum: impl Fn(usize, usize) -> &'s Moments, data: &Data) -> Normal {
         let mut normal = Normal::new();
         for (k, channel) in self.channels.iter().enumerate() {
             for group in mounts(data, channel.body, self.recordings) {
@@ -291,12 +342,10 @@ impl<'a> Scan<'a> {
                 normal.include(&total);
             }
         }
-        let registration = normal.solve();
-        let rms = rms(registration.f, normal.w, normal.points);
-        (registration, Score { rms, score: rms })
+        normal
     }
 
-    /// The registration under a hypothesis (or of the uncorrected data), with the points; any hypothesis, no sharing of sums.
+    /// The registration under a hypothesis (or of the uncorrected data), with the points; no sharing of sums.
     pub(crate) fn fit(&self, scoped: Option<&Scoped>) -> Fit {
         let Some(scoped) = scoped else {
             let (registration, score) = self.combine(&self.sums, Scope::All);
@@ -318,17 +367,17 @@ impl<'a> Scan<'a> {
         {
             return self.fit_points(scoped);
         }
-        let corrected = apply(scoped, self.data);
-        let mut scan = Scan::new(&corrected, &[]);
+        self.fit_corrected(&correct(scoped, self.data))
+    }
+
+    /// The registration of corrected data with the weights of these.
+    pub(crate) fn fit_corrected(&self, corrected: &Data) -> Fit {
+        let mut scan = Scan::new(corrected, &[]);
         for (weight, own) in scan.weights.iter_mut().zip(&self.weights) {
             *weight = weight.min(*own);
         }
         scan.screen(&[]);
-        let mut fit = scan.fit(None);
-        if matches!(scoped.hypothesis, Hypothesis::MissingColumn { .. }) {
-            super::special::penalize(self, scoped.scope, &mut fit.score);
-        }
-        fit
+        scan.fit(None)
     }
 
     /// Corrections of the measured points: the poses of the links stay.
@@ -359,7 +408,7 @@ impl<'a> Scan<'a> {
             self.add_row(
                 &mut sums,
                 i,
-                |body| self.poses[i * self.data.bodies.len() + body],
+                |body| Some(self.poses[i * self.data.bodies.len() + body]),
                 &points,
             );
         }

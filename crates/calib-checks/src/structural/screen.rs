@@ -9,6 +9,8 @@
 //! ```
 //!
 //! The scale grows without limit as a fifth of the samples disagree, and a tenth of them cannot hide: it costs 1/√(2(1 − …)).
+//! Each body has a scale of its own, since nominal errors grow along the robot; hypotheses are compared by the geometric mean.
+//! Where most samples of a body in a recording disagree, they are no outliers and stay.
 
 use super::apply::apply_all;
 use super::data::{Data, Measured};
@@ -22,6 +24,12 @@ const SHARE: f64 = 0.2;
 const BOUND: f64 = 15.0;
 /// A residual beyond this many scales is an outlier: 1 in 10⁴ Gaussian ones.
 const CUT: f64 = 4.6;
+/// Samples of a body from which a scale of its own is worth something.
+const ENOUGH_SAMPLES: usize = 12;
+/// Least scale, m, so that noise-free data can be compared.
+const LEAST_SCALE: f64 = 1e-9;
+/// Part of a body's samples in a recording up to which they can be outliers.
+const MINORITY: f64 = 0.4;
 /// Rounds with smooth weights, then as many with the cut.
 const ROUNDS: usize = 4;
 
@@ -57,31 +65,26 @@ pub(crate) fn screen(data: &Data, corrections: &[Scoped]) -> Screened {
                 (sum / channels.len() as f64).sqrt()
             })
             .collect();
-        let scale = s_scale(&norms);
+        let scales = scales(&samples, &norms, data.bodies.len());
+        let cut = |s: &SampleIndex| CUT * scales[s.body.0];
         let total: f64 = norms.iter().map(|r| r * r).sum();
-        let inside: f64 = norms
-            .iter()
-            .filter(|r| **r <= CUT * scale)
-            .map(|r| r * r)
-            .sum();
+        let all = || samples.iter().zip(&norms);
+        let inside = all().filter(|((s, _), r)| **r <= cut(s));
         // Outliers with less than a tenth of the sum of squares move no ratio.
         if round == 0 {
-            screened.matters = inside < 0.9 * total;
+            screened.matters = inside.map(|(_, r)| r * r).sum::<f64>() < 0.9 * total;
         }
-        screened.scale = scale;
-        screened.samples = samples
-            .iter()
-            .zip(&norms)
-            .filter(|(_, r)| **r > CUT * scale)
-            .map(|(s, _)| s.0)
-            .collect();
-        if scale <= 0.0 {
+        screened.scale = geometric_mean(&samples, &scales);
+        let outside = all().filter(|((s, _), r)| **r > cut(s));
+        screened.samples = outside.map(|(s, _)| s.0).collect();
+        if screened.scale <= LEAST_SCALE {
             break;
         }
         let mut weights = vec![0.0; seen.len()];
-        for ((sample, channels), r) in samples.iter().zip(&norms) {
+        for ((sample, channels), r) in all() {
+            let scale = scales[sample.body.0].max(LEAST_SCALE);
             let smooth = (1.0 + (r / scale).powi(2) / 9.0).powi(-2);
-            let hard = if *r <= CUT * scale { 1.0 } else { 0.0 };
+            let hard = if *r <= cut(sample) { 1.0 } else { 0.0 };
             let w = if round < ROUNDS { smooth } else { hard };
             channels
                 .iter()
@@ -89,9 +92,49 @@ pub(crate) fn screen(data: &Data, corrections: &[Scoped]) -> Screened {
         }
         scan.set_weights(weights);
     }
+    only_minorities(data, &samples, &mut screened.samples);
     screened.matters |=
         !screened.samples.is_empty() && screened.samples.len() * 100 >= samples.len();
     screened
+}
+
+/// The scale of each body; one with few samples has that of all.
+fn scales(samples: &[(SampleIndex, Vec<usize>)], norms: &[f64], bodies: usize) -> Vec<f64> {
+    let all = s_scale(norms);
+    let own = |b: usize| {
+        let of_body = samples
+            .iter()
+            .zip(norms)
+            .filter(|((s, _), _)| s.body.0 == b);
+        let own: Vec<f64> = of_body.map(|(_, r)| *r).collect();
+        if own.len() < ENOUGH_SAMPLES {
+            all
+        } else {
+            s_scale(&own)
+        }
+    };
+    (0..bodies).map(own).collect()
+}
+
+/// The geometric mean of the scales over the samples.
+fn geometric_mean(samples: &[(SampleIndex, Vec<usize>)], scales: &[f64]) -> f64 {
+    let logs = samples
+        .iter()
+        .map(|(s, _)| scales[s.body.0].max(LEAST_SCALE).ln());
+    (logs.sum::<f64>() / samples.len().max(1) as f64).exp()
+}
+
+/// Keeps the outliers of a body in a recording only where they are the minority.
+fn only_minorities(
+    data: &Data,
+    samples: &[(SampleIndex, Vec<usize>)],
+    screened: &mut Vec<SampleIndex>,
+) {
+    let place = |s: &SampleIndex| s.body.0 * data.recordings() + data.recording[s.row].0;
+    let mut counts = vec![(0.0, 0.0); data.bodies.len() * data.recordings()];
+    samples.iter().for_each(|(s, _)| counts[place(s)].0 += 1.0);
+    screened.iter().for_each(|s| counts[place(s)].1 += 1.0);
+    screened.retain(|s| counts[place(s)].1 <= MINORITY * counts[place(s)].0);
 }
 
 /// Samples with the channels that belong to them.

@@ -8,7 +8,7 @@ use super::chain::{Motion, Walk};
 use super::data::{Data, Measured};
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{JointIndex, LinkIndex};
-use super::scan::{Fit, Scan, Score};
+use super::scan::{Fit, Scan};
 
 /// Alternations between registration and the estimated part; the residual falls by half or more in each.
 const ALTERNATIONS: usize = 12;
@@ -26,25 +26,6 @@ pub(crate) fn apply(scoped: &Scoped, data: &Data) -> Data {
         Hypothesis::MissingColumn { joint } => missing_column(scoped.scope, joint, data),
         _ => data.clone(),
     }
-}
-
-/// One estimated reading per row: the degrees of freedom that are left are fewer.
-pub(crate) fn penalize(scan: &Scan<'_>, scope: Scope, score: &mut Score) {
-    let rows = scan
-        .data
-        .recording
-        .iter()
-        .filter(|r| scope.contains(**r))
-        .count() as f64;
-    let (_, freedom) = scan.freedom();
-    let left = (freedom - rows) / freedom.max(1.0);
-    let factor = if left > 0.1 {
-        left.sqrt().recip()
-    } else {
-        f64::INFINITY
-    };
-    score.rms *= factor;
-    score.score *= factor;
 }
 
 fn tracker_moved(scope: Scope, data: &Data) -> Data {

@@ -1,12 +1,9 @@
 //! Every fault class injected into simulated recordings: found in (nearly) all, and clean ones stay silent.
 
-use calib_checks::model::{
-    Mistake, Prediction, alignment, better_explanation, disagreement, quaternion_order,
-    spoiled_rows, up_axis,
-};
+use calib_checks::model::{alignment, disagreement, spoiled_rows, up_axis};
 use calib_checks::rigid_body::Template;
 use calib_checks::{Expectations, checks, held_out_in_training};
-use calib_finding::{Fact, Finding, Severity, catalog};
+use calib_finding::{About, Fact, Finding, Severity};
 use calib_recording::{JointUnit, Poses};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -472,122 +469,52 @@ fn clean_recordings_are_silent() {
     assert!(alarms.is_empty(), "{alarms:#?}");
 }
 
-pub fn prediction(
-    mistake: Mistake,
-    q: impl Iterator<Item = [f64; 3]>,
-    link: fn([f64; 3]) -> Isometry3<f64>,
-) -> Prediction {
-    Prediction {
-        mistake,
-        base_from_link: q.map(link).collect(),
-    }
-}
-
 pub fn recorded_q(poses: &Poses) -> Vec<[f64; 3]> {
     (0..poses.len())
         .map(|i| JOINTS.map(|joint| poses.joints[joint][i].expect("recorded")))
         .collect()
 }
 
-fn set_joint_row(recorded: &mut Recorded, row: usize, q: [f64; 3]) {
-    for (name, q) in JOINTS.iter().zip(q) {
-        recorded.poses.joints.get_mut(*name).expect("recorded")[row] = Some(q);
-    }
+/// Errors about bodies in a recording whose noise is not stated.
+fn errors_about_bodies(mut recorded: Recorded) -> Vec<Finding> {
+    recorded.expected.min_poses = 1;
+    recorded.expected.marker_sigma = None;
+    let mut found = checks(&recorded.poses, &recorded.expected);
+    found.retain(|f| f.severity == Severity::Error && matches!(f.subject.about, About::Body(_)));
+    found
 }
 
-/// Replaces all joint values.
-pub fn set_joints(recorded: &mut Recorded, q: &[[f64; 3]]) {
-    for (row, &q) in q.iter().enumerate() {
-        set_joint_row(recorded, row, q);
+// Power: were 1 in 20 of the bodies called bent, 160 recordings would be silent with probability 3e-4.
+#[test]
+fn few_poses_are_no_fault_of_a_body() {
+    for seed in 0..160 {
+        let mut recorded = record(2000 + seed, false);
+        let rows: Vec<usize> = (0..36).step_by(7 - seed as usize % 4).collect();
+        recorded.poses = recorded.poses.select(&rows);
+        let found = errors_about_bodies(recorded);
+        assert!(found.is_empty(), "{seed}: {} rows, {found:?}", rows.len());
     }
-}
-
-pub fn alternatives(q: &[[f64; 3]]) -> Vec<Prediction> {
-    let each = || q.iter().copied();
-    let link = |link: &str| Mistake::OtherLink {
-        link: link.to_owned(),
-    };
-    let order = |joint: &str, other: &str| Mistake::JointOrder {
-        joint: joint.to_owned(),
-        other: other.to_owned(),
-    };
-    let sign = |joint: &str| Mistake::JointSign {
-        joint: joint.to_owned(),
-    };
-    let mut all = vec![
-        prediction(link("upper_arm"), each(), |q| forward([q[0], q[1], 0.0])),
-        prediction(link("turret"), each(), |q| forward([q[0], 0.0, 0.0])),
-        prediction(order("waist", "shoulder"), each(), |q| {
-            forward([q[1], q[0], q[2]])
-        }),
-        prediction(order("shoulder", "roll"), each(), |q| {
-            forward([q[0], q[2], q[1]])
-        }),
-        prediction(sign("waist"), each(), |q| forward([-q[0], q[1], q[2]])),
-        prediction(sign("shoulder"), each(), |q| forward([q[0], -q[1], q[2]])),
-        prediction(sign("roll"), each(), |q| forward([q[0], q[1], -q[2]])),
-    ];
-    let lagged = (0..q.len()).map(|i| q[(i + 1).min(q.len() - 1)]);
-    all.push(prediction(Mistake::OtherRow { by: 1 }, lagged, forward));
-    all
 }
 
 #[test]
-fn the_model_tells_wrong_mounts_signs_orders_and_lags() {
-    let mut found: BTreeMap<&str, u64> = BTreeMap::new();
-    type Bend = fn([f64; 3]) -> [f64; 3];
-    let bends: [(&str, Bend); 4] = [
-        ("clean", |q| q),
-        ("joint-sign", |q| [q[0], -q[1], q[2]]),
-        ("joint-order", |q| [q[1], q[0], q[2]]),
-        ("wrong-mount", |q| q),
-    ];
-    for seed in 0..SEEDS {
-        for (id, bend) in bends {
-            let mut recorded = record(seed, false);
-            for i in 0..recorded.q.len() {
-                let q = bend(recorded.q[i]);
-                set_joint_row(&mut recorded, i, q);
+fn gross_outliers_in_a_tenth_of_the_samples_are_no_fault_of_a_body() {
+    for seed in 0..60 {
+        let mut recorded = record(3000 + seed, false);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        for track in recorded.poses.markers.values_mut() {
+            for point in track.iter_mut().flatten() {
+                if rng.random_bool(0.1) {
+                    *point += Vector3::from_fn(|_, _| 0.03 * normal(&mut rng));
+                }
             }
-            let mut track = recorded.poses.bodies["tool"].clone();
-            if id == "wrong-mount" {
-                track = recorded
-                    .q
-                    .iter()
-                    .map(|q| {
-                        Some(forward([q[0], q[1], 0.0]) * Isometry3::translation(0.1, 0.0, 0.0))
-                    })
-                    .collect();
-            }
-            let q = recorded_q(&recorded.poses);
-            let nominal: Vec<_> = q.iter().map(|&q| forward(q)).collect();
-            let others = alternatives(&q);
-            let finding = better_explanation("tool", "hand", &track, &nominal, &others);
-            *found.entry(id).or_default() +=
-                u64::from(finding.map_or("clean", |f| f.id.as_str()) == id);
         }
-        // The joint values of a continuous motion lag by 20 ms, the rows are 10 ms apart.
-        let recorded = record(seed, true);
-        let every: Vec<usize> = (0..300).step_by(10).collect();
-        let poses = recorded.poses.select(&every);
-        let lagged: Vec<[f64; 3]> = every
-            .iter()
-            .map(|&i| recorded.q[i.saturating_sub(10)])
-            .collect();
-        let nominal: Vec<_> = lagged.iter().map(|&q| forward(q)).collect();
-        let finding = better_explanation(
-            "tool",
-            "hand",
-            &poses.bodies["tool"],
-            &nominal,
-            &alternatives(&lagged),
-        );
-        *found.entry("clock-lag").or_default() +=
-            u64::from(finding.is_some_and(|f| f.id == catalog::CLOCK_LAG));
+        let found = errors_about_bodies(recorded);
+        assert!(found.is_empty(), "{seed}: {found:?}");
     }
-    println!("{found:?} of {SEEDS}");
-    assert!(found.values().all(|&count| count == SEEDS), "{found:?}");
 }
+
+/// Disagreement, rad, that no motion between two readings explains.
+pub const FLIPPED: f64 = 0.6;
 
 #[test]
 fn spoiled_rows_are_exactly_those() {
@@ -600,27 +527,24 @@ fn spoiled_rows_are_exactly_those() {
         }
         let predicted: Vec<_> = q.iter().map(|&q| forward(q)).collect();
         let track = &recorded.poses.bodies["tool"];
-        let findings = spoiled_rows(&recorded.poses, "tool", track, &predicted);
-        let [finding] = findings.as_slice() else {
-            panic!("{findings:?}")
+        let rows = |track: &[_], predicted: &[_]| -> Vec<(usize, bool)> {
+            let found = spoiled_rows(track, predicted).rows;
+            found.iter().map(|r| (r.row, r.off > FLIPPED)).collect()
         };
-        assert_eq!(finding.id, catalog::UNSETTLED_ROWS);
-        let expected: Vec<u64> = spoiled.iter().map(|&i| i as u64 + 2).collect();
-        assert_eq!(finding.rows, expected, "seed {seed}");
+        assert_eq!(
+            rows(track, &predicted),
+            spoiled.map(|row| (row, false)),
+            "seed {seed}"
+        );
         let clean: Vec<_> = recorded.q.iter().map(|&q| forward(q)).collect();
-        assert!(spoiled_rows(&recorded.poses, "tool", track, &clean).is_empty());
+        assert!(spoiled_rows(track, &clean).rows.is_empty());
         let mut flipped = track.clone();
         for i in [2, 17, 18] {
             flipped[i].as_mut().expect("tracked").rotation *=
                 UnitQuaternion::from_scaled_axis(Vector3::y() * std::f64::consts::PI);
         }
-        let findings = spoiled_rows(&recorded.poses, "tool", &flipped, &clean);
-        let found: Vec<_> = findings.iter().map(|f| (f.id, f.rows.clone())).collect();
-        assert_eq!(
-            found,
-            [(catalog::BODY_FLIP, vec![4, 19, 20])],
-            "seed {seed}"
-        );
+        let flips = [(2, true), (17, true), (18, true)];
+        assert_eq!(rows(&flipped, &clean), flips, "seed {seed}");
         assert!(disagreement(track, &clean).expect("turned") < 0.005);
     }
 }
@@ -706,33 +630,6 @@ fn holds_that_are_named_are_neither_jumps_nor_gaps() {
     let names = (0..180).map(|i| (i / 5 + 1).to_string()).collect();
     live.labels.insert("hold".to_string(), names);
     assert_eq!(ids(&live), [""; 0]);
-}
-
-#[test]
-fn quaternions_in_the_other_order_are_found() {
-    for seed in 0..SEEDS {
-        let recorded = record(seed, false);
-        let predicted: Vec<_> = recorded.q.iter().map(|&q| forward(q)).collect();
-        let right = &recorded.poses.bodies["tool"];
-        assert!(
-            quaternion_order("tool", right, &predicted).is_none(),
-            "seed {seed}"
-        );
-        let wrong: Vec<_> = right
-            .iter()
-            .map(|pose| {
-                pose.map(|pose| {
-                    let c = pose.rotation.coords;
-                    // w, x, y, z read as x, y, z, w.
-                    let q = nalgebra::Quaternion::new(c.z, c.w, c.x, c.y);
-                    Isometry3::from_parts(pose.translation, UnitQuaternion::from_quaternion(q))
-                })
-            })
-            .collect();
-        let finding =
-            quaternion_order("tool", &wrong, &predicted).unwrap_or_else(|| panic!("seed {seed}"));
-        assert_eq!(finding.id, catalog::QUATERNION_ORDER);
-    }
 }
 
 #[test]

@@ -37,11 +37,14 @@ super::topic! {
             "A marker is out of place in {rows:row}; the worst is `{marker}`, by {off}.",
             "Drop these samples: a reflection or a neighboring marker was taken for the marker.";
     }
-    /// The mirror image of the template fits.
+    /// The mirror image fits.
     MIRRORED = "mirrored" {
-        "": Error,
+        "template": Error,
             "The body fits the mirror image of its template to {mirrored}, the template only to {plain}.",
             "Check the axes of the export: the recording's frame is left-handed, or an axis has the wrong sign.";
+        "tracker": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with one axis of the tracker reversed[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Check the axes of the export: the tracker's frame is left-handed, or an axis has the wrong sign.";
     }
     /// A marker moves on its body over all recordings together.
     BODY_NOT_RIGID = "body-not-rigid" {

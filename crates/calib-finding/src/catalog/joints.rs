@@ -31,16 +31,34 @@ super::topic! {
             "The body is {ratio} times as large as its template: a factor of ten.",
             "Correct the unit of length of the recording or of the template.";
         "all_degrees": Error,
-            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with all joint angles read as degrees.",
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with all joint angles read as degrees[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
             "Correct the unit in the columns' names, or set `columns: {angles: deg}` for the recording.";
         "all_radians": Error,
-            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with all joint angles read as radians.",
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with all joint angles read as radians[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
             "Correct the unit in the columns' names, or set `columns: {angles: rad}` for the recording.";
+        "all_millimeters": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with all prismatic joints read as millimeters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Correct the unit in the columns' names, or set `columns: {lengths: mm}` for the recording.";
+        "all_meters": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with all prismatic joints read as meters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Correct the unit in the columns' names, or set `columns: {lengths: m}` for the recording.";
+        "joint_degrees": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with joint `{joint}` read as degrees[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Name the column `{joint}_deg`.";
+        "joint_radians": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with joint `{joint}` read as radians[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Name the column `{joint}_rad`.";
+        "joint_millimeters": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with joint `{joint}` read as millimeters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Name the column `{joint}_mm`.";
+        "joint_meters": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with joint `{joint}` read as meters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Name the column `{joint}_m`.";
         "lengths_too_large": Error,
-            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with the tracker's lengths a thousand times smaller.",
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with the tracker's lengths a thousand times smaller[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
             "Correct the unit in the columns' names, or set `columns: {lengths: mm}` for the recording.";
         "lengths_too_small": Error,
-            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with the tracker's lengths a thousand times larger.",
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with the tracker's lengths a thousand times larger[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
             "Correct the unit in the columns' names, or set `columns: {lengths: m}` for the recording.";
     }
     /// A joint has values beyond its limits.

@@ -4,31 +4,76 @@ super::topic! {
     /// A joint has the opposite sign.
     JOINT_SIGN = "joint-sign" {
         "": Error,
-            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with the opposite sign of joint `{joint}`.",
-            "Reverse the sign of this joint's column, or of its axis in the URDF.";
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with the opposite sign of joint `{joint}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Negate this joint's column, or reverse its axis in the URDF: `<axis xyz=\"{axis}\"/>`.";
     }
     /// Two joint columns are exchanged.
     JOINT_ORDER = "joint-order" {
         "": Error,
-            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with joints `{joint}` and `{other}` exchanged.",
-            "Exchange these joints' columns, or correct the joint names in the header.";
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with joints `{joint}` and `{other}` exchanged[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Exchange the names of these columns in the header, or map them: `columns: {joints: {{joint}: <column of {other}>, {other}: <column of {joint}>}}`.";
+    }
+    /// The zero of a joint is off by a multiple of 90°.
+    JOINT_OFFSET = "joint-offset" {
+        "": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with {offset} added to joint `{joint}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Correct the zero of this joint: add {offset} to its column, or rotate the joint's origin in the URDF by as much about its axis.";
+    }
+    /// A joint also moves with another joint.
+    JOINT_COUPLING = "joint-coupling" {
+        "whole": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} if joint `{joint}` also moves by {factor} times joint `{other}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Declare the coupling: `solve: {joints: {{joint}: {coupled_to: [{other}]}}}`. If the controller computes it already, record the joint's own position.";
+        "fraction": Warning,
+            "Joint `{joint}` seems to move by {factor:percent} (± {sigma:percent}) of joint `{other}` as well; this changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
+            "Declare the coupling, and compare the held-out errors: `solve: {joints: {{joint}: {coupled_to: [{other}]}}}`.";
+    }
+    /// A joint moves more or less than its readings.
+    JOINT_GAIN = "joint-gain" {
+        "": Warning,
+            "Joint `{joint}` seems to move {excess:percent} (± {sigma:percent}) more than its readings say; this changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
+            "Check the joint's transmission ratio. To estimate it, add `gain` to what is free of this joint in `solve: {joints: …}`.";
+    }
+    /// A joint of a body's chain without readings.
+    JOINT_COLUMN_MISSING = "joint-column-missing" {
+        "assumed_zero": Warning,
+            "The recording has no values of joint `{joint}`, which moves {bodies:code}; it is taken to stand at 0.",
+            "Record this joint, or state where it stood: `hold: {{joint}_{unit}: 0}` in the recording.";
+        "moved": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} if joint `{joint}`, which has no column, moved[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Record this joint: export its column.";
     }
     /// A body is on another link.
     WRONG_MOUNT = "wrong-mount" {
         "other_link": Error,
-            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with link `{other}`.",
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with body `{body}` on link `{other}` instead of `{link}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
             "Correct the body's link in the profile: `link: {other}`.";
-        "no_link": Error,
-            "The body does not move with link `{link}`: the motions disagree by {claimed}, and no single mistake explains it.",
-            "Check the body's link, that its name is on the right body, and that joints and tracker recorded the same motion.";
+        "exchanged": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with bodies `{body}` and `{other}` exchanged[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Exchange the links of these bodies in the profile, or their names in the tracker's software.";
+    }
+    /// The tracker's frame is another one in some recordings.
+    TRACKER_MOVED = "tracker-moved" {
+        "moved": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} if the tracker was moved for {recordings:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Record these again without moving the tracker or the robot's base, or calibrate them in a profile of their own.";
+        "axes": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with other tracker axes in {recordings:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Export these recordings with the axes of the others.";
+    }
+    /// A body has another mount in some recordings.
+    BODY_REMOUNTED = "body-remounted" {
+        "": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} if body `{body}` was remounted for {recordings:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Give the body another name in these recordings and in the profile, or record them again.";
     }
     /// Tracker and joints were read at different times.
     CLOCK_LAG = "clock-lag" {
         "rows_before": Error,
-            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with the joint values {rows:row} before.",
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with the joint values {rows:row} before[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
             "Synchronize the two, or record in holds: the joint values are ahead of the tracker.";
         "rows_after": Error,
-            "The body's motion disagrees with link `{link}` by {claimed}, but only by {explained} with the joint values {rows:row} after.",
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with the joint values {rows:row} after[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
             "Synchronize the two, or record in holds: the joint values lag behind the tracker.";
         "offset": Warning,
             "The tracker's clock is {offset} ± {sigma} ahead of the robot's and runs {drift:ppm} faster.",
@@ -48,9 +93,45 @@ super::topic! {
     }
     /// Quaternions in another order.
     QUATERNION_ORDER = "quaternion-order" {
-        "": Error,
-            "The body's motion disagrees with the robot's by {claimed}, but only by {explained} with the quaternions read scalar first.",
+        "scalar_first": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with the quaternions of {bodies:code} read scalar first[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
             "Rename the columns, or list them under `quaternion_wxyz` in the column map: the file writes w, x, y, z.";
+        "scalar_last": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with the quaternions of {bodies:code} read scalar last[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Rename the columns: the file writes x, y, z, w.";
+    }
+    /// Poses in another convention.
+    POSE_CONVENTION = "pose-convention" {
+        "inverse": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with the poses of {bodies:code} inverted[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Export the pose of the body in the tracker's frame: the file has that of the tracker in the body's frame.";
+        "transposed": Error,
+            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with the rotations of {bodies:code} transposed[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "Export the rotation from body to tracker coordinates: the file has its inverse.";
+    }
+    /// The recordings contradict the nominal robot, and nothing that is known explains it.
+    MODEL_DISAGREES = "model-disagrees" {
+        "undecided": Error,
+            "The recordings disagree with the nominal robot by {none} rms, where nominal errors explain {limit}; no single mistake and no pair explains it[[; the best attempt, {leading:code}, leaves {best}]].",
+            "Check that URDF and robot are the same model, the links of the bodies, and that joints and tracker recorded the same motion.";
+        "large": Warning,
+            "The recordings disagree with the nominal robot by {none} rms, where nominal errors explain {limit}; no single mistake explains it.",
+            "Check the URDF against a drawing, and validate with separate poses.";
+        "range": Warning,
+            "Most rows with joint `{joint}` between {low} and {high} disagree with the nominal robot: {count} of {rows:row}.",
+            "Check what is special about this range of the joint: a stop, a cable, or a wrong reading.";
+    }
+    /// A body that could not be compared with the robot.
+    NOT_CHECKED = "not-checked" {
+        "": Warning,
+            "Too few rows to compare the body's motion with the nominal robot ({rows:row} with {samples:sample}).",
+            "Record more poses of this body.";
+    }
+    /// Mistakes that these recordings cannot show.
+    INVISIBLE_MISTAKES = "invisible-mistakes" {
+        "": Info,
+            "These recordings cannot show whether {mistakes:code} is true: the corrected data fit equally well.",
+            "Add combined poses in which all joints move, or a marker away from the last axis, if the result must hold beyond the recorded motions.";
     }
     /// Another axis of the tracker points up.
     UP_AXIS = "up-axis" {
@@ -66,5 +147,8 @@ super::topic! {
         "one_body": Warning,
             "{count:row} deviate by up to {position} and {angle}, {ratio} times the usual; no motion between rows explains it[[; an error of joint {joints:or} alone would]].",
             "Look at these rows: a wrong reading, or backlash of that joint. A robust fit rejects them.";
+        "model": Warning,
+            "{count:row} deviate from the nominal robot by up to {position} and {worst}; {usual} is usual.",
+            "Look at these rows: a wrong reading of a joint or of the body. A robust fit rejects them.";
     }
 }

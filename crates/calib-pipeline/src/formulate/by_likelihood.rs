@@ -11,7 +11,7 @@ use crate::formulate::found::Found;
 use crate::formulate::kinematics::Calibration;
 use crate::formulate::ml;
 use crate::formulate::solved::Solved;
-use crate::formulate::{clock, model_checks};
+use crate::formulate::{bad_rows, clock};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::body_tracks;
 
@@ -40,7 +40,7 @@ pub fn likelihood(
     let full = ml::state(inputs, &checked.tracks, &checked.start, FreeSet::Profile);
     let mut fit = ml::fit(full, inputs, &settings)?;
     if settings.robust.enabled {
-        let bad = model_checks::bad_rows(inputs, &checked.tracks, &fit);
+        let bad = bad_rows::bad_rows(inputs, &checked.tracks, &fit);
         checked.findings.extend(bad.findings);
         if !bad.unsettled.is_empty() {
             progress("fit again without the unsettled rows");

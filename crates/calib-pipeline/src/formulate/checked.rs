@@ -45,7 +45,7 @@ pub fn check_data(
         tracks => tracks?,
     };
     let start = start(inputs, &tracks);
-    findings.extend(model_checks::before_the_fit(inputs, &tracks, &start));
+    model_checks::before_the_fit(inputs, &tracks, &start, &mut findings);
     if stops(&findings) {
         return Err(stopped(inputs, &findings));
     }

@@ -1,5 +1,6 @@
 //! The profile and the recordings as one likelihood problem.
 
+pub mod bad_rows;
 pub mod by_closed_forms;
 pub mod by_likelihood;
 pub mod checked;
@@ -11,4 +12,6 @@ pub mod kinematics;
 pub mod ml;
 pub mod model_checks;
 pub mod models;
+pub mod row_checks;
 pub mod solved;
+pub mod structural;

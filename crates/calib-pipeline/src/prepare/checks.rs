@@ -82,6 +82,11 @@ fn expectations(inputs: &Inputs, loaded: &Loaded) -> Expectations {
         templates,
         limits: model
             .joint_ids()
+            // The reading of a coupled joint is not its position.
+            .filter(|id| {
+                let own = profile.solve.joints.get(id);
+                own.is_none_or(|own| own.coupled_to.is_empty())
+            })
             .filter_map(|id| Some((name(&id), model.joint(id).limits.range()?)))
             .collect(),
         asked: loaded

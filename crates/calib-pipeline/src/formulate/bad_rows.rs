@@ -1,0 +1,377 @@
+//! Rows that the robust fit left out, and what is wrong with them.
+//!
+//! Such a row is compared with the motion to its neighbors,
+//!
+//! ```text
+//! e(q_i + f (q_k − q_i)),   k = i ± 1,   f minimizes |e|                                              (1)
+//! ```
+//!
+//! If a fraction f of the way to another row makes the row right, joints and tracker were read at different times, or the
+//! robot had not settled. e is the body's pose error, rotation and position in units of what is usual.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use calib_finding::{Fact, Finding, Subject, catalog};
+use calib_geometry::so3;
+use calib_profile::Usage;
+use nalgebra::{Isometry3, Vector6};
+
+use crate::error::PipelineError;
+use crate::estimate::start::start;
+use crate::formulate::formulation::{FreeSet, MlFit};
+use crate::formulate::ml;
+use crate::prepare::conditions::{Conditions, conditions};
+use crate::prepare::excluded::Excluded;
+use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::tracks::BodyTrack;
+
+/// What (1) may leave of a row's squared error: by chance a direction of six takes that much in 1 of 150 rows.
+const LEFT: f64 = 0.2;
+/// Largest part of the way to a neighbor: beyond it the row would belong to the other posture.
+const LARGEST_FRACTION: f64 = 0.5;
+/// A row that is off by this many times the usual is named although no motion explains it.
+const FAR_OFF: f64 = 3.0;
+/// One joint alone explains a row when it leaves no more than this of the squared error.
+const ONE_JOINT_LEFT: f64 = 0.3;
+/// Median and σ of the length of a Gaussian 3-vector: √χ²₃(½).
+const MEDIAN_OF_THREE: f64 = 1.538;
+
+/// Rows that a fit cannot explain, and what is wrong with them.
+#[derive(Debug, Clone, Default)]
+pub struct BadRows {
+    /// For the report and for `calib check`.
+    pub findings: Vec<Finding>,
+    /// Rows that lie on the way to a neighbor: joints and tracker were not read at the same time.
+    pub unsettled: Vec<Excluded>,
+}
+
+/// The rows that a robust fit of the profile's model leaves out, for a check without a run.
+///
+/// # Errors
+/// [`PipelineError::Solve`] when the problem cannot be stated.
+pub fn bad_rows_of_inputs(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+) -> Result<BadRows, PipelineError> {
+    let start = start(inputs, tracks);
+    let stated = ml::state(inputs, tracks, &start, FreeSet::Profile);
+    let fit = ml::fit(stated, inputs, &calib_core::Settings::default())?;
+    Ok(bad_rows(inputs, tracks, &fit))
+}
+
+/// What is wrong with the rows that `fit` left out.
+#[must_use]
+pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlFit) -> BadRows {
+    let mut bad = BadRows::default();
+    if !fit.solution.status.is_converged() {
+        return bad;
+    }
+    let rejected = rejected_bodies(fit);
+    let (model, load) = (&inputs.robot.model, inputs.robot.profile.solve.load);
+    let recordings = inputs.recordings.iter();
+    let conditions = recordings
+        .map(|(name, r)| (name.as_str(), conditions(r, model, load)))
+        .collect();
+    for name in inputs.robot.profile.bodies.keys() {
+        let off = BodyError {
+            inputs,
+            fit,
+            name,
+            track: &tracks[name],
+            conditions: &conditions,
+        };
+        let Some(usual) = off.usual(&rejected) else {
+            continue;
+        };
+        for (recording, loaded) in inputs
+            .recordings
+            .iter()
+            // Where rows follow each other in time, a lag is the clock's, and every row has one.
+            .filter(|(_, r)| r.spec.usage != Usage::Validation && r.alignment.is_none())
+        {
+            let (mut moving, mut others) = (Vec::new(), Vec::new());
+            for row in 0..loaded.q.len() {
+                if !rejected.contains(&(recording.clone(), row, name.clone())) {
+                    continue;
+                }
+                match off.between_rows(loaded, row, usual) {
+                    Some(on_the_way) => moving.push((row, on_the_way)),
+                    None => others.extend(off.far_off(loaded, row, usual).map(|w| (row, w))),
+                }
+            }
+            bad.findings
+                .extend(unsettled_finding(recording, name, loaded, &moving));
+            bad.findings
+                .extend(outlier_finding(recording, name, loaded, &others));
+            bad.unsettled.extend(moving.iter().map(|(row, _)| Excluded {
+                recording: recording.clone(),
+                row: *row,
+                body: name.clone(),
+                cause: calib_report::RejectedFor::OnTheWay,
+            }));
+        }
+    }
+    bad
+}
+
+/// Recording, row and body where nothing that was seen of the body takes part.
+fn rejected_bodies(fit: &MlFit) -> BTreeSet<(String, usize, String)> {
+    // (sample, measurement) → observations
+    let mut rejected: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+    for r in &fit.solution.rejected {
+        *rejected
+            .entry((r.sample, r.measurement.index()))
+            .or_default() += 1;
+    }
+    let measurements = fit.formulation.problem.measurements();
+    let mut seen: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+    for (m, measurement) in measurements.iter().enumerate() {
+        if let calib_core::MeasurementKind::Markers(calib_core::measurement::Markers {
+            observations,
+            ..
+        }) = &measurement.kind
+        {
+            for o in observations {
+                *seen.entry((o.sample, m)).or_default() += 1;
+            }
+        }
+    }
+    rejected
+        .into_iter()
+        .filter(|(key, count)| seen.get(key).is_none_or(|all| count >= all))
+        .map(|((sample, m), _)| {
+            let (recording, row) = &fit.formulation.samples[sample];
+            (recording.clone(), *row, measurements[m].name.clone())
+        })
+        .collect()
+}
+
+fn unsettled_finding(
+    recording: &str,
+    body: &str,
+    loaded: &Loaded,
+    moving: &[(usize, OnTheWay)],
+) -> Option<Finding> {
+    let (_, worst) = moving
+        .iter()
+        .max_by(|a, b| a.1.position.total_cmp(&b.1.position))?;
+    let angle = moving.iter().map(|(_, w)| w.angle).fold(0.0, f64::max);
+    Some(
+        Finding::of_kind(
+            catalog::UNSETTLED_ROWS,
+            "between",
+            Subject::body(body).in_recording(recording),
+        )
+        .with("count", Fact::count(moving.len()))
+        .with("position", Fact::meters(worst.position))
+        .with("angle", Fact::radians(angle))
+        .with("fraction", Fact::ratio(worst.fraction.abs()))
+        .at_rows(moving.iter().map(|(row, _)| loaded.poses.rows[*row])),
+    )
+}
+
+fn outlier_finding(
+    recording: &str,
+    body: &str,
+    loaded: &Loaded,
+    rows: &[(usize, FarOff)],
+) -> Option<Finding> {
+    let (_, worst) = rows.iter().max_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio))?;
+    let joints: BTreeSet<&str> = rows
+        .iter()
+        .filter_map(|(_, w)| w.joint.as_deref())
+        .collect();
+    let joints = (!joints.is_empty()).then(|| Fact::names(joints));
+    Some(
+        Finding::of_kind(
+            catalog::ROW_OUTLIER,
+            "one_body",
+            Subject::body(body).in_recording(recording),
+        )
+        .with("count", Fact::count(rows.len()))
+        .with("position", Fact::meters(worst.position))
+        .with("angle", Fact::radians(worst.angle))
+        .with("ratio", Fact::ratio(worst.ratio))
+        .with_some("joints", joints)
+        .at_rows(rows.iter().map(|(row, _)| loaded.poses.rows[*row])),
+    )
+}
+
+/// A row that is right a part of the way to a neighbor.
+struct OnTheWay {
+    fraction: f64,
+    position: f64,
+    angle: f64,
+}
+
+/// A row that is far off.
+struct FarOff {
+    /// In units of the usual.
+    ratio: f64,
+    position: f64,
+    angle: f64,
+    /// The joint whose error alone would explain it.
+    joint: Option<String>,
+}
+
+/// Usual size of rotation, rad, and position, m, errors per component.
+type Usual = (f64, f64);
+
+/// What one row says of a body and of the joints.
+struct SeenRow<'a> {
+    seen: &'a Isometry3<f64>,
+    q: &'a [f64],
+    under: &'a Conditions,
+}
+
+/// The pose error of one body under a fit.
+struct BodyError<'a> {
+    inputs: &'a Inputs,
+    fit: &'a MlFit,
+    name: &'a str,
+    track: &'a BodyTrack,
+    /// From which side the joints came and what they held, by recording and row.
+    conditions: &'a BTreeMap<&'a str, Vec<Conditions>>,
+}
+
+impl<'a> BodyError<'a> {
+    /// Predicted ⊟ seen in body axes, `[rad; m]`, at joint positions `q`.
+    fn at(&self, row: &SeenRow<'_>, q: &[f64]) -> Option<Vector6<f64>> {
+        let robot = &self.fit.calibration;
+        let link = self.inputs.robot.profile.bodies[self.name].link;
+        let mount = robot.mounts.get(self.name)?;
+        let predicted = robot.tracker_from_root
+            * robot.root_from_link_under(q, row.under)[link.index()]
+            * mount;
+        let seen_from_predicted = row.seen.inverse() * predicted;
+        let w = so3::log(&seen_from_predicted.rotation);
+        let t = seen_from_predicted.translation.vector;
+        Some(Vector6::new(w.x, w.y, w.z, t.x, t.y, t.z))
+    }
+
+    fn weighted(&self, row: &SeenRow<'_>, q: &[f64], usual: Usual) -> Option<Vector6<f64>> {
+        let mut e = self.at(row, q)?;
+        for i in 0..3 {
+            e[i] /= usual.0;
+            e[i + 3] /= usual.1;
+        }
+        Some(e)
+    }
+
+    fn seen(&self, loaded: &'a Loaded, row: usize) -> Option<SeenRow<'a>> {
+        Some(SeenRow {
+            seen: self.track.in_recording(&loaded.name).get(row)?.as_ref()?,
+            q: loaded.q.get(row)?.as_ref()?,
+            under: self.conditions.get(loaded.name.as_str())?.get(row)?,
+        })
+    }
+
+    /// Robust size of the errors of the rows that take part; `None` below eight of them, or without a body frame.
+    fn usual(&self, rejected: &BTreeSet<(String, usize, String)>) -> Option<Usual> {
+        let (mut turns, mut shifts) = (Vec::new(), Vec::new());
+        for loaded in fitted(self.inputs) {
+            for row in 0..loaded.q.len() {
+                let key = (loaded.name.clone(), row, self.name.to_owned());
+                if rejected.contains(&key) {
+                    continue;
+                }
+                if let Some(e) = self
+                    .seen(loaded, row)
+                    .and_then(|seen| self.at(&seen, seen.q))
+                {
+                    turns.push(e.fixed_rows::<3>(0).norm());
+                    shifts.push(e.fixed_rows::<3>(3).norm());
+                }
+            }
+        }
+        /// Rows from which a median is worth something.
+        const ENOUGH: usize = 8;
+        let middle = |all: &mut Vec<f64>| {
+            all.sort_by(f64::total_cmp);
+            let median = all.get(all.len() / 2).copied()?;
+            (all.len() >= ENOUGH && median > 0.0).then_some(median / MEDIAN_OF_THREE)
+        };
+        Some((middle(&mut turns)?, middle(&mut shifts)?))
+    }
+
+    /// Part of the squared error that a step along `direction` leaves, with the step.
+    fn explained(&self, row: &SeenRow<'_>, direction: &[f64], usual: Usual) -> Option<(f64, f64)> {
+        /// Step of the difference quotient: a thousandth of the way.
+        const STEP: f64 = 1e-3;
+        let moved = |f: f64| -> Vec<f64> {
+            row.q
+                .iter()
+                .zip(direction)
+                .map(|(q, d)| q + f * d)
+                .collect()
+        };
+        let e = self.weighted(row, row.q, usual)?;
+        let slope = (self.weighted(row, &moved(STEP), usual)? - e) / STEP;
+        let size = slope.norm_squared();
+        if size <= 0.0 || e.norm_squared() <= 0.0 {
+            return None;
+        }
+        let step = -slope.dot(&e) / size;
+        let left = self.weighted(row, &moved(step), usual)?;
+        Some((step, left.norm_squared() / e.norm_squared()))
+    }
+
+    /// Equation (1).
+    fn between_rows(&self, loaded: &'a Loaded, row: usize, usual: Usual) -> Option<OnTheWay> {
+        let seen = self.seen(loaded, row)?;
+        let neighbors = [row.checked_sub(1), row.checked_add(1)];
+        let best = neighbors
+            .into_iter()
+            .flatten()
+            .filter_map(|k| loaded.q.get(k)?.as_ref())
+            .filter_map(|other| {
+                let way: Vec<f64> = other.iter().zip(seen.q).map(|(o, q)| o - q).collect();
+                self.explained(&seen, &way, usual)
+            })
+            .filter(|(fraction, left)| *left < LEFT && fraction.abs() < LARGEST_FRACTION)
+            .min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let e = self.at(&seen, seen.q)?;
+        Some(OnTheWay {
+            fraction: best.0,
+            position: e.fixed_rows::<3>(3).norm(),
+            angle: e.fixed_rows::<3>(0).norm(),
+        })
+    }
+
+    fn far_off(&self, loaded: &'a Loaded, row: usize, usual: Usual) -> Option<FarOff> {
+        let seen = self.seen(loaded, row)?;
+        let e = self.at(&seen, seen.q)?;
+        // √χ²₆(½) is what is usual.
+        let ratio = self.weighted(&seen, seen.q, usual)?.norm() / 2.313;
+        if ratio < FAR_OFF {
+            return None;
+        }
+        let model = &self.inputs.robot.model;
+        let link = self.inputs.robot.profile.bodies[self.name].link;
+        let joint = model
+            .chain_to_root(link)
+            .into_iter()
+            .filter(|joint| model.joint(*joint).kind.axis().is_some())
+            .filter_map(|joint| {
+                let mut only = vec![0.0; seen.q.len()];
+                only[joint.index()] = 1.0;
+                let (_, left) = self.explained(&seen, &only, usual)?;
+                Some((left, joint))
+            })
+            .filter(|(left, _)| *left < ONE_JOINT_LEFT)
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        Some(FarOff {
+            ratio,
+            position: e.fixed_rows::<3>(3).norm(),
+            angle: e.fixed_rows::<3>(0).norm(),
+            joint: joint.map(|(_, joint)| model.joint(joint).name.clone()),
+        })
+    }
+}
+
+fn fitted(inputs: &Inputs) -> impl Iterator<Item = &Loaded> {
+    inputs
+        .recordings
+        .values()
+        .filter(|r| r.spec.usage != Usage::Validation)
+}

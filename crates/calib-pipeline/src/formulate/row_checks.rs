@@ -1,0 +1,274 @@
+//! Single rows against the nominal robot, before the fit.
+//!
+//! A row is named when its body's motion to the other rows disagrees with that of its link ([`calib_checks::model`]) *and*
+//! most of its samples deviate from the registration of all rows: one marker out of place, or a pose that the seen
+//! markers hardly determine, is no fault of the row. Rows that are the majority within a part of a joint's range are not
+//! named one by one.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use calib_checks::model::{Spoiled, SpoiledRow, spoiled_rows};
+use calib_checks::structural::{Chain, Deviation, deviations};
+use calib_finding::{Fact, Finding, Subject, catalog};
+use calib_profile::Usage;
+
+use crate::formulate::structural::{Coupling, Layout, Structural, coupled};
+use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::tracks::BodyTrack;
+
+/// Parts of a joint's range in which the deviating rows must be the minority.
+const PARTS: usize = 4;
+/// Rows of such a part that say something.
+const ENOUGH_IN_PART: usize = 5;
+/// Deviation of orientation, rad (34°), that no motion between two readings explains.
+const FLIPPED: f64 = 0.6;
+/// Displacement of the centroid, as part of the markers' displacement, up to which a body rotated on the spot.
+const ON_THE_SPOT: f64 = 0.5;
+
+/// How a row deviates.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// The body rotated on the spot.
+    Flipped,
+    /// The robot had not settled, or the two were read at different times.
+    Unsettled,
+    /// Neither.
+    Off,
+}
+
+/// A row that deviates.
+struct Row {
+    row: usize,
+    /// Disagreement of its motions with those of the other rows, rad.
+    off: f64,
+    /// Of the markers from where they should be, rms, m.
+    distance: f64,
+    kind: Kind,
+}
+
+/// The deviating rows of one body in one recording.
+struct Rows<'a> {
+    body: &'a str,
+    loaded: &'a Loaded,
+    rows: Vec<Row>,
+    /// Usual disagreement, rad.
+    usual: f64,
+}
+
+/// Rows that deviate while no structural hypothesis stands out.
+#[must_use]
+pub fn rows(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    structural: &Structural,
+) -> Vec<Finding> {
+    // A recording that a mistake explains as a whole has no deviating rows.
+    let explained = |name: &str| {
+        let mut all = structural.findings.iter();
+        all.any(|f| f.severity == calib_finding::Severity::Error && f.subject.is_in(name))
+    };
+    let mut all: Vec<Spoilt<'_>> = Vec::new();
+    for (body, spec) in &inputs.robot.profile.bodies {
+        for loaded in inputs.recordings.values().filter(|r| !explained(&r.name)) {
+            let seen = tracks[body].in_recording(&loaded.name);
+            if seen.is_empty() || loaded.q.iter().any(Option::is_none) {
+                continue;
+            }
+            let q = loaded.q.iter().flatten();
+            let q = q.map(|q| with_couplings(q, &structural.couplings));
+            let poses: Vec<_> = q
+                .map(|q| inputs.robot.model.root_from_link(&q, spec.link))
+                .collect();
+            let spoiled = spoiled_rows(seen, &poses);
+            if !spoiled.rows.is_empty() {
+                all.push((body.as_str(), loaded, spoiled));
+            }
+        }
+    }
+    if all.is_empty() {
+        return Vec::new();
+    }
+    let mut all = deviating(inputs, tracks, structural, &all);
+    let mut findings = in_several_bodies(&mut all);
+    for rows in &all {
+        match part_of_a_range(inputs, rows) {
+            Some(finding) => findings.push(finding),
+            None => findings.extend(row_findings(rows)),
+        }
+    }
+    findings
+}
+
+/// The findings of deviating rows, by how they deviate.
+fn row_findings(rows: &Rows<'_>) -> Vec<Finding> {
+    let of_kind = |id, kind: Kind| {
+        let of_kind: Vec<&Row> = rows.rows.iter().filter(|row| row.kind == kind).collect();
+        let largest = |of: fn(&Row) -> f64| of_kind.iter().map(|row| of(row)).fold(0.0, f64::max);
+        let subject = Subject::body(rows.body).in_recording(&rows.loaded.name);
+        (!of_kind.is_empty()).then(|| {
+            Finding::of_kind(id, "model", subject)
+                .with("count", Fact::count(of_kind.len()))
+                .with("worst", Fact::radians(largest(|row| row.off)))
+                .with("usual", Fact::radians(rows.usual))
+                .with("position", Fact::meters(largest(|row| row.distance)))
+                .at_rows(of_kind.iter().map(|row| rows.loaded.poses.rows[row.row]))
+        })
+    };
+    [
+        of_kind(catalog::BODY_FLIP, Kind::Flipped),
+        of_kind(catalog::UNSETTLED_ROWS, Kind::Unsettled),
+        of_kind(catalog::ROW_OUTLIER, Kind::Off),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+fn with_couplings(q: &[f64], couplings: &[Coupling]) -> Vec<f64> {
+    let mut moved = q.to_vec();
+    for c in couplings {
+        moved[c.joint.0] += c.factor * q[c.source.0];
+    }
+    moved
+}
+
+/// Rows whose motions disagree: body, recording, rows.
+type Spoilt<'a> = (&'a str, &'a Loaded, Spoiled);
+
+/// The rows most of whose samples deviate from the registration, and how.
+fn deviating<'a>(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    structural: &Structural,
+    all: &[Spoilt<'a>],
+) -> Vec<Rows<'a>> {
+    // A model that was read is a tree, and what a reader lets through does not contradict itself.
+    let Ok(chain) = Chain::from_model(&inputs.robot.model) else {
+        return Vec::new();
+    };
+    let chain = coupled(chain, &structural.couplings);
+    let validation = |(_, loaded, _): &Spoilt<'_>| loaded.spec.usage == Usage::Validation;
+    let layout = Layout::new(inputs, tracks, &chain, all.iter().any(validation));
+    let Ok(found) = deviations(&layout.data) else {
+        return Vec::new();
+    };
+    // (recording, row, body) → deviation
+    let mut by_row: BTreeMap<(&str, usize, &str), Deviation> = BTreeMap::new();
+    for deviation in &found.rows {
+        let recording = layout.data.recording[deviation.row];
+        let recording = layout.recordings[recording.0].name.as_str();
+        let body = layout.body(deviation.body);
+        by_row.insert((recording, layout.rows[deviation.row], body), *deviation);
+    }
+    let mut kept = Vec::new();
+    for (body, loaded, spoiled) in all {
+        let row = |row: &SpoiledRow| {
+            let deviation = by_row.get(&(loaded.name.as_str(), row.row, *body))?;
+            deviation.whole().then(|| Row {
+                row: row.row,
+                off: row.off,
+                distance: deviation.distance,
+                kind: kind(row.off, deviation),
+            })
+        };
+        kept.push(Rows {
+            body,
+            loaded,
+            rows: spoiled.rows.iter().filter_map(row).collect(),
+            usual: spoiled.usual,
+        });
+    }
+    kept.retain(|rows| !rows.rows.is_empty());
+    kept
+}
+
+/// A flip is a rotation of the marker pattern on the spot.
+fn kind(off: f64, deviation: &Deviation) -> Kind {
+    if off < FLIPPED {
+        return Kind::Unsettled;
+    }
+    let turned = deviation.angle.is_some_and(|angle| angle > FLIPPED);
+    if turned && deviation.shift < ON_THE_SPOT * deviation.distance {
+        Kind::Flipped
+    } else {
+        Kind::Off
+    }
+}
+
+/// Rows in which several bodies deviate at once: not the bodies are wrong there, but what the joints are said to be.
+fn in_several_bodies(all: &mut Vec<Rows<'_>>) -> Vec<Finding> {
+    let mut count: BTreeMap<(String, usize), usize> = BTreeMap::new();
+    let far = |row: &Row| row.kind != Kind::Unsettled;
+    for rows in all.iter() {
+        for row in rows.rows.iter().filter(|row| far(row)) {
+            let key = (rows.loaded.name.clone(), row.row);
+            *count.entry(key).or_default() += 1;
+        }
+    }
+    count.retain(|_, bodies| *bodies > 1);
+    let mut by_recording: BTreeMap<String, BTreeSet<u64>> = BTreeMap::new();
+    for rows in all.iter_mut() {
+        let name = &rows.loaded.name;
+        rows.rows.retain(|row| {
+            let several = count.contains_key(&(name.clone(), row.row));
+            if several {
+                let number = rows.loaded.poses.rows[row.row];
+                by_recording.entry(name.clone()).or_default().insert(number);
+            }
+            !several
+        });
+    }
+    all.retain(|rows| !rows.rows.is_empty());
+    let finding = |(recording, rows): (String, BTreeSet<u64>)| {
+        Finding::of_kind(
+            catalog::ROW_OUTLIER,
+            "several_bodies",
+            Subject::recording(recording),
+        )
+        .with("count", Fact::count(rows.len()))
+        .at_rows(rows)
+    };
+    by_recording.into_iter().map(finding).collect()
+}
+
+/// The part of a joint's range in which most rows deviate: the range is the cause, not the rows.
+fn part_of_a_range(inputs: &Inputs, rows: &Rows<'_>) -> Option<Finding> {
+    let model = &inputs.robot.model;
+    let q: Vec<&Vec<f64>> = rows.loaded.q.iter().flatten().collect();
+    let off: BTreeSet<usize> = rows.rows.iter().map(|row| row.row).collect();
+    for joint in model.independent_joints() {
+        let at = |row: usize| q[row][joint.index()];
+        let (low, high) = (0..q.len()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), row| {
+            (l.min(at(row)), h.max(at(row)))
+        });
+        let width = (high - low) / PARTS as f64;
+        if width <= 0.0 {
+            continue;
+        }
+        for part in 0..PARTS {
+            let (from, to) = (low + width * part as f64, low + width * (part + 1) as f64);
+            let inside = (0..q.len()).filter(|&row| (from..=to).contains(&at(row)));
+            let (mut count, mut wrong) = (0, 0);
+            for row in inside {
+                count += 1;
+                wrong += usize::from(off.contains(&row));
+            }
+            if count >= ENOUGH_IN_PART && 2 * wrong > count {
+                let number = |value| match model.joint(joint).kind.turns() {
+                    true => Fact::radians(value),
+                    false => Fact::meters(value),
+                };
+                let subject = Subject::body(rows.body).in_recording(&rows.loaded.name);
+                return Some(
+                    Finding::of_kind(catalog::MODEL_DISAGREES, "range", subject)
+                        .with("joint", Fact::name(&model.joint(joint).name))
+                        .with("low", number(from))
+                        .with("high", number(to))
+                        .with("count", Fact::count(wrong))
+                        .with("rows", Fact::count(count)),
+                );
+            }
+        }
+    }
+    None
+}

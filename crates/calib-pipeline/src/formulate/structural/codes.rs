@@ -1,0 +1,84 @@
+//! Short codes of hypotheses, for the values of findings: `sign(elbow)`, `exchange(elbow, wrist)@sweep`.
+
+use calib_checks::structural::{
+    Correction, Hypothesis, PoseMistake, QuarterTurns, Scope, Scoped, UnitMistake,
+};
+
+use super::layout::Layout;
+
+/// The code of a correction: those of its parts, joined by `+`.
+#[must_use]
+pub fn of_correction(layout: &Layout<'_>, correction: &Correction) -> String {
+    let parts: Vec<String> = correction.iter().map(|s| of(layout, s)).collect();
+    parts.join(" + ")
+}
+
+/// The code of a hypothesis, with its recordings where they are not all.
+#[must_use]
+pub fn of(layout: &Layout<'_>, scoped: &Scoped) -> String {
+    let code = of_hypothesis(layout, &scoped.hypothesis);
+    match scoped.scope {
+        Scope::All => code,
+        scope => format!("{code}@{}", layout.recordings_in(scope).join("+")),
+    }
+}
+
+fn of_hypothesis(layout: &Layout<'_>, hypothesis: &Hypothesis) -> String {
+    let joint = |j| layout.joint(j);
+    match *hypothesis {
+        Hypothesis::Sign { joint: j } => format!("sign({})", joint(j)),
+        Hypothesis::Exchange { first, second } => {
+            format!("exchange({}, {})", joint(first), joint(second))
+        }
+        Hypothesis::Unit { joint: j, mistake } => format!("unit({}, {})", joint(j), unit(mistake)),
+        Hypothesis::Units { mistake } => format!("unit(all, {})", unit(mistake)),
+        Hypothesis::Coupling {
+            joint: j,
+            source,
+            factor,
+        } => format!("coupling({}, {}, {factor:+.3})", joint(j), joint(source)),
+        Hypothesis::Gain { joint: j, factor } => format!("gain({}, {factor:.4})", joint(j)),
+        Hypothesis::Offset { joint: j, turns } => {
+            let degrees = match turns {
+                QuarterTurns::Plus90 => "+90",
+                QuarterTurns::Minus90 => "-90",
+                QuarterTurns::Half => "180",
+            };
+            format!("offset({}, {degrees} deg)", joint(j))
+        }
+        Hypothesis::RowShift { rows } => format!("rows({rows:+})"),
+        Hypothesis::MissingColumn { joint: j } => format!("column({})", joint(j)),
+        Hypothesis::WrongLink { body, link } => {
+            format!("link({}, {})", layout.body(body), layout.link(link))
+        }
+        Hypothesis::ExchangedBodies { first, second } => {
+            format!("bodies({}, {})", layout.body(first), layout.body(second))
+        }
+        Hypothesis::TrackerUnit { mistake } => format!("unit(tracker, {})", unit(mistake)),
+        Hypothesis::Mirrored => "mirrored(tracker)".to_owned(),
+        Hypothesis::TrackerAxes { rotation } => format!("axes(tracker, {rotation})"),
+        Hypothesis::TrackerMoved => "moved(tracker)".to_owned(),
+        Hypothesis::Remounted { body } => format!("remounted({})", layout.body(body)),
+        Hypothesis::Poses { body, mistake } => {
+            let body = body.map_or("all", |b| layout.body(b));
+            let mistake = match mistake {
+                PoseMistake::ScalarFirstReadAsLast => "scalar first",
+                PoseMistake::ScalarLastReadAsFirst => "scalar last",
+                PoseMistake::Inverse => "inverse",
+                PoseMistake::Transposed => "transposed",
+            };
+            format!("poses({body}, {mistake})")
+        }
+        _ => "other".to_owned(),
+    }
+}
+
+/// The unit that the values really have.
+fn unit(mistake: UnitMistake) -> &'static str {
+    match mistake {
+        UnitMistake::DegreesReadAsRadians => "deg",
+        UnitMistake::RadiansReadAsDegrees => "rad",
+        UnitMistake::MillimetersReadAsMeters => "mm",
+        UnitMistake::MetersReadAsMillimeters => "m",
+    }
+}

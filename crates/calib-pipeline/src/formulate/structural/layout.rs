@@ -1,0 +1,166 @@
+//! Recordings and nominal robot as the engine of structural hypotheses takes them.
+
+use std::collections::BTreeMap;
+
+use calib_checks::structural::{
+    Body, BodyIndex, Chain, Data, JointIndex, LinkIndex, Measured, RecordingIndex, Scope,
+};
+use calib_profile::{BodyKind, Usage};
+use calib_urdf::{JointId, LinkId};
+use nalgebra::{Isometry3, Point3};
+
+use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::tracks::BodyTrack;
+
+/// Noise of a pose where the profile states none, m and rad: an optical tracker's body of 0.1 m.
+const BODY_SIGMA: (f64, f64) = (3e-4, 1e-3);
+
+/// The engine's input, and the names behind its numbers.
+#[derive(Debug, Clone)]
+pub struct Layout<'a> {
+    /// Robot used for names.
+    pub inputs: &'a Inputs,
+    /// The engine's input.
+    pub data: Data,
+    /// By recording index: fitted ones first.
+    pub recordings: Vec<&'a Loaded>,
+    /// By body index.
+    pub bodies: Vec<&'a str>,
+    /// Row of its recording, for every row of `data`.
+    pub rows: Vec<usize>,
+}
+
+impl<'a> Layout<'a> {
+    /// The fitted recordings, and those of the validation behind them where `validation` asks for it.
+    #[must_use]
+    pub fn new(
+        inputs: &'a Inputs,
+        tracks: &'a BTreeMap<String, BodyTrack>,
+        chain: &Chain,
+        validation: bool,
+    ) -> Self {
+        let held_out = |r: &&Loaded| r.spec.usage == Usage::Validation;
+        let all = || inputs.recordings.values();
+        let mut recordings: Vec<&Loaded> = all().filter(|r| !held_out(r)).collect();
+        if validation {
+            recordings.extend(all().filter(held_out));
+        }
+        let mut layout = Self {
+            inputs,
+            data: Data {
+                chain: chain.clone(),
+                readings: Vec::new(),
+                recording: Vec::new(),
+                bodies: Vec::new(),
+            },
+            recordings,
+            bodies: Vec::new(),
+            rows: Vec::new(),
+        };
+        layout.add_rows();
+        for (name, body) in &inputs.robot.profile.bodies {
+            let measured = layout.measured(&body.kind, &tracks[name]);
+            layout.data.bodies.extend(measured.map(|measured| Body {
+                link: LinkIndex::from(body.link),
+                measured,
+                mounts: Vec::new(),
+            }));
+            if layout.data.bodies.len() > layout.bodies.len() {
+                layout.bodies.push(name);
+            }
+        }
+        layout
+    }
+
+    /// Rows with joint values; a joint without a column has none, unless the profile holds it.
+    fn add_rows(&mut self) {
+        let model = &self.inputs.robot.model;
+        for (r, loaded) in self.recordings.iter().enumerate() {
+            let mut stated = vec![false; model.joints().len()];
+            let recorded = loaded.poses.joints.keys();
+            let recorded = recorded.filter_map(|name| model.joint_id(name).ok());
+            for joint in recorded.chain(loaded.spec.hold.keys().copied()) {
+                stated[joint.index()] = true;
+            }
+            for (row, q) in loaded.q.iter().enumerate() {
+                let Some(q) = q else { continue };
+                let readings = q.iter().zip(&stated);
+                self.data
+                    .readings
+                    .push(readings.map(|(q, stated)| stated.then_some(*q)).collect());
+                self.data.recording.push(RecordingIndex(r));
+                self.rows.push(row);
+            }
+        }
+    }
+
+    /// Markers where markers were measured, poses otherwise; `None` for a body that no row shows.
+    fn measured(&self, kind: &BodyKind, track: &BodyTrack) -> Option<Measured> {
+        let places = || self.data.recording.iter().zip(&self.rows);
+        match kind {
+            BodyKind::Markers { names, .. } if !track.is_computed() => {
+                let at = |marker: &String, r: &RecordingIndex, row: usize| -> Option<Point3<f64>> {
+                    *self.recordings[r.0].poses.markers.get(marker)?.get(row)?
+                };
+                let points: Vec<Vec<_>> = places()
+                    .map(|(r, row)| names.iter().map(|m| at(m, r, *row)).collect())
+                    .collect();
+                let seen = points.iter().flatten().any(Option::is_some);
+                seen.then_some(Measured::Markers(points))
+            }
+            _ => {
+                let poses: Vec<Option<Isometry3<f64>>> = places()
+                    .map(|(r, row)| {
+                        let name = &self.recordings[r.0].name;
+                        *track.in_recording(name).get(*row)?
+                    })
+                    .collect();
+                let tracker = &self.inputs.robot.profile.tracker;
+                poses.iter().any(Option::is_some).then(|| Measured::Poses {
+                    tracker_from_body: poses,
+                    sigma_position: tracker.body_sigma.unwrap_or(BODY_SIGMA.0),
+                    sigma_orientation: tracker.body_sigma_rad.unwrap_or(BODY_SIGMA.1),
+                })
+            }
+        }
+    }
+
+    /// Name of a joint.
+    #[must_use]
+    pub fn joint(&self, joint: JointIndex) -> &'a str {
+        let model = &self.inputs.robot.model;
+        let id = model.joint_ids().nth(joint.0);
+        id.map_or("", |id: JointId| &model.joint(id).name)
+    }
+
+    /// Name of a link.
+    #[must_use]
+    pub fn link(&self, link: LinkIndex) -> &'a str {
+        let model = &self.inputs.robot.model;
+        let id = model.link_ids().nth(link.0);
+        id.map_or("", |id: LinkId| &model.link(id).name)
+    }
+
+    /// Name of a body.
+    #[must_use]
+    pub fn body(&self, body: BodyIndex) -> &'a str {
+        self.bodies[body.0]
+    }
+
+    /// Names of the bodies that are measured as poses.
+    #[must_use]
+    pub fn posed(&self) -> Vec<&'a str> {
+        let all = self.bodies.iter().zip(&self.data.bodies);
+        all.filter(|(_, body)| matches!(body.measured, Measured::Poses { .. }))
+            .map(|(name, _)| *name)
+            .collect()
+    }
+
+    /// Names of the recordings of a scope.
+    #[must_use]
+    pub fn recordings_in(&self, scope: Scope) -> Vec<&'a str> {
+        let inside = |(r, _): &(usize, &&'a Loaded)| scope.contains(RecordingIndex(*r));
+        let all = self.recordings.iter().enumerate();
+        all.filter(inside).map(|(_, r)| r.name.as_str()).collect()
+    }
+}

@@ -1,0 +1,140 @@
+//! Which single mistake, or which pair, explains the recordings: asked before any row is blamed.
+//!
+//! The recordings and the nominal robot, with the couplings that the profile declares, go to the engine
+//! ([`calib_checks::structural`]) in one call over all fitted recordings; what it decides becomes findings. Where the
+//! fitted recordings agree with the robot, those of the validation join them in a second call.
+
+mod codes;
+mod declared;
+mod layout;
+mod limits;
+mod merge;
+mod named;
+
+use std::collections::BTreeMap;
+
+use calib_checks::structural::{
+    Chain, Decision, Options, Outcome, explain, registration_residual, thin,
+};
+use calib_finding::{Fact, Finding, Severity, Subject, catalog};
+use calib_profile::Usage;
+
+use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::tracks::BodyTrack;
+
+pub use declared::{Coupling, coupled};
+pub use layout::Layout;
+pub use merge::keep_unexplained;
+
+/// A residual of this many times what nominal errors explain is a mistake, not a bad URDF: errors three times the
+/// expected ones (3°, 30 mm) reach it in 1 of 100 robots.
+const NOT_NOMINAL: f64 = 3.0;
+
+/// A mistake that divides the residual by 1.5 raised it by more than this.
+const RAISED: f64 = 1.1;
+
+/// What the structural hypotheses say.
+#[derive(Debug, Clone, Default)]
+pub struct Structural {
+    /// For the report and for `calib check`.
+    pub findings: Vec<Finding>,
+    /// No mistake about whole recordings stands out: single rows may be judged.
+    pub rows_count: bool,
+    /// Couplings that the profile declares.
+    pub couplings: Vec<Coupling>,
+}
+
+/// Asks the engine about the recordings.
+#[must_use]
+pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Structural {
+    // A model that was read is a tree.
+    let Ok(chain) = Chain::from_model(&inputs.robot.model) else {
+        return Structural::default();
+    };
+    let couplings = {
+        let plain = Layout::new(inputs, tracks, &chain, false);
+        declared::couplings(inputs, &plain.data)
+    };
+    let chain = declared::coupled(chain, &couplings);
+    let layout = Layout::new(inputs, tracks, &chain, false);
+    let mut found = Structural {
+        findings: Vec::new(),
+        rows_count: true,
+        couplings,
+    };
+    let mut options = Options::default();
+    if let Some(sigma) = inputs.robot.profile.tracker.marker_sigma {
+        options.sigma = sigma;
+    }
+    // Without a body there is nothing to compare; what a reader lets through does not contradict itself.
+    let Ok(outcome) = explain(&layout.data, &options) else {
+        return found;
+    };
+    found.findings.extend(decision(&layout, &outcome));
+    found.findings.extend(limits::findings(&layout, &outcome));
+    found.rows_count = matches!(
+        outcome.decision,
+        Decision::Consistent { .. } | Decision::TooFewData { .. }
+    );
+    if found.rows_count {
+        let all = Layout::new(inputs, tracks, &chain, true);
+        found
+            .findings
+            .extend(of_validation(&all, &outcome, options));
+    }
+    found
+}
+
+/// What is wrong in the recordings of the validation alone, where they raise the residual of the fitted ones.
+fn of_validation(all: &Layout<'_>, fitted: &Outcome, mut options: Options) -> Vec<Finding> {
+    let held_out = |r: &&Loaded| r.spec.usage == Usage::Validation;
+    if !all.recordings.iter().any(held_out) {
+        return Vec::new();
+    }
+    let rms = registration_residual(&thin(&all.data, options.most_rows));
+    if rms.is_ok_and(|rms| rms < RAISED * fitted.rms) {
+        return Vec::new();
+    }
+    (options.list_invisible, options.score_tests) = (false, false);
+    let Ok(outcome) = explain(&all.data, &options) else {
+        return Vec::new();
+    };
+    // A large residual alone was judged by the fitted recordings.
+    let errors = decision(all, &outcome).into_iter();
+    errors.filter(|f| f.severity == Severity::Error).collect()
+}
+
+/// The findings of a decision.
+fn decision(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
+    match &outcome.decision {
+        Decision::Named(named) => named::findings(layout, outcome, named),
+        Decision::Undecided { leading, .. } => {
+            let limit = outcome.expected.map(|e| e.limit);
+            let beyond = limit.is_none_or(|limit| outcome.rms > NOT_NOMINAL * limit);
+            let kind = if beyond || leading.is_some() {
+                "undecided"
+            } else {
+                "large"
+            };
+            let recordings = layout.recordings.iter().map(|r| r.name.clone()).collect();
+            let subject = Subject {
+                recordings,
+                ..Subject::default()
+            };
+            let finding = Finding::of_kind(catalog::MODEL_DISAGREES, kind, subject)
+                .with("none", Fact::meters(outcome.rms))
+                .with_some("limit", limit.map(Fact::meters));
+            let Some(leading) = leading else {
+                return vec![finding];
+            };
+            let finding = named::with_evidence(layout, finding, outcome, leading);
+            let code = codes::of_correction(layout, &leading.correction);
+            vec![
+                finding
+                    .with_some("limit", limit.map(Fact::meters))
+                    .with("leading", Fact::names([code])),
+            ]
+        }
+        _ => Vec::new(),
+    }
+}

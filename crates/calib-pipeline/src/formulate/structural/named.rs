@@ -1,0 +1,206 @@
+//! A named mistake as findings: one for each correction, with the evidence and what is not distinguishable from it.
+
+use calib_checks::structural::{
+    Correction, Hypothesis, JointIndex, Named, Outcome, PoseMistake, Scoped, UnitMistake,
+};
+use calib_finding::{About, Fact, Finding, Id, Subject, catalog};
+
+use super::codes;
+use super::layout::Layout;
+
+/// The findings of a named correction.
+#[must_use]
+pub fn findings(layout: &Layout<'_>, outcome: &Outcome, named: &Named) -> Vec<Finding> {
+    let one = |scoped: &Scoped| {
+        let others = named.correction.iter().filter(|other| *other != scoped);
+        let others: Vec<String> = others.map(|other| codes::of(layout, other)).collect();
+        let finding = of_hypothesis(layout, scoped);
+        let finding = with_evidence(layout, finding, outcome, named);
+        let mut finding = finding.with_some("other_correction", names(others));
+        let recordings = layout.recordings_in(scoped.scope);
+        finding.subject.recordings = recordings.into_iter().map(str::to_owned).collect();
+        finding
+    };
+    named.correction.iter().map(one).collect()
+}
+
+fn names(all: Vec<String>) -> Option<Fact> {
+    (!all.is_empty()).then(|| Fact::names(all))
+}
+
+/// Residuals before and after, the next best, and what is as good.
+pub(super) fn with_evidence(
+    layout: &Layout<'_>,
+    finding: Finding,
+    outcome: &Outcome,
+    named: &Named,
+) -> Finding {
+    let code = |correction| codes::of_correction(layout, correction);
+    // Where a joint stands still its mistake is the same with and without that recording.
+    let hypotheses = |c: &Correction| c.iter().map(|s| s.hypothesis).collect::<Vec<_>>();
+    let mut known = vec![hypotheses(&named.correction)];
+    let mut equivalent = Vec::new();
+    for other in &named.equivalent {
+        if !known.contains(&hypotheses(other)) {
+            known.push(hypotheses(other));
+            equivalent.push(code(other));
+        }
+    }
+    let doubtful = named.within_expected == Some(false);
+    let limit = outcome.expected.filter(|_| doubtful).map(|e| e.limit);
+    finding
+        .with("none", Fact::meters(named.evidence.none))
+        .with("best", Fact::meters(named.evidence.best))
+        .with_some("next", named.evidence.next.map(Fact::meters))
+        .with_some("limit", limit.map(Fact::meters))
+        .with_some("equivalent", names(equivalent))
+        .with_some(
+            "alternatives",
+            names(named.alternatives.iter().map(|a| code(&a.0)).collect()),
+        )
+}
+
+/// Id, subject and values of one hypothesis.
+fn of_hypothesis(layout: &Layout<'_>, scoped: &Scoped) -> Finding {
+    let of_joint = |id: Id, joint: JointIndex| {
+        let name = layout.joint(joint);
+        Finding::new(id, Subject::joint(name)).with("joint", Fact::name(name))
+    };
+    let other = |joint| Fact::name(layout.joint(joint));
+    match scoped.hypothesis {
+        Hypothesis::Sign { joint } => {
+            of_joint(catalog::JOINT_SIGN, joint).with_some("axis", reversed_axis(layout, joint))
+        }
+        Hypothesis::Exchange { first, second } => {
+            of_joint(catalog::JOINT_ORDER, first).with("other", other(second))
+        }
+        Hypothesis::Offset { joint, turns } => {
+            of_joint(catalog::JOINT_OFFSET, joint).with("offset", Fact::radians(turns.angle()))
+        }
+        Hypothesis::Coupling {
+            joint,
+            source,
+            factor,
+        } => {
+            let subject = Subject::joint(layout.joint(joint));
+            Finding::of_kind(catalog::JOINT_COUPLING, "whole", subject)
+                .with("joint", Fact::name(layout.joint(joint)))
+                .with("other", other(source))
+                .with("factor", Fact::ratio(factor))
+        }
+        Hypothesis::MissingColumn { joint } => {
+            let subject = Subject::joint(layout.joint(joint));
+            Finding::of_kind(catalog::JOINT_COLUMN_MISSING, "moved", subject)
+                .with("joint", Fact::name(layout.joint(joint)))
+        }
+        Hypothesis::Unit { joint, mistake } => {
+            let subject = Subject::joint(layout.joint(joint));
+            Finding::of_kind(catalog::UNIT_MISMATCH, of_one_joint(mistake), subject)
+                .with("joint", Fact::name(layout.joint(joint)))
+        }
+        Hypothesis::Units { mistake } => Finding::of_kind(
+            catalog::UNIT_MISMATCH,
+            of_all_joints(mistake),
+            Subject::default(),
+        ),
+        _ => of_tracker(layout, scoped),
+    }
+}
+
+/// Hypotheses about bodies, tracker and clocks.
+fn of_tracker(layout: &Layout<'_>, scoped: &Scoped) -> Finding {
+    let body = |b| Subject::body(layout.body(b));
+    let recordings = || Fact::names(layout.recordings_in(scoped.scope));
+    match scoped.hypothesis {
+        Hypothesis::RowShift { rows } => {
+            // Row i needs the readings of row i − rows.
+            let kind = if rows > 0 {
+                "rows_before"
+            } else {
+                "rows_after"
+            };
+            Finding::of_kind(catalog::CLOCK_LAG, kind, About::Clocks)
+                .with("rows", Fact::count(usize::from(rows.unsigned_abs())))
+        }
+        Hypothesis::WrongLink { body: b, link } => {
+            Finding::of_kind(catalog::WRONG_MOUNT, "other_link", body(b))
+                .with("body", Fact::name(layout.body(b)))
+                .with(
+                    "link",
+                    Fact::name(layout.link(layout.data.bodies[b.0].link)),
+                )
+                .with("other", Fact::name(layout.link(link)))
+        }
+        Hypothesis::ExchangedBodies { first, second } => {
+            Finding::of_kind(catalog::WRONG_MOUNT, "exchanged", body(first))
+                .with("body", Fact::name(layout.body(first)))
+                .with("other", Fact::name(layout.body(second)))
+        }
+        Hypothesis::TrackerUnit { mistake } => {
+            let kind = match mistake {
+                UnitMistake::MetersReadAsMillimeters => "lengths_too_small",
+                _ => "lengths_too_large",
+            };
+            Finding::of_kind(catalog::UNIT_MISMATCH, kind, About::Lengths)
+        }
+        Hypothesis::Mirrored => Finding::of_kind(catalog::MIRRORED, "tracker", About::Tracker),
+        Hypothesis::TrackerMoved => {
+            Finding::of_kind(catalog::TRACKER_MOVED, "moved", About::Tracker)
+                .with("recordings", recordings())
+        }
+        Hypothesis::TrackerAxes { .. } => {
+            Finding::of_kind(catalog::TRACKER_MOVED, "axes", About::Tracker)
+                .with("recordings", recordings())
+        }
+        Hypothesis::Remounted { body: b } => Finding::new(catalog::BODY_REMOUNTED, body(b))
+            .with("body", Fact::name(layout.body(b)))
+            .with("recordings", recordings()),
+        Hypothesis::Poses { body: b, mistake } => {
+            let (id, kind) = match mistake {
+                PoseMistake::ScalarFirstReadAsLast => (catalog::QUATERNION_ORDER, "scalar_first"),
+                PoseMistake::ScalarLastReadAsFirst => (catalog::QUATERNION_ORDER, "scalar_last"),
+                PoseMistake::Inverse => (catalog::POSE_CONVENTION, "inverse"),
+                PoseMistake::Transposed => (catalog::POSE_CONVENTION, "transposed"),
+            };
+            let subject = b.map_or_else(|| About::Tracker.into(), body);
+            let bodies = b.map_or_else(|| layout.posed(), |b| vec![layout.body(b)]);
+            Finding::of_kind(id, kind, subject).with("bodies", Fact::names(bodies))
+        }
+        // The engine's list may grow; what has no words of its own is undecided.
+        _ => Finding::of_kind(catalog::MODEL_DISAGREES, "undecided", About::Recording)
+            .with("leading", Fact::names([codes::of(layout, scoped)])),
+    }
+}
+
+/// The axis of a joint in the URDF with the other sign, as a URDF writes it.
+fn reversed_axis(layout: &Layout<'_>, joint: JointIndex) -> Option<Fact> {
+    let model = &layout.inputs.robot.model;
+    let id = model.joint_ids().nth(joint.0)?;
+    let axis = model.joint(id).kind.axis()?;
+    let number = |x: f64| {
+        // Axes are written with few digits; −0 is 0.
+        let rounded = (-x * 1e6).round() / 1e6 + 0.0;
+        rounded.to_string()
+    };
+    Some(Fact::name(
+        [number(axis.x), number(axis.y), number(axis.z)].join(" "),
+    ))
+}
+
+fn of_one_joint(mistake: UnitMistake) -> &'static str {
+    match mistake {
+        UnitMistake::DegreesReadAsRadians => "joint_degrees",
+        UnitMistake::RadiansReadAsDegrees => "joint_radians",
+        UnitMistake::MillimetersReadAsMeters => "joint_millimeters",
+        UnitMistake::MetersReadAsMillimeters => "joint_meters",
+    }
+}
+
+fn of_all_joints(mistake: UnitMistake) -> &'static str {
+    match mistake {
+        UnitMistake::DegreesReadAsRadians => "all_degrees",
+        UnitMistake::RadiansReadAsDegrees => "all_radians",
+        UnitMistake::MillimetersReadAsMeters => "all_millimeters",
+        UnitMistake::MetersReadAsMillimeters => "all_meters",
+    }
+}

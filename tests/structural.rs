@@ -1,0 +1,462 @@
+//! Structural mistakes through the program, over designs: random poses, one-joint sweeps, six poses; one to four markers.
+//! Each is named before a row is blamed, once, with its places; correct data are given no error.
+
+mod scratch;
+
+use scratch::Scratch;
+use serde_json::Value;
+
+const JOINTS: [(&str, f64, f64); 5] = [
+    ("waist", -70.0, 170.0),
+    ("shoulder", -100.0, 20.0),
+    ("elbow", -20.0, 120.0),
+    ("wrist_pitch", -90.0, 90.0),
+    ("wrist_roll", -100.0, 100.0),
+];
+
+/// Where the joints stand while another one is swept: no two axes coincide.
+const HOME: [f64; 5] = [20.0, -35.0, 80.0, -30.0, 15.0];
+
+#[derive(Clone, Copy, PartialEq)]
+enum Design {
+    Random(usize),
+    /// A recording of its own for each joint.
+    Sweeps,
+}
+
+/// Markers of the hand, mm, in the frame of its mount.
+type Markers = &'static [[f64; 3]];
+const ONE: Markers = &[[20.0, 30.0, 10.0]];
+const TWO: Markers = &[[20.0, 30.0, 10.0], [70.0, -20.0, 15.0]];
+const FOUR: Markers = &[
+    [0.0, 0.0, 0.0],
+    [72.0, 0.0, 0.0],
+    [25.0, 58.0, 0.0],
+    [48.0, 30.0, -40.0],
+];
+/// All within 15 mm of the wrist's axis once the mount is on it.
+const NEAR_THE_AXIS: Markers = &[[0.0, 0.0, 0.0], [60.0, 12.0, 0.0], [30.0, 0.0, 14.0]];
+
+struct Setting {
+    design: Design,
+    markers: Markers,
+    /// mm, from the last link.
+    mount: [f64; 3],
+    validation: bool,
+    seed: u64,
+}
+
+impl Setting {
+    fn new(design: Design, markers: Markers, seed: u64) -> Self {
+        Self {
+            design,
+            markers,
+            mount: [55.0, -40.0, 35.0],
+            validation: false,
+            seed,
+        }
+    }
+
+    fn tables(&self) -> Vec<String> {
+        let mut tables: Vec<String> = match self.design {
+            Design::Random(_) => vec!["poses".to_owned()],
+            Design::Sweeps => JOINTS.iter().map(|j| j.0.to_owned()).collect(),
+        };
+        if self.validation {
+            tables.push("checks".to_owned());
+        }
+        // In the order of the program.
+        tables.sort();
+        tables
+    }
+
+    /// How one table is simulated.
+    fn plan(&self, table: &str) -> String {
+        let ranges: Vec<String> = JOINTS
+            .iter()
+            .map(|(joint, low, high)| format!("{joint}_deg: [{low}, {high}]"))
+            .collect();
+        let random = |poses| format!("{{random: {{{}}}, poses: {poses}}}", ranges.join(", "));
+        match self.design {
+            _ if table == "checks" => random(10),
+            Design::Random(poses) => random(poses),
+            Design::Sweeps => {
+                let (_, low, high) = JOINTS.iter().find(|j| j.0 == table).expect("a joint");
+                let hold = JOINTS.iter().zip(HOME).filter(|(j, _)| j.0 != table);
+                let hold: Vec<String> = hold.map(|(j, q)| format!("{}_deg: {q}", j.0)).collect();
+                format!(
+                    "{{grid: [{{joint: {table}_deg, from: {low}, to: {high}, poses: 9}}], hold: {{{}}}}}",
+                    hold.join(", ")
+                )
+            }
+        }
+    }
+
+    /// A folder with the profile and its simulated recordings.
+    fn folder(&self) -> Scratch {
+        let names: Vec<String> = (1..=self.markers.len()).map(|k| format!("m{k}")).collect();
+        let of_table = |table: &String, text: String| format!("  {table}: {text}\n");
+        let recordings: String = self
+            .tables()
+            .iter()
+            .map(|table| {
+                let usage = if table == "checks" {
+                    "validation"
+                } else {
+                    "static"
+                };
+                of_table(table, format!("{{file: {table}.csv, use: {usage}}}"))
+            })
+            .collect();
+        let plans: String = self
+            .tables()
+            .iter()
+            .map(|table| of_table(table, self.plan(table)).replace("  ", "    "))
+            .collect();
+        let places: Vec<String> = names
+            .iter()
+            .zip(self.markers)
+            .map(|(name, m)| format!("{name}: {m:?}"))
+            .collect();
+        let profile = format!(
+            "calib: 1
+robot: {{name: arm, urdf: robots/ripley/r17.urdf}}
+tracker: {{frame: world}}
+bodies:
+  hand: {{link: gripper, markers: [{}]}}
+recordings:
+{recordings}solve:
+  free: [bodies, tracker, joint_offsets, joint_axes]
+simulate:
+  seed: {}
+  tracker_from_root: {{xyz_mm: [140, -60, 742]}}
+  mounts:
+    hand: {{xyz_mm: {:?}, markers_mm: {{{}}}}}
+  errors: {{joint_offset_deg: 0.3, axis_mm: 0.8, axis_deg: 0.15}}
+  noise: {{marker_mm: 0.3, joint_deg: 0.02}}
+  recordings:
+{plans}",
+            names.join(", "),
+            self.seed,
+            self.mount,
+            places.join(", "),
+        );
+        let dir = Scratch::new().robot("ripley").file("arm.yaml", profile);
+        dir.calib(["simulate", "arm.yaml", "--out", "."]).expect(0);
+        dir
+    }
+}
+
+/// Changes the cells of one column in some tables.
+fn column(dir: Scratch, tables: &[String], name: &str, change: impl Fn(f64) -> f64) -> Scratch {
+    tables.iter().fold(dir, |dir, table| {
+        dir.cells(&format!("{table}.csv"), |_, column, cell| {
+            match cell.parse::<f64>() {
+                Ok(value) if column == name => change(value).to_string(),
+                _ => cell.to_owned(),
+            }
+        })
+    })
+}
+
+/// Exchanges the names of two columns.
+fn exchanged(dir: Scratch, tables: &[String], a: &str, b: &str) -> Scratch {
+    tables.iter().fold(dir, |dir, table| {
+        let text = dir.read(&format!("{table}.csv"));
+        let text = text.replace(a, "\u{1}").replace(b, a).replace('\u{1}', b);
+        dir.file(&format!("{table}.csv"), text)
+    })
+}
+
+/// Row by row, with the names of the columns: the cells may be replaced.
+fn rows(dir: Scratch, table: &str, change: impl Fn(usize, &[String], &mut Vec<String>)) -> Scratch {
+    let path = format!("{table}.csv");
+    let text = dir.read(&path);
+    let mut header: Vec<String> = Vec::new();
+    let mut row = 0;
+    let mut lines = Vec::new();
+    for line in text.lines() {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if header.is_empty() && !line.starts_with('#') {
+            header.clone_from(&cells);
+        } else if !line.starts_with('#') {
+            change(row, &header, &mut cells);
+            row += 1;
+        }
+        lines.push(cells.join(","));
+    }
+    dir.file(&path, lines.join("\n") + "\n")
+}
+
+/// `to` becomes `to + factor · from`.
+fn coupled(dir: Scratch, tables: &[String], to: &str, from: &str, factor: f64) -> Scratch {
+    tables.iter().fold(dir, |dir, table| {
+        rows(dir, table, |_, header, cells| {
+            let at = |name: &str| header.iter().position(|h| h == name).expect("a column");
+            let value = |k: usize| cells[k].parse::<f64>().expect("a number");
+            let sum = value(at(to)) + factor * value(at(from));
+            cells[at(to)] = sum.to_string();
+        })
+    })
+}
+
+fn findings(dir: &Scratch) -> Vec<Value> {
+    let checked = dir.calib(["check", "arm.yaml", "--json"]);
+    checked.json()["findings"]
+        .as_array()
+        .expect("a list")
+        .clone()
+}
+
+fn errors(found: &[Value]) -> Vec<&Value> {
+    found.iter().filter(|f| f["severity"] == "error").collect()
+}
+
+/// The only error is `id`, about `about` and with these recordings; no row is blamed.
+#[track_caller]
+fn named(dir: &Scratch, id: &str, about: &str, recordings: &[String]) -> Value {
+    let found = findings(dir);
+    let wrong = errors(&found);
+    assert_eq!(wrong.len(), 1, "{found:#?}");
+    assert_eq!(wrong[0]["id"], id, "{found:#?}");
+    assert_eq!(wrong[0]["about"]["name"], about, "{found:#?}");
+    assert_eq!(
+        wrong[0]["about"]["recordings"],
+        serde_json::json!(recordings),
+        "{found:#?}"
+    );
+    for finding in &found {
+        assert_eq!(finding["rows"], serde_json::json!([]), "{found:#?}");
+    }
+    wrong[0].clone()
+}
+
+#[test]
+fn correct_data_are_given_no_error() {
+    let designs = [
+        (Design::Random(40), FOUR),
+        (Design::Random(6), FOUR),
+        (Design::Random(6), TWO),
+        (Design::Random(8), FOUR),
+        (Design::Random(8), FOUR),
+        (Design::Random(10), FOUR),
+        (Design::Random(10), ONE),
+        (Design::Sweeps, ONE),
+        (Design::Sweeps, TWO),
+        (Design::Sweeps, TWO),
+        (Design::Sweeps, FOUR),
+        (Design::Sweeps, FOUR),
+    ];
+    for (k, (design, markers)) in designs.into_iter().enumerate() {
+        let setting = Setting {
+            validation: true,
+            ..Setting::new(design, markers, 30 + k as u64)
+        };
+        let found = findings(&setting.folder());
+        let loud: Vec<_> = found.iter().filter(|f| f["severity"] != "info").collect();
+        assert!(loud.is_empty(), "{k}: {loud:#?}");
+    }
+}
+
+#[test]
+fn the_sign_of_a_wrist_with_markers_near_its_axis() {
+    let setting = Setting {
+        mount: [55.0, 0.0, 0.0],
+        ..Setting::new(Design::Random(40), NEAR_THE_AXIS, 3)
+    };
+    let dir = column(setting.folder(), &setting.tables(), "wrist_roll_deg", |q| {
+        -q
+    });
+    let finding = named(&dir, "joint-sign", "wrist_roll", &setting.tables());
+    // The last two axes meet at a right angle: no data can tell the two.
+    let same = finding["facts"]["equivalent"].to_string();
+    assert!(
+        same.contains("offset(wrist_pitch, 180 deg)"),
+        "{finding:#?}"
+    );
+    let remedy = finding["remedy"].as_str().expect("text");
+    assert!(remedy.contains("<axis xyz="), "{remedy}");
+}
+
+#[test]
+fn a_wrong_sign_seen_by_one_marker() {
+    for (design, seed) in [(Design::Random(30), 4), (Design::Sweeps, 5)] {
+        let setting = Setting::new(design, ONE, seed);
+        let dir = column(setting.folder(), &setting.tables(), "elbow_deg", |q| -q);
+        named(&dir, "joint-sign", "elbow", &setting.tables());
+    }
+}
+
+#[test]
+fn exchanged_columns_in_one_joint_sweeps() {
+    for (markers, seed) in [(ONE, 6), (FOUR, 7)] {
+        let setting = Setting::new(Design::Sweeps, markers, seed);
+        let tables = setting.tables();
+        let dir = exchanged(setting.folder(), &tables, "elbow_deg", "wrist_pitch_deg");
+        let finding = named(&dir, "joint-order", "elbow", &tables);
+        assert_eq!(finding["facts"]["other"], "wrist_pitch");
+    }
+}
+
+#[test]
+fn a_joint_that_moves_with_another_one() {
+    for (factor, seed) in [(1.0, 8), (-1.0, 9)] {
+        let setting = Setting::new(Design::Random(40), FOUR, seed);
+        let tables = setting.tables();
+        // The column holds the sum, so the joint itself moves by the difference.
+        let dir = coupled(
+            setting.folder(),
+            &tables,
+            "wrist_pitch_deg",
+            "elbow_deg",
+            factor,
+        );
+        let finding = named(&dir, "joint-coupling", "wrist_pitch", &tables);
+        assert_eq!(finding["facts"]["other"], "elbow");
+        assert_eq!(finding["facts"]["factor"]["value"], -factor);
+        let remedy = finding["remedy"].as_str().expect("text");
+        assert!(
+            remedy.contains("wrist_pitch: {coupled_to: [elbow]}"),
+            "{remedy}"
+        );
+        // Declared, it is no mistake, and the fit finds it.
+        let declared = "solve:\n  joints: {wrist_pitch: {coupled_to: [elbow]}}\n";
+        let dir = dir.edit("arm.yaml", "solve:\n", declared);
+        let found = findings(&dir);
+        assert!(found.is_empty(), "{found:#?}");
+        let ran = dir.calib(["run", "arm.yaml", "--out", "out"]);
+        assert!(ran.code < 2, "{}", ran.stderr);
+        let rms = dir.json("out/report.json")["residuals"]["all"]["rms_m"].as_f64();
+        assert!(rms.is_some_and(|rms| rms < 1e-3), "{rms:?}");
+    }
+}
+
+#[test]
+fn a_joint_without_a_column() {
+    let setting = Setting::new(Design::Random(40), FOUR, 10);
+    let without = |dir: Scratch, joint: &str| {
+        rows(dir, "poses", |_, header, cells| {
+            let at = header.iter().position(|h| h == joint).expect("a column");
+            cells[at] = String::new();
+        })
+        .edit("poses.csv", joint, "note")
+    };
+    let dir = without(setting.folder(), "elbow_deg");
+    named(&dir, "joint-column-missing", "elbow", &setting.tables());
+    // A joint that stood still is a warning only: the tracker and the mounts take it up, or the profile says where it stood.
+    let setting = Setting::new(Design::Sweeps, FOUR, 11);
+    let tables = setting.tables();
+    let dir = tables
+        .iter()
+        .filter(|t| *t != "wrist_roll")
+        .fold(setting.folder(), |dir, table| {
+            dir.edit(&format!("{table}.csv"), "wrist_roll_deg", "note")
+        });
+    let found = findings(&dir);
+    let silent = found.iter().find(|f| f["id"] == "joint-column-missing");
+    let silent = silent.unwrap_or_else(|| panic!("{found:#?}"));
+    assert_eq!(silent["about"]["name"], "wrist_roll");
+    assert_eq!(
+        silent["about"]["recordings"].as_array().map(Vec::len),
+        Some(4)
+    );
+}
+
+#[test]
+fn millimeters_in_the_columns_of_meters_of_one_file() {
+    let setting = Setting {
+        validation: true,
+        ..Setting::new(Design::Sweeps, FOUR, 12)
+    };
+    let wrong = ["elbow".to_owned()];
+    let dir = wrong.iter().fold(setting.folder(), |dir, table| {
+        dir.cells(&format!("{table}.csv"), |_, column, cell| {
+            match cell.parse::<f64>() {
+                Ok(value) if column.ends_with("_m") => (1e3 * value).to_string(),
+                _ => cell.to_owned(),
+            }
+        })
+    });
+    let found = findings(&dir);
+    let wrong = errors(&found);
+    assert_eq!(wrong.len(), 1, "{found:#?}");
+    assert_eq!(wrong[0]["id"], "unit-mismatch");
+    assert_eq!(
+        wrong[0]["about"]["recordings"],
+        serde_json::json!(["elbow"])
+    );
+}
+
+#[test]
+fn what_is_wrong_in_the_validation_alone() {
+    let setting = Setting {
+        validation: true,
+        ..Setting::new(Design::Random(40), FOUR, 13)
+    };
+    let checks = ["checks".to_owned()];
+    let dir = exchanged(setting.folder(), &checks, "elbow_deg", "shoulder_deg");
+    let finding = named(&dir, "joint-order", "shoulder", &checks);
+    assert_eq!(finding["facts"]["other"], "elbow");
+    // The tracker was moved by 0.1 m before the validation.
+    let moved = setting
+        .folder()
+        .cells("checks.csv", |_, column, cell| match cell.parse::<f64>() {
+            Ok(value) if column.ends_with(".x_m") => (value + 0.1).to_string(),
+            _ => cell.to_owned(),
+        });
+    let found = findings(&moved);
+    let wrong = errors(&found);
+    assert_eq!(wrong.len(), 1, "{found:#?}");
+    assert_eq!(wrong[0]["id"], "tracker-moved", "{found:#?}");
+    assert_eq!(wrong[0]["about"]["recordings"], serde_json::json!(checks));
+}
+
+#[test]
+fn gross_outliers_do_not_stop_a_run() {
+    for (markers, share, seed) in [(FOUR, 10, 14), (FOUR, 5, 15), (ONE, 5, 16), (TWO, 10, 17)] {
+        let setting = Setting::new(Design::Random(60), markers, seed);
+        // Every so many samples, counted over rows and markers, one is 10 to 60 mm off.
+        let every = 100 / share;
+        let dir = rows(setting.folder(), "poses", |row, header, cells| {
+            for (m, at) in (0..header.len())
+                .filter(|&k| header[k].ends_with(".x_m"))
+                .enumerate()
+            {
+                let sample = row * markers.len() + m;
+                if (7 * sample + row) % every == 0 {
+                    let off = 0.01 + 0.05 * ((sample * 37 % 100) as f64 / 100.0);
+                    let value: f64 = cells[at].parse().expect("seen");
+                    cells[at] = (value + if sample % 2 == 0 { off } else { -off }).to_string();
+                }
+            }
+        });
+        let found = findings(&dir);
+        assert!(
+            errors(&found).is_empty(),
+            "{share} % of {}: {found:#?}",
+            markers.len()
+        );
+        let ran = dir.calib(["run", "arm.yaml", "--out", "out"]);
+        assert!(ran.code < 2, "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_lost_marker_of_a_nearly_collinear_triple_is_no_fault_of_the_row() {
+    const NEARLY_A_LINE: Markers = &[
+        [0.0, 0.0, 0.0],
+        [40.0, 1.0, 0.0],
+        [80.0, 0.0, 1.0],
+        [30.0, 50.0, 0.0],
+    ];
+    let setting = Setting::new(Design::Random(40), NEARLY_A_LINE, 18);
+    let dir = rows(setting.folder(), "poses", |row, header, cells| {
+        for (k, name) in header.iter().enumerate() {
+            if name.starts_with("m4.") && row % 8 == 3 {
+                cells[k] = String::new();
+            }
+        }
+    });
+    let found = findings(&dir);
+    assert!(found.is_empty(), "{found:#?}");
+}
