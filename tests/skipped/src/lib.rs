@@ -23,8 +23,6 @@ use std::time::{Duration, SystemTime};
 
 /// Why a test was skipped where `CALIB_REAL_DATA` is missing.
 pub const NO_REAL_DATA: &str = "no measurements of other laboratories (CALIB_REAL_DATA)";
-/// Why a test was skipped where `CALIB_GOLDEN` is missing.
-pub const NO_GOLDEN: &str = "no independent results (CALIB_GOLDEN)";
 /// Why a test was skipped where no browser is installed.
 pub const NO_BROWSER: &str = "no Chromium";
 
@@ -51,12 +49,12 @@ pub fn real_data(path: &str) -> Option<PathBuf> {
     find("CALIB_REAL_DATA", "data", path, NO_REAL_DATA)
 }
 
-/// A file or folder of independent results; `None`, counted as skipped, where it is not there.
-///
-/// They lie in the folder that `CALIB_GOLDEN` names, or in `../shared/golden` beside the workspace.
+/// A file of independent results: in the folder that `CALIB_GOLDEN` names, else in `tests/golden`.
 #[must_use]
-pub fn golden(path: &str) -> Option<PathBuf> {
-    find("CALIB_GOLDEN", "golden", path, NO_GOLDEN)
+pub fn golden(path: &str) -> PathBuf {
+    let own = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden");
+    let named = std::env::var_os("CALIB_GOLDEN").map(PathBuf::from);
+    named.unwrap_or_else(own).join(path)
 }
 
 fn find(variable: &str, beside: &str, path: &str, reason: &str) -> Option<PathBuf> {
