@@ -23,6 +23,7 @@ mod locate;
 mod profile;
 pub mod raw;
 mod schema;
+mod touched;
 mod units;
 
 pub use check::check;

@@ -1,11 +1,5 @@
 //! Touches: loops that close through a plane, a line, a point or a ball bar instead of through the tracker.
 //!
-//! The touched thing has a frame of its own with z along its normal or direction. With p the touching point in it,
-//!
-//! ```text
-//! plane p_z = 0     line p_x = p_y = 0     point p = 0     distance |p| = ℓ                 (1)
-//! ```
-//!
 //! Its place and the point are unknowns where the profile gives them a prior.
 
 use calib_core::{
@@ -113,20 +107,17 @@ pub fn add_contacts(formulation: &mut Formulation, inputs: &Inputs) {
     }
 }
 
-/// The directions of the touched thing that equation (1) can tell, where the profile frees them.
+/// The directions of the touched thing that contacts can tell, where the profile frees them.
 fn place_chart(contact: &Contact) -> Chart {
-    let (shift, turn) = (
-        contact.place_sigma.is_some(),
-        contact.place_sigma_rad.is_some(),
-    );
-    Chart::of(match contact.touched {
-        Touched::Plane => [turn, turn, false, false, false, shift],
-        Touched::Line => [turn, turn, false, shift, shift, false],
-        Touched::Point | Touched::Distance(_) => [false, false, false, shift, shift, shift],
-    })
+    let (turns, shifts) = contact.touched.seen();
+    let turns = turns.map(|seen| seen && contact.place_sigma_rad.is_some());
+    let shifts = shifts.map(|seen| seen && contact.place_sigma.is_some());
+    let [a, b, c] = turns;
+    let [x, y, z] = shifts;
+    Chart::of([a, b, c, x, y, z])
 }
 
-/// How far a touch misses, by equation (1): predicted − touched, tracker frame, m; `None` where the robot knows no
+/// How far a touch misses: predicted − touched, tracker frame, m; `None` where the robot knows no
 /// such contact.
 #[must_use]
 pub fn miss(
@@ -146,12 +137,6 @@ pub fn miss(
     let tip = robot.contact_points.get(&contact.point)?;
     let touching = robot.tracker_from_root * root_from_link[carrier.index()] * tip;
     let p = tracker_from_place.inverse_transform_point(&touching).coords;
-    let off = match contact.touched {
-        Touched::Plane => Vector3::new(0.0, 0.0, p.z),
-        Touched::Line => Vector3::new(p.x, p.y, 0.0),
-        Touched::Point => p,
-        Touched::Distance(distance) if p.norm() > 0.0 => p * (1.0 - distance / p.norm()),
-        Touched::Distance(distance) => Vector3::new(0.0, 0.0, -distance),
-    };
+    let off = contact.touched.off(&p);
     Some(tracker_from_place.rotation * off)
 }

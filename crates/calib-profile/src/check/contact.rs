@@ -3,8 +3,9 @@
 use nalgebra::{Translation3, UnitQuaternion};
 
 use super::*;
-use crate::profile::{Contact, ContactBase, Tip, Touched};
-use crate::raw::{RawContact, RawTouched};
+use crate::profile::{Contact, ContactBase, Tip};
+use crate::raw::RawContact;
+use crate::touched::{RawTouched, Touched};
 
 impl Checker<'_> {
     pub(super) fn contacts(&mut self) -> BTreeMap<String, Contact> {
@@ -84,8 +85,8 @@ impl Checker<'_> {
             }
         }
         let (base_from_place, touched) = self.touched(name, &raw.touches);
-        if raw.place_sigma_deg.is_some() && matches!(touched, Touched::Point | Touched::Distance(_))
-        {
+        let (turns, _) = touched.seen();
+        if raw.place_sigma_deg.is_some() && turns == [false; 3] {
             self.problem(
                 &["contacts", name, "place_sigma_deg"],
                 "a point has no orientation",
@@ -106,38 +107,24 @@ impl Checker<'_> {
 
     /// What is touched, and the pose of its frame in what carries it.
     fn touched(&mut self, name: &str, touches: &RawTouched) -> (Isometry3<f64>, Touched) {
-        let (at, along, touched) = match *touches {
-            RawTouched::Plane { through_mm, normal } => (
-                through_mm,
-                self.direction_of(name, "normal", normal),
-                Touched::Plane,
-            ),
-            RawTouched::Line {
-                through_mm,
-                direction,
-            } => (
-                through_mm,
-                self.direction_of(name, "direction", direction),
-                Touched::Line,
-            ),
-            RawTouched::Point { at_mm } => (at_mm, UnitQuaternion::identity(), Touched::Point),
-            RawTouched::Distance {
-                from_mm,
-                distance_mm,
-            } => {
-                if !(distance_mm > 0.0 || self.named_already(distance_mm)) {
-                    self.problem(
-                        &["contacts", name, "touches"],
-                        format!("{distance_mm} is not a distance"),
-                        "give a number above 0; for distance 0 use `point`",
-                    );
-                }
-                let touched = Touched::Distance(distance_mm * MM);
-                (from_mm, UnitQuaternion::identity(), touched)
-            }
-        };
-        let place = Translation3::from(Vector3::from(at) * MM);
-        (Isometry3::from_parts(place, along), touched)
+        let parts = touches.parts();
+        if let Some(length) = parts.length
+            && !(length.mm > 0.0 || self.named_already(length.mm))
+        {
+            let (what, at_zero) = (length.what, length.at_zero);
+            self.problem(
+                &["contacts", name, "touches"],
+                format!("{} is not a {what}", length.mm),
+                format!("give a number above 0; for {what} 0 use `{at_zero}`"),
+            );
+        }
+        let along = parts
+            .along
+            .map_or_else(UnitQuaternion::identity, |(key, v)| {
+                self.direction_of(name, key, v)
+            });
+        let place = Translation3::from(Vector3::from(parts.at_mm) * MM);
+        (Isometry3::from_parts(place, along), parts.touched)
     }
 
     /// Rotation whose z axis is along `v`.

@@ -4,6 +4,8 @@ use calib_urdf::LinkId;
 use nalgebra::Isometry3;
 use nalgebra::Point3;
 
+use crate::touched::Touched;
+
 /// A point of a link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tip {
@@ -43,17 +45,4 @@ pub enum ContactBase {
     Tracker,
     /// A link.
     Link(LinkId),
-}
-
-/// What is touched, in its own frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Touched {
-    /// The plane z = 0.
-    Plane,
-    /// The line along z.
-    Line,
-    /// The origin.
-    Point,
-    /// The sphere of this radius about the origin, m.
-    Distance(f64),
 }

@@ -7,8 +7,9 @@ mod recording;
 mod simulate;
 mod solve;
 
+pub use crate::touched::Touched;
 pub use body::{Body, BodyKind};
-pub use contact::{Contact, ContactBase, Tip, Touched};
+pub use contact::{Contact, ContactBase, Tip};
 pub use origin::{LinkTransform, Loop, Orientation, Origin, PointChoice, SweptAxis};
 pub use recording::{RecordingSpec, RobotLog, Timing};
 pub use simulate::{Error3, Protocol, SimErrors, SimMount, SimNoise, Simulation, Steps};

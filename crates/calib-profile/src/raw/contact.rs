@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::touched::RawTouched;
+
 /// A point of a link, e.g. the end of a stylus or the center of a ball.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -38,36 +40,4 @@ pub struct RawContact {
     pub place_sigma_deg: Option<f64>,
     /// Standard deviation of one contact, mm.
     pub sigma_mm: f64,
-}
-
-/// What a point touches, in the frame of what it is fixed to.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum RawTouched {
-    /// A plane, e.g. a table.
-    Plane {
-        /// Any point of the plane, mm.
-        through_mm: [f64; 3],
-        /// Its normal; any length.
-        normal: [f64; 3],
-    },
-    /// A line, e.g. an edge or a taut wire.
-    Line {
-        /// Any point of the line, mm.
-        through_mm: [f64; 3],
-        /// Its direction; any length.
-        direction: [f64; 3],
-    },
-    /// A point, e.g. a cone or a socket.
-    Point {
-        /// Where it is, mm.
-        at_mm: [f64; 3],
-    },
-    /// A point at a known distance, e.g. the far ball of a ball bar.
-    Distance {
-        /// Where the far point is, mm.
-        from_mm: [f64; 3],
-        /// How far away, mm.
-        distance_mm: f64,
-    },
 }

@@ -11,8 +11,9 @@ mod recording;
 mod simulate;
 mod solve;
 
+pub use crate::touched::RawTouched;
 pub use body::{RawBody, RawPose};
-pub use contact::{RawContact, RawTip, RawTouched};
+pub use contact::{RawContact, RawTip};
 pub(crate) use free::{ANGLE, POSITION, PRIOR_KEYS};
 pub use free::{RawFree, RawJointFree, RawPrior};
 pub use origin::{RawLoop, RawOrientation, RawOrigin, RawPoint, RawTransform};
