@@ -41,6 +41,7 @@
 //! | how well does it predict | [`Solution::leave_one_out`], [`Solution::held_out`] with [`Problem::held_out`], [`k_fold`] |
 //! | against what | [`Problem::baseline`]: nominal, registration only |
 //! | which physics is missing | [`Solution::goodness_of_fit`], with [`Problem::candidate`] effects |
+//! | did something move meanwhile | [`Solution::changes`] |
 //! | which model | [`compare()`] |
 //! | can I trust the intervals if the noise model is wrong | [`sandwich`] |
 //! | how well does a loop close | [`ClosureStatistics`], [`Solution::pose_at_sample`] |
@@ -131,6 +132,7 @@ mod solve;
 
 pub use nalgebra;
 
+pub use analysis::change::{Change, ChangeScan, ChangeSettings, Moved};
 pub use analysis::closure::{ClosureStatistics, Spread};
 pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};
 pub use analysis::estimate::{Settings, solve};

@@ -23,6 +23,7 @@ use crate::output::view::{Shown, view};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
 use crate::prepare::robot::load_robot;
+use crate::verify::changes::changes;
 use crate::verify::closure::close_loops;
 use crate::verify::held_out;
 use crate::verify::known::known_numbers;
@@ -106,8 +107,11 @@ pub fn run_on(
         Method::Ml => likelihood(&mut inputs, &mut checked, progress)?,
     };
     progress("verify");
-    let tracks = &checked.tracks;
     let (robot, fit) = (&solved.robot, solved.fit.as_ref());
+    checked
+        .findings
+        .extend(fit.and_then(|fit| changes(&inputs, fit)));
+    let tracks = &checked.tracks;
     let loops = close_loops(&inputs, tracks, &solved.body_from_origin(), &solved.fk);
     let robots = held_out::Robots {
         nominal: Some(&nominal),

@@ -5,6 +5,7 @@
 //! the two.
 
 mod bodies;
+mod changes;
 mod files;
 mod joints;
 mod markers;
@@ -13,6 +14,7 @@ mod motion;
 mod results;
 
 pub use bodies::*;
+pub use changes::*;
 pub use files::*;
 pub use joints::*;
 pub use markers::*;
@@ -88,6 +90,7 @@ impl Id {
     pub fn all() -> Vec<Id> {
         let topics = [
             bodies::ENTRIES,
+            changes::ENTRIES,
             files::ENTRIES,
             joints::ENTRIES,
             markers::ENTRIES,

@@ -1,6 +1,7 @@
 //! What a solution is worth: held-out errors, loops, residuals, accuracy over the workspace.
 
 pub(crate) mod accuracy;
+pub mod changes;
 pub mod closure;
 pub mod deviations;
 pub mod held_out;

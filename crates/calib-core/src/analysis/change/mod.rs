@@ -1,0 +1,209 @@
+//! Did something move while the data were taken? Score tests of a step, a drift and a scale against the fitted model.
+//!
+//! Candidates: everything seen at one frame (a body that slipped), the measuring frame (a tracker that was bumped), one
+//! joint (an encoder that slipped). B holds the columns ∂e/∂c of a candidate for the samples of a range S and 0 elsewhere:
+//!
+//! ```text
+//! U = Σ_{s∈S} B̃ᵀ w,   E = Σ_{s∈S} Aᵀ B̃,   I = Σ_{s∈S} B̃ᵀB̃ − Eᵀ C E + P,   B̃ = L⁻¹B           (1)
+//! Δ = Uᵀ I⁻¹ U,   T = N ln(F / (F − Δ)),   ĉ = −I⁻¹ U,   cov ĉ = I⁻¹                              (2)
+//! ```
+//!
+//! F is the minimum of the cost, N the count of rows, w, A, L and C those of the fit, P a wide prior that keeps jumps
+//! finite where nothing shows them. T, unlike Δ, does not depend on the stated level of the noise. Sums over ranges
+//! are differences of cumulative sums: the cost is linear in the samples. Ranges are `[k, end)` in the order of the samples, and inside
+//! every recording its beginning, its end, and all of it, because the order in which recordings were made is not known.
+//!
+//! How large T becomes by chance over all ranges is simulated from the model. Candidates have up to six columns, so
+//! every T counts from its own quantile of that simulation; the largest excess is compared with the quantile of the
+//! largest excess. What it does **not** protect against: physics that is missing in the model and follows the order of the samples, as
+//! in sweeps of one joint after another; [`Solution::goodness_of_fit`] says whether it explains more.
+
+mod chance;
+mod columns;
+mod sums;
+
+use serde::{Deserialize, Serialize};
+
+use crate::analysis::solution::Solution;
+use crate::graph::ids::{EdgeId, FrameId};
+use chance::Chance;
+use columns::{Candidates, Pattern};
+use sums::{Design, Found, LEAST, SIMULATED};
+
+/// What may have moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Moved {
+    /// Everything that is measured at this frame, by a step; jumps `[ω; v]` in this frame.
+    Body(FrameId),
+    /// The measuring frame, by a step; jumps `[ω; v]` in its axes about the middle of what it sees.
+    Reference(FrameId),
+    /// The zero of a joint, by a step, rad or m.
+    Joint(EdgeId),
+    /// The measuring frame, evenly over the samples; `[ω; v]` from first to last.
+    Drift(FrameId),
+    /// The lengths that the measuring frame reports, throughout; a ratio.
+    Scale(FrameId),
+}
+
+/// How a scan is made.
+///
+/// Non-exhaustive: start from [`ChangeSettings::default`] and change what differs.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct ChangeSettings {
+    /// First sample of every recording but the first.
+    pub borders: Vec<usize>,
+    /// Simulated data sets for the threshold.
+    pub draws: usize,
+    /// Chance that clean data exceed the threshold anywhere.
+    pub level: f64,
+    /// Seed of the simulation.
+    pub seed: u64,
+}
+
+impl Default for ChangeSettings {
+    fn default() -> Self {
+        Self {
+            borders: Vec::new(),
+            // 200: the threshold then varies by about 1 in T.
+            draws: 200,
+            level: 0.01,
+            seed: 1,
+        }
+    }
+}
+
+/// The best range of one candidate.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Change {
+    /// What may have moved.
+    pub moved: Moved,
+    /// First sample of the changed range.
+    pub first: usize,
+    /// First sample after the changed range.
+    pub end: usize,
+    /// T of equation (2).
+    pub score: f64,
+    /// T less its quantile under the model: what candidates are compared by.
+    pub excess: f64,
+    /// Share of the cost that the change would remove.
+    pub explains: f64,
+    /// ĉ of equation (2).
+    pub jump: Vec<f64>,
+    /// Its standard deviations, for noise as found.
+    pub sigma: Vec<f64>,
+}
+
+/// The outcome of a scan.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct ChangeScan {
+    /// The best range of every candidate, most significant first.
+    pub changes: Vec<Change>,
+    /// Excess that clean data do not reach but with the stated chance.
+    pub threshold: f64,
+}
+
+impl ChangeScan {
+    /// The most significant change, where chance does not explain it.
+    #[must_use]
+    pub fn significant(&self) -> Option<&Change> {
+        self.changes.first().filter(|c| c.excess > self.threshold)
+    }
+
+    /// Changes of something else that explain the data nearly as well as the most significant one.
+    #[must_use]
+    pub fn rivals(&self) -> Vec<&Change> {
+        /// Twice the log-likelihood ratio of 20 : 1.
+        const DISTINCT: f64 = 6.0;
+        let Some(best) = self.significant() else {
+            return Vec::new();
+        };
+        let others = self.changes.iter().skip(1);
+        others
+            .filter(|c| c.excess > best.excess - DISTINCT && c.excess > self.threshold)
+            .collect()
+    }
+}
+
+/// Ranges begin and end at so many samples at most; the best range is then refined to the sample.
+const EDGES: usize = 384;
+
+impl Solution {
+    /// Scans the samples of the fit for changes. `None` where the model cannot be evaluated or where fewer than
+    /// six samples were used.
+    #[must_use]
+    pub fn changes(&self, settings: &ChangeSettings) -> Option<ChangeScan> {
+        let candidates = Candidates::new(self);
+        let used = candidates.samples(self);
+        if used.len() < 2 * LEAST || candidates.list.is_empty() {
+            return None;
+        }
+        let thin = every(&used, used.len().div_ceil(SIMULATED));
+        let borders = &settings.borders;
+        let simulated = Design::new(self, &candidates, &thin, &thin, borders)?;
+        let chance = Chance::simulate(&simulated, settings);
+        let stride = used.len().div_ceil(EDGES);
+        let design = Design::new(self, &candidates, &used, &every(&used, stride), borders)?;
+        let mut changes: Vec<(usize, Change)> = Vec::new();
+        for (k, candidate) in candidates.list.iter().enumerate() {
+            if let Some(found) = design.best(k) {
+                let range = design.samples_of(found.range);
+                changes.push((
+                    k,
+                    change(candidate.moved, &found, range, &design, chance.quantiles[k]),
+                ));
+            }
+        }
+        changes.sort_by(|(_, a), (_, b)| b.excess.total_cmp(&a.excess).then(a.moved.cmp(&b.moved)));
+        if stride > 1
+            && let Some((k, first)) = changes.first_mut()
+            && candidates.list[*k].pattern == Pattern::Step
+            && let Some(coarse) = design.best(*k)
+        {
+            let edges = design.finer(coarse.range, &used);
+            let fine = Design::new(self, &candidates, &used, &edges, borders)?;
+            if let Some(found) = fine.best_near(*k, &design, coarse.range) {
+                let range = fine.samples_of(found.range);
+                *first = change(first.moved, &found, range, &fine, chance.quantiles[*k]);
+            }
+        }
+        Some(ChangeScan {
+            changes: changes.into_iter().map(|(_, c)| c).collect(),
+            threshold: chance.threshold,
+        })
+    }
+}
+
+fn every(samples: &[usize], stride: usize) -> Vec<usize> {
+    samples.iter().step_by(stride).copied().collect()
+}
+
+fn change(
+    moved: Moved,
+    found: &Found,
+    (first, end): (usize, usize),
+    design: &Design,
+    quantile: f64,
+) -> Change {
+    // Noise as found: s² = (F − Δ) / N
+    let s2 = (design.cost - found.gain) / design.rows;
+    let score = design.score(found.gain);
+    Change {
+        moved,
+        first,
+        end,
+        score,
+        excess: score - quantile,
+        explains: found.gain / design.cost,
+        jump: found.jump.clone(),
+        sigma: found
+            .variance
+            .iter()
+            .map(|v| (v * s2.max(0.0)).sqrt())
+            .collect(),
+    }
+}

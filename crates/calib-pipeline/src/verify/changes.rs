@@ -1,0 +1,190 @@
+//! Did a body, the tracker or a joint's zero move while the data were recorded?
+
+use calib_core::{Change, ChangeSettings, EdgeId, FrameId, Moved, Physics, ScoreTest};
+use calib_finding::{About, Fact, Finding, Severity, Subject, catalog};
+use calib_urdf::Joint;
+
+use crate::formulate::formulation::MlFit;
+use crate::prepare::inputs::Inputs;
+
+/// At most one finding: the change that the data show best. Others appear once it has been dealt with.
+#[must_use]
+pub fn changes(inputs: &Inputs, fit: &MlFit) -> Option<Finding> {
+    let mut settings = ChangeSettings::default();
+    settings.borders = borders(fit);
+    let scan = fit.solution.changes(&settings)?;
+    let change = scan.significant()?;
+    let names = Names { inputs, fit };
+    let finding = names.described(change)?;
+    let rivals: Vec<String> = scan
+        .rivals()
+        .iter()
+        .filter_map(|c| names.of(c.moved))
+        .collect();
+    let physics = physics(fit, change);
+    let size = finding.facts.get("distance").and_then(Fact::value);
+    let limits = &inputs.robot.profile.solve.limits;
+    let harmful = match (size, limits.held_out_max.or(limits.held_out_rms)) {
+        (Some(size), Some(limit)) => size > limit,
+        _ => false,
+    };
+    let finding = finding
+        .with_some("rivals", (!rivals.is_empty()).then(|| Fact::names(rivals)))
+        .with_some("physics", physics.map(Fact::name));
+    Some(if harmful {
+        finding.with_severity(Severity::Error)
+    } else {
+        finding
+    })
+}
+
+/// First sample of every recording but the first.
+fn borders(fit: &MlFit) -> Vec<usize> {
+    let samples = &fit.formulation.samples;
+    let starts = (1..samples.len()).filter(|s| samples[*s].0 != samples[s - 1].0);
+    starts.collect()
+}
+
+/// The missing effect that explains more than a change does, where there is one.
+fn physics(fit: &MlFit, change: &Change) -> Option<String> {
+    let goodness = fit.solution.goodness_of_fit()?;
+    // The drift of the tracker is tried by the scan itself.
+    let other = |t: &&ScoreTest| t.physics != Physics::Drift && t.explains > change.explains;
+    goodness.missing.iter().find(other).map(|t| t.name.clone())
+}
+
+/// What the parts of the problem are called.
+struct Names<'a> {
+    inputs: &'a Inputs,
+    fit: &'a MlFit,
+}
+
+impl Names<'_> {
+    /// The body of a frame; markers without a frame of their own are points of their link.
+    fn body(&self, frame: FrameId) -> Option<&String> {
+        let formulation = &self.fit.formulation;
+        let own = formulation.bodies.iter().find(|(_, f)| **f == frame);
+        let on_link = || {
+            let bodies = &self.inputs.robot.profile.bodies;
+            let mut on = bodies
+                .iter()
+                .filter(|(_, b)| formulation.links[b.link.index()] == Some(frame));
+            on.next().map(|(name, _)| name)
+        };
+        own.map(|(name, _)| name).or_else(on_link)
+    }
+
+    fn joint(&self, edge: EdgeId) -> Option<&Joint> {
+        let joints = &self.fit.formulation.joints;
+        let place = joints.iter().position(|j| *j == Some(edge))?;
+        self.inputs.robot.model.joints().get(place)
+    }
+
+    /// What a rival explanation is called.
+    fn of(&self, moved: Moved) -> Option<String> {
+        match moved {
+            Moved::Body(frame) => self.body(frame).cloned(),
+            Moved::Joint(edge) => self.joint(edge).map(|joint| joint.name.clone()),
+            Moved::Reference(_) | Moved::Drift(_) => {
+                Some(self.inputs.robot.profile.tracker.frame.clone())
+            }
+            _ => None,
+        }
+    }
+
+    fn described(&self, change: &Change) -> Option<Finding> {
+        let id = catalog::CHANGED_WHILE_RECORDING;
+        let finding = match change.moved {
+            Moved::Body(frame) => {
+                let name = self.body(frame)?;
+                Finding::of_kind(id, "body", Subject::body(name.clone()))
+                    .with("body", Fact::name(name.clone()))
+            }
+            Moved::Reference(_) => Finding::of_kind(id, "tracker", About::Tracker),
+            Moved::Drift(_) => Finding::of_kind(id, "drift", About::Tracker),
+            Moved::Scale(_) => Finding::of_kind(id, "scale", About::Tracker)
+                .with("scale", Fact::ratio(change.jump[0]))
+                .with("sigma_scale", Fact::ratio(change.sigma[0])),
+            Moved::Joint(edge) => {
+                let joint = self.joint(edge)?;
+                let (kind, size, sigma) = if joint.kind.turns() {
+                    (
+                        "joint",
+                        ("angle", Fact::radians(change.jump[0].abs())),
+                        ("sigma_angle", Fact::radians(change.sigma[0])),
+                    )
+                } else {
+                    (
+                        "axis",
+                        ("distance", Fact::meters(change.jump[0].abs())),
+                        ("sigma", Fact::meters(change.sigma[0])),
+                    )
+                };
+                Finding::of_kind(id, kind, Subject::joint(joint.name.clone()))
+                    .with(size.0, size.1)
+                    .with(sigma.0, sigma.1)
+            }
+            _ => return None,
+        };
+        let finding = match change.jump.len() {
+            6 => {
+                let (angle, _) = size(&change.jump[..3], &change.sigma[..3]);
+                let (distance, sigma) = size(&change.jump[3..], &change.sigma[3..]);
+                finding
+                    .with("angle", Fact::radians(angle))
+                    .with("distance", Fact::meters(distance))
+                    .with("sigma", Fact::meters(sigma))
+            }
+            _ => finding,
+        };
+        Some(match change.moved {
+            Moved::Drift(_) | Moved::Scale(_) => finding,
+            _ => self.placed(finding, change),
+        })
+    }
+
+    /// The recording, and the rows on either side of the change.
+    fn placed(&self, finding: Finding, change: &Change) -> Finding {
+        let samples = &self.fit.formulation.samples;
+        // A range that begins where its recording begins ends with the change.
+        let starts = |s: usize| s == 0 || samples[s].0 != samples[s - 1].0;
+        let at = if starts(change.first) && change.end < samples.len() && !starts(change.end) {
+            change.end
+        } else {
+            change.first
+        };
+        let row = |s: usize| {
+            let (recording, row) = &samples[s];
+            (
+                recording,
+                self.inputs.recordings[recording].poses.rows[*row],
+            )
+        };
+        let (recording, after) = row(at);
+        let before = row(at.max(1) - 1);
+        let shown = |(name, row): (&String, u64)| {
+            if name == recording {
+                row.to_string()
+            } else {
+                format!("{row} of `{name}`")
+            }
+        };
+        finding
+            .with("before", Fact::name(shown(before)))
+            .with("row", Fact::name(after.to_string()))
+            .with("recording", Fact::name(recording.clone()))
+            .in_recording(recording.clone())
+            .at_rows([after])
+    }
+}
+
+/// Length of a jump, and its σ along it.
+fn size(jump: &[f64], sigma: &[f64]) -> (f64, f64) {
+    let length = jump.iter().map(|x| x * x).sum::<f64>().sqrt();
+    // σ² = Σ (j_i/|j|)² σ_i²
+    let along = jump
+        .iter()
+        .zip(sigma)
+        .map(|(j, s)| (j / length.max(f64::MIN_POSITIVE) * s).powi(2));
+    (length, along.sum::<f64>().sqrt())
+}
