@@ -15,8 +15,8 @@
 //! An unknown plane or line is a frame with an unknown edge: give the measurement that frame as `from`. A touched
 //! point is a marker of known place.
 //!
-//! To add a kind: write its file (the fields, and `Kind` for them), name it in [`MeasurementKind`] and in
-//! the one `match` below. Layout, solver, robust weights, validation and input check follow.
+//! To add a kind: write its file (the fields, `Kind` for them, and the test of its derivatives), name it in
+//! [`MeasurementKind`] and in the one `match` below. Layout, solver, robust weights, validation and input check follow.
 
 use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId, GroupId};
@@ -141,4 +141,66 @@ fn isotropic(
 
 fn norm(e: &[f64]) -> f64 {
     e.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use nalgebra::{Isometry3, Vector3, Vector6};
+
+    use super::{At, Kind, Rows};
+    use crate::graph::ids::PointId;
+
+    /// Compares the derivatives of a kind with central differences, at a few poses and points.
+    pub(crate) fn assert_jacobian(kind: &dyn Kind) {
+        /// Step of the differences, rad and m: its cube is far below the tolerance, rounding over it too.
+        const STEP: f64 = 1e-6;
+        const TOLERANCE: f64 = 1e-8;
+        let residual = |x: &Isometry3<f64>, p: &Vector3<f64>| -> Rows {
+            let r = x.rotation.to_rotation_matrix();
+            let at = At {
+                r: r.matrix(),
+                t: &x.translation.vector,
+                point: &|_: PointId| *p,
+            };
+            kind.residual(0, &at)
+        };
+        for k in 0..5 {
+            let k = f64::from(k);
+            let x = Isometry3::new(
+                Vector3::new(0.4 + 0.1 * k, -0.3, 0.2 * k),
+                Vector3::new(0.3 * k, 0.7 - k, 0.2),
+            );
+            let p = Vector3::new(0.05 * k, 0.1, -0.07);
+            let rows = residual(&x, &p);
+            let slope =
+                |f: &dyn Fn(f64) -> Rows, i: usize| (f(STEP).e[i] - f(-STEP).e[i]) / (2.0 * STEP);
+            for c in 0..6 {
+                let moved = |h: f64| {
+                    let mut xi = Vector6::zeros();
+                    xi[c] = h;
+                    let (omega, v) = (xi.fixed_rows::<3>(0), xi.fixed_rows::<3>(3));
+                    // x · exp(ξ) to first order in one coordinate
+                    residual(&(x * Isometry3::new(v.into(), omega.into())), &p)
+                };
+                for i in 0..kind.rows() {
+                    assert!(
+                        (rows.m[i][c] - slope(&moved, i)).abs() < TOLERANCE,
+                        "row {i}, twist {c}"
+                    );
+                }
+            }
+            let Some((_, by_point)) = rows.point else {
+                continue;
+            };
+            for c in 0..3 {
+                let moved = |h: f64| residual(&x, &(p + Vector3::ith(c, h)));
+                for i in 0..kind.rows() {
+                    assert!(
+                        (by_point[i][c] - slope(&moved, i)).abs() < TOLERANCE,
+                        "row {i}, point {c}"
+                    );
+                }
+            }
+        }
+    }
 }
