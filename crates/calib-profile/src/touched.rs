@@ -3,7 +3,7 @@
 //! The touched thing has a frame of its own with z along its normal or direction. With p the touching point in it,
 //!
 //! ```text
-//! plane p_z = 0     line p_x = p_y = 0     point p = 0     distance |p| = ℓ                 (1)
+//! plane p_z = 0     line p_x = p_y = 0     point p = 0     distance |p| = ℓ     cylinder √(p_x² + p_y²) = r     (1)
 //! ```
 
 use nalgebra::Vector3;
@@ -42,6 +42,15 @@ pub enum RawTouched {
         /// How far away, mm.
         distance_mm: f64,
     },
+    /// The mantle of a cylinder, e.g. a pin, a shaft or a bore.
+    Cylinder {
+        /// Any point of its axis, mm.
+        through_mm: [f64; 3],
+        /// Direction of its axis; any length.
+        direction: [f64; 3],
+        /// Distance of the contact point from the axis, mm: the radius, plus that of a ball which touches from outside.
+        radius_mm: f64,
+    },
 }
 
 /// What is touched, in its own frame.
@@ -55,6 +64,8 @@ pub enum Touched {
     Point,
     /// The sphere of this radius about the origin, m.
     Distance(f64),
+    /// The cylinder of this radius about z, m.
+    Cylinder(f64),
 }
 
 /// What a written kind of contact consists of.
@@ -103,6 +114,22 @@ impl RawTouched {
                 }),
                 ..plain(from_mm, None, Touched::Distance(distance_mm * MM))
             },
+            Self::Cylinder {
+                through_mm,
+                direction,
+                radius_mm,
+            } => Parts {
+                length: Some(Length {
+                    mm: radius_mm,
+                    what: "radius",
+                    at_zero: "line",
+                }),
+                ..plain(
+                    through_mm,
+                    Some(("direction", direction)),
+                    Touched::Cylinder(radius_mm * MM),
+                )
+            },
         }
     }
 }
@@ -113,7 +140,7 @@ impl Touched {
     pub fn seen(self) -> ([bool; 3], [bool; 3]) {
         match self {
             Self::Plane => ([true, true, false], [false, false, true]),
-            Self::Line => ([true, true, false], [true, true, false]),
+            Self::Line | Self::Cylinder(_) => ([true, true, false], [true, true, false]),
             Self::Point | Self::Distance(_) => ([false; 3], [true; 3]),
         }
     }
@@ -127,6 +154,11 @@ impl Touched {
             Self::Point => *p,
             Self::Distance(distance) if p.norm() > 0.0 => p * (1.0 - distance / p.norm()),
             Self::Distance(distance) => Vector3::new(0.0, 0.0, -distance),
+            Self::Cylinder(radius) => {
+                let across = Vector3::new(p.x, p.y, 0.0);
+                let unit = across.try_normalize(0.0).unwrap_or_else(Vector3::x);
+                across - unit * radius
+            }
         }
     }
 }

@@ -95,6 +95,14 @@ pub fn add_contacts(formulation: &mut Formulation, inputs: &Inputs) {
                 noise,
                 observations: touches.into_iter().map(|s| (s, distance)).collect(),
             }),
+            Touched::Cylinder(radius) => MeasurementKind::Cylinder(measurement::Cylinder {
+                point,
+                through: Point3::origin(),
+                direction: Vector3::z_axis(),
+                radius,
+                noise,
+                samples: touches,
+            }),
         };
         problem.add_measurement(Measurement {
             name: name.clone(),

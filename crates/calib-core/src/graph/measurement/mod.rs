@@ -10,6 +10,7 @@
 //! line        e = E(d)ᵀ (R p + t − o)                                  2, m                 (5)
 //! distance    e = |R p + t − y| − ℓ                                    1, m                 (6)
 //! loop        (2) with T the closed path and T_z = identity            6                    (7)
+//! cylinder    e = |E(d)ᵀ (R p + t − o)| − r                            1, m                 (8)
 //! ```
 //!
 //! An unknown plane or line is a frame with an unknown edge: give the measurement that frame as `from`. A touched
@@ -22,6 +23,7 @@ use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId, GroupId};
 
 mod closed;
+mod cylinder;
 mod directions;
 mod distance;
 mod input;
@@ -32,6 +34,7 @@ mod poses;
 mod rows;
 
 pub use closed::Loop;
+pub use cylinder::Cylinder;
 pub use directions::{DirectionObservation, Directions};
 pub use distance::Distance;
 pub(crate) use input::Input;
@@ -57,7 +60,7 @@ pub struct Measurement {
     pub kind: MeasurementKind,
 }
 
-/// Equations (1) to (7).
+/// Equations (1) to (8).
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum MeasurementKind {
@@ -75,6 +78,8 @@ pub enum MeasurementKind {
     Distance(Distance),
     /// A closed path.
     Loop(Loop),
+    /// A point of `to` lies on a cylinder of `from`.
+    Cylinder(Cylinder),
 }
 
 /// What the rest of the crate asks of a kind of measurement.
@@ -124,6 +129,7 @@ impl MeasurementKind {
             Self::Line(kind) => kind,
             Self::Distance(kind) => kind,
             Self::Loop(kind) => kind,
+            Self::Cylinder(kind) => kind,
         }
     }
 }
