@@ -88,6 +88,9 @@ fn check_parameter(p: &Parameter) -> Result<(), Error> {
         positive(&format!("{} prior", p.name), sigma)?;
     }
     match p.bounds {
+        Some(_) if !cfg!(feature = "clarabel") => Err(Error::BoundsNotBuilt {
+            name: p.name.clone(),
+        }),
         Some((lower, upper)) if !(lower <= p.start && p.start <= upper) => {
             Err(Error::OutOfBounds {
                 name: p.name.clone(),

@@ -120,6 +120,12 @@ pub enum Error {
         /// Joint and effect.
         what: String,
     },
+    /// A parameter has bounds, and the crate was built without the solver for them.
+    #[error("parameter `{name}` has bounds: build calib-core with the feature `clarabel`")]
+    BoundsNotBuilt {
+        /// The parameter.
+        name: String,
+    },
     /// Two parameters have one name.
     #[error("two parameters are called `{name}`")]
     DuplicateName {

@@ -4,11 +4,6 @@
 //! min ½ δᵀ(H + λ S⁻²)δ + gᵀδ      s.t.   lower ≤ x + δ ≤ upper                              (1)
 //! ```
 
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{
-    DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus,
-};
-
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::model::layout::Model;
@@ -41,7 +36,7 @@ pub(crate) fn bounded_step(
     }
     let program = Program::new(system, curvature, natural, damping);
     let walls = walls(&room);
-    let Some((z, pressed)) = program.interior_point(&walls) else {
+    let Some((z, pressed)) = interior_point(&program, &walls) else {
         return false;
     };
     for c in 0..n {
@@ -119,50 +114,6 @@ impl Program {
         }
     }
 
-    /// z, and per coordinate the wall that is active; `None` when the solver fails.
-    fn interior_point(&self, walls: &[Wall]) -> Option<(Vec<f64>, Vec<Option<f64>>)> {
-        let n = self.linear.len();
-        // ±z_c ≤ ±wall/scale_c
-        let rows: Vec<Vec<f64>> = walls
-            .iter()
-            .map(|w| {
-                let mut row = vec![0.0; n];
-                row[w.column] = w.side;
-                row
-            })
-            .collect();
-        let b: Vec<f64> = walls
-            .iter()
-            .map(|w| w.side * w.at / self.scale[w.column])
-            .collect();
-        let triangle = CscMatrix::from(&self.quadratic).to_triu();
-        let a = CscMatrix::from(&rows);
-        let cones = [NonnegativeConeT(b.len())];
-        let settings = DefaultSettingsBuilder::default()
-            .verbose(false)
-            .tol_gap_abs(1e-12)
-            .tol_gap_rel(1e-12)
-            .tol_feas(1e-12)
-            .build()
-            .ok()?;
-        let mut solver =
-            DefaultSolver::new(&triangle, &self.linear, &a, &b, &cones, settings).ok()?;
-        solver.solve();
-        let solution = &solver.solution;
-        let solved = matches!(
-            solution.status,
-            SolverStatus::Solved | SolverStatus::AlmostSolved | SolverStatus::InsufficientProgress
-        );
-        let mut pressed = vec![None; n];
-        for (k, wall) in walls.iter().enumerate() {
-            // Complementary slackness: the multiplier of an active wall exceeds its slack.
-            if solution.z[k] > solution.s[k] {
-                pressed[wall.column] = Some(wall.at);
-            }
-        }
-        solved.then(|| (solution.x.clone(), pressed))
-    }
-
     /// The minimizer of (1) with the pressed coordinates on their walls and the others free.
     fn exact_step(&self, pressed: &[Option<f64>]) -> Option<Vec<f64>> {
         let Self {
@@ -191,4 +142,63 @@ impl Program {
         }
         Some(step)
     }
+}
+
+/// z, and per coordinate the wall that is active.
+type Pressed = (Vec<f64>, Vec<Option<f64>>);
+
+/// The minimum of (1) by an interior-point method; `None` when the solver fails.
+#[cfg(feature = "clarabel")]
+fn interior_point(program: &Program, walls: &[Wall]) -> Option<Pressed> {
+    use clarabel::algebra::CscMatrix;
+    use clarabel::solver::{
+        DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus,
+    };
+
+    let n = program.linear.len();
+    // ±z_c ≤ ±wall/scale_c
+    let rows: Vec<Vec<f64>> = walls
+        .iter()
+        .map(|w| {
+            let mut row = vec![0.0; n];
+            row[w.column] = w.side;
+            row
+        })
+        .collect();
+    let b: Vec<f64> = walls
+        .iter()
+        .map(|w| w.side * w.at / program.scale[w.column])
+        .collect();
+    let triangle = CscMatrix::from(&program.quadratic).to_triu();
+    let a = CscMatrix::from(&rows);
+    let cones = [NonnegativeConeT(b.len())];
+    let settings = DefaultSettingsBuilder::default()
+        .verbose(false)
+        .tol_gap_abs(1e-12)
+        .tol_gap_rel(1e-12)
+        .tol_feas(1e-12)
+        .build()
+        .ok()?;
+    let mut solver =
+        DefaultSolver::new(&triangle, &program.linear, &a, &b, &cones, settings).ok()?;
+    solver.solve();
+    let solution = &solver.solution;
+    let solved = matches!(
+        solution.status,
+        SolverStatus::Solved | SolverStatus::AlmostSolved | SolverStatus::InsufficientProgress
+    );
+    let mut pressed = vec![None; n];
+    for (k, wall) in walls.iter().enumerate() {
+        // Complementary slackness: the multiplier of an active wall exceeds its slack.
+        if solution.z[k] > solution.s[k] {
+            pressed[wall.column] = Some(wall.at);
+        }
+    }
+    solved.then(|| (solution.x.clone(), pressed))
+}
+
+/// Without the solver a problem with bounds is refused before it comes here.
+#[cfg(not(feature = "clarabel"))]
+fn interior_point(_: &Program, _: &[Wall]) -> Option<Pressed> {
+    None
 }

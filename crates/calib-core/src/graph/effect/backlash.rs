@@ -43,7 +43,6 @@ pub static EFFECT: Effect = Effect {
     estimable: always,
     testable: Some(from_both_sides),
     confounded: Confounded::Nothing,
-    page: "mathematics.md",
     terms: &[Term {
         kind: EffectKind::Backlash,
         name: "backlash",

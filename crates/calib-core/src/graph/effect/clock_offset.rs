@@ -14,7 +14,6 @@ pub static EFFECT: Effect = Effect {
     estimable: always,
     testable: Some(always),
     confounded: Confounded::Nothing,
-    page: "recording-a-sweep.md",
     terms: &[Term {
         kind: EffectKind::ClockOffset,
         name: "clock_offset",

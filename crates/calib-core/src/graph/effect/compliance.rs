@@ -34,7 +34,6 @@ pub static EFFECT: Effect = Effect {
     estimable: loaded,
     testable: Some(loaded),
     confounded: Confounded::Nothing,
-    page: "mathematics.md",
     terms: &[Term {
         kind: EffectKind::TorqueCompliance,
         name: "compliance",

@@ -19,7 +19,6 @@ pub static EFFECT: Effect = Effect {
     estimable: always,
     testable: None,
     confounded: Confounded::Scale,
-    page: "mathematics.md",
     terms: &[Term {
         kind: EffectKind::Coupling,
         name: "coupling",

@@ -33,7 +33,6 @@ pub static EFFECT: Effect = Effect {
     estimable: always,
     testable: Some(always),
     confounded: Confounded::Nothing,
-    page: "mathematics.md",
     terms: &[
         Term {
             kind: EffectKind::EccentricityCos,

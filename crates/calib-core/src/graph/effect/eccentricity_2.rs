@@ -34,7 +34,6 @@ pub static EFFECT: Effect = Effect {
     estimable: always,
     testable: Some(always),
     confounded: Confounded::Nothing,
-    page: "mathematics.md",
     terms: &[
         Term {
             kind: EffectKind::Eccentricity2Cos,

@@ -34,7 +34,6 @@ pub static EFFECT: Effect = Effect {
     estimable: always,
     testable: Some(always),
     confounded: Confounded::Scale,
-    page: "mathematics.md",
     terms: &[Term {
         kind: EffectKind::Gain,
         name: "gain",

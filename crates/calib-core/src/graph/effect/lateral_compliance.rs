@@ -27,7 +27,6 @@ pub static EFFECT: Effect = Effect {
     estimable: loaded,
     testable: None,
     confounded: Confounded::Nothing,
-    page: "mathematics.md",
     terms: &[
         Term {
             kind: EffectKind::Lateral1,

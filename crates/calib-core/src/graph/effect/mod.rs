@@ -244,8 +244,6 @@ pub struct Effect {
     pub testable: Option<fn(&[JointState]) -> bool>,
     /// What it is confounded with.
     pub confounded: Confounded,
-    /// Section of the book.
-    pub page: &'static str,
     /// Its terms.
     pub terms: &'static [Term],
 }
@@ -292,13 +290,6 @@ impl Effect {
     #[must_use]
     pub fn applies_to(&self, axis: &Axis) -> bool {
         !self.revolute_only || matches!(axis, Axis::Revolute(_))
-    }
-
-    /// What must be written into a profile to estimate it, as YAML.
-    #[must_use]
-    pub fn enable(&self) -> Option<String> {
-        let keys = self.profile.as_ref()?;
-        Some(format!("solve: {{free: [..., {}]}}", keys.all))
     }
 }
 

@@ -36,7 +36,6 @@ pub static EFFECT: Effect = Effect {
     estimable: always,
     testable: None,
     confounded: Confounded::AxisMotion,
-    page: "mathematics.md",
     terms: &[Term {
         kind: EffectKind::ZeroOffset,
         name: "offset",

@@ -14,7 +14,6 @@ pub static EFFECT: Effect = Effect {
     estimable: always,
     testable: None,
     confounded: Confounded::Nothing,
-    page: "mathematics.md",
     terms: &[Term {
         kind: EffectKind::Other,
         name: "effect",
