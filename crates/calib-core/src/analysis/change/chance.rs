@@ -48,22 +48,19 @@ fn largest(design: &Design, tests: &[Vec<Test>], rng: &mut ChaCha8Rng) -> Vec<f6
     let n = design.covariance.nrows();
     let mut g = DVector::zeros(n);
     let mut cost = 0.0;
-    // Σ B̃ᵀz up to each sample, all columns.
     let width = design.kept.first().map_or(0, |k| k.b.ncols());
-    let mut running = DVector::<f64>::zeros(width);
-    let mut cumulative = Vec::with_capacity(design.kept.len() + 1);
+    // Σ B̃ᵀz up to each sample, and the same in proportion to the place: all columns.
+    let mut steps = vec![DVector::<f64>::zeros(width)];
     let mut linear = DVector::<f64>::zeros(width);
-    let last = design.kept.len().max(2) - 1;
+    let count = design.kept.len();
     for (place, kept) in design.kept.iter().enumerate() {
         let z = DVector::<f64>::from_fn(kept.a.nrows(), |_, _| StandardNormal.sample(rng));
-        cumulative.push(running.clone());
         g.gemv_tr(1.0, &kept.a, &z, 1.0);
         let own = kept.b.tr_mul(&z);
-        linear.axpy(place as f64 / last as f64 - 0.5, &own, 1.0);
-        running += own;
+        linear.axpy(place as f64 / (count - 1) as f64 - 0.5, &own, 1.0);
+        steps.push(&steps[place] + own);
         cost += z.norm_squared();
     }
-    cumulative.push(running);
     for &(c, weight) in &design.priors {
         let z: f64 = StandardNormal.sample(rng);
         g[c] += weight * z;
@@ -72,16 +69,18 @@ fn largest(design: &Design, tests: &[Vec<Test>], rng: &mut ChaCha8Rng) -> Vec<f6
     let step = -(&design.covariance * &g);
     cost += g.dot(&step);
     let of_candidate = |(k, tests): (usize, &Vec<Test>)| {
-        let columns = design.columns[k].clone();
-        let gains = tests.iter().map(|test| {
-            let all = match design.patterns[k] {
-                Pattern::Linear => linear.clone(),
-                _ => &cumulative[test.range.end] - &cumulative[test.range.first],
-            };
-            let u = all.rows_range(columns.clone()) + test.e.tr_mul(&step);
-            u.dot(&(&test.inverse * &u))
-        });
-        score(design.rows, cost, gains.fold(0.0, f64::max))
+        let own = |u: &DVector<f64>| u.rows_range(design.columns[k].clone()).into_owned();
+        let mut u: Vec<DVector<f64>> = match design.patterns[k] {
+            Pattern::Step => steps.iter().map(own).collect(),
+            Pattern::Linear => vec![DVector::zeros(design.columns[k].len()), own(&linear)],
+            Pattern::Constant => vec![own(&steps[0]), own(&steps[count])],
+        };
+        // U ← U + Eᵀ δ
+        for (u, sum) in u.iter_mut().zip(&design.cumulative[k]) {
+            *u += sum.e.tr_mul(&step);
+        }
+        let best = design.best(k, tests, &u);
+        score(design.rows, cost, best.map_or(0.0, |b| b.gain))
     };
     tests.iter().enumerate().map(of_candidate).collect()
 }

@@ -1,6 +1,6 @@
-//! Cumulative sums of equation (1) over the samples, and the best range of a candidate.
+//! Cumulative sums of equation (1) over the samples, and the best set of samples of a candidate.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::columns::{Candidates, Pattern};
 use crate::analysis::solution::Solution;
@@ -14,17 +14,22 @@ pub(super) const LEAST: usize = 3;
 /// Samples whose rows the threshold is simulated with: beyond, the distribution of T no longer depends on their count.
 pub(super) const SIMULATED: usize = 240;
 
-/// From one edge up to another, by their numbers among the edges.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Range {
+/// The samples after a change: the end of one recording, from an edge on, and other recordings as a whole.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct After {
+    /// First and last edge, by their numbers.
     pub first: usize,
     pub end: usize,
+    /// The recording of these edges.
+    part: usize,
+    /// Recordings that belong to it besides.
+    others: Vec<usize>,
 }
 
-/// The best range of a candidate.
+/// The best set of a candidate.
 #[derive(Debug, Clone)]
 pub(super) struct Found {
-    pub range: Range,
+    pub after: After,
     /// Δ of equation (2).
     pub gain: f64,
     pub jump: Vec<f64>,
@@ -38,43 +43,40 @@ pub(super) struct Kept {
     pub b: DMatrix<f64>,
 }
 
-/// U, E, C E and Σ B̃ᵀB̃ of one candidate over a set of samples.
+/// E, C E and Σ B̃ᵀB̃ of one candidate over a set of samples.
 #[derive(Clone)]
-struct Sum {
-    u: DVector<f64>,
-    e: DMatrix<f64>,
+pub(super) struct Sum {
+    pub e: DMatrix<f64>,
+    ce: DMatrix<f64>,
     g: DMatrix<f64>,
 }
 
 impl Sum {
     fn zeros(n: usize, d: usize) -> Self {
         Self {
-            u: DVector::zeros(d),
             e: DMatrix::zeros(n, d),
+            ce: DMatrix::zeros(n, d),
             g: DMatrix::zeros(d, d),
         }
     }
 
-    fn add(&mut self, a: &DMatrix<f64>, b: &DMatrix<f64>, w: &DVector<f64>, factor: f64) {
-        self.u.gemv_tr(factor, b, w, 1.0);
+    fn add(&mut self, a: &DMatrix<f64>, b: &DMatrix<f64>, factor: f64) {
         self.e.gemm_tr(factor, a, b, 1.0);
         self.g.gemm_tr(factor * factor, b, b, 1.0);
     }
 
-    fn minus(&self, other: &Self) -> Self {
-        Self {
-            u: &self.u - &other.u,
-            e: &self.e - &other.e,
-            g: &self.g - &other.g,
-        }
+    /// Adds what lies between two cumulative sums.
+    fn add_between(&mut self, from: &Self, to: &Self) {
+        self.e += &to.e - &from.e;
+        self.ce += &to.ce - &from.ce;
+        self.g += &to.g - &from.g;
     }
 }
 
-/// What a candidate needs of the data, but for U: its ranges with I⁻¹ and E.
+/// A set with I⁻¹: everything of a test that does not depend on the residuals.
 pub(super) struct Test {
-    pub range: Range,
-    pub inverse: DMatrix<f64>,
-    pub e: DMatrix<f64>,
+    after: After,
+    inverse: DMatrix<f64>,
 }
 
 /// The scan of a set of samples.
@@ -83,7 +85,8 @@ pub(super) struct Design {
     edges: Vec<usize>,
     /// Used samples before each edge.
     places: Vec<usize>,
-    borders: Vec<usize>,
+    /// First edge of every recording, and the last edge.
+    parts: Vec<usize>,
     pub covariance: DMatrix<f64>,
     /// Columns with a prior, and 1/σ of it.
     pub priors: Vec<(usize, f64)>,
@@ -93,8 +96,10 @@ pub(super) struct Design {
     pub rows: f64,
     pub patterns: Vec<Pattern>,
     pub columns: Vec<std::ops::Range<usize>>,
-    /// By candidate: cumulative sums up to each edge; for other patterns than steps the whole sum alone.
-    cumulative: Vec<Vec<Sum>>,
+    /// By candidate: cumulative sums up to each edge; for other patterns than steps nothing and the whole.
+    pub cumulative: Vec<Vec<Sum>>,
+    /// U in the same way, at the minimum.
+    pub u: Vec<Vec<DVector<f64>>>,
     /// P of equation (1) by candidate.
     wide: Vec<f64>,
     /// Samples, for designs that are simulated.
@@ -102,7 +107,7 @@ pub(super) struct Design {
 }
 
 impl Design {
-    /// Sums over `samples`; ranges begin and end at `edges` of them and at the borders of recordings.
+    /// Sums over `samples`; changes are tried at `edges` of them and at the borders of recordings.
     pub(super) fn new(
         solution: &Solution,
         candidates: &Candidates,
@@ -124,11 +129,19 @@ impl Design {
             .iter()
             .map(|e| samples.partition_point(|s| s < e))
             .collect();
+        let last = at.len() - 1;
+        let mut parts: Vec<usize> = borders
+            .iter()
+            .filter_map(|b| at.binary_search(b).ok())
+            .collect();
+        parts.extend([0, last]);
+        parts.sort_unstable();
+        parts.dedup();
         let list = &candidates.list;
         let mut out = Self {
             edges: at,
             places,
-            borders,
+            parts,
             covariance: DMatrix::zeros(0, 0),
             priors: Vec::new(),
             cost: 0.0,
@@ -136,6 +149,7 @@ impl Design {
             patterns: list.iter().map(|c| c.pattern).collect(),
             columns: list.iter().map(|c| c.columns.clone()).collect(),
             cumulative: Vec::new(),
+            u: Vec::new(),
             wide: (0..list.len()).map(|k| candidates.prior(k)).collect(),
             kept: Vec::new(),
         };
@@ -157,15 +171,18 @@ impl Design {
         work.cache.update(&model.problem, &solution.values);
         let mut h = DMatrix::zeros(n, n);
         let mut g = DVector::zeros(n);
-        let sizes = self.columns.iter().map(ExactSizeIterator::len);
-        let mut running: Vec<Sum> = sizes.map(|d| Sum::zeros(n, d)).collect();
-        let mut cumulative: Vec<Vec<Sum>> = vec![Vec::new(); running.len()];
+        let sizes: Vec<usize> = self.columns.iter().map(ExactSizeIterator::len).collect();
+        let mut sums: Vec<Sum> = sizes.iter().map(|d| Sum::zeros(n, *d)).collect();
+        let mut us: Vec<DVector<f64>> = sizes.iter().map(|d| DVector::zeros(*d)).collect();
+        self.cumulative = vec![Vec::new(); sizes.len()];
+        self.u = vec![Vec::new(); sizes.len()];
         let mut bin = 0;
         for (place, &sample) in samples.iter().enumerate() {
             while bin < self.edges.len() && self.edges[bin] <= sample {
-                for (k, sums) in cumulative.iter_mut().enumerate() {
-                    if self.patterns[k] == Pattern::Step {
-                        sums.push(running[k].clone());
+                for k in 0..sizes.len() {
+                    if self.patterns[k] == Pattern::Step || bin == 0 {
+                        self.cumulative[k].push(sums[k].clone());
+                        self.u[k].push(us[k].clone());
                     }
                 }
                 bin += 1;
@@ -179,26 +196,30 @@ impl Design {
             g.gemv_tr(1.0, &rows.a, &rows.w, 1.0);
             self.cost += rows.w.norm_squared();
             self.rows += rows.w.len() as f64;
-            let position = place as f64 / (samples.len() - 1) as f64 - 0.5;
-            for (k, sum) in running.iter_mut().enumerate() {
+            for k in 0..sizes.len() {
                 let own = b.columns_range(self.columns[k].clone()).into_owned();
-                let factor = if self.patterns[k] == Pattern::Linear {
-                    position
-                } else {
-                    1.0
-                };
-                sum.add(&rows.a, &own, &rows.w, factor);
+                let factor = self.factor(k, place, samples.len());
+                us[k].gemv_tr(factor, &own, &rows.w, 1.0);
+                sums[k].add(&rows.a, &own, factor);
             }
             if keep {
                 let Whitened { a, .. } = rows;
                 self.kept.push(Kept { a, b });
             }
         }
-        for (k, sum) in running.into_iter().enumerate() {
-            cumulative[k].push(sum);
+        for (k, (sum, u)) in sums.into_iter().zip(us).enumerate() {
+            self.cumulative[k].push(sum);
+            self.u[k].push(u);
         }
-        self.cumulative = cumulative;
         self.solve(solution, &h, &g)
+    }
+
+    /// What a candidate's columns are multiplied by at a sample: its place from −½ to ½ for a drift.
+    pub(super) fn factor(&self, candidate: usize, place: usize, samples: usize) -> f64 {
+        match self.patterns[candidate] {
+            Pattern::Linear => place as f64 / (samples - 1) as f64 - 0.5,
+            _ => 1.0,
+        }
     }
 
     /// C of the samples, F at their own minimum, and U there: one Gauss–Newton step from the fit, which is zero where
@@ -219,10 +240,10 @@ impl Design {
         // δ = −C g,   U ← U + Eᵀ δ,   F ← F − gᵀ C g
         let step = -(&self.covariance * &gradient);
         self.cost += system.prior + gradient.dot(&step);
-        for sums in &mut self.cumulative {
-            for sum in sums {
-                let more = sum.e.tr_mul(&step);
-                sum.u += more;
+        for (sums, us) in self.cumulative.iter_mut().zip(&mut self.u) {
+            for (sum, u) in sums.iter_mut().zip(us) {
+                *u += sum.e.tr_mul(&step);
+                sum.ce = &self.covariance * &sum.e;
             }
         }
         for (c, &p) in model.columns.iter().enumerate() {
@@ -238,128 +259,193 @@ impl Design {
         score(self.rows, self.cost, gain)
     }
 
-    /// First sample of a range, and the first after it.
-    pub(super) fn samples_of(&self, range: Range) -> (usize, usize) {
-        (self.edges[range.first], self.edges[range.end])
+    /// First sample after a change, and the first that is no longer.
+    pub(super) fn samples_of(&self, after: &After) -> (usize, usize) {
+        (self.edges[after.first], self.edges[after.end])
     }
 
-    /// All ranges that a candidate is tried with.
-    fn ranges(&self, candidate: usize) -> Vec<Range> {
-        let last = self.edges.len() - 1;
-        if self.patterns[candidate] != Pattern::Step {
-            return vec![Range {
-                first: 0,
-                end: last,
-            }];
-        }
-        let place = |sample: &usize| self.edges.binary_search(sample).unwrap_or(last);
-        let mut limits: Vec<usize> = self.borders.iter().map(place).collect();
-        limits.insert(0, 0);
-        limits.push(last);
-        let mut out: Vec<Range> = (1..last).map(|first| Range { first, end: last }).collect();
-        // One recording has no order to be in doubt about.
-        if limits.len() > 2 {
-            for part in limits.windows(2) {
-                let (start, end) = (part[0], part[1]);
-                out.extend((start..end).map(|first| Range { first, end }));
-                out.extend((start + 1..end).map(|end| Range { first: start, end }));
-            }
-        }
-        let enough = |r: &Range| {
-            let inside = self.places[r.end] - self.places[r.first];
-            inside >= LEAST && self.places[last] - inside >= LEAST
-        };
-        out.retain(enough);
-        out.sort_by_key(|r| (r.first, r.end));
-        out.dedup();
+    /// First samples of the other recordings of a set.
+    pub(super) fn also(&self, after: &After) -> Vec<usize> {
+        let mut out: Vec<usize> = after
+            .others
+            .iter()
+            .map(|o| self.edges[self.parts[*o]])
+            .collect();
+        out.sort_unstable();
         out
     }
 
-    fn sum(&self, candidate: usize, range: Range) -> Sum {
-        let sums = &self.cumulative[candidate];
-        if self.patterns[candidate] == Pattern::Step {
-            sums[range.end].minus(&sums[range.first])
-        } else {
-            sums[0].clone()
+    /// All sets that a candidate is tried with: the end of each recording, alone, with the recordings behind it in the
+    /// order of the samples, and with all others. (The beginning alone is the last of these with the sign reversed.)
+    fn sets(&self, candidate: usize) -> Vec<After> {
+        let alone = |first: usize, end: usize, part: usize, others: Vec<usize>| After {
+            first,
+            end,
+            part,
+            others,
+        };
+        if self.patterns[candidate] != Pattern::Step {
+            return vec![alone(0, 1, 0, Vec::new())];
         }
+        let count = self.parts.len() - 1;
+        let mut out = Vec::new();
+        for part in 0..count {
+            for first in self.parts[part]..self.parts[part + 1] {
+                let all: Vec<usize> = (0..count).filter(|o| *o != part).collect();
+                let later: Vec<usize> = (part + 1..count).collect();
+                let mut others = vec![Vec::new(), later, all];
+                others.dedup();
+                let end = self.parts[part + 1];
+                out.extend(others.into_iter().map(|o| alone(first, end, part, o)));
+            }
+        }
+        out.retain(|after| self.is_large_enough(after));
+        out
     }
 
-    /// I of equation (1), inverted; `None` where nothing is left of the columns.
-    fn inverse(&self, candidate: usize, sum: &Sum) -> Option<DMatrix<f64>> {
-        let mut information = &sum.g - sum.e.tr_mul(&(&self.covariance * &sum.e));
+    /// Whether enough samples lie on both sides.
+    fn is_large_enough(&self, after: &After) -> bool {
+        let between = |first: usize, end: usize| self.places[end] - self.places[first];
+        let others = after
+            .others
+            .iter()
+            .map(|o| between(self.parts[*o], self.parts[o + 1]));
+        let inside = between(after.first, after.end) + others.sum::<usize>();
+        inside >= LEAST && self.places[self.places.len() - 1] - inside >= LEAST
+    }
+
+    fn sum(&self, candidate: usize, after: &After) -> Sum {
+        let sums = &self.cumulative[candidate];
+        let mut out = Sum::zeros(sums[0].e.nrows(), sums[0].e.ncols());
+        out.add_between(&sums[after.first], &sums[after.end]);
+        for o in &after.others {
+            out.add_between(&sums[self.parts[*o]], &sums[self.parts[o + 1]]);
+        }
+        out
+    }
+
+    fn u_of(&self, u: &[DVector<f64>], after: &After) -> DVector<f64> {
+        let mut out = &u[after.end] - &u[after.first];
+        for o in &after.others {
+            out += &u[self.parts[o + 1]] - &u[self.parts[*o]];
+        }
+        out
+    }
+
+    /// I of equation (1), inverted; `None` where it is not positive.
+    fn inverse(&self, candidate: usize, after: &After) -> Option<DMatrix<f64>> {
+        let sum = self.sum(candidate, after);
+        let mut information = &sum.g - sum.e.tr_mul(&sum.ce);
         for i in 0..information.nrows() {
             information[(i, i)] += self.wide[candidate];
         }
-        Some(nalgebra::Cholesky::new(information)?.inverse())
+        Some(Cholesky::new(information)?.inverse())
     }
 
-    /// Everything of a candidate's tests that does not depend on the residuals.
     pub(super) fn tests(&self, candidate: usize) -> Vec<Test> {
-        let ranges = self.ranges(candidate).into_iter();
-        ranges
-            .filter_map(|range| {
-                let sum = self.sum(candidate, range);
-                let inverse = self.inverse(candidate, &sum)?;
-                Some(Test {
-                    range,
-                    inverse,
-                    e: sum.e,
-                })
-            })
-            .collect()
+        let sets = self.sets(candidate).into_iter();
+        sets.filter_map(|after| {
+            let inverse = self.inverse(candidate, &after)?;
+            Some(Test { after, inverse })
+        })
+        .collect()
     }
 
-    /// The range of the largest Δ.
-    pub(super) fn best(&self, candidate: usize) -> Option<Found> {
-        self.best_of(candidate, &self.ranges(candidate))
-    }
-
-    fn best_of(&self, candidate: usize, ranges: &[Range]) -> Option<Found> {
-        let mut best: Option<Found> = None;
-        for &range in ranges {
-            let sum = self.sum(candidate, range);
-            let Some(inverse) = self.inverse(candidate, &sum) else {
-                continue;
-            };
-            let step = &inverse * &sum.u;
-            let gain = sum.u.dot(&step);
-            if gain.is_finite() && best.as_ref().is_none_or(|b| gain > b.gain) {
-                best = Some(Found {
-                    range,
-                    gain,
-                    jump: step.iter().map(|x| -x).collect(),
-                    variance: inverse.diagonal().iter().copied().collect(),
-                });
+    /// The set of the largest Δ for given cumulative sums of U: the best test of every recording, with other recordings
+    /// moved to the other side as long as that helps.
+    pub(super) fn best(
+        &self,
+        candidate: usize,
+        tests: &[Test],
+        u: &[DVector<f64>],
+    ) -> Option<Found> {
+        let mut of_part: Vec<Option<(f64, &Test)>> = vec![None; self.parts.len() - 1];
+        for test in tests {
+            let own = self.u_of(u, &test.after);
+            let gain = own.dot(&(&test.inverse * &own));
+            let best = &mut of_part[test.after.part];
+            if gain.is_finite() && best.is_none_or(|(g, _)| gain > g) {
+                *best = Some((gain, test));
             }
         }
-        best
+        let found = of_part.into_iter().flatten().filter_map(|(_, test)| {
+            let first = found(&test.after, &test.inverse, &self.u_of(u, &test.after));
+            self.extended(candidate, first, u)
+        });
+        found.max_by(|a, b| a.gain.total_cmp(&b.gain))
     }
 
-    /// The best range whose borders lie within a bin of those of a range in a coarser design.
-    pub(super) fn best_near(&self, candidate: usize, coarse: &Self, range: Range) -> Option<Found> {
-        let last = coarse.edges.len() - 1;
-        let near = |edge: usize, of: usize| {
-            let from = coarse.edges[of.saturating_sub(1)];
-            let to = coarse.edges[(of + 1).min(last)];
-            (from..=to).contains(&self.edges[edge])
-        };
-        let all = self.ranges(candidate).into_iter();
-        let close = |r: &Range| near(r.first, range.first) && near(r.end, range.end);
-        self.best_of(candidate, &all.filter(close).collect::<Vec<_>>())
+    fn extended(&self, candidate: usize, mut best: Found, u: &[DVector<f64>]) -> Option<Found> {
+        if self.patterns[candidate] != Pattern::Step {
+            return Some(best);
+        }
+        loop {
+            let toggled = (0..self.parts.len() - 1)
+                .filter(|o| *o != best.after.part)
+                .map(|o| {
+                    let mut after = best.after.clone();
+                    match after.others.iter().position(|x| *x == o) {
+                        Some(at) => drop(after.others.remove(at)),
+                        None => after.others.push(o),
+                    }
+                    after
+                });
+            let better = toggled
+                .filter(|after| self.is_large_enough(after))
+                .filter_map(|after| {
+                    let inverse = self.inverse(candidate, &after)?;
+                    Some(found(&after, &inverse, &self.u_of(u, &after)))
+                })
+                .max_by(|a, b| a.gain.total_cmp(&b.gain));
+            match better {
+                // More than rounding, so that the loop ends.
+                Some(next) if next.gain > best.gain * (1.0 + 1e-9) => best = next,
+                _ => return Some(best),
+            }
+        }
     }
 
-    /// Samples within a bin of the borders of a range, among `samples`, and the edges.
-    pub(super) fn finer(&self, range: Range, samples: &[usize]) -> Vec<usize> {
+    /// The best change near that of a coarser design, with the same other recordings.
+    pub(super) fn best_near(&self, candidate: usize, coarse: &Self, near: &After) -> Option<Found> {
+        let from = coarse.edges[near.first.saturating_sub(1)];
+        let to = coarse.edges[(near.first + 1).min(coarse.edges.len() - 1)];
+        let (start, end) = (self.parts[near.part], self.parts[near.part + 1]);
+        let firsts = (start..end).filter(|f| (from..=to).contains(&self.edges[*f]));
+        let sets = firsts.map(|first| After {
+            first,
+            end,
+            ..near.clone()
+        });
+        sets.filter(|after| self.is_large_enough(after))
+            .filter_map(|after| {
+                let inverse = self.inverse(candidate, &after)?;
+                Some(found(
+                    &after,
+                    &inverse,
+                    &self.u_of(&self.u[candidate], &after),
+                ))
+            })
+            .max_by(|a, b| a.gain.total_cmp(&b.gain))
+    }
+
+    /// The edges, and all of `samples` within a bin of the first one of a set.
+    pub(super) fn finer(&self, after: &After, samples: &[usize]) -> Vec<usize> {
         let last = self.edges.len() - 1;
         let mut out = self.edges[..last].to_vec();
-        for of in [range.first, range.end] {
-            let (from, to) = (
-                self.edges[of.saturating_sub(1)],
-                self.edges[(of + 1).min(last)],
-            );
-            out.extend(samples.iter().filter(|s| (from..to).contains(*s)));
-        }
+        let from = self.edges[after.first.saturating_sub(1)];
+        let to = self.edges[(after.first + 1).min(last)];
+        out.extend(samples.iter().filter(|s| (from..to).contains(*s)));
         out
+    }
+}
+
+fn found(after: &After, inverse: &DMatrix<f64>, u: &DVector<f64>) -> Found {
+    let step = inverse * u;
+    Found {
+        after: after.clone(),
+        gain: u.dot(&step),
+        jump: step.iter().map(|x| -x).collect(),
+        variance: inverse.diagonal().iter().copied().collect(),
     }
 }
 
