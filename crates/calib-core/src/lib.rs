@@ -42,6 +42,7 @@
 //! | against what | [`Problem::baseline`]: nominal, registration only |
 //! | which physics is missing | [`Solution::goodness_of_fit`], with [`Problem::candidate`] effects |
 //! | did something move meanwhile | [`Solution::changes`] |
+//! | has the noise a memory, and what does that cost | [`Solution::dependence`], [`Solution::under`] |
 //! | which model | [`compare()`] |
 //! | can I trust the intervals if the noise model is wrong | [`sandwich`] |
 //! | how well does a loop close | [`ClosureStatistics`], [`Solution::pose_at_sample`] |
@@ -135,6 +136,7 @@ pub use nalgebra;
 pub use analysis::change::{Change, ChangeScan, ChangeSettings, Moved};
 pub use analysis::closure::{ClosureStatistics, Spread};
 pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};
+pub use analysis::dependence::Dependence;
 pub use analysis::estimate::{Settings, solve};
 pub use analysis::folds::{folds, k_fold};
 pub use analysis::gauge::Gauge;

@@ -3,6 +3,7 @@
 pub(crate) mod change;
 pub(crate) mod closure;
 pub(crate) mod compare;
+pub(crate) mod dependence;
 pub(crate) mod estimate;
 pub(crate) mod folds;
 pub(crate) mod gauge;

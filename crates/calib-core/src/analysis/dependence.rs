@@ -1,0 +1,397 @@
+//! Noise with a memory: its strength from the residuals of successive samples, and what it does to the uncertainty.
+//!
+//! With x = e/σ of each row, the model says Cov(x_s) = X_s = V_s/(σσᵀ) and nothing between samples. A tracker with a
+//! memory (filters, warming, air) adds, for the same row l samples apart, c ρ^l:
+//!
+//! ```text
+//! W = X⁻¹,   k_s = W_s J_s/σ,   N_s = Σ_{u≠s} c ρ^|u−s| k_u,   h_s = k_s + W_s N_s           (1)
+//! G = H + Σ_s N_sᵀ k_s,   C' = C G C                                                      (2)
+//! E[ŷ_s·ŷ_t] = c ρ^l tr(W_s W_t) − tr(k_s C h_tᵀ) − tr(k_t C h_sᵀ) + tr(k_s C' k_tᵀ),   ŷ = W x̂    (3)
+//! ```
+//!
+//! C' is the covariance of the same estimate under that noise: nothing is fitted again. (3) is what residuals show
+//! after the fit has taken its share of the slow part; c and ρ follow from it by repeated substitution, and a common
+//! factor κ for the level of the noise, which the fit makes look smaller. Residuals of missing physics that follow the order of the samples
+//! look the same, and are treated the same.
+//!
+//! What this does not see: frames of one pose as separate samples, whose errors are shared but do not fade. Their
+//! joint values are equal; merge them before.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::analysis::solution::{Solution, describe_parameters};
+use crate::graph::measurement::MeasurementKind;
+use crate::solve::equations::{NormalEquations, Workspace};
+use crate::solve::normal::accumulate;
+use crate::solve::rows::add_block;
+use crate::solve::whitened::{Whitened, covariance_of, whitened};
+
+/// Memory of the noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Dependence {
+    /// Correlation of successive samples that the residuals of the fit show.
+    pub lag_one: f64,
+    /// That correlation over its standard deviation for noise without memory.
+    pub z: f64,
+    /// ρ: how much of the memory is left after one sample more.
+    pub decay: f64,
+    /// c: part of the noise that has a memory.
+    pub share: f64,
+    /// κ: variance of the noise over what the fit found.
+    pub level: f64,
+}
+
+impl Dependence {
+    /// Whether noise without memory shows so much less often than once in a thousand fits.
+    #[must_use]
+    pub fn is_significant(&self) -> bool {
+        /// One-sided normal quantile of 0.999.
+        const Z: f64 = 3.09;
+        self.z > Z
+    }
+}
+
+/// Samples that the memory is estimated from at most.
+const SAMPLES: usize = 1500;
+/// Lags that it is estimated from.
+const LAGS: usize = 3;
+/// Strongest memory that is distinguishable from a constant error.
+const LARGEST_DECAY: f64 = 0.98;
+/// Rounds of substitution in (3): each leaves about a third of the error.
+const ROUNDS: usize = 8;
+
+/// One sample in units of each row's own σ.
+struct Scaled {
+    k: DMatrix<f64>,
+    w: DMatrix<f64>,
+    y: DVector<f64>,
+    /// Which row of which observation, the same in all samples.
+    keys: Vec<usize>,
+    /// First sample of a recording.
+    starts: bool,
+}
+
+impl Solution {
+    /// Estimates the memory of the noise from successive samples; `borders` are the first samples of recordings, across which nothing is
+    /// remembered. `None` where fewer than eight samples or no pairs of rows exist.
+    #[must_use]
+    pub fn dependence(&self, borders: &[usize]) -> Option<Dependence> {
+        /// Fewer pairs say nothing.
+        const LEAST: usize = 8;
+        let samples = self.scaled_samples(borders, SAMPLES);
+        if samples.len() < LEAST {
+            return None;
+        }
+        let h = self.curvature()?;
+        let c = covariance_of(&h)?;
+        let seen = lag_sums(&samples, |a, i, b, j| a.y[i] * b.y[j]);
+        let expected = lag_traces(&samples);
+        if expected[1] <= 0.0 {
+            return None;
+        }
+        let mut found = Dependence {
+            lag_one: 0.0,
+            z: 0.0,
+            decay: 0.0,
+            share: 0.0,
+            level: 1.0,
+        };
+        for round in 0..ROUNDS {
+            let bias = bias(&samples, &c, found.share, found.decay);
+            // κ from lag 0, then γ_l = (seen / κ − bias) / T
+            found.level = (seen[0] / (expected[0] + bias[0])).max(1.0);
+            let gamma: Vec<f64> = (1..=LAGS)
+                .map(|l| {
+                    if expected[l] > 0.0 {
+                        (seen[l] / found.level - bias[l]) / expected[l]
+                    } else {
+                        0.0
+                    }
+                })
+                .collect();
+            if round == 0 {
+                found.lag_one = gamma[0];
+                // Var(ŷ_s·ŷ_t) = tr(W_s W_t) without memory
+                found.z = gamma[0] * expected[1].sqrt();
+            }
+            let decay =
+                (gamma[0] * gamma[1] + gamma[1] * gamma[2]) / (gamma[0].powi(2) + gamma[1].powi(2));
+            found.decay = if gamma[1] > 0.0 && decay > 0.0 {
+                decay.min(LARGEST_DECAY)
+            } else {
+                gamma[0].clamp(0.0, LARGEST_DECAY)
+            };
+            found.share = if found.decay > 0.0 {
+                (gamma[0] / found.decay).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+        }
+        Some(found)
+    }
+
+    /// The same solution with the uncertainty that it has under noise with a memory: equation (2), for parameters and
+    /// everything derived from them. `None` when the model cannot be evaluated.
+    #[must_use]
+    pub fn under(&self, dependence: &Dependence, borders: &[usize]) -> Option<Self> {
+        let samples = self.scaled_samples(borders, usize::MAX);
+        let before = memory(
+            &samples,
+            dependence.share,
+            dependence.decay,
+            self.model.free(),
+        );
+        // Σ_s N_sᵀ k_s, earlier and later samples alike
+        let n = self.model.free();
+        let mut added = DMatrix::zeros(n, n);
+        for (sample, n_s) in samples.iter().zip(&before) {
+            added.gemm_tr(1.0, n_s, &sample.k, 1.0);
+        }
+        let added = &added + added.transpose();
+        let mut out = self.clone();
+        let c = &self.information.covariance;
+        let more = c * added * c;
+        // Memory of both signs could in rare directions cancel: it is never taken for information.
+        let more = positive(&more);
+        out.information.covariance = (c + more) * dependence.level;
+        let described = describe_parameters(&out.model, &out.values, &out.information);
+        for (parameter, described) in out.parameters.iter_mut().zip(described) {
+            parameter.sigma = described.sigma;
+        }
+        Some(out)
+    }
+
+    fn curvature(&self) -> Option<NormalEquations> {
+        let mut system = NormalEquations::new(self.model.free());
+        let mut work = Workspace::new(&self.model);
+        accumulate(self.objective(), &self.values, &mut work, &mut system).then_some(system)
+    }
+
+    fn scaled_samples(&self, borders: &[usize], most: usize) -> Vec<Scaled> {
+        let mut work = Workspace::new(&self.model);
+        work.cache.update(&self.model.problem, &self.values);
+        let mut keys = Keys::default();
+        let mut out = Vec::new();
+        let mut recording = None;
+        for sample in 0..self.model.problem.samples {
+            if out.len() >= most {
+                break;
+            }
+            let Some(rows) = whitened(self.objective(), &self.values, sample, &mut work) else {
+                continue;
+            };
+            let own = borders.partition_point(|b| *b <= sample);
+            let starts = recording != Some(own);
+            recording = Some(own);
+            out.push(self.scaled_sample(&rows, starts, &mut keys));
+        }
+        out
+    }
+
+    /// W = σ V⁻¹ σ,   k = σ V⁻¹ J,   y = σ V⁻¹ e
+    fn scaled_sample(&self, rows: &Whitened, starts: bool, keys: &mut Keys) -> Scaled {
+        let m = rows.w.len();
+        let mut sigma = vec![1.0; m];
+        let mut own = vec![0; m];
+        for &(o, first, count) in &rows.blocks {
+            add_block(&self.model, o, |i, j, group, shape| {
+                if i == j {
+                    sigma[first + i] = (self.theta[group] * shape).sqrt();
+                }
+            });
+            let observation = self.model.observations[o];
+            let kind = &self.model.problem.measurements[observation.measurement].kind;
+            let part = match kind {
+                MeasurementKind::Markers(markers) => {
+                    markers.observations[observation.item].point.index() + 1
+                }
+                _ => 0,
+            };
+            for i in 0..count {
+                own[first + i] = keys.of(observation.measurement, part, i);
+            }
+        }
+        let mut scaled = rows.l_inverse.clone();
+        for (j, s) in sigma.iter().enumerate() {
+            scaled.column_mut(j).scale_mut(*s);
+        }
+        Scaled {
+            k: scaled.tr_mul(&rows.a),
+            y: scaled.tr_mul(&rows.w),
+            w: scaled.tr_mul(&scaled),
+            keys: own,
+            starts,
+        }
+    }
+}
+
+/// Numbers of (measurement, point, row).
+#[derive(Default)]
+struct Keys(Vec<(usize, usize, usize)>);
+
+impl Keys {
+    fn of(&mut self, measurement: usize, part: usize, row: usize) -> usize {
+        let key = (measurement, part, row);
+        self.0.iter().position(|k| *k == key).unwrap_or_else(|| {
+            self.0.push(key);
+            self.0.len() - 1
+        })
+    }
+}
+
+/// Sums over the same rows of samples 0, 1, …, [`LAGS`] apart within a recording.
+fn lag_sums(
+    samples: &[Scaled],
+    mut of: impl FnMut(&Scaled, usize, &Scaled, usize) -> f64,
+) -> [f64; LAGS + 1] {
+    let mut out = [0.0; LAGS + 1];
+    each_pair(samples, |lag, a, b| {
+        for (i, j) in shared(a, b) {
+            out[lag] += of(a, i, b, j);
+        }
+    });
+    out
+}
+
+/// tr(W_s W_t) over the same rows; at lag 0 tr W.
+fn lag_traces(samples: &[Scaled]) -> [f64; LAGS + 1] {
+    let mut out = [0.0; LAGS + 1];
+    each_pair(samples, |lag, a, b| {
+        if lag == 0 {
+            out[0] += a.w.trace();
+            return;
+        }
+        let pairs: Vec<(usize, usize)> = shared(a, b).collect();
+        for &(i, p) in &pairs {
+            for &(j, q) in &pairs {
+                out[lag] += a.w[(i, j)] * b.w[(p, q)];
+            }
+        }
+    });
+    out
+}
+
+fn each_pair<'a>(samples: &'a [Scaled], mut see: impl FnMut(usize, &'a Scaled, &'a Scaled)) {
+    for (s, a) in samples.iter().enumerate() {
+        see(0, a, a);
+        for lag in 1..=LAGS {
+            match samples.get(s + lag) {
+                Some(b) if samples[s + 1..=s + lag].iter().all(|x| !x.starts) => see(lag, a, b),
+                _ => break,
+            }
+        }
+    }
+}
+
+/// Places of the same row in two samples.
+fn shared<'a>(a: &'a Scaled, b: &'a Scaled) -> impl Iterator<Item = (usize, usize)> + 'a {
+    let place = |key: &usize| b.keys.iter().position(|k| k == key);
+    a.keys
+        .iter()
+        .enumerate()
+        .filter_map(move |(i, key)| Some((i, place(key)?)))
+}
+
+/// Σ_{u<s} c ρ^(s−u) k_u for every sample, by recursion.
+fn memory(samples: &[Scaled], share: f64, decay: f64, n: usize) -> Vec<DMatrix<f64>> {
+    let reset = |s: usize| samples[s].starts;
+    recursion(samples.len(), |s| &samples[s], reset, share, decay, n)
+}
+
+fn recursion<'a>(
+    count: usize,
+    at: impl Fn(usize) -> &'a Scaled,
+    reset: impl Fn(usize) -> bool,
+    share: f64,
+    decay: f64,
+    n: usize,
+) -> Vec<DMatrix<f64>> {
+    let width = (0..count)
+        .flat_map(|s| &at(s).keys)
+        .max()
+        .map_or(0, |k| k + 1);
+    let mut held = DMatrix::<f64>::zeros(width, n);
+    let mut out = Vec::with_capacity(count);
+    for s in 0..count {
+        if reset(s) {
+            held.fill(0.0);
+        } else {
+            held *= decay;
+        }
+        let sample = at(s);
+        let mut own = DMatrix::zeros(sample.keys.len(), n);
+        for (i, key) in sample.keys.iter().enumerate() {
+            own.row_mut(i).copy_from(&held.row(*key));
+        }
+        for (i, key) in sample.keys.iter().enumerate() {
+            let mut row = held.row_mut(*key);
+            row += sample.k.row(i) * share;
+        }
+        out.push(own);
+    }
+    out
+}
+
+/// The last three terms of (3), by lag.
+fn bias(samples: &[Scaled], c: &DMatrix<f64>, share: f64, decay: f64) -> [f64; LAGS + 1] {
+    let n = c.nrows();
+    let count = samples.len();
+    let before = memory(samples, share, decay, n);
+    // The same from the end: a recording then begins with its last sample.
+    let ends = |s: usize| s == 0 || samples[count - s].starts;
+    let after = recursion(count, |s| &samples[count - 1 - s], ends, share, decay, n);
+    let mut added = DMatrix::zeros(n, n);
+    let around: Vec<DMatrix<f64>> = (0..count)
+        .map(|s| &before[s] + &after[count - 1 - s])
+        .collect();
+    for (sample, n_s) in samples.iter().zip(&around) {
+        added.gemm_tr(1.0, n_s, &sample.k, 1.0);
+    }
+    let covariance = c + c * added * c;
+    let h: Vec<DMatrix<f64>> = samples
+        .iter()
+        .zip(&around)
+        .map(|(s, n_s)| &s.k + &s.w * n_s)
+        .collect();
+    let kc: Vec<DMatrix<f64>> = samples.iter().map(|s| &s.k * c).collect();
+    let kg: Vec<DMatrix<f64>> = samples.iter().map(|s| &s.k * &covariance).collect();
+    let mut out = [0.0; LAGS + 1];
+    for (s, a) in samples.iter().enumerate() {
+        for lag in 0..=LAGS {
+            let t = s + lag;
+            if t >= count || (lag > 0 && samples[t].starts) {
+                break;
+            }
+            for (i, j) in shared(a, &samples[t]) {
+                out[lag] += kg[s].row(i).dot(&samples[t].k.row(j))
+                    - kc[s].row(i).dot(&h[t].row(j))
+                    - kc[t].row(j).dot(&h[s].row(i));
+            }
+        }
+    }
+    out
+}
+
+/// The positive part of a symmetric matrix.
+fn positive(m: &DMatrix<f64>) -> DMatrix<f64> {
+    // Scaled to a unit diagonal: radians and meters differ by orders.
+    let size = |i: usize| match m[(i, i)].abs().sqrt() {
+        size if size > 0.0 => size,
+        _ => 1.0,
+    };
+    let scale: Vec<f64> = (0..m.nrows()).map(size).collect();
+    let unit = DMatrix::from_fn(m.nrows(), m.nrows(), |i, j| {
+        0.5 * (m[(i, j)] + m[(j, i)]) / (scale[i] * scale[j])
+    });
+    let eigen = calib_geometry::decompose::symmetric_eigen(&unit);
+    let mut half = eigen.vectors.clone();
+    for k in 0..half.ncols() {
+        half.column_mut(k)
+            .scale_mut(eigen.values[k].max(0.0).sqrt());
+    }
+    let kept = &half * half.transpose();
+    DMatrix::from_fn(m.nrows(), m.nrows(), |i, j| {
+        kept[(i, j)] * scale[i] * scale[j]
+    })
+}
