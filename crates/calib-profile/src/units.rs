@@ -1,9 +1,5 @@
 //! The one place where profile units become SI.
 
-use nalgebra::{Isometry3, Translation3, Vector3};
-
-use crate::raw::RawPose;
-
 pub(crate) const MM: f64 = 1e-3;
 pub(crate) const DEG: f64 = std::f64::consts::PI / 180.0;
 
@@ -41,13 +37,4 @@ pub(crate) fn split_joint_key(key: &str) -> Option<(&str, JointUnit)> {
     units
         .iter()
         .find_map(|(suffix, unit)| key.strip_suffix(suffix).map(|joint| (joint, *unit)))
-}
-
-/// URDF convention: fixed-axis roll, pitch, yaw.
-pub(crate) fn pose(raw: &RawPose) -> Isometry3<f64> {
-    let rpy = Vector3::from(raw.rpy_deg) * DEG;
-    Isometry3::from_parts(
-        Translation3::from(Vector3::from(raw.xyz_mm) * MM),
-        calib_urdf::rpy::rotation_from_rpy(&rpy),
-    )
 }

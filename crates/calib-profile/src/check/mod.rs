@@ -3,13 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_urdf::{JointId, JointKind, LinkId, RobotModel};
-use nalgebra::{Isometry3, Point3, Unit, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, Unit, Vector3};
 
 use crate::error::{Problem, ProfileError, expected, one_of};
 use crate::locate::{Place, Places};
 use crate::profile::{Outputs, Profile, Tracker};
-use crate::raw::RawProfile;
-use crate::units::{DEG, MM, pose, split_joint_key};
+use crate::raw::{RawPose, RawProfile};
+use crate::units::{DEG, MM, split_joint_key};
 
 /// The only version of the format so far.
 const VERSION: u32 = 1;
@@ -193,4 +193,13 @@ impl<'a> Checker<'a> {
         }
         outputs
     }
+}
+
+/// URDF convention: fixed-axis roll, pitch, yaw.
+fn pose(raw: &RawPose) -> Isometry3<f64> {
+    let rpy = Vector3::from(raw.rpy_deg) * DEG;
+    Isometry3::from_parts(
+        Translation3::from(Vector3::from(raw.xyz_mm) * MM),
+        calib_urdf::rpy::rotation_from_rpy(&rpy),
+    )
 }
