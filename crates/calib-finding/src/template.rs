@@ -84,6 +84,7 @@ fn shown(fact: &Fact, form: &str) -> String {
             "or" => names.join(" or "),
             "code" => format!("`{}`", names.join("`, `")),
             "exchange" => names.join(" ↔ "),
+            "list" => format!("[{}]", names.join(", ")),
             _ => names.join(", "),
         },
         Fact::Unknown => UNKNOWN.to_owned(),

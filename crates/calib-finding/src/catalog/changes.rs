@@ -1,11 +1,23 @@
-//! What changed while the data were recorded.
+//! What changed while the data were recorded, and what successive rows share.
 
 super::topic! {
+    /// Successive rows of one posture.
+    FRAMES_MERGED = "frames-merged" {
+        "": Info,
+            "The {rows:row} show {poses:pose}: successive rows with equal joint values were merged into their mean.",
+            "Nothing is needed. Record more poses rather than more frames of a pose: the frames share the error of the posture.";
+    }
+    /// Residuals of successive rows are correlated.
+    NOISE_HAS_MEMORY = "noise-has-memory" {
+        "": Warning,
+            "The residuals of successive rows are correlated ({correlation}). The stated uncertainties allow for it and are up to {factor} times larger than for independent noise.",
+            "Record the poses in random order and wait between them; switch off filters of the tracker. If an effect is named as missing, enable it first.";
+    }
     /// Something moved while the data were recorded.
     CHANGED_WHILE_RECORDING = "changed-while-recording" {
         "body": Warning,
             "Body `{body}` moved on its link by {distance} ± {sigma} and {angle} between rows {before} and {row}, or this part of the data differs for another reason.[[ The data show nearly as well that {rivals:code} moved.]][[ Missing physics explains as much: `{physics}`.]]",
-            "Fasten the body and record again, or estimate one mount for each part: add `split: {recording: {recording}, at_row: {row}}` to the body in the profile.";
+            "Fasten the body and record again, or estimate one mount for each part: add `split: {recording: {recording}, at_row: {row}[[, before: {earlier:list}]]}` to the body in the profile.";
         "tracker": Warning,
             "The tracker, or the whole robot, moved by {distance} ± {sigma} and {angle} between rows {before} and {row}.[[ The data show nearly as well that {rivals:code} moved.]][[ Missing physics explains as much: `{physics}`.]]",
             "Secure the tracker and the robot's stand, and record again; until then keep only the rows of one side.";

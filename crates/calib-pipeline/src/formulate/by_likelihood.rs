@@ -9,10 +9,12 @@ use crate::formulate::checked::Checked;
 use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::found::Found;
 use crate::formulate::kinematics::Calibration;
+use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::solved::Solved;
 use crate::formulate::{bad_rows, clock};
 use crate::prepare::inputs::Inputs;
+use crate::prepare::repeats::merge;
 use crate::prepare::tracks::body_tracks;
 
 /// Fits all loops at once; rows that had not settled are excluded and the fit is repeated.
@@ -25,6 +27,11 @@ pub fn likelihood(
     progress: &mut dyn FnMut(&str),
 ) -> Result<Solved, PipelineError> {
     only_a_cross_check(&mut checked.findings);
+    let merged = merge(inputs);
+    if !merged.is_empty() {
+        checked.findings.extend(merged);
+        checked.tracks = body_tracks(inputs, &mut Vec::new())?;
+    }
     progress("fit registration only");
     // The baseline is plain least squares: what is left then is the geometry's fault, not noise to be estimated.
     let baseline = ml::state(
@@ -51,6 +58,7 @@ pub fn likelihood(
         }
     }
     checked.findings.extend(on_their_limit(&fit));
+    checked.findings.extend(with_memory(&mut fit));
     *inputs = clock::corrected(inputs, &fit);
     ml_result(inputs, fit, registered.calibration)
 }

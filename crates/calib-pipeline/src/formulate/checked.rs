@@ -10,6 +10,7 @@ use crate::formulate::model_checks;
 use crate::prepare::checks;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::relabel::relabel;
+use crate::prepare::split::split;
 use crate::prepare::stopped::stopped;
 use crate::prepare::tracks::{BodyTrack, body_tracks};
 
@@ -38,6 +39,7 @@ pub fn check_data(
         findings.extend(relabel(inputs));
     }
     findings.extend(checks::check(inputs));
+    split(inputs);
     findings.extend(of_shapes);
     let stops = |findings: &[Finding]| checks::stops(findings) && !force;
     let tracks = match body_tracks(inputs, &mut findings) {

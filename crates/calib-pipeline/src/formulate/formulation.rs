@@ -70,6 +70,16 @@ pub struct NoiseGroups {
     pub joint: Option<GroupId>,
 }
 
+impl Formulation {
+    /// First sample of every recording but the first.
+    #[must_use]
+    pub fn borders(&self) -> Vec<usize> {
+        let samples = &self.samples;
+        let starts = (1..samples.len()).filter(|s| samples[*s].0 != samples[s - 1].0);
+        starts.collect()
+    }
+}
+
 /// A solved problem.
 #[derive(Debug, Clone)]
 pub struct MlFit {

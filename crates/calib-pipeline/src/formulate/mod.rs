@@ -9,6 +9,7 @@ pub mod contacts;
 pub mod formulation;
 pub mod found;
 pub mod kinematics;
+pub(crate) mod memory;
 pub mod ml;
 pub mod model_checks;
 pub mod models;

@@ -1,7 +1,10 @@
 //! Did a body, the tracker or a joint's zero move while the data were recorded?
 
+use std::collections::BTreeSet;
+
 use calib_core::{Change, ChangeSettings, EdgeId, FrameId, Moved, Physics, ScoreTest};
 use calib_finding::{About, Fact, Finding, Severity, Subject, catalog};
+use calib_profile::Usage;
 use calib_urdf::Joint;
 
 use crate::formulate::formulation::MlFit;
@@ -11,7 +14,7 @@ use crate::prepare::inputs::Inputs;
 #[must_use]
 pub fn changes(inputs: &Inputs, fit: &MlFit) -> Option<Finding> {
     let mut settings = ChangeSettings::default();
-    settings.borders = borders(fit);
+    settings.borders = fit.formulation.borders();
     let scan = fit.solution.changes(&settings)?;
     let change = scan.significant()?;
     let names = Names { inputs, fit };
@@ -36,13 +39,6 @@ pub fn changes(inputs: &Inputs, fit: &MlFit) -> Option<Finding> {
     } else {
         finding
     })
-}
-
-/// First sample of every recording but the first.
-fn borders(fit: &MlFit) -> Vec<usize> {
-    let samples = &fit.formulation.samples;
-    let starts = (1..samples.len()).filter(|s| samples[*s].0 != samples[s - 1].0);
-    starts.collect()
 }
 
 /// The missing effect that explains more than a change does, where there is one.
@@ -146,13 +142,7 @@ impl Names<'_> {
     /// The recording, and the rows on either side of the change.
     fn placed(&self, finding: Finding, change: &Change) -> Finding {
         let samples = &self.fit.formulation.samples;
-        // A range that begins where its recording begins ends with the change.
-        let starts = |s: usize| s == 0 || samples[s].0 != samples[s - 1].0;
-        let at = if starts(change.first) && change.end < samples.len() && !starts(change.end) {
-            change.end
-        } else {
-            change.first
-        };
+        let at = change.first;
         let row = |s: usize| {
             let (recording, row) = &samples[s];
             (
@@ -162,6 +152,18 @@ impl Names<'_> {
         };
         let (recording, after) = row(at);
         let before = row(at.max(1) - 1);
+        // Recordings that lie before the change, of those that were fitted.
+        let changed: BTreeSet<&String> = change.also.iter().map(|s| &samples[*s].0).collect();
+        let all: BTreeSet<&String> = samples.iter().map(|(name, _)| name).collect();
+        let fitted = |name: &&String| self.inputs.recordings[*name].spec.usage != Usage::Validation;
+        let others = all
+            .into_iter()
+            .filter(fitted)
+            .filter(|name| *name != recording);
+        let earlier: Vec<String> = others
+            .filter(|name| !changed.contains(name))
+            .cloned()
+            .collect();
         let shown = |(name, row): (&String, u64)| {
             if name == recording {
                 row.to_string()
@@ -173,6 +175,10 @@ impl Names<'_> {
             .with("before", Fact::name(shown(before)))
             .with("row", Fact::name(after.to_string()))
             .with("recording", Fact::name(recording.clone()))
+            .with_some(
+                "earlier",
+                (!earlier.is_empty()).then(|| Fact::names(earlier)),
+            )
             .in_recording(recording.clone())
             .at_rows([after])
     }

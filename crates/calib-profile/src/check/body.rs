@@ -3,7 +3,7 @@
 use super::names::MarkerList;
 use super::*;
 use crate::profile::{Body, BodyKind};
-use crate::raw::RawBody;
+use crate::raw::{RawBody, RawSplit};
 
 impl Checker<'_> {
     pub(super) fn bodies(&mut self) -> BTreeMap<String, Body> {
@@ -19,6 +19,9 @@ impl Checker<'_> {
                         "one marker belongs to one body; rename or remove it",
                     );
                 }
+            }
+            if let Some(split) = &body.split {
+                self.split(name, split);
             }
             if let Some(body) = self.body(name, body) {
                 bodies.insert(name.clone(), body);
@@ -59,7 +62,31 @@ impl Checker<'_> {
             link: link?,
             kind,
             mount: raw.mount.as_ref().map(pose),
+            split: raw.split.clone(),
         })
+    }
+
+    /// The recordings of a `split`, and the name that the body before it gets.
+    fn split(&mut self, name: &str, split: &RawSplit) {
+        let recordings = &self.raw.recordings;
+        self.known(
+            "recording",
+            &["bodies", name, "split", "recording"],
+            &split.recording,
+            recordings.keys(),
+        );
+        for (i, recording) in split.before.iter().enumerate() {
+            let path = ["bodies", name, "split", "before", &i.to_string()];
+            self.known("recording", &path, recording, recordings.keys());
+        }
+        let before = format!("{name}_before");
+        if self.raw.bodies.contains_key(&before) {
+            self.problem(
+                &["bodies", name, "split"],
+                format!("a body `{before}` exists already"),
+                "rename that body: the split gives its name to the rows before the change",
+            );
+        }
     }
 
     fn template(&mut self, name: &str, raw: &RawBody) -> Option<Vec<Point3<f64>>> {

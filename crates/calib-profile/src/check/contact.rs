@@ -1,6 +1,6 @@
 //! Contacts: the touching point, what it touches, and which of both is known.
 
-use nalgebra::{Translation3, UnitQuaternion};
+use nalgebra::UnitQuaternion;
 
 use super::*;
 use crate::profile::{Contact, ContactBase, Tip};

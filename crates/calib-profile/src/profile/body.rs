@@ -4,6 +4,8 @@ use calib_urdf::LinkId;
 use nalgebra::Isometry3;
 use nalgebra::Point3;
 
+use crate::raw::RawSplit;
+
 /// A tracking body on a link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
@@ -13,6 +15,8 @@ pub struct Body {
     pub kind: BodyKind,
     /// `link_from_body` where known by construction.
     pub mount: Option<Isometry3<f64>>,
+    /// Where it moved on its link, in the numbers of the recordings' rows.
+    pub split: Option<RawSplit>,
 }
 
 /// What is recorded of a tracking body.

@@ -19,7 +19,8 @@ pub use solve::{
 
 pub use crate::raw::{
     RawClocks as Clocks, RawFree as Free, RawJointFree as JointFree, RawLoad as Load,
-    RawMethod as Method, RawTimedPoses as TimedPoses, RawUpAxis as UpAxis, RawUse as Usage,
+    RawMethod as Method, RawSplit as Split, RawTimedPoses as TimedPoses, RawUpAxis as UpAxis,
+    RawUse as Usage,
 };
 pub use crate::raw::{RawPlugin as Plugin, RawValue as ParameterValue};
 

@@ -23,6 +23,22 @@ pub struct RawBody {
     /// Pose of the body on its link where it is known by construction (`link_from_body`): it is then not estimated.
     #[serde(default)]
     pub mount: Option<RawPose>,
+    /// The body moved on its link during the recordings: one mount for the rows before, one for those from there on.
+    #[serde(default)]
+    pub split: Option<RawSplit>,
+}
+
+/// Where a body moved on its link. The rows before belong to a body of the same name with the ending `_before`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawSplit {
+    /// The recording in which it moved.
+    pub recording: String,
+    /// The first row after it moved, as findings number rows.
+    pub at_row: u64,
+    /// Recordings that were made before; all others were made after.
+    #[serde(default)]
+    pub before: Vec<String>,
 }
 
 /// A pose: position and fixed-axis roll, pitch, yaw (URDF convention).

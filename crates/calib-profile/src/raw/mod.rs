@@ -12,7 +12,7 @@ mod simulate;
 mod solve;
 
 pub use crate::touched::RawTouched;
-pub use body::{RawBody, RawPose};
+pub use body::{RawBody, RawPose, RawSplit};
 pub use contact::{RawContact, RawTip};
 pub(crate) use free::{ANGLE, POSITION, PRIOR_KEYS};
 pub use free::{RawFree, RawJointFree, RawPrior};

@@ -1,0 +1,32 @@
+//! Noise with a memory: the uncertainty of the fit where successive rows share a part of their errors.
+
+use calib_finding::{About, Fact, Finding, catalog};
+
+use crate::formulate::formulation::MlFit;
+
+/// Gives the fit the uncertainty that it has under the memory that its residuals show, with the finding that says so.
+pub(crate) fn with_memory(fit: &mut MlFit) -> Option<Finding> {
+    let borders = fit.formulation.borders();
+    let found = fit.solution.dependence(&borders)?;
+    if !found.is_significant() {
+        return None;
+    }
+    let largest = |s: &calib_core::Solution| -> Vec<f64> {
+        s.parameters.iter().filter_map(|p| p.sigma).collect()
+    };
+    let under = fit.solution.under(&found, &borders)?;
+    // The factor that a parameter's σ grows by at most.
+    let (before, after) = (largest(&fit.solution), largest(&under));
+    let ratios = before
+        .iter()
+        .zip(&after)
+        .filter(|(b, _)| **b > 0.0)
+        .map(|(b, a)| a / b);
+    let factor = ratios.fold(1.0, f64::max);
+    fit.solution = under;
+    Some(
+        Finding::new(catalog::NOISE_HAS_MEMORY, About::Fit)
+            .with("correlation", Fact::ratio(found.lag_one))
+            .with("factor", Fact::number(factor, calib_finding::Unit::One)),
+    )
+}

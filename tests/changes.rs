@@ -1,0 +1,251 @@
+//! What moved while the data were recorded, and rows that are not independent: said by `calib run`, with row and size.
+
+mod scratch;
+
+use scratch::{Ran, Scratch};
+use serde_json::Value;
+
+const PROFILE: &str = "robots/ripley.yaml";
+const POSES: &str = "robots/ripley/arm_poses.csv";
+/// Recordings that were made after the change, besides the rest of `arm_poses`.
+const LATER: [&str; 2] = ["robots/ripley/wrist_sweep.csv", "robots/ripley/checks.csv"];
+/// First changed row of `arm_poses`, counted from 0.
+const FROM: usize = 22;
+/// Comment lines and header before the first row.
+const BEFORE: usize = 3;
+
+/// Every row of a table as (name, cell) pairs, changed by `change(row, get, set)`.
+fn rows(
+    dir: &Scratch,
+    table: &str,
+    change: impl Fn(usize, &mut dyn FnMut(&str, [f64; 3]), &dyn Fn(&str) -> Option<[f64; 3]>),
+) -> String {
+    let text = dir.read(table);
+    let mut out = Vec::new();
+    let mut header: Vec<String> = Vec::new();
+    let mut row = 0;
+    for line in text.lines() {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if line.starts_with('#') || header.is_empty() {
+            if !line.starts_with('#') {
+                header = cells;
+            }
+            out.push(line.to_owned());
+            continue;
+        }
+        let place = |marker: &str, axis: &str| {
+            let column = header
+                .iter()
+                .position(|h| *h == format!("{marker}.{axis}_m"));
+            column.expect("a marker of the table")
+        };
+        let before = cells.clone();
+        let get = |marker: &str| {
+            let [x, y, z] = ["x", "y", "z"].map(|axis| before[place(marker, axis)].parse().ok());
+            Some([x?, y?, z?])
+        };
+        let mut set = |marker: &str, p: [f64; 3]| {
+            for (axis, value) in ["x", "y", "z"].iter().zip(p) {
+                cells[place(marker, axis)] = format!("{value:.6}");
+            }
+        };
+        change(row, &mut set, &get);
+        row += 1;
+        out.push(cells.join(","));
+    }
+    out.join("\n") + "\n"
+}
+
+/// Ripley with one change of the marker positions from row [`FROM`] of `arm_poses` on.
+fn changed_from(
+    markers: &[&str],
+    shift: impl Fn(&dyn Fn(&str) -> Option<[f64; 3]>) -> Option<[f64; 3]>,
+) -> Scratch {
+    let mut dir = Scratch::new().robot("ripley");
+    for table in [POSES].into_iter().chain(LATER) {
+        let first = if table == POSES { FROM } else { 0 };
+        let text = rows(&dir, table, |row, set, get| {
+            if let (true, Some(by)) = (row >= first, shift(get)) {
+                for marker in markers {
+                    if let Some(p) = get(marker) {
+                        set(marker, [0, 1, 2].map(|i| p[i] + by[i]));
+                    }
+                }
+            }
+        });
+        dir = dir.file(table, text);
+    }
+    dir
+}
+
+fn run(dir: &Scratch) -> (Ran, Value) {
+    let ran = dir.calib(["run", PROFILE, "--out", "out"]);
+    let report = dir.json("out/report.json");
+    (ran, report)
+}
+
+fn finding<'a>(report: &'a Value, id: &str) -> Option<&'a Value> {
+    let mut all = report["findings"].as_array().expect("a list").iter();
+    all.find(|f| f["id"] == id)
+}
+
+const GRIPPER: [&str; 4] = ["gripM_1", "gripM_2", "gripM_3", "gripM_4"];
+
+/// The gripper's body slips by 1.5 mm along the line of two markers: the same direction on the body at every pose.
+fn slipped() -> Scratch {
+    changed_from(&GRIPPER, |get| {
+        let (a, b) = (get("gripM_1")?, get("gripM_2")?);
+        let d = [0, 1, 2].map(|i| b[i] - a[i]);
+        let length = d.iter().map(|x| x * x).sum::<f64>().sqrt();
+        Some(d.map(|x| 1.5e-3 * x / length))
+    })
+}
+
+#[test]
+fn a_body_that_slips_is_named_with_its_row() {
+    let dir = slipped();
+    let (_, report) = run(&dir);
+    let found = finding(&report, "changed-while-recording").expect("the slip is named");
+    assert_eq!(found["facts"]["kind"], "body", "{found:#}");
+    assert_eq!(found["facts"]["body"], "gripM", "{found:#}");
+    assert_eq!(found["facts"]["recording"], "arm_poses", "{found:#}");
+    let row: usize = found["facts"]["row"]
+        .as_str()
+        .and_then(|r| r.parse().ok())
+        .expect("a row");
+    assert!(row.abs_diff(FROM + BEFORE + 1) <= 1, "{found:#}");
+    let distance = found["facts"]["distance"]["value"]
+        .as_f64()
+        .expect("a length");
+    assert!((distance - 1.5e-3).abs() < 0.4e-3, "{found:#}");
+}
+
+#[test]
+fn a_split_gives_the_body_two_mounts() {
+    let dir = slipped().edit(
+        PROFILE,
+        "gripM: {link: gripper, markers: [gripM_1, gripM_2, gripM_3, gripM_4]}",
+        &format!(
+            "gripM: {{link: gripper, markers: [gripM_1, gripM_2, gripM_3, gripM_4], split: {{recording: arm_poses, at_row: {}, before: [base_sweep]}}}}",
+            FROM + BEFORE + 1
+        ),
+    );
+    let (ran, report) = run(&dir);
+    assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
+    assert!(
+        finding(&report, "changed-while-recording").is_none(),
+        "{:#}",
+        report["findings"]
+    );
+    // The mounts differ by what the body slipped.
+    let calibration = dir.read("out/calibration.yaml");
+    assert!(calibration.contains("gripM_before"), "{calibration}");
+    let wrong = dir.edit(
+        PROFILE,
+        "recording: arm_poses, at_row",
+        "recording: arm_pose, at_row",
+    );
+    let ran = wrong.calib(["check", PROFILE]);
+    assert!(ran.stderr.contains("arm_poses"), "{}", ran.stderr);
+}
+
+#[test]
+fn a_tracker_that_is_bumped_is_named_with_its_row() {
+    let dir = Scratch::new().robot("ripley");
+    let header = dir.read(POSES);
+    let header = header
+        .lines()
+        .find(|l| l.starts_with("pose,"))
+        .expect("a header");
+    let markers: Vec<&str> = header
+        .split(',')
+        .filter_map(|c| c.strip_suffix(".x_m"))
+        .collect();
+    let dir = changed_from(&markers, |_| Some([1.2e-3, -0.8e-3, 0.5e-3]));
+    let (_, report) = run(&dir);
+    let found = finding(&report, "changed-while-recording").expect("the bump is named");
+    assert_eq!(found["facts"]["kind"], "tracker", "{found:#}");
+    let row: usize = found["facts"]["row"]
+        .as_str()
+        .and_then(|r| r.parse().ok())
+        .expect("a row");
+    assert!(row.abs_diff(FROM + BEFORE + 1) <= 1, "{found:#}");
+}
+
+/// The rows of `arm_poses`, each written `copies` times with another error of 0.3 mm in every coordinate.
+fn frames(copies: usize) -> Scratch {
+    let dir = Scratch::new().robot("ripley");
+    let text = dir.read(POSES);
+    let mut state = 1u64;
+    // Sums of uniform numbers: nearly normal, from a plain generator with a fixed seed.
+    let mut normal = || {
+        let mut sum = 0.0;
+        for _ in 0..12 {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            sum += (state >> 11) as f64 / (1u64 << 53) as f64;
+        }
+        sum - 6.0
+    };
+    let mut out = Vec::new();
+    let mut header: Vec<&str> = Vec::new();
+    for line in text.lines() {
+        if line.starts_with('#') || header.is_empty() {
+            if !line.starts_with('#') {
+                header = line.split(',').collect();
+            }
+            out.push(line.to_owned());
+            continue;
+        }
+        for _ in 0..copies {
+            let cells =
+                line.split(',')
+                    .zip(&header)
+                    .map(|(cell, name)| match cell.parse::<f64>() {
+                        Ok(x) if name.ends_with("_m") => format!("{:.6}", x + 3e-4 * normal()),
+                        _ => cell.to_owned(),
+                    });
+            out.push(cells.collect::<Vec<_>>().join(","));
+        }
+    }
+    dir.file(POSES, out.join("\n") + "\n")
+}
+
+#[test]
+fn frames_of_one_pose_count_once() {
+    let (_, plain) = run(&Scratch::new().robot("ripley"));
+    let (_, report) = run(&frames(8));
+    let found = finding(&report, "frames-merged").expect("said");
+    assert_eq!(found["severity"], "info");
+    assert_eq!(found["facts"]["rows"], 320);
+    assert_eq!(found["facts"]["poses"], 40);
+    // The uncertainty is that of 40 poses, not of 320.
+    let sigma = |report: &Value| -> Vec<f64> {
+        let all = report["parameters"].as_array().expect("a list").iter();
+        all.filter_map(|p| p["sigma"].as_f64())
+            .filter(|s| *s > 0.0)
+            .collect()
+    };
+    let (a, b) = (sigma(&plain), sigma(&report));
+    assert_eq!(a.len(), b.len());
+    assert!(a.len() > 10);
+    for (a, b) in a.iter().zip(&b) {
+        assert!(*b > 0.7 * a, "{b} after merging, {a} with single frames");
+    }
+    assert!(finding(&plain, "frames-merged").is_none());
+}
+
+#[test]
+fn a_clean_recording_has_neither() {
+    for robot in ["ripley", "justin"] {
+        let report = &scratch::finished(robot, "ml").report;
+        for id in [
+            "changed-while-recording",
+            "frames-merged",
+            "noise-has-memory",
+        ] {
+            assert!(finding(report, id).is_none(), "{robot}: {id}");
+        }
+    }
+}
