@@ -45,7 +45,7 @@ pub(crate) struct Disturbance {
     pub transmission: Transmission,
     /// A step of a pose: 2 mm for slips and bumps.
     pub step: Isometry3<f64>,
-    /// Pose by which a body was mounted anew, or the tracker moved.
+    /// Pose by which a body was mounted again, or the tracker moved.
     pub moved: Isometry3<f64>,
     /// Row from which a change holds, as a share of the first recording.
     pub from: f64,

@@ -42,7 +42,7 @@ pub enum Fault {
     ExchangeInOne,
     /// The tracker was moved before the last recording.
     TrackerMoved,
-    /// The body was mounted anew before the last recording.
+    /// The body was mounted again before the last recording.
     Remounted,
     /// Two discrete faults at once.
     Pair,

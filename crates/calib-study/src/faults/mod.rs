@@ -19,6 +19,7 @@ mod outcome;
 mod render;
 mod robot;
 mod run;
+mod settings;
 mod state;
 
 pub use case::Cell;
@@ -26,4 +27,5 @@ pub use design::{Body, Design, Validation};
 pub use fault::{Class, Fault};
 pub use outcome::{CaseResult, Outcome};
 pub use render::{csv, json, markdown};
-pub use run::{FaultError, FaultOptions, FaultResult, run_faults};
+pub use run::{FaultResult, run_faults};
+pub use settings::{FaultError, FaultOptions};

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use super::design::{Body, Design};
 use super::fault::{Class, Fault};
 use super::outcome::{CaseResult, Outcome};
-use super::run::{FaultError, FaultResult};
+use super::run::FaultResult;
+use super::settings::FaultError;
 
 /// How many cases ended how.
 #[derive(Debug, Clone, Copy, Default)]

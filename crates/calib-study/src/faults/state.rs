@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::case::Cell;
 use super::outcome::CaseResult;
-use super::run::{FaultError, FaultOptions};
+use super::settings::{FaultError, FaultOptions};
 
 /// What must be the same for cases to be kept. The number of cases is not: a longer study continues a shorter one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
