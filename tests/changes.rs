@@ -137,9 +137,9 @@ fn a_split_gives_the_body_two_mounts() {
         "{:#}",
         report["findings"]
     );
-    // The mounts differ by what the body slipped.
-    let calibration = dir.read("out/calibration.yaml");
-    assert!(calibration.contains("gripM_before"), "{calibration}");
+    // Both mounts are in the scene.
+    let scene = dir.read("out/ripley.scene.json");
+    assert!(scene.contains("gripM_before"), "{scene}");
     let wrong = dir.edit(
         PROFILE,
         "recording: arm_poses, at_row",
