@@ -879,6 +879,38 @@ fn hand_and_eye_are_judged() {
 }
 
 #[test]
+fn rows_with_gross_errors_are_named_as_in_the_file() {
+    let table = hand_eye(|p| p).read("pairs.csv");
+    let spoil = |lost: Option<usize>| {
+        let rows: Vec<String> = table
+            .lines()
+            .enumerate()
+            .map(|(line, text)| {
+                let mut cells: Vec<String> = text.split(',').map(str::to_owned).collect();
+                if line == 9 {
+                    let x: f64 = cells[7].parse().expect("a number");
+                    cells[7] = (x + 0.03).to_string();
+                }
+                if Some(line) == lost {
+                    cells[7..].iter_mut().for_each(String::clear);
+                }
+                cells.join(",")
+            })
+            .collect();
+        Scratch::new().file("pairs.csv", rows.join("\n") + "\n")
+    };
+    let fit = |dir: &Scratch| {
+        let ran = dir.calib(["fit", "handeye", "pairs.csv", "--json"]);
+        ran.expect(0).json()
+    };
+    let (all, fewer) = (fit(&spoil(None)), fit(&spoil(Some(4))));
+    assert_eq!((&all["used"], &fewer["used"]), (&19.into(), &18.into()));
+    assert_eq!(all["rejected"].as_array().map(Vec::len), Some(1), "{all}");
+    // A lost pose before it does not change its number.
+    assert_eq!(all["rejected"], fewer["rejected"], "{fewer}");
+}
+
+#[test]
 fn frames_and_hand_eyes_go_the_road_of_all_estimators() {
     let dir = hand_eye(|p| p);
     for (what, known) in [("handeye", "handeye"), ("frame", "algorithm1")] {

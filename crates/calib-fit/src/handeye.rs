@@ -41,7 +41,11 @@ pub fn handeye(request: &HandEyeRequest) -> Result<Answer, FitError> {
         return Ok(command.list());
     }
     let file = request.file.as_deref().ok_or_else(no_table)?;
-    let (robot, measured) = pose_pairs(file, &request.robot, &request.measured)?;
+    let PosePairs {
+        rows,
+        robot,
+        measured,
+    } = pose_pairs(file, &request.robot, &request.measured)?;
     let input = Input::PosePairs {
         robot: &robot,
         measured: &measured,
@@ -61,11 +65,22 @@ pub fn handeye(request: &HandEyeRequest) -> Result<Answer, FitError> {
         estimator: request.estimator.as_deref(),
         all: request.all,
     };
-    road.answer(wish, |_| "handeye", |id, e| handeye_answer(request, id, e))
+    road.answer(
+        wish,
+        |_| "handeye",
+        |id, e| {
+            let rejected: Vec<u64> = e.rejected.iter().map(|&k| rows[k]).collect();
+            handeye_answer(request, id, e, &rejected)
+        },
+    )
 }
 
-/// Poses of one side and of the other, row by row.
-type PosePairs = (Vec<Isometry3<f64>>, Vec<Isometry3<f64>>);
+/// Poses of one side and of the other, with their rows in the file.
+struct PosePairs {
+    rows: Vec<u64>,
+    robot: Vec<Isometry3<f64>>,
+    measured: Vec<Isometry3<f64>>,
+}
 
 /// The rows in which both poses are known.
 fn pose_pairs(file: &Path, robot: &str, measured: &str) -> Result<PosePairs, FitError> {
@@ -100,10 +115,22 @@ fn pose_pairs(file: &Path, robot: &str, measured: &str) -> Result<PosePairs, Fit
         }
     };
     let both = poses.bodies[robot].iter().zip(&poses.bodies[measured]);
-    Ok(both.filter_map(|(a, b)| Some(((*a)?, (*b)?))).unzip())
+    let mut pairs = PosePairs {
+        rows: Vec::new(),
+        robot: Vec::new(),
+        measured: Vec::new(),
+    };
+    for ((a, b), row) in both.zip(&poses.rows) {
+        if let (Some(a), Some(b)) = (a, b) {
+            pairs.rows.push(*row);
+            pairs.robot.push(*a);
+            pairs.measured.push(*b);
+        }
+    }
+    Ok(pairs)
 }
 
-fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye) -> Answer {
+fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rejected: &[u64]) -> Answer {
     let observable = e.verdict == Verdict::Ok;
     let value = json!({
         "estimator": id,
@@ -122,7 +149,7 @@ fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye) -> Answer {
         "gap": e.gap,
         "certified": e.certified,
         "used": e.used,
-        "rejected": e.rejected,
+        "rejected": rejected,
     });
     let mut text = format!(
         "{id}: {} X = Z {}, {} poses\n",
@@ -157,8 +184,8 @@ fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye) -> Answer {
         },
         e.gap
     );
-    if !e.rejected.is_empty() {
-        let _ = writeln!(text, "  gross errors in rows {:?}", e.rejected);
+    if !rejected.is_empty() {
+        let _ = writeln!(text, "  gross errors in rows {rejected:?}");
     }
     answer(text, &value, observable)
 }
