@@ -1,21 +1,20 @@
 //! `calib run`: everything, in order.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use calib_files::OutputFile;
 use calib_profile::Method;
-use calib_report::{Report, Verdict};
+use calib_report::Report;
 
 use crate::error::{ExitCode, PipelineError};
-use crate::estimate::paper::{self, OriginEstimate};
+use crate::estimate::paper;
 use crate::formulate::by_closed_forms::{paper_assumptions, paper_result};
 use crate::formulate::by_likelihood::likelihood;
 use crate::formulate::checked::check_data;
-use crate::formulate::formulation::MlFit;
 use crate::formulate::solved::{Solved, nominal};
 use crate::output::assemble::assemble;
 use crate::output::evidence::Evidence;
+use crate::output::exit::exit_code;
 use crate::output::export::{patch_urdf, scene};
 use crate::output::files::{files, written};
 use crate::output::shapes;
@@ -23,11 +22,10 @@ use crate::output::view::{Shown, view};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
 use crate::prepare::robot::load_robot;
+use crate::verify;
 use crate::verify::changes::changes;
 use crate::verify::closure::close_loops;
-use crate::verify::held_out;
 use crate::verify::known::known_numbers;
-use crate::verify::left_out;
 use crate::verify::residuals::residual_rows;
 
 /// How to run.
@@ -68,11 +66,8 @@ pub fn run(
     progress("read profile and robot");
     let robot = load_robot(profile)?;
     progress("read recordings");
-    run_on(
-        load_recordings(robot, !options.no_plugins)?,
-        options,
-        progress,
-    )
+    let inputs = load_recordings(robot, !options.no_plugins)?;
+    run_on(inputs, options, progress)
 }
 
 /// [`run`] on recordings that are in memory.
@@ -108,19 +103,13 @@ pub fn run_on(
     };
     progress("verify");
     let (robot, fit) = (&solved.robot, solved.fit.as_ref());
-    checked
-        .findings
-        .extend(fit.and_then(|fit| changes(&inputs, fit)));
+    let changed = fit.and_then(|fit| changes(&inputs, fit));
+    checked.findings.extend(changed);
     let tracks = &checked.tracks;
     let loops = close_loops(&inputs, tracks, &solved.body_from_origin(), &solved.fk);
-    let robots = held_out::Robots {
-        nominal: Some(&nominal),
-        registered: solved.registered.as_ref(),
-        calibrated: robot,
-    };
-    let held_out = held_out::held_out(&inputs, tracks, &robots, fit)
-        .or_else(|| left_out::left_out(&inputs, tracks, &robots, fit?));
-    let known = fit.map_or_else(BTreeMap::new, |fit| known_numbers(&inputs, fit));
+    let held_out = verify::held_out(&inputs, tracks, &nominal, &solved);
+    let known = fit.map(|fit| known_numbers(&inputs, fit));
+    let known = known.unwrap_or_default();
     let residuals = residual_rows(&inputs, tracks, robot, fit);
     progress("patch the URDF");
     let urdf = patch_urdf(&inputs, robot, &known)?;
@@ -159,24 +148,4 @@ pub fn run_on(
         exit,
         solved,
     })
-}
-
-fn exit_code(
-    report: &Report,
-    strict: bool,
-    fit: Option<&MlFit>,
-    origins: &BTreeMap<String, OriginEstimate>,
-) -> ExitCode {
-    if fit.is_some_and(|f| !f.solution.status.is_converged()) {
-        return ExitCode::NotConverged;
-    }
-    if fit.is_none() && origins.values().any(|o| o.pose.is_none()) {
-        return ExitCode::NotObservable;
-    }
-    match report.verdict {
-        Verdict::Accepted => ExitCode::Accepted,
-        Verdict::AcceptedWithWarnings if !strict => ExitCode::Accepted,
-        Verdict::AcceptedWithWarnings => ExitCode::VerdictFail,
-        Verdict::Rejected | Verdict::NotEvaluated => ExitCode::VerdictFail,
-    }
 }

@@ -3,6 +3,7 @@
 pub mod assemble;
 mod counts;
 pub mod evidence;
+pub(crate) mod exit;
 pub mod export;
 mod facts;
 pub(crate) mod files;

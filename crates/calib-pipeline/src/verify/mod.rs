@@ -11,3 +11,30 @@ pub mod known;
 pub mod left_out;
 pub(crate) mod motions;
 pub mod residuals;
+
+use std::collections::BTreeMap;
+
+use calib_report::HeldOut;
+
+use crate::formulate::kinematics::Calibration;
+use crate::formulate::solved::Solved;
+use crate::prepare::inputs::Inputs;
+use crate::prepare::tracks::BodyTrack;
+
+/// Errors on held-out recordings; without any, on fitted poses that are left out in turn.
+#[must_use]
+pub fn held_out(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    nominal: &Calibration,
+    solved: &Solved,
+) -> Option<HeldOut> {
+    let robots = held_out::Robots {
+        nominal: Some(nominal),
+        registered: solved.registered.as_ref(),
+        calibrated: &solved.robot,
+    };
+    let fit = solved.fit.as_ref();
+    held_out::held_out(inputs, tracks, &robots, fit)
+        .or_else(|| left_out::left_out(inputs, tracks, &robots, fit?))
+}
