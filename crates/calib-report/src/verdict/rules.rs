@@ -210,8 +210,8 @@ fn found(id: ReasonId, effect: Effect, findings: &[String]) -> Vec<Reason> {
     counted.into_iter().map(reason).collect()
 }
 
-/// Validation that repeats fitted postures in more than this share proves nothing about new ones…
-const REPEATED: f64 = 0.5;
+/// Validation that repeats fitted postures in this share, measured again, proves little about new ones…
+const REPEATED: f64 = 2.0 / 3.0;
 /// …and below this share it does not matter.
 const FEW_REPEATED: f64 = 0.05;
 

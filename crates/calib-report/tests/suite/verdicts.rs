@@ -246,7 +246,7 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
             with(|f| f.validation = Validation::LeaveOneOut { postures: 40 }),
         ),
         (ReasonId::ValidationRepeatsFit, Warns, repeats(2)),
-        (ReasonId::ValidationRepeatsFit, LeavesOpen, repeats(10)),
+        (ReasonId::ValidationRepeatsFit, LeavesOpen, repeats(14)),
         (
             ReasonId::ImplausibleChange,
             Warns,
