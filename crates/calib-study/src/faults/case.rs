@@ -7,14 +7,15 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vect
 use serde::{Deserialize, Serialize};
 
 use super::design::{Body, Design, Validation, random};
+use super::disturbance::Disturbance;
 use super::fault::Fault;
-use super::robot::{BIG, Robot, SMALL, Transmission};
+use super::robot::{BIG, Robot, SMALL};
 use crate::noise::Noise;
 
 /// Tracker noise of each coordinate, m.
 pub(crate) const SIGMA: f64 = 3e-4;
 /// Orientation noise of a 6-DoF body, rad.
-const SIGMA_ORIENTATION: f64 = 1e-3;
+pub(super) const SIGMA_ORIENTATION: f64 = 1e-3;
 /// Noise of the joints from pose to pose, rad (0.01°).
 const SIGMA_JOINT: f64 = 1.75e-4;
 /// Postures at which a result is compared with the truth.
@@ -35,26 +36,6 @@ pub struct Cell {
     pub big: bool,
 }
 
-/// What changes on the table, in the workcell or in the file: drawn once per case.
-#[derive(Debug, Clone)]
-pub(crate) struct Disturbance {
-    pub faults: Vec<Fault>,
-    /// The joint that is concerned, and another one.
-    pub joint: usize,
-    pub other: usize,
-    pub transmission: Transmission,
-    /// A step of a pose: 2 mm for slips and bumps.
-    pub step: Isometry3<f64>,
-    /// Pose by which a body was mounted again, or the tracker moved.
-    pub moved: Isometry3<f64>,
-    /// Row from which a change holds, as a share of the first recording.
-    pub from: f64,
-    /// Rows by which joints lag: ±1.
-    pub lag: isize,
-    /// Degrees as rad rather than rad as degrees; mm as m rather than m as mm.
-    pub up: bool,
-}
-
 /// A case, drawn.
 pub(crate) struct Case {
     pub cell: Cell,
@@ -62,13 +43,13 @@ pub(crate) struct Case {
     pub disturbance: Disturbance,
     tracker_from_root: Isometry3<f64>,
     tip_from_body: Isometry3<f64>,
-    markers: Vec<Point3<f64>>,
-    readings: Vec<(&'static str, Vec<Vec<f64>>)>,
+    pub(super) markers: Vec<Point3<f64>>,
+    pub(super) readings: Vec<(&'static str, Vec<Vec<f64>>)>,
     evaluated: Vec<Vec<f64>>,
 }
 
 /// The last recording, in time.
-const LAST: &str = "checks";
+pub(super) const LAST: &str = "checks";
 
 impl Case {
     /// Case `number` of a cell.
@@ -112,7 +93,7 @@ impl Case {
         }
     }
 
-    fn has(&self, fault: Fault) -> bool {
+    pub(super) fn has(&self, fault: Fault) -> bool {
         self.disturbance.faults.contains(&fault)
     }
 
@@ -367,53 +348,6 @@ impl Case {
         }
         table
     }
-
-    /// The profile, as a careful person would write it who does not know of the fault.
-    pub fn profile(&self) -> String {
-        let n = self.robot.joints.len();
-        let link = if self.has(Fault::WrongLink) { n - 1 } else { n };
-        let markers: Vec<String> = (1..=self.markers.len())
-            .map(|m| format!("tip_{m}"))
-            .collect();
-        let body = if markers.is_empty() {
-            "pose: true".to_owned()
-        } else {
-            format!("markers: [{}]", markers.join(", "))
-        };
-        let recordings: Vec<String> = self
-            .readings
-            .iter()
-            .map(|(name, _)| {
-                let usage = if *name == LAST {
-                    "validation"
-                } else {
-                    "static"
-                };
-                format!("  {name}: {{file: {name}.csv, use: {usage}}}")
-            })
-            .collect();
-        let sigma = if self.cell.big {
-            "{position_mm: 5, angle_deg: 1, offset_deg: 1}"
-        } else {
-            "{position_mm: 2, angle_deg: 0.5, offset_deg: 0.5}"
-        };
-        let tracker = if markers.is_empty() {
-            format!(
-                "body_sigma_mm: {}, body_sigma_deg: {:.4}",
-                SIGMA * 1e3,
-                SIGMA_ORIENTATION.to_degrees()
-            )
-        } else {
-            format!("marker_sigma_mm: {}", SIGMA * 1e3)
-        };
-        format!(
-            "calib: 1\nrobot: {{name: arm, urdf: arm.urdf}}\ntracker: {{frame: lab, {tracker}}}\nbodies:\n  tip: {{link: l{link}, {body}}}\n\
-             recordings:\n{}\nsolve:\n  free: [bodies, tracker, joint_offsets, joint_axes]\n  prior: {sigma}\n  \
-             limits: {{held_out_rms_mm: {LIMIT_MM}, held_out_max_mm: {}}}\noutputs: {{urdf: arm.calibrated.urdf}}\n",
-            recordings.join("\n"),
-            4.0 * LIMIT_MM,
-        )
-    }
 }
 
 /// Largest rms error that the profiles of the study accept, mm.
@@ -435,90 +369,6 @@ struct State {
     last: bool,
     /// Share of all rows before it.
     share: f64,
-}
-
-impl Disturbance {
-    fn draw(fault: Fault, robot: &Robot, noise: &mut Noise) -> Self {
-        let n = robot.joints.len();
-        let joint = noise.below(n);
-        // Exchanged columns are of one unit.
-        let alike: Vec<usize> = (0..n)
-            .filter(|k| *k != joint && robot.joints[*k].prismatic == robot.joints[joint].prismatic)
-            .collect();
-        let revolute: Vec<usize> = (0..n).filter(|k| !robot.joints[*k].prismatic).collect();
-        let (joint, other) = match alike.get(noise.below(alike.len().max(1))) {
-            Some(other) => (joint, *other),
-            None => (revolute[0], revolute[1]),
-        };
-        let side = if noise.uniform() < 0.5 { 1.0 } else { -1.0 };
-        let step = |mm: f64, noise: &mut Noise| {
-            Isometry3::from_parts(
-                Translation3::from(noise.direction() * mm * 1e-3),
-                noise.turn(mm * 2e-3),
-            )
-        };
-        let pairs = [
-            Fault::Sign,
-            Fault::Exchange,
-            Fault::JointUnit,
-            Fault::RowShift,
-            Fault::WrongLink,
-            Fault::Coupling,
-        ];
-        let faults = if fault == Fault::Pair {
-            let first = noise.below(pairs.len());
-            let second = (first + 1 + noise.below(pairs.len() - 1)) % pairs.len();
-            vec![pairs[first], pairs[second]]
-        } else {
-            vec![fault]
-        };
-        let mut transmission = Transmission::default();
-        let turning = if robot.joints[joint].prismatic {
-            revolute[0]
-        } else {
-            joint
-        };
-        for fault in &faults {
-            match fault {
-                Fault::Gain => transmission.gain = Some((joint, 0.01 * side)),
-                Fault::Coupling => transmission.coupling = Some((joint, other, side)),
-                Fault::Crosstalk => transmission.coupling = Some((joint, other, 0.02 * side)),
-                Fault::Eccentricity => {
-                    transmission.eccentricity = Some((turning, 0.5_f64.to_radians() * side))
-                }
-                Fault::QuarterTurn => {
-                    let quarter = std::f64::consts::FRAC_PI_2;
-                    let by = [quarter, -quarter, 2.0 * quarter][noise.below(3)];
-                    transmission.offset = Some((turning, by));
-                }
-                _ => {}
-            }
-        }
-        let joint = match fault {
-            Fault::JointUnit | Fault::OffsetStep | Fault::Pair => turning,
-            _ => joint,
-        };
-        let other = if other == joint {
-            revolute
-                .iter()
-                .copied()
-                .find(|k| *k != joint)
-                .unwrap_or(other)
-        } else {
-            other
-        };
-        Self {
-            faults,
-            joint,
-            other,
-            transmission,
-            step: step(2.0, noise),
-            moved: step(40.0, noise),
-            from: noise.between(0.3, 0.7),
-            lag: if noise.uniform() < 0.5 { 1 } else { -1 },
-            up: noise.uniform() < 0.5,
-        }
-    }
 }
 
 impl Cell {

@@ -13,9 +13,11 @@
 
 mod case;
 mod design;
+mod disturbance;
 mod fault;
 mod names;
 mod outcome;
+mod profile;
 mod render;
 mod robot;
 mod run;
