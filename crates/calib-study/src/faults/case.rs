@@ -226,7 +226,7 @@ impl Case {
         let rho: f64 = if self.has(Fault::Memory) { 0.9 } else { 0.0 };
         let error = |memory: &mut Vector3<f64>, noise: &mut Noise| {
             *memory = *memory * rho + noise.vector(SIGMA * (1.0 - rho * rho).sqrt());
-            let gross = self.has(Fault::Outliers) && noise.uniform() < 0.05;
+            let gross = self.has(Fault::Outliers) && noise.uniform() < self.disturbance.outliers;
             let jump = if gross {
                 noise.direction() * noise.between(0.01, 0.1)
             } else {

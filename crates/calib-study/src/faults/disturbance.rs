@@ -16,12 +16,14 @@ pub(crate) struct Disturbance {
     pub transmission: Transmission,
     /// A step of a pose: 2 mm for slips and bumps.
     pub step: Isometry3<f64>,
-    /// Pose by which a body was mounted anew, or the tracker moved.
+    /// Pose by which a body was mounted again, or the tracker moved.
     pub moved: Isometry3<f64>,
     /// Row from which a change holds, as a share of the first recording.
     pub from: f64,
     /// Rows by which joints lag: ±1.
     pub lag: isize,
+    /// Share of samples that are far off.
+    pub outliers: f64,
     /// Degrees as rad rather than rad as degrees; mm as m rather than m as mm.
     pub up: bool,
 }
@@ -106,6 +108,7 @@ impl Disturbance {
             from: noise.between(0.3, 0.7),
             lag: if noise.uniform() < 0.5 { 1 } else { -1 },
             up: noise.uniform() < 0.5,
+            outliers: noise.log_between(0.005, 0.04),
         }
     }
 }

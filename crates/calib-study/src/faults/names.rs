@@ -117,7 +117,7 @@ fn expected(case: &Case, fault: Fault) -> Expected {
             &[],
         ),
         Fault::RepeatedFrames | Fault::CopiedRows | Fault::Memory => {
-            any(&["rows-repeated", "dependent-rows"], &[])
+            any(&["rows-repeated", "frames-merged", "noise-has-memory"], &[])
         }
         Fault::HeldOutCopies => any(&["held-out-in-training"], &[]),
         Fault::None | Fault::Outliers | Fault::Pair => any(&[], &[]),

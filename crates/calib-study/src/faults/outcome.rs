@@ -9,12 +9,13 @@ use calib_pipeline::prepare::load::{RobotProfile, of_tables};
 use calib_pipeline::run::{RunOptions, RunOutput, run_on};
 use calib_pipeline::{ExitCode, PipelineError};
 use calib_report::Verdict;
+use calib_report::verdict::{Effect, ReasonId};
 use calib_urdf::RobotModel;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::case::{Case, Cell, LIMIT_MM, Seen};
-use super::fault::Class;
+use super::fault::{Class, Fault};
 use super::names::names_the_cause;
 use crate::noise::Noise;
 
@@ -47,6 +48,8 @@ pub struct CaseResult {
     pub verdict: String,
     /// Ids of findings that are warnings or errors.
     pub findings: BTreeSet<String>,
+    /// Rules that kept the verdict from an acceptance without reserve.
+    pub reasons: BTreeSet<ReasonId>,
     /// True rms position error at new poses, m, where there is a result.
     pub rms_m: Option<f64>,
     /// Largest χ² of a predicted position over its threshold: above 1 the stated uncertainty does not cover the error.
@@ -54,14 +57,42 @@ pub struct CaseResult {
 }
 
 impl CaseResult {
-    /// Good data that was not accepted without reserve.
+    /// Accepted without a warning, and wrong.
     #[must_use]
-    pub fn false_alarm(&self) -> bool {
-        self.cell.fault.class() == Class::Clean && self.verdict != ACCEPTED
+    pub fn confidently_wrong(&self) -> bool {
+        self.outcome == Outcome::Wrong && self.verdict == Verdict::Accepted.word()
+    }
+
+    /// Good data that was not accepted.
+    #[must_use]
+    pub fn false_refusal(&self) -> bool {
+        self.cell.fault.class() == Class::Clean && self.outcome != Outcome::Harmless
+    }
+
+    /// Good data of which a finding or a reason says what is not true. What a design does not show, and outliers
+    /// that there are, are said with reason.
+    #[must_use]
+    pub fn false_warning(&self) -> bool {
+        let true_of_outliers = [
+            "marker-outlier",
+            "row-outlier",
+            "body-not-rigid",
+            "not-rigid",
+        ];
+        let outliers = self.cell.fault == Fault::Outliers;
+        let untrue = |id: &String| !(outliers && true_of_outliers.contains(&id.as_str()));
+        let about_the_model = [
+            ReasonId::ImplausibleChange,
+            ReasonId::ReversedAxis,
+            ReasonId::GoodnessOfFit,
+            ReasonId::NoiseAboveStated,
+            ReasonId::WorseThanRegistration,
+        ];
+        self.cell.fault.class() == Class::Clean
+            && (self.findings.iter().any(untrue)
+                || self.reasons.iter().any(|id| about_the_model.contains(id)))
     }
 }
-
-const ACCEPTED: &str = "accepted";
 
 /// Error of a result at new poses.
 struct Error {
@@ -107,6 +138,7 @@ fn stopped(case: &Case, number: u64, error: PipelineError) -> CaseResult {
         named,
         verdict: "stopped".to_owned(),
         findings: ids(&findings),
+        reasons: BTreeSet::new(),
         rms_m: None,
         worst_z: None,
     }
@@ -156,6 +188,8 @@ fn judged(case: &Case, number: u64, output: &RunOutput) -> CaseResult {
     } else {
         Outcome::Harmless
     };
+    let reasons = output.report.reason_facts.iter();
+    let against = reasons.filter(|reason| reason.effect != Effect::Supports);
     CaseResult {
         cell: case.cell,
         number,
@@ -163,6 +197,7 @@ fn judged(case: &Case, number: u64, output: &RunOutput) -> CaseResult {
         named,
         verdict: verdict.word().to_owned(),
         findings: ids(findings),
+        reasons: against.map(|reason| reason.id).collect(),
         rms_m: Some(error.rms_m),
         worst_z: error.worst_z,
     }

@@ -66,10 +66,13 @@ pub fn markdown(result: &FaultResult) -> String {
         result.seed
     );
     let _ = writeln!(text, "Wrong: {wrong} of {n}{}.\n", upper(wrong, n));
-    let alarms = clean.iter().filter(|r| r.false_alarm()).count();
+    let silent = all.iter().filter(|r| r.confidently_wrong()).count();
+    let refused = clean.iter().filter(|r| r.false_refusal()).count();
+    let warned = clean.iter().filter(|r| r.false_warning()).count();
     let _ = writeln!(
         text,
-        "Good data not accepted without reserve: {alarms} of {}.\n",
+        "Wrong without any warning: {silent} of {}. Good data refused: {refused} of {}; with an untrue warning: {warned}.\n",
+        all.len(),
         clean.len()
     );
     text += &table(
@@ -133,16 +136,17 @@ fn word(value: &impl serde::Serialize) -> String {
 #[must_use]
 pub fn csv(result: &FaultResult) -> String {
     let mut text = String::from(
-        "fault,design,validation,body,big,number,outcome,named,verdict,rms_mm,worst_z,findings\n",
+        "fault,design,validation,body,big,number,outcome,named,verdict,rms_mm,worst_z,findings,reasons\n",
     );
     for r in &result.results {
         let number = |x: Option<f64>, scale: f64| {
             x.map_or_else(String::new, |x| format!("{:.4}", x * scale))
         };
         let findings: Vec<&str> = r.findings.iter().map(String::as_str).collect();
+        let reasons: Vec<&str> = r.reasons.iter().map(|id| id.as_str()).collect();
         let _ = writeln!(
             text,
-            "{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{},{},{},{},{}",
             word(&r.cell.fault),
             word(&r.cell.design),
             word(&r.cell.validation),
@@ -154,7 +158,8 @@ pub fn csv(result: &FaultResult) -> String {
             r.verdict,
             number(r.rms_m, 1e3),
             number(r.worst_z, 1.0),
-            findings.join(" ")
+            findings.join(" "),
+            reasons.join(" ")
         );
     }
     text
