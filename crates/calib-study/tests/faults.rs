@@ -85,9 +85,19 @@ fn tables_count_every_case_once() {
     let result = part(&[Fault::HeldOutCopies], 1);
     assert_eq!(csv(&result).lines().count(), 1 + result.results.len());
     let text = markdown(&result);
-    let first = format!(
+    let counted = format!(
         "{} cases with a fault, 0 without; seed 1.",
         result.results.len()
     );
-    assert!(text.starts_with(&first), "{text}");
+    assert!(text.contains(&counted), "{text}");
+    let headings = |text: &str| -> Vec<String> {
+        let lines = text.lines().filter(|l| l.starts_with('#'));
+        lines.map(str::to_owned).collect()
+    };
+    let page = include_str!("../../../book/src/studies/faults.md");
+    assert_eq!(
+        headings(page),
+        headings(&text),
+        "`just studies` regenerates the page"
+    );
 }

@@ -61,7 +61,9 @@ pub fn markdown(result: &FaultResult) -> String {
     // Writing into a string cannot fail.
     let _ = writeln!(
         text,
-        "{n} cases with a fault, {} without; seed {}.\n",
+        "# Faults: what `calib run` says of them\n\n{n} cases with a fault, {} without; seed {}. A case is *named* where it is not accepted without reserve and a \
+         finding names the cause or what the data cannot distinguish from it; *stopped* where it is not accepted; *harmless* where it is accepted (with or without \
+         warnings), its rms error at 24 new poses is within the limit, and its uncertainty covers the error; *wrong* where it is accepted and one of the two fails.\n",
         clean.len(),
         result.seed
     );
@@ -116,7 +118,7 @@ fn upper(events: u64, n: usize) -> String {
 
 fn table<const N: usize>(first: &str, rows: [(String, Count); N]) -> String {
     let mut text = format!(
-        "| {first} | cases | named | stopped | harmless | wrong |\n|---|---|---|---|---|---|\n"
+        "## By {first}\n\n| {first} | cases | named | stopped | harmless | wrong |\n|---|---|---|---|---|---|\n"
     );
     for (name, count) in rows.iter().filter(|(_, count)| count.cases > 0) {
         text += &count.row(name);
