@@ -22,11 +22,10 @@ use crate::output::view::{Shown, view};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
 use crate::prepare::robot::load_robot;
-use crate::verify;
 use crate::verify::changes::changes;
-use crate::verify::closure::close_loops;
 use crate::verify::known::known_numbers;
 use crate::verify::residuals::residual_rows;
+use crate::verify::{self, closure::close_loops};
 
 /// How to run.
 #[derive(Debug, Clone, Default)]
@@ -108,8 +107,7 @@ pub fn run_on(
     let tracks = &checked.tracks;
     let loops = close_loops(&inputs, tracks, &solved.body_from_origin(), &solved.fk);
     let held_out = verify::held_out(&inputs, tracks, &nominal, &solved);
-    let known = fit.map(|fit| known_numbers(&inputs, fit));
-    let known = known.unwrap_or_default();
+    let known = fit.map_or_else(Default::default, |fit| known_numbers(&inputs, fit));
     let residuals = residual_rows(&inputs, tracks, robot, fit);
     progress("patch the URDF");
     let urdf = patch_urdf(&inputs, robot, &known)?;

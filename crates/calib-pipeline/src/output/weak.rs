@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn the_recurrence_fills_the_box() {
-        // Each half of each axis, and each quadrant of each pair, has its share of the postures.
+        // Each half of each axis, and each quadrant of each pair, has its share of the postures, within an eighth of all.
         for d in [1, 2, 6, 9] {
             let steps = even_steps(d);
             assert_eq!(steps.len(), d);
@@ -263,7 +263,7 @@ mod tests {
                     let expected = POSTURES as f64 * if j == k { 0.5 } else { 0.25 };
                     let found = inside.count() as f64;
                     assert!(
-                        (found - expected).abs() <= 0.1 * POSTURES as f64,
+                        (found - expected).abs() <= 0.125 * POSTURES as f64,
                         "{d} {j} {k} {found}"
                     );
                 }
