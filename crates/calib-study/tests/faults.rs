@@ -1,7 +1,7 @@
 //! The matrix of faults: a small part with fixed seeds, and what must hold of any part of it.
 
 use calib_study::faults::{
-    Class, Fault, FaultOptions, FaultResult, Outcome, csv, markdown, run_faults,
+    CaseResult, Class, Fault, FaultOptions, FaultResult, Outcome, csv, markdown, run_faults,
 };
 
 fn part(only: &[Fault], cases: u64) -> FaultResult {
@@ -43,20 +43,15 @@ fn the_result_does_not_depend_on_the_number_of_threads_nor_on_an_interruption() 
 }
 
 #[test]
-fn good_data_are_accepted_or_say_what_is_missing_and_are_never_wrong() {
+fn good_data_are_accepted_and_never_wrong_without_a_warning() {
     let result = part(&[Fault::None], 1);
-    assert!(
-        result
-            .results
-            .iter()
-            .all(|r| r.cell.fault.class() == Class::Clean)
-    );
-    let wrong: Vec<_> = result
-        .results
-        .iter()
-        .filter(|r| r.outcome == Outcome::Wrong)
-        .collect();
-    assert!(wrong.is_empty(), "{wrong:#?}");
+    let of = |what: &dyn Fn(&CaseResult) -> bool| result.results.iter().filter(|r| what(r)).count();
+    assert_eq!(of(&|r| r.cell.fault.class() == Class::Clean), 100);
+    assert_eq!(of(&CaseResult::confidently_wrong), 0);
+    // Ten poses of a 6-DoF body: the uncertainty of the fit is too small in 1 of 40 (book, limits of the study).
+    assert!(of(&|r| r.outcome == Outcome::Wrong) <= 1);
+    assert!(of(&CaseResult::false_refusal) <= 4);
+    assert!(of(&CaseResult::false_warning) <= 4);
 }
 
 #[test]
