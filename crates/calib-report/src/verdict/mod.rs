@@ -1,6 +1,6 @@
 //! The verdict on a result: one pure function over facts.
 //!
-//! [`Facts`] holds what the verdict depends on and nothing else; [`judge`] applies every rule of [`RULES`] to it. A rule
+//! [`VerdictFacts`] holds what the verdict depends on and nothing else; [`judge`] applies every rule of [`RULES`] to it. A rule
 //! gives no reason, or one [`Reason`] with its id, its [`Effect`] and its values. The verdict is that of the gravest
 //! effect. The sentences are those of `words::verdict`; the book's page on the verdict lists every rule, and a test
 //! compares the two.
