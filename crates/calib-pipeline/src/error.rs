@@ -1,6 +1,6 @@
 //! What can go wrong, and with which exit code the program ends.
 //!
-//! A variant holds ids and values; the sentences stand here and in [`data`], and nowhere else
+//! A variant holds ids and values; the sentences stand here and in `data`, and nowhere else
 //! (book/src/decisions/errors.md).
 
 mod data;
