@@ -15,7 +15,7 @@ use crate::formulate::kinematics::motion_axis;
 use crate::output::counts::{Tracks, rejected_parts, rejected_share};
 use crate::output::evidence::{Evidence, fit_end};
 use crate::output::of_fit::{stated_sigma, unit};
-use crate::verify::accuracy::tool_body;
+use crate::verify::accuracy::{ToolBody, tool_bodies};
 use crate::verify::motions::Motions;
 
 /// Everything that the rules of the verdict look at.
@@ -137,12 +137,10 @@ fn changes(e: &Evidence<'_>, fit: &MlFit) -> Vec<ImplausibleChange> {
     out
 }
 
-/// Orientation of the last body on held-out poses.
+/// Orientation of the bodies on the last link on held-out poses; a split body is two.
 fn orientation(e: &Evidence<'_>) -> Orientation {
-    let Some(tool) = tool_body(e.inputs) else {
-        return Orientation::default();
-    };
-    let subjects = tool.subjects();
+    let tools = tool_bodies(e.inputs);
+    let subjects: Vec<&String> = tools.iter().flat_map(ToolBody::subjects).collect();
     let errors = e.held_out.iter().flat_map(|h| &h.poses);
     let angles: Vec<f64> = errors
         .filter(|pose| !pose.screened && subjects.contains(&&pose.subject))
@@ -151,7 +149,9 @@ fn orientation(e: &Evidence<'_>) -> Orientation {
     let squares: f64 = angles.iter().map(|angle| angle * angle).sum();
     Orientation {
         rms: (!angles.is_empty()).then(|| (squares / angles.len() as f64).sqrt()),
-        expected: tool.orientation_noise(e.tracks, e.fit),
+        expected: tools
+            .iter()
+            .find_map(|tool| tool.orientation_noise(e.tracks, e.fit)),
     }
 }
 

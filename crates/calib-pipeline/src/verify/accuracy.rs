@@ -148,12 +148,16 @@ pub(crate) struct ToolBody<'a> {
     kind: &'a BodyKind,
 }
 
-pub(crate) fn tool_body(inputs: &Inputs) -> Option<ToolBody<'_>> {
-    let tool = tool_link(inputs)?;
-    let mut bodies = inputs.robot.profile.bodies.iter();
-    let (name, body) = bodies.find(|(_, body)| body.link == tool)?;
-    let kind = &body.kind;
-    Some(ToolBody { name, kind })
+pub(crate) fn tool_bodies(inputs: &Inputs) -> Vec<ToolBody<'_>> {
+    let tool = tool_link(inputs);
+    let bodies = inputs.robot.profile.bodies.iter();
+    bodies
+        .filter(|(_, body)| Some(body.link) == tool)
+        .map(|(name, body)| {
+            let kind = &body.kind;
+            ToolBody { name, kind }
+        })
+        .collect()
 }
 
 impl ToolBody<'_> {
