@@ -62,6 +62,8 @@ reasons! {
     NoLimits = "no-limits": LeavesOpen,
     /// A limit could not be evaluated.
     LimitNotEvaluated = "limit-not-evaluated": LeavesOpen,
+    /// The estimate is within a limit, the upper end of its interval is not.
+    LimitUndecided = "limit-undecided": LeavesOpen,
     /// Nothing was predicted that was not fitted.
     NoValidation = "no-validation": LeavesOpen,
     /// Held-out rows repeat fitted postures.
@@ -78,8 +80,6 @@ reasons! {
     GoodnessOfFit = "goodness-of-fit": Warns | LeavesOpen,
     /// The noise that was found is far above the noise that was stated.
     NoiseAboveStated = "noise-above-stated": Warns,
-    /// The estimate is within a limit, the upper end of its interval is not.
-    LimitUndecided = "limit-undecided": Warns,
     /// Held-out errors after registration only are not significantly higher.
     NotBetterThanRegistration = "not-better-than-registration": Warns,
     /// No recording is held out: every pose was left out in turn.

@@ -69,7 +69,8 @@ fn origins(facts: &Facts) -> Vec<Reason> {
     facts.undetermined_origins.iter().map(reason).collect()
 }
 
-/// An estimate above its limit rejects, whether its interval reaches below or not.
+/// An estimate above its limit rejects, whether its interval reaches below or not; one below it that its interval does not
+/// bear out leaves open what more data decide.
 fn limits(facts: &Facts) -> Vec<Reason> {
     if facts.limits.is_empty() {
         return vec![Reason::new(ReasonId::NoLimits, Effect::LeavesOpen)];
@@ -79,7 +80,7 @@ fn limits(facts: &Facts) -> Vec<Reason> {
         let (id, effect) = match limit.outcome {
             Outcome::NotEvaluated => (ReasonId::LimitNotEvaluated, Effect::LeavesOpen),
             Outcome::Met => (ReasonId::LimitMet, Effect::Supports),
-            Outcome::Undecided if !above => (ReasonId::LimitUndecided, Effect::Warns),
+            Outcome::Undecided if !above => (ReasonId::LimitUndecided, Effect::LeavesOpen),
             Outcome::Undecided | Outcome::Exceeded => (ReasonId::LimitExceeded, Effect::Rejects),
         };
         let number = |value: Option<f64>| value.map(|value| Fact::number(value, limit.unit));
@@ -91,6 +92,12 @@ fn limits(facts: &Facts) -> Vec<Reason> {
             .with_some("low", number(limit.low))
             .with_some("high", number(limit.high))
             .with_some(
+                "postures",
+                enough(facts, limit)
+                    .filter(|_| id == ReasonId::LimitUndecided)
+                    .map(Fact::count),
+            )
+            .with_some(
                 "because",
                 Some(&limit.reason)
                     .filter(|r| !r.is_empty())
@@ -98,6 +105,20 @@ fn limits(facts: &Facts) -> Vec<Reason> {
             )
     };
     facts.limits.iter().map(reason).collect()
+}
+
+/// Postures of which an estimate like this one would have its whole interval below the limit: its half-width shrinks with
+/// the square root of their number. `None` for limits of anything else, or where no number is of use.
+fn enough(facts: &Facts, limit: &Limit) -> Option<usize> {
+    /// Nobody records more to decide a limit.
+    const TOO_MANY: f64 = 1000.0;
+    if !limit.name.starts_with("held_out") {
+        return None;
+    }
+    let value = limit.value?;
+    let wider = (limit.high? - value) / (limit.limit - value);
+    let postures = (facts.validation.postures() as f64 * wider * wider).ceil();
+    (postures > 0.0 && postures < TOO_MANY).then_some(postures as usize)
 }
 
 /// Chance makes a robot look better (or worse) so clearly in at most this share of the cases.

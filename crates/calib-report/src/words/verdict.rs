@@ -240,10 +240,16 @@ fn of_limit(reason: &Reason, v: &Values<'_>) -> String {
                 v.name("because")
             )
         }
-        ReasonId::LimitUndecided => format!(
-            "{quantity}: {}{interval}, limit {limit}: met by the estimate, undecided by its interval.",
-            v.number("value")
-        ),
+        ReasonId::LimitUndecided => {
+            let enough = match v.count("postures") {
+                0 => String::new(),
+                n => format!(" About {n} postures would decide it."),
+            };
+            format!(
+                "{quantity}: {}{interval}, limit {limit}: met by the estimate, undecided by its interval.{enough}",
+                v.number("value")
+            )
+        }
         ReasonId::LimitExceeded => format!(
             "{quantity}: {}{interval}, limit {limit} (exceeded).",
             v.number("value")

@@ -127,8 +127,22 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
         ),
         (
             ReasonId::LimitUndecided,
-            Warns,
+            LeavesOpen,
             with(|f| f.limits = limit(0.0009, Some((0.0007, 0.0012)))),
+        ),
+        // An interval that more poses do not shrink.
+        (
+            ReasonId::LimitUndecided,
+            LeavesOpen,
+            with(|f| {
+                let closed = Limited::loop_mean("hand");
+                f.limits.push(Limit::compared(
+                    closed,
+                    0.001,
+                    0.0009,
+                    Some((0.0007, 0.0012)),
+                ));
+            }),
         ),
         (
             ReasonId::LimitNotEvaluated,

@@ -50,6 +50,9 @@ pub struct CaseResult {
     pub findings: BTreeSet<String>,
     /// Rules that kept the verdict from an acceptance without reserve.
     pub reasons: BTreeSet<ReasonId>,
+    /// Those of them that kept it from an acceptance with warnings.
+    #[serde(default)]
+    pub refused_by: BTreeSet<ReasonId>,
     /// True rms position error at new poses, m, where there is a result.
     pub rms_m: Option<f64>,
     /// Largest χ² of a predicted position over its threshold: above 1 the stated uncertainty does not cover the error.
@@ -63,10 +66,25 @@ impl CaseResult {
         self.outcome == Outcome::Wrong && self.verdict == Verdict::Accepted.word()
     }
 
-    /// Good data that was not accepted.
+    /// Good data that was not accepted, for whatever reason.
+    #[must_use]
+    pub fn refused(&self) -> bool {
+        let accepted = [Outcome::Harmless, Outcome::Wrong];
+        self.cell.fault.class() == Class::Clean && !accepted.contains(&self.outcome)
+    }
+
+    /// Good data that was not accepted for a reason that is true of it: all that kept it from acceptance is that the data are
+    /// too few to decide.
+    #[must_use]
+    pub fn truly_undecided(&self) -> bool {
+        let too_few = |id: &ReasonId| TOO_FEW.contains(id);
+        self.refused() && !self.refused_by.is_empty() && self.refused_by.iter().all(too_few)
+    }
+
+    /// Good data that was not accepted for a reason that is not true of it.
     #[must_use]
     pub fn false_refusal(&self) -> bool {
-        self.cell.fault.class() == Class::Clean && self.outcome != Outcome::Harmless
+        self.refused() && !self.truly_undecided()
     }
 
     /// Good data of which a finding or a reason says what is not true. What a design does not show, and outliers
@@ -93,6 +111,9 @@ impl CaseResult {
                 || self.reasons.iter().any(|id| about_the_model.contains(id)))
     }
 }
+
+/// Reasons that say of the data that they are too few, and nothing of what is wrong: they ask for more poses.
+const TOO_FEW: [ReasonId; 1] = [ReasonId::LimitUndecided];
 
 /// Error of a result at new poses.
 struct Error {
@@ -139,6 +160,7 @@ fn stopped(case: &Case, number: u64, error: PipelineError) -> CaseResult {
         verdict: "stopped".to_owned(),
         findings: ids(&findings),
         reasons: BTreeSet::new(),
+        refused_by: BTreeSet::new(),
         rms_m: None,
         worst_z: None,
     }
@@ -189,7 +211,10 @@ fn judged(case: &Case, number: u64, output: &RunOutput) -> CaseResult {
         Outcome::Harmless
     };
     let reasons = output.report.reason_facts.iter();
-    let against = reasons.filter(|reason| reason.effect != Effect::Supports);
+    let against: Vec<_> = reasons
+        .filter(|reason| reason.effect != Effect::Supports)
+        .collect();
+    let refusing = against.iter().filter(|r| r.effect > Effect::Warns);
     CaseResult {
         cell: case.cell,
         number,
@@ -197,7 +222,8 @@ fn judged(case: &Case, number: u64, output: &RunOutput) -> CaseResult {
         named,
         verdict: verdict.word().to_owned(),
         findings: ids(findings),
-        reasons: against.map(|reason| reason.id).collect(),
+        refused_by: refusing.map(|reason| reason.id).collect(),
+        reasons: against.iter().map(|reason| reason.id).collect(),
         rms_m: Some(error.rms_m),
         worst_z: error.worst_z,
     }

@@ -1,6 +1,9 @@
 //! The study as Markdown, CSV and JSON.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
+
+use calib_report::verdict::ReasonId;
 
 use super::design::{Body, Design};
 use super::fault::{Class, Fault};
@@ -70,10 +73,13 @@ pub fn markdown(result: &FaultResult) -> String {
     let _ = writeln!(text, "Wrong: {wrong} of {n}{}.\n", upper(wrong, n));
     let silent = all.iter().filter(|r| r.confidently_wrong()).count();
     let refused = clean.iter().filter(|r| r.false_refusal()).count();
+    let undecided = clean.iter().filter(|r| r.truly_undecided()).count();
+    let harmful = clean.iter().filter(|r| r.outcome == Outcome::Wrong).count();
     let warned = clean.iter().filter(|r| r.false_warning()).count();
     let _ = writeln!(
         text,
-        "Wrong without any warning: {silent} of {}. Good data refused: {refused} of {}; with an untrue warning: {warned}.\n",
+        "Wrong without any warning: {silent} of {}. Of {} cases of good data: refused with an untrue reason {refused}; refused because they are too few to decide, \
+         and nothing else, {undecided} (*undecided*: that is true of them, and the reason asks for more poses); with an untrue warning {warned}; wrong {harmful}.\n",
         all.len(),
         clean.len()
     );
@@ -134,21 +140,26 @@ fn word(value: &impl serde::Serialize) -> String {
     }
 }
 
+/// The ids of reasons, in one field.
+fn words(reasons: &BTreeSet<ReasonId>) -> String {
+    let ids: Vec<&str> = reasons.iter().map(|id| id.as_str()).collect();
+    ids.join(" ")
+}
+
 /// One line per case.
 #[must_use]
 pub fn csv(result: &FaultResult) -> String {
     let mut text = String::from(
-        "fault,design,validation,body,big,number,outcome,named,verdict,rms_mm,worst_z,findings,reasons\n",
+        "fault,design,validation,body,big,number,outcome,named,verdict,rms_mm,worst_z,findings,reasons,refused_by\n",
     );
     for r in &result.results {
         let number = |x: Option<f64>, scale: f64| {
             x.map_or_else(String::new, |x| format!("{:.4}", x * scale))
         };
         let findings: Vec<&str> = r.findings.iter().map(String::as_str).collect();
-        let reasons: Vec<&str> = r.reasons.iter().map(|id| id.as_str()).collect();
         let _ = writeln!(
             text,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
             word(&r.cell.fault),
             word(&r.cell.design),
             word(&r.cell.validation),
@@ -161,7 +172,8 @@ pub fn csv(result: &FaultResult) -> String {
             number(r.rms_m, 1e3),
             number(r.worst_z, 1.0),
             findings.join(" "),
-            reasons.join(" ")
+            words(&r.reasons),
+            words(&r.refused_by)
         );
     }
     text
