@@ -66,17 +66,7 @@ impl Estimate for FrameEstimate {
 
     const NOTHING: Known = Known::Nothing;
 
-    fn estimator(&self) -> &'static str {
-        self.estimator
-    }
-
-    fn verdict(&self) -> Verdict {
-        self.verdict
-    }
-
-    fn reason(&self) -> Option<&str> {
-        self.reason.as_deref()
-    }
+    calib_estimator::estimate_fields!();
 
     fn is_finite(&self) -> bool {
         let isometry = |x: &Isometry3<f64>| x.to_homogeneous().iter().all(|v| v.is_finite());

@@ -12,7 +12,7 @@ use calib_estimator::{
         Angles, Axes, Center, PlaneFit, SameAngle, Seed, Separation, SigmaR, SigmaT, Significance,
         Subsets, Towards, WeakAngle, WeakFraction, Weights,
     },
-    Options, find,
+    Options,
 };
 
 /// One estimator of an axis.
@@ -175,19 +175,13 @@ const TABLE: &[EstimatorInfo] = &[
     },
 ];
 
-/// All axis estimators, the paper's first. Those of a frame are in [`frame_estimators`].
-#[must_use]
-pub fn estimators() -> &'static [EstimatorInfo] {
-    TABLE
-}
-
-/// The estimator called `id`.
-///
-/// # Errors
-/// [`EstimatorError::Unknown`] with the names of the table.
-pub fn estimator(id: &str) -> Result<&'static EstimatorInfo, EstimatorError> {
-    find(Kind::Axis, TABLE, id)
-}
+calib_estimator::offers!(
+    Kind::Axis,
+    TABLE: EstimatorInfo,
+    "All axis estimators, the paper's first. Those of a frame are in [`frame_estimators`]."
+    estimators,
+    estimator
+);
 
 /// Runs the estimator called `id`.
 ///
@@ -238,16 +232,10 @@ const FRAMES: &[FrameInfo] = &[
     },
 ];
 
-/// All frame estimators, the paper's first.
-#[must_use]
-pub fn frame_estimators() -> &'static [FrameInfo] {
-    FRAMES
-}
-
-/// The frame estimator called `id`.
-///
-/// # Errors
-/// [`EstimatorError::Unknown`] with the names of the table.
-pub fn frame_estimator(id: &str) -> Result<&'static FrameInfo, EstimatorError> {
-    find(Kind::Frame, FRAMES, id)
-}
+calib_estimator::offers!(
+    Kind::Frame,
+    FRAMES: FrameInfo,
+    "All frame estimators, the paper's first."
+    frame_estimators,
+    frame_estimator
+);

@@ -9,7 +9,6 @@ use calib_pipeline::{ExitCode, PipelineError};
 use calib_plugin::NewProjectError;
 use calib_study::StudyError;
 use calib_study::cases::CaseError;
-use calib_study::faults::FaultError;
 
 use crate::commands::record::error::RecordError;
 
@@ -67,15 +66,12 @@ pub enum CliError {
     /// A report has no text or JSON form.
     #[error("the report cannot be written: {0}")]
     Report(#[from] calib_report::ReportError),
-    /// Of `calib study cor` and `aor`.
-    #[error("{0}\n  help: choose another folder with --out, or start over with --restart")]
+    /// Of `calib study cor`, `aor` and `faults`.
+    #[error(transparent)]
     Study(#[from] StudyError),
     /// Of `calib study justin` and `ripley`.
     #[error(transparent)]
     Cases(#[from] CaseError),
-    /// The study of faults failed.
-    #[error(transparent)]
-    Faults(#[from] FaultError),
     /// `calib record` was asked for what does not go together.
     #[error("{0}")]
     Record(#[from] RecordError),
@@ -110,7 +106,6 @@ impl CliError {
             | Self::Fit(_)
             | Self::Study(_)
             | Self::Cases(_)
-            | Self::Faults(_)
             | Self::Record(_)
             | Self::NewPlugin(_) => ExitCode::Usage,
         }

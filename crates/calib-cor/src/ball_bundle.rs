@@ -14,7 +14,7 @@ use calib_estimator::noise::Level;
 use calib_estimator::{
     Verdict,
     levenberg::{Problem, Stop, minimize},
-    measured::Cloud,
+    measured::{Cloud, longest},
 };
 use calib_geometry::{decompose::symmetric_eigen_small, so3};
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, UnitQuaternion, Vector3};
@@ -167,33 +167,20 @@ pub(crate) struct Step {
 
 impl Bundle {
     fn of(cloud: &Cloud) -> Self {
-        let rows = cloud.labels.iter().map(|l| l.1 + 1).max().unwrap_or(0);
-        let mut frames = vec![(Vec::new(), 1.0); rows];
-        for p in 0..cloud.markers() {
-            for k in cloud.range(p) {
-                let frame = &mut frames[cloud.labels[k].1];
-                frame.0.push((p, cloud.points[k]));
-                frame.1 = cloud.weight(k);
-            }
-        }
-        frames.retain(|f| !f.0.is_empty());
-        let (frames, weights) = frames.into_iter().unzip();
+        let (frames, weights) = cloud
+            .rows()
+            .into_iter()
+            .map(|r| (r.markers, r.weight))
+            .unzip();
         Self::new(frames, weights, cloud.markers())
     }
 
     pub fn new(frames: Vec<Vec<(usize, Vector3<f64>)>>, weights: Vec<f64>, markers: usize) -> Self {
-        let reference = (0..frames.len()).fold(0, |best, i| {
-            if frames[i].len() > frames[best].len() {
-                i
-            } else {
-                best
-            }
-        });
         Self {
+            reference: longest(&frames),
             frames,
             weights,
             markers,
-            reference,
         }
     }
 

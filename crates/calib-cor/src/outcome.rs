@@ -125,17 +125,7 @@ impl Estimate for CorEstimate {
 
     const NOTHING: Known = Known::Nothing;
 
-    fn estimator(&self) -> &'static str {
-        self.estimator
-    }
-
-    fn verdict(&self) -> Verdict {
-        self.verdict
-    }
-
-    fn reason(&self) -> Option<&str> {
-        self.reason.as_deref()
-    }
+    calib_estimator::estimate_fields!();
 
     fn is_finite(&self) -> bool {
         let shape = match &self.shape {

@@ -12,7 +12,7 @@ use calib_estimator::{
         Covariances, NoisePerMarker, Seed, SigmaR, SigmaT, Significance, Subsets, WeakFraction,
         Weights,
     },
-    Options, find,
+    Options,
 };
 
 /// One estimator of a center.
@@ -211,19 +211,13 @@ const TABLE: &[EstimatorInfo] = &[
     },
 ];
 
-/// All estimators, the paper's four first.
-#[must_use]
-pub fn estimators() -> &'static [EstimatorInfo] {
-    TABLE
-}
-
-/// The estimator called `id`.
-///
-/// # Errors
-/// [`EstimatorError::Unknown`] with the names of the table.
-pub fn estimator(id: &str) -> Result<&'static EstimatorInfo, EstimatorError> {
-    find(Kind::Center, TABLE, id)
-}
+calib_estimator::offers!(
+    Kind::Center,
+    TABLE: EstimatorInfo,
+    "All estimators, the paper's four first."
+    estimators,
+    estimator
+);
 
 /// Runs the estimator called `id`.
 ///

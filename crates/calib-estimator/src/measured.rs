@@ -294,6 +294,28 @@ impl Cloud {
         self.starts.len() - 1
     }
 
+    /// The rows in which a marker was seen, in the caller's order.
+    #[must_use]
+    pub fn rows(&self) -> Vec<CloudRow> {
+        let count = self.labels.iter().map(|l| l.1 + 1).max().unwrap_or(0);
+        let mut rows: Vec<CloudRow> = (0..count)
+            .map(|row| CloudRow {
+                row,
+                markers: Vec::new(),
+                weight: 1.0,
+            })
+            .collect();
+        for p in 0..self.markers() {
+            for k in self.range(p) {
+                let row = &mut rows[self.labels[k].1];
+                row.markers.push((p, self.points[k]));
+                row.weight = self.weight(k);
+            }
+        }
+        rows.retain(|r| !r.markers.is_empty());
+        rows
+    }
+
     /// Samples of marker p, relative to the origin.
     #[must_use]
     pub fn marker(&self, p: usize) -> &[Vector3<f64>] {
@@ -340,6 +362,30 @@ impl Cloud {
         }
         out
     }
+}
+
+/// What the markers of a body show in one row.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct CloudRow {
+    /// Row in the caller's tables.
+    pub row: usize,
+    /// The markers that were seen (of those kept) and where, relative to the cloud's origin.
+    pub markers: Vec<(usize, Vector3<f64>)>,
+    /// Weight of the row.
+    pub weight: f64,
+}
+
+/// Place of the first list that no other one exceeds in length; 0 where there is none.
+#[must_use]
+pub fn longest<T>(lists: &[Vec<T>]) -> usize {
+    (0..lists.len()).fold(0, |best, i| {
+        if lists[i].len() > lists[best].len() {
+            i
+        } else {
+            best
+        }
+    })
 }
 
 /// Data that no estimator can read.

@@ -24,6 +24,24 @@ pub trait Estimate: Debug + Clone + PartialEq + Serialize {
     fn is_finite(&self) -> bool;
 }
 
+/// The functions of [`Estimate`] that read the fields `estimator`, `verdict` and `reason`, for estimates that have them.
+#[macro_export]
+macro_rules! estimate_fields {
+    () => {
+        fn estimator(&self) -> &'static str {
+            self.estimator
+        }
+
+        fn verdict(&self) -> $crate::Verdict {
+            self.verdict
+        }
+
+        fn reason(&self) -> Option<&str> {
+            self.reason.as_deref()
+        }
+    };
+}
+
 /// The data cannot answer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotObservable<K> {

@@ -72,3 +72,27 @@ pub fn find<E: Estimate>(
             known: table.iter().map(|e| e.id.to_owned()).collect(),
         })
 }
+
+/// The functions by which a crate offers a table of estimators: all entries, and one by name.
+///
+/// ```text
+/// offers!(Kind::Center, TABLE: EstimatorInfo, "doc of the first" estimators, estimator);
+/// ```
+#[macro_export]
+macro_rules! offers {
+    ($kind:expr, $table:ident: $info:ty, $about:literal $all:ident, $one:ident) => {
+        #[doc = $about]
+        #[must_use]
+        pub fn $all() -> &'static [$info] {
+            $table
+        }
+
+        /// The estimator of this kind called `id`.
+        ///
+        /// # Errors
+        /// [`EstimatorError::Unknown`]($crate::EstimatorError::Unknown) with the names of the table.
+        pub fn $one(id: &str) -> Result<&'static $info, $crate::EstimatorError> {
+            $crate::find($kind, $table, id)
+        }
+    };
+}

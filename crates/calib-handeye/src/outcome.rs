@@ -73,17 +73,7 @@ impl Estimate for HandEye {
 
     const NOTHING: () = ();
 
-    fn estimator(&self) -> &'static str {
-        self.estimator
-    }
-
-    fn verdict(&self) -> Verdict {
-        self.verdict
-    }
-
-    fn reason(&self) -> Option<&str> {
-        self.reason.as_deref()
-    }
+    calib_estimator::estimate_fields!();
 
     fn is_finite(&self) -> bool {
         let finite = |t: &Isometry3<f64>| t.to_homogeneous().iter().all(|v| v.is_finite());

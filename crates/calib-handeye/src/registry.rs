@@ -1,9 +1,8 @@
 //! All hand-eye estimators in one table: what each needs and how to call it by name.
 
 use calib_estimator::{
-    EstimatorError, EstimatorInfo, InputKind, Kind, OptionId,
+    EstimatorInfo, InputKind, Kind, OptionId,
     OptionId::{SigmaR, SigmaT, Significance, WeakAngle, WeakFraction},
-    find,
 };
 
 use crate::{by_input, dual_quaternion, outcome::HandEye};
@@ -35,16 +34,10 @@ const TABLE: &[HandEyeInfo] = &[
     },
 ];
 
-/// All estimators of hand-eye transforms.
-#[must_use]
-pub fn estimators() -> &'static [HandEyeInfo] {
-    TABLE
-}
-
-/// The estimator called `id`.
-///
-/// # Errors
-/// [`EstimatorError::Unknown`] with the names of the table.
-pub fn estimator(id: &str) -> Result<&'static HandEyeInfo, EstimatorError> {
-    find(Kind::HandEye, TABLE, id)
-}
+calib_estimator::offers!(
+    Kind::HandEye,
+    TABLE: HandEyeInfo,
+    "All estimators of hand-eye transforms."
+    estimators,
+    estimator
+);

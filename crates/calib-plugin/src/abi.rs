@@ -178,27 +178,6 @@ pub struct CorResult {
     pub rejected_count: usize,
 }
 
-/// `calib_cor_sink`.
-#[repr(C)]
-#[derive(Clone, Copy)]
-#[allow(missing_docs)]
-pub struct CorSink {
-    pub struct_size: u32,
-    pub reserved: u32,
-    pub context: *mut c_void,
-    pub result: Option<unsafe extern "C" fn(*mut c_void, *const CorResult) -> Status>,
-}
-
-/// `calib_cor_1`.
-#[repr(C)]
-#[derive(Clone, Copy)]
-#[allow(missing_docs)]
-pub struct Cor1 {
-    pub struct_size: u32,
-    pub reserved: u32,
-    pub fit: Option<unsafe extern "C" fn(*const Call, *const Motion, *const CorSink) -> Status>,
-}
-
 /// `calib_aor_result`.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -216,26 +195,39 @@ pub struct AorResult {
     pub rejected_count: usize,
 }
 
-/// `calib_aor_sink`.
+/// Where an estimator gives its result: `calib_cor_sink`, `calib_aor_sink`.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[allow(missing_docs)]
-pub struct AorSink {
+pub struct EstimatorSink<R> {
     pub struct_size: u32,
     pub reserved: u32,
     pub context: *mut c_void,
-    pub result: Option<unsafe extern "C" fn(*mut c_void, *const AorResult) -> Status>,
+    pub result: Option<unsafe extern "C" fn(*mut c_void, *const R) -> Status>,
 }
 
-/// `calib_aor_1`.
+/// `fit` of an estimator's table.
+pub type Fit<R> =
+    unsafe extern "C" fn(*const Call, *const Motion, *const EstimatorSink<R>) -> Status;
+
+/// The table of an estimator: `calib_cor_1`, `calib_aor_1`.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[allow(missing_docs)]
-pub struct Aor1 {
+pub struct EstimatorTable<R> {
     pub struct_size: u32,
     pub reserved: u32,
-    pub fit: Option<unsafe extern "C" fn(*const Call, *const Motion, *const AorSink) -> Status>,
+    pub fit: Option<Fit<R>>,
 }
+
+/// `calib_cor_sink`.
+pub type CorSink = EstimatorSink<CorResult>;
+/// `calib_cor_1`.
+pub type Cor1 = EstimatorTable<CorResult>;
+/// `calib_aor_sink`.
+pub type AorSink = EstimatorSink<AorResult>;
+/// `calib_aor_1`.
+pub type Aor1 = EstimatorTable<AorResult>;
 
 /// `calib_source`.
 #[repr(C)]

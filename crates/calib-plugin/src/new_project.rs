@@ -67,6 +67,7 @@ const AUTHOR_SIDE: &[(&str, &str)] = &[
     ("author/aor.rs", include_str!("author/aor.rs")),
     ("author/border.rs", include_str!("author/border.rs")),
     ("author/cor.rs", include_str!("author/cor.rs")),
+    ("author/estimator.rs", include_str!("author/estimator.rs")),
     ("author/exported.rs", include_str!("author/exported.rs")),
     ("author/mod.rs", include_str!("author/mod.rs")),
     ("author/motion.rs", include_str!("author/motion.rs")),

@@ -58,15 +58,18 @@ impl Default for StudyOptions {
 
 /// A study that cannot be run.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StudyError {
     /// No trials.
-    #[error("a study needs at least 1 trial, got {got}")]
+    #[error(
+        "a study needs at least 1 trial of each cell, got {got}\n  help: give --trials 1 or more"
+    )]
     NoTrials {
         /// Trials asked for.
         got: u64,
     },
     /// Threads cannot be started.
-    #[error("cannot start {threads} threads")]
+    #[error("cannot start {threads} threads: {source}\n  help: ask for fewer")]
     Threads {
         /// Threads asked for (0: one for each processor).
         threads: usize,
@@ -77,10 +80,13 @@ pub enum StudyError {
     #[error(transparent)]
     File(#[from] calib_files::FileError),
     /// A result has no JSON form.
-    #[error("a result cannot be written: {0}")]
+    #[error("a result cannot be written: {0}\n  help: report this as a defect")]
     Unwritable(#[from] serde_json::Error),
     /// The state file belongs to another study or other settings.
-    #[error("{}: holds {found}, this run is {expected}: finish that one, or start over without resuming", path.display())]
+    #[error(
+        "{}: holds {found}, this run is {expected}\n  help: choose another folder with --out, or start over with --restart",
+        path.display()
+    )]
     OtherState {
         /// The file.
         path: PathBuf,

@@ -1,6 +1,10 @@
 //! The bundle's unknowns and its normal equations, (1) and (2).
 
-use calib_estimator::{EstimatorError, levenberg::Problem, measured::Cloud};
+use calib_estimator::{
+    EstimatorError,
+    levenberg::Problem,
+    measured::{Cloud, longest},
+};
 use calib_geometry::so3;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SMatrix, Vector2, Vector3, Vector4};
 
@@ -61,21 +65,11 @@ impl Bundle {
                 },
             ));
         }
-        let mut frames = vec![(Vec::new(), 1.0); rows];
-        for p in 0..cloud.markers() {
-            for k in cloud.range(p) {
-                let frame = &mut frames[cloud.labels[k].1];
-                frame.0.push((p, cloud.points[k]));
-                frame.1 = cloud.weight(k);
-            }
-        }
         let (mut kept, mut weights, mut kept_angles) = (Vec::new(), Vec::new(), Vec::new());
-        for (row, (frame, weight)) in frames.into_iter().enumerate() {
-            if !frame.is_empty() {
-                kept.push(frame);
-                weights.push(weight);
-                kept_angles.extend(angles.get(row));
-            }
+        for row in cloud.rows() {
+            kept.push(row.markers);
+            weights.push(row.weight);
+            kept_angles.extend(angles.get(row.row));
         }
         Ok(Self::new(kept, weights, kept_angles, cloud.markers(), size))
     }
@@ -87,19 +81,12 @@ impl Bundle {
         markers: usize,
         size: f64,
     ) -> Self {
-        let reference = (0..frames.len()).fold(0, |best, i| {
-            if frames[i].len() > frames[best].len() {
-                i
-            } else {
-                best
-            }
-        });
         Self {
+            reference: longest(&frames),
             frames,
             weights,
             angles,
             markers,
-            reference,
             size,
         }
     }

@@ -38,43 +38,19 @@ pub struct Item {
 impl Item {
     /// A center estimator.
     #[must_use]
-    pub fn cor(
-        offer: Offer,
-        fit: unsafe extern "C" fn(
-            *const abi::Call,
-            *const abi::Motion,
-            *const abi::CorSink,
-        ) -> abi::Status,
-    ) -> Self {
-        let table = abi::Cor1 {
-            struct_size: abi::size::<abi::Cor1>(),
-            reserved: 0,
-            fit: Some(fit),
-        };
+    pub fn cor(offer: Offer, fit: abi::Fit<abi::CorResult>) -> Self {
         Self {
             offer,
-            table: Table::Cor(Box::new(table)),
+            table: Table::Cor(estimator(fit)),
         }
     }
 
     /// An axis estimator.
     #[must_use]
-    pub fn aor(
-        offer: Offer,
-        fit: unsafe extern "C" fn(
-            *const abi::Call,
-            *const abi::Motion,
-            *const abi::AorSink,
-        ) -> abi::Status,
-    ) -> Self {
-        let table = abi::Aor1 {
-            struct_size: abi::size::<abi::Aor1>(),
-            reserved: 0,
-            fit: Some(fit),
-        };
+    pub fn aor(offer: Offer, fit: abi::Fit<abi::AorResult>) -> Self {
         Self {
             offer,
-            table: Table::Aor(Box::new(table)),
+            table: Table::Aor(estimator(fit)),
         }
     }
 
@@ -121,6 +97,15 @@ impl Item {
             table: Table::Report(Box::new(table)),
         }
     }
+}
+
+/// The table of an estimator.
+fn estimator<R>(fit: abi::Fit<R>) -> Box<abi::EstimatorTable<R>> {
+    Box::new(abi::EstimatorTable {
+        struct_size: abi::size::<abi::EstimatorTable<R>>(),
+        reserved: 0,
+        fit: Some(fit),
+    })
 }
 
 /// Everything that the C structs point to; made once, never changed, never freed.

@@ -6,6 +6,7 @@
 mod aor;
 mod border;
 mod cor;
+mod estimator;
 mod exported;
 mod motion;
 mod reader;

@@ -1,5 +1,7 @@
 //! What loaded estimators of all kinds share: the arrays of a motion, the call, and where the result goes.
 
+use std::ffi::c_void;
+
 use super::{
     call::{Got, across},
     raw::array,
@@ -9,47 +11,80 @@ use crate::{
     answer::{Answer, Failure},
     call::Call,
     motion::Motion,
+    offer::Offer,
 };
 
-/// A result that may be weak.
-pub(super) trait Fitted {
-    /// The reason why it is weak, where it is.
-    fn weak(&mut self) -> Option<&mut String>;
+/// A result as it crosses the border.
+pub(super) trait Raw: Sized {
+    /// What it becomes.
+    type Fit;
+
+    /// Reads it. `tracks` and `rows` are those of the motion.
+    ///
+    /// # Safety
+    /// `result` is null or a result of the contract.
+    unsafe fn read(result: *const Self, tracks: usize, rows: usize) -> Result<Self::Fit, String>;
+
+    /// The reason why the estimate is weak, where it is.
+    fn weak(fit: &mut Self::Fit) -> Option<&mut String>;
+}
+
+/// A loaded estimator, whose sizes were verified by `Bound`.
+pub(super) struct Loaded<R> {
+    pub offer: Offer,
+    pub fit: abi::Fit<R>,
 }
 
 /// Where a result goes; the sizes that it may have.
-pub(super) struct Target<T> {
-    pub got: Got<T>,
-    pub tracks: usize,
-    pub rows: usize,
+struct Target<T> {
+    got: Got<T>,
+    tracks: usize,
+    rows: usize,
 }
 
-/// Calls an estimator's function, which is given the call, the arrays and where the result goes.
-pub(super) fn fitted<F: Fitted>(
-    motion: &Motion<'_>,
-    call: &Call<'_>,
-    function: impl FnOnce(*const abi::Call, *const abi::Motion, *mut Target<F>) -> abi::Status,
-) -> Result<Answer<F>, Failure> {
-    let mut target = Target {
-        got: Got::Nothing,
-        tracks: motion.tracks,
-        rows: motion.tracks * motion.samples,
-    };
-    let raw = raw(motion);
-    let ended = across(call, |call| function(call, &raw const raw, &raw mut target));
-    Ok(match ended.with(target.got)? {
-        Err(reason) => Answer::NotObservable(reason),
-        Ok((mut fit, text)) => {
-            if let Some(weak) = fit.weak() {
-                *weak = if text.is_empty() {
-                    "the plugin gave no reason".into()
-                } else {
-                    text
-                };
+impl<R: Raw> Loaded<R> {
+    /// Calls the estimator's function.
+    pub fn fitted(&self, motion: &Motion<'_>, call: &Call<'_>) -> Result<Answer<R::Fit>, Failure> {
+        let mut target = Target::<R::Fit> {
+            got: Got::Nothing,
+            tracks: motion.tracks,
+            rows: motion.tracks * motion.samples,
+        };
+        let sink = abi::EstimatorSink {
+            struct_size: abi::size::<abi::EstimatorSink<R>>(),
+            reserved: 0,
+            context: (&raw mut target).cast(),
+            result: Some(take::<R>),
+        };
+        let raw = raw(motion);
+        // SAFETY: all arguments are alive until the function returns. Sizes were verified by `Bound`, the only way here.
+        let ended = across(call, |call| unsafe {
+            (self.fit)(call, &raw const raw, &raw const sink)
+        });
+        Ok(match ended.with(target.got)? {
+            Err(reason) => Answer::NotObservable(reason),
+            Ok((mut fit, text)) => {
+                if let Some(weak) = R::weak(&mut fit) {
+                    *weak = if text.is_empty() {
+                        "the plugin gave no reason".into()
+                    } else {
+                        text
+                    };
+                }
+                Answer::Found(fit)
             }
-            Answer::Found(fit)
-        }
-    })
+        })
+    }
+}
+
+unsafe extern "C" fn take<R: Raw>(context: *mut c_void, result: *const R) -> abi::Status {
+    // SAFETY: the context of `fitted`, used by this thread only.
+    let Some(target) = (unsafe { context.cast::<Target<R::Fit>>().as_mut() }) else {
+        return abi::FAILED;
+    };
+    // SAFETY: a result of the contract, alive until this function returns.
+    let fit = unsafe { R::read(result, target.tracks, target.rows) };
+    target.got.take(fit)
 }
 
 /// The arrays of a motion that was verified.

@@ -7,10 +7,9 @@ use std::{
 };
 
 use super::{
-    aor::LoadedAor,
-    cor::LoadedCor,
     describe::{self, Description},
     error::{PluginError, chain},
+    estimator::Loaded,
     pin,
     raw::{prefix, size_to, sized},
     reader::LoadedReader,
@@ -198,14 +197,14 @@ impl LoadedPlugin {
                     unsafe { sized("calib_cor_1", found, size_to!(abi::Cor1, fit)) }
                         .map_err(table)?;
                 let fit = raw.fit.ok_or_else(|| missing("fit"))?;
-                self.cor.push(Entry::cor(LoadedCor { offer, fit }, origin));
+                self.cor.push(Entry::cor(Loaded { offer, fit }, origin));
             }
             Kind::Aor => {
                 let raw: abi::Aor1 =
                     unsafe { sized("calib_aor_1", found, size_to!(abi::Aor1, fit)) }
                         .map_err(table)?;
                 let fit = raw.fit.ok_or_else(|| missing("fit"))?;
-                self.aor.push(Entry::aor(LoadedAor { offer, fit }, origin));
+                self.aor.push(Entry::aor(Loaded { offer, fit }, origin));
             }
             Kind::Reader => {
                 let raw: abi::Reader1 =

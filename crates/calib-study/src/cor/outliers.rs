@@ -33,83 +33,25 @@ enum Sees {
     Moved,
 }
 
-/// Name, estimator, data, which recording, whether the noise is stated.
-const TABLE: [(&str, &str, Gets, Sees, bool); 14] = [
-    (
-        "ml_sphere, clean",
-        "ml_sphere",
-        Gets::Points,
-        Sees::Clean,
-        false,
-    ),
-    (
-        "ml_sphere, inliers",
-        "ml_sphere",
-        Gets::Points,
-        Sees::Left,
-        false,
-    ),
-    ("ml_sphere", "ml_sphere", Gets::Points, Sees::Moved, false),
-    ("robust, points", "robust", Gets::Points, Sees::Moved, false),
-    (
-        "robust, points, σ known",
-        "robust",
-        Gets::Points,
-        Sees::Moved,
-        true,
-    ),
-    (
-        "consensus, points",
-        "consensus",
-        Gets::Points,
-        Sees::Moved,
-        false,
-    ),
-    (
-        "consensus, points, σ known",
-        "consensus",
-        Gets::Points,
-        Sees::Moved,
-        true,
-    ),
-    (
-        "hotspot_ml, clean",
-        "hotspot_ml",
-        Gets::Poses,
-        Sees::Clean,
-        false,
-    ),
-    (
-        "hotspot_ml, inliers",
-        "hotspot_ml",
-        Gets::Poses,
-        Sees::Left,
-        false,
-    ),
-    ("hotspot_ml", "hotspot_ml", Gets::Poses, Sees::Moved, false),
-    ("robust, poses", "robust", Gets::Poses, Sees::Moved, false),
-    (
-        "robust, poses, σ known",
-        "robust",
-        Gets::Poses,
-        Sees::Moved,
-        true,
-    ),
-    (
-        "consensus, poses",
-        "consensus",
-        Gets::Poses,
-        Sees::Moved,
-        false,
-    ),
-    (
-        "consensus, poses, σ known",
-        "consensus",
-        Gets::Poses,
-        Sees::Moved,
-        true,
-    ),
-];
+/// Name, estimator, which recording, and whether the noise is stated: the plain estimator with the clean recording, with the inliers
+/// and with everything; the robust ones with everything.
+fn ways(gets: Gets) -> Vec<(String, &'static str, Sees, bool)> {
+    let (plain, data) = match gets {
+        Gets::Points => ("ml_sphere", "points"),
+        Gets::Poses => ("hotspot_ml", "poses"),
+    };
+    let mut ways = vec![
+        (format!("{plain}, clean"), plain, Sees::Clean, false),
+        (format!("{plain}, inliers"), plain, Sees::Left, false),
+        (plain.to_owned(), plain, Sees::Moved, false),
+    ];
+    for robust in ["robust", "consensus"] {
+        let name = format!("{robust}, {data}");
+        ways.push((name.clone(), robust, Sees::Moved, false));
+        ways.push((format!("{name}, σ known"), robust, Sees::Moved, true));
+    }
+    ways
+}
 
 struct Use {
     info: &'static EstimatorInfo,
@@ -132,10 +74,13 @@ impl OutlierScene {
     pub fn new(scene: Scene, reach: f64) -> Self {
         let ball = Ball::new(Range::Hand.turns(scene.samples), &scene);
         let (mut uses, mut rows) = (Vec::new(), Vec::new());
-        for (name, id, gets, sees, known) in TABLE {
+        let all = [Gets::Points, Gets::Poses]
+            .into_iter()
+            .flat_map(|gets| ways(gets).into_iter().map(move |way| (gets, way)));
+        for (gets, (name, id, sees, known)) in all {
             if let Some(info) = estimators().iter().find(|e| e.id == id) {
                 rows.push(Row {
-                    method: name.to_owned(),
+                    method: name,
                     estimator: info.id,
                     quantity: Quantity::Center,
                     // The bound of the clean recording; with outliers nobody reaches it.

@@ -30,4 +30,4 @@ pub use fault::{Class, Fault};
 pub use outcome::{CaseResult, Outcome};
 pub use render::{csv, json, markdown};
 pub use run::{FaultResult, run_faults};
-pub use settings::{FaultError, FaultOptions};
+pub use settings::FaultOptions;

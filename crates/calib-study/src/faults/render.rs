@@ -9,7 +9,7 @@ use super::design::{Body, Design};
 use super::fault::{Class, Fault};
 use super::outcome::{CaseResult, Outcome};
 use super::run::FaultResult;
-use super::settings::FaultError;
+use crate::settings::StudyError;
 
 /// How many cases ended how.
 #[derive(Debug, Clone, Copy, Default)]
@@ -182,7 +182,7 @@ pub fn csv(result: &FaultResult) -> String {
 /// Every case as JSON.
 ///
 /// # Errors
-/// [`FaultError::Unwritable`] for numbers that JSON does not have.
-pub fn json(result: &FaultResult) -> Result<String, FaultError> {
+/// [`StudyError::Unwritable`] for numbers that JSON does not have.
+pub fn json(result: &FaultResult) -> Result<String, StudyError> {
     Ok(serde_json::to_string_pretty(result)? + "\n")
 }

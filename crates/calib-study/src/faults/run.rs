@@ -10,8 +10,9 @@ use super::case::Cell;
 use super::design::{Body, Design, Validation};
 use super::fault::{Class, Fault};
 use super::outcome::{CaseResult, run_case};
-use super::settings::{FaultError, FaultOptions};
+use super::settings::FaultOptions;
 use super::state::State;
+use crate::settings::StudyError;
 
 /// A finished study.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,14 +60,14 @@ pub(super) fn matrix(only: &[Fault]) -> Vec<Cell> {
 /// Runs the study. `progress(done, total)` counts cases and is called from any thread.
 ///
 /// # Errors
-/// [`FaultError`] for no cases, threads that cannot be started, and a state file that cannot be used. A run that stops is a
+/// [`StudyError`] for no cases, threads that cannot be started, and a state file that cannot be used. A run that stops is a
 /// result, not an error.
 pub fn run_faults(
     options: &FaultOptions,
     progress: &(dyn Fn(u64, u64) + Sync),
-) -> Result<FaultResult, FaultError> {
+) -> Result<FaultResult, StudyError> {
     if options.cases == 0 {
-        return Err(FaultError::NoCases { got: 0 });
+        return Err(StudyError::NoTrials { got: 0 });
     }
     let clean = |cell: &Cell| {
         if cell.fault.class() == Class::Clean {
@@ -84,7 +85,7 @@ pub fn run_faults(
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
-        .map_err(|source| FaultError::Threads { threads, source })?;
+        .map_err(|source| StudyError::Threads { threads, source })?;
     let done = AtomicU64::new(0);
     let total = plan.len() as u64;
     let lock = || state.lock().unwrap_or_else(PoisonError::into_inner);
@@ -104,7 +105,7 @@ pub fn run_faults(
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
                 Ok(result)
             })
-            .collect::<Result<Vec<_>, FaultError>>()
+            .collect::<Result<Vec<_>, StudyError>>()
     })?;
     lock().close(&results)?;
     Ok(FaultResult {

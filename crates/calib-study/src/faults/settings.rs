@@ -1,4 +1,4 @@
-//! How the matrix is run, and why it cannot be.
+//! How the matrix is run.
 
 use std::path::PathBuf;
 
@@ -32,32 +32,4 @@ impl Default for FaultOptions {
             only: Vec::new(),
         }
     }
-}
-
-/// A study that cannot be run.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum FaultError {
-    /// No cases.
-    #[error(
-        "a study needs at least 1 case of each cell, got {got}\n  help: give --trials 1 or more"
-    )]
-    NoCases {
-        /// Cases asked for.
-        got: u64,
-    },
-    /// Threads cannot be started.
-    #[error("cannot start {threads} threads: {source}\n  help: ask for fewer")]
-    Threads {
-        /// Threads asked for (0: one for each processor).
-        threads: usize,
-        /// Why.
-        source: rayon::ThreadPoolBuildError,
-    },
-    /// A file cannot be read or written.
-    #[error(transparent)]
-    File(#[from] calib_files::FileError),
-    /// A result has no JSON form.
-    #[error("a result cannot be written: {0}\n  help: report this as a defect")]
-    Unwritable(#[from] serde_json::Error),
 }

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::case::Cell;
 use super::outcome::CaseResult;
-use super::settings::{FaultError, FaultOptions};
+use super::settings::FaultOptions;
+use crate::settings::StudyError;
 
 /// What must be the same for cases to be kept. The number of cases is not: a longer study continues a shorter one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,7 +24,7 @@ pub(super) struct State {
 }
 
 impl State {
-    pub fn open(options: &FaultOptions) -> Result<Self, FaultError> {
+    pub fn open(options: &FaultOptions) -> Result<Self, StudyError> {
         let Some(folder) = &options.out else {
             return Ok(Self {
                 file: None,
@@ -49,7 +50,7 @@ impl State {
         self.finished.get(&(cell, number)).cloned()
     }
 
-    pub fn append(&mut self, result: &CaseResult) -> Result<(), FaultError> {
+    pub fn append(&mut self, result: &CaseResult) -> Result<(), StudyError> {
         if let Some(file) = &mut self.file {
             file.append(&serde_json::to_string(result)?)?;
         }
@@ -57,7 +58,7 @@ impl State {
     }
 
     /// Writes all cases in the order of the matrix.
-    pub fn close(&mut self, results: &[CaseResult]) -> Result<(), FaultError> {
+    pub fn close(&mut self, results: &[CaseResult]) -> Result<(), StudyError> {
         let Some(file) = self.file.take() else {
             return Ok(());
         };

@@ -1,8 +1,7 @@
 //! Backlash: the joint stops half of its clearance short of where its motor is, on the side that it came from.
 
 use super::{
-    Confounded, DEG, Drives, Effect, EffectKind, JointState, MM, Prior, PriorKey, ProfileKeys,
-    Quantity, Source, Term, always,
+    Drives, Effect, EffectKind, JointState, Prior, PriorKey, ProfileKeys, Quantity, Source, Term,
 };
 
 /// Approached from both sides: otherwise backlash and zero offset are one number.
@@ -24,25 +23,15 @@ pub static EFFECT: Effect = Effect {
         own_text: "Backlash, by the direction of approach.",
     }),
     prior: Some(Prior {
-        revolute: &PriorKey {
-            key: "backlash_deg",
-            text: "Half of a joint's backlash, deg.",
-            default: 0.2,
-            si: DEG,
-        },
-        prismatic: &PriorKey {
-            key: "backlash_mm",
-            text: "Half of a prismatic joint's backlash, mm.",
-            default: 0.5,
-            si: MM,
-        },
+        revolute: &PriorKey::deg("backlash_deg", "Half of a joint's backlash, deg.", 0.2),
+        prismatic: &PriorKey::mm(
+            "backlash_mm",
+            "Half of a prismatic joint's backlash, mm.",
+            0.5,
+        ),
         least: 0.0,
     }),
-    geometric: false,
-    revolute_only: false,
-    estimable: always,
     testable: Some(from_both_sides),
-    confounded: Confounded::Nothing,
     terms: &[Term {
         kind: EffectKind::Backlash,
         name: "backlash",
@@ -53,4 +42,5 @@ pub static EFFECT: Effect = Effect {
         source: Source::Approach,
         regressor: |s| s.approach,
     }],
+    ..Effect::PLAIN
 };

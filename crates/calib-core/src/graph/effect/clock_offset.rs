@@ -1,19 +1,11 @@
 //! Clock offset: the tracker's time is not the encoders' time, so a moving joint is read early or late.
 
-use super::{Confounded, Drives, Effect, EffectKind, Quantity, Source, Term, always};
+use super::{Drives, Effect, EffectKind, Quantity, Source, Term};
 
 /// F = joint velocity; one coefficient for all joints of a recording.
 pub static EFFECT: Effect = Effect {
     id: "clock_offset",
     physics: "clock offset between tracker and encoders",
-    ladder: None,
-    profile: None,
-    prior: None,
-    geometric: false,
-    revolute_only: false,
-    estimable: always,
-    testable: Some(always),
-    confounded: Confounded::Nothing,
     terms: &[Term {
         kind: EffectKind::ClockOffset,
         name: "clock_offset",
@@ -24,4 +16,5 @@ pub static EFFECT: Effect = Effect {
         source: Source::Velocity,
         regressor: |s| s.velocity,
     }],
+    ..Effect::PLAIN
 };

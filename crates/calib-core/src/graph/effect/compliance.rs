@@ -1,17 +1,12 @@
 //! Compliance: the joint yields under the load about its axis.
 
 use super::{
-    Confounded, DEG, Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Source,
-    Term, loaded,
+    Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Source, Term, loaded,
 };
 
 /// Prior of compliances, shared by those across the axis.
-pub(super) static PRIOR: PriorKey = PriorKey {
-    key: "compliance_deg_per_nm",
-    text: "Compliance, deg per N m.",
-    default: 0.05,
-    si: DEG,
-};
+pub(super) static PRIOR: PriorKey =
+    PriorKey::deg("compliance_deg_per_nm", "Compliance, deg per N m.", 0.05);
 
 /// F = torque about (force along) the axis.
 pub static EFFECT: Effect = Effect {
@@ -24,16 +19,9 @@ pub static EFFECT: Effect = Effect {
         own: "compliance",
         own_text: "Compliance about the axis.",
     }),
-    prior: Some(Prior {
-        revolute: &PRIOR,
-        prismatic: &PRIOR,
-        least: 0.0,
-    }),
-    geometric: false,
-    revolute_only: false,
+    prior: Some(Prior::of(&PRIOR)),
     estimable: loaded,
     testable: Some(loaded),
-    confounded: Confounded::Nothing,
     terms: &[Term {
         kind: EffectKind::TorqueCompliance,
         name: "compliance",
@@ -44,4 +32,5 @@ pub static EFFECT: Effect = Effect {
         source: Source::Load,
         regressor: |s| s.torque,
     }],
+    ..Effect::PLAIN
 };

@@ -1,22 +1,17 @@
 //! Coupling: the joint also moves by a share of another joint's motion (belt, parallelogram).
 
-use super::{Confounded, Drives, Effect, EffectKind, Prior, Quantity, Source, Term, always, gain};
+use super::{Confounded, Drives, Effect, EffectKind, Prior, Quantity, Source, Term, gain};
 
 /// F = the other joint's reading. Freed by `solve.joints.<joint>.coupled_to`.
 pub static EFFECT: Effect = Effect {
     id: "coupling",
     physics: "coupling with another joint",
-    ladder: None,
-    profile: None,
     prior: Some(Prior {
         revolute: &gain::PRIOR,
         prismatic: &gain::PRIOR,
         // A belt or parallelogram passes on the whole motion: a share of 1 is an ordinary value.
         least: 1.0,
     }),
-    geometric: false,
-    revolute_only: false,
-    estimable: always,
     testable: None,
     confounded: Confounded::Scale,
     terms: &[Term {
@@ -29,4 +24,5 @@ pub static EFFECT: Effect = Effect {
         source: Source::OtherJoint,
         regressor: |s| s.other,
     }],
+    ..Effect::PLAIN
 };

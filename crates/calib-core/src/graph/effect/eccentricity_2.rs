@@ -1,17 +1,13 @@
 //! Second harmonic of eccentricity: two faults per turn, as of an oval gear or a strain-wave drive.
 
-use super::{
-    Confounded, DEG, Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Source,
-    Term, always,
-};
+use super::{Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Term};
 
-static PRIOR: PriorKey = PriorKey {
-    key: "eccentricity_2_deg",
-    text: "Second harmonic of eccentricity, deg.",
-    // A strain-wave drive errs by some 0.02° twice per turn; an oval ring of a large bearing by a few times that.
-    default: 0.1,
-    si: DEG,
-};
+/// A strain-wave drive errs by some 0.02° twice per turn; an oval ring of a large bearing by a few times that.
+static PRIOR: PriorKey = PriorKey::deg(
+    "eccentricity_2_deg",
+    "Second harmonic of eccentricity, deg.",
+    0.1,
+);
 
 /// F = cos 2q − 1 and F = sin 2q: both vanish at q = 0, where the zero offset is defined.
 pub static EFFECT: Effect = Effect {
@@ -24,36 +20,23 @@ pub static EFFECT: Effect = Effect {
         own: "eccentricity_2",
         own_text: "Second-harmonic eccentricity.",
     }),
-    prior: Some(Prior {
-        revolute: &PRIOR,
-        prismatic: &PRIOR,
-        least: 0.0,
-    }),
-    geometric: false,
+    prior: Some(Prior::of(&PRIOR)),
     revolute_only: true,
-    estimable: always,
-    testable: Some(always),
-    confounded: Confounded::Nothing,
     terms: &[
-        Term {
-            kind: EffectKind::Eccentricity2Cos,
-            name: "eccentricity_2_cos",
-            class: "eccentricity_2_cos",
-            formula: "eccentricity_2_cos*(cos 2q - 1)",
-            quantity: Quantity::Position,
-            drives: Drives::About,
-            source: Source::Reading,
-            regressor: |s| (2.0 * s.q).cos() - 1.0,
-        },
-        Term {
-            kind: EffectKind::Eccentricity2Sin,
-            name: "eccentricity_2_sin",
-            class: "eccentricity_2_sin",
-            formula: "eccentricity_2_sin*sin 2q",
-            quantity: Quantity::Position,
-            drives: Drives::About,
-            source: Source::Reading,
-            regressor: |s| (2.0 * s.q).sin(),
-        },
+        Term::of_reading(
+            EffectKind::Eccentricity2Cos,
+            "eccentricity_2_cos",
+            "eccentricity_2_cos*(cos 2q - 1)",
+            Quantity::Position,
+            |s| (2.0 * s.q).cos() - 1.0,
+        ),
+        Term::of_reading(
+            EffectKind::Eccentricity2Sin,
+            "eccentricity_2_sin",
+            "eccentricity_2_sin*sin 2q",
+            Quantity::Position,
+            |s| (2.0 * s.q).sin(),
+        ),
     ],
+    ..Effect::PLAIN
 };

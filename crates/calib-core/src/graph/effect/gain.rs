@@ -1,9 +1,6 @@
 //! Gain: the joint moves by more or less than its encoder says, in proportion.
 
-use super::{
-    Confounded, Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Source, Term,
-    always,
-};
+use super::{Confounded, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Term};
 
 /// Prior of gains, shared by couplings.
 pub(super) static PRIOR: PriorKey = PriorKey {
@@ -24,24 +21,14 @@ pub static EFFECT: Effect = Effect {
         own: "gain",
         own_text: "Gain.",
     }),
-    prior: Some(Prior {
-        revolute: &PRIOR,
-        prismatic: &PRIOR,
-        least: 0.0,
-    }),
-    geometric: false,
-    revolute_only: false,
-    estimable: always,
-    testable: Some(always),
+    prior: Some(Prior::of(&PRIOR)),
     confounded: Confounded::Scale,
-    terms: &[Term {
-        kind: EffectKind::Gain,
-        name: "gain",
-        class: "gain",
-        formula: "gain*q",
-        quantity: Quantity::Ratio,
-        drives: Drives::About,
-        source: Source::Reading,
-        regressor: |s| s.q,
-    }],
+    terms: &[Term::of_reading(
+        EffectKind::Gain,
+        "gain",
+        "gain*q",
+        Quantity::Ratio,
+        |s| s.q,
+    )],
+    ..Effect::PLAIN
 };

@@ -1,8 +1,7 @@
 //! Lateral compliance: the joint's bearing yields under the torques across its axis.
 
 use super::{
-    Confounded, Drives, Effect, EffectKind, Prior, ProfileKeys, Quantity, Source, Term, compliance,
-    loaded,
+    Drives, Effect, EffectKind, Prior, ProfileKeys, Quantity, Source, Term, compliance, loaded,
 };
 
 /// F = torque about each of the two axes across.
@@ -16,17 +15,10 @@ pub static EFFECT: Effect = Effect {
         own: "lateral_compliance",
         own_text: "Compliance across the axis.",
     }),
-    prior: Some(Prior {
-        revolute: &compliance::PRIOR,
-        prismatic: &compliance::PRIOR,
-        least: 0.0,
-    }),
-    geometric: false,
-    revolute_only: false,
+    prior: Some(Prior::of(&compliance::PRIOR)),
     // Only joints that hold a load about their axis: a joint with a vertical axis shows none of it.
     estimable: loaded,
     testable: None,
-    confounded: Confounded::Nothing,
     terms: &[
         Term {
             kind: EffectKind::Lateral1,
@@ -49,4 +41,5 @@ pub static EFFECT: Effect = Effect {
             regressor: |s| s.across[1],
         },
     ],
+    ..Effect::PLAIN
 };

@@ -248,10 +248,82 @@ pub struct Effect {
     pub terms: &'static [Term],
 }
 
+impl Term {
+    /// A term of the reading alone, which adds to the motion about (along) the axis; its class is its name.
+    pub(crate) const fn of_reading(
+        kind: EffectKind,
+        name: &'static str,
+        formula: &'static str,
+        quantity: Quantity,
+        regressor: fn(&JointState) -> f64,
+    ) -> Self {
+        Self {
+            kind,
+            name,
+            class: name,
+            formula,
+            quantity,
+            drives: Drives::About,
+            source: Source::Reading,
+            regressor,
+        }
+    }
+}
+
+impl PriorKey {
+    /// A key in degrees.
+    pub(crate) const fn deg(key: &'static str, text: &'static str, default: f64) -> Self {
+        Self {
+            key,
+            text,
+            default,
+            si: DEG,
+        }
+    }
+
+    /// A key in millimeters.
+    pub(crate) const fn mm(key: &'static str, text: &'static str, default: f64) -> Self {
+        Self {
+            key,
+            text,
+            default,
+            si: MM,
+        }
+    }
+}
+
+impl Prior {
+    /// The same key at revolute and prismatic joints.
+    pub(crate) const fn of(key: &'static PriorKey) -> Self {
+        Self {
+            revolute: key,
+            prismatic: key,
+            least: 0.0,
+        }
+    }
+}
+
+impl Effect {
+    /// What an entry leaves unsaid: any joint, no profile key, always estimable and testable, confounded with nothing.
+    pub(crate) const PLAIN: Self = Self {
+        id: "",
+        physics: "",
+        ladder: None,
+        profile: None,
+        prior: None,
+        geometric: false,
+        revolute_only: false,
+        estimable: always,
+        testable: Some(always),
+        confounded: Confounded::Nothing,
+        terms: &[],
+    };
+}
+
 /// Radians per degree: priors in profiles are in degrees.
-pub(crate) const DEG: f64 = std::f64::consts::PI / 180.0;
+const DEG: f64 = std::f64::consts::PI / 180.0;
 /// Meters per millimeter.
-pub(crate) const MM: f64 = 1e-3;
+const MM: f64 = 1e-3;
 
 /// At any samples.
 pub(crate) fn always(_: &[JointState]) -> bool {

@@ -1,8 +1,7 @@
 //! Zero offset: the encoder's zero is not where the URDF draws it.
 
 use super::{
-    Confounded, DEG, Drives, Effect, EffectKind, MM, Prior, PriorKey, ProfileKeys, Quantity,
-    Source, Term, always,
+    Confounded, Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Source, Term,
 };
 
 /// F = 1.
@@ -17,23 +16,11 @@ pub static EFFECT: Effect = Effect {
         own_text: "Zero offset.",
     }),
     prior: Some(Prior {
-        revolute: &PriorKey {
-            key: "offset_deg",
-            text: "Zero offsets of joints, deg.",
-            default: 1.0,
-            si: DEG,
-        },
-        prismatic: &PriorKey {
-            key: "offset_mm",
-            text: "Zero offsets of prismatic joints, mm.",
-            default: 10.0,
-            si: MM,
-        },
+        revolute: &PriorKey::deg("offset_deg", "Zero offsets of joints, deg.", 1.0),
+        prismatic: &PriorKey::mm("offset_mm", "Zero offsets of prismatic joints, mm.", 10.0),
         least: 0.0,
     }),
     geometric: true,
-    revolute_only: false,
-    estimable: always,
     testable: None,
     confounded: Confounded::AxisMotion,
     terms: &[Term {
@@ -46,4 +33,5 @@ pub static EFFECT: Effect = Effect {
         source: Source::Constant,
         regressor: |_| 1.0,
     }],
+    ..Effect::PLAIN
 };

@@ -1,19 +1,12 @@
 //! Any other effect, by a regressor that the caller supplies.
 
-use super::{Confounded, Drives, Effect, EffectKind, Quantity, Source, Term, always};
+use super::{Drives, Effect, EffectKind, Quantity, Source, Term};
 
 /// F = whatever the caller supplies.
 pub static EFFECT: Effect = Effect {
     id: "other",
     physics: "an effect that the caller named",
-    ladder: None,
-    profile: None,
-    prior: None,
-    geometric: false,
-    revolute_only: false,
-    estimable: always,
     testable: None,
-    confounded: Confounded::Nothing,
     terms: &[Term {
         kind: EffectKind::Other,
         name: "effect",
@@ -24,4 +17,5 @@ pub static EFFECT: Effect = Effect {
         source: Source::Caller,
         regressor: |s| s.given,
     }],
+    ..Effect::PLAIN
 };
