@@ -11,6 +11,7 @@
 use calib_estimator::{
     EstimatorError, Input, Options, Verdict, chance::f_tail, cloud_of, measured::Cloud,
 };
+use calib_geometry::statistics;
 
 use crate::{
     circles::{Axis, Free, minimize_line},
@@ -186,14 +187,9 @@ fn squares_of(cloud: &Cloud, keep: &[bool]) -> Option<Vec<f64>> {
 /// Median over the kept samples of a marker; `of` counts from its first.
 fn median(range: std::ops::Range<usize>, of: impl Fn(usize) -> f64, keep: &[bool]) -> f64 {
     let first = range.start;
-    let mut values: Vec<f64> = range.filter(|&k| keep[k]).map(|k| of(k - first)).collect();
-    values.sort_by(f64::total_cmp);
     // The mean of the middle two: heights change their sign with the direction.
-    let n = values.len();
-    if n == 0 {
-        return 0.0;
-    }
-    0.5 * (values[n / 2] + values[(n - 1) / 2])
+    let values = range.filter(|&k| keep[k]).map(|k| of(k - first));
+    statistics::median(values.collect()).unwrap_or(0.0)
 }
 
 /// The samples that are no surprise for the noise of those that are kept.
@@ -201,11 +197,10 @@ fn within(squares: &[f64], keep: &[bool], markers: usize) -> Vec<bool> {
     let n = squares.len();
     let kept: Vec<f64> = (0..n).filter(|&k| keep[k]).map(|k| squares[k]).collect();
     let freedom = (2.0 * kept.len() as f64 - 4.0 - 2.0 * markers as f64).max(1.0);
-    let mut sorted = squares.to_vec();
-    sorted.sort_by(f64::total_cmp);
+    let middle = statistics::upper_median(&mut squares.to_vec()).unwrap_or(0.0);
     // Those of least squares show too little noise: the median of all bears a half of them wrong.
     let mean = kept.iter().sum::<f64>() / freedom;
-    let variance = (sorted[n / 2] / MEDIAN).max(mean).max(f64::MIN_POSITIVE);
+    let variance = (middle / MEDIAN).max(mean).max(f64::MIN_POSITIVE);
     squares
         .iter()
         .map(|d2| f_tail(d2 / 2.0 / variance, 2.0, freedom) * n as f64 >= FAMILYWISE)

@@ -1,14 +1,6 @@
-//! Medians.
+//! Robust spreads and ranges.
 
-/// The median (mean of the middle two); `None` of nothing.
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    Some(0.5 * (values[(n - 1) / 2] + values[n / 2]))
-}
+pub(crate) use calib_geometry::statistics::median;
 
 /// σ of a Gaussian from the median absolute deviation about `center`.
 pub(crate) fn robust_sigma(values: impl Iterator<Item = f64>, center: f64) -> Option<f64> {

@@ -15,6 +15,7 @@
 //! * [`decompose`]: the singular value and eigenvalue decompositions used for estimation.
 //! * [`registration`]: the rigid motion between two corresponding point sets.
 //! * [`row_qr`]: the triangular factor of tall matrices, row by row.
+//! * [`statistics`]: medians and quantiles, each under the name of its definition.
 //!
 //! What this crate does not do: it never decides whether data suffice for an estimate; it returns
 //! spectra and named degeneracies, and the estimators judge them.
@@ -26,6 +27,7 @@ pub mod registration;
 pub mod row_qr;
 pub mod se3;
 pub mod so3;
+pub mod statistics;
 
 pub use nalgebra;
 

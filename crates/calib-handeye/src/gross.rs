@@ -6,6 +6,7 @@
 //! ```
 
 use calib_estimator::chance::f_tail;
+use calib_geometry::statistics::upper_median;
 use nalgebra::Isometry3;
 
 use crate::{
@@ -148,8 +149,7 @@ fn within(
     let dof = 3.0 * keep.len() as f64 - 6.0;
     let variance = |k: usize| {
         let mut of_all: Vec<f64> = squares.iter().map(|s| s[k]).collect();
-        of_all.sort_by(f64::total_cmp);
-        let median = of_all[n / 2] / MEDIAN;
+        let median = upper_median(&mut of_all).unwrap_or(0.0) / MEDIAN;
         let kept: f64 = keep.iter().map(|i| squares[*i][k]).sum();
         let seen = match scale {
             Scale::Median => median,

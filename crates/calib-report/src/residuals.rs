@@ -1,5 +1,5 @@
-use crate::verification::quantile;
 use crate::{JointValue, Stats, Unit};
+use calib_geometry::statistics::quantile_type7;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -200,7 +200,7 @@ impl ResidualGroup {
             .filter(|x| x.is_finite())
             .collect();
         sorted.sort_by(f64::total_cmp);
-        let p95_m = quantile(&sorted, 0.95);
+        let p95_m = quantile_type7(&sorted, 0.95)?;
         Some(Self {
             name: name.into(),
             samples: sorted.len(),

@@ -1,4 +1,5 @@
 use crate::{HeldOut, Outcome};
+use calib_geometry::statistics::quantile_type7;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -65,7 +66,7 @@ impl ErrorStats {
         Some(Self {
             mean_m: stats.mean,
             rms_m: stats.rms,
-            p95_m: quantile(&sorted, 0.95),
+            p95_m: quantile_type7(&sorted, 0.95)?,
             max_m: stats.max,
         })
     }
@@ -122,14 +123,6 @@ pub(crate) fn sorted_finite(values: &[f64]) -> Option<Vec<f64>> {
     let mut finite: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     finite.sort_by(f64::total_cmp);
     (!finite.is_empty()).then_some(finite)
-}
-
-/// Quantile of sorted values, linear between the order statistics (Hyndman and Fan's type 7).
-pub(crate) fn quantile(sorted: &[f64], p: f64) -> f64 {
-    let position = p * (sorted.len() - 1) as f64;
-    let below = position.floor() as usize;
-    let above = (below + 1).min(sorted.len() - 1);
-    sorted[below] + (position - below as f64) * (sorted[above] - sorted[below])
 }
 
 /// A loop of two paths to one frame: measured against forward kinematics.

@@ -11,6 +11,7 @@
 //! A joint changes distances by centimeters, noise and skin by parts of a millimeter to some, and bodies need not be equally stiff: what tells a
 //! joint is the leap. The 80 % quantile bears one bad row in five and still sees a joint that moves in one row of four.
 
+use calib_geometry::statistics::quantile_nearest;
 use nalgebra::Point3;
 
 /// The leap of (1).
@@ -81,20 +82,11 @@ fn distance(a: &[Option<Point3<f64>>], b: &[Option<Point3<f64>>]) -> Option<(f64
     if lengths.len() < MIN_ROWS {
         return None;
     }
-    let median = quantile(&mut lengths, 0.5);
+    let median = quantile_nearest(&mut lengths, 0.5)?;
     for length in &mut lengths {
         *length = (*length - median).abs();
     }
-    Some((median, quantile(&mut lengths, 0.8) / 1.28))
-}
-
-/// 0 for no values.
-fn quantile(values: &mut [f64], part: f64) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let at = ((values.len() - 1) as f64 * part).round() as usize;
-    *values.select_nth_unstable_by(at, f64::total_cmp).1
+    Some((median, quantile_nearest(&mut lengths, 0.8)? / 1.28))
 }
 
 #[cfg(test)]

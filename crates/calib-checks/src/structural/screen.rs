@@ -17,6 +17,7 @@ use super::data::{Data, Measured};
 use super::hypothesis::Scoped;
 use super::ids::{BodyIndex, SampleIndex};
 use super::scan::Scan;
+use calib_geometry::statistics::upper_median;
 
 /// Share of the bounded loss that defines the scale: the share of outliers at which it breaks down.
 const SHARE: f64 = 0.2;
@@ -167,9 +168,7 @@ fn samples_of(scan: &Scan<'_>, seen: &[f64]) -> Vec<(SampleIndex, Vec<usize>)> {
 
 /// The S-scale of the norms of three-dimensional residuals.
 fn s_scale(norms: &[f64]) -> f64 {
-    let mut sorted = norms.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let Some(median) = sorted.get(sorted.len() / 2) else {
+    let Some(median) = upper_median(&mut norms.to_vec()) else {
         return 0.0;
     };
     let mut squared = median * median / 2.4;

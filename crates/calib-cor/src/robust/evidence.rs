@@ -1,6 +1,7 @@
 //! The evidence for a choice of samples, costs (1) and (2).
 
 use calib_estimator::chance::chi2_tail;
+use calib_geometry::statistics::upper_median;
 use nalgebra::Vector3;
 
 use super::Model;
@@ -184,10 +185,5 @@ pub(super) fn surprising(components: usize, n: usize) -> f64 {
 }
 
 pub(super) fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    let middle = sorted.len() / 2;
-    if sorted.is_empty() {
-        return f64::NAN;
-    }
-    *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
+    upper_median(&mut values.to_vec()).unwrap_or(f64::NAN)
 }

@@ -12,6 +12,7 @@
 //! the board (an unmodeled effect), d² is measured against their median: a model that is wrong
 //! everywhere must not declare half of its data outliers.
 
+use calib_geometry::statistics::upper_median;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -179,12 +180,7 @@ fn inflation(model: &Model, d2: &[f64], mask: &[f64], limits: &Limits) -> f64 {
         .filter(|(_, w)| **w > 0.0)
         .map(|((o, d), _)| d / limits.median[o.rows])
         .collect();
-    if ratio.is_empty() {
-        return 1.0;
-    }
-    let middle = ratio.len() / 2;
-    let (_, median, _) = ratio.select_nth_unstable_by(middle, f64::total_cmp);
-    median.max(1.0)
+    upper_median(&mut ratio).unwrap_or(1.0).max(1.0)
 }
 
 /// Huber and GNC from a start; returns values and the set that passed the gate (0/1 weights).

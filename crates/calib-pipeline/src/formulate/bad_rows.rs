@@ -9,6 +9,7 @@
 //! If a fraction f of the way to another row makes the row right, joints and tracker were read at different times, or the
 //! robot had not settled. e is the body's pose error, rotation and position in units of what is usual.
 
+use calib_geometry::statistics::upper_median;
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_finding::{Fact, Finding, Subject, catalog};
@@ -287,8 +288,7 @@ impl<'a> BodyError<'a> {
         /// Rows from which a median is worth something.
         const ENOUGH: usize = 8;
         let middle = |all: &mut Vec<f64>| {
-            all.sort_by(f64::total_cmp);
-            let median = all.get(all.len() / 2).copied()?;
+            let median = upper_median(all)?;
             (all.len() >= ENOUGH && median > 0.0).then_some(median / MEDIAN_OF_THREE)
         };
         Some((middle(&mut turns)?, middle(&mut shifts)?))

@@ -5,6 +5,7 @@
 //! arrangement ([`calib_core::relabel`]). What is put right is said, row by row; what cannot be, is left to the data
 //! checks.
 
+use calib_geometry::statistics::upper_median;
 use std::collections::BTreeMap;
 
 use calib_core::{MarkerObservation, MeasurementKind, NoiseKind, PointId, Problem, measurement};
@@ -165,9 +166,9 @@ fn tolerance(
         .iter_mut()
         .filter(|all| all.len() >= ENOUGH)
         .map(|all| {
-            let middle = median(all);
+            let middle = upper_median(all).unwrap_or(0.0);
             let mut off: Vec<f64> = all.iter().map(|d| (d - middle).abs()).collect();
-            SIGMA_PER_MAD * median(&mut off)
+            SIGMA_PER_MAD * upper_median(&mut off).unwrap_or(0.0)
         })
         .collect();
     if sigmas.is_empty() {
@@ -178,9 +179,4 @@ fn tolerance(
     let quiet = sigmas[(sigmas.len() - 1) / 4];
     let stated = stated.map_or(0.0, |sigma| sigma * std::f64::consts::SQRT_2);
     Some((SIGMAS * quiet.max(stated)).max(SMALLEST_FAULT))
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

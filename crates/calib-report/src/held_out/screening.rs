@@ -8,6 +8,7 @@
 //! one good error of n in one validation of twenty. The second keeps what a wrong model looks like: its errors grow over
 //! the workspace, they do not leave the others behind.
 
+use calib_geometry::statistics::upper_median;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::PoseError;
@@ -54,8 +55,7 @@ pub fn screen(poses: &mut [PoseError]) {
 
 fn median(mut values: Vec<f64>) -> Option<f64> {
     values.retain(|value| value.is_finite());
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+    upper_median(&mut values)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! z ~ N(0, I),   g = Aᵀz + Λ^½ z_p,   δ = −C g,   U = Σ_{s∈S} B̃ᵀz + Eᵀδ,   F = |z|² + |z_p|² − gᵀ C g     (1)
 //! ```
 
+use calib_geometry::statistics::quantile_nearest;
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -86,8 +87,7 @@ fn largest(design: &Design, tests: &[Vec<Test>], rng: &mut ChaCha8Rng) -> Vec<f6
 }
 
 fn quantile(mut values: Vec<f64>, p: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[((values.len() - 1) as f64 * p).round() as usize]
+    quantile_nearest(&mut values, p).unwrap_or(0.0)
 }
 
 /// The value that is exceeded with chance `level`: the empirical quantile of the highest fifth, continued by an exponential tail,
