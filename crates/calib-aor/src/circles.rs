@@ -89,6 +89,36 @@ pub(crate) fn linearize_marker(
     }
 }
 
+/// f alone, to the last digit that of [`linearize`]: a search that compares costs needs no derivatives.
+pub(crate) fn cost(cloud: &Cloud, axis: &Axis) -> f64 {
+    (0..cloud.markers())
+        .map(|p| cost_of_marker(cloud.samples(p), axis))
+        .sum()
+}
+
+/// f for the samples of one marker: squares about the mean height and the mean radius.
+fn cost_of_marker(samples: impl Iterator<Item = (Vector3<f64>, f64)> + Clone, axis: &Axis) -> f64 {
+    let n = axis.frame.n;
+    let of = |x: Vector3<f64>| {
+        let d = x - axis.point;
+        let a = d.dot(&n);
+        (a, (d - n * a).norm())
+    };
+    let (a0, r0) = samples.clone().next().map_or((0.0, 0.0), |(x, _)| of(x));
+    let (mut total, mut cost, mut mean_a, mut mean_r) = (0.0, 0.0, 0.0, 0.0);
+    for (x, weight) in samples {
+        let (a, length) = of(x);
+        let (e_a, e_r) = (a - a0, length - r0);
+        cost += weight * (e_a * e_a + e_r * e_r);
+        mean_a += weight * e_a;
+        mean_r += weight * e_r;
+        total += weight;
+    }
+    mean_a /= total;
+    mean_r /= total;
+    (cost - total * (mean_a * mean_a + mean_r * mean_r)).max(0.0)
+}
+
 /// Linearizes f for all markers around one line.
 pub(crate) fn linearize(cloud: &Cloud, axis: &Axis) -> Normal {
     let mut total = Normal {

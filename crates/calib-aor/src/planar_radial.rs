@@ -17,7 +17,7 @@ use calib_estimator::{Verdict, measured::Cloud};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix4};
 
 use crate::{
-    circles::{Axis, Free, information, linearize, minimize_line, spread_out},
+    circles::{Axis, Free, cost, information, linearize, minimize_line, spread_out},
     judge::{Candidate, inverse_or_zero, judge, prepare},
     outcome::{Known, Outcome},
     plane,
@@ -133,7 +133,7 @@ impl CostFunction for Walk<'_> {
     type Output = f64;
 
     fn cost(&self, x: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        Ok(linearize(self.cloud, &self.at(x)).cost / (self.size * self.size))
+        Ok(cost(self.cloud, &self.at(x)) / (self.size * self.size))
     }
 }
 
@@ -199,26 +199,25 @@ fn quadratic_surface(walk: &Walk<'_>, unknowns: usize) -> Option<DVector<f64>> {
     const CURVATURE: f64 = 1e-3;
     /// A walk that ended away from the minimum is not mended here.
     const NEAR: f64 = 1e-2;
-    let cost = |moves: &[(usize, f64)]| {
+    let at = |moves: &[(usize, f64)]| {
         let mut x = vec![0.0; unknowns];
         for (k, by) in moves {
             x[*k] += by;
         }
-        linearize(walk.cloud, &walk.at(&x)).cost / (walk.size * walk.size)
+        cost(walk.cloud, &walk.at(&x)) / (walk.size * walk.size)
     };
-    let here = cost(&[]);
+    let here = at(&[]);
     let mut gradient = DVector::zeros(unknowns);
     let mut hessian = DMatrix::zeros(unknowns, unknowns);
     for i in 0..unknowns {
         // Fourth order: (8 (f₁ − f₋₁) − (f₂ − f₋₂)) / 12h
-        let apart = |by: f64| cost(&[(i, by)]) - cost(&[(i, -by)]);
+        let apart = |by: f64| at(&[(i, by)]) - at(&[(i, -by)]);
         gradient[i] = (8.0 * apart(SLOPE) - apart(2.0 * SLOPE)) / (12.0 * SLOPE);
         let h = CURVATURE;
-        hessian[(i, i)] = (cost(&[(i, h)]) + cost(&[(i, -h)]) - 2.0 * here) / (h * h);
+        hessian[(i, i)] = (at(&[(i, h)]) + at(&[(i, -h)]) - 2.0 * here) / (h * h);
         for j in 0..i {
-            let mixed =
-                cost(&[(i, h), (j, h)]) - cost(&[(i, h), (j, -h)]) - cost(&[(i, -h), (j, h)])
-                    + cost(&[(i, -h), (j, -h)]);
+            let mixed = at(&[(i, h), (j, h)]) - at(&[(i, h), (j, -h)]) - at(&[(i, -h), (j, h)])
+                + at(&[(i, -h), (j, -h)]);
             hessian[(i, j)] = mixed / (4.0 * h * h);
             hessian[(j, i)] = hessian[(i, j)];
         }

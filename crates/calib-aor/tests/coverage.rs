@@ -2,11 +2,12 @@
 
 mod common;
 
-use calib_aor::{Input, InputKind, Options, estimators, fit};
+use calib_aor::{EstimatorInfo, Input, InputKind, Options, estimators, fit};
 use calib_estimator::Verdict;
 use calib_geometry::Line;
 use common::{Hinge, Noise, steps};
 use nalgebra::{Isometry3, Matrix2, Matrix3, SMatrix, Vector3};
+use rayon::prelude::*;
 
 const MM: f64 = 1e-3;
 const FRAMES: usize = 19;
@@ -69,69 +70,79 @@ fn cover(id: &str, markers: usize, arc: f64, mm: f64, degrees: f64, trials: u64)
 
 /// Mean of χ²(2) with a σ of some 30 degrees of freedom is 2.14. A quarter more is allowed for what is not linear.
 fn study(trials: u64) {
+    estimators()
+        .iter()
+        .flat_map(|info| scenes(info.input).iter().map(move |scene| (info, scene)))
+        .par_bridge()
+        .for_each(|(info, scene)| judge(info, *scene, trials));
+}
+
+/// Markers (0: poses), arc in degrees, noise in mm and in degrees.
+type Scene = (usize, f64, f64, f64);
+
+fn scenes(input: InputKind) -> &'static [Scene] {
+    if input == InputKind::OneOrTwoBodies {
+        &[
+            (0, 180.0, 1.0, 1.0),
+            (0, 60.0, 0.2, 1.0),
+            (0, 60.0, 1.0, 0.3),
+            (0, 20.0, 0.2, 0.3),
+            (0, 20.0, 1.0, 0.3),
+            (0, 20.0, 1.0, 1.0),
+        ]
+    } else {
+        &[
+            (4, 180.0, 2.5, 0.0),
+            (4, 60.0, 1.0, 0.0),
+            (4, 60.0, 2.5, 0.0),
+            (4, 20.0, 0.2, 0.0),
+            (4, 20.0, 1.0, 0.0),
+            (4, 20.0, 2.5, 0.0),
+            (1, 180.0, 2.5, 0.0),
+            (1, 60.0, 1.0, 0.0),
+            (1, 20.0, 0.2, 0.0),
+        ]
+    }
+}
+
+fn judge(info: &EstimatorInfo, (markers, arc, mm, degrees): Scene, trials: u64) {
     const MEAN: f64 = 2.65;
     const BEYOND: f64 = 0.045;
-    for info in estimators() {
-        let scenes: &[(usize, f64, f64, f64)] = if info.input == InputKind::OneOrTwoBodies {
-            &[
-                (0, 180.0, 1.0, 1.0),
-                (0, 60.0, 0.2, 1.0),
-                (0, 60.0, 1.0, 0.3),
-                (0, 20.0, 0.2, 0.3),
-                (0, 20.0, 1.0, 0.3),
-                (0, 20.0, 1.0, 1.0),
-            ]
-        } else {
-            &[
-                (4, 180.0, 2.5, 0.0),
-                (4, 60.0, 1.0, 0.0),
-                (4, 60.0, 2.5, 0.0),
-                (4, 20.0, 0.2, 0.0),
-                (4, 20.0, 1.0, 0.0),
-                (4, 20.0, 2.5, 0.0),
-                (1, 180.0, 2.5, 0.0),
-                (1, 60.0, 1.0, 0.0),
-                (1, 20.0, 0.2, 0.0),
-            ]
-        };
-        for (markers, arc, mm, degrees) in scenes {
-            // A walk of the simplex takes a hundred times the others'.
-            let trials = if info.id == "planar_radial" {
-                trials / 20
-            } else {
-                trials
-            };
-            let c = cover(info.id, *markers, *arc, *mm, *degrees, trials);
-            let what = format!(
-                "{}, {markers} markers, {arc}°, {mm} mm, {degrees}°",
-                info.id
-            );
-            let n = c.answered;
-            println!(
-                "{what}: ok {n} of {trials}; d² of the direction {:.2} ({:.3} beyond 99 %), of the point {:.2} ({:.3})",
-                c.sum[0] / n,
-                c.beyond[0] / n,
-                c.sum[1] / n,
-                c.beyond[1] / n
-            );
-            if n < 10.0 {
-                // Own centers that are not known make the answer weak, as they should.
-                assert_eq!((*markers, *arc), (4, 20.0), "{what}: ok {n} of {trials}");
-                continue;
-            }
-            for (k, kind) in ["direction", "point"].into_iter().enumerate() {
-                let mean = c.sum[k] / n;
-                let slack = 3.0 * 2.0 / n.sqrt();
-                assert!(mean < MEAN + slack, "{what}: d² of the {kind} {mean:.2}");
-                assert!(mean > 1.4 - slack, "{what}: d² of the {kind} {mean:.2}");
-                let beyond = c.beyond[k] / n;
-                let slack = 3.0 * (BEYOND / n).sqrt();
-                assert!(
-                    beyond < BEYOND + slack,
-                    "{what}: {beyond:.3} of the {kind}s beyond 99 %"
-                );
-            }
-        }
+    // A walk of the simplex takes a hundred times the others'.
+    let trials = if info.id == "planar_radial" {
+        trials / 20
+    } else {
+        trials
+    };
+    let c = cover(info.id, markers, arc, mm, degrees, trials);
+    let what = format!(
+        "{}, {markers} markers, {arc}°, {mm} mm, {degrees}°",
+        info.id
+    );
+    let n = c.answered;
+    println!(
+        "{what}: ok {n} of {trials}; d² of the direction {:.2} ({:.3} beyond 99 %), of the point {:.2} ({:.3})",
+        c.sum[0] / n,
+        c.beyond[0] / n,
+        c.sum[1] / n,
+        c.beyond[1] / n
+    );
+    if n < 10.0 {
+        // Own centers that are not known make the answer weak, as they should.
+        assert_eq!((markers, arc), (4, 20.0), "{what}: ok {n} of {trials}");
+        return;
+    }
+    for (k, kind) in ["direction", "point"].into_iter().enumerate() {
+        let mean = c.sum[k] / n;
+        let slack = 3.0 * 2.0 / n.sqrt();
+        assert!(mean < MEAN + slack, "{what}: d² of the {kind} {mean:.2}");
+        assert!(mean > 1.4 - slack, "{what}: d² of the {kind} {mean:.2}");
+        let beyond = c.beyond[k] / n;
+        let slack = 3.0 * (BEYOND / n).sqrt();
+        assert!(
+            beyond < BEYOND + slack,
+            "{what}: {beyond:.3} of the {kind}s beyond 99 %"
+        );
     }
 }
 

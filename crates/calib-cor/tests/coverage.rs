@@ -5,6 +5,7 @@ mod common;
 use calib_cor::{Input, InputKind, Options, Pose, estimators, fit};
 use common::{Noise, grid};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
 
 const CENTER: Vector3<f64> = Vector3::new(0.3, -0.2, 0.9);
 
@@ -106,27 +107,31 @@ fn covariances_are_not_too_small() {
     const ENOUGH: u64 = 50;
     /// 1 and five Monte-Carlo errors of 100 trials; estimated noise adds to few degrees of freedom.
     const LIMIT: f64 = 1.45;
-    let mut judged = 0;
-    for cell in cells() {
-        let name = format!(
-            "{}, n {}, r {} mm, {} mm, {:.2}°",
-            cell.name,
-            cell.turns.len(),
-            cell.radius * 1e3,
-            cell.sigma_t * 1e3,
-            cell.sigma_r.to_degrees()
-        );
-        for info in estimators() {
-            // COBYLA finds what SFE finds; the robust ones are judged with outliers.
-            if matches!(info.id, "sfa" | "robust" | "consensus") {
-                continue;
+    let judged: usize = cells()
+        .par_iter()
+        .map(|cell| {
+            let name = format!(
+                "{}, n {}, r {} mm, {} mm, {:.2}°",
+                cell.name,
+                cell.turns.len(),
+                cell.radius * 1e3,
+                cell.sigma_t * 1e3,
+                cell.sigma_r.to_degrees()
+            );
+            let mut judged = 0;
+            for info in estimators() {
+                // COBYLA finds what SFE finds; the robust ones are judged with outliers.
+                if matches!(info.id, "sfa" | "robust" | "consensus") {
+                    continue;
+                }
+                let (ratio, answered) = ratio(cell, info.id, info.input, TRIALS);
+                if answered >= ENOUGH {
+                    judged += 1;
+                    assert!(ratio < LIMIT, "{name}: {} {ratio:.2}", info.id);
+                }
             }
-            let (ratio, answered) = ratio(&cell, info.id, info.input, TRIALS);
-            if answered >= ENOUGH {
-                judged += 1;
-                assert!(ratio < LIMIT, "{name}: {} {ratio:.2}", info.id);
-            }
-        }
-    }
+            judged
+        })
+        .sum();
     assert!(judged > 300, "{judged} cells");
 }

@@ -349,13 +349,18 @@ fn bias(samples: &[Scaled], c: &DMatrix<f64>, share: f64, decay: f64) -> [f64; L
         added.gemm_tr(1.0, n_s, &sample.k, 1.0);
     }
     let covariance = c + c * added * c;
+    // Rows are columns of the transposed matrices, which lie side by side in memory.
+    let k: Vec<DMatrix<f64>> = samples.iter().map(|s| s.k.transpose()).collect();
     let h: Vec<DMatrix<f64>> = samples
         .iter()
         .zip(&around)
-        .map(|(s, n_s)| &s.k + &s.w * n_s)
+        .map(|(s, n_s)| (&s.k + &s.w * n_s).transpose())
         .collect();
-    let kc: Vec<DMatrix<f64>> = samples.iter().map(|s| &s.k * c).collect();
-    let kg: Vec<DMatrix<f64>> = samples.iter().map(|s| &s.k * &covariance).collect();
+    let times = |right: &DMatrix<f64>| -> Vec<DMatrix<f64>> {
+        let product = |s: &Scaled| (&s.k * right).transpose();
+        samples.iter().map(product).collect()
+    };
+    let (kc, kg) = (times(c), times(&covariance));
     let mut out = [0.0; LAGS + 1];
     for (s, a) in samples.iter().enumerate() {
         for lag in 0..=LAGS {
@@ -364,9 +369,9 @@ fn bias(samples: &[Scaled], c: &DMatrix<f64>, share: f64, decay: f64) -> [f64; L
                 break;
             }
             for (i, j) in shared(a, &samples[t]) {
-                out[lag] += kg[s].row(i).dot(&samples[t].k.row(j))
-                    - kc[s].row(i).dot(&h[t].row(j))
-                    - kc[t].row(j).dot(&h[s].row(i));
+                out[lag] += kg[s].column(i).dot(&k[t].column(j))
+                    - kc[s].column(i).dot(&h[t].column(j))
+                    - kc[t].column(j).dot(&h[s].column(i));
             }
         }
     }
