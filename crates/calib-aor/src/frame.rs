@@ -52,6 +52,8 @@ pub struct FrameEstimate {
     pub planes: (usize, usize),
     /// Samples used.
     pub used: usize,
+    /// Rows with rejected samples.
+    pub rejected: Vec<usize>,
     /// [`Verdict::Ok`], or [`Verdict::Weak`] with the reason beside it.
     pub verdict: Verdict,
     /// Why the verdict is not `ok`, with numbers.
@@ -138,19 +140,33 @@ pub(crate) fn residuals(
     let joint_from_body = body_from_joint.inverse();
     let (mut t2, mut r2, mut total) = (0.0, 0.0, 0.0_f64);
     for sample in samples {
-        let Some(pose) = sample.seen() else {
+        let Some([t, r]) = squares(sample, axes, world_from_joint, &joint_from_body) else {
             continue;
         };
         let w = sample.weight;
-        let turn = axes.turned(sample.proximal, sample.distal);
-        let predicted = world_from_joint * turn * joint_from_body;
-        t2 += w * (predicted.translation.vector - pose.translation).norm_squared();
-        let measured = so3::quaternion_of(&Rotation3::from_matrix_unchecked(pose.rotation));
-        r2 += w * so3::log(&(predicted.rotation.inverse() * measured)).norm_squared();
+        t2 += w * t;
+        r2 += w * r;
         total += w;
     }
     let total = total.max(f64::MIN_POSITIVE);
     ((t2 / total).sqrt(), (r2 / total).sqrt())
+}
+
+/// Squared position and orientation residuals of one sample against (2); `None` where the body was not seen.
+pub(crate) fn squares(
+    sample: &FrameSample,
+    axes: FrameAxes,
+    world_from_joint: &Isometry3<f64>,
+    joint_from_body: &Isometry3<f64>,
+) -> Option<[f64; 2]> {
+    let pose = sample.seen()?;
+    let turn = axes.turned(sample.proximal, sample.distal);
+    let predicted = world_from_joint * turn * joint_from_body;
+    let measured = so3::quaternion_of(&Rotation3::from_matrix_unchecked(pose.rotation));
+    Some([
+        (predicted.translation.vector - pose.translation).norm_squared(),
+        so3::log(&(predicted.rotation.inverse() * measured)).norm_squared(),
+    ])
 }
 
 /// Both axes in the body.

@@ -135,6 +135,7 @@ pub fn algorithm1(
         rms_r,
         planes: (grid.around_proximal.len(), grid.around_distal.len()),
         used: seen,
+        rejected: Vec::new(),
         verdict,
         reason,
     }))

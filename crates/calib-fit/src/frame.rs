@@ -1,6 +1,7 @@
 //! `calib fit frame`.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::Path;
 
 use calib_aor::{FrameAxes, FrameAxis, FrameEstimate, FrameSample, Options};
@@ -54,20 +55,21 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
     let body = body_of(file, request.body.as_deref(), &poses.bodies)?;
     let (a, b) = (column(proximal)?, column(distal)?);
     let weights = noise::weights(request.weights.as_deref(), poses.rows.len())?;
-    let samples: Vec<FrameSample> = a
+    let (samples, rows): (Vec<FrameSample>, Vec<u64>) = a
         .iter()
         .zip(b)
         .zip(body)
         .enumerate()
         .filter_map(|(row, ((a, b), pose))| {
-            Some(FrameSample {
+            let sample = FrameSample {
                 world_from_body: pose.map(Pose::from),
                 proximal: (*a)?,
                 distal: (*b)?,
                 weight: weights.get(row).copied().unwrap_or(1.0),
-            })
+            };
+            Some((sample, *poses.rows.get(row)?))
         })
-        .collect();
+        .unzip();
     let options = Options {
         axes: FrameAxes {
             proximal: proximal_letter,
@@ -99,10 +101,17 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
         estimator: request.estimator.as_deref(),
         all: request.all,
     };
-    road.answer(wish, |_| "algorithm1", frame_answer)
+    road.answer(
+        wish,
+        |_| "algorithm1",
+        |id, f| {
+            let rejected: Vec<u64> = f.rejected.iter().map(|&k| rows[k]).collect();
+            frame_answer(id, f, &rejected)
+        },
+    )
 }
 
-fn frame_answer(id: &str, f: &FrameEstimate) -> Answer {
+fn frame_answer(id: &str, f: &FrameEstimate, rejected: &[u64]) -> Answer {
     let observable = f.verdict == Verdict::Ok;
     let value = json!({
         "estimator": id,
@@ -115,9 +124,10 @@ fn frame_answer(id: &str, f: &FrameEstimate) -> Answer {
         "rms_m": f.rms_t,
         "rms_rad": f.rms_r,
         "used": f.used,
+        "rejected": rejected,
     });
     let sigma = f.covariance.diagonal().map(|v| v.max(0.0).sqrt());
-    let text = format!(
+    let mut text = format!(
         "{}: body_from_joint {}\n{}  sigma {:.4}, {:.4}, {:.4} mm; {:.4}, {:.4}, {:.4} deg\n  axes {:.3} deg off square; rms {:.4} mm, {:.4} deg; {} samples\n",
         id,
         pose_text(&f.body_from_joint),
@@ -133,6 +143,9 @@ fn frame_answer(id: &str, f: &FrameEstimate) -> Answer {
         f.rms_r.to_degrees(),
         f.used
     );
+    if !rejected.is_empty() {
+        let _ = writeln!(text, "  gross errors in rows {rejected:?}");
+    }
     answer(text, &value, observable)
 }
 

@@ -132,6 +132,7 @@ fn estimate(
         rms_r,
         planes: (0, 0),
         used: n,
+        rejected: Vec::new(),
         verdict,
         reason,
     })
