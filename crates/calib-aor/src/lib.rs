@@ -48,6 +48,7 @@ mod outcome;
 pub mod planar_radial;
 pub mod plane;
 mod registry;
+pub mod robust_frame;
 pub mod robust_line;
 pub mod shared_axis;
 mod straight;

@@ -4,7 +4,7 @@ use crate::{
     frame::FrameEstimate,
     frame_ml, frame_planes, halvorsen, hinge_bundle, hinge_poses, line_ml,
     outcome::{AorEstimate, Outcome},
-    planar_radial, plane, robust_line, shared_axis,
+    planar_radial, plane, robust_frame, robust_line, shared_axis,
 };
 use calib_estimator::{
     EstimatorError, Input, InputKind, Kind, OptionId,
@@ -229,6 +229,25 @@ const FRAMES: &[FrameInfo] = &[
         summary: "all poses and joint angles at once by maximum likelihood",
         source: "joint likelihood, see the book",
         fit: frame_ml::by_poses,
+    },
+    FrameInfo {
+        id: "robust_frame",
+        name: "both axes by maximum likelihood, with outliers",
+        input: InputKind::TwoJoints,
+        options: &[
+            SigmaT,
+            SigmaR,
+            Axes,
+            PlaneFit,
+            SameAngle,
+            WeakAngle,
+            WeakFraction,
+            Seed,
+            Subsets,
+        ],
+        summary: "least trimmed squares over random subsets, then frame_ml of the poses that belong",
+        source: "Rousseeuw & Van Driessen 1999",
+        fit: robust_frame::fit,
     },
 ];
 
