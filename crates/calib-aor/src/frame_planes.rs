@@ -39,6 +39,7 @@ pub type CenterOf<'a> = &'a dyn Fn(&[Option<Pose>]) -> Option<Point3<f64>>;
 
 /// Where the center of rotation comes from.
 #[derive(Clone, Copy)]
+#[non_exhaustive]
 pub enum Center<'a> {
     /// A point with its covariance, independent of these samples.
     Given {

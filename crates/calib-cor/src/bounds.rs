@@ -97,6 +97,7 @@ pub fn ball(
 
 /// Bounds (3), (4) and the second-order figure (5) of a sphere whose samples have covariances of their own.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct SphereBounds {
     /// (3): the Cramér–Rao bound.
     pub cramer_rao: Matrix3<f64>,

@@ -64,6 +64,7 @@ pub struct PencilPair {
 
 /// Minimum-norm least-squares solution and the rank it used.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct LeastSquares {
     /// x of least ‖x‖ among the minimizers of ‖Ax − b‖.
     pub x: DVector<f64>,

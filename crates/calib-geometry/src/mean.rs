@@ -15,6 +15,7 @@ const UNIQUE: f64 = 1e-9;
 
 /// Why there is no mean.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeanError {
     /// Nothing to average.
     #[error("no samples to average")]

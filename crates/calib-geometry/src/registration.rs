@@ -14,6 +14,7 @@ const COLLINEAR: f64 = 1e-7;
 
 /// Rigid motion between two point sets, and how well it fits.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Registration {
     /// `b_from_a`.
     pub b_from_a: Isometry3<f64>,
@@ -23,6 +24,7 @@ pub struct Registration {
 
 /// Why two point sets do not determine a motion.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RegistrationError {
     /// The sets have different lengths.
     #[error("{a} points were given against {b}")]

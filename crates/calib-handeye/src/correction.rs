@@ -7,6 +7,7 @@ use crate::residuals::Residuals;
 /// One of the two tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Side {
     /// The robot's poses.
     Robot,

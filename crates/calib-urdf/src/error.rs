@@ -5,6 +5,7 @@ use thiserror::Error;
 
 /// A place in a text file, counted from 1; the column counts characters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub struct Place {
     /// Line, from 1.
     pub line: usize,
@@ -252,6 +253,7 @@ impl Problem {
 
 /// A [`Problem`] with its place and the line that shows it.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ReadProblem {
     /// Where it was found; `None` when the file as a whole is wrong.
     pub place: Option<Place>,
@@ -307,6 +309,7 @@ impl ReadProblem {
 ///
 /// `Display` gives, for each finding, `file:line:column: finding`, the line with a caret under the place, and what to do.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ReadError {
     /// The name of the file as the caller gave it.
     pub file: String,

@@ -123,6 +123,7 @@ pub struct Mimic {
 ///
 /// A joint that mimics nothing follows itself, with 1 and 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct MimicLaw {
     /// The joint that moves on its own.
     pub source: JointId,

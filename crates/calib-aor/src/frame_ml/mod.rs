@@ -36,6 +36,7 @@ const NOISE_ROUNDS: usize = 50;
 
 /// Which residuals count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Residuals {
     /// Positions and orientations.
     Poses,

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 /// Mean, standard deviation, largest and rms of a set of norms.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Spread {
     /// Mean.
     pub mean: f64,
@@ -48,6 +49,7 @@ impl Spread {
 
 /// Closure errors over the samples of one loop.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ClosureStatistics {
     /// Number of samples.
     pub samples: usize,

@@ -22,6 +22,7 @@ use crate::graph::problem::Problem;
 /// By what variants are ranked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Criterion {
     /// Equation (1).
     #[default]
@@ -32,6 +33,7 @@ pub enum Criterion {
 
 /// One variant after comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct RankedVariant {
     /// Its name.
     pub name: String,

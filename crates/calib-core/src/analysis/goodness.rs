@@ -38,6 +38,7 @@ pub enum Physics {
 
 /// One effect that was tested.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ScoreTest {
     /// What it is called, for instance `elbow.compliance`.
     pub name: String,
@@ -59,6 +60,7 @@ pub struct ScoreTest {
 
 /// Result of the goodness-of-fit analysis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct GoodnessOfFit {
     /// χ²/dof with the noise levels as stated.
     pub chi2_per_dof: f64,

@@ -21,6 +21,7 @@ use crate::graph::ids::ParameterId;
 
 /// A point at one posture, and how it follows the free parameters.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct LinearPoint {
     /// Where it is predicted, m.
     pub position: Point3<f64>,
@@ -30,6 +31,7 @@ pub struct LinearPoint {
 
 /// What of a displacement counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Placement {
     /// All of it: the frame in which the point is predicted was measured.
     Counts,

@@ -20,6 +20,7 @@ use crate::solve::whitened::{covariance_of, whitened};
 
 /// Prediction of one sample from the others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SamplePrediction {
     /// Sample.
     pub sample: usize,
@@ -35,6 +36,7 @@ pub struct SamplePrediction {
 
 /// One predicted vector.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct VectorError {
     /// Measurement.
     pub measurement: MeasurementId,
@@ -52,6 +54,7 @@ pub struct VectorError {
 
 /// Mean, rms, 95 % and largest of a set of error norms.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ErrorSummary {
     /// How many.
     pub n: usize,
@@ -99,6 +102,7 @@ impl ErrorSummary {
 
 /// Predictions of all samples that could be predicted, and those that could not.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct CrossValidation {
     /// One per sample.
     pub samples: Vec<SamplePrediction>,

@@ -9,6 +9,7 @@ use crate::graph::unit::{DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA};
 
 /// How much of a problem is left free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Baseline {
     /// Nothing: every parameter is held at nominal.
     Nominal,

@@ -55,6 +55,7 @@ impl Edge {
 
 /// Every edge of the frame graph is one of these.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum EdgeKind {
     /// A constant that is not questioned.
     Known(Isometry3<f64>),
@@ -82,6 +83,7 @@ pub enum EdgeKind {
 /// Where an unknown pose stands in the robot; only the words about it depend on this.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Role {
     /// Between the tracker (or another world frame) and the robot.
     World,
@@ -154,6 +156,7 @@ impl JointEffect {
 
 /// An effect outside the model.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Candidate {
     /// Which.
     pub kind: EffectKind,

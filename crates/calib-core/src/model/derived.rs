@@ -83,6 +83,7 @@ pub struct DerivedPoint {
 
 /// What is seen at a posture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Target {
     /// The origin of a frame.
     Frame(FrameId),

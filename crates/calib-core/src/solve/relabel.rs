@@ -18,6 +18,7 @@ const UNAMBIGUOUS: f64 = 3.0;
 
 /// A sample whose labels were put right.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Relabeled {
     /// Sample.
     pub sample: usize,

@@ -41,6 +41,7 @@ pub enum RejectReason {
 
 /// An observation that does not take part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Rejection {
     /// Sample.
     pub sample: usize,

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// One change of a URDF. Lengths m, angles rad.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum UrdfEdit {
     /// A joint's `<origin>`.
     SetOrigin {

@@ -17,6 +17,7 @@ const SAME_DEG: f64 = 1e-10;
 
 /// Everything that differs between two robots, `a` before and `b` after; empty lists where nothing does.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ModelDiff {
     /// The joints that both have and that differ, in the order of `a`.
     pub joints: Vec<JointDiff>,
@@ -41,6 +42,7 @@ pub struct ModelDiff {
 
 /// Before and after.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Changed<T> {
     /// Before.
     pub from: T,
@@ -50,6 +52,7 @@ pub struct Changed<T> {
 
 /// How one joint differs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct JointDiff {
     /// Its name.
     pub joint: String,

@@ -19,6 +19,7 @@ pub const ROTATION_TOLERANCE: f64 = 1e-12;
 
 /// How well a text reproduces the model that it should hold.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Verification {
     /// The largest distance of a link's origin from where it should be, m, over all links and tried positions.
     pub translation: f64,
@@ -30,6 +31,7 @@ pub struct Verification {
 
 /// What urdf-rs says to the text.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum SecondReader {
     /// It reads it, and no link is further away than this.
     Agrees {

@@ -10,6 +10,7 @@ use nalgebra::{Isometry3, Point3};
 
 /// How two axes lie to each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum AxisRelation {
     /// Same line.
     Coincident,
@@ -23,6 +24,7 @@ pub enum AxisRelation {
 
 /// Two turning or sliding joints with no moving joint between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct AxisPair {
     /// The one nearer to the chain's beginning.
     pub first: JointId,

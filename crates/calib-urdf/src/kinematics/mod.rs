@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 
 /// Which way a chain passes a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Passing {
     /// From the parent link to the child link.
     Forward,

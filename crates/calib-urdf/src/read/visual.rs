@@ -41,6 +41,7 @@ pub enum Geometry {
 
 /// One `<visual>` of a link.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Visual {
     /// The link's name.
     pub link: String,
@@ -52,6 +53,7 @@ pub struct Visual {
 
 /// A `<visual>` that could not be understood.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct VisualFault {
     /// The link's name.
     pub link: String,

@@ -112,6 +112,7 @@ pub enum Source {
 
 /// What a term adds to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Drives {
     /// φ of equation (1): the motion about (along) the axis.
     About,
@@ -121,6 +122,7 @@ pub enum Drives {
 
 /// What a coefficient measures; its unit follows with the joint's kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Quantity {
     /// Same as the reading: rad or m.
     Position,

@@ -30,6 +30,7 @@ pub struct PoseObservation {
     clippy::large_enum_variant,
     reason = "one per measurement, not per observation; a box would cost Copy"
 )]
+#[non_exhaustive]
 pub enum PoseNoise {
     /// Isotropic in orientation and position.
     Split {

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 /// A patched text and what is different in it.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Patched {
     /// The new text.
     pub text: String,
@@ -18,6 +19,7 @@ pub struct Patched {
 
 /// What [`crate::patch_with`] makes of a text and of the files that it reads.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct PatchedFiles {
     /// The text itself.
     pub main: Patched,
