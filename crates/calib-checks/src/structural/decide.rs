@@ -2,11 +2,11 @@
 
 use super::apply::{apply, apply_all};
 use super::candidates::{Candidate, candidates, span};
+use super::continuous;
 use super::data::{Data, DataError};
 use super::expected::expected;
-use super::hypothesis::{Hypothesis, Scoped};
+use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{JointIndex, SampleIndex};
-use super::linear;
 use super::outcome::{Correction, Decision, Design, Evidence, Named, Options, Outcome};
 use super::scan::{Scan, Score, Scored};
 use super::score::score;
@@ -91,6 +91,12 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
         // The neighbor of a row is not among the rows that are left.
         candidates.retain(|c| !matches!(c.0, Hypothesis::RowShift { .. }));
     }
+    if !options.suspects.is_empty() {
+        let about =
+            |scope: &Scope| matches!(scope, Scope::Recording(r) if options.suspects.contains(r));
+        candidates.iter_mut().for_each(|c| c.1.retain(about));
+        candidates.retain(|c| !c.1.is_empty());
+    }
     let (ranking, screened) = screened_ranking(work, &candidates);
     outcome.rms = ranking.none.rms;
     outcome.expected = expected(work, &screened, options);
@@ -107,7 +113,8 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
         _ => Vec::new(),
     };
     if options.score_tests {
-        outcome.continuous = linear::continuous(&apply_all(&correction, work), &screened, options);
+        outcome.continuous =
+            continuous::continuous(&apply_all(&correction, work), &screened, options);
     }
     outcome.screened = screened
         .iter()
@@ -433,7 +440,7 @@ fn undoes(first: &Scoped, second: &Scoped) -> bool {
 }
 
 /// Evenly spaced rows of every recording. Recordings share the rows; what a short one leaves is for the longer ones.
-fn thinned(data: &Data, most: usize) -> Vec<usize> {
+pub(super) fn thinned(data: &Data, most: usize) -> Vec<usize> {
     if data.readings.len() <= most {
         return (0..data.readings.len()).collect();
     }

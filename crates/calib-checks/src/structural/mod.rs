@@ -51,6 +51,7 @@ mod apply;
 mod candidates;
 mod chain;
 mod channels;
+mod continuous;
 mod correct;
 mod data;
 mod decide;
@@ -70,12 +71,12 @@ mod twin;
 
 pub use apply::{apply, apply_all};
 pub use chain::{Chain, ChainError, ChainJoint, Motion};
+pub use continuous::Continuous;
 pub use data::{Body, Data, DataError, Measured};
 pub use decide::{explain, registration_residual, thin};
 pub use hypothesis::{
     Hypothesis, PoseMistake, QuarterTurns, Scope, Scoped, UnitMistake, axes_rotation,
 };
 pub use ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex, SampleIndex};
-pub use linear::Continuous;
 pub use outcome::{Correction, Decision, Design, Evidence, Expected, Named, Options, Outcome};
 pub use rows::{Deviation, Deviations, deviations};

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
+use super::continuous::Continuous;
 use super::hypothesis::Scoped;
 use super::ids::{JointIndex, RecordingIndex, SampleIndex};
-use super::linear::Continuous;
 
 /// How decisions are made. The defaults are measured, see the book's page on structural hypotheses.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +35,8 @@ pub struct Options {
     pub most_rows: usize,
     /// List the hypotheses that this design cannot distinguish from correct data.
     pub list_invisible: bool,
+    /// Recordings that alone may be wrong; empty: all.
+    pub suspects: Vec<RecordingIndex>,
     /// Test gains and fractional couplings.
     pub score_tests: bool,
 }
@@ -54,6 +56,7 @@ impl Default for Options {
             beam: 6,
             most_rows: 400,
             list_invisible: true,
+            suspects: Vec::new(),
             score_tests: true,
         }
     }

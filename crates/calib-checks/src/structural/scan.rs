@@ -196,7 +196,7 @@ impl<'a> Scan<'a> {
         scopes: &[Scope],
         enough: f64,
     ) -> Vec<Scored> {
-        let sums = self.moved_sums(hypothesis, &mut Vec::new());
+        let sums = self.moved_sums(hypothesis, scopes);
         let one = |scope: &Scope| {
             let scoped = Scoped {
                 hypothesis: *hypothesis,
@@ -211,8 +211,8 @@ impl<'a> Scan<'a> {
         scopes.iter().map(one).collect()
     }
 
-    /// The sums under a hypothesis that changes readings or links alone.
-    fn moved_sums(&self, h: &Hypothesis, row: &mut Vec<f64>) -> Option<Vec<Moments>> {
+    /// The sums under a hypothesis that changes readings or links alone, in the recordings of the scopes.
+    fn moved_sums(&self, h: &Hypothesis, scopes: &[Scope]) -> Option<Vec<Moments>> {
         let changes = h.affine().is_some()
             || matches!(
                 h,
@@ -240,11 +240,13 @@ impl<'a> Scan<'a> {
                 *sum = Moments::ZERO;
             }
         }
+        let mut row = Vec::new();
         for i in 0..self.data.readings.len() {
-            if !self.moved_readings(h, i, row) {
+            let asked = scopes.iter().any(|s| s.contains(self.data.recording[i]));
+            if !asked || !self.moved_readings(h, i, &mut row) {
                 continue;
             }
-            walk.go(&self.data.chain, row);
+            walk.go(&self.data.chain, &row);
             let pose = |body: usize| links[body].map(|link| walk.root_from_link[link.0]);
             self.add_row(&mut sums, i, pose, &self.points);
         }

@@ -74,7 +74,7 @@ struct Scaled {
 
 impl Solution {
     /// Estimates the memory of the noise from successive samples; `borders` are the first samples of recordings, across which nothing is
-    /// remembered. `None` where fewer than eight samples or no pairs of rows exist.
+    /// remembered. Where the residuals do not show one, decay and share are zero. `None` where fewer than eight samples or no pairs of rows exist.
     #[must_use]
     pub fn dependence(&self, borders: &[usize]) -> Option<Dependence> {
         /// Fewer pairs say nothing.
@@ -114,6 +114,9 @@ impl Solution {
                 found.lag_one = gamma[0];
                 // Var(ŷ_s·ŷ_t) = tr(W_s W_t) without memory
                 found.z = gamma[0] * expected[1].sqrt();
+                if !found.is_significant() {
+                    return Some(found);
+                }
             }
             let decay =
                 (gamma[0] * gamma[1] + gamma[1] * gamma[2]) / (gamma[0].powi(2) + gamma[1].powi(2));

@@ -23,25 +23,53 @@ pub(super) struct Chance {
 }
 
 impl Chance {
-    pub(super) fn simulate(design: &Design, settings: &ChangeSettings) -> Self {
+    /// `seen`: T of every candidate. Where the first draws already show that chance explains them, no more are drawn:
+    /// the threshold is then a rough one.
+    pub(super) fn simulate(design: &Design, seen: &[f64], settings: &ChangeSettings) -> Self {
+        /// Draws that decide on more.
+        const FIRST: usize = 40;
+        /// So many of them above what is seen: a chance of 0.3 % would bring that about once in 4 000 scans.
+        const ABOVE: usize = 3;
         let count = design.columns.len();
         let tests: Vec<Vec<Test>> = (0..count).map(|k| design.tests(k)).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-        let draws: Vec<Vec<f64>> = (0..settings.draws.max(20))
-            .map(|_| largest(design, &tests, &mut rng))
-            .collect();
-        let quantiles: Vec<f64> = (0..count)
-            .map(|k| quantile(draws.iter().map(|d| d[k]).collect(), 0.9))
-            .collect();
-        let excess = draws.iter().map(|d| {
-            let each = d.iter().zip(&quantiles).map(|(t, q)| t - q);
-            each.fold(f64::NEG_INFINITY, f64::max)
-        });
+        let all = settings.draws.max(20);
+        let mut draws: Vec<Vec<f64>> = Vec::with_capacity(all);
+        let mut draw = |draws: &mut Vec<Vec<f64>>, until: usize| {
+            while draws.len() < until {
+                draws.push(largest(design, &tests, &mut rng));
+            }
+        };
+        draw(&mut draws, FIRST.min(all));
+        let quantiles = quantiles(&draws, count);
+        let of_data = excess(seen, &quantiles);
+        let above = draws.iter().filter(|d| excess(d, &quantiles) > of_data);
+        if above.count() < ABOVE {
+            draw(&mut draws, all);
+        }
+        Self::of(&draws, count, settings.level)
+    }
+
+    fn of(draws: &[Vec<f64>], count: usize, level: f64) -> Self {
+        let quantiles = quantiles(draws, count);
+        let largest = draws.iter().map(|d| excess(d, &quantiles));
         Self {
-            threshold: tail(excess.collect(), settings.level),
+            threshold: tail(largest.collect(), level),
             quantiles,
         }
     }
+}
+
+/// By candidate: T that a tenth of the draws exceed.
+fn quantiles(draws: &[Vec<f64>], count: usize) -> Vec<f64> {
+    let of = |k: usize| quantile(draws.iter().map(|d| d[k]).collect(), 0.9);
+    (0..count).map(of).collect()
+}
+
+/// The largest excess of T over its quantile.
+fn excess(scores: &[f64], quantiles: &[f64]) -> f64 {
+    let each = scores.iter().zip(quantiles).map(|(t, q)| t - q);
+    each.fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// The largest T of every candidate in one simulated data set.

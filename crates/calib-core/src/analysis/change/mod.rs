@@ -147,24 +147,29 @@ impl Solution {
         }
         let thin = every(&used, used.len().div_ceil(SIMULATED));
         let borders = &settings.borders;
-        let simulated = Design::new(self, &candidates, &thin, &thin, borders)?;
-        let chance = Chance::simulate(&simulated, settings);
         let stride = used.len().div_ceil(EDGES);
         let design = Design::new(self, &candidates, &used, &every(&used, stride), borders)?;
+        let found: Vec<Option<Found>> = (0..candidates.list.len())
+            .map(|k| design.best(k, &design.tests(k), &design.u[k]))
+            .collect();
+        let seen: Vec<f64> = found
+            .iter()
+            .map(|f| f.as_ref().map_or(0.0, |f| design.score(f.gain)))
+            .collect();
+        let simulated = Design::new(self, &candidates, &thin, &thin, borders)?;
+        let chance = Chance::simulate(&simulated, &seen, settings);
         let mut changes: Vec<(usize, Change)> = Vec::new();
-        for (k, candidate) in candidates.list.iter().enumerate() {
-            if let Some(found) = design.best(k, &design.tests(k), &design.u[k]) {
-                changes.push((
-                    k,
-                    change(candidate.moved, &found, &design, chance.quantiles[k]),
-                ));
+        for (k, (candidate, found)) in candidates.list.iter().zip(&found).enumerate() {
+            if let Some(found) = found {
+                let quantile = chance.quantiles[k];
+                changes.push((k, change(candidate.moved, found, &design, quantile)));
             }
         }
         changes.sort_by(|(_, a), (_, b)| b.excess.total_cmp(&a.excess).then(a.moved.cmp(&b.moved)));
         if stride > 1
             && let Some((k, first)) = changes.first_mut()
             && candidates.list[*k].pattern == Pattern::Step
-            && let Some(coarse) = design.best(*k, &design.tests(*k), &design.u[*k])
+            && let Some(coarse) = &found[*k]
         {
             let edges = design.finer(&coarse.after, &used);
             let fine = Design::new(self, &candidates, &used, &edges, borders)?;

@@ -14,7 +14,7 @@ mod named;
 use std::collections::BTreeMap;
 
 use calib_checks::structural::{
-    Chain, Decision, Options, Outcome, explain, registration_residual, thin,
+    Chain, Decision, Options, Outcome, RecordingIndex, explain, registration_residual, thin,
 };
 use calib_finding::{Fact, Finding, Severity, Subject, catalog};
 use calib_profile::Usage;
@@ -96,6 +96,9 @@ fn of_validation(all: &Layout<'_>, fitted: &Outcome, mut options: Options) -> Ve
         return Vec::new();
     }
     (options.list_invisible, options.score_tests) = (false, false);
+    let recordings = all.recordings.iter().enumerate();
+    let suspects = recordings.filter(|(_, r)| held_out(r));
+    options.suspects = suspects.map(|(r, _)| RecordingIndex(r)).collect();
     let Ok(outcome) = explain(&all.data, &options) else {
         return Vec::new();
     };

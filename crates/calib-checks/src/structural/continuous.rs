@@ -1,0 +1,229 @@
+//! Continuous faults (gain, coupling by a fraction) by score tests, and the residual that nominal errors explain.
+//!
+//! The residuals `r = Q y + c − R m − t` are linear in small changes of the registration (Q, c, m: columns A_r), of the nominal
+//! geometry (six per moving joint, with priors: A_g) and of the tested parameter (one column G per gain and per coupling):
+//!
+//! ```text
+//! r ≈ A x + G k + e,   cov e = σ² (I + λ Σ_j D_j D_jᵀ) per row,   D_j = ∂(R m + t)/∂reading_j         joint noise
+//! N = Aᵀ V⁻¹ A + P,    P = σ²/σ_prior² for the geometry
+//! g = Gᵀ V⁻¹ (r − A x̂),   h = Gᵀ V⁻¹ G − Gᵀ V⁻¹ A N⁻¹ Aᵀ V⁻¹ G,   k̂ = g/h
+//! T = ν ln(χ²/(χ² − g²/h)),   ν = n − tr(N⁻¹ Aᵀ V⁻¹ A)
+//! ```
+//!
+//! λ by restricted maximum likelihood over a grid, σ² from χ². The geometry is relinearized before the tests.
+//! The largest T of all tests is compared with the F quantile at `false_alarm / tests`.
+
+use calib_geometry::se3;
+use nalgebra::{DVector, Isometry3, Vector3};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::Options;
+use super::candidates::span;
+use super::data::Data;
+use super::decide::thinned;
+use super::hypothesis::Hypothesis;
+use super::ids::SampleIndex;
+use super::linear::{Map, Model, Sums, Test, moving_joints, projected, solve};
+
+/// Joint noise against marker noise, (rad/m)²: none, and 0.003° … 0.1° for a marker of 0.3 mm.
+const NOISE_RATIOS: [f64; 5] = [0.0, 0.03, 0.3, 3.0, 30.0];
+/// Relinearizations of the geometry before the tests.
+const RELINEARIZATIONS: usize = 3;
+/// With fewer degrees of freedom the priors, not the data, decide a test.
+const LEAST_FREEDOM: f64 = 8.0;
+/// Fall of T from the best within which another test explains the data as well (log-likelihood difference 3).
+const AS_GOOD: f64 = 6.0;
+
+/// A continuous fault that the data demand.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Continuous {
+    /// [`Hypothesis::Gain`] or [`Hypothesis::Coupling`], with its estimated factor.
+    pub hypothesis: Hypothesis,
+    /// Standard deviation of the factor.
+    pub sigma: f64,
+    /// The score statistic.
+    pub statistic: f64,
+    /// Its familywise threshold.
+    pub threshold: f64,
+    /// What the fault moves the registration residual by, rms, m.
+    pub effect: f64,
+    /// Others whose statistic is within 6 of the largest.
+    pub alternatives: Vec<Hypothesis>,
+}
+
+impl Test {
+    fn hypothesis(&self, k: f64) -> Hypothesis {
+        if self.joint == self.source {
+            Hypothesis::Gain {
+                joint: self.joint,
+                factor: 1.0 + k,
+            }
+        } else {
+            Hypothesis::Coupling {
+                joint: self.joint,
+                source: self.source,
+                factor: k,
+            }
+        }
+    }
+}
+
+/// The most significant continuous fault, if any is significant and large enough to matter.
+pub(crate) fn continuous(
+    data: &Data,
+    screened: &[SampleIndex],
+    options: &Options,
+) -> Option<Continuous> {
+    let tests = tests(data);
+    if tests.is_empty() {
+        return None;
+    }
+    let (part, part_screened) = fewer(data, screened);
+    let (part, deviation, sigma) = relinearized(part, &part_screened, options)?;
+    let (lambda, sigma) = noise_ratio(&part, &deviation, sigma, &part_screened, options)?;
+    let at_map = Data {
+        chain: part.chain,
+        ..data.clone()
+    };
+    let model = Model::new(&at_map, &tests, screened);
+    let sums = model.sums(lambda);
+    let map = solve(&model, &sums, sigma, &deviation, options)?;
+    let mut scored = score_tests(&model, &sums, &map);
+    scored.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let &(which, statistic, factor, h) = scored.first()?;
+    if map.freedom < LEAST_FREEDOM {
+        return None;
+    }
+    let threshold = threshold(options.false_alarm / tests.len() as f64, map.freedom);
+    if statistic < threshold {
+        return None;
+    }
+    let plain = model.sums(0.0);
+    let first = model.registration + 6 * model.geometry.len() + which;
+    let moved = projected(&plain.gram, model.registration, first, 1)?[(0, 0)].max(0.0);
+    let effect = factor.abs() * (3.0 * moved / plain.observations).sqrt();
+    if effect < options.least_effect {
+        return None;
+    }
+    let alternatives = scored[1..].iter().take_while(|s| statistic - s.1 < AS_GOOD);
+    Some(Continuous {
+        hypothesis: tests[which].hypothesis(factor),
+        sigma: map.sigma / h.sqrt(),
+        statistic,
+        threshold,
+        effect,
+        alternatives: alternatives.map(|s| tests[s.0].hypothesis(s.2)).collect(),
+    })
+}
+
+/// Rows that give the point of linearization and the noise ratio: what they leave open is of second order, or a grid of
+/// factors of ten.
+const ROWS: usize = 120;
+
+/// Evenly spaced rows, and what is screened of them.
+fn fewer(data: &Data, screened: &[SampleIndex]) -> (Data, Vec<SampleIndex>) {
+    let rows = thinned(data, ROWS);
+    let place = |s: &SampleIndex| {
+        let row = rows.binary_search(&s.row).ok()?;
+        Some(SampleIndex { row, ..*s })
+    };
+    (
+        data.select(&rows),
+        screened.iter().filter_map(place).collect(),
+    )
+}
+
+/// The noise ratio λ of the largest restricted likelihood, and σ under it.
+fn noise_ratio(
+    data: &Data,
+    deviation: &DVector<f64>,
+    mut sigma: f64,
+    screened: &[SampleIndex],
+    options: &Options,
+) -> Option<(f64, f64)> {
+    let model = Model::new(data, &[], screened);
+    let mut best: Option<(f64, f64, f64)> = None;
+    for lambda in NOISE_RATIOS {
+        let sums = model.sums(lambda);
+        sigma = solve(&model, &sums, sigma, deviation, options)?.sigma;
+        let map = solve(&model, &sums, sigma, deviation, options)?;
+        if best.is_none_or(|b| map.log_likelihood > b.0) {
+            best = Some((map.log_likelihood, lambda, sigma));
+        }
+    }
+    best.map(|(_, lambda, sigma)| (lambda, sigma))
+}
+
+fn tests(data: &Data) -> Vec<Test> {
+    let joints = data.relevant_joints();
+    let mut tests = Vec::new();
+    for &joint in &joints {
+        for &source in joints.iter().filter(|s| span(data, **s) > 0.0) {
+            tests.push(Test { joint, source });
+        }
+    }
+    tests
+}
+
+/// (test, T, k̂, h) for every test.
+fn score_tests(model: &Model<'_>, sums: &Sums, map: &Map) -> Vec<(usize, f64, f64, f64)> {
+    let p = model.registration + 6 * model.geometry.len();
+    let last = sums.gram.ncols() - 1;
+    let count = model.tests.len();
+    let cross = sums.gram.view((0, p), (p, count)).into_owned();
+    let solved = map.factor.solve(&cross);
+    (0..count)
+        .map(|t| {
+            let own = sums.gram[(p + t, p + t)];
+            let h = own - cross.column(t).dot(&solved.column(t));
+            let g = sums.gram[(p + t, last)] + cross.column(t).dot(&map.x);
+            // A column that the geometry explains altogether tests nothing.
+            if h <= 1e-9 * own || own <= 0.0 {
+                return (t, 0.0, 0.0, f64::INFINITY);
+            }
+            let explained = (g * g / h).min(map.chi2 * (1.0 - 1e-12));
+            // r + A x + G k is minimal at k = −g/h; the correction is reading += k reading_source
+            let statistic = map.freedom * (map.chi2 / (map.chi2 - explained)).ln();
+            (t, statistic, -g / h, h)
+        })
+        .collect()
+}
+
+/// T that the largest of all tests exceeds with probability `level` times their number.
+fn threshold(level: f64, freedom: f64) -> f64 {
+    let f = FisherSnedecor::new(1.0, freedom).map_or(1e3, |d| d.inverse_cdf(1.0 - level));
+    // g²/h = χ² F/(F + ν)
+    freedom * (1.0 + f / freedom).ln()
+}
+
+/// The data with the chain at its MAP geometry, how far that is from nominal, and σ.
+fn relinearized(
+    mut data: Data,
+    screened: &[SampleIndex],
+    options: &Options,
+) -> Option<(Data, DVector<f64>, f64)> {
+    let nominal = data.chain.clone();
+    let moving = moving_joints(&data);
+    let mut deviation = DVector::zeros(6 * moving.len());
+    let mut sigma = options.sigma;
+    for _ in 0..RELINEARIZATIONS {
+        let x = {
+            let model = Model::new(&data, &[], screened);
+            let sums = model.sums(NOISE_RATIOS[2]);
+            let map = solve(&model, &sums, sigma, &deviation, options)?;
+            sigma = map.sigma;
+            map.x.rows(model.registration, deviation.len()).into_owned()
+        };
+        deviation += x;
+        for (g, &j) in moving.iter().enumerate() {
+            let xi = deviation.rows(6 * g, 6);
+            let twist = se3::Twist::new(
+                Vector3::new(xi[0], xi[1], xi[2]),
+                Vector3::new(xi[3], xi[4], xi[5]),
+            );
+            let step: Isometry3<f64> = se3::exp(&twist);
+            data.chain.joints[j].parent_from_joint = nominal.joints[j].parent_from_joint * step;
+        }
+    }
+    Some((data, deviation, sigma))
+}
