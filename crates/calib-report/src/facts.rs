@@ -72,6 +72,8 @@ pub enum NextStep {
     Use {
         /// The file.
         urdf: String,
+        /// The file with the joint effects that a URDF cannot hold, where there are any.
+        effects: Option<String>,
     },
     /// Fix the problems of a rejected result.
     FixProblems,

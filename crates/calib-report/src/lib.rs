@@ -71,7 +71,8 @@ pub use scene::Scene;
 pub use schema::{report_schema, scene_schema};
 pub use verdict::{
     Compared, Effect, Goodness, ImplausibleChange, Improvement, Judgment, Orientation, Part,
-    Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver, Validation, VerdictFacts, judge,
+    Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver, UrdfAlone, Validation,
+    VerdictFacts, judge,
 };
 pub use verification::{AngleStats, ErrorStats, LoopClosure, LoopGroup, Stats, Verification};
 pub use view3d::View3d;

@@ -128,6 +128,7 @@ impl Screen<'_> {
         for (name, stats) in [
             ("nominal", held_out.nominal),
             ("registration only", held_out.registration_only),
+            ("URDF without effects", held_out.urdf_alone),
             ("calibrated", held_out.calibrated),
         ] {
             let Some(stats) = stats else { continue };

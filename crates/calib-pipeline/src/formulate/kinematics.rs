@@ -135,6 +135,17 @@ impl Calibration {
         }
         model
     }
+
+    /// The robot as its URDF alone has it, without the effects that a URDF cannot hold; `None` where it has none.
+    #[must_use]
+    pub fn urdf_alone(&self) -> Option<Self> {
+        let beyond = self.effects.iter().any(|j| !j.fits_into_urdf());
+        beyond.then(|| Self {
+            model: self.urdf_model(),
+            effects: vec![JointEffects::default(); self.effects.len()],
+            ..self.clone()
+        })
+    }
 }
 
 /// Axis of a joint's motion; `None` for a fixed joint.

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use calib_core::NoiseKind;
 use calib_finding::{Finding, Severity, catalog};
 use calib_report::{
-    Goodness, ImplausibleChange, Improvement, Limit, Orientation, Share, SingleJoint, Solver, Unit,
-    Validation, VerdictFacts,
+    Goodness, HeldOut, ImplausibleChange, Improvement, Limit, Orientation, Share, SingleJoint,
+    Solver, Unit, UrdfAlone, Validation, VerdictFacts,
 };
 use nalgebra::UnitVector3;
 
@@ -50,6 +50,7 @@ pub(crate) fn facts(
         freed: e.fit.is_some_and(frees_the_robot),
         improvements: held_out.map(Improvement::of).unwrap_or_default(),
         changes: e.fit.map(|fit| changes(e, fit)).unwrap_or_default(),
+        urdf_alone: held_out.and_then(|h| urdf_alone(e, h)),
         validation: match held_out {
             None => Validation::None,
             Some(h) if h.left_out => Validation::LeaveOneOut {
@@ -68,6 +69,15 @@ pub(crate) fn facts(
         not_verified: motions.still.clone(),
         goodness: e.fit.map(|fit| goodness(e, fit)),
     }
+}
+
+/// The patched URDF without effects, beside the calibrated robot.
+fn urdf_alone(e: &Evidence<'_>, held_out: &HeldOut) -> Option<UrdfAlone> {
+    Some(UrdfAlone {
+        rms: held_out.urdf_alone?.rms_m,
+        with_effects: held_out.calibrated?.rms_m,
+        limit: e.inputs.robot.profile.solve.limits.held_out_rms,
+    })
 }
 
 /// Ids of the findings of one severity. What a rule of its own judges better is left to it.

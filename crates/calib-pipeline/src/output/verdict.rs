@@ -4,6 +4,7 @@ use calib_profile::{Limits, Method};
 use calib_report::{HeldOut, Limit, Limited, MissingPhysics, NextStep, Scope, Verdict};
 
 use crate::output::evidence::Evidence;
+use crate::output::export::calibration_name;
 use crate::verify::motions::Motions;
 
 pub(crate) fn limits(limits: &Limits, e: &Evidence<'_>) -> Vec<Limit> {
@@ -96,15 +97,17 @@ pub(crate) fn scope(e: &Evidence<'_>, motions: &Motions) -> Vec<Scope> {
         }
         None => {}
     }
-    if e.robot.effects.iter().any(|j| !j.fits_into_urdf()) {
-        scope.push(Scope::EffectsOf {
-            file: crate::output::export::calibration_name(&profile.outputs.urdf),
-        });
-    }
+    scope.extend(effects_file(e).map(|file| Scope::EffectsOf { file }));
     if e.method == Method::Paper {
         scope.push(Scope::OriginsOneByOne);
     }
     scope
+}
+
+/// The file with the effects that a URDF cannot hold, where there are any.
+fn effects_file(e: &Evidence<'_>) -> Option<String> {
+    let beyond = e.robot.effects.iter().any(|j| !j.fits_into_urdf());
+    beyond.then(|| calibration_name(&e.inputs.robot.profile.outputs.urdf))
 }
 
 pub(crate) fn next_steps(
@@ -117,6 +120,7 @@ pub(crate) fn next_steps(
     let mut steps = vec![match verdict {
         Verdict::Accepted | Verdict::AcceptedWithWarnings => NextStep::Use {
             urdf: e.inputs.robot.profile.outputs.urdf.clone(),
+            effects: effects_file(e),
         },
         Verdict::NotEvaluated if !has_limits || !has_validation => NextStep::AddValidation,
         Verdict::Rejected | Verdict::NotEvaluated => NextStep::FixProblems,

@@ -25,6 +25,8 @@ pub struct Robots<'a> {
     pub registered: Option<&'a Calibration>,
     /// The calibrated robot.
     pub calibrated: &'a Calibration,
+    /// The same without the effects that a URDF cannot hold, where there are any.
+    pub urdf_alone: Option<&'a Calibration>,
 }
 
 /// Errors in the validation recordings; `None` without validation rows.
@@ -42,6 +44,7 @@ pub fn held_out(
         })
     };
     let (nominal, registered) = (of(robots.nominal), of(robots.registered));
+    let urdf_alone = of(robots.urdf_alone);
     let distances = fit.map(distances).unwrap_or_default();
     let best = deviations(inputs, tracks, robots.calibrated, validation);
     if best.is_empty() {
@@ -57,6 +60,7 @@ pub fn held_out(
                 nominal_m: length(&nominal),
                 registration_only_m: length(&registered),
                 calibrated_m: Some(d.vector.norm()),
+                urdf_alone_m: length(&urdf_alone),
                 vector_m: Some(d.vector.into()),
                 nominal_rad: angle(&nominal),
                 registration_only_rad: angle(&registered),

@@ -33,6 +33,7 @@ pub fn left_out(
     let of = |robot| by_key(deviations(inputs, tracks, robot, fitted));
     let calibrated = of(robots.calibrated);
     let registered = robots.registered.map(of).unwrap_or_default();
+    let urdf_alone = robots.urdf_alone.map(of).unwrap_or_default();
     let mut poses = Vec::new();
     for sample in &predicted.samples {
         let (recording, row) = &fit.formulation.samples[sample.sample];
@@ -50,6 +51,8 @@ pub fn left_out(
                 registration_only_m: before.map(|d| d.vector.norm()),
                 registration_only_rad: before.and_then(|d| d.angle),
                 calibrated_m: v.position.or(calibrated.get(&key).map(|d| d.vector.norm())),
+                // Fitted with this pose, too: what is left are the effects.
+                urdf_alone_m: urdf_alone.get(&key).map(|d| d.vector.norm()),
                 calibrated_rad: v.rotation.or(angles.get(&v.measurement).copied()),
                 vector_m: vector,
                 distance: v.z.is_finite().then_some(Distance {

@@ -29,10 +29,12 @@ pub fn held_out(
     nominal: &Calibration,
     solved: &Solved,
 ) -> Option<HeldOut> {
+    let urdf_alone = solved.robot.urdf_alone();
     let robots = held_out::Robots {
         nominal: Some(nominal),
         registered: solved.registered.as_ref(),
         calibrated: &solved.robot,
+        urdf_alone: urdf_alone.as_ref(),
     };
     let fit = solved.fit.as_ref();
     held_out::held_out(inputs, tracks, &robots, fit)

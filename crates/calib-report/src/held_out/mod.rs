@@ -28,6 +28,9 @@ pub struct HeldOut {
     pub registration_only: Option<ErrorStats>,
     /// The calibrated robot.
     pub calibrated: Option<ErrorStats>,
+    /// What the patched URDF predicts without the joint effects that it cannot hold; null where there are none.
+    #[serde(default)]
+    pub urdf_alone: Option<ErrorStats>,
     /// Orientation errors of the same three, where a body's orientation is measured; null where none is.
     #[serde(default)]
     pub orientation: Option<OrientationErrors>,
@@ -108,6 +111,7 @@ impl HeldOut {
             nominal: over(|pose| pose.nominal_m),
             registration_only: over(|pose| pose.registration_only_m),
             calibrated: over(|pose| pose.calibrated_m),
+            urdf_alone: over(|pose| pose.urdf_alone_m),
             with_screened: ErrorStats::of(&values(&all, |pose| pose.calibrated_m))
                 .filter(|_| screened > 0),
             screened,
@@ -170,6 +174,9 @@ pub struct PoseError {
     pub registration_only_m: Option<f64>,
     /// The same with the calibrated robot, m.
     pub calibrated_m: Option<f64>,
+    /// The same with the patched URDF, without the effects that it cannot hold, m; null where there are none.
+    #[serde(default)]
+    pub urdf_alone_m: Option<f64>,
     /// predicted − observed with the calibrated robot, in the tracker frame, m.
     pub vector_m: Option<[f64; 3]>,
     /// Angle between predicted and observed orientation with the nominal robot, rad; null where no orientation is measured.

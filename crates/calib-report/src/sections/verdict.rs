@@ -46,6 +46,9 @@ pub(super) fn head(page: &mut Page, report: &Report) {
     ));
 }
 
+/// The patched URDF without the effects that it cannot hold.
+const ALONE: &str = "URDF without effects";
+
 pub(super) fn held_out(page: &mut Page, report: &Report) {
     page.section("held-out", "Errors on held-out poses");
     let Some(held_out) = &report.verification.held_out else {
@@ -57,8 +60,13 @@ pub(super) fn held_out(page: &mut Page, report: &Report) {
     for (name, stats) in [
         ("nominal", held_out.nominal),
         ("registration only", held_out.registration_only),
+        (ALONE, held_out.urdf_alone),
         ("calibrated", held_out.calibrated),
     ] {
+        // Not a row of its own where the URDF holds everything.
+        if stats.is_none() && name == ALONE {
+            continue;
+        }
         let cells = match stats {
             Some(stats) => [stats.mean_m, stats.rms_m, stats.p95_m, stats.max_m].map(mm),
             None => std::array::from_fn(|_| number::UNKNOWN.to_owned()),

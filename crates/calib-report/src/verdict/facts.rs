@@ -30,6 +30,8 @@ pub struct Facts {
     pub improvements: Vec<Improvement>,
     /// Numbers far from their nominal values.
     pub changes: Vec<Change>,
+    /// Held-out errors of the URDF alone; `None` where it holds everything that was found.
+    pub urdf_alone: Option<UrdfAlone>,
     /// What the result was verified with.
     pub validation: Validation,
     /// Orientation of the last body on held-out poses.
@@ -104,6 +106,17 @@ pub enum Part {
         /// Unit of both.
         unit: Unit,
     },
+}
+
+/// Held-out errors of the patched URDF without the effects that it cannot hold.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct UrdfAlone {
+    /// rms error of the URDF alone, m.
+    pub rms: f64,
+    /// rms error with the effects, m.
+    pub with_effects: f64,
+    /// The profile's limit of the rms error, m.
+    pub limit: Option<f64>,
 }
 
 /// A number that moved far from its nominal value.

@@ -13,7 +13,7 @@ mod rules;
 pub use compare::{Improvement, Quantity as Compared};
 pub use facts::{
     Change as ImplausibleChange, Facts as VerdictFacts, Goodness, Orientation, Part, RejectedPart,
-    Share, SingleJoint, Solver, Validation,
+    Share, SingleJoint, Solver, UrdfAlone, Validation,
 };
 pub use reason::{Effect, Reason, ReasonId};
 pub use rules::{Judgment, RULES, judge};

@@ -90,6 +90,8 @@ reasons! {
     SingleJointData = "single-joint-data": Warns,
     /// Joints that the fit used hardly move in the held-out poses.
     JointsNotVerified = "joints-not-verified": Warns,
+    /// What the URDF predicts without the effects that it cannot hold.
+    UrdfAlone = "urdf-alone": Supports | Warns,
     /// A warning among the findings.
     WarningFinding = "warning-finding": Warns,
     /// A limit is met with its whole interval.

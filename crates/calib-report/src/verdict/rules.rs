@@ -10,7 +10,7 @@ use crate::{FitEnd, Limit, Outcome, Unit, Verdict};
 pub type Rule = fn(&Facts) -> Vec<Reason>;
 
 /// Every rule. What each asks for stands in the book, by the ids of its reasons.
-pub const RULES: [Rule; 16] = [
+pub const RULES: [Rule; 17] = [
     converged,
     origins,
     limits,
@@ -26,6 +26,7 @@ pub const RULES: [Rule; 16] = [
     stated_noise,
     single_joint,
     verified_joints,
+    urdf_alone,
     warnings,
 ];
 
@@ -396,5 +397,26 @@ fn verified_joints(facts: &Facts) -> Vec<Reason> {
     vec![
         Reason::new(ReasonId::JointsNotVerified, Effect::Warns)
             .with("joints", Fact::names(facts.not_verified.clone())),
+    ]
+}
+
+/// Without a limit of the rms error, the URDF alone does as well as with effects up to this ratio.
+const AS_WELL: f64 = 1.2;
+
+fn urdf_alone(facts: &Facts) -> Vec<Reason> {
+    let Some(alone) = facts.urdf_alone else {
+        return Vec::new();
+    };
+    let accepted = alone.limit.unwrap_or(AS_WELL * alone.with_effects);
+    let effect = if alone.rms <= accepted {
+        Effect::Supports
+    } else {
+        Effect::Warns
+    };
+    vec![
+        Reason::new(ReasonId::UrdfAlone, effect)
+            .with("rms", Fact::meters(alone.rms))
+            .with("with_effects", Fact::meters(alone.with_effects))
+            .with_some("limit", alone.limit.map(Fact::meters)),
     ]
 }

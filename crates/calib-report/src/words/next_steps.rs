@@ -8,8 +8,11 @@ impl NextStep {
     #[must_use]
     pub fn sentence(&self) -> String {
         match self {
-            Self::Use { urdf } => {
-                format!("Use `{urdf}`, and keep this folder: `calib revert` needs it.")
+            Self::Use { urdf, effects } => {
+                let with = effects.as_ref();
+                let with =
+                    with.map_or_else(String::new, |file| format!(" with the effects in `{file}`"));
+                format!("Use `{urdf}`{with}, and keep this folder: `calib revert` needs it.")
             }
             Self::FixProblems => {
                 "Do not use this result until the problems above are fixed.".to_owned()

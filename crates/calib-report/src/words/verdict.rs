@@ -383,6 +383,21 @@ fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
             postures(),
             v.number("p")
         ),
+        ReasonId::UrdfAlone => {
+            let error = format!(
+                "The URDF alone, without the joint effects that it cannot hold: {} rms; with them {} rms",
+                v.number("rms"),
+                v.number("with_effects")
+            );
+            match (reason.effect, v.get("limit")) {
+                (Effect::Warns, Some(_)) => format!(
+                    "{error} (limit {}): use it with the effects only.",
+                    v.number("limit")
+                ),
+                (Effect::Warns, None) => format!("{error}: use it with the effects only."),
+                _ => format!("{error}."),
+            }
+        }
         ReasonId::NoValidation => "Nothing was verified on poses that were not fitted.".to_owned(),
         ReasonId::ValidationRepeatsFit => format!(
             "{} held-out postures repeat fitted ones: they do not test the model.",

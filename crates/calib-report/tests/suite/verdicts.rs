@@ -5,7 +5,7 @@ use std::path::Path;
 
 use calib_report::{
     Compared, Effect, FitEnd, Goodness, ImplausibleChange, Improvement, Limit, Limited,
-    Orientation, Part, Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver, Unit,
+    Orientation, Part, Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver, Unit, UrdfAlone,
     Validation, Verdict, VerdictFacts, judge,
 };
 
@@ -97,6 +97,16 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
         })
     };
     let share = |part| Share { part, of: 100 };
+    let alone = |rms, limit| {
+        let with_effects = 0.0005;
+        with(|f| {
+            f.urdf_alone = Some(UrdfAlone {
+                rms,
+                with_effects,
+                limit,
+            });
+        })
+    };
     vec![
         (ReasonId::LimitMet, Supports, clean()),
         (
@@ -314,6 +324,10 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
                 };
             }),
         ),
+        (ReasonId::UrdfAlone, Supports, alone(0.0009, Some(0.001))),
+        (ReasonId::UrdfAlone, Warns, alone(0.0011, Some(0.001))),
+        (ReasonId::UrdfAlone, Supports, alone(0.0005, None)),
+        (ReasonId::UrdfAlone, Warns, alone(0.0007, None)),
         (
             ReasonId::JointsNotVerified,
             Warns,
