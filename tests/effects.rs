@@ -162,6 +162,12 @@ fn backlash_is_found_and_taken_out_of_the_prediction() {
     }
     let held_out = &report["verification"]["held_out"]["calibrated"]["rms_m"];
     assert!(number(held_out) < 2.0 * MARKER, "{held_out}");
+    // The URDF cannot hold the backlash: what it predicts alone stands beside, and the verdict says so.
+    let alone = number(&report["verification"]["held_out"]["urdf_alone"]["rms_m"]);
+    assert!(alone > 5.0 * number(held_out), "{alone}");
+    let reasons = report["reason_ids"].as_array().expect("a list");
+    assert!(reasons.iter().any(|r| r == "urdf-alone"), "{reasons:?}");
+    assert_eq!(report["verdict"], "accepted_with_warnings");
     let yaml = dir.read("out/arm.calibrated.calibration.yaml");
     assert!(yaml.contains("backlash_rad:"), "{yaml}");
     assert!(!says(&report, "missing-physics"), "{}", report["findings"]);

@@ -1,7 +1,7 @@
-//! Continuous faults (gain, coupling by a fraction) by score tests, and the residual that nominal errors explain.
+//! Continuous faults (gain, coupling by a fraction, readings that lag behind) by score tests, and the residual that nominal errors explain.
 //!
 //! The residuals `r = Q y + c − R m − t` are linear in small changes of the registration (Q, c, m: columns A_r), of the nominal
-//! geometry (six per moving joint, with priors: A_g) and of the tested parameter (one column G per gain and per coupling):
+//! geometry (six per moving joint, with priors: A_g) and of the tested parameter (one column G per gain, per coupling and per recording's lag):
 //!
 //! ```text
 //! r ≈ A x + G k + e,   cov e = σ² (I + λ Σ_j D_j D_jᵀ) per row,   D_j = ∂(R m + t)/∂reading_j         joint noise
@@ -13,6 +13,8 @@
 //! λ by restricted maximum likelihood over a grid, σ² from χ². The geometry is relinearized before the tests.
 //! The largest T of all tests is compared with the F quantile at `false_alarm / tests`.
 
+use std::collections::BTreeSet;
+
 use calib_geometry::se3;
 use nalgebra::{DVector, Isometry3, Vector3};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -20,10 +22,10 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::Options;
 use super::candidates::span;
 use super::data::Data;
-use super::decide::thinned;
 use super::hypothesis::Hypothesis;
-use super::ids::SampleIndex;
+use super::ids::{RecordingIndex, SampleIndex};
 use super::linear::{Map, Model, Sums, Test, moving_joints, projected, solve};
+use super::thinning::thinned;
 
 /// Joint noise against marker noise, (rad/m)²: none, and 0.003° … 0.1° for a marker of 0.3 mm.
 const NOISE_RATIOS: [f64; 5] = [0.0, 0.03, 0.3, 3.0, 30.0];
@@ -37,9 +39,9 @@ const AS_GOOD: f64 = 6.0;
 /// A continuous fault that the data demand.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Continuous {
-    /// [`Hypothesis::Gain`] or [`Hypothesis::Coupling`], with its estimated factor.
+    /// [`Hypothesis::Gain`], [`Hypothesis::Coupling`] or [`Hypothesis::Lag`], with its estimated factor or lag.
     pub hypothesis: Hypothesis,
-    /// Standard deviation of the factor.
+    /// Standard deviation of the factor, or of the lag, s.
     pub sigma: f64,
     /// The score statistic.
     pub statistic: f64,
@@ -53,17 +55,20 @@ pub struct Continuous {
 
 impl Test {
     fn hypothesis(&self, k: f64) -> Hypothesis {
-        if self.joint == self.source {
-            Hypothesis::Gain {
-                joint: self.joint,
+        match *self {
+            Self::Reading { joint, source } if joint == source => Hypothesis::Gain {
+                joint,
                 factor: 1.0 + k,
-            }
-        } else {
-            Hypothesis::Coupling {
-                joint: self.joint,
-                source: self.source,
+            },
+            Self::Reading { joint, source } => Hypothesis::Coupling {
+                joint,
+                source,
                 factor: k,
-            }
+            },
+            Self::Lag { recording } => Hypothesis::Lag {
+                recording,
+                seconds: k,
+            },
         }
     }
 }
@@ -159,9 +164,14 @@ fn tests(data: &Data) -> Vec<Test> {
     let mut tests = Vec::new();
     for &joint in &joints {
         for &source in joints.iter().filter(|s| span(data, **s) > 0.0) {
-            tests.push(Test { joint, source });
+            tests.push(Test::Reading { joint, source });
         }
     }
+    let known = data.recording.iter().zip(&data.rates);
+    let timed: BTreeSet<RecordingIndex> = known
+        .filter_map(|(recording, rates)| rates.as_ref().map(|_| *recording))
+        .collect();
+    tests.extend(timed.into_iter().map(|recording| Test::Lag { recording }));
     tests
 }
 

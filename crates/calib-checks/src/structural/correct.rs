@@ -25,6 +25,7 @@ pub(crate) fn correct(scoped: &Scoped, data: &Data) -> Data {
         }
         Hypothesis::Remounted { body } => remount(&mut corrected, scoped.scope, body),
         Hypothesis::TrackerMoved | Hypothesis::MissingColumn { .. } => {}
+        Hypothesis::Lag { recording, seconds } => later(&mut corrected, recording, seconds),
         _ => {
             correct_readings(&mut corrected, h, &inside);
             correct_measured(&mut corrected, h, &inside);
@@ -60,6 +61,20 @@ fn correct_readings(data: &mut Data, h: &Hypothesis, inside: &[bool]) {
                 None if added != 0.0 => Some(added),
                 None => None,
             };
+        }
+    }
+}
+
+/// Every reading as it was `seconds` later.
+fn later(data: &mut Data, recording: RecordingIndex, seconds: f64) {
+    let rows = data.readings.iter_mut().zip(&data.rates);
+    for ((row, rates), of) in rows.zip(&data.recording) {
+        if *of == recording
+            && let Some(rates) = rates
+        {
+            for (q, rate) in row.iter_mut().zip(rates) {
+                *q = q.map(|q| q + rate * seconds);
+            }
         }
     }
 }

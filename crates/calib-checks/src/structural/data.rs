@@ -44,6 +44,8 @@ pub struct Data {
     pub readings: Vec<Vec<Option<f64>>>,
     /// The recording of each row. Rows of a recording stand in the order in which they were measured.
     pub recording: Vec<RecordingIndex>,
+    /// `[row]`: how fast each joint moved, rad/s or m/s, one entry per joint; `None` where it is not known. Empty: nowhere.
+    pub rates: Vec<Option<Vec<f64>>>,
     /// Bodies; each has one sample per row.
     pub bodies: Vec<Body>,
 }
@@ -167,6 +169,9 @@ impl Data {
             }
         };
         same(self.recording.len())?;
+        if !self.rates.is_empty() {
+            same(self.rates.len())?;
+        }
         for (row, readings) in self.readings.iter().enumerate() {
             if readings.len() != self.chain.joints.len() {
                 let expected = self.chain.joints.len();
@@ -176,7 +181,10 @@ impl Data {
                     found: readings.len(),
                 });
             }
-            if readings.iter().flatten().any(|q| !q.is_finite()) {
+            let rates = self.rates.get(row).and_then(Option::as_ref);
+            let rates = rates.into_iter().flatten();
+            let numbers = readings.iter().flatten().chain(rates);
+            if numbers.copied().any(|q| !q.is_finite()) {
                 return Err(DataError::NotFinite { row });
             }
         }
@@ -246,6 +254,10 @@ impl Data {
             chain: self.chain.clone(),
             readings: rows.iter().map(|&i| self.readings[i].clone()).collect(),
             recording: rows.iter().map(|&i| self.recording[i]).collect(),
+            rates: rows
+                .iter()
+                .filter_map(|&i| self.rates.get(i).cloned())
+                .collect(),
             bodies: bodies.collect(),
         }
     }

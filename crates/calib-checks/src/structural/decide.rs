@@ -11,6 +11,7 @@ use super::outcome::{Correction, Decision, Design, Evidence, Named, Options, Out
 use super::scan::{Scan, Score, Scored};
 use super::score::score;
 use super::screen::screen;
+use super::thinning::thinned;
 use super::twin::twin;
 
 /// Degrees of freedom below which the residual of a registration says nothing.
@@ -124,12 +125,6 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
         })
         .collect();
     Ok(outcome)
-}
-
-/// The data that [`explain`] scores: at most `most` rows.
-#[must_use]
-pub fn thin(data: &Data, most: usize) -> Data {
-    data.select(&thinned(data, most))
 }
 
 /// Residual of the registration of the data as they are, rms, m: all samples count.
@@ -437,29 +432,6 @@ fn undoes(first: &Scoped, second: &Scoped) -> bool {
         Hypothesis::TrackerMoved | Hypothesis::Remounted { .. }
     );
     first == second || (same_kind && own)
-}
-
-/// Evenly spaced rows of every recording. Recordings share the rows; what a short one leaves is for the longer ones.
-pub(super) fn thinned(data: &Data, most: usize) -> Vec<usize> {
-    if data.readings.len() <= most {
-        return (0..data.readings.len()).collect();
-    }
-    let mut recordings: Vec<Vec<usize>> = vec![Vec::new(); data.recordings()];
-    for (i, recording) in data.recording.iter().enumerate() {
-        recordings[recording.0].push(i);
-    }
-    recordings.retain(|rows| !rows.is_empty());
-    recordings.sort_by_key(Vec::len);
-    let (count, mut left) = (recordings.len(), most);
-    let mut kept = Vec::new();
-    for (k, rows) in recordings.iter().enumerate() {
-        let take = rows.len().min((left / (count - k)).max(1));
-        let step = rows.len() as f64 / take as f64;
-        kept.extend((0..take).map(|n| rows[(step * (n as f64 + 0.5)) as usize]));
-        left = left.saturating_sub(take);
-    }
-    kept.sort_unstable();
-    kept
 }
 
 fn design(data: &Data) -> Design {

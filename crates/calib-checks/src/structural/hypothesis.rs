@@ -1,6 +1,7 @@
 //! The hypotheses: what may be wrong with the data or with the claims about them, and how each is corrected.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::LazyLock;
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::Serialize;
@@ -135,6 +136,13 @@ pub enum Hypothesis {
         /// ±1 or ±2.
         rows: i8,
     },
+    /// The readings of a recording were taken `seconds` before the tracker's data of their row.
+    Lag {
+        /// Recording.
+        recording: RecordingIndex,
+        /// s; negative where the readings are ahead.
+        seconds: f64,
+    },
     /// The joint moved although its column is empty.
     MissingColumn {
         /// Joint.
@@ -217,9 +225,10 @@ pub struct Scoped {
 /// The rotation that a [`Hypothesis::TrackerAxes`] applies to the coordinates of its recording; 0 is the identity.
 #[must_use]
 pub fn axes_rotation(rotation: u8) -> Matrix3<f64> {
-    cube()
-        .nth(usize::from(rotation))
-        .unwrap_or_else(Matrix3::identity)
+    // Asked for once for every sample.
+    static CUBE: LazyLock<Vec<Matrix3<f64>>> = LazyLock::new(|| cube().collect());
+    let found = CUBE.get(usize::from(rotation));
+    found.copied().unwrap_or_else(Matrix3::identity)
 }
 
 /// `reading_joint ← factor · reading_joint + coupling · reading_source + offset`.

@@ -8,7 +8,7 @@ use super::Options;
 use super::chain::{Chain, Motion, Pose, Walk};
 use super::channels::mounts;
 use super::data::{Data, Measured};
-use super::ids::{JointIndex, LinkIndex, SampleIndex};
+use super::ids::{JointIndex, LinkIndex, RecordingIndex, SampleIndex};
 use super::scan::{Fit, Scan};
 
 /// Noise of a prismatic joint in m where a revolute one has it in rad: 0.01 mm beside 0.01°.
@@ -20,9 +20,14 @@ const RIDGE: f64 = 1e-10;
 
 /// One test.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Test {
-    pub joint: JointIndex,
-    pub source: JointIndex,
+pub(crate) enum Test {
+    /// `reading_joint += k · reading_source`.
+    Reading {
+        joint: JointIndex,
+        source: JointIndex,
+    },
+    /// Every reading of the recording as it was k seconds later.
+    Lag { recording: RecordingIndex },
 }
 
 /// The linear model at one point of linearization: sums over the rows.
@@ -177,8 +182,20 @@ impl<'a> Model<'a> {
         let first = self.registration + 6 * self.geometry.len();
         for (n, test) in self.tests.iter().enumerate() {
             // r = … − p, and p changes by ∂p/∂reading_joint · reading_source · k
-            let d = &by_reading[test.joint.0].1 * -readings[test.source.0];
-            block.column_mut(first + n).copy_from(&d);
+            let mut column = block.column_mut(first + n);
+            match test {
+                Test::Reading { joint, source } => {
+                    column.axpy(-readings[source.0], &by_reading[joint.0].1, 0.0);
+                }
+                Test::Lag { recording } if data.recording[i] == *recording => {
+                    let rates = data.rates.get(i).and_then(Option::as_ref);
+                    let rates = rates.into_iter().flatten();
+                    for ((_, d), rate) in by_reading.iter().zip(rates) {
+                        column.axpy(-rate, d, 1.0);
+                    }
+                }
+                Test::Lag { .. } => {}
+            }
         }
         by_reading.retain(|(_, d)| d.amax() > 0.0);
         (block, by_reading)

@@ -67,16 +67,18 @@ mod scan;
 mod score;
 mod screen;
 mod special;
+mod thinning;
 mod twin;
 
 pub use apply::{apply, apply_all};
 pub use chain::{Chain, ChainError, ChainJoint, Motion};
 pub use continuous::Continuous;
 pub use data::{Body, Data, DataError, Measured};
-pub use decide::{explain, registration_residual, thin};
+pub use decide::{explain, registration_residual};
 pub use hypothesis::{
     Hypothesis, PoseMistake, QuarterTurns, Scope, Scoped, UnitMistake, axes_rotation,
 };
 pub use ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex, SampleIndex};
 pub use outcome::{Correction, Decision, Design, Evidence, Expected, Named, Options, Outcome};
 pub use rows::{Deviation, Deviations, deviations};
+pub use thinning::thin;

@@ -31,6 +31,7 @@ pub(crate) fn twin(data: &Data, corrections: &[Scoped], screened: &[SampleIndex]
         chain: data.chain.clone(),
         readings: data.readings.clone(),
         recording: data.recording.clone(),
+        rates: data.rates.clone(),
         bodies: twin
             .bodies
             .into_iter()

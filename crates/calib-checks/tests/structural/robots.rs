@@ -303,6 +303,7 @@ impl Setting {
                 .map(|row| row.iter().copied().map(Some).collect())
                 .collect(),
             recording: self.recording.clone(),
+            rates: Vec::new(),
             bodies: vec![Body {
                 link,
                 measured,

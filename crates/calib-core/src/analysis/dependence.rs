@@ -340,6 +340,9 @@ fn recursion<'a>(
 fn bias(samples: &[Scaled], c: &DMatrix<f64>, share: f64, decay: f64) -> [f64; LAGS + 1] {
     let n = c.nrows();
     let count = samples.len();
+    if share == 0.0 {
+        return bias_of_none(samples, c);
+    }
     let before = memory(samples, share, decay, n);
     // The same from the end: a recording then begins with its last sample.
     let ends = |s: usize| s == 0 || samples[count - s].starts;
@@ -375,6 +378,24 @@ fn bias(samples: &[Scaled], c: &DMatrix<f64>, share: f64, decay: f64) -> [f64; L
                 out[lag] += kg[s].column(i).dot(&k[t].column(j))
                     - kc[s].column(i).dot(&h[t].column(j))
                     - kc[t].column(j).dot(&h[s].column(i));
+            }
+        }
+    }
+    out
+}
+
+/// The same without memory: −tr(k_s C k_tᵀ).
+fn bias_of_none(samples: &[Scaled], c: &DMatrix<f64>) -> [f64; LAGS + 1] {
+    let kc: Vec<DMatrix<f64>> = samples.iter().map(|s| &s.k * c).collect();
+    let mut out = [0.0; LAGS + 1];
+    for (s, a) in samples.iter().enumerate() {
+        for lag in 0..=LAGS {
+            let t = s + lag;
+            if t >= samples.len() || (lag > 0 && samples[t].starts) {
+                break;
+            }
+            for (i, j) in shared(a, &samples[t]) {
+                out[lag] -= kc[s].row(i).dot(&samples[t].k.row(j));
             }
         }
     }

@@ -11,6 +11,8 @@
 //! variance that samples as clusters show: correlated residuals inside a sample cannot fake significance. If the
 //! stated noise is too small, z² is divided by χ²/dof.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DVector, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -30,7 +32,7 @@ use crate::solve::whitened::{Whitened, covariance_of, whitened};
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Physics {
-    /// An effect of a joint; [`EffectKind::ClockOffset`] of all joints together.
+    /// An effect of a joint; [`EffectKind::ClockOffset`] of all joints of a recording together.
     Effect(EffectKind),
     /// A drift of the measuring frame along one of its axes, over time.
     Drift,
@@ -248,7 +250,7 @@ impl Solution {
 
 fn candidates(model: &Model) -> Vec<Candidate> {
     let mut out = Vec::new();
-    let mut clocks = Vec::new();
+    let mut clocks = BTreeMap::<&String, Vec<(usize, Option<usize>, Vec<f64>)>>::new();
     let used: std::collections::BTreeSet<usize> = model
         .paths
         .iter()
@@ -282,7 +284,8 @@ fn candidates(model: &Model) -> Vec<Candidate> {
         }
         for candidate in &joint.candidates {
             if candidate.kind.term().source == Source::Velocity {
-                clocks.push((e, None, candidate.values.clone()));
+                let clock = clocks.entry(&candidate.name).or_default();
+                clock.push((e, None, candidate.values.clone()));
             } else {
                 add(
                     candidate.kind,
@@ -292,14 +295,12 @@ fn candidates(model: &Model) -> Vec<Candidate> {
             }
         }
     }
-    if !clocks.is_empty() {
-        out.push(Candidate {
-            name: "clock_offset".to_owned(),
-            joint: None,
-            physics: Physics::Effect(EffectKind::ClockOffset),
-            effect: Effect::Joints(clocks),
-        });
-    }
+    out.extend(clocks.into_iter().map(|(name, parts)| Candidate {
+        name: name.clone(),
+        joint: None,
+        physics: Physics::Effect(EffectKind::ClockOffset),
+        effect: Effect::Joints(parts),
+    }));
     if let Some(times) = &model.problem.times {
         let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
         let centered: Vec<f64> = times.iter().map(|t| t - mean).collect();

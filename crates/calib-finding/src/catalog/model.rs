@@ -75,6 +75,12 @@ super::topic! {
         "rows_after": Error,
             "The recordings disagree with the nominal robot by {none} rms, but only by {best} with the joint values {rows:row} after[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
             "Synchronize the two, or record in holds: the joint values lag behind the tracker.";
+        "behind": Warning,
+            "The joint values of {recording:code} lag {offset} ± {sigma} behind the tracker's data of their rows: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
+            "Correct the times of the joint values, record in holds, or give tracker and joints as two files with their own times, so that `timing` aligns them.";
+        "ahead": Warning,
+            "The joint values of {recording:code} are {offset} ± {sigma} ahead of the tracker's data of their rows: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
+            "Correct the times of the joint values, record in holds, or give tracker and joints as two files with their own times, so that `timing` aligns them.";
         "offset": Warning,
             "The tracker's clock is {offset} ± {sigma} ahead of the robot's and runs {drift:ppm} faster.",
             "Use a shared clock if you can. The offset is taken into account.";

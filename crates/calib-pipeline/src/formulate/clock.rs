@@ -54,10 +54,10 @@ pub fn add_clocks(formulation: &mut Formulation, inputs: &Inputs, free_set: Free
         if loaded.spec.usage == Usage::Validation || loaded.velocities.is_empty() {
             continue;
         }
-        let Some(alignment) = &loaded.alignment else {
-            continue;
-        };
-        let found = matches!(alignment.clocks, ClockState::Found { .. });
+        let found = loaded
+            .alignment
+            .as_ref()
+            .is_some_and(|a| matches!(a.clocks, ClockState::Found { .. }));
         for (joint, speeds) in &loaded.velocities {
             let Some(edge) = inputs
                 .robot
@@ -80,7 +80,8 @@ pub fn add_clocks(formulation: &mut Formulation, inputs: &Inputs, free_set: Free
             let constant = regressor(&|_| 1.0);
             if !found || free_set == FreeSet::RegistrationOnly {
                 let problem = &mut formulation.problem;
-                problem.candidate(edge, EffectKind::ClockOffset, constant);
+                let clock = format!("{name}.clock_offset");
+                problem.shared_candidate(edge, EffectKind::ClockOffset, clock, constant);
                 continue;
             }
             let linear = regressor(&|row| position(loaded, row).unwrap_or(0.0));

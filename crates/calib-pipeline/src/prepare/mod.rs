@@ -15,6 +15,7 @@ pub mod repeats;
 pub mod robot;
 pub mod rows;
 pub mod settled;
+mod speeds;
 pub mod split;
 pub mod stopped;
 pub mod streams;

@@ -9,6 +9,7 @@ use calib_urdf::RobotModel;
 
 use crate::error::{DataProblem, PipelineError};
 use crate::prepare::inputs::{Loaded, RobotProfile};
+use crate::prepare::speeds::speeds;
 
 /// Checks the names of a table against robot and profile and makes its joint vectors.
 pub(crate) fn prepare(
@@ -56,6 +57,7 @@ pub(crate) fn prepare(
         }
     }
     let q = joint_vectors(model, spec, &poses);
+    let velocities = speeds(&poses);
     Ok(Loaded {
         name: name.to_owned(),
         spec: spec.clone(),
@@ -63,7 +65,7 @@ pub(crate) fn prepare(
         q,
         meta,
         alignment: None,
-        velocities: BTreeMap::new(),
+        velocities,
         shapes: BTreeMap::new(),
     })
 }

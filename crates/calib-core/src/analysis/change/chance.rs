@@ -27,9 +27,9 @@ impl Chance {
     /// the threshold is then a rough one.
     pub(super) fn simulate(design: &Design, seen: &[f64], settings: &ChangeSettings) -> Self {
         /// Draws that decide on more.
-        const FIRST: usize = 40;
-        /// So many of them above what is seen: a chance of 0.3 % would bring that about once in 4 000 scans.
-        const ABOVE: usize = 3;
+        const FIRST: usize = 20;
+        /// So many of them above what is seen: a chance of 0.3 % would bring that about once in 600 scans.
+        const ABOVE: usize = 2;
         let count = design.columns.len();
         let tests: Vec<Vec<Test>> = (0..count).map(|k| design.tests(k)).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);

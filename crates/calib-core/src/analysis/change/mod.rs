@@ -156,8 +156,13 @@ impl Solution {
             .iter()
             .map(|f| f.as_ref().map_or(0.0, |f| design.score(f.gain)))
             .collect();
-        let simulated = Design::new(self, &candidates, &thin, &thin, borders)?;
-        let chance = Chance::simulate(&simulated, &seen, settings);
+        // With few samples the scan itself is small enough to be simulated.
+        let fewer = (thin.len() < used.len())
+            .then(|| Design::new(self, &candidates, &thin, &thin, borders));
+        let chance = match fewer {
+            Some(simulated) => Chance::simulate(&simulated?, &seen, settings),
+            None => Chance::simulate(&design, &seen, settings),
+        };
         let mut changes: Vec<(usize, Change)> = Vec::new();
         for (k, (candidate, found)) in candidates.list.iter().zip(&found).enumerate() {
             if let Some(found) = found {

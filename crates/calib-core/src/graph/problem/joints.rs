@@ -144,13 +144,24 @@ impl Problem {
 
     /// Declares an effect that is not modeled, for the goodness-of-fit test.
     pub fn candidate(&mut self, edge: EdgeId, kind: EffectKind, values: Vec<f64>) {
-        let name = self.edge_name(edge).to_owned();
+        let name = match kind.term().source {
+            // All joints share a clock.
+            Source::Velocity => kind.label().to_owned(),
+            _ => format!("{}.{}", self.edge_name(edge), kind.label()),
+        };
+        self.shared_candidate(edge, kind, name, values);
+    }
+
+    /// The same of an effect whose coefficient joints have in common: candidates of speeds with one `name` are tested as one.
+    pub fn shared_candidate(
+        &mut self,
+        edge: EdgeId,
+        kind: EffectKind,
+        name: String,
+        values: Vec<f64>,
+    ) {
         if let Some(joint) = self.joint_mut(edge, "candidate") {
-            joint.candidates.push(Candidate {
-                kind,
-                name: format!("{name}.{}", kind.label()),
-                values,
-            });
+            joint.candidates.push(Candidate { kind, name, values });
         }
     }
 

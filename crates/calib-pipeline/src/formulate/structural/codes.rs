@@ -46,6 +46,10 @@ fn of_hypothesis(layout: &Layout<'_>, hypothesis: &Hypothesis) -> String {
             };
             format!("offset({}, {degrees} deg)", joint(j))
         }
+        Hypothesis::Lag { recording, seconds } => {
+            let name = &layout.recordings[recording.0].name;
+            format!("lag({name}, {:+.1} ms)", 1e3 * seconds)
+        }
         Hypothesis::RowShift { rows } => format!("rows({rows:+})"),
         Hypothesis::MissingColumn { joint: j } => format!("column({})", joint(j)),
         Hypothesis::WrongLink { body, link } => {

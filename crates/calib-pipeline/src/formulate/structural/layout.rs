@@ -6,7 +6,7 @@ use calib_checks::structural::{
     Body, BodyIndex, Chain, Data, JointIndex, LinkIndex, Measured, RecordingIndex, Scope,
 };
 use calib_profile::{BodyKind, Usage};
-use calib_urdf::{JointId, LinkId};
+use calib_urdf::{JointId, LinkId, RobotModel};
 use nalgebra::{Isometry3, Point3};
 
 use crate::prepare::inputs::{Inputs, Loaded};
@@ -51,6 +51,7 @@ impl<'a> Layout<'a> {
                 chain: chain.clone(),
                 readings: Vec::new(),
                 recording: Vec::new(),
+                rates: Vec::new(),
                 bodies: Vec::new(),
             },
             recordings,
@@ -89,6 +90,7 @@ impl<'a> Layout<'a> {
                     .readings
                     .push(readings.map(|(q, stated)| stated.then_some(*q)).collect());
                 self.data.recording.push(RecordingIndex(r));
+                self.data.rates.push(rates(model, loaded, row));
                 self.rows.push(row);
             }
         }
@@ -163,4 +165,16 @@ impl<'a> Layout<'a> {
         let all = self.recordings.iter().enumerate();
         all.filter(inside).map(|(_, r)| r.name.as_str()).collect()
     }
+}
+
+/// How fast each joint moved in a row; `None` where the rows are poses, or where the speed of a recorded joint is not known.
+fn rates(model: &RobotModel, loaded: &Loaded, row: usize) -> Option<Vec<f64>> {
+    if loaded.velocities.is_empty() {
+        return None;
+    }
+    let mut rates = vec![0.0; model.joints().len()];
+    for (joint, speeds) in &loaded.velocities {
+        rates[model.joint_id(joint).ok()?.index()] = speeds.get(row).copied().flatten()?;
+    }
+    Some(rates)
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use calib_checks::structural::{
     Continuous, Decision, Hypothesis, JointIndex, Measured, Outcome, Scope, Scoped,
 };
-use calib_finding::{Fact, Finding, Subject, catalog};
+use calib_finding::{About, Fact, Finding, Subject, Unit, catalog};
 
 use super::codes;
 use super::layout::Layout;
@@ -132,6 +132,22 @@ fn continuous_finding(layout: &Layout<'_>, found: &Continuous) -> Option<Finding
                 .with("joint", Fact::name(name))
                 .with("other", Fact::name(layout.joint(source)))
                 .with("factor", Fact::ratio(factor))
+        }
+        Hypothesis::Lag { recording, seconds } => {
+            let name = layout.recordings[recording.0].name.clone();
+            let kind = if seconds > 0.0 { "behind" } else { "ahead" };
+            let subject = Subject {
+                recordings: vec![name.clone()],
+                ..About::Clocks.into()
+            };
+            return Some(
+                Finding::of_kind(catalog::CLOCK_LAG, kind, subject)
+                    .with("recording", Fact::name(name))
+                    .with("offset", Fact::number(seconds.abs(), Unit::Second))
+                    .with("sigma", Fact::number(found.sigma, Unit::Second))
+                    .with("effect", Fact::meters(found.effect))
+                    .with_some("alternatives", alternatives),
+            );
         }
         _ => return None,
     };

@@ -1,0 +1,171 @@
+//! What laboratories do to recordings without meaning to, through the program: rows written twice, noise with a memory,
+//! joint values that lag behind.
+
+mod scratch;
+
+use std::collections::BTreeMap;
+
+use calib_pipeline::prepare::load::load_robot;
+use calib_recording::{Poses, WriteOptions, write_poses};
+use calib_sim::{Motion, StreamPlan, simulate_streams};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use scratch::{Ran, Scratch, root};
+use serde_json::Value;
+
+const PROFILE: &str = "robots/ripley.yaml";
+const POSES: &str = "robots/ripley/arm_poses.csv";
+
+fn run(dir: &Scratch) -> (Ran, Value) {
+    let ran = dir.calib(["run", PROFILE, "--out", "out"]);
+    let report = dir.json("out/report.json");
+    (ran, report)
+}
+
+fn finding<'a>(report: &'a Value, id: &str) -> Option<&'a Value> {
+    let mut all = report["findings"].as_array().expect("a list").iter();
+    all.find(|f| f["id"] == id)
+}
+
+/// Standard deviations of everything that was estimated.
+fn sigmas(report: &Value) -> Vec<f64> {
+    let all = report["parameters"].as_array().expect("a list").iter();
+    let sigma = all.filter_map(|p| p["sigma"].as_f64());
+    sigma.filter(|s| *s > 0.0).collect()
+}
+
+/// The table of the arm's poses, line by line: comments and header first.
+fn lines(dir: &Scratch) -> (Vec<String>, Vec<String>) {
+    let text = dir.read(POSES);
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let header = lines.iter().position(|l| !l.starts_with('#'));
+    let rows = lines.split_off(header.expect("a header") + 1);
+    (lines, rows)
+}
+
+#[test]
+fn rows_that_are_written_twice_count_once() {
+    let dir = Scratch::new().robot("ripley");
+    let (head, rows) = lines(&dir);
+    let twice: Vec<String> = rows.iter().flat_map(|r| [r.clone(), r.clone()]).collect();
+    let text = [head, twice].concat().join("\n") + "\n";
+    let (_, plain) = run(&dir);
+    let (_, report) = run(&dir.file(POSES, text));
+    let (a, b) = (sigmas(&plain), sigmas(&report));
+    assert!(a.len() > 10 && a.len() == b.len());
+    for (a, b) in a.iter().zip(&b) {
+        assert!((b / a - 1.0).abs() < 0.02, "{b} with copies, {a} without");
+    }
+    let said = finding(&report, "frames-merged").expect("said");
+    assert_eq!(said["facts"]["poses"], rows.len());
+}
+
+/// Marker errors of 0.5 mm that keep nine tenths of the error of the row before.
+#[test]
+fn noise_with_a_memory_is_said_and_widens_the_uncertainty() {
+    let dir = Scratch::new().robot("ripley");
+    let (head, rows) = lines(&dir);
+    let header: Vec<&str> = head[head.len() - 1].split(',').collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let mut kept = vec![0.0; header.len()];
+    let mut with_memory = |row: &String| -> String {
+        let cells = row.split(',').zip(&header).enumerate();
+        let cells = cells.map(|(k, (cell, name))| {
+            let fresh: f64 = StandardNormal.sample(&mut rng);
+            kept[k] = 0.9 * kept[k] + 5e-4 * (1.0_f64 - 0.81).sqrt() * fresh;
+            match cell.parse::<f64>() {
+                Ok(x) if name.ends_with("_m") => format!("{:.6}", x + kept[k]),
+                _ => cell.to_owned(),
+            }
+        });
+        cells.collect::<Vec<_>>().join(",")
+    };
+    let slow: Vec<String> = rows.iter().map(&mut with_memory).collect();
+    let text = [head, slow].concat().join("\n") + "\n";
+    let (_, report) = run(&dir.file(POSES, text));
+    let said = finding(&report, "noise-has-memory").expect("said");
+    assert!(
+        said["facts"]["factor"]["value"].as_f64().expect("a factor") > 1.2,
+        "{said:#}"
+    );
+    assert_ne!(report["verdict"], "accepted");
+}
+
+/// Joint values of a motion at 0.4 rad/s that are older than the markers of their row, by `lag` s.
+fn lagging(lag: f64) -> Scratch {
+    let robot = load_robot(&root().join(PROFILE)).expect("shipped");
+    let ranges: [(&str, f64, f64); 5] = [
+        ("waist", -70.0, 170.0),
+        ("shoulder", -100.0, 20.0),
+        ("elbow", -20.0, 120.0),
+        ("wrist_pitch", -90.0, 90.0),
+        ("wrist_roll", -100.0, 100.0),
+    ];
+    let plan = StreamPlan {
+        motion: Motion::Continuous,
+        ranges: ranges
+            .into_iter()
+            .map(|(joint, low, high)| {
+                let id = robot.model.joint_id(joint).expect("of the robot");
+                (id, (low.to_radians(), high.to_radians()))
+            })
+            .collect(),
+        bodies: robot.profile.bodies.keys().cloned().collect(),
+        duration: 20.0,
+        tracker_hz: 10.0,
+        robot_hz: 500.0,
+        offset: 0.0,
+        drift: 0.0,
+    };
+    let streams = simulate_streams(&robot.profile, &robot.model, &plan, 17).expect("a section");
+    let mut table: Poses = streams.tracker;
+    let (at, old) = (
+        table.t.clone().expect("timed"),
+        streams.robot.t.as_ref().expect("timed"),
+    );
+    let mut joints = BTreeMap::new();
+    for (name, values) in &streams.robot.joints {
+        let column = at.iter().map(|t| {
+            let t = t - lag;
+            let after = old.partition_point(|o| *o <= t).clamp(1, old.len() - 1);
+            let share = (t - old[after - 1]) / (old[after] - old[after - 1]);
+            let (a, b) = (values[after - 1]?, values[after]?);
+            Some(a + share * (b - a))
+        });
+        joints.insert(name.clone(), column.collect());
+    }
+    table.joint_units = streams.robot.joint_units.clone();
+    table.joints = joints;
+    let text = write_poses(&table, &WriteOptions::micro()).expect("plain names");
+    Scratch::new().robot("ripley").file(POSES, text)
+}
+
+#[test]
+fn joint_values_that_lag_behind_in_one_file_are_named() {
+    let (_, clean) = run(&lagging(0.0));
+    for id in [
+        "clock-lag",
+        "joint-coupling",
+        "joint-gain",
+        "changed-while-recording",
+    ] {
+        assert!(finding(&clean, id).is_none(), "{:#}", clean["findings"]);
+    }
+    let (_, report) = run(&lagging(0.008));
+    assert_ne!(report["verdict"], "accepted");
+    let lag = finding(&report, "clock-lag").expect("named");
+    assert_eq!(lag["facts"]["recording"], "arm_poses", "{lag:#}");
+    assert_eq!(lag["facts"]["kind"], "behind", "{lag:#}");
+    let offset = lag["facts"]["offset"]["value"].as_f64().expect("s");
+    assert!((offset - 0.008).abs() < 1e-3, "{lag:#}");
+    // The trace of the lag is not blamed on a transmission.
+    for id in ["joint-coupling", "joint-gain"] {
+        assert!(finding(&report, id).is_none(), "{:#}", report["findings"]);
+    }
+    let missing = finding(&report, "missing-physics").expect("after the fit, too");
+    assert_eq!(
+        missing["facts"]["parameter"], "arm_poses.clock_offset",
+        "{missing:#}"
+    );
+}
