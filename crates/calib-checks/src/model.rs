@@ -231,3 +231,33 @@ pub fn spoiled_rows(
         usual,
     }
 }
+
+/// Rows that one row is compared with at most, evenly over all: a median needs no more.
+const COMPARED: usize = 64;
+
+impl Spoiled {
+    /// Disagreement (1) of a row with the rows that are not spoiled, median, rad, if its link had been at
+    /// `base_from_link_there`; `None` where it turned against none of them.
+    pub fn disagreement_at(
+        &self,
+        row: usize,
+        base_from_link_there: &Isometry3<f64>,
+        tracker_from_body: &[Option<Isometry3<f64>>],
+        base_from_link: &[Isometry3<f64>],
+    ) -> Option<f64> {
+        let seen = tracker_from_body.get(row)?.as_ref()?;
+        let size = size(tracker_from_body);
+        let good: Vec<usize> = (0..base_from_link.len())
+            .filter(|other| *other != row && self.rows.iter().all(|r| r.row != *other))
+            .collect();
+        let others = good.iter().step_by(good.len().div_ceil(COMPARED).max(1));
+        let off = others.filter_map(|&other| {
+            let measured = screw(seen, tracker_from_body[other].as_ref()?);
+            let predicted = screw(base_from_link_there, &base_from_link[other]);
+            let slide = measured.1.zip(predicted.1);
+            let slide = slide.map_or(0.0, |(a, b)| (a - b) / size);
+            (measured.0.max(predicted.0) > TURNED).then(|| (measured.0 - predicted.0).hypot(slide))
+        });
+        median(off.collect())
+    }
+}

@@ -24,6 +24,7 @@ use crate::prepare::load::load_recordings;
 use crate::prepare::robot::load_robot;
 use crate::verify::changes::changes;
 use crate::verify::known::known_numbers;
+use crate::verify::moved::moved;
 use crate::verify::residuals::residual_rows;
 use crate::verify::{self, closure::close_loops};
 
@@ -105,6 +106,7 @@ pub fn run_on(
     let changed = fit.and_then(|fit| changes(&inputs, fit));
     checked.findings.extend(changed);
     let tracks = &checked.tracks;
+    checked.findings.extend(moved(&inputs, tracks, robot));
     let loops = close_loops(&inputs, tracks, &solved.body_from_origin(), &solved.fk);
     let held_out = verify::held_out(&inputs, tracks, &nominal, &solved);
     let known = fit.map_or_else(Default::default, |fit| known_numbers(&inputs, fit));

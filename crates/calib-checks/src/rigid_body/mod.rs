@@ -17,10 +17,12 @@
 //!
 //! Gower 1975, Psychometrika 40, 33–51 (generalized Procrustes); Kabsch 1976.
 
+mod gross;
 mod groups;
 mod learn;
 mod pose;
 
+pub use gross::Distances;
 pub use groups::rigid_groups;
 pub use learn::{MarkerFit, NotABody, Template};
 pub use pose::{BodyPoses, RowPose, WithoutPose, body_from_markers, body_poses};

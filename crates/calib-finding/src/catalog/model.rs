@@ -60,12 +60,18 @@ super::topic! {
         "axes": Error,
             "The recordings disagree with the nominal robot by {none} rms, but only by {best} with other tracker axes in {recordings:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
             "Export these recordings with the axes of the others.";
+        "held_out": Error,
+            "The errors in {recordings:code} are {none} per coordinate, but only {best} if the tracker, or the whole robot, moved by {distance} ± {sigma} and {angle} before.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
+            "Record the validation again without moving the tracker or the robot's base between it and the fitted recordings.";
     }
     /// A body has another mount in some recordings.
     BODY_REMOUNTED = "body-remounted" {
-        "": Error,
+        "recordings": Error,
             "The recordings disagree with the nominal robot by {none} rms, but only by {best} if body `{body}` was remounted for {recordings:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
             "Give the body another name in these recordings and in the profile, or record them again.";
+        "held_out": Error,
+            "The errors in {recordings:code} are {none} per coordinate, but only {best} if body `{body}` moved on its link by {distance} ± {sigma}[[ and {angle}]] before.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
+            "Record the validation again without remounting the body between it and the fitted recordings.";
     }
     /// Tracker and joints were read at different times.
     CLOCK_LAG = "clock-lag" {

@@ -85,6 +85,7 @@ pub(crate) fn paper_result(
         },
         robot,
         registered: None,
+        registration: None,
         found,
         root_covariance: None,
         fit: None,

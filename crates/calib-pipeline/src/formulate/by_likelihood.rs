@@ -8,7 +8,6 @@ use crate::error::PipelineError;
 use crate::formulate::checked::Checked;
 use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::found::Found;
-use crate::formulate::kinematics::Calibration;
 use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::solved::Solved;
@@ -60,7 +59,7 @@ pub fn likelihood(
     checked.findings.extend(on_their_limit(&fit));
     checked.findings.extend(with_memory(&mut fit));
     *inputs = clock::corrected(inputs, &fit);
-    ml_result(inputs, fit, registered.calibration)
+    ml_result(inputs, fit, registered)
 }
 
 /// Numbers that a physical limit of the profile stopped.
@@ -91,11 +90,7 @@ fn only_a_cross_check(findings: &mut [Finding]) {
     }
 }
 
-fn ml_result(
-    inputs: &Inputs,
-    fit: MlFit,
-    registered: Calibration,
-) -> Result<Solved, PipelineError> {
+fn ml_result(inputs: &Inputs, fit: MlFit, registered: MlFit) -> Result<Solved, PipelineError> {
     let profile = &inputs.robot.profile;
     let model = &inputs.robot.model;
     let at_zero = calib_core::Configuration::zero();
@@ -144,7 +139,8 @@ fn ml_result(
     Ok(Solved {
         robot: fit.calibration.clone(),
         fk: fit.calibration.clone(),
-        registered: Some(registered),
+        registered: Some(registered.calibration.clone()),
+        registration: Some(registered),
         found,
         root_covariance,
         fit: Some(fit),

@@ -25,12 +25,19 @@ const FLIPPED: f64 = 0.6;
 /// Displacement of the centroid, as part of the markers' displacement, up to which a body rotated on the spot.
 const ON_THE_SPOT: f64 = 0.5;
 
+/// The way to the next row is tried in steps that shrink by this factor: the nearest misses the right place by a tenth of the way there.
+const SHRINKS: f64 = 0.8;
+/// Shortest part of the way that is tried.
+const SHORTEST: f64 = 0.004;
+/// What a place on the way may leave of a row's disagreement.
+const LEFT: f64 = 0.3;
+
 /// How a row deviates.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     /// The body rotated on the spot.
     Flipped,
-    /// The robot had not settled, or the two were read at different times.
+    /// It is right on the way to a neighboring row: the robot had not settled, or the two were read at different times.
     Unsettled,
     /// Neither.
     Off,
@@ -74,15 +81,28 @@ pub fn rows(
             if seen.is_empty() || loaded.q.iter().any(Option::is_none) {
                 continue;
             }
-            let q = loaded.q.iter().flatten();
-            let q = q.map(|q| with_couplings(q, &structural.couplings));
-            let poses: Vec<_> = q
-                .map(|q| inputs.robot.model.root_from_link(&q, spec.link))
-                .collect();
+            let q: Vec<&Vec<f64>> = loaded.q.iter().flatten().collect();
+            let at = |q: &[f64]| {
+                let q = with_couplings(q, &structural.couplings);
+                inputs.robot.model.root_from_link(&q, spec.link)
+            };
+            let poses: Vec<_> = q.iter().map(|q| at(q)).collect();
             let spoiled = spoiled_rows(seen, &poses);
-            if !spoiled.rows.is_empty() {
-                all.push((body.as_str(), loaded, spoiled));
+            if spoiled.rows.is_empty() {
+                continue;
             }
+            let on_the_way = |row: &&SpoiledRow| {
+                on_the_way(&q, row, |there| {
+                    spoiled.disagreement_at(row.row, &at(there), seen, &poses)
+                })
+            };
+            let moving = spoiled.rows.iter().filter(on_the_way).map(|row| row.row);
+            all.push(Spoilt {
+                body,
+                loaded,
+                moving: moving.collect(),
+                spoiled,
+            });
         }
     }
     if all.is_empty() {
@@ -132,8 +152,32 @@ fn with_couplings(q: &[f64], couplings: &[Coupling]) -> Vec<f64> {
     moved
 }
 
-/// Rows whose motions disagree: body, recording, rows.
-type Spoilt<'a> = (&'a str, &'a Loaded, Spoiled);
+/// Whether a row is right somewhere on the way to the row before or after it; `off`: its disagreement at joint positions, rad.
+fn on_the_way(q: &[&Vec<f64>], row: &SpoiledRow, off: impl Fn(&[f64]) -> Option<f64>) -> bool {
+    let neighbors = [row.row.checked_sub(1), row.row.checked_add(1)];
+    let neighbors = neighbors.into_iter().flatten().filter_map(|k| q.get(k));
+    let parts = || {
+        let shorter = |part: &f64| Some(part * SHRINKS);
+        std::iter::successors(Some(1.0), shorter).take_while(|part| *part > SHORTEST)
+    };
+    let own = q[row.row];
+    let mut places = neighbors.flat_map(|other| {
+        parts().map(move |part| -> Vec<f64> {
+            let between = own.iter().zip(other.iter());
+            between.map(|(a, b)| a + part * (b - a)).collect()
+        })
+    });
+    places.any(|there| off(&there).is_some_and(|off| off < LEFT * row.off))
+}
+
+/// Rows of one body in one recording whose motions disagree.
+struct Spoilt<'a> {
+    body: &'a str,
+    loaded: &'a Loaded,
+    /// Those that are right on the way to a neighboring row.
+    moving: BTreeSet<usize>,
+    spoiled: Spoiled,
+}
 
 /// The rows most of whose samples deviate from the registration, and how.
 fn deviating<'a>(
@@ -147,7 +191,7 @@ fn deviating<'a>(
         return Vec::new();
     };
     let chain = coupled(chain, &structural.couplings);
-    let validation = |(_, loaded, _): &Spoilt<'_>| loaded.spec.usage == Usage::Validation;
+    let validation = |of: &Spoilt<'_>| of.loaded.spec.usage == Usage::Validation;
     let layout = Layout::new(inputs, tracks, &chain, all.iter().any(validation));
     let Ok(found) = deviations(&layout.data) else {
         return Vec::new();
@@ -161,14 +205,20 @@ fn deviating<'a>(
         by_row.insert((recording, layout.rows[deviation.row], body), *deviation);
     }
     let mut kept = Vec::new();
-    for (body, loaded, spoiled) in all {
+    for Spoilt {
+        body,
+        loaded,
+        moving,
+        spoiled,
+    } in all
+    {
         let row = |row: &SpoiledRow| {
             let deviation = by_row.get(&(loaded.name.as_str(), row.row, *body))?;
             deviation.whole().then(|| Row {
                 row: row.row,
                 off: row.off,
                 distance: deviation.distance,
-                kind: kind(row.off, deviation),
+                kind: kind(row.off, deviation, moving.contains(&row.row)),
             })
         };
         kept.push(Rows {
@@ -183,8 +233,8 @@ fn deviating<'a>(
 }
 
 /// A flip is a rotation of the marker pattern on the spot.
-fn kind(off: f64, deviation: &Deviation) -> Kind {
-    if off < FLIPPED {
+fn kind(off: f64, deviation: &Deviation, moving: bool) -> Kind {
+    if moving && off < FLIPPED {
         return Kind::Unsettled;
     }
     let turned = deviation.angle.is_some_and(|angle| angle > FLIPPED);

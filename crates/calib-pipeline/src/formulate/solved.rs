@@ -19,6 +19,8 @@ pub struct Solved {
     pub fk: Calibration,
     /// The robot at its zero configuration, with tracker and bodies fitted; `None` with the paper's method.
     pub registered: Option<Calibration>,
+    /// The fit that it comes from.
+    pub registration: Option<MlFit>,
     /// Transforms found.
     pub found: Vec<Found>,
     /// Covariance of where the robot stands.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use calib_checks::rigid_body::{NotABody, Template, body_poses};
+use calib_checks::rigid_body::{Distances, NotABody, Template, body_poses};
 use calib_finding::nearest_word;
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::{Body, BodyKind, Usage};
@@ -166,7 +166,10 @@ fn body_track(
     };
     let stated = inputs.robot.profile.tracker.marker_sigma;
     let gathered = gather(names, &fitted);
-    let all = body_poses(names, &slices(&gathered), given.clone(), None).map_err(fail)?;
+    let distances = Distances::of(&slices(&gathered), stated);
+    // A sample that is off its body would turn the body's frame in all rows.
+    let good = distances.without_gross(&slices(&gathered));
+    let all = body_poses(names, &slices(&good), given.clone(), None).map_err(fail)?;
     // A marker that wanders on its body by more than this is loose or mislabeled.
     let limit = (8.0 * stated.unwrap_or(0.0005)).max(0.003);
     if let Some((fit, wander)) = all.moving_marker(limit) {
@@ -179,7 +182,7 @@ fn body_track(
     }
     for (recording, loaded) in &inputs.recordings {
         if names.iter().any(|m| loaded.poses.markers.contains_key(m)) {
-            let tracks = gather(names, &[loaded]);
+            let tracks = distances.without_gross(&slices(&gather(names, &[loaded])));
             let poses = body_poses(names, &slices(&tracks), Some(all.template.clone()), stated)
                 .map_err(fail)?;
             track.poses.insert(recording.clone(), poses.track());

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use calib_geometry::registration::rigid_registration;
 use calib_profile::{Body, BodyKind, Usage};
 use calib_report::{JointValue, Unit};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -52,6 +53,10 @@ pub fn deviations(
         .iter()
         .filter(|(_, body)| is_moved(inputs, body))
         .collect();
+    let mounts: BTreeMap<&String, Isometry3<f64>> = moved
+        .iter()
+        .filter_map(|(name, body)| Some((*name, mount(robot, name, body, &tracks[*name])?)))
+        .collect();
     let mut out = Vec::new();
     for (name, loaded) in recordings.filter(|(_, r)| usage(r.spec.usage)) {
         let under = conditions(loaded, model, profile.solve.load);
@@ -79,6 +84,7 @@ pub fn deviations(
                     name: body_name,
                     body,
                     track: &tracks[*body_name],
+                    mount: mounts.get(body_name).copied(),
                     tracker_from_link: robot.tracker_from_root * root_from_link[body.link.index()],
                 };
                 seen.deviations(robot, loaded, row, &mut push);
@@ -86,6 +92,28 @@ pub fn deviations(
         }
     }
     out
+}
+
+/// `link_from_body`, body as its template has it. Three markers nearly on a line hardly determine a frame, and that of the fitted markers then
+/// turns against that of the template: all markers together say how the body is mounted.
+fn mount(
+    robot: &Calibration,
+    name: &str,
+    body: &Body,
+    track: &BodyTrack,
+) -> Option<Isometry3<f64>> {
+    let by_pattern = || {
+        let BodyKind::Markers { names, .. } = &body.kind else {
+            return None;
+        };
+        let template = track.template.as_ref()?;
+        let fitted = robot.points.get(name)?;
+        let on_link: Option<Vec<Point3<f64>>> =
+            names.iter().map(|m| fitted.get(m).copied()).collect();
+        let found = rigid_registration(&template.points, &on_link?, None).ok()?;
+        Some(found.b_from_a)
+    };
+    by_pattern().or_else(|| robot.mounts.get(name).copied())
 }
 
 /// Whether a joint moves the body against the root.
@@ -104,6 +132,8 @@ struct OfBody<'a> {
     name: &'a str,
     body: &'a Body,
     track: &'a BodyTrack,
+    /// `link_from_body`, where the body has a frame.
+    mount: Option<Isometry3<f64>>,
     tracker_from_link: Isometry3<f64>,
 }
 
@@ -111,8 +141,7 @@ impl OfBody<'_> {
     fn deviations(&self, robot: &Calibration, loaded: &Loaded, row: usize, push: &mut Push<'_>) {
         let seen = self.track.in_recording(&loaded.name).get(row);
         let seen = seen.copied().flatten();
-        let predicted = robot.mounts.get(self.name);
-        let predicted = predicted.map(|mount| self.tracker_from_link * mount);
+        let predicted = self.mount.map(|mount| self.tracker_from_link * mount);
         let pair = predicted.zip(seen);
         let angle = pair.map(|(predicted, seen)| predicted.rotation.angle_to(&seen.rotation));
         match &self.body.kind {

@@ -26,6 +26,7 @@ pub fn left_out(
     tracks: &BTreeMap<String, BodyTrack>,
     robots: &Robots<'_>,
     fit: &MlFit,
+    registration: Option<&MlFit>,
 ) -> Option<HeldOut> {
     let fitted = |usage| usage != Usage::Validation;
     let step = fit.formulation.samples.len().div_ceil(POSES).max(1);
@@ -34,6 +35,10 @@ pub fn left_out(
     let calibrated = of(robots.calibrated);
     let registered = robots.registered.map(of).unwrap_or_default();
     let urdf_alone = robots.urdf_alone.map(of).unwrap_or_default();
+    // The registration has its unknowns too: compared with its fitted errors, a calibration of a few poses would look worse than it is.
+    let without = registration
+        .map(|fit| each_left_out(fit, step))
+        .unwrap_or_default();
     let mut poses = Vec::new();
     for sample in &predicted.samples {
         let (recording, row) = &fit.formulation.samples[sample.sample];
@@ -45,11 +50,11 @@ pub fn left_out(
                 continue;
             }
             let before = registered.get(&key);
+            let alone = without.get(&key);
             let vector = <[f64; 3]>::try_from(v.error.as_slice()).ok();
             poses.push(PoseError {
-                // Fitted with this pose: slightly too good, which favors no calibration.
-                registration_only_m: before.map(|d| d.vector.norm()),
-                registration_only_rad: before.and_then(|d| d.angle),
+                registration_only_m: alone.and_then(|a| a.0).or(before.map(|d| d.vector.norm())),
+                registration_only_rad: alone.and_then(|a| a.1).or(before.and_then(|d| d.angle)),
                 calibrated_m: v.position.or(calibrated.get(&key).map(|d| d.vector.norm())),
                 // Fitted with this pose, too: what is left are the effects.
                 urdf_alone_m: urdf_alone.get(&key).map(|d| d.vector.norm()),
@@ -82,6 +87,29 @@ pub fn left_out(
         left_out: true,
         ..HeldOut::from_poses(quantity(inputs, fitted), poses)
     })
+}
+
+/// Errors of position (m) and orientation (rad) of a fit whose poses are left out in turn.
+fn each_left_out(fit: &MlFit, step: usize) -> BTreeMap<Key, (Option<f64>, Option<f64>)> {
+    let mut out = BTreeMap::new();
+    let Some(predicted) = fit.solution.leave_out(|sample| sample % step == 0) else {
+        return out;
+    };
+    for sample in &predicted.samples {
+        let (recording, row) = &fit.formulation.samples[sample.sample];
+        let angles = angles(fit, sample.sample, &sample.vectors);
+        for v in &sample.vectors {
+            let key = (recording.clone(), *row, subject(fit, v.measurement, v.item));
+            out.insert(
+                key,
+                (
+                    v.position,
+                    v.rotation.or(angles.get(&v.measurement).copied()),
+                ),
+            );
+        }
+    }
+    out
 }
 
 /// A rejected measurement took no part: its residual is its prediction error.

@@ -10,6 +10,7 @@ pub mod invariants;
 pub mod known;
 pub mod left_out;
 pub(crate) mod motions;
+pub mod moved;
 pub mod residuals;
 
 use std::collections::BTreeMap;
@@ -38,5 +39,5 @@ pub fn held_out(
     };
     let fit = solved.fit.as_ref();
     held_out::held_out(inputs, tracks, &robots, fit)
-        .or_else(|| left_out::left_out(inputs, tracks, &robots, fit?))
+        .or_else(|| left_out::left_out(inputs, tracks, &robots, fit?, solved.registration.as_ref()))
 }

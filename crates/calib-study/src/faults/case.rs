@@ -153,7 +153,7 @@ impl Case {
         for (i, q) in rows.iter().enumerate() {
             let state = State {
                 late: !first || i >= change,
-                last: name == LAST,
+                last: self.in_one(name),
                 share: (before + i) as f64 / total as f64,
             };
             let moving: Vec<f64> = q

@@ -19,6 +19,8 @@ pub enum Design {
     Both,
     /// A slow motion of all joints, 150 samples.
     Stream,
+    /// Six random poses.
+    Six,
 }
 
 /// How the held-out poses were chosen.
@@ -51,12 +53,13 @@ pub enum Body {
 
 impl Design {
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Random,
         Self::Few,
         Self::Sweeps,
         Self::Both,
         Self::Stream,
+        Self::Six,
     ];
 
     /// Readings by recording, fitted ones first; the name says what it holds.
@@ -68,6 +71,7 @@ impl Design {
         match self {
             Self::Random => vec![("poses", random(robot, 40, noise))],
             Self::Few => vec![("poses", random(robot, 10, noise))],
+            Self::Six => vec![("poses", random(robot, 6, noise))],
             Self::Sweeps => vec![("sweeps", sweeps(robot, noise))],
             Self::Both => vec![
                 ("poses", random(robot, 20, noise)),

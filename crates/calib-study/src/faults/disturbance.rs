@@ -108,7 +108,7 @@ impl Disturbance {
             from: noise.between(0.3, 0.7),
             lag: if noise.uniform() < 0.5 { 1 } else { -1 },
             up: noise.uniform() < 0.5,
-            outliers: noise.log_between(0.005, 0.04),
+            outliers: noise.log_between(0.005, 0.05),
         }
     }
 }

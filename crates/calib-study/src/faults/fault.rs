@@ -68,7 +68,7 @@ pub enum Fault {
     CopiedRows,
     /// The tracker's noise has a memory: AR(1) with ρ = 0.9.
     Memory,
-    /// Up to four percent of the samples are off by 10–100 mm, held-out ones included.
+    /// Half a percent to five percent of the samples are off by 10–100 mm, held-out ones included.
     Outliers,
     /// The held-out rows repeat fitted ones.
     HeldOutCopies,

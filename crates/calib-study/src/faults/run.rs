@@ -28,14 +28,12 @@ pub struct FaultResult {
 }
 
 /// Cells of the matrix: every fault in every design it can have, with every body; the held-out design and the size of the
-/// nominal errors alternate, so that each occurs with each.
+/// nominal errors alternate, so that each occurs with each. A part of the matrix has the cells of the whole.
 pub(super) fn matrix(only: &[Fault]) -> Vec<Cell> {
     let validations = [Validation::Combined, Validation::Alike, Validation::Absent];
     let mut cells = Vec::new();
-    let faults = Fault::ALL
-        .iter()
-        .filter(|f| only.is_empty() || only.contains(f));
-    for (f, fault) in faults.enumerate() {
+    let faults = Fault::ALL.iter().enumerate();
+    for (f, fault) in faults.filter(|(_, f)| only.is_empty() || only.contains(f)) {
         for (d, design) in Design::ALL.into_iter().enumerate() {
             for (b, body) in Body::ALL.into_iter().enumerate() {
                 let first = validations[(f + d + b) % 3];

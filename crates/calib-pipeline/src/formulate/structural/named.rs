@@ -152,9 +152,11 @@ fn of_tracker(layout: &Layout<'_>, scoped: &Scoped) -> Finding {
             Finding::of_kind(catalog::TRACKER_MOVED, "axes", About::Tracker)
                 .with("recordings", recordings())
         }
-        Hypothesis::Remounted { body: b } => Finding::new(catalog::BODY_REMOUNTED, body(b))
-            .with("body", Fact::name(layout.body(b)))
-            .with("recordings", recordings()),
+        Hypothesis::Remounted { body: b } => {
+            Finding::of_kind(catalog::BODY_REMOUNTED, "recordings", body(b))
+                .with("body", Fact::name(layout.body(b)))
+                .with("recordings", recordings())
+        }
         Hypothesis::Poses { body: b, mistake } => {
             let (id, kind) = match mistake {
                 PoseMistake::ScalarFirstReadAsLast => (catalog::QUATERNION_ORDER, "scalar_first"),
