@@ -169,3 +169,18 @@ fn joint_values_that_lag_behind_in_one_file_are_named() {
         "{missing:#}"
     );
 }
+
+/// The uncertainty that does not trust the noise model agrees where the model is right.
+#[test]
+fn cluster_robust_deviations_agree_where_the_noise_model_is_right() {
+    for robot in ["ripley", "justin"] {
+        let report = &scratch::finished(robot, "ml").report;
+        let ratio = report["fit"]["cluster_robust_ratio"]
+            .as_f64()
+            .expect("a ratio");
+        assert!((0.8..1.25).contains(&ratio), "{robot}: {ratio}");
+        let all = report["parameters"].as_array().expect("a list").iter();
+        let both = |p: &Value| p["sigma"].is_null() == p["sigma_cluster_robust"].is_null();
+        assert!(all.clone().count() > 10 && all.clone().all(both), "{robot}");
+    }
+}

@@ -299,6 +299,10 @@ pub struct FitSummary {
     /// Groups of observations whose noise the profile states; empty: `chi2_per_dof` is 1 by construction.
     #[serde(default)]
     pub stated_noise: Vec<String>,
+    /// Median over the parameters that the data determine of the cluster-robust standard deviation over the stated one:
+    /// about 1 where the noise model is right.
+    #[serde(default)]
+    pub cluster_robust_ratio: Option<f64>,
 }
 
 /// The predicted uncertainty of the tool over the workspace.

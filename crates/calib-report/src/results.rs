@@ -225,6 +225,9 @@ pub struct Parameter {
     pub value: f64,
     /// Standard deviation; null when it is unknown.
     pub sigma: Option<f64>,
+    /// The same without trust in the noise model (CR2, postures as clusters); a cross-check that varies more by chance.
+    #[serde(default)]
+    pub sigma_cluster_robust: Option<f64>,
     /// 1 − posterior variance / prior variance; null without a prior.
     pub data_share: Option<f64>,
     /// How well it is identifiable.

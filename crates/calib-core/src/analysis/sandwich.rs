@@ -11,6 +11,7 @@ use nalgebra::DMatrix;
 
 use calib_geometry::decompose::symmetric_eigen;
 
+use crate::analysis::solution::Solution;
 use crate::model::layout::Model;
 use crate::model::values::Values;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
@@ -19,6 +20,18 @@ use crate::solve::whitened::{covariance_of, whitened};
 
 /// An eigenvalue of I − Q below this means a direction with leverage 1, which carries no residual.
 const LEVERAGE_LEFT: f64 = 1e-10;
+
+impl Solution {
+    /// Standard deviation of every parameter by equation (1), in the order of the parameters; `None` for one that is
+    /// held. It does not trust the noise model, and varies more by chance than the stated one: a cross-check.
+    #[must_use]
+    pub fn cluster_robust_sigmas(&self) -> Option<Vec<Option<f64>>> {
+        let covariance = sandwich(&self.model, &self.values, &self.weights, &self.theta)?;
+        let sigma = |column: usize| covariance[(column, column)].max(0.0).sqrt();
+        let columns = self.model.column_of.iter();
+        Some(columns.map(|column| column.map(sigma)).collect())
+    }
+}
 
 /// Equation (1), samples being the clusters. The prior enters as if it were right. `None` when the model cannot be
 /// evaluated.

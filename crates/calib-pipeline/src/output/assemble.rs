@@ -40,6 +40,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
     let limits = limits(&profile.solve.limits, e);
     let judgment = judge(&facts(e, &findings, &limits, &motions, &tracks));
     let verdict = judgment.verdict;
+    let parameters = e.fit.map_or_else(Vec::new, parameters);
     let report = Report {
         profile: file.clone(),
         robot: profile.robot.clone(),
@@ -54,7 +55,6 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             .map(NextStep::sentence)
             .collect(),
         transforms: e.found.iter().map(transform).collect(),
-        parameters: e.fit.map_or_else(Vec::new, parameters),
         changes: e.urdf.changes.clone(),
         urdf_diff: e.urdf.diff.clone(),
         not_observable: e.fit.map_or_else(Vec::new, not_observable),
@@ -75,7 +75,8 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             },
         },
         estimators: estimators(e),
-        fit: e.fit.map(|fit| fit_summary(profile, fit)),
+        fit: e.fit.map(|fit| fit_summary(profile, fit, &parameters)),
+        parameters,
         residuals: Residuals::from_rows(e.residuals),
         noise: e.fit.map_or_else(Vec::new, |fit| noise(e, fit)),
         clocks: crate::formulate::clock::clocks(e.inputs, e.fit),

@@ -1,6 +1,7 @@
 //! The fit as the report's data.
 
 use calib_core::{Gauge, NoiseKind};
+use calib_geometry::statistics::median;
 use calib_profile::Profile;
 use calib_report::{Cause, FitSummary, NotObservable, Parameter, Term, Transform, Unit};
 
@@ -39,7 +40,8 @@ pub(crate) fn parameters(fit: &MlFit) -> Vec<Parameter> {
         .iter()
         .enumerate()
         .filter(|(i, _)| !held(*i));
-    all.map(|(_, p)| Parameter {
+    let robust = fit.solution.cluster_robust_sigmas().unwrap_or_default();
+    all.map(|(i, p)| Parameter {
         name: p.name.clone(),
         joint: p.joint.clone(),
         kind: serde_json::to_value(p.kind)
@@ -50,6 +52,11 @@ pub(crate) fn parameters(fit: &MlFit) -> Vec<Parameter> {
         nominal: p.nominal,
         value: p.value,
         sigma: p.sigma,
+        sigma_cluster_robust: robust
+            .get(i)
+            .copied()
+            .flatten()
+            .filter(|_| p.sigma.is_some()),
         data_share: Some(p.data_share),
         class: match p.class {
             calib_core::ParameterClass::Solid => calib_report::Class::Solid,
@@ -100,7 +107,17 @@ fn cause(gauge: Gauge) -> Cause {
     }
 }
 
-pub(crate) fn fit_summary(profile: &Profile, fit: &MlFit) -> FitSummary {
+/// Median of the cluster-robust standard deviation over the stated one where the data determine a parameter.
+fn cluster_robust_ratio(parameters: &[Parameter]) -> Option<f64> {
+    let solid = parameters
+        .iter()
+        .filter(|p| p.class == calib_report::Class::Solid);
+    let ratios =
+        solid.filter_map(|p| Some(p.sigma_cluster_robust? / p.sigma.filter(|s| *s > 0.0)?));
+    median(ratios.collect())
+}
+
+pub(crate) fn fit_summary(profile: &Profile, fit: &MlFit, parameters: &[Parameter]) -> FitSummary {
     let s = &fit.solution;
     // Against what the profile states, where it states something; what was found explains itself.
     let levels = s
@@ -122,6 +139,7 @@ pub(crate) fn fit_summary(profile: &Profile, fit: &MlFit) -> FitSummary {
             .filter(|name| stated_sigma(profile, name).is_some())
             .cloned()
             .collect(),
+        cluster_robust_ratio: cluster_robust_ratio(parameters),
     }
 }
 

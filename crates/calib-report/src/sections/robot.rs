@@ -2,7 +2,7 @@
 
 use super::{Page, code};
 use crate::table::Table;
-use crate::{LoopClosure, LoopGroup, Report, Stats, Unit, number};
+use crate::{LoopClosure, LoopGroup, Report, Stats, Unit, number, words};
 
 pub(super) fn changes(page: &mut Page, report: &Report) {
     page.section("changes", "Changes to the URDF");
@@ -275,4 +275,8 @@ pub(super) fn parameters(page: &mut Page, report: &Report) {
         ]);
     }
     page.table("", table);
+    let fit = report.fit.as_ref();
+    if let Some(ratio) = fit.and_then(|fit| fit.cluster_robust_ratio) {
+        page.text(words::fit::cluster_robust(ratio));
+    }
 }

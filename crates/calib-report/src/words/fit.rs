@@ -33,3 +33,11 @@ pub(crate) fn summary(fit: &FitSummary) -> String {
         fit.status, fit.observations, fit.unknowns
     )
 }
+
+/// How the uncertainty compares with one that does not trust the noise model.
+pub(crate) fn cluster_robust(ratio: f64) -> String {
+    format!(
+        "Cluster-robust standard deviations (CR2, postures as clusters) do not trust the noise model: in the median they are {} times the ones above.",
+        number::fixed(ratio, 2)
+    )
+}

@@ -307,6 +307,7 @@ pub fn accepted() -> Report {
             nominal: change.old.unwrap_or(0.0),
             value: change.new,
             sigma: change.sigma,
+            sigma_cluster_robust: change.sigma.map(|s| 1.04 * s),
             data_share: change.data_share,
             class: if change.data_share > Some(0.9) {
                 Class::Solid
@@ -403,6 +404,7 @@ pub fn accepted() -> Report {
             chi2_per_dof: Some(1.0612),
             chi2_used_per_dof: Some(1.0),
             stated_noise: vec!["marker".into()],
+            cluster_robust_ratio: Some(1.04),
         }),
         residuals: Residuals::from_rows(&residual_rows()),
         noise: vec![
