@@ -8,6 +8,8 @@
 // Every test binary has its own copy and uses a part of it.
 #![allow(dead_code)]
 
+mod kept;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -174,7 +176,7 @@ pub fn finished(robot: &str, method: &str) -> &'static Finished {
     RUNS[slot].get_or_init(|| {
         let dir = Scratch::new().robot(robot);
         let profile = format!("robots/{robot}.yaml");
-        let ran = dir.calib(["run", &profile, "--method", method, "--out", "out"]);
+        let ran = kept::run(&dir, &["run", &profile, "--method", method, "--out", "out"]);
         assert!(
             ran.code < 2,
             "{robot} {method}: {} {}",

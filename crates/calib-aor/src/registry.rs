@@ -195,20 +195,23 @@ pub fn fit(id: &str, input: &Input<'_>, options: &Options) -> Result<Outcome, Es
 /// One estimator of a frame.
 pub type FrameInfo = calib_estimator::EstimatorInfo<FrameEstimate>;
 
+/// What every frame estimator uses.
+const FRAMED: &[OptionId] = &[
+    SigmaT,
+    SigmaR,
+    Axes,
+    PlaneFit,
+    SameAngle,
+    WeakAngle,
+    WeakFraction,
+];
+
 const FRAMES: &[FrameInfo] = &[
     FrameInfo {
         id: "algorithm1",
         name: "circles around both axes",
         input: InputKind::TwoJoints,
-        options: &[
-            SigmaT,
-            SigmaR,
-            Axes,
-            PlaneFit,
-            SameAngle,
-            WeakAngle,
-            WeakFraction,
-        ],
+        options: FRAMED,
         summary: "circles around both axes, axes rotated back by the joint angles; the paper's Algorithm 1",
         source: "Chang & Pollard 2007; paper §4, Algorithm 1",
         fit: frame_planes::fit,
@@ -217,15 +220,7 @@ const FRAMES: &[FrameInfo] = &[
         id: "frame_ml",
         name: "both axes by maximum likelihood",
         input: InputKind::TwoJoints,
-        options: &[
-            SigmaT,
-            SigmaR,
-            Axes,
-            PlaneFit,
-            SameAngle,
-            WeakAngle,
-            WeakFraction,
-        ],
+        options: FRAMED,
         summary: "all poses and joint angles at once by maximum likelihood",
         source: "joint likelihood, see the book",
         fit: frame_ml::by_poses,
