@@ -90,7 +90,7 @@ macro_rules! offers {
         /// The estimator of this kind called `id`.
         ///
         /// # Errors
-        /// [`EstimatorError::Unknown`]($crate::EstimatorError::Unknown) with the names of the table.
+        /// [`Unknown`](calib_estimator::EstimatorError::Unknown) with the names of the table.
         pub fn $one(id: &str) -> Result<&'static $info, $crate::EstimatorError> {
             $crate::find($kind, $table, id)
         }
