@@ -215,8 +215,15 @@ fn frames(copies: usize) -> Scratch {
 #[test]
 fn frames_of_one_pose_count_once() {
     let (_, plain) = run(&Scratch::new().robot("ripley"));
-    let (_, report) = run(&frames(8));
+    let (ran, report) = run(&frames(8));
     let found = finding(&report, "frames-merged").expect("said");
+    // On one line of a terminal, and in the report.
+    assert!(
+        ran.stdout.contains("The 320 rows show 40 poses"),
+        "{}",
+        ran.stdout
+    );
+    assert!(found["facts"]["copies"].is_null());
     assert_eq!(found["severity"], "info");
     assert_eq!(found["facts"]["rows"], 320);
     assert_eq!(found["facts"]["poses"], 40);
@@ -234,6 +241,25 @@ fn frames_of_one_pose_count_once() {
         assert!(*b > 0.7 * a, "{b} after merging, {a} with single frames");
     }
     assert!(finding(&plain, "frames-merged").is_none());
+}
+
+/// Every row three times, as a logger writes it that is faster than the robot: said how many are copies.
+#[test]
+fn copies_of_a_row_count_once_and_are_said() {
+    let dir = Scratch::new().robot("ripley");
+    let text = dir.read(POSES);
+    let comment = |line: &str| {
+        line.starts_with('#') || !line.starts_with(|c: char| c.is_ascii_digit() || c == '-')
+    };
+    let copied: Vec<&str> = text
+        .lines()
+        .flat_map(|line| std::iter::repeat_n(line, if comment(line) { 1 } else { 3 }))
+        .collect();
+    let (ran, report) = run(&dir.file(POSES, copied.join("\n") + "\n"));
+    let found = finding(&report, "frames-merged").expect("said");
+    assert_eq!(found["facts"]["poses"], 40);
+    assert_eq!(found["facts"]["copies"], 80);
+    assert!(ran.stdout.contains("80 rows repeat"), "{}", ran.stdout);
 }
 
 #[test]

@@ -42,6 +42,21 @@ struct Case {
 }
 
 fn case(seed: u64, design: Design, event: Event) -> Case {
+    case_with(seed, design, event, Fitted::All)
+}
+
+/// How a case is fitted.
+#[derive(Clone, Copy, PartialEq)]
+enum Fitted {
+    /// Every row counts; the change is anywhere in the middle.
+    All,
+    /// Robustly; the change is so many rows before the end.
+    Robustly(usize),
+    /// Robustly, with so many gross outliers at random rows, 20 mm.
+    WithOutliers(usize),
+}
+
+fn case_with(seed: u64, design: Design, event: Event, fitted: Fitted) -> Case {
     let mut r = rng(seed);
     let free = Free::everything(6);
     let mut chain = Chain::nominal(six_r());
@@ -60,7 +75,16 @@ fn case(seed: u64, design: Design, event: Event) -> Case {
     }
     let chain = chain.deviate(&mut r, &free, 0.005, 0.002);
     let samples = chain.q.len();
-    let row = r.random_range(samples / 5..samples * 4 / 5);
+    let mut row = r.random_range(samples / 5..samples * 4 / 5);
+    if let Fitted::Robustly(last) = fitted {
+        row = samples - last;
+    }
+    let mut gross = Vec::new();
+    if let Fitted::WithOutliers(count) = fitted {
+        gross = (0..count).map(|_| r.random_range(0..samples)).collect();
+        // The end is where a change would be taken for.
+        gross.extend([samples - 1, samples - 2, samples - 3]);
+    }
     let mut h = chain.problem(&free, SIGMA);
     h.problem.group_mut(h.markers).estimate = true;
     let noise = h
@@ -95,10 +119,17 @@ fn case(seed: u64, design: Design, event: Event) -> Case {
         }
         let x = chain.tracker_from_body(&chain.q[s].clone(), &extra);
         for (m, p) in chain.markers.iter().enumerate() {
+            let off = if gross.contains(&s) {
+                normal3(&mut r).normalize() * 0.02
+            } else {
+                nalgebra::Vector3::zeros()
+            };
             seen.push(calib_core::MarkerObservation {
                 sample: s,
                 point: h.points[m],
-                position: nalgebra::Point3::from((x * p).coords * scale + normal3(&mut r) * SIGMA),
+                position: nalgebra::Point3::from(
+                    (x * p).coords * scale + normal3(&mut r) * SIGMA + off,
+                ),
                 shape: None,
             });
         }
@@ -106,7 +137,7 @@ fn case(seed: u64, design: Design, event: Event) -> Case {
     h.problem
         .markers("body", h.tracker, h.body, h.markers, seen);
     let mut settings = Settings::default();
-    settings.robust.enabled = false;
+    settings.robust.enabled = fitted != Fitted::All;
     let solution = solve(&h.problem, &settings).expect("solves");
     Case { h, solution, row }
 }
@@ -171,6 +202,42 @@ fn a_change_is_named_with_its_row() {
             assert!(row + 2 >= all, "{body:?} {tracker:?} {joint:?}");
         }
     }
+}
+
+/// The robust fit rejects the last eight rows, which are those after the change.
+#[test]
+fn a_change_whose_rows_were_rejected_is_named() {
+    for seed in 0..6 {
+        for (event, slips) in [(Event::Slip(6e-3), true), (Event::Bump(6e-3), false)] {
+            let case = case_with(seed, Design::Random(50), event, Fitted::Robustly(8));
+            let moved = if slips {
+                Moved::Body(case.h.body)
+            } else {
+                Moved::Reference(case.h.tracker)
+            };
+            let rejected = case.solution.rejected.iter();
+            let after = rejected.filter(|r| r.sample >= case.row).count();
+            assert!(after > 8, "seed {seed}: the fit kept the rows: {after}");
+            let scan = scan(&case);
+            let change = scan.significant().expect("a change");
+            assert_eq!(
+                (change.moved, change.first),
+                (moved, case.row),
+                "seed {seed}"
+            );
+        }
+    }
+}
+
+/// Gross outliers that follow each other are no change: nothing that moved once explains them.
+#[test]
+fn gross_outliers_are_no_change() {
+    let named = (0..20).filter(|seed| {
+        let fitted = Fitted::WithOutliers(2);
+        let case = case_with(*seed, Design::Random(40), Event::Nothing, fitted);
+        scan(&case).significant().is_some()
+    });
+    assert!(named.count() <= 1);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use crate::words::answers::answers_in;
 use crate::words::prose::{full_stop, sentence};
 use crate::{Class, Outcome, Report, Severity, Unit, Verdict, number};
 use anstyle::{AnsiColor, Style};
+use calib_finding::catalog;
 
 /// Columns of the narrowest terminal in use.
 const COLUMNS: usize = 80;
@@ -230,21 +231,19 @@ impl Screen<'_> {
         }
     }
 
-    /// Warnings and errors.
+    /// Warnings and errors, and what changes the count of the data.
     fn findings(&mut self) {
-        let findings: Vec<_> = self
-            .report
-            .findings
-            .iter()
-            .filter(|finding| finding.severity > Severity::Info)
-            .collect();
+        let shown = |finding: &&calib_finding::Finding| {
+            finding.severity > Severity::Info || finding.id == catalog::FRAMES_MERGED
+        };
+        let findings: Vec<_> = self.report.findings.iter().filter(shown).collect();
         if !findings.is_empty() {
             self.heading("Findings");
             for finding in findings {
-                let style = if finding.severity == Severity::Error {
-                    AnsiColor::Red
-                } else {
-                    AnsiColor::Yellow
+                let style = match finding.severity {
+                    Severity::Error => AnsiColor::Red,
+                    Severity::Warning => AnsiColor::Yellow,
+                    Severity::Info => AnsiColor::Cyan,
                 };
                 let line = wrap(
                     &format!(

@@ -4,7 +4,7 @@ super::topic! {
     /// Successive rows of one posture.
     FRAMES_MERGED = "frames-merged" {
         "": Info,
-            "The {rows:row} show {poses:pose}: successive rows with equal joint values were merged into their mean.",
+            "The {rows:row} show {poses:pose}: successive rows with equal joint values were merged into their mean, which counts once.[[ {copies:row} repeat the row before in every tracked value.]]",
             "Nothing is needed. Record more poses rather than more frames of a pose: the frames share the error of the posture.";
     }
     /// Residuals of successive rows are correlated.
@@ -17,7 +17,7 @@ super::topic! {
     CHANGED_WHILE_RECORDING = "changed-while-recording" {
         "body": Warning,
             "Body `{body}` moved on its link by {distance} ± {sigma} and {angle} between rows {before} and {row}, or this part of the data differs for another reason.[[ The data show nearly as well that {rivals:code} moved.]][[ Missing physics explains as much: `{physics}`.]]",
-            "Fasten the body and record again, or estimate one mount for each part: add `split: {recording: {recording}, at_row: {row}[[, before: {earlier:list}]]}` to the body in the profile.";
+            "Fasten the body and record again, or estimate one mount for each part: add `split: {recording: {recording}, at_row: {row}[[, before: {earlier:list}]]}` to the body in the profile, and list held-out recordings that were made before the change under `before` as well.";
         "tracker": Warning,
             "The tracker, or the whole robot, moved by {distance} ± {sigma} and {angle} between rows {before} and {row}.[[ The data show nearly as well that {rivals:code} moved.]][[ Missing physics explains as much: `{physics}`.]]",
             "Secure the tracker and the robot's stand, and record again; until then keep only the rows of one side.";

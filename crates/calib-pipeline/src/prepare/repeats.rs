@@ -17,6 +17,8 @@ use crate::prepare::inputs::{Inputs, Loaded};
 const EQUAL: f64 = 1e-7;
 /// Frames of a robot at rest agree to this, m. Where they do not, the joint values are not those of the rows.
 const AT_REST: f64 = 5e-3;
+/// Measured twice, a place differs by more than this, m: what is closer was copied and rounded.
+const COPIED: f64 = 1e-6;
 
 /// Merges the frames of every posture in the recordings that are fitted; a finding for each recording that had some.
 pub fn merge(inputs: &mut Inputs) -> Vec<Finding> {
@@ -37,7 +39,8 @@ pub fn merge(inputs: &mut Inputs) -> Vec<Finding> {
                 Subject::recording(loaded.name.clone()),
             )
             .with("rows", Fact::count(loaded.q.len()))
-            .with("poses", Fact::count(groups.len())),
+            .with("poses", Fact::count(groups.len()))
+            .with_some("copies", copies(loaded, &groups)),
         );
         merge_rows(loaded, &groups);
         moved.push((loaded.name.clone(), groups));
@@ -75,9 +78,23 @@ fn postures(loaded: &Loaded) -> Vec<Range<usize>> {
     groups
 }
 
-/// Whether everything that both rows show is in the same place.
+/// Rows that repeat the row before in everything that was tracked.
+fn copies(loaded: &Loaded, groups: &[Range<usize>]) -> Option<Fact> {
+    let rows = groups.iter().flat_map(|group| group.start + 1..group.end);
+    let count = rows
+        .filter(|&row| agree(loaded, row - 1, row, COPIED))
+        .count();
+    (count > 0).then(|| Fact::count(count))
+}
+
+/// Whether the body stood still between two rows.
 fn at_rest(loaded: &Loaded, a: usize, b: usize) -> bool {
-    let near = |a: Vector3<f64>, b: Vector3<f64>| (a - b).norm() < AT_REST;
+    agree(loaded, a, b, AT_REST)
+}
+
+/// Whether everything that both rows show is in the same place to within `tolerance`, m.
+fn agree(loaded: &Loaded, a: usize, b: usize, tolerance: f64) -> bool {
+    let near = |a: Vector3<f64>, b: Vector3<f64>| (a - b).norm() < tolerance;
     let markers = loaded
         .poses
         .markers

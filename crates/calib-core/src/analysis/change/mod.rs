@@ -108,6 +108,8 @@ pub struct ChangeScan {
     pub changes: Vec<Change>,
     /// Excess that clean data do not reach but with the stated chance.
     pub threshold: f64,
+    /// F / N of equation (2).
+    pub cost_per_row: f64,
 }
 
 impl ChangeScan {
@@ -132,14 +134,62 @@ impl ChangeScan {
     }
 }
 
+/// A change leaves the cost per row of the rows that the fit kept, times this, where it is why the others were rejected.
+const EXPLAINED: f64 = 1.5;
+
 /// Ranges begin and end at so many samples at most; the best range is then refined to the sample.
 const EDGES: usize = 384;
 
 impl Solution {
     /// Scans the samples of the fit for changes. `None` where the model cannot be evaluated or where fewer than
     /// six samples were used.
+    ///
+    /// A robust fit rejects the rows on the shorter side of a large jump, and what is left shows none. Where most rows at an end of a recording were
+    /// rejected, they are scanned as well; a change that leaves no more of them than of the others is why they did not fit.
     #[must_use]
     pub fn changes(&self, settings: &ChangeSettings) -> Option<ChangeScan> {
+        let kept = self.scan(settings)?;
+        let Some(scan) = self
+            .with_rejected(settings)
+            .and_then(|all| all.scan(settings))
+        else {
+            return Some(kept);
+        };
+        let explained = |change: &Change| {
+            scan.cost_per_row * (1.0 - change.explains) < EXPLAINED * kept.cost_per_row
+        };
+        Some(if scan.significant().is_some_and(explained) {
+            scan
+        } else {
+            kept
+        })
+    }
+
+    /// The same solution with the rejected observations, where they may have been rejected for a change.
+    fn with_rejected(&self, settings: &ChangeSettings) -> Option<Self> {
+        let model = &self.model;
+        let rejected = |s: usize| {
+            let mut observations = model.of_sample[s].clone();
+            !model.is_held_out(s) && observations.any(|o| self.weights[o] == 0.0)
+        };
+        let rejected: Vec<bool> = (0..model.problem.samples).map(rejected).collect();
+        let mut starts = vec![0];
+        starts.extend(settings.borders.iter().copied());
+        starts.push(rejected.len());
+        let mut parts = starts.windows(2).map(|w| &rejected[w[0].min(w[1])..w[1]]);
+        if !parts.any(|part| mostly(part.iter()) || mostly(part.iter().rev())) {
+            return None;
+        }
+        let mut out = self.clone();
+        for (o, observation) in model.observations.iter().enumerate() {
+            if !model.is_held_out(observation.sample) {
+                out.weights[o] = 1.0;
+            }
+        }
+        Some(out)
+    }
+
+    fn scan(&self, settings: &ChangeSettings) -> Option<ChangeScan> {
         let candidates = Candidates::new(self);
         let used = candidates.samples(self);
         if used.len() < 2 * LEAST || candidates.list.is_empty() {
@@ -185,8 +235,21 @@ impl Solution {
         Some(ChangeScan {
             changes: changes.into_iter().map(|(_, c)| c).collect(),
             threshold: chance.threshold,
+            cost_per_row: design.cost / design.rows,
         })
     }
+}
+
+/// Whether most of the first few were rejected, and so many that a step can be told.
+fn mostly<'a>(rejected: impl Iterator<Item = &'a bool>) -> bool {
+    let mut count = 0;
+    for (place, rejected) in rejected.enumerate() {
+        count += usize::from(*rejected);
+        if count >= LEAST && 2 * count > place + 1 {
+            return true;
+        }
+    }
+    false
 }
 
 fn every(samples: &[usize], stride: usize) -> Vec<usize> {
@@ -195,8 +258,8 @@ fn every(samples: &[usize], stride: usize) -> Vec<usize> {
 
 fn change(moved: Moved, found: &Found, design: &Design, quantile: f64) -> Change {
     let (first, end) = design.samples_of(&found.after);
-    // Noise as found: s² = (F − Δ) / N
-    let s2 = (design.cost - found.gain) / design.rows;
+    // Noise as found: s² = (F − Δ) / ν. N would make the jumps of ten poses look three times as certain as they are.
+    let s2 = (design.cost - found.gain) / design.freedom(found.jump.len());
     let score = design.score(found.gain);
     Change {
         moved,

@@ -254,6 +254,12 @@ impl Design {
         (self.cost.is_finite() && self.rows > 0.0).then_some(())
     }
 
+    /// Degrees of freedom ν beside the parameters of the fit and `jumps` more; those that their prior holds cost none.
+    pub(super) fn freedom(&self, jumps: usize) -> f64 {
+        let unknowns = self.covariance.nrows() + jumps;
+        (self.rows + self.priors.len() as f64 - unknowns as f64).max(1.0)
+    }
+
     /// T of equation (2).
     pub(super) fn score(&self, gain: f64) -> f64 {
         score(self.rows, self.cost, gain)
