@@ -70,9 +70,9 @@ pub use results::{
 pub use scene::Scene;
 pub use schema::{report_schema, scene_schema};
 pub use verdict::{
-    Compared, Effect, Goodness, ImplausibleChange, Improvement, Judgment, Orientation, Part,
-    Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver, UrdfAlone, Validation,
-    VerdictFacts, judge,
+    Agreement, Compared, Effect, Goodness, ImplausibleChange, Improvement, Judgment, Orientation,
+    Part, Predicted, Prediction, Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver,
+    Untested, UntestedKind, UrdfAlone, Validation, VerdictFacts, judge,
 };
 pub use verification::{AngleStats, ErrorStats, LoopClosure, LoopGroup, Stats, Verification};
 pub use view3d::View3d;

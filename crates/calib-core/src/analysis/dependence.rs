@@ -26,10 +26,24 @@ use crate::solve::normal::accumulate;
 use crate::solve::rows::add_block;
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
+/// Which rows have the memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MemoryOf {
+    /// All.
+    All,
+    /// Positions of bodies that are measured as poses; their orientations have none.
+    Positions,
+    /// Their orientations; the positions have none.
+    Orientations,
+}
+
 /// Memory of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Dependence {
+    /// Which rows have it.
+    pub of: MemoryOf,
     /// Correlation of successive samples that the residuals of the fit show.
     pub lag_one: f64,
     /// That correlation over its standard deviation for noise without memory.
@@ -46,9 +60,14 @@ impl Dependence {
     /// Whether noise without memory shows so much less often than once in a thousand fits.
     #[must_use]
     pub fn is_significant(&self) -> bool {
-        /// One-sided normal quantile of 0.999.
+        /// One-sided normal quantile of 0.999…
         const Z: f64 = 3.09;
-        self.z > Z
+        /// …and of 0.9995, for each of two parts.
+        const Z_OF_PART: f64 = 3.29;
+        match self.of {
+            MemoryOf::All => self.z > Z,
+            _ => self.z > Z_OF_PART,
+        }
     }
 }
 
@@ -66,8 +85,8 @@ struct Scaled {
     k: DMatrix<f64>,
     w: DMatrix<f64>,
     y: DVector<f64>,
-    /// Which row of which observation, the same in all samples.
-    keys: Vec<usize>,
+    /// Which row of which observation, the same in all samples; `None` for rows that are not asked.
+    keys: Vec<Option<usize>>,
     /// First sample of a recording.
     starts: bool,
 }
@@ -77,9 +96,28 @@ impl Solution {
     /// remembered. Where the residuals do not show one, decay and share are zero. `None` where fewer than eight samples or no pairs of rows exist.
     #[must_use]
     pub fn dependence(&self, borders: &[usize]) -> Option<Dependence> {
+        let all = self.dependence_of(MemoryOf::All, borders)?;
+        let measurements = self.model.problem.measurements.iter();
+        let poses = measurements
+            .into_iter()
+            .any(|m| matches!(m.kind, MeasurementKind::Poses(_)));
+        if all.is_significant() || !poses {
+            return Some(all);
+        }
+        // Position and orientation of a body come from different parts of a tracker: one without memory hides the other's.
+        let parts = [MemoryOf::Positions, MemoryOf::Orientations];
+        let part = parts
+            .into_iter()
+            .filter_map(|of| self.dependence_of(of, borders))
+            .filter(Dependence::is_significant)
+            .max_by(|a, b| a.z.total_cmp(&b.z));
+        Some(part.unwrap_or(all))
+    }
+
+    fn dependence_of(&self, of: MemoryOf, borders: &[usize]) -> Option<Dependence> {
         /// Fewer pairs say nothing.
         const LEAST: usize = 8;
-        let samples = self.scaled_samples(borders, SAMPLES);
+        let samples = self.scaled_samples(of, borders, SAMPLES);
         if samples.len() < LEAST {
             return None;
         }
@@ -91,6 +129,7 @@ impl Solution {
             return None;
         }
         let mut found = Dependence {
+            of,
             lag_one: 0.0,
             z: 0.0,
             decay: 0.0,
@@ -138,7 +177,7 @@ impl Solution {
     /// everything derived from them. `None` when the model cannot be evaluated.
     #[must_use]
     pub fn under(&self, dependence: &Dependence, borders: &[usize]) -> Option<Self> {
-        let samples = self.scaled_samples(borders, usize::MAX);
+        let samples = self.scaled_samples(dependence.of, borders, usize::MAX);
         let before = memory(
             &samples,
             dependence.share,
@@ -171,7 +210,7 @@ impl Solution {
         accumulate(self.objective(), &self.values, &mut work, &mut system).then_some(system)
     }
 
-    fn scaled_samples(&self, borders: &[usize], most: usize) -> Vec<Scaled> {
+    fn scaled_samples(&self, of: MemoryOf, borders: &[usize], most: usize) -> Vec<Scaled> {
         let mut work = Workspace::new(&self.model);
         work.cache.update(&self.model.problem, &self.values);
         let mut keys = Keys::default();
@@ -187,16 +226,22 @@ impl Solution {
             let own = borders.partition_point(|b| *b <= sample);
             let starts = recording != Some(own);
             recording = Some(own);
-            out.push(self.scaled_sample(&rows, starts, &mut keys));
+            out.push(self.scaled_sample(&rows, of, starts, &mut keys));
         }
         out
     }
 
     /// W = σ V⁻¹ σ,   k = σ V⁻¹ J,   y = σ V⁻¹ e
-    fn scaled_sample(&self, rows: &Whitened, starts: bool, keys: &mut Keys) -> Scaled {
+    fn scaled_sample(
+        &self,
+        rows: &Whitened,
+        of: MemoryOf,
+        starts: bool,
+        keys: &mut Keys,
+    ) -> Scaled {
         let m = rows.w.len();
         let mut sigma = vec![1.0; m];
-        let mut own = vec![0; m];
+        let mut own = vec![None; m];
         for &(o, first, count) in &rows.blocks {
             add_block(&self.model, o, |i, j, group, shape| {
                 if i == j {
@@ -212,7 +257,9 @@ impl Solution {
                 _ => 0,
             };
             for i in 0..count {
-                own[first + i] = keys.of(observation.measurement, part, i);
+                if asked(of, kind, i) {
+                    own[first + i] = Some(keys.of(observation.measurement, part, i));
+                }
             }
         }
         let mut scaled = rows.l_inverse.clone();
@@ -226,6 +273,16 @@ impl Solution {
             keys: own,
             starts,
         }
+    }
+}
+
+/// Whether a row of a measurement belongs to the rows that are asked.
+fn asked(of: MemoryOf, kind: &MeasurementKind, row: usize) -> bool {
+    let pose = matches!(kind, MeasurementKind::Poses(_));
+    match of {
+        MemoryOf::All => true,
+        MemoryOf::Positions => pose && row >= 3,
+        MemoryOf::Orientations => pose && row < 3,
     }
 }
 
@@ -262,7 +319,11 @@ fn lag_traces(samples: &[Scaled]) -> [f64; LAGS + 1] {
     let mut out = [0.0; LAGS + 1];
     each_pair(samples, |lag, a, b| {
         if lag == 0 {
-            out[0] += a.w.trace();
+            let asked = |i: &usize| a.keys[*i].is_some();
+            out[0] += (0..a.keys.len())
+                .filter(asked)
+                .map(|i| a.w[(i, i)])
+                .sum::<f64>();
             return;
         }
         let pairs: Vec<(usize, usize)> = shared(a, b).collect();
@@ -289,11 +350,11 @@ fn each_pair<'a>(samples: &'a [Scaled], mut see: impl FnMut(usize, &'a Scaled, &
 
 /// Places of the same row in two samples.
 fn shared<'a>(a: &'a Scaled, b: &'a Scaled) -> impl Iterator<Item = (usize, usize)> + 'a {
-    let place = |key: &usize| b.keys.iter().position(|k| k == key);
+    let place = |key: usize| b.keys.iter().position(|k| *k == Some(key));
     a.keys
         .iter()
         .enumerate()
-        .filter_map(move |(i, key)| Some((i, place(key)?)))
+        .filter_map(move |(i, key)| Some((i, place((*key)?)?)))
 }
 
 /// Σ_{u<s} c ρ^(s−u) k_u for every sample, by recursion.
@@ -312,6 +373,7 @@ fn recursion<'a>(
 ) -> Vec<DMatrix<f64>> {
     let width = (0..count)
         .flat_map(|s| &at(s).keys)
+        .flatten()
         .max()
         .map_or(0, |k| k + 1);
     let mut held = DMatrix::<f64>::zeros(width, n);
@@ -324,11 +386,15 @@ fn recursion<'a>(
         }
         let sample = at(s);
         let mut own = DMatrix::zeros(sample.keys.len(), n);
-        for (i, key) in sample.keys.iter().enumerate() {
-            own.row_mut(i).copy_from(&held.row(*key));
+        let asked = || {
+            let keys = sample.keys.iter().enumerate();
+            keys.filter_map(|(i, key)| Some((i, (*key)?)))
+        };
+        for (i, key) in asked() {
+            own.row_mut(i).copy_from(&held.row(key));
         }
-        for (i, key) in sample.keys.iter().enumerate() {
-            let mut row = held.row_mut(*key);
+        for (i, key) in asked() {
+            let mut row = held.row_mut(key);
             row += sample.k.row(i) * share;
         }
         out.push(own);

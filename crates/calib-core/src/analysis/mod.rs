@@ -13,4 +13,5 @@ pub(crate) mod observability;
 pub(crate) mod sandwich;
 pub(crate) mod solution;
 pub(crate) mod spread;
+pub(crate) mod untested;
 pub(crate) mod validate;

@@ -150,7 +150,7 @@ impl Solution {
     }
 
     /// A square root of C of equation (2) of [`Information`](crate::Information): C = H Hᵀ.
-    fn half_covariance(&self) -> DMatrix<f64> {
+    pub(crate) fn half_covariance(&self) -> DMatrix<f64> {
         let scale = &self.information.scale;
         let n = scale.len();
         let covariance = &self.information.covariance;

@@ -4,9 +4,12 @@
 //! left out:   e₋ = L (I − Q)⁻¹ w,      Cov(e₋) = L (I − Q)⁻¹ Lᵀ,    Q = A C Aᵀ               (1)
 //! held out:   e = predicted ⊟ observed, Cov(e) = V + J C Jᵀ                                 (2)
 //! z² = eᵀ Cov⁻¹ e  ~  χ²(rows)                                                             (3)
+//! all held out:   Σ_s wᵀw − gᵀ(C⁻¹ + H)⁻¹g  ~  χ²,   g = Σ_s Aᵀw,   H = Σ_s AᵀA             (4)
 //! ```
 //!
 //! Equation (1) is exact for a linear model and equals refits to second order in the residuals otherwise.
+
+use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -136,6 +139,43 @@ impl Solution {
             .map(|o| f64::from(u8::from(self.model.is_held_out(o.sample))))
             .collect();
         self.each_prediction(&held, false, &|_| true)
+    }
+
+    /// χ² of all held-out samples together but those of `without`, against what is stated of their prediction, with its degrees of
+    /// freedom: equation (4). `None` where nothing is held out, or the model cannot be evaluated.
+    #[must_use]
+    pub fn held_out_chi2(&self, without: &BTreeSet<usize>) -> Option<(f64, usize)> {
+        let model = &self.model;
+        let n = model.free();
+        let mut work = Workspace::new(model);
+        work.cache.update(&model.problem, &self.values);
+        let everything = vec![1.0; model.observations.len()];
+        let objective = Objective {
+            weights: &everything,
+            ..self.objective()
+        };
+        let (mut rows, mut squares) = (0, 0.0);
+        let mut h = DMatrix::zeros(n, n);
+        let mut g = DVector::zeros(n);
+        let kept = |sample: &&usize| !without.contains(*sample);
+        for &sample in model.problem.held_out.iter().filter(kept) {
+            let Some(s) = whitened(objective, &self.values, sample, &mut work) else {
+                continue;
+            };
+            rows += s.w.len();
+            squares += s.w.norm_squared();
+            h.gemm_tr(1.0, &s.a, &s.a, 1.0);
+            g.gemv_tr(1.0, &s.a, &s.w, 1.0);
+        }
+        if rows == 0 {
+            return None;
+        }
+        // C = L Lᵀ;   gᵀ (C⁻¹ + H)⁻¹ g = (Lᵀg)ᵀ (1 + Lᵀ H L)⁻¹ (Lᵀg)
+        let l = self.half_covariance();
+        let inner = DMatrix::identity(n, n) + l.transpose() * h * &l;
+        let along = l.tr_mul(&g);
+        let explained = along.dot(&inner.cholesky()?.solve(&along));
+        Some((squares - explained, rows))
     }
 
     /// Residuals `predicted ⊟ observed` of every observation at the solution, used, rejected and held out

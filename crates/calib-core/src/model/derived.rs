@@ -7,12 +7,13 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Point3};
+use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use calib_geometry::{Twist, so3};
 
 use crate::analysis::solution::Solution;
 use crate::analysis::spread::LinearPoint;
+use crate::analysis::untested::MovedPoint;
 use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{EffectKind, JointState};
 use crate::graph::error::Error;
@@ -91,6 +92,16 @@ pub enum Target {
     Point(PointId),
 }
 
+/// A path at a configuration.
+struct Evaluated {
+    pose: crate::model::pose::Pose,
+    path: CompiledPath,
+    /// Derivatives by the free parameters.
+    buffer: PathBuffer,
+    /// Body twists of its end per unit of motion of each joint: about the axis, about the two axes across.
+    motions: Vec<(usize, [Vector6<f64>; 3])>,
+}
+
 /// F n below this (rad, m, for n of one prior σ) is rounding: prior σ are about 1e-2, null vectors
 /// are accurate to about 1e-9.
 const ESTIMABLE: f64 = 1e-8;
@@ -106,7 +117,9 @@ impl Solution {
         to: FrameId,
         at: &Configuration,
     ) -> Result<DerivedPose, Error> {
-        let (pose, path, buffer) = self.evaluate(from, to, at)?;
+        let Evaluated {
+            pose, path, buffer, ..
+        } = self.evaluate(from, to, at)?;
         let f = self.expand(&path, &buffer);
         let covariance = self.inherit(&f).map(|c| {
             let c = Matrix6::from_iterator(c.iter().copied());
@@ -141,7 +154,9 @@ impl Solution {
         point: &Point3<f64>,
         at: &Configuration,
     ) -> Result<DerivedPoint, Error> {
-        let (pose, path, buffer) = self.evaluate(from, to, at)?;
+        let Evaluated {
+            pose, path, buffer, ..
+        } = self.evaluate(from, to, at)?;
         let f = self.expand(&path, &buffer);
         let f = point_rows(&pose, point) * f;
         Ok(DerivedPoint {
@@ -164,6 +179,19 @@ impl Solution {
         target: Target,
         at: &Configuration,
     ) -> Result<LinearPoint, Error> {
+        Ok(self.moved_point(from, target, at)?.point)
+    }
+
+    /// The same with the motions of the joints between.
+    ///
+    /// # Errors
+    /// As [`Solution::relative_pose`].
+    pub fn moved_point(
+        &self,
+        from: FrameId,
+        target: Target,
+        at: &Configuration,
+    ) -> Result<MovedPoint, Error> {
         let (to, known) = match target {
             Target::Frame(frame) => (frame, None),
             Target::Point(id) => {
@@ -177,8 +205,14 @@ impl Solution {
             (Some(point), None) => point.position,
             (None, None) => Point3::origin(),
         };
-        let (pose, path, buffer) = self.evaluate(from, to, at)?;
-        let mut jacobian = point_rows(&pose, &local) * self.expand(&path, &buffer);
+        let Evaluated {
+            pose,
+            path,
+            buffer,
+            motions,
+        } = self.evaluate(from, to, at)?;
+        let rows = point_rows(&pose, &local);
+        let mut jacobian = &rows * self.expand(&path, &buffer);
         for (k, parameter) in own.into_iter().flatten().enumerate() {
             // ∂(R p + t)/∂p_k = R e_k
             if let Some(column) = self.model.column_of[parameter.index()] {
@@ -186,9 +220,17 @@ impl Solution {
                 column += pose.r.column(k);
             }
         }
-        Ok(LinearPoint {
-            position: Point3::from(pose.r * local.coords + pose.t),
-            jacobian,
+        let by = motions.into_iter().map(|(edge, twists)| {
+            let moved: nalgebra::DVector<f64> = &rows * twists[0];
+            (EdgeId::of(edge), Vector3::new(moved[0], moved[1], moved[2]))
+        });
+        Ok(MovedPoint {
+            by: by.collect(),
+            turn: pose.r,
+            point: LinearPoint {
+                position: Point3::from(pose.r * local.coords + pose.t),
+                jacobian,
+            },
         })
     }
 
@@ -231,7 +273,9 @@ impl Solution {
         point: &Point3<f64>,
         at: &Configuration,
     ) -> Result<Vec<f64>, Error> {
-        let (pose, path, buffer) = self.evaluate(from, to, at)?;
+        let Evaluated {
+            pose, path, buffer, ..
+        } = self.evaluate(from, to, at)?;
         let f = self.scaled(&(point_rows(&pose, point) * self.expand(&path, &buffer)));
         let first = self.information.rank - self.observability.weak.len();
         Ok((first..self.information.rank)
@@ -245,12 +289,7 @@ impl Solution {
     }
 
     /// The compiled path and its derivatives at a configuration.
-    fn evaluate(
-        &self,
-        from: FrameId,
-        to: FrameId,
-        at: &Configuration,
-    ) -> Result<(crate::model::pose::Pose, CompiledPath, PathBuffer), Error> {
+    fn evaluate(&self, from: FrameId, to: FrameId, at: &Configuration) -> Result<Evaluated, Error> {
         let path = self.model.compile_between(from, to, &self.values)?;
         let mut problem = crate::graph::problem::Problem::new(1);
         problem.edges = self
@@ -273,7 +312,14 @@ impl Solution {
         let mut buffer = path.buffer();
         let at = State::new(&problem, &cache, &self.values);
         let pose = path.evaluate(at, 0, Derivatives::All, &mut buffer);
-        Ok((pose, path, buffer))
+        let mut motions = Vec::new();
+        path.effects(at, 0, &mut motions);
+        Ok(Evaluated {
+            pose,
+            path,
+            buffer,
+            motions,
+        })
     }
 
     /// 6 × n from the path's local columns.

@@ -15,6 +15,7 @@ use crate::formulate::kinematics::motion_axis;
 use crate::output::counts::{Tracks, rejected_parts, rejected_share};
 use crate::output::evidence::{Evidence, fit_end};
 use crate::output::of_fit::{stated_sigma, unit};
+use crate::output::open;
 use crate::verify::accuracy::{ToolBody, tool_bodies};
 use crate::verify::motions::Motions;
 
@@ -68,6 +69,13 @@ pub(crate) fn facts(
         },
         not_verified: motions.still.clone(),
         goodness: e.fit.map(|fit| goodness(e, fit)),
+        prediction: e
+            .fit
+            .and_then(|fit| open::prediction(e.inputs, fit, held_out)),
+        agreement: e
+            .fit
+            .filter(|_| !left_out)
+            .and_then(|fit| open::agreement(e.inputs, fit, held_out)),
     }
 }
 

@@ -9,6 +9,7 @@ mod facts;
 pub(crate) mod files;
 mod of_data;
 mod of_fit;
+mod open;
 pub mod shapes;
 mod verdict;
 pub mod view;

@@ -167,7 +167,7 @@ fn spread_of(points: &[Point3<f64>]) -> f64 {
 }
 
 /// The measured point that most moving joints carry: a body's frame, a marker, or a touching point.
-fn tool(inputs: &Inputs, fit: &MlFit) -> Option<(String, Target)> {
+pub(crate) fn tool(inputs: &Inputs, fit: &MlFit) -> Option<(String, Target)> {
     let model = &inputs.robot.model;
     let profile = &inputs.robot.profile;
     let formulation = &fit.formulation;
@@ -204,7 +204,7 @@ fn fitted_rows(inputs: &Inputs) -> Vec<&Vec<f64>> {
 }
 
 /// Postures spread evenly over the box of the recorded ranges.
-fn postures(inputs: &Inputs, rows: &[&Vec<f64>]) -> Vec<Vec<f64>> {
+pub(crate) fn postures(inputs: &Inputs, rows: &[&Vec<f64>]) -> Vec<Vec<f64>> {
     let Some(first) = rows.first() else {
         return Vec::new();
     };

@@ -42,6 +42,133 @@ pub struct Facts {
     pub not_verified: Vec<String>,
     /// Goodness of fit; `None` with the closed forms.
     pub goodness: Option<Goodness>,
+    /// How far predictions can be off; `None` with the closed forms, or where nothing was measured at the robot's end.
+    pub prediction: Option<Prediction>,
+    /// Held-out errors against what is stated of them; `None` without.
+    pub agreement: Option<Agreement>,
+}
+
+/// An rms position error over the joint ranges, m.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Predicted {
+    /// Expected, given all data.
+    pub rms: f64,
+    /// Its 99 % upper limit.
+    pub upper: f64,
+}
+
+/// How far predictions over the joint ranges can be off.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Prediction {
+    /// The rms that the fit states, m.
+    pub stated: f64,
+    /// By the parameters alone.
+    pub alone: Predicted,
+    /// With the effect that adds most, of those that the model does not have.
+    pub with: Option<(Untested, Predicted)>,
+}
+
+/// Something that the model does not have.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Untested {
+    /// What it is.
+    pub effect: UntestedKind,
+    /// Joint, body or tracker frame.
+    pub of: String,
+    /// The other joint of a coupling.
+    pub other: Option<String>,
+}
+
+/// What is not in the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UntestedKind {
+    /// Gain of a joint.
+    Gain,
+    /// Eccentricity of a joint.
+    Eccentricity,
+    /// A joint that yields under gravity.
+    Compliance,
+    /// A share of another joint's motion.
+    Coupling,
+    /// A step of a joint's zero.
+    Step,
+    /// A drift of the tracker.
+    Drift,
+    /// A step of the tracker.
+    Bump,
+    /// A step of the body on its link.
+    Slip,
+}
+
+impl UntestedKind {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Gain,
+        Self::Eccentricity,
+        Self::Compliance,
+        Self::Coupling,
+        Self::Step,
+        Self::Drift,
+        Self::Bump,
+        Self::Slip,
+    ];
+
+    /// As in `report.json`.
+    #[must_use]
+    pub const fn id(self) -> &'static str {
+        match self {
+            Self::Gain => "gain",
+            Self::Eccentricity => "eccentricity",
+            Self::Compliance => "compliance",
+            Self::Coupling => "coupling",
+            Self::Step => "step",
+            Self::Drift => "drift",
+            Self::Bump => "bump",
+            Self::Slip => "slip",
+        }
+    }
+}
+
+/// χ² of all held-out errors together, parameters and noise as stated.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Agreement {
+    /// χ² per degree of freedom.
+    pub value: f64,
+    /// What it exceeds once in a thousand validations if the stated uncertainty is right.
+    pub high: f64,
+}
+
+impl Agreement {
+    /// Of χ² over `rows` held-out numbers; the noise is known to as many degrees of freedom as the fit has.
+    #[must_use]
+    pub fn of(chi2: f64, rows: usize, degrees_of_freedom: f64) -> Self {
+        let rows = rows.max(1) as f64;
+        Self {
+            value: chi2 / rows,
+            high: quantile(rows, degrees_of_freedom),
+        }
+    }
+}
+
+/// 99.9 % quantile of F(h, ν), by the cube root of χ²/dof, which is nearly normal (Wilson & Hilferty; Paulson 1942).
+///
+/// ```text
+/// x = F^⅓:   ((1 − b) x − (1 − a))² = z² (a + b x²),   a = 2/(9h),   b = 2/(9ν)
+/// ```
+fn quantile(h: f64, freedom: f64) -> f64 {
+    /// 99.9 % quantile of the normal distribution.
+    const Z: f64 = 3.0902;
+    let (a, b) = (
+        2.0 / (9.0 * h),
+        2.0 / (9.0 * freedom.max(f64::MIN_POSITIVE)),
+    );
+    let (one_a, one_b) = (1.0 - a, 1.0 - b);
+    let square = one_b * one_b - Z * Z * b;
+    if square <= 0.0 || one_b <= 0.0 {
+        return f64::INFINITY;
+    }
+    let root = (a * one_b * one_b + b * one_a * one_a - Z * Z * a * b).max(0.0);
+    ((one_a * one_b + Z * root.sqrt()) / square).powi(3)
 }
 
 /// How the solver ended.

@@ -64,6 +64,14 @@ reasons! {
     LimitNotEvaluated = "limit-not-evaluated": LeavesOpen,
     /// The estimate is within a limit, the upper end of its interval is not.
     LimitUndecided = "limit-undecided": LeavesOpen,
+    /// Over the joint ranges the upper limit of the expected error is above a limit of the profile.
+    PredictionUndecided = "prediction-undecided": Warns | LeavesOpen,
+    /// The same with an effect that the model does not have and that the data do not exclude.
+    EffectsNotExcluded = "effects-not-excluded": Warns | LeavesOpen,
+    /// Held-out errors are larger than what is stated of them.
+    HeldOutBeyondStated = "held-out-beyond-stated": Warns | LeavesOpen,
+    /// What the data do not exclude is far above the uncertainty that the fit states.
+    UncertaintyTooSmall = "uncertainty-too-small": Warns | LeavesOpen,
     /// Nothing was predicted that was not fitted.
     NoValidation = "no-validation": LeavesOpen,
     /// Held-out rows repeat fitted postures.
@@ -94,6 +102,8 @@ reasons! {
     UrdfAlone = "urdf-alone": Supports | Warns,
     /// A warning among the findings.
     WarningFinding = "warning-finding": Warns,
+    /// How far predictions over the joint ranges are expected to be off.
+    PredictionExpected = "prediction-expected": Supports,
     /// A limit is met with its whole interval.
     LimitMet = "limit-met": Supports,
 }

@@ -2,7 +2,7 @@
 
 use calib_finding::Fact;
 
-use crate::verdict::facts::{Facts, Part, RejectedPart, Validation};
+use crate::verdict::facts::{Facts, Part, Predicted, RejectedPart, Untested, Validation};
 use crate::verdict::{Compared, Effect, Reason, ReasonId};
 use crate::{FitEnd, Limit, Outcome, Unit, Verdict};
 
@@ -10,7 +10,7 @@ use crate::{FitEnd, Limit, Outcome, Unit, Verdict};
 pub type Rule = fn(&Facts) -> Vec<Reason>;
 
 /// Every rule. What each asks for stands in the book, by the ids of its reasons.
-pub const RULES: [Rule; 17] = [
+pub const RULES: [Rule; 21] = [
     converged,
     origins,
     limits,
@@ -18,6 +18,10 @@ pub const RULES: [Rule; 17] = [
     rejected_parts,
     orientation,
     errors,
+    predicted,
+    agreement,
+    uncertainty,
+    expected,
     validation,
     plausible,
     rejected_share,
@@ -120,6 +124,114 @@ fn enough(facts: &Facts, limit: &Limit) -> Option<usize> {
     let wider = (limit.high? - value) / (limit.limit - value);
     let postures = (facts.validation.postures() as f64 * wider * wider).ceil();
     (postures > 0.0 && postures < TOO_MANY).then_some(postures as usize)
+}
+
+/// Held-out poses in which the joints move together met every limit, and prove the calibration better than registration: what
+/// they vouch for is then a warning, and leaves the verdict open otherwise.
+fn unless_confirmed(facts: &Facts) -> Effect {
+    let independent = matches!(facts.validation, Validation::Recordings { postures, repeated }
+        if (repeated as f64) < REPEATED * postures as f64);
+    let met = |limit: &Limit| limit.outcome == Outcome::Met;
+    let better = facts.improvements.iter().any(|i| i.p_better < SIGNIFICANT);
+    let combined = !facts.single_joint.held_out && facts.not_verified.is_empty();
+    if independent && combined && better && facts.limits.iter().all(met) {
+        Effect::Warns
+    } else {
+        Effect::LeavesOpen
+    }
+}
+
+/// The smallest limit of the profile for position errors, m.
+fn position_limit(facts: &Facts) -> Option<f64> {
+    let limits = facts.limits.iter();
+    limits
+        .filter(|l| l.unit == Unit::Meter && l.name.starts_with("held_out"))
+        .map(|l| l.limit)
+        .min_by(f64::total_cmp)
+}
+
+/// What the parameters leave open, then what one effect could add: the held-out poses are few, the joint ranges are wide.
+fn predicted(facts: &Facts) -> Vec<Reason> {
+    let (Some(prediction), Some(limit)) = (&facts.prediction, position_limit(facts)) else {
+        return Vec::new();
+    };
+    let reason = |id: ReasonId, found: Predicted| {
+        Reason::new(id, unless_confirmed(facts))
+            .with("expected", Fact::meters(found.rms))
+            .with("upper", Fact::meters(found.upper))
+            .with("limit", Fact::meters(limit))
+    };
+    if prediction.alone.upper > limit {
+        return vec![reason(ReasonId::PredictionUndecided, prediction.alone)];
+    }
+    let open = prediction
+        .with
+        .iter()
+        .filter(|(_, with)| with.upper > limit);
+    open.map(|(what, with)| of_effect(reason(ReasonId::EffectsNotExcluded, *with), what))
+        .collect()
+}
+
+fn of_effect(reason: Reason, what: &Untested) -> Reason {
+    reason
+        .with("effect", Fact::choice(what.effect.id()))
+        .with("of", Fact::name(&what.of))
+        .with_some("other", what.other.as_ref().map(Fact::name))
+}
+
+/// Held-out errors up to this many times their stated variance are left alone: no stated σ is that exact.
+const AGREES: f64 = 1.5;
+
+fn agreement(facts: &Facts) -> Vec<Reason> {
+    let beyond = |a: &&crate::Agreement| a.value > a.high.max(AGREES);
+    let reason = |a: &crate::Agreement| {
+        Reason::new(ReasonId::HeldOutBeyondStated, unless_confirmed(facts))
+            .with("value", Fact::ratio(a.value))
+            .with("high", Fact::ratio(a.high.max(AGREES)))
+    };
+    let found = facts.agreement.as_ref().filter(beyond);
+    found.map(reason).into_iter().collect()
+}
+
+/// An error that the data do not exclude, in units of what the fit states of its predictions, up to which stating it instead is
+/// enough. Beyond it the effect is either seen, or so poorly that what is stated rests on how large such effects usually are.
+const TOO_SMALL: f64 = 2.5;
+
+fn uncertainty(facts: &Facts) -> Vec<Reason> {
+    let Some(prediction) = &facts.prediction else {
+        return Vec::new();
+    };
+    let far = |with: &Predicted| with.rms > TOO_SMALL * prediction.stated;
+    let found = prediction.with.iter().filter(|(_, with)| far(with));
+    let reason = |with: &Predicted| {
+        Reason::new(ReasonId::UncertaintyTooSmall, unless_confirmed(facts))
+            .with("stated", Fact::meters(prediction.stated))
+            .with("expected", Fact::meters(with.rms))
+    };
+    found
+        .map(|(what, with)| of_effect(reason(with), what))
+        .collect()
+}
+
+/// The fit's own uncertainty does not know of what is not in its model: the larger error is stated in any case.
+fn expected(facts: &Facts) -> Vec<Reason> {
+    let Some(prediction) = &facts.prediction else {
+        return Vec::new();
+    };
+    let reason = |found: &Predicted| {
+        Reason::new(ReasonId::PredictionExpected, Effect::Supports)
+            .with("stated", Fact::meters(prediction.stated))
+            .with("expected", Fact::meters(found.rms))
+            .with("upper", Fact::meters(found.upper))
+    };
+    let larger = prediction.with.iter();
+    let larger = larger.filter(|(_, with)| with.rms > prediction.alone.rms);
+    let mut found = larger.map(|(what, with)| of_effect(reason(with), what));
+    vec![
+        found
+            .next_back()
+            .unwrap_or_else(|| reason(&prediction.alone)),
+    ]
 }
 
 /// Chance makes a robot look better (or worse) so clearly in at most this share of the cases.
@@ -262,17 +374,7 @@ fn validation(facts: &Facts) -> Vec<Reason> {
 
 /// A nominal value can be far off; held-out poses in which joints move together then confirm what was found.
 fn plausible(facts: &Facts) -> Vec<Reason> {
-    let independent = matches!(facts.validation, Validation::Recordings { postures, repeated }
-        if (repeated as f64) < REPEATED * postures as f64);
-    let met = |limit: &Limit| limit.outcome == Outcome::Met;
-    let better = facts.improvements.iter().any(|i| i.p_better < SIGNIFICANT);
-    let combined = !facts.single_joint.held_out && facts.not_verified.is_empty();
-    let confirmed = independent && combined && better && facts.limits.iter().all(met);
-    let effect = if confirmed {
-        Effect::Warns
-    } else {
-        Effect::LeavesOpen
-    };
+    let effect = unless_confirmed(facts);
     let mut out = Vec::new();
     for (id, reversed) in [
         (ReasonId::ReversedAxis, true),

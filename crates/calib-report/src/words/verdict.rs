@@ -30,8 +30,16 @@ pub(crate) fn trust(report: &Report, rest: &str) -> Vec<String> {
         Verdict::NotEvaluated => "Not decided.".to_owned(),
     };
     let against: Vec<String> = report.objections().cloned().collect();
+    // What predictions are expected to be off by has its own place.
+    let decides = |i: usize| {
+        let reason = report.reason_facts.get(i);
+        reason.is_none_or(|reason| reason.id != ReasonId::PredictionExpected)
+    };
+    let all = report.reasons.iter().enumerate();
     let reasons = if against.is_empty() {
-        report.reasons.clone()
+        all.filter(|(i, _)| decides(*i))
+            .map(|(_, r)| r.clone())
+            .collect()
     } else {
         against
     };
@@ -214,6 +222,11 @@ impl Reason {
                 of_rejection(self, &v)
             }
             ReasonId::ImplausibleChange | ReasonId::ReversedAxis => of_change(self, &v),
+            ReasonId::PredictionUndecided
+            | ReasonId::EffectsNotExcluded
+            | ReasonId::HeldOutBeyondStated
+            | ReasonId::UncertaintyTooSmall
+            | ReasonId::PredictionExpected => of_prediction(self, &v),
             _ => of_validation(self, &v),
         }
     }
@@ -364,6 +377,62 @@ fn of_change(reason: &Reason, v: &Values<'_>) -> String {
     match reason.effect {
         Effect::Warns => format!("{what} Held-out poses confirm it."),
         _ => format!("{what} No held-out poses in which the joints move together confirm it."),
+    }
+}
+
+/// What the model does not have, in words: "a gain of `elbow`".
+fn effect(v: &Values<'_>) -> String {
+    let (of, other) = (v.code("of"), v.code("other"));
+    match v.name("effect") {
+        "gain" => format!("a gain of {of}"),
+        "eccentricity" => format!("an eccentricity of {of}"),
+        "compliance" => format!("gravity bending {of}"),
+        "coupling" => format!("a share of the motion of {other} in that of {of}"),
+        "step" => format!("a step of the zero of {of} while the data were recorded"),
+        "drift" => format!("a drift of {of}"),
+        "bump" => format!("a step of {of} while the data were recorded"),
+        _ => format!("a slip of {of} while the data were recorded"),
+    }
+}
+
+fn of_prediction(reason: &Reason, v: &Values<'_>) -> String {
+    match reason.id {
+        ReasonId::PredictionUndecided => format!(
+            "Over the recorded joint ranges the data leave an error of {} rms open (99 % upper limit {}), limit {}: record more poses in which the joints move together.",
+            v.number("expected"),
+            v.number("upper"),
+            v.number("limit")
+        ),
+        ReasonId::EffectsNotExcluded => format!(
+            "The data do not exclude {}, with an error of {} rms over the recorded joint ranges (99 % upper limit {}), limit {}: record more poses in which the joints move together.",
+            effect(v),
+            v.number("expected"),
+            v.number("upper"),
+            v.number("limit")
+        ),
+        ReasonId::HeldOutBeyondStated => format!(
+            "χ²/dof of the held-out errors is {}, above {}: the stated uncertainty is too small.",
+            v.number("value"),
+            v.number("high")
+        ),
+        ReasonId::UncertaintyTooSmall => format!(
+            "The fit states {} rms over the recorded joint ranges, and the data do not exclude {} with {} rms: record more poses in which the joints move together.",
+            v.number("stated"),
+            effect(v),
+            v.number("expected")
+        ),
+        _ => {
+            let with = match v.get("effect") {
+                Some(_) => format!(", {} included, which the data do not exclude", effect(v)),
+                None => String::new(),
+            };
+            format!(
+                "Over the recorded joint ranges, predicted positions are expected to be off by {} rms (99 % upper limit {}){with}; the fit alone states {}.",
+                v.number("expected"),
+                v.number("upper"),
+                v.number("stated")
+            )
+        }
     }
 }
 

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use calib_report::{
-    Compared, Effect, FitEnd, Goodness, ImplausibleChange, Improvement, Limit, Limited,
-    Orientation, Part, Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver, Unit, UrdfAlone,
-    Validation, Verdict, VerdictFacts, judge,
+    Agreement, Compared, Effect, FitEnd, Goodness, ImplausibleChange, Improvement, Limit, Limited,
+    Orientation, Part, Predicted, Prediction, Reason, ReasonId, RejectedPart, Share, SingleJoint,
+    Solver, Unit, Untested, UntestedKind, UrdfAlone, Validation, Verdict, VerdictFacts, judge,
 };
 
 /// A result against which nothing speaks.
@@ -34,6 +34,9 @@ fn clean() -> VerdictFacts {
             rms: Some(0.004),
             expected: Some(0.004),
         },
+        // All just within what is accepted.
+        prediction: prediction(0.00099, 0.00099, UntestedKind::Drift),
+        agreement: Some(Agreement::of(180.0, 120, 60.0)),
         goodness: Some(Goodness {
             used: 1.0,
             band: Goodness::band_of(800.0),
@@ -84,6 +87,24 @@ fn part(part: Part) -> Vec<RejectedPart> {
     vec![RejectedPart { part, rejected }]
 }
 
+/// Upper limits of what is expected: by the parameters alone, with an effect; 0.27 mm are stated.
+fn prediction(alone: f64, with: f64, effect: UntestedKind) -> Option<Prediction> {
+    let predicted = |upper| Predicted {
+        rms: upper / 1.5,
+        upper,
+    };
+    let untested = Untested {
+        effect,
+        of: "elbow".into(),
+        other: (effect == UntestedKind::Coupling).then(|| "wrist".into()),
+    };
+    Some(Prediction {
+        stated: 0.00027,
+        alone: predicted(alone),
+        with: Some((untested, predicted(with))),
+    })
+}
+
 /// Facts that break a rule, and what must come of it. Where a rule has two effects both stand here.
 fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
     use Effect::{LeavesOpen, Rejects, Supports, Warns};
@@ -107,7 +128,17 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
             });
         })
     };
-    vec![
+    let open = UntestedKind::ALL.map(|kind| {
+        (
+            ReasonId::EffectsNotExcluded,
+            LeavesOpen,
+            with(|f| {
+                f.prediction = prediction(0.0008, 0.0011, kind);
+                unconfirmed(f);
+            }),
+        )
+    });
+    let mut out = vec![
         (ReasonId::LimitMet, Supports, clean()),
         (
             ReasonId::NotConverged,
@@ -162,6 +193,60 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
             }),
         ),
         (ReasonId::NoLimits, LeavesOpen, with(|f| f.limits.clear())),
+        (
+            ReasonId::PredictionUndecided,
+            LeavesOpen,
+            with(|f| {
+                f.prediction = prediction(0.0011, 0.0012, UntestedKind::Gain);
+                unconfirmed(f);
+            }),
+        ),
+        (
+            ReasonId::PredictionUndecided,
+            Warns,
+            with(|f| f.prediction = prediction(0.0011, 0.0012, UntestedKind::Gain)),
+        ),
+        (
+            ReasonId::EffectsNotExcluded,
+            Warns,
+            with(|f| f.prediction = prediction(0.0008, 0.0011, UntestedKind::Gain)),
+        ),
+        (
+            ReasonId::HeldOutBeyondStated,
+            LeavesOpen,
+            with(|f| {
+                f.agreement = Some(Agreement::of(360.0, 120, 60.0));
+                unconfirmed(f);
+            }),
+        ),
+        (
+            ReasonId::HeldOutBeyondStated,
+            Warns,
+            with(|f| f.agreement = Some(Agreement::of(360.0, 120, 60.0))),
+        ),
+        (
+            ReasonId::UncertaintyTooSmall,
+            LeavesOpen,
+            with(|f| {
+                f.prediction = prediction(0.0004, 0.0009, UntestedKind::Gain);
+                f.prediction.as_mut().expect("stated").stated = 0.0002;
+                unconfirmed(f);
+            }),
+        ),
+        (
+            ReasonId::UncertaintyTooSmall,
+            Warns,
+            with(|f| {
+                f.prediction = prediction(0.0004, 0.0009, UntestedKind::Gain);
+                f.prediction.as_mut().expect("stated").stated = 0.0002;
+            }),
+        ),
+        (ReasonId::PredictionExpected, Supports, clean()),
+        (
+            ReasonId::PredictionExpected,
+            Supports,
+            with(|f| f.prediction = prediction(0.0009, 0.0008, UntestedKind::Gain)),
+        ),
         (
             ReasonId::WorseThanRegistration,
             Rejects,
@@ -333,7 +418,9 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
             Warns,
             with(|f| f.not_verified = vec!["elbow".into()]),
         ),
-    ]
+    ];
+    out.extend(open);
+    out
 }
 
 fn verdict_of(effect: Effect) -> Verdict {
@@ -385,7 +472,7 @@ fn every_rule_is_silent_on_the_other_side() {
     let judgment = judge(&clean());
     assert_eq!(judgment.verdict, Verdict::Accepted);
     let ids: Vec<ReasonId> = judgment.reasons.iter().map(|r| r.id).collect();
-    assert_eq!(ids, [ReasonId::LimitMet]);
+    assert_eq!(ids, [ReasonId::LimitMet, ReasonId::PredictionExpected]);
     // Just below each threshold.
     let near = with(|f| {
         f.limits = limit(0.0009, Some((0.0008, 0.001)));

@@ -5,6 +5,7 @@
 //!
 //! ```text
 //! wrong = accepted, and (rms error > limit, or e' Σ⁻¹ e beyond 99.9 % over 24 postures)
+//! Σ = (covariance of the fit) · (expected error / error that the fit states)²,   as the reason `prediction-expected` states them
 //! upper limit of a rate with no event in n cases, 95 %:   1 − 0.05^(1/n) ≈ 3/n                        (1)
 //! ```
 //!

@@ -113,7 +113,12 @@ impl CaseResult {
 }
 
 /// Reasons that say of the data that they are too few, and nothing of what is wrong: they ask for more poses.
-const TOO_FEW: [ReasonId; 1] = [ReasonId::LimitUndecided];
+const TOO_FEW: [ReasonId; 4] = [
+    ReasonId::LimitUndecided,
+    ReasonId::PredictionUndecided,
+    ReasonId::EffectsNotExcluded,
+    ReasonId::UncertaintyTooSmall,
+];
 
 /// Error of a result at new poses.
 struct Error {
@@ -123,6 +128,24 @@ struct Error {
 
 /// χ² with three degrees of freedom that is exceeded once in 1 000 sets of 24 postures, taken as independent: 99.996 %.
 const CHI2_OF_THREE: f64 = 22.8;
+
+/// How much wider an interval of a 3-vector is where its noise is known to so many degrees of freedom only, as the report says:
+/// the quantile of F(3, ν) over that of χ²(3)/3, both by the cube root (Paulson 1942). Less than four say nothing of such a quantile.
+fn wider(freedom: f64) -> f64 {
+    /// Normal quantile of 99.996 %.
+    const Z: f64 = 3.944;
+    let quantile = |b: f64| {
+        let (a, one_b) = (2.0 / 27.0, 1.0 - b);
+        let (one_a, square) = (1.0 - a, one_b * one_b - Z * Z * b);
+        let root = a * one_b * one_b + b * one_a * one_a - Z * Z * a * b;
+        if square <= 0.0 {
+            return f64::INFINITY;
+        }
+        ((one_a * one_b + Z * root.max(0.0).sqrt()) / square).powi(3)
+    };
+    let known = 2.0 / (9.0 * freedom.max(f64::MIN_POSITIVE));
+    quantile(known) / quantile(0.0)
+}
 
 /// Draws a case and runs the program on it.
 pub(crate) fn run_case(cell: Cell, number: u64, seed: u64) -> CaseResult {
@@ -188,7 +211,7 @@ fn ids(findings: &[Finding]) -> BTreeSet<String> {
 fn judged(case: &Case, number: u64, output: &RunOutput) -> CaseResult {
     let findings = &output.report.findings;
     let named = findings.iter().any(|f| names_the_cause(case, f));
-    let error = error(case, &output.solved);
+    let error = error(case, &output.solved, widened(output));
     let over = error.rms_m > LIMIT_MM * 1e-3 || error.worst_z.is_some_and(|z| z > 1.0);
     let verdict = output.report.verdict;
     let outcome = if verdict == Verdict::Accepted {
@@ -229,8 +252,19 @@ fn judged(case: &Case, number: u64, output: &RunOutput) -> CaseResult {
     }
 }
 
+/// Variance of a prediction as the report states it over that of the fit's parameters alone: `prediction-expected`.
+fn widened(output: &RunOutput) -> f64 {
+    let mut reasons = output.report.reason_facts.iter();
+    let of = reasons.find(|reason| reason.id == ReasonId::PredictionExpected);
+    let value = |name: &str| of.and_then(|reason| reason.values.get(name)?.value());
+    match (value("expected"), value("stated")) {
+        (Some(expected), Some(stated)) if stated > 0.0 => (expected / stated).powi(2).max(1.0),
+        _ => 1.0,
+    }
+}
+
 /// The calibrated robot against the truth at new poses; z is the largest χ² over its threshold.
-fn error(case: &Case, solved: &Solved) -> Error {
+fn error(case: &Case, solved: &Solved, widened: f64) -> Error {
     let mut squares = Vec::new();
     let mut worst: Option<f64> = None;
     for (q, seen) in case.truth() {
@@ -242,7 +276,9 @@ fn error(case: &Case, solved: &Solved) -> Error {
                 let off = (tracker_from_link * mount).translation.vector - truth.translation.vector;
                 squares.push(off.norm_squared());
                 if let Some(chi2) = chi2(solved, &q, &off) {
-                    let z = chi2 / CHI2_OF_THREE;
+                    let freedom = solved.fit.as_ref();
+                    let freedom = freedom.map_or(0.0, |f| f.solution.degrees_of_freedom);
+                    let z = chi2 / (CHI2_OF_THREE * wider(freedom) * widened);
                     worst = Some(worst.map_or(z, |w| w.max(z)));
                 }
             }

@@ -66,7 +66,8 @@ pub fn markdown(result: &FaultResult) -> String {
         text,
         "# Faults: what `calib run` says of them\n\n{n} cases with a fault, {} without; seed {}. A case is *named* where it is not accepted without reserve and a \
          finding names the cause or what the data cannot distinguish from it; *stopped* where it is not accepted; *harmless* where it is accepted (with or without \
-         warnings), its rms error at 24 new poses is within the limit, and its uncertainty covers the error; *wrong* where it is accepted and one of the two fails.\n",
+         warnings), its rms error at 24 new poses is within the limit, and its uncertainty (that of the fit, widened \
+         to the error that `prediction-expected` states, with Student's allowance for noise known from few data) covers the error; *wrong* where it is accepted and one of the two fails.\n",
         clean.len(),
         result.seed
     );

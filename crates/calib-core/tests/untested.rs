@@ -1,0 +1,172 @@
+//! How far predictions can be off with an effect that the model does not have, against the truth; and held-out errors against
+//! what is stated of them.
+
+mod common;
+
+use std::collections::BTreeSet;
+
+use calib_core::{
+    Configuration, MovedPoint, Moves, OpenErrors, Settings, Solution, Target, UntestedEffect, solve,
+};
+use common::*;
+
+const SIGMA: f64 = 3e-4;
+const FITTED: usize = 12;
+const HELD_OUT: usize = 6;
+const POSTURES: usize = 24;
+/// Joint with the gain.
+const JOINT: usize = 3;
+/// σ of the gain.
+const GAIN: f64 = 0.005;
+
+struct Rig {
+    chain: Chain,
+    solution: Solution,
+    handles: Handles,
+    gain: f64,
+}
+
+/// A robot off by the priors of the fit, with a gain that the fit does not know.
+fn rig(seed: u64, gain: f64) -> Rig {
+    let mut r = rng(seed);
+    let mut free = Free::everything(6);
+    free.prior = Some((0.005, 0.002));
+    let chain = Chain::nominal(six_r()).deviate(&mut r, &free, 0.005, 0.002);
+    let chain = chain.posed(&mut r, FITTED + HELD_OUT, 1.2);
+    let gain = gain * normal(&mut r);
+    let mut handles = chain.problem(&free, SIGMA);
+    handles.problem.group_mut(handles.markers).estimate = false;
+    let q = chain.q.clone();
+    let extra = |s: usize| {
+        let moved = |j: usize| if j == JOINT { gain * q[s][j] } else { 0.0 };
+        (0..6).map(moved).collect()
+    };
+    chain.observe_moved(&mut r, &mut handles, SIGMA, extra);
+    handles.problem.held_out = (FITTED..FITTED + HELD_OUT).collect();
+    let solution = solve(&handles.problem, &Settings::plain()).expect("solved");
+    Rig {
+        chain,
+        solution,
+        handles,
+        gain,
+    }
+}
+
+fn postures() -> Vec<Vec<f64>> {
+    let at = |i: usize, k: usize| 1.2 * (0.7 * (i * (k + 2)) as f64).sin();
+    (0..POSTURES)
+        .map(|i| (0..6).map(|k| at(i, k)).collect())
+        .collect()
+}
+
+fn open(rig: &Rig, looked_at: &[usize]) -> OpenErrors {
+    let h = &rig.handles;
+    let postures = postures();
+    let point = |q: &Vec<f64>| {
+        let joints = h.joints.iter().zip(q);
+        let at = joints.fold(Configuration::zero(), |at, (j, q)| at.with(*j, *q));
+        let seen = rig
+            .solution
+            .moved_point(h.tracker, Target::Frame(h.body), &at);
+        seen.expect("a path")
+    };
+    let points: Vec<MovedPoint> = postures.iter().map(point).collect();
+    let effect = UntestedEffect {
+        moves: Moves::Joint(h.joints[JOINT]),
+        sigma: GAIN,
+        at_samples: looked_at.iter().map(|s| rig.chain.q[*s][JOINT]).collect(),
+        at_postures: postures.iter().map(|q| q[JOINT]).collect(),
+    };
+    let found = rig
+        .solution
+        .open_errors(looked_at, 1.0, &[vec![effect]], &points);
+    found.expect("postures")
+}
+
+/// Mean square of what the fit predicts less the truth, m².
+fn truth(rig: &Rig) -> f64 {
+    let h = &rig.handles;
+    let squares = postures().into_iter().map(|q| {
+        let joints = h.joints.iter().zip(&q);
+        let at = joints.fold(Configuration::zero(), |at, (j, q)| at.with(*j, *q));
+        let found = rig.solution.relative_pose(h.tracker, h.body, &at);
+        let mut extra = [0.0; 6];
+        extra[JOINT] = rig.gain * q[JOINT];
+        let true_pose = rig.chain.tracker_from_body(&q, &extra);
+        let found = found.expect("a path").pose.translation.vector;
+        (found - true_pose.translation.vector).norm_squared()
+    });
+    squares.sum::<f64>() / POSTURES as f64
+}
+
+#[test]
+fn the_error_with_an_unknown_gain_is_as_large_as_expected() {
+    let all: Vec<usize> = (0..FITTED + HELD_OUT).collect();
+    let (mut found, mut expected, mut stated, mut covered) = (0.0, 0.0, 0.0, 0);
+    const ROBOTS: u64 = 60;
+    for seed in 0..ROBOTS {
+        let rig = rig(seed, GAIN);
+        let (open, error) = (open(&rig, &all), truth(&rig));
+        found += error;
+        expected += open.with[0].rms.powi(2);
+        stated += open.stated.powi(2);
+        covered += usize::from(error.sqrt() <= open.with[0].upper);
+        let (estimate, sigma) = open.sizes[0][0];
+        assert!((estimate - rig.gain).abs() < 5.0 * sigma);
+    }
+    let ratio = found / expected;
+    assert!((0.7..1.4).contains(&ratio), "{ratio}");
+    // The fit alone states much less: it does not know of gains.
+    assert!(found / stated > 2.0, "{}", found / stated);
+    // 99 of 100: at least 55 of 60 but once in ten thousand.
+    assert!(covered >= 55, "{covered}");
+}
+
+#[test]
+fn without_an_effect_the_parameters_alone_are_left() {
+    let fitted: Vec<usize> = (0..FITTED).collect();
+    let all: Vec<usize> = (0..FITTED + HELD_OUT).collect();
+    let (mut found, mut expected) = (0.0, 0.0);
+    for seed in 100..140 {
+        let rig = rig(seed, 0.0);
+        let alone = open(&rig, &fitted).alone;
+        // What the fit states, but for rounding: nothing is held out.
+        let stated = open(&rig, &fitted).stated;
+        assert!(
+            (alone.rms / stated - 1.0).abs() < 0.01,
+            "{alone:?} {stated}"
+        );
+        let with_held_out = open(&rig, &all);
+        found += truth(&rig);
+        expected += with_held_out.alone.rms.powi(2);
+        // The data say something of the gain, and held-out data more.
+        let sigma = |open: &OpenErrors| open.sizes[0][0].1;
+        assert!(sigma(&with_held_out) < sigma(&open(&rig, &fitted)));
+        assert!(sigma(&with_held_out) < GAIN);
+    }
+    assert!((0.7..1.4).contains(&(found / expected)));
+}
+
+#[test]
+fn held_out_errors_have_the_distribution_that_is_stated() {
+    let none = BTreeSet::new();
+    let of = |gain: f64| -> f64 {
+        let mean = (200..230).map(|seed| {
+            let rig = rig(seed, gain);
+            let (chi2, rows) = rig.solution.held_out_chi2(&none).expect("held out");
+            assert_eq!(rows, HELD_OUT * 4 * 3);
+            chi2 / rows as f64
+        });
+        mean.sum::<f64>() / 30.0
+    };
+    // 30 × 72 degrees of freedom: ± 0.03.
+    let clean = of(0.0);
+    assert!((0.88..1.12).contains(&clean), "{clean}");
+    assert!(of(GAIN) > 1.5);
+    // Samples that are left out do not count.
+    let rig = rig(1, 0.0);
+    let half: BTreeSet<usize> = (FITTED..FITTED + HELD_OUT / 2).collect();
+    assert_eq!(rig.solution.held_out_chi2(&half).expect("held out").1, 36);
+    let every: BTreeSet<usize> = (0..FITTED + HELD_OUT).collect();
+    assert!(rig.solution.held_out_chi2(&every).is_none());
+}

@@ -1,0 +1,304 @@
+//! How far predictions over the joint ranges can be off, given fitted and held-out data: by the parameters alone, and with
+//! one effect that the model does not have and that the data do not exclude.
+//!
+//! What the effects are, and how large in robots that are said to be in order:
+//!
+//! | effect | size | why |
+//! |---|---|---|
+//! | gain of a joint | 0.5 % | a wrong tooth in a belt of two hundred; encoders themselves are better |
+//! | share of another joint's motion | 1 % | the prior of couplings in a profile |
+//! | eccentricity | 0.2° | an encoder disk off its axis by 0.1 mm at 30 mm |
+//! | yield under gravity | 0.2° at the largest load | strain-wave gears under their rated torque |
+//! | zero of a joint, a step | 0.2° | a tooth of a belt, a slipped coupling |
+//! | drift of the tracker | 1 mm along each axis | a stand that warms or settles in an hour |
+//! | step of the tracker or of a body | 1 mm along each axis | a touch that nobody noticed |
+
+use std::collections::BTreeSet;
+
+use calib_core::{
+    EffectKind, FrameId, JointState, MovedPoint, Moves, OpenError, Target, UntestedEffect,
+};
+use calib_profile::Usage;
+use calib_report::{Agreement, HeldOut, Predicted, Prediction, Untested, UntestedKind};
+use calib_urdf::{JointId, RobotModel};
+
+use crate::formulate::formulation::MlFit;
+use crate::formulate::kinematics::{Loads, joint_state};
+use crate::output::weak::{postures, tool};
+use crate::prepare::conditions::Conditions;
+use crate::prepare::inputs::Inputs;
+use crate::prepare::loads::has_masses;
+use crate::verify::accuracy::configuration;
+
+/// Samples that are looked at, at most: more change nothing but the time.
+const SAMPLES: usize = 300;
+
+const GAIN: f64 = 0.005;
+const CROSSTALK: f64 = 0.01;
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+const ECCENTRICITY: f64 = 0.2 * DEGREE;
+/// At the largest load.
+const YIELD: f64 = 0.2 * DEGREE;
+const STEP: f64 = 0.2 * DEGREE;
+const MOVED: f64 = 1e-3;
+
+/// Over the joint ranges of all recordings; `None` where no body was in the tracker's sight.
+pub(crate) fn prediction(
+    inputs: &Inputs,
+    fit: &MlFit,
+    held_out: Option<&HeldOut>,
+) -> Option<Prediction> {
+    // Where a robot stands that only touched something is a convention.
+    if inputs.robot.profile.bodies.is_empty() {
+        return None;
+    }
+    let (name, target) = tool(inputs, fit)?;
+    let recordings = inputs.recordings.values();
+    let rows: Vec<&Vec<f64>> = recordings.flat_map(|r| r.q.iter().flatten()).collect();
+    let box_of = postures(inputs, &rows);
+    let see = |q: &Vec<f64>| {
+        let at = configuration(inputs, fit, q);
+        let tracker = fit.formulation.tracker;
+        fit.solution.moved_point(tracker, target, &at).ok()
+    };
+    let points: Vec<MovedPoint> = box_of.iter().map(see).collect::<Option<_>>()?;
+    let kept = kept(inputs, fit, held_out);
+    let step = kept.len().div_ceil(SAMPLES).max(1);
+    let looked_at: Vec<usize> = kept.into_iter().step_by(step).collect();
+    let at = Places::new(inputs, fit, &looked_at, &box_of)?;
+    let mut effects = at.of_joints();
+    effects.extend(at.of_places(&name, target));
+    let (names, effects): (Vec<Untested>, Vec<Vec<UntestedEffect>>) = effects.into_iter().unzip();
+    let found = fit
+        .solution
+        .open_errors(&looked_at, step as f64, &effects, &points)?;
+    let worst = names
+        .into_iter()
+        .zip(&found.with)
+        .max_by(|a, b| a.1.upper.total_cmp(&b.1.upper));
+    Some(Prediction {
+        stated: found.stated,
+        alone: predicted(&found.alone),
+        with: worst.map(|(name, with)| (name, predicted(with))),
+    })
+}
+
+fn predicted(error: &OpenError) -> Predicted {
+    Predicted {
+        rms: error.rms,
+        upper: error.upper,
+    }
+}
+
+/// Held-out errors, the screened ones left out, against what the fit states of them.
+pub(crate) fn agreement(
+    inputs: &Inputs,
+    fit: &MlFit,
+    held_out: Option<&HeldOut>,
+) -> Option<Agreement> {
+    let without = screened(inputs, fit, held_out);
+    let (chi2, rows) = fit.solution.held_out_chi2(&without)?;
+    let freedom = fit.solution.degrees_of_freedom;
+    Some(Agreement::of(chi2, rows, freedom))
+}
+
+/// Samples with a held-out error that was screened out.
+fn screened(inputs: &Inputs, fit: &MlFit, held_out: Option<&HeldOut>) -> BTreeSet<usize> {
+    let errors = held_out
+        .iter()
+        .filter(|h| !h.left_out)
+        .flat_map(|h| &h.poses);
+    let gross: BTreeSet<&String> = errors.filter(|p| p.screened).map(|p| &p.pose).collect();
+    let of = |(recording, row): &(String, usize)| {
+        format!(
+            "{recording}:{}",
+            inputs.recordings[recording].poses.rows[*row]
+        )
+    };
+    let samples = fit.formulation.samples.iter().enumerate();
+    samples
+        .filter(|(_, sample)| gross.contains(&of(sample)))
+        .map(|(s, _)| s)
+        .collect()
+}
+
+/// All samples but those: fitted ones first, each in the order of the recording.
+fn kept(inputs: &Inputs, fit: &MlFit, held_out: Option<&HeldOut>) -> Vec<usize> {
+    let screened = screened(inputs, fit, held_out);
+    let samples = &fit.formulation.samples;
+    let validation = |s: &usize| inputs.recordings[&samples[*s].0].spec.usage == Usage::Validation;
+    let (after, before): (Vec<usize>, Vec<usize>) = (0..samples.len())
+        .filter(|s| !screened.contains(s))
+        .partition(validation);
+    before.into_iter().chain(after).collect()
+}
+
+/// Rows with the torques that they load the joints with.
+type Rows<'a> = Vec<(&'a Vec<f64>, Loads)>;
+
+/// Where regressors are needed.
+struct Places<'a> {
+    inputs: &'a Inputs,
+    fit: &'a MlFit,
+    samples: Rows<'a>,
+    postures: Rows<'a>,
+    /// 0 at the first sample, 1 at the last.
+    share: Vec<f64>,
+    /// 0 in the first half of the fitted samples, 1 after it.
+    late: Vec<f64>,
+}
+
+impl<'a> Places<'a> {
+    fn new(
+        inputs: &'a Inputs,
+        fit: &'a MlFit,
+        looked_at: &[usize],
+        postures: &'a [Vec<f64>],
+    ) -> Option<Self> {
+        let model = &inputs.robot.model;
+        let even = (!has_masses(model)).then(|| model.clone().with_even_masses());
+        let loaded = even.as_ref().unwrap_or(model);
+        let with_loads = |q: &'a Vec<f64>| (q, Loads::at(loaded, q));
+        let all = &fit.formulation.samples;
+        let row = |s: &usize| inputs.recordings[&all[*s].0].q[all[*s].1].as_ref();
+        let rows: Vec<&Vec<f64>> = looked_at.iter().map(row).collect::<Option<_>>()?;
+        let usage = |s: &&usize| inputs.recordings[&all[**s].0].spec.usage;
+        let fitted = looked_at.iter().filter(|s| usage(s) != Usage::Validation);
+        let half = fitted.count() / 2;
+        let last = looked_at.len().max(2) - 1;
+        Some(Self {
+            inputs,
+            fit,
+            samples: rows.into_iter().map(with_loads).collect(),
+            postures: postures.iter().map(with_loads).collect(),
+            share: (0..looked_at.len())
+                .map(|i| i as f64 / last as f64)
+                .collect(),
+            late: (0..looked_at.len())
+                .map(|i| if i < half { 0.0 } else { 1.0 })
+                .collect(),
+        })
+    }
+
+    fn of_joints(&self) -> Vec<(Untested, Vec<UntestedEffect>)> {
+        let model = &self.inputs.robot.model;
+        let mut out = Vec::new();
+        let used = |j: &JointId| self.fit.formulation.joints[j.index()].is_some();
+        let joints: Vec<JointId> = model.independent_joints().filter(used).collect();
+        for &joint in &joints {
+            let Some(edge) = self.fit.formulation.joints[joint.index()] else {
+                continue;
+            };
+            let named = model.joint(joint);
+            let turns = named.kind.turns();
+            let known = |kind: EffectKind| {
+                let edges = self.fit.formulation.problem.edges();
+                matches!(&edges[edge.index()].kind, calib_core::EdgeKind::Joint(j)
+                    if j.effects.iter().any(|e| e.kind == kind))
+            };
+            let effect = |kind: EffectKind, sigma: f64, other: Option<JointId>| {
+                let at_postures = regressors(model, (joint, other), kind, &self.postures);
+                let largest = at_postures.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+                let sigma = match kind {
+                    EffectKind::TorqueCompliance if largest > 0.0 => sigma / largest,
+                    EffectKind::TorqueCompliance => return None,
+                    _ => sigma,
+                };
+                (!known(kind)).then(|| UntestedEffect {
+                    moves: Moves::Joint(edge),
+                    sigma,
+                    at_samples: regressors(model, (joint, other), kind, &self.samples),
+                    at_postures,
+                })
+            };
+            let mut add = |what: Untested, effects: Vec<Option<UntestedEffect>>| {
+                let effects: Vec<UntestedEffect> = effects.into_iter().flatten().collect();
+                if !effects.is_empty() {
+                    out.push((what, effects));
+                }
+            };
+            let of = |kind| untested(kind, &named.name);
+            let gain = effect(EffectKind::Gain, GAIN, None);
+            add(of(UntestedKind::Gain), vec![gain]);
+            if turns {
+                let harmonics = [EffectKind::EccentricityCos, EffectKind::EccentricitySin];
+                let harmonics = harmonics.map(|kind| effect(kind, ECCENTRICITY, None));
+                add(of(UntestedKind::Eccentricity), harmonics.into());
+                let yields = effect(EffectKind::TorqueCompliance, YIELD, None);
+                add(of(UntestedKind::Compliance), vec![yields]);
+                let step = self.since(Moves::Joint(edge), STEP, &self.late);
+                add(of(UntestedKind::Step), vec![Some(step)]);
+            }
+            let alike = |o: &&JointId| **o != joint && model.joint(**o).kind.turns() == turns;
+            for &other in joints.iter().filter(alike) {
+                let coupled = Untested {
+                    other: Some(model.joint(other).name.clone()),
+                    ..of(UntestedKind::Coupling)
+                };
+                let share = effect(EffectKind::Coupling, CROSSTALK, Some(other));
+                add(coupled, vec![share]);
+            }
+        }
+        out
+    }
+
+    fn of_places(&self, name: &str, target: Target) -> Vec<(Untested, Vec<UntestedEffect>)> {
+        let problem = &self.fit.formulation.problem;
+        let body: FrameId = match target {
+            Target::Frame(frame) => frame,
+            Target::Point(point) => problem.points()[point.index()].frame,
+            _ => return Vec::new(),
+        };
+        let tracker = self.fit.formulation.tracker;
+        let frame = &self.inputs.robot.profile.tracker.frame;
+        let along = |moves: &dyn Fn(usize) -> Moves, values: &[f64]| {
+            let axes = 0..3;
+            axes.map(|axis| self.since(moves(axis), MOVED, values))
+                .collect()
+        };
+        let reference = |axis| Moves::Reference(tracker, axis);
+        let mount = |axis| Moves::Body(body, axis);
+        let of = untested;
+        vec![
+            (
+                of(UntestedKind::Drift, frame),
+                along(&reference, &self.share),
+            ),
+            (of(UntestedKind::Bump, frame), along(&reference, &self.late)),
+            (of(UntestedKind::Slip, name), along(&mount, &self.late)),
+        ]
+    }
+
+    /// What is as at the end of the recordings when the robot is used.
+    fn since(&self, moves: Moves, sigma: f64, at_samples: &[f64]) -> UntestedEffect {
+        UntestedEffect {
+            moves,
+            sigma,
+            at_samples: at_samples.to_vec(),
+            at_postures: vec![1.0; self.postures.len()],
+        }
+    }
+}
+
+fn untested(effect: UntestedKind, of: &str) -> Untested {
+    Untested {
+        effect,
+        of: of.to_owned(),
+        other: None,
+    }
+}
+
+fn regressors(
+    model: &RobotModel,
+    (joint, other): (JointId, Option<JointId>),
+    kind: EffectKind,
+    rows: &Rows<'_>,
+) -> Vec<f64> {
+    let unknown = Conditions::default();
+    let state = |(q, loads): &(&Vec<f64>, Loads)| JointState {
+        other: other.map_or(0.0, |o| model.position(q, o)),
+        ..joint_state(model, joint, q, loads, &unknown)
+    };
+    let states: Vec<JointState> = rows.iter().map(state).collect();
+    kind.regressors(&states).unwrap_or_default()
+}
