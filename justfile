@@ -38,9 +38,10 @@ studies:
 snapshots:
     cargo insta review --workspace
 
+# In a folder of its own: Cargo keeps unpacked archives by version for each target folder, and would build an older one again.
 # What would be published of the libraries (`publish = true`): each package built from its archive, against the others' archives
 package:
-    cargo publish --dry-run --workspace
+    target=$(mktemp -d) && cargo publish --dry-run --workspace --target-dir "$target" && rm -r "$target"
 
 # Licences and sources of the dependencies
 deny:
