@@ -201,6 +201,18 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
                 unconfirmed(f);
             }),
         ),
+        // All else confirms it, but with one posture too few.
+        (
+            ReasonId::PredictionUndecided,
+            LeavesOpen,
+            with(|f| {
+                f.prediction = prediction(0.0011, 0.0012, UntestedKind::Gain);
+                f.validation = Validation::Recordings {
+                    postures: 20,
+                    repeated: 1,
+                };
+            }),
+        ),
         (
             ReasonId::PredictionUndecided,
             Warns,

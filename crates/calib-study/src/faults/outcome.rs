@@ -74,10 +74,12 @@ impl CaseResult {
     }
 
     /// Good data that was not accepted for a reason that is true of it: all that kept it from acceptance is that the data are
-    /// too few to decide.
+    /// too few to decide, or that the error exceeds a limit, where it truly does.
     #[must_use]
     pub fn truly_undecided(&self) -> bool {
-        let too_few = |id: &ReasonId| TOO_FEW.contains(id);
+        let over = self.rms_m.is_some_and(|rms| rms > LIMIT_MM * 1e-3);
+        let exceeds = |id: &ReasonId| over && *id == ReasonId::LimitExceeded;
+        let too_few = |id: &ReasonId| TOO_FEW.contains(id) || exceeds(id);
         self.refused() && !self.refused_by.is_empty() && self.refused_by.iter().all(too_few)
     }
 
