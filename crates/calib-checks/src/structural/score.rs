@@ -1,5 +1,7 @@
 //! Scores of all candidates.
 
+use rayon::prelude::*;
+
 use super::candidates::Candidate;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::scan::{Scan, Score, Scored};
@@ -27,7 +29,8 @@ pub(crate) fn score(scan: &Scan<'_>, candidates: &[Candidate], enough: f64) -> V
         }
         scored
     };
-    candidates.iter().flat_map(of_candidate).collect()
+    let scored: Vec<Vec<Scored>> = candidates.par_iter().map(of_candidate).collect();
+    scored.into_iter().flatten().collect()
 }
 
 /// A hypothesis that estimates something of its own.

@@ -9,8 +9,6 @@
 
 use nalgebra::DMatrix;
 
-use calib_geometry::decompose::symmetric_eigen;
-
 use crate::analysis::solution::Solution;
 use crate::model::layout::Model;
 use crate::model::values::Values;
@@ -67,17 +65,19 @@ pub fn sandwich(
         };
         let m = s.w.len();
         // I − Q = U diag(λ) Uᵀ
-        let eigen = symmetric_eigen(&(DMatrix::identity(m, m) - &s.a * &c * s.a.transpose()));
+        let ac = &s.a * &c;
+        let eigen = (DMatrix::identity(m, m) - ac * s.a.transpose()).symmetric_eigen();
         // (I − Q)^(-½) w = U diag(λ^(-½)) Uᵀ w
-        let mut coefficients = eigen.vectors.tr_mul(&s.w);
+        let mut coefficients = eigen.eigenvectors.tr_mul(&s.w);
         for k in 0..m {
-            coefficients[k] = if eigen.values[k] > LEVERAGE_LEFT {
-                coefficients[k] / eigen.values[k].sqrt()
+            let left = eigen.eigenvalues[k];
+            coefficients[k] = if left > LEVERAGE_LEFT {
+                coefficients[k] / left.sqrt()
             } else {
                 0.0
             };
         }
-        let adjusted = &eigen.vectors * coefficients;
+        let adjusted = &eigen.eigenvectors * coefficients;
         let score = s.a.tr_mul(&adjusted);
         middle.ger(1.0, &score, &score, 1.0);
     }
