@@ -117,6 +117,23 @@ fn the_frame_depends_only_on_the_order_of_the_markers() {
     assert!(p[2].z.abs() < 1e-12 && p[2].y > 0.0);
 }
 
+/// Long recordings are thinned, marker by marker: one that is rarely seen keeps its rows.
+#[test]
+fn long_recordings_give_a_good_template_and_rarely_seen_markers_a_place() {
+    let (shape, sigma) = (shape(), 3e-4);
+    let (_, mut tracks) = tracks(&shape, 9001, sigma, 0.0, 21);
+    for row in 0..9001 {
+        if row % 3 == 0 || row % 50 != 1 {
+            tracks[4][row] = None;
+        }
+    }
+    let learned = Template::learn(&names(5), &refs(&tracks)).expect("a body");
+    for (k, (a, b)) in learned.points.iter().zip(&shape).enumerate() {
+        let rows: f64 = if k == 4 { 100.0 } else { 3000.0 };
+        assert!((a - b).norm() < 8.0 * sigma / rows.sqrt(), "marker {k}");
+    }
+}
+
 /// Five percent of the samples off by 50 mm: without them the learned places are as good as without outliers.
 #[test]
 fn gross_samples_neither_bend_the_template_nor_turn_a_row() {
