@@ -10,6 +10,7 @@ pub(crate) mod clock;
 pub(crate) mod files;
 pub(crate) mod fit;
 pub(crate) mod held_out;
+mod limit;
 mod next_steps;
 pub(crate) mod noise;
 pub(crate) mod observability;

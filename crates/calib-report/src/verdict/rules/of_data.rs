@@ -1,0 +1,120 @@
+//! What the data allow: rejections, what the result was verified with, how the joints moved.
+
+use calib_finding::Fact;
+
+use crate::verdict::facts::{Facts, Part, RejectedPart, Validation};
+use crate::verdict::{Effect, Reason, ReasonId};
+
+pub(super) fn rejected_parts(facts: &Facts) -> Vec<Reason> {
+    let reason = |rejected: &RejectedPart| {
+        let reason = Reason::new(ReasonId::RejectedPart, Effect::Rejects)
+            .with("rejected", Fact::count(rejected.rejected.part))
+            .with("of", Fact::count(rejected.rejected.of));
+        match &rejected.part {
+            Part::Recording(recording) => reason.with("recording", Fact::name(recording)),
+            Part::Subject { recording, subject } => reason
+                .with("recording", Fact::name(recording))
+                .with("subject", Fact::name(subject)),
+            Part::Range {
+                joint,
+                from,
+                to,
+                unit,
+            } => reason
+                .with("joint", Fact::name(joint))
+                .with("from", Fact::number(*from, *unit))
+                .with("to", Fact::number(*to, *unit)),
+        }
+    };
+    facts.rejected_parts.iter().map(reason).collect()
+}
+
+/// Validation that repeats fitted postures in this share, measured again, proves little about new ones…
+pub(super) const REPEATED: f64 = 2.0 / 3.0;
+
+/// …and below this share it does not matter.
+const FEW_REPEATED: f64 = 0.05;
+
+pub(super) fn validation(facts: &Facts) -> Vec<Reason> {
+    match facts.validation {
+        Validation::None => vec![Reason::new(ReasonId::NoValidation, Effect::LeavesOpen)],
+        Validation::LeaveOneOut { postures } => vec![
+            Reason::new(ReasonId::LeaveOneOut, Effect::Warns)
+                .with("postures", Fact::count(postures)),
+        ],
+        Validation::Recordings { postures, repeated } => {
+            let share = repeated as f64 / postures.max(1) as f64;
+            let effect = match share {
+                share if share >= REPEATED => Effect::LeavesOpen,
+                share if share > FEW_REPEATED => Effect::Warns,
+                _ => return Vec::new(),
+            };
+            vec![
+                Reason::new(ReasonId::ValidationRepeatsFit, effect)
+                    .with("repeated", Fact::count(repeated))
+                    .with("postures", Fact::count(postures)),
+            ]
+        }
+    }
+}
+
+/// Rejected or screened measurements above this share are a warning: the robust fit is still right…
+const NOTABLE: f64 = 0.05;
+
+/// …and above this one nothing is accepted: the rest was chosen by the model that it is to confirm.
+pub(super) const TOO_MANY: f64 = 0.10;
+
+fn share_effect(share: f64) -> Effect {
+    match share {
+        share if share > TOO_MANY => Effect::LeavesOpen,
+        share if share >= NOTABLE => Effect::Warns,
+        _ => Effect::Supports,
+    }
+}
+
+pub(super) fn rejected_share(facts: &Facts) -> Vec<Reason> {
+    let effect = share_effect(facts.rejected.ratio());
+    if effect == Effect::Supports {
+        return Vec::new();
+    }
+    vec![
+        Reason::new(ReasonId::RejectedShare, effect)
+            .with("rejected", Fact::count(facts.rejected.part))
+            .with("of", Fact::count(facts.rejected.of)),
+    ]
+}
+
+pub(super) fn screened(facts: &Facts) -> Vec<Reason> {
+    if facts.screened.part == 0 {
+        return Vec::new();
+    }
+    vec![
+        Reason::new(
+            ReasonId::ScreenedHeldOut,
+            share_effect(facts.screened.ratio()),
+        )
+        .with("screened", Fact::count(facts.screened.part))
+        .with("of", Fact::count(facts.screened.of)),
+    ]
+}
+
+pub(super) fn single_joint(facts: &Facts) -> Vec<Reason> {
+    let single = facts.single_joint;
+    let which = match (single.fitted, single.held_out) {
+        (false, false) => return Vec::new(),
+        (true, false) => "fitted",
+        (false, true) => "held_out",
+        (true, true) => "all",
+    };
+    vec![Reason::new(ReasonId::SingleJointData, Effect::Warns).with("data", Fact::choice(which))]
+}
+
+pub(super) fn verified_joints(facts: &Facts) -> Vec<Reason> {
+    if facts.not_verified.is_empty() {
+        return Vec::new();
+    }
+    vec![
+        Reason::new(ReasonId::JointsNotVerified, Effect::Warns)
+            .with("joints", Fact::names(facts.not_verified.clone())),
+    ]
+}

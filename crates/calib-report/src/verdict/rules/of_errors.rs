@@ -1,0 +1,146 @@
+//! Errors that were measured, against limits, registration and noise.
+
+use calib_finding::Fact;
+
+use crate::verdict::facts::{Facts, Validation};
+use crate::verdict::{Compared, Effect, Reason, ReasonId};
+use crate::{Limit, Outcome, Unit};
+
+/// An estimate above its limit rejects, whether its interval reaches below or not; one below it that its interval does not
+/// bear out leaves open what more data decide.
+pub(super) fn limits(facts: &Facts) -> Vec<Reason> {
+    if facts.limits.is_empty() {
+        return vec![Reason::new(ReasonId::NoLimits, Effect::LeavesOpen)];
+    }
+    let reason = |limit: &Limit| {
+        let above = limit.value.is_none_or(|value| value > limit.limit);
+        let (id, effect) = match limit.outcome {
+            Outcome::NotEvaluated => (ReasonId::LimitNotEvaluated, Effect::LeavesOpen),
+            Outcome::Met => (ReasonId::LimitMet, Effect::Supports),
+            Outcome::Undecided if !above => (ReasonId::LimitUndecided, Effect::LeavesOpen),
+            Outcome::Undecided | Outcome::Exceeded => (ReasonId::LimitExceeded, Effect::Rejects),
+        };
+        let number = |value: Option<f64>| value.map(|value| Fact::number(value, limit.unit));
+        Reason::new(id, effect)
+            .with("name", Fact::name(&limit.name))
+            .with("quantity", Fact::name(&limit.quantity))
+            .with("limit", Fact::number(limit.limit, limit.unit))
+            .with_some("value", number(limit.value))
+            .with_some("low", number(limit.low))
+            .with_some("high", number(limit.high))
+            .with_some(
+                "postures",
+                enough(facts, limit)
+                    .filter(|_| id == ReasonId::LimitUndecided)
+                    .map(Fact::count),
+            )
+            .with_some(
+                "because",
+                Some(&limit.reason)
+                    .filter(|r| !r.is_empty())
+                    .map(Fact::name),
+            )
+    };
+    facts.limits.iter().map(reason).collect()
+}
+
+/// Postures of which an estimate like this one would have its whole interval below the limit: its half-width shrinks with
+/// the square root of their number. `None` for limits of anything else, or where no number is of use.
+pub(super) fn enough(facts: &Facts, limit: &Limit) -> Option<usize> {
+    /// Nobody records more to decide a limit.
+    const TOO_MANY: f64 = 1000.0;
+    if !limit.name.starts_with("held_out") {
+        return None;
+    }
+    let value = limit.value?;
+    let wider = (limit.high? - value) / (limit.limit - value);
+    let postures = (facts.validation.postures() as f64 * wider * wider).ceil();
+    (postures > 0.0 && postures < TOO_MANY).then_some(postures as usize)
+}
+
+/// Chance makes a robot look better (or worse) so clearly in at most this share of the cases.
+pub(super) const SIGNIFICANT: f64 = 0.05;
+
+pub(super) fn registration(facts: &Facts) -> Vec<Reason> {
+    if !facts.freed || facts.improvements.is_empty() {
+        return Vec::new();
+    }
+    let worse = facts.improvements.iter().find(|i| i.p_worse < SIGNIFICANT);
+    let better = facts.improvements.iter().any(|i| i.p_better < SIGNIFICANT);
+    let (id, effect, shown) = match (worse, better) {
+        (Some(worse), _) => (ReasonId::WorseThanRegistration, Effect::Rejects, worse),
+        (None, true) => return Vec::new(),
+        (None, false) => (
+            ReasonId::NotBetterThanRegistration,
+            Effect::Warns,
+            &facts.improvements[0],
+        ),
+    };
+    let unit = match shown.quantity {
+        Compared::Position => Unit::Meter,
+        Compared::Orientation => Unit::Radian,
+    };
+    let p = match id {
+        ReasonId::WorseThanRegistration => shown.p_worse,
+        _ => shown.p_better,
+    };
+    vec![
+        Reason::new(id, effect)
+            .with("registration", Fact::number(shown.registration, unit))
+            .with("calibrated", Fact::number(shown.calibrated, unit))
+            .with("postures", Fact::count(shown.postures))
+            .with("p", Fact::ratio(p)),
+    ]
+}
+
+/// Without a limit of the profile, an orientation error above this many times the noise is gross…
+const GROSS: f64 = 5.0;
+
+/// …but never one below this (rad): three small markers are noisy…
+const NEVER_GROSS: f64 = 3.0 * std::f64::consts::PI / 180.0;
+
+/// …and always one above this (rad), whatever the noise is said to be: noise that was found may have swallowed it.
+const ALWAYS_GROSS: f64 = 10.0 * std::f64::consts::PI / 180.0;
+
+pub(super) fn orientation(facts: &Facts) -> Vec<Reason> {
+    if facts.validation == Validation::None {
+        return Vec::new();
+    }
+    let Some(rms) = facts.orientation.rms else {
+        return vec![Reason::new(ReasonId::OrientationNotMeasured, Effect::Warns)];
+    };
+    let expected = facts.orientation.expected.unwrap_or(0.0);
+    let accepted = (GROSS * expected).clamp(NEVER_GROSS, ALWAYS_GROSS);
+    let limited = facts.limits.iter().any(|limit| {
+        limit.unit == Unit::Radian && limit.value.is_some() && limit.name.starts_with("held_out")
+    });
+    if limited || rms <= accepted {
+        return Vec::new();
+    }
+    vec![
+        Reason::new(ReasonId::OrientationOff, Effect::Rejects)
+            .with("rms", Fact::radians(rms))
+            .with("accepted", Fact::radians(accepted)),
+    ]
+}
+
+/// Without a limit of the rms error, the URDF alone does as well as with effects up to this ratio.
+const AS_WELL: f64 = 1.2;
+
+pub(super) fn urdf_alone(facts: &Facts) -> Vec<Reason> {
+    let Some(alone) = facts.urdf_alone else {
+        return Vec::new();
+    };
+    let accepted = alone.limit.unwrap_or(AS_WELL * alone.with_effects);
+    let effect = if alone.rms <= accepted {
+        Effect::Supports
+    } else {
+        Effect::Warns
+    };
+    vec![
+        Reason::new(ReasonId::UrdfAlone, effect)
+            .with("rms", Fact::meters(alone.rms))
+            .with("with_effects", Fact::meters(alone.with_effects))
+            .with_some("limit", alone.limit.map(Fact::meters)),
+    ]
+}

@@ -1,0 +1,131 @@
+//! Errors that the fit predicts over the joint ranges, and whether held-out errors bear its uncertainty out.
+
+use calib_finding::Fact;
+
+use crate::verdict::facts::{Facts, Predicted, Untested, Validation};
+use crate::verdict::rules::of_data::REPEATED;
+use crate::verdict::rules::of_errors::SIGNIFICANT;
+use crate::verdict::{Effect, Reason, ReasonId};
+use crate::{Limit, Outcome, Unit};
+
+/// Held-out poses in which the joints move together met every limit, and prove the calibration better than registration: what
+/// they vouch for is then a warning, and leaves the verdict open otherwise.
+pub(super) fn unless_confirmed(facts: &Facts) -> Effect {
+    let independent = matches!(facts.validation, Validation::Recordings { postures, repeated }
+        if (repeated as f64) < REPEATED * postures as f64);
+    let met = |limit: &Limit| limit.outcome == Outcome::Met;
+    let better = facts.improvements.iter().any(|i| i.p_better < SIGNIFICANT);
+    let combined = !facts.single_joint.held_out && facts.not_verified.is_empty();
+    if independent && combined && better && facts.limits.iter().all(met) {
+        Effect::Warns
+    } else {
+        Effect::LeavesOpen
+    }
+}
+
+/// Held-out postures, those that repeat fitted ones left out, from which on what they show is taken for the joint ranges: an error
+/// that one posture of ten has is then missed in one validation of eight.
+const VERIFIED: usize = 20;
+
+/// What is computed for the joint ranges against what was measured there: few held-out postures do not outweigh it.
+fn unless_measured(facts: &Facts) -> Effect {
+    match facts.validation {
+        Validation::Recordings { postures, repeated } if postures >= VERIFIED + repeated => {
+            unless_confirmed(facts)
+        }
+        _ => Effect::LeavesOpen,
+    }
+}
+
+/// The smallest limit of the profile for position errors, m.
+fn position_limit(facts: &Facts) -> Option<f64> {
+    let limits = facts.limits.iter();
+    limits
+        .filter(|l| l.unit == Unit::Meter && l.name.starts_with("held_out"))
+        .map(|l| l.limit)
+        .min_by(f64::total_cmp)
+}
+
+/// What the parameters leave open, then what one effect could add: the held-out poses are few, the joint ranges are wide.
+pub(super) fn predicted(facts: &Facts) -> Vec<Reason> {
+    let (Some(prediction), Some(limit)) = (&facts.prediction, position_limit(facts)) else {
+        return Vec::new();
+    };
+    let reason = |id: ReasonId, found: Predicted| {
+        Reason::new(id, unless_measured(facts))
+            .with("expected", Fact::meters(found.rms))
+            .with("upper", Fact::meters(found.upper))
+            .with("limit", Fact::meters(limit))
+    };
+    if prediction.alone.upper > limit {
+        return vec![reason(ReasonId::PredictionUndecided, prediction.alone)];
+    }
+    let open = prediction
+        .with
+        .iter()
+        .filter(|(_, with)| with.upper > limit);
+    open.map(|(what, with)| of_effect(reason(ReasonId::EffectsNotExcluded, *with), what))
+        .collect()
+}
+
+fn of_effect(reason: Reason, what: &Untested) -> Reason {
+    reason
+        .with("effect", Fact::choice(what.effect.id()))
+        .with("of", Fact::name(&what.of))
+        .with_some("other", what.other.as_ref().map(Fact::name))
+}
+
+/// Held-out errors up to this many times their stated variance are left alone: no stated σ is that exact.
+const AGREES: f64 = 1.5;
+
+pub(super) fn agreement(facts: &Facts) -> Vec<Reason> {
+    let beyond = |a: &&crate::Agreement| a.value > a.high.max(AGREES);
+    let reason = |a: &crate::Agreement| {
+        Reason::new(ReasonId::HeldOutBeyondStated, unless_measured(facts))
+            .with("value", Fact::ratio(a.value))
+            .with("high", Fact::ratio(a.high.max(AGREES)))
+    };
+    let found = facts.agreement.as_ref().filter(beyond);
+    found.map(reason).into_iter().collect()
+}
+
+/// An error that the data do not exclude, in units of what the fit states of its predictions, up to which stating it instead is
+/// enough. Beyond it the effect is either seen, or so poorly that what is stated rests on how large such effects usually are.
+const TOO_SMALL: f64 = 2.5;
+
+pub(super) fn uncertainty(facts: &Facts) -> Vec<Reason> {
+    let Some(prediction) = &facts.prediction else {
+        return Vec::new();
+    };
+    let far = |with: &Predicted| with.rms > TOO_SMALL * prediction.stated;
+    let found = prediction.with.iter().filter(|(_, with)| far(with));
+    let reason = |with: &Predicted| {
+        Reason::new(ReasonId::UncertaintyTooSmall, unless_measured(facts))
+            .with("stated", Fact::meters(prediction.stated))
+            .with("expected", Fact::meters(with.rms))
+    };
+    found
+        .map(|(what, with)| of_effect(reason(with), what))
+        .collect()
+}
+
+/// The fit's own uncertainty does not know of what is not in its model: the larger error is stated in any case.
+pub(super) fn expected(facts: &Facts) -> Vec<Reason> {
+    let Some(prediction) = &facts.prediction else {
+        return Vec::new();
+    };
+    let reason = |found: &Predicted| {
+        Reason::new(ReasonId::PredictionExpected, Effect::Supports)
+            .with("stated", Fact::meters(prediction.stated))
+            .with("expected", Fact::meters(found.rms))
+            .with("upper", Fact::meters(found.upper))
+    };
+    let larger = prediction.with.iter();
+    let larger = larger.filter(|(_, with)| with.rms > prediction.alone.rms);
+    let mut found = larger.map(|(what, with)| of_effect(reason(with), what));
+    vec![
+        found
+            .next_back()
+            .unwrap_or_else(|| reason(&prediction.alone)),
+    ]
+}
