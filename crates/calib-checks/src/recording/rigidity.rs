@@ -2,9 +2,11 @@
 //!
 //! Everything is read from the distances `d_ij` between markers, which no motion changes.
 
+mod rows;
+
 use super::Expectations;
 use crate::rigid_body::Template;
-use crate::statistics::{median, range, robust_sigma};
+use crate::statistics::{median, robust_sigma};
 use calib_finding::{Fact, Finding, Id, Subject, catalog, nearest_word};
 use calib_geometry::registration::rigid_registration;
 use calib_recording::Poses;
@@ -236,156 +238,6 @@ impl<'a> Body<'a> {
         )
     }
 
-    /// Rows in which markers are exchanged, or one is out of place.
-    fn bad_rows(&self, poses: &Poses) -> Vec<Finding> {
-        let mut swapped: Vec<(u64, Vec<&str>)> = Vec::new();
-        let mut outliers: Vec<(u64, String, f64)> = Vec::new();
-        // Markers each of which alone explains a bad row.
-        let mut alone: Vec<Vec<usize>> = Vec::new();
-        for row in 0..poses.len() {
-            let points: Vec<Option<Point3<f64>>> =
-                self.tracks.iter().map(|track| track[row]).collect();
-            let worst = self.deviation(&points);
-            if worst <= self.tolerance {
-                continue;
-            }
-            match self.exchange(&points) {
-                Some(exchanged) => swapped.push((poses.rows[row], exchanged)),
-                None => {
-                    alone.push(self.explained_by_one(&points));
-                    let (marker, off) = self.out_of_place(&points);
-                    outliers.push((poses.rows[row], marker, off));
-                }
-            }
-        }
-        let mut findings = Vec::new();
-        if let Some((_, which)) = swapped.first() {
-            findings.push(
-                self.finding(catalog::MARKER_SWAP)
-                    .with("markers", Fact::names(which.iter().copied()))
-                    .with("rows", Fact::count(swapped.len()))
-                    .at_rows(swapped.iter().map(|(row, _)| *row)),
-            );
-        }
-        if self.bends(&alone, poses.len()) {
-            findings.extend(self.bending(outliers.iter().map(|(row, _, _)| *row).collect()));
-            return findings;
-        }
-        if let Some((_, marker, off)) = outliers.iter().max_by(|a, b| a.2.total_cmp(&b.2)) {
-            findings.push(
-                self.finding(catalog::MARKER_OUTLIER)
-                    .with("marker", Fact::name(marker))
-                    .with("off", Fact::meters(*off))
-                    .with("rows", Fact::count(outliers.len()))
-                    .at_rows(outliers.iter().map(|(row, _, _)| *row)),
-            );
-        }
-        findings
-    }
-
-    /// The markers without which the distances of a row are right.
-    fn explained_by_one(&self, points: &[Option<Point3<f64>>]) -> Vec<usize> {
-        let without = |k: &usize| {
-            let mut rest = points.to_vec();
-            rest[*k] = None;
-            self.deviation(&rest) <= self.tolerance
-        };
-        (0..points.len()).filter(without).collect()
-    }
-
-    /// Bad rows that are too many for rare mistakes, and that no marker explains, or always the same one.
-    fn bends(&self, alone: &[Vec<usize>], rows: usize) -> bool {
-        let many = |count: usize| count >= ROWS && count as f64 > BENDING * rows as f64;
-        let unexplained = alone.iter().filter(|markers| markers.is_empty()).count();
-        let of_marker = |k: usize| alone.iter().filter(|markers| markers.contains(&k)).count();
-        let most = (0..self.markers.len()).map(of_marker).max().unwrap_or(0);
-        let same = most as f64 > ALWAYS_THE_SAME * alone.len() as f64;
-        // Two outliers meet in a row far less often than one stands alone.
-        let bent = many(unexplained) && 2 * unexplained > alone.len();
-        bent || (same && many(alone.len()))
-    }
-
-    /// Many rows, none of them a rare mistake: the body bends.
-    fn bending(&self, rows: Vec<u64>) -> Option<Finding> {
-        let spread = |pair: &Pair| {
-            let all = distances(self.tracks[pair.i], self.tracks[pair.j]);
-            range(all.map(|(_, distance)| distance)).map_or(0.0, |(low, high)| high - low)
-        };
-        let (pair, spread) = self
-            .pairs
-            .iter()
-            .map(|pair| (pair, spread(pair)))
-            .max_by(|a, b| a.1.total_cmp(&b.1))?;
-        Some(
-            self.finding_of(catalog::NOT_RIGID, "bends")
-                .with("first", Fact::name(self.markers[pair.j]))
-                .with("second", Fact::name(self.markers[pair.i]))
-                .with("range", Fact::meters(spread))
-                .with("rows", Fact::count(rows.len()))
-                .at_rows(rows),
-        )
-    }
-
-    /// Largest departure of a distance from its median.
-    fn deviation(&self, points: &[Option<Point3<f64>>]) -> f64 {
-        let departures = self.pairs.iter().filter_map(|pair| {
-            Some(((points[pair.i]? - points[pair.j]?).norm() - pair.distance).abs())
-        });
-        departures.fold(0.0, f64::max)
-    }
-
-    /// The permutation of the markers seen that brings all distances back: the markers that it moves.
-    fn exchange(&self, points: &[Option<Point3<f64>>]) -> Option<Vec<&'a str>> {
-        let n = points.len();
-        let mut best: Option<(f64, Vec<usize>)> = None;
-        let mut consider = |order: &[usize]| {
-            let moved: Vec<Option<Point3<f64>>> = order.iter().map(|&k| points[k]).collect();
-            let deviation = self.deviation(&moved);
-            if deviation < self.tolerance
-                && best.as_ref().is_none_or(|(least, _)| deviation < *least)
-            {
-                best = Some((deviation, order.to_vec()));
-            }
-        };
-        if n <= ALL_PERMUTATIONS {
-            permutations(n, &mut consider);
-        } else {
-            for i in 0..n {
-                for j in 0..i {
-                    let mut order: Vec<usize> = (0..n).collect();
-                    order.swap(i, j);
-                    consider(&order);
-                }
-            }
-        }
-        // At least four markers, or a triangle, must be seen for a permutation to mean anything.
-        let seen = points.iter().flatten().count();
-        let (_, order) = best.filter(|_| seen >= 3)?;
-        let moved = (0..n).filter(|&k| order[k] != k);
-        Some(moved.map(|k| self.markers[k]).collect())
-    }
-
-    /// The marker whose distances are most off, and by how much.
-    fn out_of_place(&self, points: &[Option<Point3<f64>>]) -> (String, f64) {
-        let off = |k: usize| {
-            let departures: Vec<f64> = self
-                .pairs
-                .iter()
-                .filter(|pair| pair.i == k || pair.j == k)
-                .filter_map(|pair| {
-                    Some(((points[pair.i]? - points[pair.j]?).norm() - pair.distance).abs())
-                })
-                .collect();
-            median(departures).unwrap_or(0.0)
-        };
-        let worst = (0..self.markers.len())
-            .map(|k| (k, off(k)))
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        worst.map_or((String::new(), 0.0), |(k, off)| {
-            (self.markers[k].to_string(), off)
-        })
-    }
-
     /// Scale and handedness against a template that is known beforehand.
     fn against_template(&self, template: &Template) -> Option<Finding> {
         let place = |k: usize| {
@@ -457,20 +309,4 @@ fn distances<'a>(
         .zip(b)
         .enumerate()
         .filter_map(|(row, (a, b))| Some((row, (a.as_ref()? - b.as_ref()?).norm())))
-}
-
-/// Calls `visit` with every order of `0..n`.
-fn permutations(n: usize, visit: &mut dyn FnMut(&[usize])) {
-    fn place(k: usize, order: &mut Vec<usize>, visit: &mut dyn FnMut(&[usize])) {
-        if k == order.len() {
-            visit(order);
-            return;
-        }
-        for i in k..order.len() {
-            order.swap(k, i);
-            place(k + 1, order, visit);
-            order.swap(k, i);
-        }
-    }
-    place(0, &mut (0..n).collect(), visit);
 }

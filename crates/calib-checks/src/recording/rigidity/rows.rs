@@ -1,0 +1,313 @@
+//! Rows in which a body is not what it is in the others: exchanged labels, outliers, bending.
+
+use calib_finding::{Fact, Finding, catalog};
+use calib_recording::Poses;
+use nalgebra::Point3;
+
+use super::{ALL_PERMUTATIONS, ALWAYS_THE_SAME, BENDING, Body, Pair, ROWS, distances};
+use crate::statistics::{median, range};
+
+impl<'a> Body<'a> {
+    /// Rows in which markers are exchanged, or one is out of place.
+    pub(super) fn bad_rows(&self, poses: &Poses) -> Vec<Finding> {
+        let mut swapped: Vec<(u64, Vec<&str>)> = Vec::new();
+        let mut outliers: Vec<(u64, String, f64)> = Vec::new();
+        // Markers each of which alone explains a bad row.
+        let mut alone: Vec<Vec<usize>> = Vec::new();
+        // Rows that an exchange explains, and one marker out of place as well: always so with three markers, two of them exchanged.
+        let mut either: Vec<(usize, Vec<&str>)> = Vec::new();
+        for row in 0..poses.len() {
+            let points: Vec<Option<Point3<f64>>> =
+                self.tracks.iter().map(|track| track[row]).collect();
+            let worst = self.deviation(&points);
+            if worst <= self.tolerance {
+                continue;
+            }
+            match self.exchange(&points) {
+                Some(exchanged) if !self.explained_by_one(&points).is_empty() => {
+                    either.push((row, exchanged));
+                }
+                Some(exchanged) => swapped.push((poses.rows[row], exchanged)),
+                None => outliers.push(self.outlier(poses, row, &mut alone)),
+            }
+        }
+        let (same, others) = again_and_again(either, outliers.len());
+        swapped.extend(
+            same.into_iter()
+                .map(|(row, which)| (poses.rows[row], which)),
+        );
+        swapped.sort_unstable();
+        outliers.extend(
+            others
+                .into_iter()
+                .map(|row| self.outlier(poses, row, &mut alone)),
+        );
+        outliers.sort_by_key(|(row, _, _)| *row);
+        let mut findings = Vec::new();
+        if let Some((_, which)) = swapped.first() {
+            findings.push(
+                self.finding(catalog::MARKER_SWAP)
+                    .with("markers", Fact::names(which.iter().copied()))
+                    .with("rows", Fact::count(swapped.len()))
+                    .at_rows(swapped.iter().map(|(row, _)| *row)),
+            );
+        }
+        if self.bends(&alone, poses.len()) {
+            findings.extend(self.bending(outliers.iter().map(|(row, _, _)| *row).collect()));
+            return findings;
+        }
+        if let Some((_, marker, off)) = outliers.iter().max_by(|a, b| a.2.total_cmp(&b.2)) {
+            findings.push(
+                self.finding(catalog::MARKER_OUTLIER)
+                    .with("marker", Fact::name(marker))
+                    .with("off", Fact::meters(*off))
+                    .with("rows", Fact::count(outliers.len()))
+                    .at_rows(outliers.iter().map(|(row, _, _)| *row)),
+            );
+        }
+        findings
+    }
+
+    /// A row with its marker out of place, by how much, and in `alone` the markers each of which explains it alone.
+    fn outlier(
+        &self,
+        poses: &Poses,
+        row: usize,
+        alone: &mut Vec<Vec<usize>>,
+    ) -> (u64, String, f64) {
+        let points: Vec<Option<Point3<f64>>> = self.tracks.iter().map(|track| track[row]).collect();
+        alone.push(self.explained_by_one(&points));
+        let (marker, off) = self.out_of_place(&points);
+        (poses.rows[row], marker, off)
+    }
+
+    /// The markers without which the distances of a row are right.
+    fn explained_by_one(&self, points: &[Option<Point3<f64>>]) -> Vec<usize> {
+        let without = |k: &usize| {
+            let mut rest = points.to_vec();
+            rest[*k] = None;
+            self.deviation(&rest) <= self.tolerance
+        };
+        (0..points.len()).filter(without).collect()
+    }
+
+    /// Bad rows that are too many for rare mistakes, and that no marker explains, or always the same one.
+    fn bends(&self, alone: &[Vec<usize>], rows: usize) -> bool {
+        let many = |count: usize| count >= ROWS && count as f64 > BENDING * rows as f64;
+        let unexplained = alone.iter().filter(|markers| markers.is_empty()).count();
+        let of_marker = |k: usize| alone.iter().filter(|markers| markers.contains(&k)).count();
+        let most = (0..self.markers.len()).map(of_marker).max().unwrap_or(0);
+        let same = most as f64 > ALWAYS_THE_SAME * alone.len() as f64;
+        // Two outliers meet in a row far less often than one stands alone.
+        let bent = many(unexplained) && 2 * unexplained > alone.len();
+        bent || (same && many(alone.len()))
+    }
+
+    /// Many rows, none of them a rare mistake: the body bends.
+    fn bending(&self, rows: Vec<u64>) -> Option<Finding> {
+        let spread = |pair: &Pair| {
+            let all = distances(self.tracks[pair.i], self.tracks[pair.j]);
+            range(all.map(|(_, distance)| distance)).map_or(0.0, |(low, high)| high - low)
+        };
+        let (pair, spread) = self
+            .pairs
+            .iter()
+            .map(|pair| (pair, spread(pair)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(
+            self.finding_of(catalog::NOT_RIGID, "bends")
+                .with("first", Fact::name(self.markers[pair.j]))
+                .with("second", Fact::name(self.markers[pair.i]))
+                .with("range", Fact::meters(spread))
+                .with("rows", Fact::count(rows.len()))
+                .at_rows(rows),
+        )
+    }
+
+    /// Largest departure of a distance from its median.
+    fn deviation(&self, points: &[Option<Point3<f64>>]) -> f64 {
+        let departures = self.pairs.iter().filter_map(|pair| {
+            Some(((points[pair.i]? - points[pair.j]?).norm() - pair.distance).abs())
+        });
+        departures.fold(0.0, f64::max)
+    }
+
+    /// The permutation of the markers seen that brings all distances back: the markers that it moves.
+    fn exchange(&self, points: &[Option<Point3<f64>>]) -> Option<Vec<&'a str>> {
+        let n = points.len();
+        let mut best: Option<(f64, Vec<usize>)> = None;
+        let mut consider = |order: &[usize]| {
+            let moved: Vec<Option<Point3<f64>>> = order.iter().map(|&k| points[k]).collect();
+            let deviation = self.deviation(&moved);
+            if deviation < self.tolerance
+                && best.as_ref().is_none_or(|(least, _)| deviation < *least)
+            {
+                best = Some((deviation, order.to_vec()));
+            }
+        };
+        if n <= ALL_PERMUTATIONS {
+            permutations(n, &mut consider);
+        } else {
+            for i in 0..n {
+                for j in 0..i {
+                    let mut order: Vec<usize> = (0..n).collect();
+                    order.swap(i, j);
+                    consider(&order);
+                }
+            }
+        }
+        // At least four markers, or a triangle, must be seen for a permutation to mean anything.
+        let seen = points.iter().flatten().count();
+        let (_, order) = best.filter(|_| seen >= 3)?;
+        let moved = (0..n).filter(|&k| order[k] != k);
+        Some(moved.map(|k| self.markers[k]).collect())
+    }
+
+    /// The marker whose distances are most off, and by how much.
+    fn out_of_place(&self, points: &[Option<Point3<f64>>]) -> (String, f64) {
+        let off = |k: usize| {
+            let departures: Vec<f64> = self
+                .pairs
+                .iter()
+                .filter(|pair| pair.i == k || pair.j == k)
+                .filter_map(|pair| {
+                    Some(((points[pair.i]? - points[pair.j]?).norm() - pair.distance).abs())
+                })
+                .collect();
+            median(departures).unwrap_or(0.0)
+        };
+        let worst = (0..self.markers.len())
+            .map(|k| (k, off(k)))
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        worst.map_or((String::new(), 0.0), |(k, off)| {
+            (self.markers[k].to_string(), off)
+        })
+    }
+}
+
+/// Rows of an exchange that chance would bring, by an outlier that happens to fit it, less than this many times.
+const AGAIN: usize = 3;
+
+/// Of rows that an exchange or an outlier explains: those of one exchange that explains most bad rows, and the others.
+fn again_and_again(
+    either: Vec<(usize, Vec<&str>)>,
+    outliers: usize,
+) -> (Vec<(usize, Vec<&str>)>, Vec<usize>) {
+    let bad = either.len() + outliers;
+    let times = |which: &Vec<&str>| either.iter().filter(|(_, w)| w == which).count();
+    let most = either
+        .iter()
+        .map(|(_, which)| times(which))
+        .max()
+        .unwrap_or(0);
+    let real = |which: &Vec<&str>| {
+        let times = times(which);
+        times == most && times >= AGAIN && 2 * times > bad
+    };
+    let is_real: Vec<bool> = either.iter().map(|(_, which)| real(which)).collect();
+    let (same, others): (Vec<_>, Vec<_>) =
+        either.into_iter().zip(is_real).partition(|(_, real)| *real);
+    let same = same.into_iter().map(|(row, _)| row).collect();
+    (same, others.into_iter().map(|((row, _), _)| row).collect())
+}
+
+/// Calls `visit` with every order of `0..n`.
+fn permutations(n: usize, visit: &mut dyn FnMut(&[usize])) {
+    fn place(k: usize, order: &mut Vec<usize>, visit: &mut dyn FnMut(&[usize])) {
+        if k == order.len() {
+            visit(order);
+            return;
+        }
+        for i in k..order.len() {
+            order.swap(k, i);
+            place(k + 1, order, visit);
+            order.swap(k, i);
+        }
+    }
+    place(0, &mut (0..n).collect(), visit);
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::recording::Expectations;
+    use crate::recording::rigidity::rigidity;
+
+    const ROWS: usize = 60;
+
+    /// A triangle with its third corner above `x`, m, in random poses, noise 0.3 mm.
+    fn triangle(x: f64, rng: &mut ChaCha8Rng) -> Poses {
+        let shape = [
+            Vector3::new(0.0, 0.0, 0.0),
+            Vector3::new(0.06, 0.0, 0.0),
+            Vector3::new(x, 0.05, 0.0),
+        ];
+        let mut poses = Poses {
+            rows: (1..=ROWS as u64).collect(),
+            ..Poses::default()
+        };
+        let normal =
+            |rng: &mut ChaCha8Rng| Vector3::from_fn(|_, _| -> f64 { StandardNormal.sample(rng) });
+        for _ in 0..ROWS {
+            let place = Isometry3::from_parts(
+                Translation3::from(normal(rng)),
+                UnitQuaternion::from_scaled_axis(normal(rng)),
+            );
+            for (k, p) in shape.iter().enumerate() {
+                let seen = place * Point3::from(*p) + 3e-4 * normal(rng);
+                let track = poses.markers.entry(format!("m{k}")).or_default();
+                track.push(Some(seen));
+            }
+        }
+        poses
+    }
+
+    fn found(poses: &Poses) -> Vec<Finding> {
+        let names = ["m0", "m1", "m2"].map(str::to_owned).to_vec();
+        let expected = Expectations {
+            bodies: [("hand".to_owned(), names)].into(),
+            ..Expectations::default()
+        };
+        rigidity(poses, &expected)
+    }
+
+    #[test]
+    fn an_outlier_that_happens_to_fit_an_exchange_is_no_exchange() {
+        for seed in 0..60 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut poses = triangle(0.027, &mut rng);
+            for track in poses.markers.values_mut() {
+                for p in track.iter_mut().flatten() {
+                    if rng.random::<f64>() < 0.05 {
+                        let off = Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0));
+                        *p += off.normalize() * rng.random_range(0.002..0.06);
+                    }
+                }
+            }
+            let swaps = found(&poses).iter().any(|f| f.id == catalog::MARKER_SWAP);
+            assert!(!swaps, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn labels_of_a_triangle_that_are_exchanged_again_and_again_are_named() {
+        for seed in 0..20 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut poses = triangle(0.015, &mut rng);
+            for row in 20..24 {
+                let (a, b) = (poses.markers["m0"][row], poses.markers["m1"][row]);
+                poses.markers.get_mut("m0").expect("there")[row] = b;
+                poses.markers.get_mut("m1").expect("there")[row] = a;
+            }
+            let found = found(&poses);
+            let swap = found.iter().find(|f| f.id == catalog::MARKER_SWAP);
+            let swap = swap.unwrap_or_else(|| panic!("seed {seed}: {found:?}"));
+            assert_eq!(swap.facts.get("rows"), Some(&Fact::count(4)), "seed {seed}");
+        }
+    }
+}
