@@ -109,7 +109,8 @@ impl<'a> Model<'a> {
                     .for_each(|d| d.1.rows_mut(3 * s, 3).scale_mut(self.share(k)));
             }
             if lambda > 0.0 {
-                let mut v = DMatrix::identity(block.nrows(), block.nrows());
+                let v_rows = block.nrows();
+                let mut v = DMatrix::identity(v_rows, v_rows);
                 for (j, d) in &by_reading {
                     v.ger(lambda * noise_weight(&self.scan.data.chain, *j), d, d, 1.0);
                 }
@@ -121,7 +122,10 @@ impl<'a> Model<'a> {
                             .iter()
                             .map(|x| x.ln())
                             .sum::<f64>();
-                    cholesky.l_dirty().solve_lower_triangular_mut(&mut block);
+                    let mut inverse = DMatrix::identity(v_rows, v_rows);
+                    cholesky.l_dirty().solve_lower_triangular_mut(&mut inverse);
+                    // A product has a fast kernel, the solution of a triangular system has none.
+                    block = inverse * block;
                 }
             }
             observations += 3.0 * seen.iter().map(|&k| self.share(k).powi(2)).sum::<f64>();

@@ -21,8 +21,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::analysis::solution::{Solution, describe_parameters};
 use crate::graph::measurement::MeasurementKind;
-use crate::solve::equations::{NormalEquations, Workspace};
-use crate::solve::normal::accumulate;
+use crate::solve::equations::Workspace;
 use crate::solve::rows::add_block;
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
@@ -121,7 +120,7 @@ impl Solution {
         if samples.len() < LEAST {
             return None;
         }
-        let h = self.curvature()?;
+        let h = self.information.curvature(&self.model);
         let c = covariance_of(&h)?;
         let seen = lag_sums(&samples, |a, i, b, j| a.y[i] * b.y[j]);
         let expected = lag_traces(&samples);
@@ -204,12 +203,6 @@ impl Solution {
         Some(out)
     }
 
-    fn curvature(&self) -> Option<NormalEquations> {
-        let mut system = NormalEquations::new(self.model.free());
-        let mut work = Workspace::new(&self.model);
-        accumulate(self.objective(), &self.values, &mut work, &mut system).then_some(system)
-    }
-
     fn scaled_samples(&self, of: MemoryOf, borders: &[usize], most: usize) -> Vec<Scaled> {
         let mut work = Workspace::new(&self.model);
         work.cache.update(&self.model.problem, &self.values);
@@ -266,10 +259,12 @@ impl Solution {
         for (j, s) in sigma.iter().enumerate() {
             scaled.column_mut(j).scale_mut(*s);
         }
+        // The product of a transpose has no fast kernel.
+        let transposed = scaled.transpose();
         Scaled {
-            k: scaled.tr_mul(&rows.a),
-            y: scaled.tr_mul(&rows.w),
-            w: scaled.tr_mul(&scaled),
+            k: &transposed * &rows.a,
+            y: &transposed * &rows.w,
+            w: &transposed * &scaled,
             keys: own,
             starts,
         }

@@ -13,7 +13,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DVector, Vector3, Vector6};
+use nalgebra::{DMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -22,8 +22,7 @@ use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{EFFECTS, EffectKind, Source};
 use crate::model::cache::State;
 use crate::model::layout::Model;
-use crate::solve::equations::{NormalEquations, Workspace};
-use crate::solve::normal::accumulate;
+use crate::solve::equations::Workspace;
 use crate::solve::rows::{dot, residual};
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
@@ -125,33 +124,31 @@ impl Solution {
 
     fn score_tests(&self, candidates: &[Candidate]) -> Option<Vec<ScoreTest>> {
         let model = &self.model;
-        let n = model.free();
         let mut work = Workspace::new(model);
-        let mut system = NormalEquations::new(n);
-        if !accumulate(self.objective(), &self.values, &mut work, &mut system) {
-            return None;
-        }
-        let c = covariance_of(&system)?;
+        work.cache.update(&model.problem, &self.values);
+        let c = covariance_of(&self.information.curvature(model))?;
         let count = candidates.len();
         let mut u = vec![0.0; count];
         let mut raw = vec![0.0; count];
-        let mut b = vec![DVector::<f64>::zeros(n); count];
-        self.each_sample(candidates, &mut work, |s, columns| {
-            for (k, a) in columns.iter().enumerate() {
-                let alpha = &s.l_inverse * a;
-                u[k] += alpha.dot(&s.w);
-                raw[k] += alpha.norm_squared();
-                b[k] += s.a.tr_mul(&alpha);
+        let mut b = DMatrix::zeros(model.free(), count);
+        self.each_sample(candidates, &mut work, |s, alpha| {
+            for (k, own) in alpha.column_iter().enumerate() {
+                u[k] += own.dot(&s.w);
+                raw[k] += own.norm_squared();
             }
+            // The product of a transpose has no fast kernel.
+            b.gemm(1.0, &s.a.transpose(), alpha, 1.0);
         });
-        let taken: Vec<DVector<f64>> = b.iter().map(|b| &c * b).collect();
-        let information: Vec<f64> = (0..count).map(|k| raw[k] - b[k].dot(&taken[k])).collect();
+        let taken = &c * &b;
+        let information: Vec<f64> = (0..count)
+            .map(|k| raw[k] - b.column(k).dot(&taken.column(k)))
+            .collect();
         // Second pass: each sample's share of U once the effect has been taken out, so that a strong
         // effect does not count as its own noise.
         let mut clusters = vec![0.0; count];
-        self.each_sample(candidates, &mut work, |s, columns| {
-            for (k, a) in columns.iter().enumerate() {
-                let own = &s.l_inverse * a - &s.a * &taken[k];
+        self.each_sample(candidates, &mut work, |s, alpha| {
+            let left = alpha - &s.a * &taken;
+            for (k, own) in left.column_iter().enumerate() {
                 let share = own.dot(&s.w) - u[k] / information[k] * own.norm_squared();
                 clusters[k] += share * share;
             }
@@ -182,19 +179,19 @@ impl Solution {
         Some(out)
     }
 
-    /// Calls `see` with every sample's whitened rows and the candidates' columns a.
+    /// Calls `see` with every sample's whitened rows and the candidates' whitened columns L⁻¹a, side by side.
     fn each_sample(
         &self,
         candidates: &[Candidate],
         work: &mut Workspace,
-        mut see: impl FnMut(&Whitened, &[DVector<f64>]),
+        mut see: impl FnMut(&Whitened, &DMatrix<f64>),
     ) {
         for sample in 0..self.model.problem.samples {
             let Some(s) = whitened(self.objective(), &self.values, sample, work) else {
                 continue;
             };
             let columns = self.effect_rows(candidates, sample, &s.blocks, s.w.len(), work);
-            see(&s, &columns);
+            see(&s, &(&s.l_inverse * columns));
         }
     }
 
@@ -206,9 +203,9 @@ impl Solution {
         blocks: &[(usize, usize, usize)],
         rows: usize,
         work: &Workspace,
-    ) -> Vec<DVector<f64>> {
+    ) -> DMatrix<f64> {
         let model = &self.model;
-        let mut out = vec![DVector::zeros(rows); candidates.len()];
+        let mut out = DMatrix::zeros(rows, candidates.len());
         let mut twists = Vec::new();
         let mut measurement = usize::MAX;
         let mut pose = crate::model::pose::Pose::identity();
@@ -240,7 +237,7 @@ impl Solution {
                     }
                 };
                 for i in 0..count {
-                    out[k][first + i] = dot(&jacobian.m[i], &twist);
+                    out[(first + i, k)] = dot(&jacobian.m[i], &twist);
                 }
             }
         }

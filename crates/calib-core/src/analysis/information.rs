@@ -17,7 +17,7 @@ use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
-use crate::solve::equations::Workspace;
+use crate::solve::equations::{NormalEquations, Workspace};
 
 /// A direction whose singular value is below this fraction of the largest is a gauge: rounding
 /// leaves about 1e-14, the weakest physical effect seen on real robots about 1e-6.
@@ -211,6 +211,24 @@ impl Information {
             indeterminate: posterior.v.columns(known, n - known).into_owned(),
             r,
         }
+    }
+
+    /// H = JᵀV⁻¹J + Λ from R of equation (1), without another pass over the samples.
+    pub(crate) fn curvature(&self, model: &Model) -> NormalEquations {
+        let n = self.scale.len();
+        let mut system = NormalEquations::new(n);
+        let squared = self.r.transpose() * &self.r;
+        for i in 0..n {
+            for j in i..n {
+                system.h[i * n + j] = squared[(i, j)] / (self.scale[i] * self.scale[j]);
+            }
+        }
+        for (i, &p) in model.columns.iter().enumerate() {
+            if let Some(sigma) = model.problem.parameters[p].prior_sigma {
+                system.h[i * n + i] += sigma.powi(-2);
+            }
+        }
+        system
     }
 
     /// tr(C JᵀV⁻¹J): how many parameters the data determined.

@@ -24,7 +24,8 @@ impl Solution {
     /// held. It does not trust the noise model, and varies more by chance than the stated one: a cross-check.
     #[must_use]
     pub fn cluster_robust_sigmas(&self) -> Option<Vec<Option<f64>>> {
-        let covariance = sandwich(&self.model, &self.values, &self.weights, &self.theta)?;
+        let c = covariance_of(&self.information.curvature(&self.model))?;
+        let covariance = around(self.objective(), &self.values, &c);
         let sigma = |column: usize| covariance[(column, column)].max(0.0).sqrt();
         let columns = self.model.column_of.iter();
         Some(columns.map(|column| column.map(sigma)).collect())
@@ -51,7 +52,15 @@ pub fn sandwich(
     if !accumulate(objective, values, &mut work, &mut system) {
         return None;
     }
-    let c = covariance_of(&system)?;
+    Some(around(objective, values, &covariance_of(&system)?))
+}
+
+/// Equation (1) where C is known.
+fn around(objective: Objective, values: &Values, c: &DMatrix<f64>) -> DMatrix<f64> {
+    let model = objective.model;
+    let n = model.free();
+    let mut work = Workspace::new(model);
+    work.cache.update(&model.problem, values);
     // Λ = diag(1/σ²)
     let mut middle = DMatrix::zeros(n, n);
     for (i, &p) in model.columns.iter().enumerate() {
@@ -65,7 +74,7 @@ pub fn sandwich(
         };
         let m = s.w.len();
         // I − Q = U diag(λ) Uᵀ
-        let ac = &s.a * &c;
+        let ac = &s.a * c;
         let eigen = (DMatrix::identity(m, m) - ac * s.a.transpose()).symmetric_eigen();
         // (I − Q)^(-½) w = U diag(λ^(-½)) Uᵀ w
         let mut coefficients = eigen.eigenvectors.tr_mul(&s.w);
@@ -81,5 +90,5 @@ pub fn sandwich(
         let score = s.a.tr_mul(&adjusted);
         middle.ger(1.0, &score, &score, 1.0);
     }
-    Some(&c * middle * &c)
+    c * middle * c
 }

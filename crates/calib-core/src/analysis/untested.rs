@@ -176,7 +176,7 @@ impl Solution {
         }
         let count = effects.len();
         let mut fitted = NormalEquations::new(n);
-        let mut all = NormalEquations::new(n);
+        let mut held_out = NormalEquations::new(n);
         let mut b = DMatrix::zeros(n, count);
         let mut own = vec![0.0; count];
         let mut score = vec![0.0; count];
@@ -197,19 +197,29 @@ impl Solution {
             let Some(s) = whitened(objective, &self.values, sample, &mut work) else {
                 continue;
             };
-            add(&mut all, &s, factor);
-            if !model.is_held_out(sample) {
-                add(&mut fitted, &s, factor);
-            }
+            let system = if model.is_held_out(sample) {
+                &mut held_out
+            } else {
+                &mut fitted
+            };
+            // The product of a transpose has no fast kernel.
+            let transposed = s.a.transpose();
+            add(system, &s, &transposed, factor);
             let columns = &s.l_inverse * self.columns(effects, place, sample, &s, &work);
-            b.gemm_tr(factor, &s.a, &columns, 1.0);
+            b.gemm(factor, &transposed, &columns, 1.0);
             for k in 0..count {
                 own[k] += factor * columns.column(k).norm_squared();
                 score[k] += factor * columns.column(k).dot(&s.w);
             }
         }
-        add_prior(model, &self.values, &mut all);
         add_prior(model, &self.values, &mut fitted);
+        let mut all = NormalEquations::new(n);
+        for (sum, (a, b)) in all.h.iter_mut().zip(fitted.h.iter().zip(&held_out.h)) {
+            *sum = a + b;
+        }
+        for (sum, (a, b)) in all.g.iter_mut().zip(fitted.g.iter().zip(&held_out.g)) {
+            *sum = a + b;
+        }
         let common = self.common(&all, &fitted, postures)?;
         let root = (postures.len() as f64).sqrt();
         let mu = &common.g * &common.shift;
@@ -355,10 +365,10 @@ fn f_quantile(h: f64, freedom: f64) -> f64 {
 }
 
 /// Adds a sample to H (upper triangle) and g.
-fn add(out: &mut NormalEquations, s: &Whitened, factor: f64) {
+fn add(out: &mut NormalEquations, s: &Whitened, transposed: &DMatrix<f64>, factor: f64) {
     let n = out.n;
-    let h = s.a.tr_mul(&s.a);
-    let g = s.a.tr_mul(&s.w);
+    let h = transposed * &s.a;
+    let g = transposed * &s.w;
     for i in 0..n {
         for j in i..n {
             out.h[i * n + j] += factor * h[(i, j)];

@@ -60,9 +60,19 @@ impl Sum {
         }
     }
 
-    fn add(&mut self, a: &DMatrix<f64>, b: &DMatrix<f64>, factor: f64) {
-        self.e.gemm_tr(factor, a, b, 1.0);
-        self.g.gemm_tr(factor * factor, b, b, 1.0);
+    /// Adds the columns of a candidate among ÃᵀB̃ and B̃ᵀB̃ of one sample.
+    fn add(
+        &mut self,
+        ab: &DMatrix<f64>,
+        bb: &DMatrix<f64>,
+        columns: &std::ops::Range<usize>,
+        factor: f64,
+    ) {
+        let own = ab.columns_range(columns.clone());
+        self.e.zip_apply(&own, |sum, x| *sum += factor * x);
+        let own = bb.view_range(columns.clone(), columns.clone());
+        self.g
+            .zip_apply(&own, |sum, x| *sum += factor * factor * x);
     }
 
     /// Adds what lies between two cumulative sums.
@@ -192,15 +202,19 @@ impl Design {
                 continue;
             };
             let b = candidates.whitened(solution, sample, &rows, &work);
-            h.gemm_tr(1.0, &rows.a, &rows.a, 1.0);
-            g.gemv_tr(1.0, &rows.a, &rows.w, 1.0);
+            // The product of a transpose has no fast kernel.
+            let transposed = rows.a.transpose();
+            h.gemm(1.0, &transposed, &rows.a, 1.0);
+            g.gemv(1.0, &transposed, &rows.w, 1.0);
+            let (ab, bb) = (&transposed * &b, b.transpose() * &b);
+            let bw = b.tr_mul(&rows.w);
             self.cost += rows.w.norm_squared();
             self.rows += rows.w.len() as f64;
             for k in 0..sizes.len() {
-                let own = b.columns_range(self.columns[k].clone()).into_owned();
+                let columns = &self.columns[k];
                 let factor = self.factor(k, place, samples.len());
-                us[k].gemv_tr(factor, &own, &rows.w, 1.0);
-                sums[k].add(&rows.a, &own, factor);
+                us[k].axpy(factor, &bw.rows_range(columns.clone()), 1.0);
+                sums[k].add(&ab, &bb, columns, factor);
             }
             if keep {
                 let Whitened { a, .. } = rows;
