@@ -103,14 +103,22 @@ pub fn run_on(
     };
     progress("verify");
     let (robot, fit) = (&solved.robot, solved.fit.as_ref());
-    let changed = fit.and_then(|fit| changes(&inputs, fit));
-    checked.findings.extend(changed);
     let tracks = &checked.tracks;
-    checked.findings.extend(moved(&inputs, tracks, robot));
-    let loops = close_loops(&inputs, tracks, &solved.body_from_origin(), &solved.fk);
-    let held_out = verify::held_out(&inputs, tracks, &nominal, &solved);
-    let known = fit.map_or_else(Default::default, |fit| known_numbers(&inputs, fit));
-    let residuals = residual_rows(&inputs, tracks, robot, fit);
+    // The scan for changes takes as long as the rest together.
+    let (changed, (moved, loops, held_out, known, residuals)) = rayon::join(
+        || fit.and_then(|fit| changes(&inputs, fit)),
+        || {
+            (
+                moved(&inputs, tracks, robot),
+                close_loops(&inputs, tracks, &solved.body_from_origin(), &solved.fk),
+                verify::held_out(&inputs, tracks, &nominal, &solved),
+                fit.map_or_else(Default::default, |fit| known_numbers(&inputs, fit)),
+                residual_rows(&inputs, tracks, robot, fit),
+            )
+        },
+    );
+    checked.findings.extend(changed);
+    checked.findings.extend(moved);
     progress("patch the URDF");
     let urdf = patch_urdf(&inputs, robot, &known)?;
     let covariance = solved.root_covariance.as_ref();

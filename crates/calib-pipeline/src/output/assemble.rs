@@ -24,14 +24,21 @@ use crate::verify::motions::motions;
 pub fn assemble(e: &Evidence<'_>) -> Report {
     let profile = &e.inputs.robot.profile;
     let file = &e.inputs.robot.file;
-    let goodness = e.fit.and_then(|fit| fit.solution.goodness_of_fit());
+    let (goodness, (workspace, weak)) = rayon::join(
+        || e.fit.and_then(|fit| fit.solution.goodness_of_fit()),
+        || {
+            let workspace = e.fit.and_then(|fit| workspace(e.inputs, fit));
+            (
+                workspace,
+                e.fit.and_then(|fit| weak_directions(e.inputs, fit)),
+            )
+        },
+    );
     let missing: Vec<MissingPhysics> = goodness
         .iter()
         .flat_map(|g| &g.missing)
         .map(missing_physics)
         .collect();
-    let workspace = e.fit.and_then(|fit| workspace(e.inputs, fit));
-    let weak = e.fit.and_then(|fit| weak_directions(e.inputs, fit));
     let open = weak::findings(e.inputs, weak.as_ref(), e.held_out.as_ref());
     let findings = findings(e, &missing, open);
     let joint_sigma = e.fit.and_then(joint_sigma).unwrap_or(0.0);
