@@ -71,8 +71,7 @@ impl Sum {
         let own = ab.columns_range(columns.clone());
         self.e.zip_apply(&own, |sum, x| *sum += factor * x);
         let own = bb.view_range(columns.clone(), columns.clone());
-        self.g
-            .zip_apply(&own, |sum, x| *sum += factor * factor * x);
+        self.g.zip_apply(&own, |sum, x| *sum += factor * factor * x);
     }
 
     /// Adds what lies between two cumulative sums.
