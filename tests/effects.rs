@@ -32,7 +32,7 @@ fn urdf(shift: f64) -> String {
     )
 }
 
-/// What the true joint turns more than its encoder says, from the direction it came and the torque it holds.
+/// What the true joint turns more than its encoder says, from the direction it came and the torque that it holds.
 type Effect = fn(joint: usize, approach: f64, torque: f64) -> f64;
 
 /// Markers of foot and hand, joint readings and torques over random postures, in the order of recording.
@@ -142,7 +142,8 @@ const BACKLASH: f64 = 0.002;
 
 #[test]
 fn backlash_is_found_and_taken_out_of_the_prediction() {
-    let effect: Effect = |joint, approach, _| if joint == 2 { BACKLASH * approach } else { 0.0 };
+    // It stays behind: short of where it goes.
+    let effect: Effect = |joint, approach, _| if joint == 2 { -BACKLASH * approach } else { 0.0 };
     let without = laboratory(PROFILE, 0.0, effect);
     without.calib(["run", "arm.yaml", "--out", "out"]).expect(1);
     let rejected = without.json("out/report.json");
@@ -178,7 +179,8 @@ const SOFT: f64 = 1e-4;
 
 #[test]
 fn compliance_follows_measured_torques_where_the_urdf_has_no_masses() {
-    let effect: Effect = |joint, _, torque| if joint == 2 { SOFT * torque } else { 0.0 };
+    // It gives way to the load, which is minus what the drive holds.
+    let effect: Effect = |joint, _, torque| if joint == 2 { -SOFT * torque } else { 0.0 };
     let freed = PROFILE
         .replace("joint_axes]", "joint_axes, compliance]")
         .replace("solve:\n", "solve:\n  load: measured\n");

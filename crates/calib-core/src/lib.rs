@@ -133,6 +133,7 @@ mod solve;
 
 pub use nalgebra;
 
+pub use analysis::bounds::Unbounded;
 pub use analysis::change::{Change, ChangeScan, ChangeSettings, Moved};
 pub use analysis::closure::{ClosureStatistics, Spread};
 pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};
@@ -151,7 +152,7 @@ pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, Ve
 pub use graph::axis::Axis;
 pub use graph::baseline::Baseline;
 pub use graph::chart::Chart;
-pub use graph::edge::{Candidate, Edge, EdgeKind, Joint, JointEffect, Role, UnknownPose};
+pub use graph::edge::{Candidate, Edge, EdgeKind, Joint, JointEffect, Role, Share, UnknownPose};
 pub use graph::effect::{self, EFFECTS, Effect, EffectKind, JointState};
 pub use graph::error::Error;
 pub use graph::ids::{EdgeId, FrameId, GroupId, MeasurementId, ParameterId, PointId};

@@ -5,7 +5,8 @@ mod common;
 use calib_core::effect::Source;
 use calib_core::{
     Axis, Chart, DirectionObservation, EffectKind, MarkerObservation, Measurement, MeasurementKind,
-    Model, NoiseKind, PoseNoise, PoseObservation, Problem, Values, measurement,
+    Model, NoiseKind, Parameter, ParameterKind, PoseNoise, PoseObservation, Problem, Share, Unit, Values,
+    measurement,
 };
 use common::{axis, central, jitter, normal, normal3, pose, rng};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector6};
@@ -87,6 +88,31 @@ fn rig(samples: usize, seed: u64) -> Rig {
         }
     }
     let clock = clock.expect("in the table");
+    // Two masses that load both joints: effects that are bilinear in their coefficient and these.
+    let masses = ["near", "far"].map(|name| {
+        p.parameter(Parameter {
+            name: name.to_owned(),
+            joint: None,
+            kind: ParameterKind::Load,
+            unit: Unit::KilogramMeter,
+            nominal: 0.0,
+            start: 0.2,
+            prior_sigma: None,
+            bounds: None,
+            fixed: false,
+        })
+    });
+    let mut shares = || {
+        let share = |parameter| Share {
+            parameter,
+            values: array(),
+        };
+        masses.map(share).to_vec()
+    };
+    let [about, across] = [EffectKind::TorqueCompliance, EffectKind::Lateral2];
+    p.follow(e1, about, shares());
+    p.follow(e1, across, shares());
+    let of_slide = shares();
     let e2 = p.unknown(
         "second",
         b,
@@ -97,6 +123,9 @@ fn rig(samples: usize, seed: u64) -> Rig {
     let q3 = array();
     let e3 = p.joint("slide", c, end, Axis::Prismatic(axis(0.1, 0.7, 0.2)), q3);
     p.free_effect(e3, EffectKind::ZeroOffset, None);
+    let v = array();
+    p.free_effect_with(e3, about, v, None);
+    p.follow(e3, about, of_slide);
     let v = array();
     // One clock for both joints: the contributions must add.
     p.share_effect(e3, EffectKind::ClockOffset, Some(v), clock);

@@ -53,6 +53,21 @@ fn a_box_holds_and_is_reported() {
 }
 
 #[test]
+fn the_estimate_without_its_bound_is_known_on_the_bound() {
+    let inside = boxed(0.02);
+    assert_eq!(inside.without_bounds(), Some(Vec::new()));
+    let held = boxed(0.005);
+    let found = held.without_bounds().expect("a model");
+    assert!(!found.is_empty());
+    for without in found {
+        let free = &inside.parameters[without.parameter.index()];
+        let sigma = free.sigma.expect("determined");
+        assert!((without.value - free.value).abs() < 0.2 * sigma, "{without:?} {free:?}");
+        assert!((without.sigma / sigma - 1.0).abs() < 0.1, "{without:?} {free:?}");
+    }
+}
+
+#[test]
 fn bounds_that_do_not_bind_change_nothing() {
     let (a, b) = (boxed(0.02), boxed(0.5));
     for (a, b) in a.parameters.iter().zip(&b.parameters) {

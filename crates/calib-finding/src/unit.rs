@@ -42,6 +42,12 @@ pub enum Unit {
     /// Compliance of a prismatic joint, m/N.
     #[serde(rename = "m/N")]
     MeterPerNewton,
+    /// First moment of a mass, kg·m.
+    #[serde(rename = "kg·m")]
+    KilogramMeter,
+    /// Mass, kg.
+    #[serde(rename = "kg")]
+    Kilogram,
 }
 
 impl Unit {
@@ -56,6 +62,8 @@ impl Unit {
             Unit::RadianPerSecond => "rad/s",
             Unit::RadianPerNewtonMeter => "rad/(N·m)",
             Unit::MeterPerNewton => "m/N",
+            Unit::KilogramMeter => "kg·m",
+            Unit::Kilogram => "kg",
         }
     }
 
@@ -75,6 +83,8 @@ impl Unit {
             Unit::RadianPerSecond => (DEGREES, "°/s"),
             Unit::RadianPerNewtonMeter => (DEGREES, "°/(N·m)"),
             Unit::MeterPerNewton => (1e3, " mm/N"),
+            Unit::KilogramMeter => (1.0, " kg·m"),
+            Unit::Kilogram => (1.0, " kg"),
         }
     }
 
@@ -89,6 +99,8 @@ impl Unit {
             Unit::RadianPerSecond => "deg/s",
             Unit::RadianPerNewtonMeter => "deg/(N·m)",
             Unit::MeterPerNewton => "mm/N",
+            Unit::KilogramMeter => "kg·m",
+            Unit::Kilogram => "kg",
         }
     }
 }

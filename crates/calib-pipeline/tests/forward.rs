@@ -7,8 +7,9 @@ use calib_core::effect::Source;
 use calib_core::{
     Chart, EFFECTS, EffectKind, JointState, Model, NoiseKind, PoseNoise, PoseObservation, Problem,
 };
-use calib_pipeline::formulate::kinematics::{Calibration, Loads, joint_state, motion_axis};
+use calib_pipeline::formulate::kinematics::{Calibration, joint_state, motion_axis};
 use calib_pipeline::prepare::conditions::Conditions;
+use calib_profile::RobotLoad;
 use calib_urdf::{JointId, RobotModel};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use rand::{RngExt, SeedableRng};
@@ -61,7 +62,7 @@ fn calibrated(model: &RobotModel, r: &mut ChaCha8Rng) -> Calibration {
         Translation3::new(0.4, -0.2, 0.9),
         UnitQuaternion::from_euler_angles(0.1, 0.2, 0.7),
     );
-    let mut robot = Calibration::nominal(model, place);
+    let mut robot = Calibration::nominal(model, &RobotLoad::default(), place);
     for joint in model.joint_ids() {
         let Some(axis) = motion_axis(model, joint) else {
             continue;
@@ -108,7 +109,7 @@ fn add_joint(
     let axis = motion_axis(model, joint).expect("it moves");
     let states: Vec<JointState> = rows
         .iter()
-        .map(|(q, under)| joint_state(model, joint, q, &Loads::under(model, q, under), under))
+        .map(|(q, under)| joint_state(model, joint, q, &robot.masses.under(q, under), under))
         .collect();
     let q = states.iter().map(|s| s.q).collect();
     let edge = p.joint(&j.name, origin, child, axis, q);

@@ -5,7 +5,7 @@ use std::path::Path;
 use calib_core::{Configuration, EffectKind, Settings, effect};
 use calib_pipeline::estimate::start::start;
 use calib_pipeline::formulate::formulation::FreeSet;
-use calib_pipeline::formulate::kinematics::{Loads, joint_state};
+use calib_pipeline::formulate::kinematics::joint_state;
 use calib_pipeline::formulate::ml::{fit, state};
 use calib_pipeline::prepare::conditions::Conditions;
 use calib_pipeline::prepare::load::{load_recordings, load_robot};
@@ -33,6 +33,7 @@ fn the_calibrated_robot_is_the_solution() {
         let stated = state(&inputs, &tracks, &start, FreeSet::Profile);
         let fit = fit(stated, &inputs, &Settings::plain()).expect("a problem");
         let model = &inputs.robot.model;
+        let masses = &inputs.robot.masses;
         let effects = fit
             .calibration
             .effects
@@ -42,7 +43,7 @@ fn the_calibrated_robot_is_the_solution() {
         assert!(effects >= 4, "{robot}: {effects} joints with a gain");
         for loaded in inputs.recordings.values() {
             let q = loaded.q[loaded.q.len() / 2].as_ref().expect("recorded");
-            let loads = Loads::at(model, q);
+            let loads = masses.at(q);
             let unknown = Conditions::default();
             let mut at = Configuration::zero();
             for joint in model.joint_ids() {
@@ -75,19 +76,19 @@ fn the_calibrated_robot_is_the_solution() {
 }
 
 #[test]
-fn the_load_about_an_axis_is_the_nominal_urdf_s_gravity_torque() {
+fn the_load_of_a_joint_is_what_it_holds_against() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/justin.yaml");
     let robot = load_robot(&path).expect("shipped");
     let mut q = robot.model.zero_positions();
     for (i, q) in q.iter_mut().enumerate() {
         *q = (i as f64 * 0.37).sin();
     }
-    let loads = Loads::at(&robot.model, &q);
-    let torques = robot
+    let loads = robot.masses.at(&q);
+    let held = robot
         .model
-        .gravity_torques(&q, &calib_pipeline::prepare::loads::GRAVITY);
+        .gravity_torques(&q, &robot.profile.load.gravity());
     for joint in robot.model.independent_joints() {
-        let (a, b) = (loads.about_axis[joint.index()], torques[joint.index()]);
+        let (a, b) = (loads.about_axis[joint.index()], -held[joint.index()]);
         assert!(
             (a - b).abs() < 1e-9 * (1.0 + b.abs()),
             "{}: {a} against {b}",

@@ -9,7 +9,8 @@
 //! body   = tracker_from_root · FK'(q_true) · link_from_body' · exp(N(0, diag(σ_r², σ_t²))) (4)
 //! ```
 //!
-//! `g` is the gravity torque about the joint (N m) from the masses of the URDF, gravity along −z of the root.
+//! `g` is the torque that gravity exerts about the joint (N m), so that c > 0 gives way: from the masses of the URDF (uniform rods where
+//! it has none) and the payloads of the profile.
 //! (1) has no errors of an origin along or about its own axis: a zero offset and the choice of a frame on the axis
 //! describe them already. The same profile and seed give the same bytes.
 //!

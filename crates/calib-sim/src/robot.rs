@@ -13,9 +13,6 @@ use rand_distr::StandardNormal;
 
 use crate::{normal3, stream};
 
-/// Gravity in the frame of the root, m/s².
-pub(crate) const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
-
 /// The robot as it really is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrueRobot {
@@ -29,7 +26,10 @@ pub struct TrueRobot {
     pub compliance: BTreeMap<JointId, f64>,
     /// `link_from_body` by body.
     pub mounts: BTreeMap<String, Isometry3<f64>>,
-    nominal: RobotModel,
+    /// The nominal robot with everything that gravity acts on.
+    loaded: RobotModel,
+    /// Gravity in the frame of the root, m/s².
+    gravity: Vector3<f64>,
 }
 
 impl TrueRobot {
@@ -74,7 +74,8 @@ impl TrueRobot {
             offsets,
             compliance: plan.errors.compliance.clone(),
             mounts,
-            nominal: nominal.clone(),
+            loaded: profile.load.loaded(nominal),
+            gravity: profile.load.gravity(),
         }
     }
 
@@ -86,13 +87,14 @@ impl TrueRobot {
         joint_sigma: f64,
         rng: &mut ChaCha12Rng,
     ) -> Vec<Isometry3<f64>> {
-        let torques = self.nominal.gravity_torques(q_indicated, &GRAVITY);
+        let held = self.loaded.gravity_torques(q_indicated, &self.gravity);
         let mut q = q_indicated.to_vec();
         for (id, offset) in &self.offsets {
             let noise = rng.sample::<f64, _>(StandardNormal) * joint_sigma;
             let state = JointState {
                 q: q[id.index()],
-                torque: torques[id.index()],
+                // The load is what the joint holds against.
+                torque: -held[id.index()],
                 ..JointState::default()
             };
             let compliance = self.compliance.get(id).copied().unwrap_or(0.0);

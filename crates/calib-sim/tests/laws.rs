@@ -18,6 +18,35 @@ fn shipped(robot: &str) -> (Profile, RobotModel) {
 }
 
 #[test]
+fn an_arm_that_gives_way_sags() {
+    let (mut profile, model) = shipped("justin");
+    let plan = profile.simulate.as_mut().expect("a simulate section");
+    let compliance = plan.errors.compliance.clone();
+    assert!(compliance.values().all(|c| *c > 0.0));
+    plan.errors = Default::default();
+    plan.noise = Default::default();
+    let seen = |profile: &Profile| simulate(profile, &model, None).expect("simulated");
+    let stiff = seen(&profile);
+    let plan = profile.simulate.as_mut().expect("a simulate section");
+    plan.errors.compliance = compliance;
+    let up = plan.tracker_from_root * nalgebra::Vector3::z();
+    let soft = seen(&profile);
+    let (stiff, soft) = (&stiff.recordings["arm_poses"], &soft.recordings["arm_poses"]);
+    let heights = stiff.bodies["haT"].iter().zip(&soft.bodies["haT"]);
+    let sags: Vec<f64> = heights
+        .map(|(stiff, soft)| {
+            let [stiff, soft] = [stiff, soft].map(|p| p.expect("in view").translation.vector);
+            up.dot(&(stiff - soft))
+        })
+        .collect();
+    // Lower by some millimeters on average, and never higher by more than a joint that swings through can lift it.
+    let mean = sags.iter().sum::<f64>() / sags.len() as f64;
+    assert!(mean > 2e-3, "{mean}");
+    let higher = sags.iter().filter(|s| **s < 0.0).count();
+    assert!(higher * 10 < sags.len(), "{higher} of {}", sags.len());
+}
+
+#[test]
 fn the_seed_decides_everything() {
     let (profile, model) = shipped("ripley");
     let run = |seed| simulate(&profile, &model, Some(seed)).expect("a simulate section");

@@ -43,6 +43,7 @@
 pub mod edit;
 pub mod error;
 pub mod kinematics;
+mod masses;
 pub mod model;
 pub mod read;
 pub mod xacro;

@@ -311,24 +311,6 @@ impl RobotModel {
         self
     }
 
-    /// The same robot with 1 kg in the middle of every link, between its own joint and what it carries: gravity then loads the joints of
-    /// a robot without masses in the right proportions, if not with the right torques.
-    #[must_use]
-    pub fn with_even_masses(mut self) -> Self {
-        for id in self.link_ids().collect::<Vec<_>>() {
-            let carried = &self.links[id.index()].child_joints;
-            let places = carried
-                .iter()
-                .map(|j| self.joint(*j).parent_link_from_joint.translation.vector);
-            let middle = places.sum::<nalgebra::Vector3<f64>>() / (2 * carried.len().max(1)) as f64;
-            self.links[id.index()].inertial = Some(Inertial {
-                mass: 1.0,
-                center_of_mass: middle.into(),
-            });
-        }
-        self
-    }
-
     /// The same robot with a joint that moves differently (another axis, or fixed).
     #[must_use]
     pub fn with_kind(mut self, joint: JointId, kind: JointKind) -> Self {

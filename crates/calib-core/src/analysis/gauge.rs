@@ -79,6 +79,9 @@ pub(crate) fn places(model: &Model) -> Vec<Place> {
             EdgeKind::Joint(j) => {
                 for f in &j.effects {
                     place[f.parameter.index()] = Place::Effects(e);
+                    for share in &f.shares {
+                        place[share.parameter.index()] = Place::Effects(e);
+                    }
                 }
             }
             _ => {}

@@ -1,5 +1,6 @@
 //! What a minimum means: covariance, observability, goodness of fit, prediction of new poses.
 
+pub(crate) mod bounds;
 pub(crate) mod change;
 pub(crate) mod closure;
 pub(crate) mod compare;

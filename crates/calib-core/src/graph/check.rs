@@ -75,6 +75,10 @@ fn check_joint(name: &str, joint: &Joint, samples: usize) -> Result<(), Error> {
         if let Some(v) = &f.values {
             series(&format!("{name}.{}", f.kind.label()), v, samples)?;
         }
+        for share in &f.shares {
+            let label = f.kind.label();
+            series(&format!("{name}.{label} by a share"), &share.values, samples)?;
+        }
     }
     joint
         .candidates

@@ -31,9 +31,7 @@ impl Edge {
                 effects: j
                     .effects
                     .iter()
-                    .map(|f| {
-                        JointEffect::new(f.kind, f.values.as_ref().map(|_| Vec::new()), f.parameter)
-                    })
+                    .map(JointEffect::clone_shallow)
                     .collect(),
                 candidates: Vec::new(),
                 noise: j.noise,
@@ -135,6 +133,8 @@ pub struct JointEffect {
     pub values: Option<Vec<f64>>,
     /// Its coefficient; several effects may share one (one clock offset for all joints).
     pub parameter: ParameterId,
+    /// What the regressor follows beside: `F_s = values_s + Σ_i shares_i(s) x_i`.
+    pub shares: Vec<Share>,
     /// [`EffectKind::lateral`], looked up once.
     pub(crate) lateral: Option<usize>,
 }
@@ -145,13 +145,45 @@ impl JointEffect {
             kind,
             values,
             parameter,
+            shares: Vec::new(),
             lateral: kind.lateral(),
         }
     }
 
-    pub(crate) fn value(&self, sample: usize) -> f64 {
-        self.values.as_ref().map_or(1.0, |v| v[sample])
+    /// A copy whose per-sample arrays are empty.
+    fn clone_shallow(&self) -> Self {
+        let shares = self.shares.iter().map(|share| Share {
+            parameter: share.parameter,
+            values: Vec::new(),
+        });
+        Self {
+            shares: shares.collect(),
+            ..Self::new(
+                self.kind,
+                self.values.as_ref().map(|_| Vec::new()),
+                self.parameter,
+            )
+        }
     }
+
+    /// F_s at these values of all parameters.
+    #[inline]
+    pub(crate) fn value(&self, sample: usize, at: &[f64]) -> f64 {
+        let known = self.values.as_ref().map_or(1.0, |v| v[sample]);
+        let shares = self.shares.iter();
+        shares.fold(known, |sum, share| {
+            sum + share.values[sample] * at[share.parameter.index()]
+        })
+    }
+}
+
+/// How a regressor follows a parameter that joints share (a mass that loads all joints below it), linearly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Share {
+    /// The parameter.
+    pub parameter: ParameterId,
+    /// ∂F/∂x per sample.
+    pub values: Vec<f64>,
 }
 
 /// An effect outside the model.

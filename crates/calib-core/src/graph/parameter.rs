@@ -18,6 +18,8 @@ pub enum ParameterKind {
     Point,
     /// Coefficient of a joint effect.
     Effect(EffectKind),
+    /// A first moment of masses that load the joints.
+    Load,
 }
 
 impl ParameterKind {
@@ -28,6 +30,7 @@ impl ParameterKind {
             Self::Rotation => "rotation",
             Self::Translation => "translation",
             Self::Point => "point",
+            Self::Load => "first_moment",
             Self::Effect(kind) => kind.term().class,
         }
     }
@@ -48,7 +51,7 @@ impl Serialize for ParameterKind {
 impl<'de> Deserialize<'de> for ParameterKind {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let name = String::deserialize(from)?;
-        [Self::Rotation, Self::Translation, Self::Point]
+        [Self::Rotation, Self::Translation, Self::Point, Self::Load]
             .into_iter()
             .chain(EffectKind::all().map(Self::Effect))
             .find(|kind| kind.name() == name)

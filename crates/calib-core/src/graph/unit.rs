@@ -21,12 +21,14 @@ pub enum Unit {
     MeterPerNewton,
     /// Time, s.
     Second,
+    /// Mass times distance, kg·m.
+    KilogramMeter,
     /// Ratio without unit.
     One,
 }
 
 impl Unit {
-    /// Symbol: `rad`, `m`, `rad/Nm`, `m/N`, `s`, `1`.
+    /// Symbol: `rad`, `m`, `rad/Nm`, `m/N`, `s`, `kg·m`, `1`.
     #[must_use]
     pub fn symbol(self) -> &'static str {
         match self {
@@ -35,11 +37,12 @@ impl Unit {
             Self::RadianPerNewtonMeter => "rad/Nm",
             Self::MeterPerNewton => "m/N",
             Self::Second => "s",
+            Self::KilogramMeter => "kg·m",
             Self::One => "1",
         }
     }
 
-    /// Ending of a key that holds a number in this unit: `_rad`, `_m`, `_rad_per_nm`, `_m_per_n`, `_s`, or nothing.
+    /// Ending of a key that holds a number in this unit: `_rad`, `_m`, `_rad_per_nm`, `_m_per_n`, `_s`, `_kg_m`, or nothing.
     #[must_use]
     pub fn key_ending(self) -> &'static str {
         match self {
@@ -48,6 +51,7 @@ impl Unit {
             Self::RadianPerNewtonMeter => "_rad_per_nm",
             Self::MeterPerNewton => "_m_per_n",
             Self::Second => "_s",
+            Self::KilogramMeter => "_kg_m",
             Self::One => "",
         }
     }
@@ -63,6 +67,8 @@ impl Unit {
             Self::RadianPerNewtonMeter | Self::MeterPerNewton => 1e-4,
             // 10 ms: a tracker frame at 100 Hz.
             Self::Second => 0.01,
+            // A link of 5 kg with its center 0.1 m from where it was assumed.
+            Self::KilogramMeter => 0.5,
             // 1 %: the reading error of an encoder with a wrong gear ratio.
             Self::One => 0.01,
         }

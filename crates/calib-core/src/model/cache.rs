@@ -79,7 +79,7 @@ impl EdgeCache {
         let amounts = joint
             .effects
             .iter()
-            .map(|f| (f.lateral, f.value(sample) * values.0[f.parameter.index()]));
+            .map(|f| (f.lateral, f.value(sample, &values.0) * values.0[f.parameter.index()]));
         JointMotion::sum(joint.axis, joint.q[sample], amounts)
     }
 

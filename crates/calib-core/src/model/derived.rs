@@ -14,6 +14,8 @@ use calib_geometry::{Twist, so3};
 use crate::analysis::solution::Solution;
 use crate::analysis::spread::LinearPoint;
 use crate::analysis::untested::MovedPoint;
+#[cfg(doc)]
+use crate::graph::edge::JointEffect;
 use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{EffectKind, JointState};
 use crate::graph::error::Error;
@@ -29,6 +31,8 @@ pub struct Configuration {
     pub q: BTreeMap<EdgeId, f64>,
     /// Torque, velocity, approach direction, … per joint edge and effect.
     pub regressors: BTreeMap<(EdgeId, EffectKind), f64>,
+    /// Shares of a regressor per joint edge and effect, in the order of [`JointEffect::shares`].
+    pub shares: BTreeMap<(EdgeId, EffectKind), Vec<f64>>,
 }
 
 impl Configuration {
@@ -53,6 +57,13 @@ impl Configuration {
             let value = (kind.term().regressor)(state);
             self.regressors.insert((joint, kind), value);
         }
+        self
+    }
+
+    /// With the shares of a term's regressor at one joint.
+    #[must_use]
+    pub fn with_shares(mut self, joint: EdgeId, kind: EffectKind, shares: Vec<f64>) -> Self {
+        self.shares.insert((joint, kind), shares);
         self
     }
 }
@@ -385,6 +396,11 @@ fn at_configuration(
                 let given = || at.regressors.get(&(id, f.kind)).copied().unwrap_or(0.0);
                 let value = own.unwrap_or_else(given);
                 f.values = Some(vec![value]);
+            }
+            let given = at.shares.get(&(id, f.kind));
+            for (i, share) in f.shares.iter_mut().enumerate() {
+                let value = given.and_then(|s| s.get(i)).copied().unwrap_or(0.0);
+                share.values = vec![value];
             }
         }
     }

@@ -19,6 +19,7 @@ use crate::graph::axis::Axis;
 use crate::graph::edge::Joint;
 use crate::graph::effect::EffectKind;
 use crate::model::pose::Pose;
+use crate::model::values::Values;
 
 /// φ and θ of equation (1).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -179,8 +180,11 @@ pub(crate) struct JointPass<'a> {
     pub motion: JointMotion,
     pub inverse: bool,
     pub sample: usize,
+    pub values: &'a Values,
     /// (effect, local column)
     pub columns: &'a [(usize, usize)],
+    /// (effect, share, local column)
+    pub shares: &'a [(usize, usize, usize)],
     pub slot: Option<usize>,
 }
 
@@ -233,7 +237,12 @@ impl JointPass<'_> {
             for &(f, c) in self.columns {
                 let effect = &self.joint.effects[f];
                 if effect.lateral.is_none() {
-                    columns[c] += column * effect.value(self.sample);
+                    columns[c] += column * effect.value(self.sample, &self.values.0);
+                }
+            }
+            for &(f, i, c) in self.shares {
+                if self.joint.effects[f].lateral.is_none() {
+                    columns[c] += column * self.share(f, i);
                 }
             }
         }
@@ -254,13 +263,27 @@ impl JointPass<'_> {
         let Some(columns) = out.as_mut().and_then(|out| out.columns.as_mut()) else {
             return;
         };
+        let twists = self.joint.axis.across().map(|e| {
+            let w = map * e * sign;
+            suffix.pull_back(&rotation_twist(&w))
+        });
         for &(f, c) in self.columns {
             let effect = &self.joint.effects[f];
             if let Some(k) = effect.lateral {
-                let w = map * self.joint.axis.across()[k] * (sign * effect.value(self.sample));
-                columns[c] += suffix.pull_back(&rotation_twist(&w));
+                columns[c] += twists[k] * effect.value(self.sample, &self.values.0);
             }
         }
+        for &(f, i, c) in self.shares {
+            if let Some(k) = self.joint.effects[f].lateral {
+                columns[c] += twists[k] * self.share(f, i);
+            }
+        }
+    }
+
+    /// ∂(F c)/∂x of a share: its coefficient times ∂F/∂x.
+    fn share(&self, effect: usize, share: usize) -> f64 {
+        let effect = &self.joint.effects[effect];
+        self.values.0[effect.parameter.index()] * effect.shares[share].values[self.sample]
     }
 
     /// Body twist at the path's end per unit of φ (`None`) or of θ about one of the axes across.

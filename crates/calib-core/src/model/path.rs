@@ -10,7 +10,7 @@
 
 use nalgebra::Vector6;
 
-use crate::graph::edge::EdgeKind;
+use crate::graph::edge::{EdgeKind, Joint};
 use crate::graph::ids::EdgeId;
 use crate::graph::problem::Problem;
 use crate::model::cache::State;
@@ -37,11 +37,13 @@ pub(crate) enum Step {
         inverse: bool,
         columns: Vec<(usize, usize)>,
     },
-    /// (effect, local column) of the free effects; local slot of the joint's noise.
+    /// (effect, local column) of the free effects; (effect, share, local column) of the shares of their regressors;
+    /// local slot of the joint's noise.
     Joint {
         edge: usize,
         inverse: bool,
         columns: Vec<(usize, usize)>,
+        shares: Vec<(usize, usize, usize)>,
         slot: Option<usize>,
     },
     /// Pose per sample; directions of its noise.
@@ -90,6 +92,20 @@ fn add_unknown(
             suffix.pull_back_translation(&twists[i])
         };
     }
+}
+
+/// (effect, share, local column) of the shares that are free.
+fn shares_of(
+    joint: &Joint,
+    mut column: impl FnMut(usize) -> Option<usize>,
+) -> Vec<(usize, usize, usize)> {
+    let mut out = Vec::new();
+    for (f, effect) in joint.effects.iter().enumerate() {
+        for (i, share) in effect.shares.iter().enumerate() {
+            out.extend(column(share.parameter.index()).map(|c| (f, i, c)));
+        }
+    }
+    out
 }
 
 impl CompiledPath {
@@ -155,6 +171,10 @@ impl CompiledPath {
                             Some((f, local(&mut path.columns, column)))
                         })
                         .collect(),
+                    shares: shares_of(j, |parameter| {
+                        let column = column_of[parameter]?;
+                        Some(local(&mut path.columns, column))
+                    }),
                     slot: slots
                         .iter()
                         .position(|s| s.edge == e)
@@ -239,6 +259,7 @@ impl CompiledPath {
                     edge,
                     inverse,
                     columns,
+                    shares,
                     slot,
                 } => {
                     let EdgeKind::Joint(joint) = &problem.edges[*edge].kind else {
@@ -249,7 +270,9 @@ impl CompiledPath {
                         motion: cache.motion(joint, *edge, values, sample),
                         inverse: *inverse,
                         sample,
+                        values,
                         columns,
+                        shares,
                         slot: *slot,
                     };
                     let derivatives = random.then_some(JointDerivatives {
@@ -326,7 +349,9 @@ impl CompiledPath {
                         motion,
                         inverse: *inverse,
                         sample,
+                        values,
                         columns: &[],
+                        shares: &[],
                         slot: None,
                     };
                     let lateral = [None, Some(0), Some(1)];

@@ -70,6 +70,7 @@ pub(crate) fn contract_unmoved(
         }
         high - low
     };
+    let start: Vec<f64> = problem.parameters.iter().map(|p| p.start).collect();
     let mut unmoved = Vec::new();
     let mut moving_parameters = BTreeSet::new();
     let mut still_parameters = BTreeSet::new();
@@ -83,13 +84,13 @@ pub(crate) fn contract_unmoved(
                     .effects
                     .iter()
                     .filter(|f| f.lateral.is_none())
-                    .map(|f| f.value(s) * problem.parameters[f.parameter.index()].start)
+                    .map(|f| f.value(s, &start) * start[f.parameter.index()])
                     .sum::<f64>()
         };
         let driven = joint.effects.iter().any(|f| {
             matches!(f.kind.term().source, Source::OtherJoint | Source::Caller)
                 && !problem.parameters[f.parameter.index()].fixed
-                && range_of(&|s| f.value(s)) > MIN_JOINT_RANGE
+                && range_of(&|s| f.value(s, &start)) > MIN_JOINT_RANGE
         });
         let own: Vec<usize> = joint.effects.iter().map(|f| f.parameter.index()).collect();
         if driven || range_of(&reading) > MIN_JOINT_RANGE {

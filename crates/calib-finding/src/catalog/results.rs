@@ -31,6 +31,21 @@ super::topic! {
             "The unconstrained estimate lies outside ±{limit}; the bound is active.",
             "Widen `within_mm` or `within_deg` if the limit is not physical; otherwise look for an effect that is not enabled.";
     }
+    /// A coefficient that physics allows on one side of 0 only, and that the data put on the other.
+    WRONG_SIGN = "wrong-sign" {
+        "": Warning,
+            "The estimate is held at 0, the limit of the physics ({physics}); without the limit it would be {value} ± {sigma}.",
+            "Look for an effect that is not enabled, a torque column of the other sign, the direction of gravity (`robot.gravity`), or wrong masses; or do not free this effect here.";
+    }
+    /// Compliance is estimated under loads of masses that nobody stated.
+    NO_MASSES = "no-masses" {
+        "assumed": Warning,
+            "The URDF has no masses: the loads are those of uniform rods between the joints, assumed to weigh {mass} in all. Compliances are per N m of these loads, so that their scale is not known; what the robot yields depends only on the proportions.",
+            "Add `<inertial>` to the links or state `robot.total_mass_kg` and `robot.payload`; free `masses` to let the data find the proportions.";
+        "stated": Warning,
+            "The URDF has no masses: the loads are those of uniform rods between the joints, which weigh the stated {mass} in all. What the robot yields depends on their proportions.",
+            "Add `<inertial>` to the links, or free `masses` to let the data find the proportions.";
+    }
     /// The residuals show an effect that is not in the model.
     MISSING_PHYSICS = "missing-physics" {
         "": Warning,

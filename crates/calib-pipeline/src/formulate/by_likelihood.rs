@@ -1,7 +1,7 @@
 //! The result of the fit of all loops.
 
-use calib_core::Settings;
-use calib_finding::{About, Fact, Finding, Severity, catalog};
+use calib_core::{ParameterEstimate, ParameterKind, Settings};
+use calib_finding::{About, Fact, Finding, Severity, Unit, catalog};
 use calib_report::{Status, Unobservable};
 
 use crate::error::PipelineError;
@@ -57,6 +57,7 @@ pub fn likelihood(
         }
     }
     checked.findings.extend(on_their_limit(&fit));
+    checked.findings.extend(of_the_wrong_sign(&fit));
     checked.findings.extend(with_memory(&mut fit));
     *inputs = clock::corrected(inputs, &fit);
     ml_result(inputs, fit, registered)
@@ -66,6 +67,7 @@ pub fn likelihood(
 fn on_their_limit(fit: &MlFit) -> Vec<Finding> {
     let stated = fit.formulation.problem.parameters();
     let stopped = fit.solution.parameters.iter().zip(stated);
+    let stopped = stopped.filter(|(found, _)| !at_physical_limit(found));
     stopped
         .filter(|(found, _)| found.at_bound)
         .filter_map(|(found, stated)| {
@@ -78,6 +80,46 @@ fn on_their_limit(fit: &MlFit) -> Vec<Finding> {
             Some(Finding::new(catalog::ON_ITS_LIMIT, about).with("limit", limit))
         })
         .collect()
+}
+
+/// Whether a parameter lies at 0 because physics allows no less.
+fn at_physical_limit(found: &ParameterEstimate) -> bool {
+    let one_sided = |kind: ParameterKind| match kind {
+        ParameterKind::Effect(kind) => kind.effect().nonnegative,
+        _ => false,
+    };
+    found.at_bound && found.value <= 0.0 && one_sided(found.kind)
+}
+
+/// Coefficients that the data put beyond what physics allows, by more than chance.
+fn of_the_wrong_sign(fit: &MlFit) -> Vec<Finding> {
+    /// Of fifty coefficients one exceeds this by chance in one run of a hundred.
+    const SIGNIFICANT: f64 = 3.5;
+    let solution = &fit.solution;
+    let mut out = Vec::new();
+    for without in solution.without_bounds().unwrap_or_default() {
+        let found = &solution.parameters[without.parameter.index()];
+        let ParameterKind::Effect(kind) = found.kind else {
+            continue;
+        };
+        if !at_physical_limit(found) || -without.value < SIGNIFICANT * without.sigma {
+            continue;
+        }
+        let unit = match found.unit {
+            calib_core::Unit::RadianPerNewtonMeter => Unit::RadianPerNewtonMeter,
+            calib_core::Unit::MeterPerNewton => Unit::MeterPerNewton,
+            calib_core::Unit::Meter => Unit::Meter,
+            _ => Unit::Radian,
+        };
+        let number = |value: f64| Fact::number(value, unit);
+        let about = About::Parameter(found.name.clone());
+        let finding = Finding::new(catalog::WRONG_SIGN, about)
+            .with("physics", Fact::name(kind.physics()))
+            .with("value", number(without.value))
+            .with("sigma", number(without.sigma));
+        out.push(finding);
+    }
+    out
 }
 
 /// The closed forms are start values here: where one has no answer, the likelihood may still have it.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use calib_core::{EdgeId, FrameId, GroupId, ParameterId, PointId, Problem, Solution};
 
 use crate::formulate::kinematics::Calibration;
+use crate::prepare::loads::FirstMoment;
 
 /// What to free in a solve: the profile's choice, or the bodies and the robot's place only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +43,8 @@ pub struct Formulation {
     pub contact_points: BTreeMap<String, PointId>,
     /// Places of what is touched, by contact.
     pub contacts: BTreeMap<String, EdgeId>,
+    /// First moments that are estimated beyond the given masses.
+    pub masses: Vec<(FirstMoment, ParameterId)>,
     /// What is left of the clocks' offset, by recording.
     pub clocks: BTreeMap<String, ClockParameters>,
     /// Noise levels that the problem has.

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use calib_core::{Axis, EffectKind, JointMotion, JointState};
+use calib_profile::RobotLoad;
 use calib_urdf::{JointId, JointKind, RobotModel};
-use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
 
 use crate::prepare::conditions::Conditions;
-use crate::prepare::loads::{gravity_moments, has_masses};
+use crate::prepare::loads::{Loads, Masses};
 
 /// What the reading of one joint leaves out: equation (1) of [`calib_core::effect`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -46,8 +47,8 @@ impl JointEffects {
 pub struct Calibration {
     /// Geometry: origins without zero offsets.
     pub model: RobotModel,
-    /// The robot as in the nominal URDF: loads are computed from it, as in the fit.
-    pub nominal_model: RobotModel,
+    /// What loads the joints, as in the fit.
+    pub masses: Masses,
     /// Effects by joint index.
     pub effects: Vec<JointEffects>,
     /// `tracker_from_root`.
@@ -63,13 +64,22 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// A robot that is exactly as in the nominal URDF.
+    /// A robot that is exactly as in the nominal URDF, and yields by the stiffness that is stated.
     #[must_use]
-    pub fn nominal(model: &RobotModel, tracker_from_root: Isometry3<f64>) -> Self {
+    pub fn nominal(
+        model: &RobotModel,
+        load: &RobotLoad,
+        tracker_from_root: Isometry3<f64>,
+    ) -> Self {
+        let mut effects = vec![JointEffects::default(); model.joints().len()];
+        for (joint, stiffness) in &load.stiffness {
+            let own = &mut effects[joint.index()].coefficients;
+            own.insert(EffectKind::TorqueCompliance, 1.0 / stiffness);
+        }
         Self {
             model: model.clone(),
-            nominal_model: model.clone(),
-            effects: vec![JointEffects::default(); model.joints().len()],
+            masses: Masses::of(model, load),
+            effects,
             tracker_from_root,
             mounts: BTreeMap::new(),
             points: BTreeMap::new(),
@@ -88,7 +98,7 @@ impl Calibration {
     /// The same under known circumstances.
     #[must_use]
     pub fn root_from_link_under(&self, q: &[f64], under: &Conditions) -> Vec<Isometry3<f64>> {
-        let loads = Loads::under(&self.nominal_model, q, under);
+        let loads = self.masses.under(q, under);
         self.model
             .forward_kinematics_with(|joint| self.motion(joint, q, &loads, under))
     }
@@ -176,61 +186,4 @@ pub fn joint_state(
         approach: under.approach_of(index),
         ..JointState::default()
     }
-}
-
-/// Holding torques at one posture.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Loads {
-    /// About each joint's axis, N m, by joint index.
-    pub about_axis: Vec<f64>,
-    /// About the two axes across, N m.
-    pub across: Vec<[f64; 2]>,
-}
-
-impl Loads {
-    /// The measured torques about the axes where there are, gravity otherwise and across the axes.
-    #[must_use]
-    pub fn under(model: &RobotModel, q: &[f64], under: &Conditions) -> Self {
-        let mut loads = Self::at(model, q);
-        if let Some(torque) = &under.torque {
-            loads.about_axis.clone_from(torque);
-        }
-        loads
-    }
-
-    /// From the masses of the nominal URDF; zero where there are none.
-    #[must_use]
-    pub fn at(model: &RobotModel, q: &[f64]) -> Self {
-        let n = model.joints().len();
-        if !has_masses(model) {
-            return Self {
-                about_axis: vec![0.0; n],
-                across: vec![[0.0; 2]; n],
-            };
-        }
-        let moments = gravity_moments(model, &model.forward_kinematics(q));
-        let mut loads = Self {
-            about_axis: vec![0.0; n],
-            across: vec![[0.0; 2]; n],
-        };
-        for joint in model.joint_ids() {
-            let Some(axis) = model.joint(joint).kind.axis() else {
-                continue;
-            };
-            // The joint holds against gravity; the lateral axes turn with the joint (eq. 2).
-            let holds = -moments[joint.index()];
-            loads.about_axis[joint.index()] = holds.dot(&axis);
-            if model.joint(joint).kind.turns() {
-                let [e1, e2] = across(&axis);
-                let turn = UnitQuaternion::from_axis_angle(&axis, model.position(q, joint));
-                let in_child = turn.inverse() * holds;
-                loads.across[joint.index()] = [in_child.dot(&e1), in_child.dot(&e2)];
-            }
-        }
-        loads
-    }
-}
-
-fn across(axis: &Unit<Vector3<f64>>) -> [Vector3<f64>; 2] {
-    Axis::Revolute(*axis).across()
 }

@@ -12,7 +12,6 @@ use serde_json::json;
 use crate::error::PipelineError;
 use crate::estimate::start::start;
 use crate::formulate::formulation::FreeSet;
-use crate::formulate::kinematics::Loads;
 use crate::formulate::ml::state;
 use crate::prepare::checks;
 use crate::prepare::inputs::Inputs;
@@ -106,10 +105,8 @@ fn is_loaded(inputs: &Inputs) -> bool {
         .values()
         .flat_map(|r| r.q.iter().flatten());
     poses.take(1).any(|q| {
-        Loads::at(&inputs.robot.model, q)
-            .about_axis
-            .iter()
-            .any(|t| *t != 0.0)
+        let loads = inputs.robot.masses.at(q);
+        loads.about_axis.iter().any(|t| *t != 0.0)
     })
 }
 

@@ -42,7 +42,11 @@ impl Solved {
 
 /// The robot as in the nominal URDF, with the bodies placed by closed forms.
 pub(crate) fn nominal(inputs: &Inputs, start: &Start) -> Calibration {
-    let mut robot = Calibration::nominal(&inputs.robot.model, start.tracker_from_root);
+    let mut robot = Calibration::nominal(
+        &inputs.robot.model,
+        &inputs.robot.profile.load,
+        start.tracker_from_root,
+    );
     robot.mounts = start.mounts.clone();
     robot.points = start.points.clone();
     let profile = &inputs.robot.profile;

@@ -3,18 +3,18 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use calib_core::EFFECTS;
 use calib_core::effect::{Drives, Source};
+use calib_core::{EFFECTS, EffectKind};
 use calib_geometry::so3;
 use calib_report::scene::{Provenance, SceneBody, SceneFrame, SceneMarker, SceneRobot};
 use calib_report::{Change, Input, Scene, Status, Unit};
 use calib_urdf::rpy::rpy_from_rotation;
 use calib_urdf::{ChangeRecord, JointId, RobotModel, UrdfEdit, patch};
-use nalgebra::{Isometry3, Matrix6, Point3};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
 use crate::error::PipelineError;
 use crate::formulate::found::Found;
-use crate::formulate::kinematics::Calibration;
+use crate::formulate::kinematics::{Calibration, JointEffects, motion_axis};
 use crate::prepare::inputs::{Digest, Inputs};
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::known::{Known, Number};
@@ -212,12 +212,15 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
         "# Joint effects that a URDF cannot hold. Zero offsets are in the URDF's origins already.\n\
          # phi = q + {}\n\
          # rotation about the first axis across: {}; about the second: {}\n\
-         # torque: what the joint holds against gravity about its axis, N m; torque_across: about the two axes across.\n\
+         # torque: what the load exerts about the axis, N m (minus what the joint holds); torque_across: about the two axes\n\
+         # across, which turn with the joint. A compliance above 0 gives way.\n\
          # approach: +1 where the joint came from below, -1 from above; backlash is half of the clearance.\n\
-         calib_effects: 1\njoints:\n",
+         # Version 1 had torque and approach of the other sign.\n\
+         calib_effects: 2\n{}joints:\n",
         sum(Drives::About),
         sum(Drives::Across(0)),
         sum(Drives::Across(1)),
+        loads_yaml(inputs, robot),
     );
     for joint in beyond {
         let e = &robot.effects[joint.index()];
@@ -230,6 +233,11 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
             if value.abs() > NOTHING {
                 let unit = term.quantity.unit(prismatic).key_ending();
                 let _ = writeln!(text, "    {}{unit}: {value:e}", term.name);
+                if let (Drives::Across(k), Some(axis)) = (term.drives, motion_axis(model, joint)) {
+                    let v = axis.across()[k];
+                    let [x, y, z] = [v.x, v.y, v.z];
+                    let _ = writeln!(text, "    {}_axis: [{x}, {y}, {z}]", term.name);
+                }
             }
         }
         if !e.coupling.is_empty() {
@@ -240,6 +248,49 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
         }
     }
     Some(text)
+}
+
+/// What loads the joints: gravity and the masses that the compliances belong to; empty where no joint yields to them.
+fn loads_yaml(inputs: &Inputs, robot: &Calibration) -> String {
+    let by_load = |kind: &EffectKind| kind.term().source == Source::Load;
+    let yields = |e: &JointEffects| {
+        let mut found = e.coefficients.iter();
+        found.any(|(kind, c)| by_load(kind) && *c != 0.0)
+    };
+    if !robot.effects.iter().any(yields) {
+        return String::new();
+    }
+    let masses = &robot.masses;
+    let g = masses.gravity();
+    let mut text = format!(
+        "# Loads follow from gravity (in the frame of the root, m/s2) and these masses at the joint readings. first_moment: mass\n\
+         # times center in the link's frame, kg m. {}\n\
+         gravity: [{}, {}, {}]\nloads:\n",
+        match masses.assumed {
+            Some(_) => "The masses are assumed: their scale and the compliances' belong together.",
+            None => "The masses are those of the nominal URDF and of the payloads.",
+        },
+        g.x,
+        g.y,
+        g.z
+    );
+    let model = masses.loaded();
+    for link in inputs.robot.model.link_ids() {
+        let own = model.link(link).inertial;
+        let moment = own.map_or_else(Vector3::zeros, |i| i.center_of_mass.coords * i.mass);
+        let moment = moment + masses.beyond()[link.index()];
+        let mass = own.map_or(0.0, |i| i.mass);
+        if mass == 0.0 && moment == Vector3::zeros() {
+            continue;
+        }
+        let name = &model.link(link).name;
+        let [x, y, z] = [moment.x, moment.y, moment.z];
+        let _ = writeln!(
+            text,
+            "  {name}: {{mass_kg: {mass}, first_moment_kg_m: [{x:e}, {y:e}, {z:e}]}}"
+        );
+    }
+    text
 }
 
 /// The calibrated world: tracker, robot root, bodies, origins and links at the zero position.

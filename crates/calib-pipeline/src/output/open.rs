@@ -23,11 +23,11 @@ use calib_report::{Agreement, HeldOut, Predicted, Prediction, Untested, Untested
 use calib_urdf::{JointId, RobotModel};
 
 use crate::formulate::formulation::MlFit;
-use crate::formulate::kinematics::{Loads, joint_state};
+use crate::formulate::kinematics::joint_state;
 use crate::output::weak::{postures, tool};
 use crate::prepare::conditions::Conditions;
 use crate::prepare::inputs::Inputs;
-use crate::prepare::loads::has_masses;
+use crate::prepare::loads::Loads;
 use crate::verify::accuracy::configuration;
 
 /// Samples that are looked at, at most: more change nothing but the time.
@@ -155,10 +155,7 @@ impl<'a> Places<'a> {
         looked_at: &[usize],
         postures: &'a [Vec<f64>],
     ) -> Option<Self> {
-        let model = &inputs.robot.model;
-        let even = (!has_masses(model)).then(|| model.clone().with_even_masses());
-        let loaded = even.as_ref().unwrap_or(model);
-        let with_loads = |q: &'a Vec<f64>| (q, Loads::at(loaded, q));
+        let with_loads = |q: &'a Vec<f64>| (q, inputs.robot.masses.at(q));
         let all = &fit.formulation.samples;
         let row = |s: &usize| inputs.recordings[&all[*s].0].q[all[*s].1].as_ref();
         let rows: Vec<&Vec<f64>> = looked_at.iter().map(row).collect::<Option<_>>()?;

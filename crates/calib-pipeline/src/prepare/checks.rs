@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use calib_checks::rigid_body::Template;
 use calib_checks::{Expectations, checks, held_out_in_training};
-use calib_finding::{Fact, Finding, Severity, catalog};
-use calib_profile::{BodyKind, Usage};
+use calib_core::effect::{Drives, Effect, Source};
+use calib_finding::{About, Fact, Finding, Severity, Subject, Unit, catalog};
+use calib_profile::{BodyKind, Free, JointFree, Load, Usage};
 
 use crate::prepare::conditions::missing_torques;
 use crate::prepare::inputs::{Inputs, Loaded};
@@ -46,7 +47,39 @@ pub fn check(inputs: &Inputs) -> Vec<Finding> {
         }
     }
     findings.extend(missing_torques(inputs));
+    findings.extend(no_masses(inputs));
     findings
+}
+
+/// The masses were assumed, and an effect of their load is free.
+fn no_masses(inputs: &Inputs) -> Option<Finding> {
+    let mass = inputs.robot.masses.assumed?;
+    let profile = &inputs.robot.profile;
+    let measured = profile.solve.load == Load::Measured;
+    let by_gravity = |effect: &Effect| {
+        let mut terms = effect.terms.iter();
+        terms.any(|t| t.source == Source::Load && !(measured && t.drives == Drives::About))
+    };
+    let all = profile.solve.free.iter();
+    let freed = all.filter_map(|f| match f {
+        Free::Effect(effect) => Some(*effect),
+        _ => None,
+    });
+    let own = profile.solve.joints.values().flat_map(|j| &j.free).flatten();
+    let own = own.filter_map(|f| match f {
+        JointFree::Effect(effect) => Some(*effect),
+        _ => None,
+    });
+    let needed = freed.chain(own).any(by_gravity) || !profile.load.stiffness.is_empty();
+    let kind = match profile.load.total_mass {
+        Some(_) => "stated",
+        None => "assumed",
+    };
+    needed.then(|| {
+        let about = Subject::from(About::File(profile.urdf.clone()));
+        Finding::of_kind(catalog::NO_MASSES, kind, about)
+            .with("mass", Fact::number(mass, Unit::Kilogram))
+    })
 }
 
 /// Whether a finding forbids to go on.

@@ -14,7 +14,7 @@ const STILL: f64 = 1e-5;
 pub struct Conditions {
     /// Direction in which each joint moved last, by joint index: +1, −1, or 0 where no row before tells.
     pub approach: Vec<f64>,
-    /// Measured torque about each joint's axis, N m, by joint index; `None`: gravity on the nominal URDF's masses.
+    /// Measured torque that each joint holds about its axis, N m, by joint index; `None`: gravity loads it.
     pub torque: Option<Vec<f64>>,
 }
 

@@ -13,6 +13,7 @@ use nalgebra::Matrix3;
 use crate::prepare::aligned::Alignment;
 use crate::prepare::estimators::Estimators;
 use crate::prepare::excluded::Excluded;
+use crate::prepare::loads::Masses;
 
 /// A profile with its robot, before any recording is read.
 #[derive(Debug, Clone)]
@@ -25,6 +26,8 @@ pub struct RobotProfile {
     pub profile: Profile,
     /// The nominal robot.
     pub model: RobotModel,
+    /// What loads its joints.
+    pub masses: Masses,
     /// The URDF, byte for byte.
     pub urdf_text: String,
     /// Digests of the profile and the nominal URDF.

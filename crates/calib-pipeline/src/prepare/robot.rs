@@ -7,6 +7,7 @@ use calib_urdf::{RobotModel, sha256_hex};
 
 use crate::error::{NamedBy, PipelineError, WhyUnread};
 use crate::prepare::inputs::{Digest, RobotProfile};
+use crate::prepare::loads::Masses;
 
 /// Largest profile or URDF that is read, bytes.
 const LARGEST_TEXT: u64 = 64 << 20;
@@ -46,6 +47,7 @@ pub fn load_robot(profile_path: &Path) -> Result<RobotProfile, PipelineError> {
     Ok(RobotProfile {
         file,
         folder,
+        masses: Masses::of(&model, &profile.load),
         profile,
         model,
         urdf_text,

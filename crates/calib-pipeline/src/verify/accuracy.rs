@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::{Configuration, GroupId, NoiseKind};
+use calib_core::effect::Source;
+use calib_core::{Configuration, EffectKind, GroupId, NoiseKind};
 use calib_geometry::so3;
 use calib_profile::{BodyKind, Usage};
 use calib_report::{AccuracyLimit, ErrorSource, HeldOut, Workspace, WorkspacePoint};
@@ -10,7 +11,7 @@ use calib_urdf::LinkId;
 use nalgebra::Matrix6;
 
 use crate::formulate::formulation::MlFit;
-use crate::formulate::kinematics::{Loads, joint_state};
+use crate::formulate::kinematics::joint_state;
 use crate::prepare::conditions::Conditions;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
@@ -21,7 +22,9 @@ pub(crate) fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configur
     let mut at = Configuration::zero();
     // Every joint in the middle of its backlash.
     let unknown = Conditions::default();
-    let loads = fit.formulation.loaded.then(|| Loads::at(model, q));
+    let masses = &inputs.robot.masses;
+    let loads = fit.formulation.loaded.then(|| masses.at(q));
+    let free: Vec<_> = fit.formulation.masses.iter().map(|m| m.0).collect();
     for joint in model.joint_ids() {
         let Some(edge) = fit.formulation.joints[joint.index()] else {
             continue;
@@ -30,6 +33,13 @@ pub(crate) fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configur
             Some(loads) => at.at(edge, &joint_state(model, joint, q, loads, &unknown)),
             None => at.with(edge, model.position(q, joint)),
         };
+        if free.is_empty() {
+            continue;
+        }
+        for kind in EffectKind::all().filter(|k| k.term().source == Source::Load) {
+            let shares = masses.shares(q, joint, kind, &free);
+            at = at.with_shares(edge, kind, shares);
+        }
     }
     at
 }

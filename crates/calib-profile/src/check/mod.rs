@@ -60,6 +60,7 @@ pub fn check(
 
 mod body;
 mod contact;
+mod load;
 mod names;
 mod origin;
 mod recording;
@@ -137,6 +138,7 @@ impl<'a> Checker<'a> {
             robot: raw.robot.name.clone(),
             urdf: raw.robot.urdf.clone(),
             packages: raw.robot.packages.clone(),
+            load: self.load(),
             tracker: Tracker {
                 frame: raw.tracker.frame.clone(),
                 marker_sigma: raw.tracker.marker_sigma_mm.map(|s| s * MM),

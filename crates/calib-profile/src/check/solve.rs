@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::profile::{JointException, Limits, Noise, Prior, Solve};
-use crate::raw::{ANGLE, POSITION, PRIOR_KEYS, RawJointSolve, RawLimits, RawPrior, RawSolve};
+use crate::raw::{ANGLE, MASS, MASS_CENTER, POSITION, PRIOR_KEYS, RawJointSolve, RawLimits, RawPrior, RawSolve};
 use calib_core::effect::PriorKey;
 
 impl Checker<'_> {
@@ -70,6 +70,8 @@ impl Checker<'_> {
         Prior {
             position: si(&POSITION),
             angle: si(&ANGLE),
+            mass: si(&MASS),
+            mass_center: si(&MASS_CENTER),
             by_key: PRIOR_KEYS.iter().map(|key| (key.key, si(key))).collect(),
         }
     }

@@ -2,6 +2,7 @@
 
 mod body;
 mod contact;
+mod load;
 mod origin;
 mod recording;
 mod simulate;
@@ -10,6 +11,7 @@ mod solve;
 pub use crate::touched::Touched;
 pub use body::{Body, BodyKind};
 pub use contact::{Contact, ContactBase, Tip};
+pub use load::RobotLoad;
 pub use origin::{LinkTransform, Loop, Orientation, Origin, PointChoice, SweptAxis};
 pub use recording::{RecordingSpec, RobotLog, Timing};
 pub use simulate::{Error3, Protocol, SimErrors, SimMount, SimNoise, Simulation, Steps};
@@ -35,6 +37,8 @@ pub struct Profile {
     pub urdf: String,
     /// Folders of packages with meshes, relative to the profile, by name.
     pub packages: BTreeMap<String, String>,
+    /// What loads the joints.
+    pub load: RobotLoad,
     /// The tracker.
     pub tracker: Tracker,
     /// Tracking bodies by name.

@@ -152,6 +152,10 @@ pub struct Prior {
     pub position: f64,
     /// Orientation numbers of joint origins, rad.
     pub angle: f64,
+    /// Masses, as a share.
+    pub mass: f64,
+    /// Centers of mass, m.
+    pub mass_center: f64,
     /// By key of `solve.prior`.
     pub(crate) by_key: BTreeMap<&'static str, f64>,
 }

@@ -24,6 +24,8 @@ pub enum RawFree {
     JointAxes,
     /// Whole origins of the moved joints.
     JointOrigins,
+    /// First moments of the masses that load the joints.
+    Masses,
     /// An effect of the moved joints.
     Effect(&'static Effect),
 }
@@ -64,6 +66,11 @@ static FREE: Choices<RawFree> = LazyLock::new(|| {
             "joint_origins",
             RawFree::JointOrigins,
             "Whole origins of the moved joints, six numbers each.",
+        ),
+        (
+            "masses",
+            RawFree::Masses,
+            "First moments (mass times center) of what loads the compliant joints, about the masses of the URDF or assumed ones.",
         ),
     ];
     let effects = EFFECTS.iter().filter_map(|effect| {
@@ -183,6 +190,22 @@ pub(crate) static ANGLE: PriorKey = PriorKey {
     si: std::f64::consts::PI / 180.0,
 };
 
+/// Prior of masses.
+pub(crate) static MASS: PriorKey = PriorKey {
+    key: "mass",
+    text: "Masses of links, as a share of the ones that are given or assumed.",
+    default: 0.5,
+    si: 1.0,
+};
+
+/// Prior of centers of mass.
+pub(crate) static MASS_CENTER: PriorKey = PriorKey {
+    key: "mass_center_mm",
+    text: "Centers of mass of links, mm.",
+    default: 200.0,
+    si: 1e-3,
+};
+
 /// Every key of `solve.prior` once.
 pub(crate) static PRIOR_KEYS: LazyLock<Vec<&'static PriorKey>> = LazyLock::new(|| {
     let priors = EFFECTS.iter().filter_map(|e| e.prior.as_ref());
@@ -192,6 +215,7 @@ pub(crate) static PRIOR_KEYS: LazyLock<Vec<&'static PriorKey>> = LazyLock::new(|
             keys.push(key);
         }
     }
+    keys.extend([&MASS, &MASS_CENTER]);
     keys
 });
 

@@ -8,16 +8,18 @@ mod contact;
 mod free;
 mod origin;
 mod recording;
+mod robot;
 mod simulate;
 mod solve;
 
 pub use crate::touched::RawTouched;
 pub use body::{RawBody, RawPose, RawSplit};
 pub use contact::{RawContact, RawTip};
-pub(crate) use free::{ANGLE, POSITION, PRIOR_KEYS};
+pub(crate) use free::{ANGLE, MASS, MASS_CENTER, POSITION, PRIOR_KEYS};
 pub use free::{RawFree, RawJointFree, RawPrior};
 pub use origin::{RawLoop, RawOrientation, RawOrigin, RawPoint, RawTransform};
 pub use recording::{RawClocks, RawRecording, RawRobotLog, RawTimedPoses, RawTiming, RawUse};
+pub use robot::{RawPayload, RawRobot};
 pub use simulate::{RawProtocol, RawSimErrors, RawSimMount, RawSimNoise, RawSimulate, RawSteps};
 pub use solve::{RawJointSolve, RawLimits, RawLoad, RawMethod, RawNoise, RawSolve};
 
@@ -66,20 +68,6 @@ pub struct RawProfile {
     /// How `calib simulate` makes recordings with known truth for this robot.
     #[serde(default)]
     pub simulate: Option<RawSimulate>,
-}
-
-/// The robot and its description.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RawRobot {
-    /// Name of the robot in reports.
-    pub name: String,
-    /// URDF file, relative to the profile.
-    pub urdf: String,
-    /// Folders of the packages that the URDF's meshes name (`package://<name>/…`), relative to the profile, by name. Only for
-    /// the picture; packages that lie around the URDF are found without it.
-    #[serde(default)]
-    pub packages: BTreeMap<String, String>,
 }
 
 /// The optical tracker.

@@ -56,7 +56,7 @@ pub struct RawSimErrors {
     pub mount_deg: f64,
     /// Exact differences of fixed joints' origins (e.g. where the arm really stands on its table).
     pub fixed: BTreeMap<String, RawPose>,
-    /// True compliance of joints, deg per N m of gravity torque about the axis.
+    /// True compliance of joints, deg per N m of gravity torque about the axis; above 0 the joint gives way.
     pub compliance_deg_per_nm: BTreeMap<String, f64>,
 }
 

@@ -44,10 +44,11 @@ pub struct RawJointSolve {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawLoad {
-    /// Gravity on the masses of the URDF at the indicated joint positions.
+    /// Gravity on the masses of the URDF at the indicated joint positions; on uniform rods between the joints where it has none.
     #[default]
     Gravity,
-    /// The torque columns of the recordings, N m; a joint without one carries no load.
+    /// The torque columns of the recordings, N m: what the joints hold (as drives and torque sensors state it), so that the load is minus
+    /// that. A joint without a column carries no load.
     Measured,
 }
 

@@ -6,6 +6,7 @@ use calib_finding::{Finding, Severity};
 use calib_pipeline::error::DataProblem;
 use calib_pipeline::formulate::solved::Solved;
 use calib_pipeline::prepare::load::{RobotProfile, of_tables};
+use calib_pipeline::prepare::loads::Masses;
 use calib_pipeline::run::{RunOptions, RunOutput, run_on};
 use calib_pipeline::{ExitCode, PipelineError};
 use calib_report::Verdict;
@@ -198,6 +199,7 @@ fn robot_profile(profile: &str, urdf: &str) -> Result<RobotProfile, PipelineErro
     Ok(RobotProfile {
         file: "arm.yaml".to_owned(),
         folder: std::path::PathBuf::new(),
+        masses: Masses::of(&model, &checked.load),
         profile: checked,
         model,
         urdf_text: urdf.to_owned(),

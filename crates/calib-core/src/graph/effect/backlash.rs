@@ -1,4 +1,8 @@
 //! Backlash: the joint stops half of its clearance short of where its motor is, on the side that it came from.
+//!
+//! ```text
+//! φ = q − b a,   b ≥ 0,   a: direction of approach, +1 from below                           (1)
+//! ```
 
 use super::{
     Drives, Effect, EffectKind, JointState, Prior, PriorKey, ProfileKeys, Quantity, Source, Term,
@@ -11,7 +15,7 @@ fn from_both_sides(states: &[JointState]) -> bool {
         .all(|side| states.iter().any(|s| s.approach == *side))
 }
 
-/// F = ±1 by the direction of approach.
+/// F = ∓1: against the direction of approach.
 pub static EFFECT: Effect = Effect {
     id: "backlash",
     physics: "backlash (hysteresis)",
@@ -31,16 +35,17 @@ pub static EFFECT: Effect = Effect {
         ),
         least: 0.0,
     }),
+    nonnegative: true,
     testable: Some(from_both_sides),
     terms: &[Term {
         kind: EffectKind::Backlash,
         name: "backlash",
         class: "backlash",
-        formula: "backlash*approach",
+        formula: "backlash*(-approach)",
         quantity: Quantity::Position,
         drives: Drives::About,
         source: Source::Approach,
-        regressor: |s| s.approach,
+        regressor: |s| -s.approach,
     }],
     ..Effect::PLAIN
 };

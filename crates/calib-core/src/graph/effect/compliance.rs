@@ -1,4 +1,8 @@
 //! Compliance: the joint yields under the load about its axis.
+//!
+//! ```text
+//! φ = q + c τ,   c = 1/K ≥ 0,   τ: what the load exerts = − what the joint holds            (1)
+//! ```
 
 use super::{
     Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Source, Term, loaded,
@@ -8,7 +12,7 @@ use super::{
 pub(super) static PRIOR: PriorKey =
     PriorKey::deg("compliance_deg_per_nm", "Compliance, deg per N m.", 0.05);
 
-/// F = torque about (force along) the axis.
+/// F = torque that the load exerts about (force that it exerts along) the axis: c > 0 gives way.
 pub static EFFECT: Effect = Effect {
     id: "compliance",
     physics: "compliance under gravity",
@@ -20,6 +24,7 @@ pub static EFFECT: Effect = Effect {
         own_text: "Compliance about the axis.",
     }),
     prior: Some(Prior::of(&PRIOR)),
+    nonnegative: true,
     estimable: loaded,
     testable: Some(loaded),
     terms: &[Term {

@@ -1,10 +1,11 @@
 //! Lateral compliance: the joint's bearing yields under the torques across its axis.
 
 use super::{
-    Drives, Effect, EffectKind, Prior, ProfileKeys, Quantity, Source, Term, compliance, loaded,
+    Drives, Effect, EffectKind, Prior, ProfileKeys, Quantity, Source, Term, compliance,
+    loaded_across,
 };
 
-/// F = torque about each of the two axes across.
+/// F = torque that the load exerts about each of the two axes across: c > 0 gives way.
 pub static EFFECT: Effect = Effect {
     id: "lateral_compliance",
     physics: "lateral compliance",
@@ -16,8 +17,8 @@ pub static EFFECT: Effect = Effect {
         own_text: "Compliance across the axis.",
     }),
     prior: Some(Prior::of(&compliance::PRIOR)),
-    // Only joints that hold a load about their axis: a joint with a vertical axis shows none of it.
-    estimable: loaded,
+    nonnegative: true,
+    estimable: loaded_across,
     testable: None,
     terms: &[
         Term {

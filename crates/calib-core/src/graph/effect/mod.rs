@@ -61,7 +61,7 @@ pub enum EffectKind {
     Lateral1,
     /// Rotation about the second axis across, F = torque about it, N·m.
     Lateral2,
-    /// F = ±1 by the direction of approach (or tanh τ/ε).
+    /// F = ∓1: against the direction of approach (or tanh τ/ε).
     Backlash,
     /// F = another joint's reading.
     Coupling,
@@ -78,9 +78,9 @@ pub struct JointState {
     pub q: f64,
     /// Rate of the reading, rad/s or m/s.
     pub velocity: f64,
-    /// Torque that the joint holds about (force along) its axis, N·m (N).
+    /// Torque that the load (gravity) exerts about the axis, force along it, N·m (N): minus what the joint holds.
     pub torque: f64,
-    /// Torques about the two axes across ([`Axis::across`]), N·m.
+    /// Torques that the load exerts about the two axes across ([`Axis::across`]), N·m.
     pub across: [f64; 2],
     /// Direction of approach: +1, −1, or 0 where it is not known.
     pub approach: f64,
@@ -98,7 +98,7 @@ pub enum Source {
     Constant,
     /// The reading alone.
     Reading,
-    /// The torques that the joint holds.
+    /// The torques that the load exerts.
     Load,
     /// The direction of approach.
     Approach,
@@ -240,6 +240,8 @@ pub struct Effect {
     pub geometric: bool,
     /// Defined for an angle only.
     pub revolute_only: bool,
+    /// Physics allows no coefficient below 0.
+    pub nonnegative: bool,
     /// Whether the states of the samples let the effect be estimated.
     pub estimable: fn(&[JointState]) -> bool,
     /// Whether a score test is worth making where it is not estimated; `None`: never.
@@ -315,6 +317,7 @@ impl Effect {
         prior: None,
         geometric: false,
         revolute_only: false,
+        nonnegative: false,
         estimable: always,
         testable: Some(always),
         confounded: Confounded::Nothing,
@@ -332,9 +335,18 @@ pub(crate) fn always(_: &[JointState]) -> bool {
     true
 }
 
-/// Where the joint holds a load about its axis in some sample.
+/// A smaller load, N m or N, is rounding: a joint with a vertical axis has none.
+const NO_LOAD: f64 = 1e-9;
+
+/// Where something loads the joint about its axis in some sample.
 pub(crate) fn loaded(states: &[JointState]) -> bool {
-    states.iter().any(|s| s.torque.abs() > 0.0)
+    states.iter().any(|s| s.torque.abs() > NO_LOAD)
+}
+
+/// Where something loads the joint across its axis in some sample.
+pub(crate) fn loaded_across(states: &[JointState]) -> bool {
+    let loaded = |s: &JointState| s.across.iter().any(|t| t.abs() > NO_LOAD);
+    states.iter().any(loaded)
 }
 
 impl PartialEq for Effect {

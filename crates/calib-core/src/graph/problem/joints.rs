@@ -1,7 +1,7 @@
 //! Joints and their effects.
 
 use crate::graph::axis::Axis;
-use crate::graph::edge::{Candidate, EdgeKind, Joint, JointEffect};
+use crate::graph::edge::{Candidate, EdgeKind, Joint, JointEffect, Share};
 use crate::graph::effect::{EffectKind, JointState, Source};
 use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId, GroupId, ParameterId};
@@ -139,6 +139,19 @@ impl Problem {
             joint
                 .effects
                 .push(JointEffect::new(kind, values, parameter));
+        }
+    }
+
+    /// Lets the regressor of a term that is free follow parameters besides: `F_s + Σ_i shares_i(s) x_i`. The effect is then
+    /// bilinear in its coefficient and these, as a compliance is under masses that are not known.
+    pub fn follow(&mut self, edge: EdgeId, kind: EffectKind, shares: Vec<Share>) {
+        let found = self.joint_mut(edge, "follow").map(|joint| {
+            let effect = joint.effects.iter_mut().rev().find(|f| f.kind == kind);
+            effect.map(|f| f.shares.extend(shares)).is_some()
+        });
+        if found == Some(false) {
+            let what = format!("{}.{}", self.edge_name(edge), kind.label());
+            self.faults.push(Error::NoRegressor { what });
         }
     }
 

@@ -31,7 +31,11 @@ pub(crate) fn calibration_at(
             .edge_pose(edge, values)
             .unwrap_or_else(Isometry3::identity)
     };
-    let mut robot = Calibration::nominal(model, pose(formulation.root));
+    let load = &inputs.robot.profile.load;
+    let mut robot = Calibration::nominal(model, load, pose(formulation.root));
+    for (moment, parameter) in &formulation.masses {
+        robot.masses.add(*moment, values.0[parameter.index()]);
+    }
     for joint in model.joint_ids() {
         if let Some(edge) = formulation.origins[joint.index()] {
             robot.model = robot.model.with_origin(joint, pose(edge));

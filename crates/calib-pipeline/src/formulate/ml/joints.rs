@@ -1,6 +1,6 @@
 //! Joints: their origins, their motion and its effects.
 
-use calib_core::effect::Source;
+use calib_core::effect::{Effect, Source};
 use calib_core::{
     Axis, Chart, EFFECTS, EdgeId, EffectKind, GroupId, JointState, NoiseKind, Problem, Role,
 };
@@ -8,14 +8,18 @@ use calib_profile::{ContactBase, JointFreeSet, OriginFreeSet, Profile};
 use calib_urdf::{JointId, JointKind, RobotModel};
 
 use crate::formulate::formulation::{Formulation, FreeSet};
-use crate::formulate::kinematics::{Loads, joint_state};
+use crate::formulate::kinematics::joint_state;
 use crate::prepare::conditions::Conditions;
 use crate::prepare::inputs::Inputs;
+use crate::prepare::loads::Loads;
 
 /// Joint noise that estimation starts from, rad (0.01°).
 const JOINT_SIGMA: f64 = 1.7e-4;
 /// A revolute joint that moves less than this in the fitted recordings did not move, rad.
 const MOVED: f64 = 1e-3;
+
+/// The term whose coefficient is one over a stiffness.
+const COMPLIANCE: EffectKind = EffectKind::TorqueCompliance;
 
 /// One sample: indicated positions, and what else is known of it.
 pub(super) struct Row<'a> {
@@ -141,6 +145,14 @@ pub(super) fn add_joint(
     }
 }
 
+/// What physics and the profile allow a coefficient.
+fn limits(effect: &Effect, within: Option<f64>) -> Option<(f64, f64)> {
+    match (effect.nonnegative, within) {
+        (true, within) => Some((0.0, within.unwrap_or(f64::INFINITY))),
+        (false, within) => within.map(|w| (-w, w)),
+    }
+}
+
 /// Frees the effects of a joint and offers the others to the test for missing physics; returns whether a prediction
 /// needs its load or another joint's reading.
 fn add_effects(
@@ -156,15 +168,29 @@ fn add_effects(
         .iter()
         .map(|r| joint_state(model, joint, r.q, &r.loads, r.under))
         .collect();
+    let stiffness = profile.load.stiffness.get(&joint);
+    let given = stiffness.map(|stiffness| 1.0 / stiffness);
     let mut loaded = false;
     for effect in EFFECTS.iter().filter(|e| e.profile.is_some()) {
         let wanted = free.effects.iter().find(|f| f.effect == *effect);
         if let Some(wanted) = wanted.filter(|_| (effect.estimable)(&states)) {
             for term in effect.terms {
                 let p = problem.free_effect_at(edge, term.kind, &states, wanted.sigma);
-                problem.parameter_mut(p).bounds = wanted.within.map(|w| (-w, w));
+                let parameter = problem.parameter_mut(p);
+                parameter.bounds = limits(effect, wanted.within);
+                if let Some(compliance) = given.filter(|_| term.kind == COMPLIANCE) {
+                    parameter.nominal = compliance;
+                    parameter.start = compliance;
+                }
                 loaded |= term.source == Source::Load;
             }
+        } else if let Some(compliance) = given.filter(|_| *effect == COMPLIANCE.effect()) {
+            let p = problem.free_effect_at(edge, COMPLIANCE, &states, None);
+            let parameter = problem.parameter_mut(p);
+            parameter.nominal = compliance;
+            parameter.start = compliance;
+            parameter.fixed = true;
+            loaded = true;
         } else if wanted.is_none() && effect.testable.is_some_and(|test| test(&states)) {
             // Terms of the reading alone are tested in any case.
             let terms = effect.terms.iter().filter(|t| t.source != Source::Reading);

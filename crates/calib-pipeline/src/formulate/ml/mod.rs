@@ -7,12 +7,12 @@ use calib_core::{Chart, Problem, Role, Settings};
 use calib_profile::{Free, Usage};
 use calibration::calibration;
 use joints::{Row, add_joint, joint_noise_group, used_joints};
+use masses::free_masses;
 
 use crate::error::PipelineError;
 use crate::estimate::start::Start;
 use crate::formulate::contacts::add_contacts;
 use crate::formulate::formulation::{Formulation, FreeSet, MlFit, NoiseGroups};
-use crate::formulate::kinematics::Loads;
 use crate::prepare::conditions::{Conditions, conditions};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
@@ -20,6 +20,7 @@ use crate::prepare::tracks::BodyTrack;
 mod bodies;
 mod calibration;
 mod joints;
+mod masses;
 
 pub(crate) use calibration::calibration_at;
 
@@ -47,7 +48,7 @@ pub fn state(
             Some(Row {
                 q,
                 under,
-                loads: Loads::under(model, q, under),
+                loads: inputs.robot.masses.under(q, under),
             })
         })
         .collect();
@@ -86,6 +87,7 @@ pub fn state(
         points: BTreeMap::new(),
         contact_points: BTreeMap::new(),
         contacts: BTreeMap::new(),
+        masses: Vec::new(),
         clocks: BTreeMap::new(),
         noise: NoiseGroups::default(),
         loaded: false,
@@ -103,6 +105,9 @@ pub fn state(
             joint_noise,
             free_set,
         );
+    }
+    if free_set == FreeSet::Profile && profile.solve.free.contains(&Free::Masses) {
+        free_masses(&mut formulation, inputs, &rows);
     }
     add_bodies(&mut formulation, inputs, tracks, start);
     add_contacts(&mut formulation, inputs);
