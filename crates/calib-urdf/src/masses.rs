@@ -4,8 +4,9 @@ use nalgebra::{Point3, Vector3};
 
 use crate::model::{Inertial, LinkId, RobotModel};
 
-/// Length of what a link without a next joint carries, m: a hand or a flange. Its rod lies at the joint's origin.
-const END: f64 = 0.1;
+/// A moved link is as heavy as a rod of this length at least, m: the joints of a wrist that lie in one point have motors too, and
+/// the last link has a flange. What the rods to the next joints lack lies at the link's origin.
+const SHORTEST: f64 = 0.1;
 
 impl RobotModel {
     /// Whether any link has a mass.
@@ -23,7 +24,7 @@ impl RobotModel {
 
     /// The same robot with uniform rods for links: from each link's origin to every place where a joint that moves, or
     /// leads to one, hangs on it, with this mass per length, kg/m. At the end of a chain the rod leads to the farthest
-    /// fixed link, and is 0.1 m long at least.
+    /// fixed link. A link that a joint moves weighs as much as 0.1 m of rod at least.
     #[must_use]
     pub fn with_rods(mut self, mass_per_length: f64) -> Self {
         for id in self.link_ids().collect::<Vec<_>>() {
@@ -33,10 +34,12 @@ impl RobotModel {
                 .iter()
                 .map(|end| end * (0.5 * mass_per_length * end.norm()))
                 .sum();
-            let leads_on = self.leads_on(id);
-            let short = (END * mass_per_length - mass).max(0.0);
-            let carried = id != self.root && !leads_on && self.is_end(id);
-            let mass = if carried { mass + short } else { mass };
+            let least = if self.is_moved(id) {
+                SHORTEST * mass_per_length
+            } else {
+                0.0
+            };
+            let mass = mass.max(least);
             self.links[id.index()].inertial = (mass > 0.0).then(|| Inertial {
                 mass,
                 center_of_mass: Point3::from(moment / mass),
@@ -107,7 +110,7 @@ impl RobotModel {
     }
 
     /// Whether a joint that moves carries the link itself.
-    fn is_end(&self, id: LinkId) -> bool {
+    fn is_moved(&self, id: LinkId) -> bool {
         let joint = self.links[id.index()].parent_joint;
         joint.is_some_and(|j| self.joint(j).kind.axis().is_some())
     }
@@ -142,13 +145,13 @@ mod tests {
             })
         };
         assert_eq!(of("base"), rod(5.0, 0.0, 0.25));
-        assert_eq!(of("pan"), None);
+        assert_eq!(of("pan"), rod(1.0, 0.0, 0.0));
         assert_eq!(of("upper"), rod(4.0, 0.2, 0.0));
         assert_eq!(of("hand"), rod(2.0, 0.1, 0.0));
         assert_eq!(of("flange"), None);
-        assert!((arm.total_mass() - 11.0).abs() < 1e-12);
+        assert!((arm.total_mass() - 12.0).abs() < 1e-12);
         let scaled = arm.clone().with_masses_scaled(2.0);
-        assert!((scaled.total_mass() - 22.0).abs() < 1e-12);
+        assert!((scaled.total_mass() - 24.0).abs() < 1e-12);
         let hand = arm.link_id("hand").expect("there");
         let load = Inertial {
             mass: 2.0,

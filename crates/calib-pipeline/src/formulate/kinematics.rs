@@ -98,7 +98,7 @@ impl Calibration {
     /// The same under known circumstances.
     #[must_use]
     pub fn root_from_link_under(&self, q: &[f64], under: &Conditions) -> Vec<Isometry3<f64>> {
-        let loads = self.masses.under(q, under);
+        let loads = self.masses.under(q, under.torque.as_deref());
         self.model
             .forward_kinematics_with(|joint| self.motion(joint, q, &loads, under))
     }

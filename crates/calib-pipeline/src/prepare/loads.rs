@@ -12,8 +12,6 @@ use calib_profile::{Prior, RobotLoad};
 use calib_urdf::{JointId, LinkId, RobotModel};
 use nalgebra::{Isometry3, Matrix3, Unit, UnitQuaternion, Vector3};
 
-use crate::prepare::conditions::Conditions;
-
 /// What loads the joints of a robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Masses {
@@ -86,13 +84,13 @@ impl Masses {
         &self.loaded
     }
 
-    /// Minus the measured torques about the axes where there are (they say what the joint holds); gravity otherwise, and
-    /// across the axes.
+    /// Minus the torques that the joints were measured to hold about their axes, N m by joint index, where there are; gravity
+    /// otherwise, and across the axes.
     #[must_use]
-    pub fn under(&self, q: &[f64], under: &Conditions) -> Loads {
+    pub fn under(&self, q: &[f64], held: Option<&[f64]>) -> Loads {
         let mut loads = self.at(q);
-        if let Some(torque) = &under.torque {
-            loads.about_axis = torque.iter().map(|held| -held).collect();
+        if let Some(held) = held {
+            loads.about_axis = held.iter().map(|torque| -torque).collect();
         }
         loads
     }

@@ -6,7 +6,7 @@
 //!
 //! M_i is the mass that hangs on link k at the joint i, r_i where: a mass further out acts on the joints before k as if it were
 //! there. The h are all that static postures can tell of the masses (the base inertial parameters of gravity); a single mass or
-//! center cannot be told from them. Their scale is a gauge against the compliances, which the priors of both hold.
+//! center is not among them. Their scale is a gauge against the compliances, which the priors of both hold.
 
 use calib_core::effect::Source;
 use calib_core::{EdgeKind, EffectKind, Parameter, ParameterId, ParameterKind, Share, Unit};
@@ -43,13 +43,16 @@ pub(super) fn free_masses(formulation: &mut Formulation, inputs: &Inputs, rows: 
             rows.iter().map(at).collect()
         })
         .collect();
+    let prior = &inputs.robot.profile.solve.prior;
     let mut seen: Vec<(usize, ParameterId)> = Vec::new();
     for (i, moment) in all.iter().enumerate() {
         let sees = |row: &Vec<f64>| row[i].abs() > UNSEEN;
-        if !tables.iter().flatten().any(sees) {
+        let sigma = masses.moment_sigma(moment.0, prior)[moment.1];
+        // A link without mass, with nothing on it, has none.
+        if sigma <= 0.0 || !tables.iter().flatten().any(sees) {
             continue;
         }
-        let parameter = parameter(inputs, *moment);
+        let parameter = parameter(inputs, *moment, sigma);
         let id = formulation.problem.parameter(parameter);
         formulation.masses.push((*moment, id));
         seen.push((i, id));
@@ -88,12 +91,11 @@ fn loaded_effects(
     found
 }
 
-fn parameter(inputs: &Inputs, (link, axis): FirstMoment) -> Parameter {
+fn parameter(inputs: &Inputs, (link, axis): FirstMoment, sigma: f64) -> Parameter {
     let model = &inputs.robot.model;
     let joint = model.link(link).parent_joint;
     let joint = joint.map(|j| model.joint(j).name.clone());
     let of = joint.as_deref().unwrap_or(&model.link(link).name);
-    let prior = &inputs.robot.profile.solve.prior;
     Parameter {
         name: format!("{of}.first_moment.{}", AXES[axis]),
         joint,
@@ -101,7 +103,7 @@ fn parameter(inputs: &Inputs, (link, axis): FirstMoment) -> Parameter {
         unit: Unit::KilogramMeter,
         nominal: 0.0,
         start: 0.0,
-        prior_sigma: Some(inputs.robot.masses.moment_sigma(link, prior)[axis]),
+        prior_sigma: Some(sigma),
         bounds: None,
         fixed: false,
     }

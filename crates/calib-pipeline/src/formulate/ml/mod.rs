@@ -48,7 +48,7 @@ pub fn state(
             Some(Row {
                 q,
                 under,
-                loads: inputs.robot.masses.under(q, under),
+                loads: inputs.robot.masses.under(q, under.torque.as_deref()),
             })
         })
         .collect();
