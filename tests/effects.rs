@@ -143,7 +143,13 @@ const BACKLASH: f64 = 0.002;
 #[test]
 fn backlash_is_found_and_taken_out_of_the_prediction() {
     // It stays behind: short of where it goes.
-    let effect: Effect = |joint, approach, _| if joint == 2 { -BACKLASH * approach } else { 0.0 };
+    let effect: Effect = |joint, approach, _| {
+        if joint == 2 {
+            -BACKLASH * approach
+        } else {
+            0.0
+        }
+    };
     let without = laboratory(PROFILE, 0.0, effect);
     without.calib(["run", "arm.yaml", "--out", "out"]).expect(1);
     let rejected = without.json("out/report.json");

@@ -103,7 +103,10 @@ fn without_masses_the_loads_are_rods_and_the_report_says_so() {
     let report = ran(&dir);
     let finding = says(&report, "no-masses").expect("masses were assumed");
     assert!(
-        finding["text"].as_str().expect("a text").contains("assumed"),
+        finding["text"]
+            .as_str()
+            .expect("a text")
+            .contains("assumed"),
         "{finding}"
     );
     assert!(rms_m(&report) < NOISE, "{}", rms_m(&report));
@@ -112,7 +115,12 @@ fn without_masses_the_loads_are_rods_and_the_report_says_so() {
     let yaml = dir.read("out/arm.calibrated.calibration.yaml");
     let masses = yaml.split("mass_kg: ").skip(1);
     let total: f64 = masses
-        .map(|m| m.split(',').next().and_then(|m| m.parse().ok()).unwrap_or(0.0))
+        .map(|m| {
+            m.split(',')
+                .next()
+                .and_then(|m| m.parse().ok())
+                .unwrap_or(0.0)
+        })
         .sum();
     assert!(total > 5.0 && total < 30.0, "{total} of {assumed}");
     let (value, sigma) = parameter(&report, "j2.compliance");
@@ -142,7 +150,10 @@ fn a_wall_and_a_payload_load_the_joints_as_the_profile_states_them() {
     assert!(rms_m(&report) < NOISE, "{}", rms_m(&report));
     for (joint, deg) in [("j2", 0.02_f64), ("j3", 0.03)] {
         let (value, sigma) = parameter(&report, &format!("{joint}.compliance"));
-        assert!((value - deg.to_radians()).abs() < 4.0 * sigma, "{joint}: {value} ± {sigma}");
+        assert!(
+            (value - deg.to_radians()).abs() < 4.0 * sigma,
+            "{joint}: {value} ± {sigma}"
+        );
     }
     // On a wall the first joint holds a load.
     parameter(&report, "j1.compliance");
@@ -175,7 +186,11 @@ fn a_stated_stiffness_yields_without_being_estimated() {
     let dir = laboratory((&arm, &stiff), (&arm, &given));
     let report = ran(&dir);
     assert!(rms_m(&report) < NOISE, "{}", rms_m(&report));
-    assert!(rms_m(&without) > 2.0 * rms_m(&report), "{}", rms_m(&without));
+    assert!(
+        rms_m(&without) > 2.0 * rms_m(&report),
+        "{}",
+        rms_m(&without)
+    );
     let registered = |r: &Value| {
         let baseline = &r["verification"]["held_out"]["registration_only"]["rms_m"];
         baseline.as_f64().expect("registered")
@@ -200,7 +215,12 @@ fn free_masses_find_the_proportions_that_rods_do_not_have() {
     let freed = soft.replace(", compliance]", ", compliance, masses]");
     let dir = laboratory((&real, &soft), (&nominal, &freed));
     let report = ran(&dir);
-    assert!(rms_m(&rods) > 2.0 * rms_m(&report), "{} {}", rms_m(&rods), rms_m(&report));
+    assert!(
+        rms_m(&rods) > 2.0 * rms_m(&report),
+        "{} {}",
+        rms_m(&rods),
+        rms_m(&report)
+    );
     assert!(rms_m(&report) < NOISE, "{}", rms_m(&report));
     let found = report["parameters"].as_array().expect("a list");
     let moments = found.iter().filter(|p| p["kind"] == "first_moment");

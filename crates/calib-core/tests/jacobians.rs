@@ -5,8 +5,8 @@ mod common;
 use calib_core::effect::Source;
 use calib_core::{
     Axis, Chart, DirectionObservation, EffectKind, MarkerObservation, Measurement, MeasurementKind,
-    Model, NoiseKind, Parameter, ParameterKind, PoseNoise, PoseObservation, Problem, Share, Unit, Values,
-    measurement,
+    Model, NoiseKind, Parameter, ParameterKind, PoseNoise, PoseObservation, Problem, Share, Unit,
+    Values, measurement,
 };
 use common::{axis, central, jitter, normal, normal3, pose, rng};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector6};

@@ -62,8 +62,14 @@ fn the_estimate_without_its_bound_is_known_on_the_bound() {
     for without in found {
         let free = &inside.parameters[without.parameter.index()];
         let sigma = free.sigma.expect("determined");
-        assert!((without.value - free.value).abs() < 0.2 * sigma, "{without:?} {free:?}");
-        assert!((without.sigma / sigma - 1.0).abs() < 0.1, "{without:?} {free:?}");
+        assert!(
+            (without.value - free.value).abs() < 0.2 * sigma,
+            "{without:?} {free:?}"
+        );
+        assert!(
+            (without.sigma / sigma - 1.0).abs() < 0.1,
+            "{without:?} {free:?}"
+        );
     }
 }
 

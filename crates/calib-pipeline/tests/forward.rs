@@ -109,7 +109,15 @@ fn add_joint(
     let axis = motion_axis(model, joint).expect("it moves");
     let states: Vec<JointState> = rows
         .iter()
-        .map(|(q, under)| joint_state(model, joint, q, &robot.masses.under(q, under.torque.as_deref()), under))
+        .map(|(q, under)| {
+            joint_state(
+                model,
+                joint,
+                q,
+                &robot.masses.under(q, under.torque.as_deref()),
+                under,
+            )
+        })
         .collect();
     let q = states.iter().map(|s| s.q).collect();
     let edge = p.joint(&j.name, origin, child, axis, q);

@@ -34,8 +34,8 @@ pub use profile::{
     Body, BodyKind, Clocks, Contact, ContactBase, Error3, Free, FreeEffect, JointException,
     JointFree, JointFreeSet, Limits, LinkTransform, Load, Loop, Method, Noise, Orientation, Origin,
     OriginFreeSet, Outputs, ParameterValue, Plugin, PointChoice, Prior, Profile, Protocol,
-    RecordingSpec, RobotLoad, RobotLog, SimErrors, SimMount, SimNoise, Simulation, Solve, Split, Steps,
-    SweptAxis, TimedPoses, Timing, Tip, Touched, Tracker, UpAxis, Usage,
+    RecordingSpec, RobotLoad, RobotLog, SimErrors, SimMount, SimNoise, Simulation, Solve, Split,
+    Steps, SweptAxis, TimedPoses, Timing, Tip, Touched, Tracker, UpAxis, Usage,
 };
 pub use schema::json_schema;
 

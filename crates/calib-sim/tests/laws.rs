@@ -31,7 +31,10 @@ fn an_arm_that_gives_way_sags() {
     plan.errors.compliance = compliance;
     let up = plan.tracker_from_root * nalgebra::Vector3::z();
     let soft = seen(&profile);
-    let (stiff, soft) = (&stiff.recordings["arm_poses"], &soft.recordings["arm_poses"]);
+    let (stiff, soft) = (
+        &stiff.recordings["arm_poses"],
+        &soft.recordings["arm_poses"],
+    );
     let heights = stiff.bodies["haT"].iter().zip(&soft.bodies["haT"]);
     let sags: Vec<f64> = heights
         .map(|(stiff, soft)| {

@@ -77,7 +77,11 @@ fn check_joint(name: &str, joint: &Joint, samples: usize) -> Result<(), Error> {
         }
         for share in &f.shares {
             let label = f.kind.label();
-            series(&format!("{name}.{label} by a share"), &share.values, samples)?;
+            series(
+                &format!("{name}.{label} by a share"),
+                &share.values,
+                samples,
+            )?;
         }
     }
     joint

@@ -28,11 +28,7 @@ impl Edge {
             EdgeKind::Joint(j) => EdgeKind::Joint(Joint {
                 axis: j.axis,
                 q: Vec::new(),
-                effects: j
-                    .effects
-                    .iter()
-                    .map(JointEffect::clone_shallow)
-                    .collect(),
+                effects: j.effects.iter().map(JointEffect::clone_shallow).collect(),
                 candidates: Vec::new(),
                 noise: j.noise,
             }),

@@ -76,10 +76,12 @@ impl EdgeCache {
         {
             return JointMotion::shifted(joint.axis, reading, constant);
         }
-        let amounts = joint
-            .effects
-            .iter()
-            .map(|f| (f.lateral, f.value(sample, &values.0) * values.0[f.parameter.index()]));
+        let amounts = joint.effects.iter().map(|f| {
+            (
+                f.lateral,
+                f.value(sample, &values.0) * values.0[f.parameter.index()],
+            )
+        });
         JointMotion::sum(joint.axis, joint.q[sample], amounts)
     }
 

@@ -14,9 +14,9 @@ use calib_geometry::{Twist, so3};
 use crate::analysis::solution::Solution;
 use crate::analysis::spread::LinearPoint;
 use crate::analysis::untested::MovedPoint;
+use crate::graph::edge::EdgeKind;
 #[cfg(doc)]
 use crate::graph::edge::JointEffect;
-use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{EffectKind, JointState};
 use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId, PointId};

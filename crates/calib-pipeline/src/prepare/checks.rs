@@ -65,7 +65,12 @@ fn no_masses(inputs: &Inputs) -> Option<Finding> {
         Free::Effect(effect) => Some(*effect),
         _ => None,
     });
-    let own = profile.solve.joints.values().flat_map(|j| &j.free).flatten();
+    let own = profile
+        .solve
+        .joints
+        .values()
+        .flat_map(|j| &j.free)
+        .flatten();
     let own = own.filter_map(|f| match f {
         JointFree::Effect(effect) => Some(*effect),
         _ => None,

@@ -226,9 +226,7 @@ impl Frame {
         Some(Self {
             origin: root_from_joint.translation.vector,
             axis: root_from_joint.rotation * axis.into_inner(),
-            across: Axis::Revolute(axis)
-                .across()
-                .map(|e| root_from_child * e),
+            across: Axis::Revolute(axis).across().map(|e| root_from_child * e),
         })
     }
 }

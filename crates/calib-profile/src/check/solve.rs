@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::profile::{JointException, Limits, Noise, Prior, Solve};
-use crate::raw::{ANGLE, MASS, MASS_CENTER, POSITION, PRIOR_KEYS, RawJointSolve, RawLimits, RawPrior, RawSolve};
+use crate::raw::{
+    ANGLE, MASS, MASS_CENTER, POSITION, PRIOR_KEYS, RawJointSolve, RawLimits, RawPrior, RawSolve,
+};
 use calib_core::effect::PriorKey;
 
 impl Checker<'_> {
