@@ -129,6 +129,36 @@ const WRONG: &[(&str, &str, &str, &str)] = &[
     ),
     ("use: sweep", "use: validation", "arm.yaml:9:", "held out"),
     (
+        "urdf: arm.urdf}",
+        "urdf: arm.urdf, gravity: [0, 0, 0]}",
+        "arm.yaml:2:",
+        "no direction",
+    ),
+    (
+        "urdf: arm.urdf}",
+        "urdf: arm.urdf, payload: {tup: {mass_kg: 2}}}",
+        "arm.yaml:2:",
+        "did you mean `tip`?",
+    ),
+    (
+        "urdf: arm.urdf}",
+        "urdf: arm.urdf, total_mass_kg: -4}",
+        "arm.yaml:2:",
+        "-4 is not a mass",
+    ),
+    (
+        "urdf: arm.urdf}",
+        "urdf: arm.urdf, stiffness_nm_per_rad: {rail: 9000}}",
+        "arm.yaml:2:",
+        "does not turn",
+    ),
+    (
+        "urdf: arm.urdf}",
+        "urdf: arm.urdf}\nsolve: {free: [bodies, tracker, masses]}",
+        "arm.yaml:3:",
+        "no joint yields",
+    ),
+    (
         "frame: world",
         "frme: world",
         "arm.yaml:3:",

@@ -3,9 +3,10 @@
 use super::*;
 use crate::profile::{JointException, Limits, Noise, Prior, Solve};
 use crate::raw::{
-    ANGLE, MASS, MASS_CENTER, POSITION, PRIOR_KEYS, RawJointSolve, RawLimits, RawPrior, RawSolve,
+    ANGLE, MASS, MASS_CENTER, POSITION, PRIOR_KEYS, RawFree, RawJointFree, RawJointSolve,
+    RawLimits, RawPrior, RawSolve,
 };
-use calib_core::effect::PriorKey;
+use calib_core::effect::{Effect, PriorKey, Source};
 
 impl Checker<'_> {
     pub(super) fn solve(&mut self, raw: &RawSolve) -> Solve {
@@ -18,6 +19,7 @@ impl Checker<'_> {
             let exception = self.exception(name, exception);
             joints.insert(joint, exception);
         }
+        self.masses_load_something(raw);
         let prior = self.prior(&raw.prior);
         if let Some(sigma) = raw.noise.joint_deg {
             self.not_negative(&["solve", "noise", "joint_deg"], sigma);
@@ -35,6 +37,31 @@ impl Checker<'_> {
             load: raw.load,
             robust: raw.robust,
             limits,
+        }
+    }
+
+    /// Masses show by what yields to them.
+    fn masses_load_something(&mut self, raw: &RawSolve) {
+        if !raw.free.contains(&RawFree::Masses) || !self.raw.robot.stiffness_nm_per_rad.is_empty() {
+            return;
+        }
+        let by_load = |effect: &Effect| effect.terms.iter().any(|t| t.source == Source::Load);
+        let all = raw.free.iter();
+        let all = all.filter_map(|free| match free {
+            RawFree::Effect(effect) => Some(*effect),
+            _ => None,
+        });
+        let own = raw.joints.values().flat_map(|j| &j.free).flatten();
+        let own = own.filter_map(|free| match free {
+            RawJointFree::Effect(effect) => Some(*effect),
+            _ => None,
+        });
+        if !all.chain(own).any(by_load) {
+            self.problem(
+                &["solve", "free"],
+                "`masses` is free, and no joint yields to its load",
+                "free `compliance` or `lateral_compliance` too, or state `robot.stiffness_nm_per_rad`",
+            );
         }
     }
 
