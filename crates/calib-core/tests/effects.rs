@@ -4,8 +4,8 @@ mod common;
 
 use calib_core::effect::Effect;
 use calib_core::{
-    Axis, Chart, EFFECTS, EffectKind, JointMotion, JointState, NoiseKind, Parameter, ParameterKind,
-    PoseNoise, PoseObservation, Problem, Settings, Share, Unit, solve,
+    Axis, Chart, EFFECTS, EffectKind, Gauge, JointMotion, JointState, NoiseKind, Parameter,
+    ParameterKind, PoseNoise, PoseObservation, Problem, Settings, Share, Unit, solve,
 };
 use common::{axis, jitter, normal, pose, rng};
 use rand::RngExt;
@@ -158,6 +158,55 @@ fn yielding(seed: u64) -> [f64; 3] {
         (value(id) - truth) / sigma
     };
     [z(c, SOFT), z(moments[0], truth[0]), z(moments[1], truth[1])]
+}
+
+/// Without priors and with nothing known of the masses only the products are determined, and the null space says so.
+#[test]
+fn the_common_scale_of_masses_and_compliances_is_named() {
+    let mut p = Problem::new(30);
+    let mut r = rng(3);
+    let (a, b) = (p.frame("a"), p.frame("b"));
+    let lever: Vec<f64> = (0..30).map(|_| r.random_range(-9.81..9.81)).collect();
+    let q: Vec<f64> = lever.iter().map(|l| 0.1 * l).collect();
+    let motion = Axis::Revolute(axis(0.0, 1.0, 0.0));
+    let joint = p.joint("joint", a, b, motion, q.clone());
+    let kind = EffectKind::TorqueCompliance;
+    let c = p.free_effect_with(joint, kind, vec![0.0; 30], None);
+    p.parameter_mut(c).start = 2e-3;
+    let moment = p.parameter(Parameter {
+        name: "moment".to_owned(),
+        joint: None,
+        kind: ParameterKind::Load,
+        unit: Unit::KilogramMeter,
+        nominal: 1.0,
+        start: 1.0,
+        prior_sigma: None,
+        bounds: None,
+        fixed: false,
+    });
+    let share = Share {
+        parameter: moment,
+        values: lever.clone(),
+    };
+    p.follow(joint, kind, vec![share]);
+    let observations = (0..30)
+        .map(|s| {
+            let moved = JointMotion::new(motion, q[s], [(kind, 3e-3 * lever[s])]);
+            let pose = moved.joint_from_child() * jitter(&mut r, NOISE, NOISE);
+            PoseObservation { sample: s, pose }
+        })
+        .collect();
+    let noise = PoseNoise::Split {
+        orientation: p.noise_group("orientation", NoiseKind::Orientation, NOISE, false),
+        position: p.noise_group("position", NoiseKind::Position, NOISE, false),
+    };
+    p.poses("body", a, b, noise, observations);
+    let solution = solve(&p, &Settings::plain()).expect("a problem");
+    let value = |id: calib_core::ParameterId| solution.parameters[id.index()].value;
+    assert!((value(c) * value(moment) - 3e-3).abs() < 1e-5);
+    let null = &solution.observability.null;
+    assert_eq!(null.len(), 1);
+    assert_eq!(null[0].gauge, Gauge::LoadsAgainstCompliances);
 }
 
 #[test]

@@ -165,6 +165,8 @@ pub enum Cause {
     WorldAgainstTool,
     /// A gain and a length.
     Scale,
+    /// Masses and the compliances that yield to them.
+    LoadsAgainstCompliances,
     /// A contact and what it touches.
     TableAgainstContact,
     /// A combination without a name.

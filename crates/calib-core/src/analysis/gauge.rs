@@ -41,6 +41,8 @@ pub enum Gauge {
     WorldAgainstTool,
     /// A gain or coupling is the same as a length: no length is known.
     Scale,
+    /// Masses and the compliances that yield to them: only products of both act.
+    LoadsAgainstCompliances,
     /// A plane, table or contact moves against another.
     TableAgainstContact,
     /// A combination without a name.
@@ -196,6 +198,9 @@ pub(crate) fn classify(model: &Model, places: &[Place], axes: &Axes, columns: &[
     let rotates = || columns.iter().any(|c| kind(c) == ParameterKind::Rotation);
     if columns.len() == 1 && parts.points.is_empty() && parts.mounts.is_empty() {
         return Gauge::NotMeasured;
+    }
+    if columns.iter().any(|c| kind(c) == ParameterKind::Load) {
+        return Gauge::LoadsAgainstCompliances;
     }
     if !parts.others.is_empty() {
         return Gauge::TableAgainstContact;

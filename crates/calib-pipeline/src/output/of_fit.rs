@@ -103,6 +103,7 @@ fn cause(gauge: Gauge) -> Cause {
         Gauge::MarkersAgainstMount => Cause::MarkersAgainstMount,
         Gauge::WorldAgainstTool => Cause::WorldAgainstTool,
         Gauge::Scale => Cause::Scale,
+        Gauge::LoadsAgainstCompliances => Cause::LoadsAgainstCompliances,
         Gauge::TableAgainstContact => Cause::TableAgainstContact,
         Gauge::Unnamed => Cause::Combination,
     }

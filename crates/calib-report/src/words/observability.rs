@@ -160,6 +160,9 @@ impl Cause {
                 "the joints that moved do not separate the pose of the tracker from the mount of the body"
             }
             Self::Scale => "a length and a gain have the same effect; no length is known",
+            Self::LoadsAgainstCompliances => {
+                "the measurements determine products of masses and compliances, not each of them"
+            }
             Self::TableAgainstContact => "the contacts determine only their difference",
             Self::Combination | Self::Unstated => {
                 "the measurements determine only their combination"
@@ -197,6 +200,9 @@ impl Cause {
             }
             Self::WorldAgainstTool => "Move more joints, with axes that are not parallel.",
             Self::Scale => "Provide one length: a known marker distance or a known origin.",
+            Self::LoadsAgainstCompliances => {
+                "State what is known: a mass, a payload or a stiffness; or record postures in which the loads differ more."
+            }
             Self::TableAgainstContact => "Measure the table or the contact point separately once.",
             Self::Combination | Self::Unstated => {
                 "Fix one of them, or add motion of the joints between them."
