@@ -12,11 +12,20 @@
 //! step and the standard error of σ, and is exact for one group. The second form of (2) needs one sum
 //! over the samples like the normal equations, no product over pairs of rows. Scoring runs on log θ, so a
 //! variance stays positive.
+//!
+//! With about as many unknowns as measurements, (1) is nearly flat in the noise of the tracker, and often rises to σ = 0: residuals
+//! that the unknowns have taken up altogether say nothing of it. What is stated of a tracker is then all that is known, and it is
+//! seldom much too large. Below β times the stated σ₀ a log-normal prior holds it, which the data soon outweigh:
+//!
+//! ```text
+//! score_g ← score_g − u/s²,   fisher_gg ← fisher_gg + 1/s²,   u = log(θ_g / (β σ₀)²) < 0        (4)
+//! ```
 
 use nalgebra::{DMatrix, DVector};
 
 use calib_geometry::decompose::{solve_least_squares, symmetric_eigen};
 
+use crate::graph::problem::{NoiseGroup, NoiseKind};
 use crate::model::values::Values;
 use crate::solve::components::{Sums, sums};
 use crate::solve::equations::{Objective, Workspace};
@@ -24,6 +33,10 @@ use crate::solve::whitened::covariance_of;
 
 /// A σ may fall to this fraction of the stated one before it counts as zero.
 const FLOOR: f64 = 1e-3;
+/// β of equation (4): trackers are up to twice as good as their data sheets say…
+const BETTER: f64 = 0.5;
+/// …and s: better by a factor of e in σ² beyond that once in three times.
+const SPREAD: f64 = 1.0;
 /// Largest change of log θ in one step: a factor of 7 in variance.
 const MAX_STEP: f64 = 2.0;
 
@@ -58,10 +71,15 @@ pub(crate) fn score(
     }
     let sums = sums(objective, values, &groups, work)?;
     let c = covariance_of(&sums.normal_equations(model, values))?;
-    let (gradient, fisher) = gradient_and_fisher(&sums, &c);
+    let (mut gradient, mut fisher) = gradient_and_fisher(&sums, &c);
+    let relative = relative_sigmas(&fisher);
+    for (i, &g) in groups.iter().enumerate() {
+        let (slope, information) = expectation(&model.problem.groups[g], theta[g]);
+        gradient[i] += slope;
+        fisher[(i, i)] += information;
+    }
     // Two groups that the data cannot distinguish make (3) singular: least squares shares the step.
     let solved = solve_least_squares(&fisher, &gradient, 1e-10);
-    let relative = relative_sigmas(&fisher);
     for (i, &g) in groups.iter().enumerate() {
         let step = if solved.x[i].is_finite() {
             solved.x[i].clamp(-MAX_STEP, MAX_STEP)
@@ -75,6 +93,18 @@ pub(crate) fn score(
         out.relative_sigma[g] = relative[i];
     }
     Some(out)
+}
+
+/// Slope and information of equation (4).
+fn expectation(group: &NoiseGroup, theta: f64) -> (f64, f64) {
+    if !matches!(group.kind, NoiseKind::Position | NoiseKind::Orientation) {
+        return (0.0, 0.0);
+    }
+    let below = (theta / (BETTER * group.sigma).powi(2)).ln();
+    if below >= 0.0 {
+        return (0.0, 0.0);
+    }
+    (-below / (SPREAD * SPREAD), 1.0 / (SPREAD * SPREAD))
 }
 
 /// Equations (2) and (3) for log θ. The sums are 1/θ too large in every factor: exactly the chain rule to log θ.
