@@ -6,7 +6,8 @@ mod common;
 use std::collections::BTreeSet;
 
 use calib_core::{
-    Configuration, MovedPoint, Moves, OpenErrors, Settings, Solution, Target, UntestedEffect, solve,
+    Configuration, MovedPoint, Moves, NoiseKind, OpenErrors, Settings, Solution, Target,
+    UntestedEffect, solve,
 };
 use common::*;
 
@@ -28,6 +29,11 @@ struct Rig {
 
 /// A robot off by the priors of the fit, with a gain that the fit does not know.
 fn rig(seed: u64, gain: f64) -> Rig {
+    rig_with(seed, gain, None)
+}
+
+/// The same, with joints that the fit knows to be noisy.
+fn rig_with(seed: u64, gain: f64, joints: Option<f64>) -> Rig {
     let mut r = rng(seed);
     let mut free = Free::everything(6);
     free.prior = Some((0.005, 0.002));
@@ -36,10 +42,19 @@ fn rig(seed: u64, gain: f64) -> Rig {
     let gain = gain * normal(&mut r);
     let mut handles = chain.problem(&free, SIGMA);
     handles.problem.group_mut(handles.markers).estimate = false;
+    if let Some(sigma) = joints {
+        let p = &mut handles.problem;
+        let noise = p.noise_group("joints", NoiseKind::Joint, sigma, false);
+        handles.joints.iter().for_each(|j| p.joint_noise(*j, noise));
+    }
     let q = chain.q.clone();
+    let noise: Vec<[f64; 6]> = q
+        .iter()
+        .map(|_| [0.0; 6].map(|_: f64| joints.map_or(0.0, |sigma| sigma * normal(&mut r))))
+        .collect();
     let extra = |s: usize| {
         let moved = |j: usize| if j == JOINT { gain * q[s][j] } else { 0.0 };
-        (0..6).map(moved).collect()
+        (0..6).map(|j| moved(j) + noise[s][j]).collect()
     };
     chain.observe_moved(&mut r, &mut handles, SIGMA, extra);
     handles.problem.held_out = (FITTED..FITTED + HELD_OUT).collect();
@@ -85,13 +100,18 @@ fn open(rig: &Rig, looked_at: &[usize]) -> OpenErrors {
 
 /// Mean square of what the fit predicts less the truth, m².
 fn truth(rig: &Rig) -> f64 {
+    truth_with(rig, || 0.0)
+}
+
+/// The same where the joints stop at readings that are off by `noise`.
+fn truth_with(rig: &Rig, mut noise: impl FnMut() -> f64) -> f64 {
     let h = &rig.handles;
     let squares = postures().into_iter().map(|q| {
         let joints = h.joints.iter().zip(&q);
         let at = joints.fold(Configuration::zero(), |at, (j, q)| at.with(*j, *q));
         let found = rig.solution.relative_pose(h.tracker, h.body, &at);
-        let mut extra = [0.0; 6];
-        extra[JOINT] = rig.gain * q[JOINT];
+        let mut extra = [0.0; 6].map(|_: f64| noise());
+        extra[JOINT] += rig.gain * q[JOINT];
         let true_pose = rig.chain.tracker_from_body(&q, &extra);
         let found = found.expect("a path").pose.translation.vector;
         (found - true_pose.translation.vector).norm_squared()
@@ -145,6 +165,37 @@ fn without_an_effect_the_parameters_alone_are_left() {
         assert!(sigma(&with_held_out) < GAIN);
     }
     assert!((0.7..1.4).contains(&(found / expected)));
+}
+
+#[test]
+fn a_prediction_carries_what_the_joints_do_from_pose_to_pose() {
+    const JOINTS: f64 = 1e-3;
+    let all: Vec<usize> = (0..FITTED + HELD_OUT).collect();
+    let (mut found, mut expected, mut joints, mut covered) = (0.0, 0.0, 0.0, 0);
+    const ROBOTS: u64 = 40;
+    for seed in 400..400 + ROBOTS {
+        let rig = rig_with(seed, 0.0, Some(JOINTS));
+        let mut r = rng(seed + 7000);
+        let (open, error) = (
+            open(&rig, &all),
+            truth_with(&rig, || JOINTS * normal(&mut r)),
+        );
+        found += error;
+        expected += open.alone.rms.powi(2);
+        joints += open.joints.powi(2);
+        covered += usize::from(error.sqrt() <= open.alone.upper);
+        assert!(open.joints < open.alone.rms && open.joints < open.with[0].rms);
+    }
+    assert!(
+        (0.75..1.33).contains(&(found / expected)),
+        "{}",
+        found / expected
+    );
+    // The parameters alone explain two thirds of it at most.
+    assert!(joints / expected > 0.33, "{}", joints / expected);
+    assert!(covered >= 36, "{covered}");
+    let none = open(&rig(1, 0.0), &all).joints;
+    assert!(none == 0.0);
 }
 
 #[test]

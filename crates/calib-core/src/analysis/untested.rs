@@ -8,12 +8,14 @@
 //! v = 1 / (Σ aᵀV⁻¹a − bᵀH⁻¹b + s⁻²),   ĉ = −v (Σ aᵀV⁻¹e − bᵀH⁻¹g)                               (2)
 //! u_m = G_m (δ − H⁻¹g) + (d_m − G_m H⁻¹b) c,   δ ~ N(0, H⁻¹),   c ~ N(ĉ, v)                       (3)
 //! R² = 1/M Σ_m |u_m|²,   E = tr S + |μ|²,   Var = 2 tr S² + 4 μᵀSμ                               (4)
+//! J² = 1/M Σ_m Σ_j θ_j |∂p_m/∂q_j|²                                                              (5)
 //! ```
 //!
 //! u_m is how far the truth is from what is stated at posture m: what the parameters leave open, what the effect does there
 //! less what the fit made of it. μ and S are mean and covariance of all u_m/√M. R² is taken as a multiple of χ² with
 //! 2E²/Var degrees of freedom, and of F where the noise itself was estimated. One effect at a time: two at once are rare, and each bounds what the
-//! other could hide.
+//! other could hide. What the joints do from pose to pose (5), θ as found, is added to every E: it is what a prediction meets, and
+//! what is not in the model and was taken for noise of the joints is in it.
 
 use std::collections::BTreeMap;
 
@@ -21,6 +23,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 
 use crate::analysis::solution::Solution;
 use crate::analysis::spread::LinearPoint;
+use crate::graph::edge::EdgeKind;
 use crate::graph::ids::{EdgeId, FrameId};
 use crate::model::cache::State;
 use crate::model::pose::Pose;
@@ -82,6 +85,8 @@ impl MovedPoint {
 pub struct OpenErrors {
     /// What the fit states, rms, m: √(1/M Σ_m tr(G_m C G_mᵀ)).
     pub stated: f64,
+    /// By the joints' noise from pose to pose, rms, m: J of equation (5). It is in the errors below.
+    pub joints: f64,
     /// By the parameters alone.
     pub alone: OpenError,
     /// With each cause, in the order in which they were given.
@@ -118,6 +123,8 @@ struct Common {
     freedom: f64,
     /// What the fit states.
     stated: f64,
+    /// Mean and variance of what the joints do from pose to pose, m² and m⁴.
+    joints: (f64, f64),
 }
 
 impl Common {
@@ -134,8 +141,9 @@ impl Common {
             }
             along += d.dot(mu).powi(2);
         }
-        let mean = self.level * trace + mu.norm_squared();
-        let variance = 2.0 * self.level.powi(2) * squares + 4.0 * self.level * along;
+        let (joints, spread) = self.joints;
+        let mean = self.level * trace + mu.norm_squared() + joints;
+        let variance = 2.0 * self.level.powi(2) * squares + 4.0 * self.level * along + spread;
         (mean, variance)
     }
 
@@ -241,6 +249,7 @@ impl Solution {
         }
         let mut out = OpenErrors {
             stated: common.stated,
+            joints: common.joints.0.sqrt(),
             alone: common.open(&mu, &[]),
             with: Vec::new(),
             sizes: Vec::new(),
@@ -292,7 +301,27 @@ impl Solution {
             level: if level.is_finite() { level } else { 1.0 },
             freedom: self.degrees_of_freedom,
             stated: stated.max(0.0).sqrt(),
+            joints: self.joints(postures),
         })
+    }
+
+    /// Equation (5): its mean, and at most its variance, every posture for itself.
+    fn joints(&self, postures: &[MovedPoint]) -> (f64, f64) {
+        let noise = |joint: &EdgeId| match &self.model.problem.edges[joint.index()].kind {
+            EdgeKind::Joint(j) => j.noise.map_or(0.0, |group| self.theta[group.index()]),
+            _ => 0.0,
+        };
+        let of = |posture: &MovedPoint| -> f64 {
+            let by = posture.by.iter();
+            by.map(|(joint, by)| noise(joint) * by.norm_squared()).sum()
+        };
+        let count = postures.len() as f64;
+        let of: Vec<f64> = postures.iter().map(of).collect();
+        let squares: f64 = of.iter().map(|x| x * x).sum();
+        (
+            of.iter().sum::<f64>() / count,
+            2.0 * squares / (count * count),
+        )
     }
 
     /// a of equation (1) for every effect at one sample, not whitened.

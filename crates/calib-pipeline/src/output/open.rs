@@ -78,6 +78,7 @@ pub(crate) fn prediction(
         .max_by(|a, b| a.1.upper.total_cmp(&b.1.upper));
     Some(Prediction {
         stated: found.stated,
+        joints: found.joints,
         alone: predicted(&found.alone),
         with: worst.map(|(name, with)| (name, predicted(with))),
     })

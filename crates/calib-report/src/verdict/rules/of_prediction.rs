@@ -97,7 +97,9 @@ pub(super) fn uncertainty(facts: &Facts) -> Vec<Reason> {
     let Some(prediction) = &facts.prediction else {
         return Vec::new();
     };
-    let far = |with: &Predicted| with.rms > TOO_SMALL * prediction.stated;
+    // What the joints do from pose to pose is stated as their noise.
+    let of_fit = (TOO_SMALL * prediction.stated).hypot(prediction.joints);
+    let far = |with: &Predicted| with.rms > of_fit;
     let found = prediction.with.iter().filter(|(_, with)| far(with));
     let reason = |with: &Predicted| {
         Reason::new(ReasonId::UncertaintyTooSmall, unless_measured(facts))
