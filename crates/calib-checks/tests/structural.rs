@@ -405,6 +405,29 @@ fn study_of_gains_and_pairs() {
     }
 }
 
+/// Outliers of 10 to 100 mm hide among nominal errors of 5 mm until the geometry is fitted; a gain is no outlier.
+#[test]
+fn outliers_beside_large_nominal_errors_are_no_gain() {
+    let factor = 1.05;
+    let (mut clean, mut seen) = (0, 0);
+    const ROBOTS: u64 = 40;
+    for seed in 700_000..700_000 + ROBOTS {
+        let setting = Setting::new(seed, Plan::Sweeps, BodyKind::Markers(1), BIG);
+        let data = setting.data(true);
+        let of = |data: Data| explain(&with_outliers(data, 0.03, seed), &options()).unwrap();
+        clean += usize::from(of(data.clone()).continuous.is_some());
+        let joint = JointIndex(setting.nominal.joints().len() / 2);
+        let gain = Scoped {
+            hypothesis: Hypothesis::Gain { joint, factor },
+            scope: Scope::All,
+        };
+        let found = of(with_fault(&setting, &data, &gain)).continuous;
+        seen += usize::from(found.is_some());
+    }
+    assert!(clean <= 1, "{clean} of {ROBOTS}");
+    assert!(seen >= 24, "{seen} of {ROBOTS}");
+}
+
 #[test]
 #[ignore = "study: minutes"]
 fn study_of_single_faults() {

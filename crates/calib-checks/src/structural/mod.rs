@@ -61,6 +61,7 @@ mod ids;
 mod linear;
 mod moments;
 mod outcome;
+mod registration;
 mod rotation;
 mod rows;
 mod scan;
@@ -80,5 +81,6 @@ pub use hypothesis::{
 };
 pub use ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex, SampleIndex};
 pub use outcome::{Correction, Decision, Design, Evidence, Expected, Named, Options, Outcome};
+pub use registration::{PointRows, Registered, registration};
 pub use rows::{Deviation, Deviations, deviations};
 pub use thinning::thin;

@@ -167,6 +167,11 @@ impl Normal {
         (reduced, h_qc, inverse, g_c)
     }
 
+    /// The cost at a rotation, with c eliminated.
+    pub(crate) fn at(&self, q: &Matrix3<f64>) -> f64 {
+        self.reduced().0.at(&super::rotation::vec9(q))
+    }
+
     /// Eliminates c and minimizes over the rotations.
     pub(crate) fn solve(&self) -> Registration {
         let (reduced, h_qc, inverse, g_c) = self.reduced();

@@ -24,7 +24,8 @@ pub(crate) struct Quadratic {
 }
 
 impl Quadratic {
-    fn at(&self, q: &Vec9) -> f64 {
+    /// f at a rotation.
+    pub(crate) fn at(&self, q: &Vec9) -> f64 {
         q.dot(&(self.a * q + self.b * 2.0)) + self.d
     }
 

@@ -8,10 +8,12 @@
 //! z_i = R (R_i p + t_i) + t          linear in R, t and B_jkl = R_jk p_l                      (1)
 //! ```
 //!
-//! Three small least-squares problems (one per coordinate of z) give R (projected onto SO(3)), t and p.
+//! Three small least-squares problems (one per coordinate of z) give R (projected onto SO(3)), t and p. Few rows leave (1) open; where
+//! the least residual over all rotations is much smaller, that rotation is taken.
 
 use std::collections::BTreeMap;
 
+use calib_checks::structural::{PointRows, registration};
 use calib_geometry::decompose::solve_least_squares;
 use calib_geometry::{mean, so3};
 use calib_profile::{BodyKind, Usage};
@@ -41,6 +43,12 @@ struct Tracked {
 
 /// Relative singular value under which (1) leaves a direction open; LM decides about it later.
 const RANK: f64 = 1e-8;
+
+/// Arm at which the orientation of a body counts beside its position, m: bodies are about as large.
+const ARM: f64 = 0.1;
+
+/// The linear start is kept up to this many times the least residual: the fit's own steps find the way from there.
+const MUCH: f64 = 2.0;
 
 /// Start values from all fitted recordings.
 #[must_use]
@@ -157,6 +165,8 @@ fn from_known_mounts(
 
 fn from_points(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Isometry3<f64> {
     let mut tracked = Vec::new();
+    // A pose counts as its position and the ends of three arms.
+    let mut points: Vec<PointRows> = Vec::new();
     for (name, body) in &inputs.robot.profile.bodies {
         match &body.kind {
             BodyKind::Markers { names, .. } if tracks[name].template.is_none() => {
@@ -167,17 +177,25 @@ fn from_points(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Isometr
                 );
             }
             _ => {
-                let rows =
-                    body_rows(inputs, &tracks[name], body.link).map(|(root_from_link, body)| {
+                let rows: PointRows = body_rows(inputs, &tracks[name], body.link)
+                    .map(|(root_from_link, body)| {
                         (root_from_link, Point3::from(body.translation.vector))
-                    });
-                tracked.push(Tracked {
-                    rows: rows.collect(),
-                });
+                    })
+                    .collect();
+                for axis in 0..3 {
+                    let arm = Point3::from(Vector3::ith(axis, ARM));
+                    let rows = body_rows(inputs, &tracks[name], body.link);
+                    points.push(rows.map(|(link, body)| (link, body * arm)).collect());
+                }
+                tracked.push(Tracked { rows });
             }
         }
     }
-    solve_points(&tracked).unwrap_or_else(Isometry3::identity)
+    let linear = solve_points(&tracked).unwrap_or_else(Isometry3::identity);
+    points.extend(tracked.into_iter().map(|t| t.rows));
+    let best = registration(&points, &linear);
+    let best = best.filter(|found| found.rms_of_other > MUCH * found.rms);
+    best.map_or(linear, |found| found.tracker_from_root)
 }
 
 /// Eq. (1) over all tracked points, which share R and t.
