@@ -60,15 +60,7 @@ impl Case {
             readings.push((LAST, held_out));
         }
         let evaluated = random(&robot, EVALUATED, noise);
-        let markers = (0..cell.body.markers())
-            .map(|_| {
-                Point3::new(
-                    noise.between(-0.06, 0.06),
-                    noise.between(-0.06, 0.06),
-                    noise.between(-0.06, 0.06),
-                )
-            })
-            .collect();
+        let markers = markers(cell.body.markers(), noise);
         let (side, off) = (
             noise.between(0.0, std::f64::consts::TAU),
             noise.between(0.05, 0.12),
@@ -352,6 +344,30 @@ impl Case {
 
 /// Largest rms error that the profiles of the study accept, mm.
 pub(crate) const LIMIT_MM: f64 = 2.0;
+
+/// Markers of a body: three are never mounted on a line.
+fn markers(count: usize, noise: &mut Noise) -> Vec<Point3<f64>> {
+    /// Least distance of the third marker from the line through the first two, m.
+    const OFF_THE_LINE: f64 = 0.005;
+    loop {
+        let markers: Vec<Point3<f64>> = (0..count)
+            .map(|_| {
+                Point3::new(
+                    noise.between(-0.06, 0.06),
+                    noise.between(-0.06, 0.06),
+                    noise.between(-0.06, 0.06),
+                )
+            })
+            .collect();
+        let on_a_line = match markers[..] {
+            [a, b, c, ..] => (b - a).normalize().cross(&(c - a)).norm() < OFF_THE_LINE,
+            _ => false,
+        };
+        if !on_a_line {
+            return markers;
+        }
+    }
+}
 
 /// One sample of the body.
 #[derive(Debug, Clone)]

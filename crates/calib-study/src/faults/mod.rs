@@ -28,7 +28,7 @@ mod state;
 pub use case::Cell;
 pub use design::{Body, Design, Validation};
 pub use fault::{Class, Fault};
-pub use outcome::{CaseResult, Outcome};
+pub use outcome::{CaseResult, Outcome, report_of};
 pub use render::{csv, json, markdown};
 pub use run::{FaultResult, run_faults};
 pub use settings::FaultOptions;

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use calib_finding::{Finding, Severity};
 use calib_pipeline::error::DataProblem;
+use calib_pipeline::formulate::kinematics::Calibration;
 use calib_pipeline::formulate::solved::Solved;
 use calib_pipeline::prepare::load::{RobotProfile, of_tables};
 use calib_pipeline::prepare::loads::Masses;
@@ -16,6 +17,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::case::{Case, Cell, LIMIT_MM, Seen};
+use super::design::{Design, Validation};
 use super::fault::{Class, Fault};
 use super::names::names_the_cause;
 use crate::noise::Noise;
@@ -56,6 +58,9 @@ pub struct CaseResult {
     pub refused_by: BTreeSet<ReasonId>,
     /// True rms position error at new poses, m, where there is a result.
     pub rms_m: Option<f64>,
+    /// The same with registration only.
+    #[serde(default)]
+    pub registered_rms_m: Option<f64>,
     /// Largest χ² of a predicted position over its threshold: above 1 the stated uncertainty does not cover the error.
     pub worst_z: Option<f64>,
 }
@@ -79,9 +84,20 @@ impl CaseResult {
     #[must_use]
     pub fn truly_undecided(&self) -> bool {
         let over = self.rms_m.is_some_and(|rms| rms > LIMIT_MM * 1e-3);
-        let exceeds = |id: &ReasonId| over && *id == ReasonId::LimitExceeded;
-        let too_few = |id: &ReasonId| TOO_FEW.contains(id) || exceeds(id);
+        let exceeds = |id: &ReasonId| {
+            (over && *id == ReasonId::LimitExceeded)
+                || (self.truly_worse() && *id == ReasonId::WorseThanRegistration)
+        };
+        let nothing_held_out = self.cell.validation == Validation::Absent;
+        let not_verified = |id: &ReasonId| nothing_held_out && NOT_VERIFIED.contains(id);
+        let too_few = |id: &ReasonId| TOO_FEW.contains(id) || not_verified(id) || exceeds(id);
         self.refused() && !self.refused_by.is_empty() && self.refused_by.iter().all(too_few)
+    }
+
+    /// At new poses, the calibrated robot is off by more than with registration only.
+    fn truly_worse(&self) -> bool {
+        let both = self.rms_m.zip(self.registered_rms_m);
+        both.is_some_and(|(calibrated, registered)| calibrated > registered)
     }
 
     /// Good data that was not accepted for a reason that is not true of it.
@@ -90,8 +106,8 @@ impl CaseResult {
         self.refused() && !self.truly_undecided()
     }
 
-    /// Good data of which a finding or a reason says what is not true. What a design does not show, and outliers
-    /// that there are, are said with reason.
+    /// Good data of which a finding or a reason says what is not true. What a design does not show, outliers
+    /// that there are, and a calibration that is worse at new poses, are said with reason.
     #[must_use]
     pub fn false_warning(&self) -> bool {
         let true_of_outliers = [
@@ -101,16 +117,21 @@ impl CaseResult {
             "not-rigid",
         ];
         let outliers = self.cell.fault == Fault::Outliers;
-        let untrue = |id: &String| !(outliers && true_of_outliers.contains(&id.as_str()));
+        let few = [Design::Few, Design::Six].contains(&self.cell.design);
+        let said_with_reason = |id: &str| {
+            (outliers && true_of_outliers.contains(&id)) || (few && TRUE_OF_FEW.contains(&id))
+        };
+        let untrue = |id: &String| !said_with_reason(id);
         let about_the_model = [
             ReasonId::ImplausibleChange,
             ReasonId::ReversedAxis,
             ReasonId::GoodnessOfFit,
             ReasonId::NoiseAboveStated,
-            ReasonId::WorseThanRegistration,
         ];
+        let worse = self.reasons.contains(&ReasonId::WorseThanRegistration);
         self.cell.fault.class() == Class::Clean
             && (self.findings.iter().any(untrue)
+                || (worse && !self.truly_worse())
                 || self.reasons.iter().any(|id| about_the_model.contains(id)))
     }
 }
@@ -122,6 +143,12 @@ const TOO_FEW: [ReasonId; 4] = [
     ReasonId::EffectsNotExcluded,
     ReasonId::UncertaintyTooSmall,
 ];
+
+/// Reasons that say that nothing was verified: where nothing was held out, and poses are too few to leave one out, that is so.
+const NOT_VERIFIED: [ReasonId; 2] = [ReasonId::NoValidation, ReasonId::LimitNotEvaluated];
+
+/// Findings that say of few poses what they leave open.
+const TRUE_OF_FEW: [&str; 3] = ["held-by-priors", "size-not-seen", "not-checked"];
 
 /// Error of a result at new poses.
 struct Error {
@@ -152,15 +179,39 @@ fn wider(freedom: f64) -> f64 {
 
 /// Draws a case and runs the program on it.
 pub(crate) fn run_case(cell: Cell, number: u64, seed: u64) -> CaseResult {
+    let (case, ran) = run(cell, number, seed);
+    match ran {
+        Ok(output) => judged(&case, number, &output),
+        Err(error) => stopped(&case, number, error),
+    }
+}
+
+fn run(cell: Cell, number: u64, seed: u64) -> (Case, Result<RunOutput, PipelineError>) {
     let mut noise = Noise::of_trial(seed, &cell.id(), number);
     let case = Case::draw(cell, number, &mut noise);
     let tables = case.tables(&mut noise);
     let ran = robot_profile(&case.profile(), &case.robot.urdf())
         .and_then(|robot| of_tables(robot, tables))
         .and_then(|inputs| run_on(inputs, &RunOptions::default(), &mut |_| {}));
+    (case, ran)
+}
+
+/// A single case: what became of it, and the whole report.
+///
+/// # Errors
+/// What stopped the run, beside what became of it.
+pub fn report_of(
+    cell: Cell,
+    number: u64,
+    seed: u64,
+) -> (CaseResult, Result<calib_report::Report, String>) {
+    let (case, ran) = run(cell, number, seed);
     match ran {
-        Ok(output) => judged(&case, number, &output),
-        Err(error) => stopped(&case, number, error),
+        Ok(output) => (judged(&case, number, &output), Ok(output.report)),
+        Err(error) => {
+            let text = error.to_string();
+            (stopped(&case, number, error), Err(text))
+        }
     }
 }
 
@@ -188,6 +239,7 @@ fn stopped(case: &Case, number: u64, error: PipelineError) -> CaseResult {
         reasons: BTreeSet::new(),
         refused_by: BTreeSet::new(),
         rms_m: None,
+        registered_rms_m: None,
         worst_z: None,
     }
 }
@@ -252,6 +304,7 @@ fn judged(case: &Case, number: u64, output: &RunOutput) -> CaseResult {
         refused_by: refusing.map(|reason| reason.id).collect(),
         reasons: against.iter().map(|reason| reason.id).collect(),
         rms_m: Some(error.rms_m),
+        registered_rms_m: output.solved.registered.as_ref().map(|r| rms(case, r)),
         worst_z: error.worst_z,
     }
 }
@@ -269,42 +322,55 @@ fn widened(output: &RunOutput) -> f64 {
 
 /// The calibrated robot against the truth at new poses; z is the largest χ² over its threshold.
 fn error(case: &Case, solved: &Solved, widened: f64) -> Error {
-    let mut squares = Vec::new();
     let mut worst: Option<f64> = None;
     for (q, seen) in case.truth() {
-        let links = solved.robot.root_from_link(&q);
-        let link = links[solved.robot.model.links().len() - 1 - usize::from(case.wrong_link())];
-        let tracker_from_link = solved.robot.tracker_from_root * link;
-        match (solved.robot.mounts.get("tip"), body_frame(&seen)) {
-            (Some(mount), Some(truth)) => {
-                let off = (tracker_from_link * mount).translation.vector - truth.translation.vector;
-                squares.push(off.norm_squared());
-                if let Some(chi2) = chi2(solved, &q, &off) {
-                    let freedom = solved.fit.as_ref();
-                    let freedom = freedom.map_or(0.0, |f| f.solution.degrees_of_freedom);
-                    let z = chi2 / (CHI2_OF_THREE * wider(freedom) * widened);
-                    worst = Some(worst.map_or(z, |w| w.max(z)));
-                }
-            }
-            _ => {
-                let points = solved.robot.points.get("tip");
-                for (i, truth) in seen.points.iter().enumerate() {
-                    if let Some(p) = points.and_then(|p| p.get(&format!("tip_{}", i + 1))) {
-                        squares.push((tracker_from_link * p - truth).norm_squared());
-                    }
-                }
-            }
-        }
+        let off = off(case, &solved.robot, &q, &seen);
+        let framed = body_frame(&seen).and(off.first());
+        let Some(chi2) = framed.and_then(|off| chi2(solved, &q, off)) else {
+            continue;
+        };
+        let freedom = solved.fit.as_ref();
+        let freedom = freedom.map_or(0.0, |f| f.solution.degrees_of_freedom);
+        let z = chi2 / (CHI2_OF_THREE * wider(freedom) * widened);
+        worst = Some(worst.map_or(z, |w| w.max(z)));
     }
-    let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
     Error {
-        rms_m: if squares.is_empty() {
-            f64::INFINITY
-        } else {
-            mean.sqrt()
-        },
+        rms_m: rms(case, &solved.robot),
         worst_z: worst,
     }
+}
+
+/// rms error of a robot at new poses, m.
+fn rms(case: &Case, robot: &Calibration) -> f64 {
+    let truth = case.truth();
+    let squares: Vec<f64> = truth
+        .iter()
+        .flat_map(|(q, seen)| off(case, robot, q, seen))
+        .map(|off| off.norm_squared())
+        .collect();
+    if squares.is_empty() {
+        return f64::INFINITY;
+    }
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+/// How far the body's frame is off, or where it has none each of its markers.
+fn off(case: &Case, robot: &Calibration, q: &[f64], seen: &Seen) -> Vec<Vector3<f64>> {
+    let links = robot.root_from_link(q);
+    let link = links[robot.model.links().len() - 1 - usize::from(case.wrong_link())];
+    let tracker_from_link = robot.tracker_from_root * link;
+    if let (Some(mount), Some(truth)) = (robot.mounts.get("tip"), body_frame(seen)) {
+        let found = (tracker_from_link * mount).translation.vector;
+        return vec![found - truth.translation.vector];
+    }
+    let points = robot.points.get("tip");
+    let truth = seen.points.iter().enumerate();
+    truth
+        .filter_map(|(i, truth)| {
+            let p = points?.get(&format!("tip_{}", i + 1))?;
+            Some(tracker_from_link * p - truth)
+        })
+        .collect()
 }
 
 /// ‖e‖² in the covariance that the fit states for the body's position at readings.
