@@ -264,7 +264,7 @@ fn drift_and_scale_of_the_tracker_are_named() {
         let drift = found(0..8, design, Event::Drift(1e-3), |h| {
             Moved::Drift(h.tracker)
         });
-        let scale = found(0..8, design, Event::Scale(2e-3), |h| {
+        let scale = found(0..8, design, Event::Scale(3e-3), |h| {
             Moved::Scale(h.tracker)
         });
         assert_eq!((drift.1, scale.1), (8, 8));

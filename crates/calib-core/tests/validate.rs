@@ -94,3 +94,40 @@ fn summaries_of_no_errors_are_zero() {
         (1, 2.0, 2.0, 2.0, 2.0)
     );
 }
+
+#[test]
+fn left_out_errors_are_as_large_as_expected_and_larger_than_with_all() {
+    let (mut squares, mut expected, mut with_all) = (0.0, 0.0, 0.0);
+    for seed in 0..30 {
+        let (_, h) = fitted(300 + seed, 8, false);
+        let whole = solve(&h.problem, &Settings::plain()).unwrap();
+        for v in whole
+            .leave_one_out()
+            .unwrap()
+            .samples
+            .iter()
+            .flat_map(|s| &s.vectors)
+        {
+            squares += v.position.unwrap().powi(2);
+            expected += v.expected.unwrap().powi(2);
+            with_all += v.expected_with_all.unwrap().powi(2);
+            assert!(v.expected_with_all < v.expected);
+        }
+    }
+    // 30 × 8 poses: ± 5 %.
+    assert!(
+        (squares / expected - 1.0).abs() < 0.2,
+        "{}",
+        squares / expected
+    );
+    assert!(expected / with_all > 1.1, "{}", expected / with_all);
+    // What is held out took no part: both are the same.
+    let (_, mut h) = fitted(5, 20, true);
+    h.problem.held_out = (10..20).collect();
+    let whole = solve(&h.problem, &Settings::plain()).unwrap();
+    let held = whole.held_out().unwrap();
+    let of = held.samples.iter().flat_map(|s| &s.vectors);
+    of.for_each(|v| {
+        assert!((v.expected.unwrap() / v.expected_with_all.unwrap() - 1.0).abs() < 1e-9)
+    });
+}

@@ -252,6 +252,20 @@ impl Limit {
         }
     }
 
+    /// Errors of poses left out in turn are those of results with a pose less, `over` times larger than with all of them: a limit
+    /// that all of them may meet is not exceeded.
+    #[must_use]
+    pub fn left_out(mut self, over: Option<f64>) -> Self {
+        let held_out = self.name.starts_with("held_out");
+        let least = self.low.or(self.value).zip(over.filter(|_| held_out));
+        if self.outcome == Outcome::Exceeded
+            && least.is_some_and(|(low, over)| low <= over * self.limit)
+        {
+            self.outcome = Outcome::Undecided;
+        }
+        self
+    }
+
     /// A limit against an exact value.
     #[must_use]
     pub fn evaluated(of: Limited, limit: f64, value: f64) -> Self {

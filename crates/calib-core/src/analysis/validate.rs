@@ -53,6 +53,10 @@ pub struct VectorError {
     pub error: Vec<f64>,
     /// √(eᵀ Cov⁻¹ e) of this vector alone.
     pub z: f64,
+    /// What is expected of `position`, m: the root of the trace of its covariance.
+    pub expected: Option<f64>,
+    /// The same if the sample took part in the fit, as it does in the result, and were measured once more.
+    pub expected_with_all: Option<f64>,
 }
 
 /// Mean, rms, 95 % and largest of a set of error norms.
@@ -199,7 +203,8 @@ impl Solution {
             let e = &s.l * &s.w;
             let v = &s.l * s.l.transpose();
             for &(o, first, rows) in &s.blocks {
-                out.push((sample, vector_error(model, o, first, rows, &e, &v)));
+                let of = vector_error(model, (o, first, rows), &e, [&v, &v]);
+                out.push((sample, of));
             }
         }
         Some(out)
@@ -229,6 +234,7 @@ impl Solution {
             };
             let m = s.w.len();
             let q = &s.a * &c * s.a.transpose();
+            let with_all = &s.l * (DMatrix::identity(m, m) + &q) * s.l.transpose();
             // Covariance of the whitened prediction error and the error itself.
             let (error, covariance) = if left_out {
                 let eigen =
@@ -260,7 +266,7 @@ impl Solution {
                 vectors: s
                     .blocks
                     .iter()
-                    .map(|&(o, first, rows)| vector_error(model, o, first, rows, &e, &full))
+                    .map(|&block| vector_error(model, block, &e, [&full, &with_all]))
                     .collect(),
                 z2,
                 rows: m,
@@ -271,13 +277,12 @@ impl Solution {
     }
 }
 
+/// One vector of a sample: its observation, first row and rows; with the covariance of the error, and that of one with all samples.
 fn vector_error(
     model: &Model,
-    observation: usize,
-    first: usize,
-    rows: usize,
+    (observation, first, rows): (usize, usize, usize),
     e: &DVector<f64>,
-    covariance: &DMatrix<f64>,
+    [covariance, with_all]: [&DMatrix<f64>; 2],
 ) -> VectorError {
     let o = model.observations[observation];
     let measurement = &model.problem.measurements[o.measurement];
@@ -287,7 +292,15 @@ fn vector_error(
         .and_then(|c| c.l().solve_lower_triangular(&error))
         .map_or(f64::INFINITY, |y| y.norm());
     let deviation = measurement.kind.of().deviation(error.as_slice());
+    let expected = |covariance: &DMatrix<f64>| {
+        let sigma: Vec<f64> = (first..first + rows)
+            .map(|i| covariance[(i, i)].max(0.0).sqrt())
+            .collect();
+        measurement.kind.of().deviation(&sigma).position
+    };
     VectorError {
+        expected: expected(covariance),
+        expected_with_all: expected(with_all),
         measurement: MeasurementId::of(o.measurement),
         item: o.item,
         position: deviation.position,

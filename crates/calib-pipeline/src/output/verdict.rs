@@ -9,12 +9,15 @@ use crate::verify::motions::Motions;
 
 pub(crate) fn limits(limits: &Limits, e: &Evidence<'_>) -> Vec<Limit> {
     let mut out = Vec::new();
+    let over_all = e.held_out.as_ref().and_then(|h| h.left_out_over_all);
     // (limit, what it is about, value and its interval)
     type Value = Option<(f64, Option<(f64, f64)>)>;
     let mut compare = |limit: Option<f64>, of: Limited, value: Value| {
         let Some(limit) = limit else { return };
         out.push(match value {
-            Some((value, interval)) => Limit::compared(of, limit, value, interval),
+            Some((value, interval)) => {
+                Limit::compared(of, limit, value, interval).left_out(over_all)
+            }
             None => of.unknown(limit),
         });
     };

@@ -10,6 +10,9 @@ use calib_urdf::Joint;
 use crate::formulate::formulation::MlFit;
 use crate::prepare::inputs::Inputs;
 
+/// Standard deviations within which the size of a change lies, 97.5 % on the side that counts.
+const CERTAIN: f64 = 2.0;
+
 /// At most one finding: the change that the data show best. Others appear once it has been dealt with.
 #[must_use]
 pub fn changes(inputs: &Inputs, fit: &MlFit) -> Option<Finding> {
@@ -25,7 +28,9 @@ pub fn changes(inputs: &Inputs, fit: &MlFit) -> Option<Finding> {
         .filter_map(|c| names.of(c.moved))
         .collect();
     let physics = physics(fit, change);
-    let size = finding.facts.get("distance").and_then(Fact::value);
+    // What of the size is beyond doubt.
+    let of = |name| finding.facts.get(name).and_then(Fact::value);
+    let size = of("distance").map(|size| size - CERTAIN * of("sigma").unwrap_or(0.0));
     let limits = &inputs.robot.profile.solve.limits;
     let harmful = match (size, limits.held_out_max.or(limits.held_out_rms)) {
         (Some(size), Some(limit)) => size > limit,

@@ -40,11 +40,15 @@ pub fn left_out(
         .map(|fit| each_left_out(fit, step))
         .unwrap_or_default();
     let mut poses = Vec::new();
+    // Squares that are expected: of what is left out, and with all poses.
+    let (mut squares, mut with_all) = (0.0, 0.0);
     for sample in &predicted.samples {
         let (recording, row) = &fit.formulation.samples[sample.sample];
         let angles = angles(fit, sample.sample, &sample.vectors);
         for v in &sample.vectors {
             let key = (recording.clone(), *row, subject(fit, v.measurement, v.item));
+            squares += v.expected.unwrap_or(0.0).powi(2);
+            with_all += v.expected_with_all.unwrap_or(0.0).powi(2);
             // Bodies that no joint moves say nothing about the robot.
             if !calibrated.contains_key(&key) {
                 continue;
@@ -85,6 +89,7 @@ pub fn left_out(
     poses.extend(outside.map(|(key, d)| of_rejected(inputs, key, d, registered.get(key))));
     Some(HeldOut {
         left_out: true,
+        left_out_over_all: (with_all > 0.0).then(|| (squares / with_all).sqrt()),
         ..HeldOut::from_poses(quantity(inputs, fitted), poses)
     })
 }

@@ -49,6 +49,10 @@ pub struct HeldOut {
     /// Whether no recording was held out and each fitted pose was left out in turn instead.
     #[serde(default)]
     pub left_out: bool,
+    /// How many times larger errors of poses left out in turn are expected to be than those of the result, which has all poses;
+    /// null where recordings are held out.
+    #[serde(default)]
+    pub left_out_over_all: Option<f64>,
     /// Errors that were screened out as gross outliers; nothing above counts them.
     #[serde(default)]
     pub screened: usize,
@@ -121,6 +125,7 @@ impl HeldOut {
             z2_per_dof: z2_per_dof(&kept),
             poses,
             left_out: false,
+            left_out_over_all: None,
         }
     }
 }

@@ -140,8 +140,21 @@ fn of_limit(reason: &Reason, v: &Values<'_>) -> String {
                 0 => String::new(),
                 n => format!(" About {n} postures would decide it."),
             };
+            let of = |name| v.get(name).and_then(Fact::value);
+            let above = |name| {
+                of(name)
+                    .zip(of("limit"))
+                    .is_some_and(|(x, limit)| x > limit)
+            };
+            let open = if above("low") || (above("value") && of("low").is_none()) {
+                "exceeded with a pose less, undecided with all of them"
+            } else if above("value") {
+                "exceeded by the estimate, undecided by its interval"
+            } else {
+                "met by the estimate, undecided by its interval"
+            };
             format!(
-                "{quantity}: {}{interval}, limit {limit}: met by the estimate, undecided by its interval.{enough}",
+                "{quantity}: {}{interval}, limit {limit}: {open}.{enough}",
                 v.number("value")
             )
         }

@@ -100,6 +100,7 @@ fn prediction(alone: f64, with: f64, effect: UntestedKind) -> Option<Prediction>
     };
     Some(Prediction {
         stated: 0.00027,
+        joints: 0.0,
         alone: predicted(alone),
         with: Some((untested, predicted(with))),
     })
@@ -162,9 +163,26 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
         ),
         // The interval reaches below the limit, the estimate does not.
         (
+            ReasonId::LimitUndecided,
+            LeavesOpen,
+            with(|f| f.limits = limit(0.0012, Some((0.0009, 0.0014)))),
+        ),
+        // Above it with a pose less, perhaps not with all of them.
+        (
+            ReasonId::LimitUndecided,
+            LeavesOpen,
+            with(|f| {
+                let above = limit(0.0016, Some((0.0012, 0.0019)));
+                f.limits = above.into_iter().map(|l| l.left_out(Some(1.3))).collect();
+            }),
+        ),
+        (
             ReasonId::LimitExceeded,
             Rejects,
-            with(|f| f.limits = limit(0.0012, Some((0.0009, 0.0014)))),
+            with(|f| {
+                let above = limit(0.0016, Some((0.0012, 0.0019)));
+                f.limits = above.into_iter().map(|l| l.left_out(Some(1.1))).collect();
+            }),
         ),
         (
             ReasonId::LimitUndecided,
@@ -308,7 +326,7 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
         (
             ReasonId::RejectedShare,
             LeavesOpen,
-            with(|f| f.rejected = share(11)),
+            with(|f| f.rejected = share(16)),
         ),
         (
             ReasonId::ScreenedHeldOut,
@@ -323,7 +341,23 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
         (
             ReasonId::ScreenedHeldOut,
             LeavesOpen,
-            with(|f| f.screened = share(11)),
+            with(|f| f.screened = share(16)),
+        ),
+        // Two of twelve are no proof of more than a tenth, four are.
+        (
+            ReasonId::ScreenedHeldOut,
+            Warns,
+            with(|f| f.screened = Share { part: 2, of: 12 }),
+        ),
+        (
+            ReasonId::ScreenedHeldOut,
+            LeavesOpen,
+            with(|f| f.screened = Share { part: 4, of: 12 }),
+        ),
+        (
+            ReasonId::RejectedShare,
+            Warns,
+            with(|f| f.rejected = share(15)),
         ),
         (
             ReasonId::OrientationOff,

@@ -28,7 +28,7 @@ impl Chance {
     pub(super) fn simulate(design: &Design, seen: &[f64], settings: &ChangeSettings) -> Self {
         /// Draws that decide on more.
         const FIRST: usize = 20;
-        /// So many of them above what is seen: a chance of 0.3 % would bring that about once in 600 scans.
+        /// So many of them above what is seen: a chance of 0.3 % would bring that about once in 600 scans, a smaller one less often.
         const ABOVE: usize = 2;
         let count = design.columns.len();
         let tests: Vec<Vec<Test>> = (0..count).map(|k| design.tests(k)).collect();

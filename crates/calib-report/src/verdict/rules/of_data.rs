@@ -2,7 +2,7 @@
 
 use calib_finding::Fact;
 
-use crate::verdict::facts::{Facts, Part, RejectedPart, Validation};
+use crate::verdict::facts::{Facts, Part, RejectedPart, Share, Validation};
 use crate::verdict::{Effect, Reason, ReasonId};
 
 pub(super) fn rejected_parts(facts: &Facts) -> Vec<Reason> {
@@ -58,22 +58,28 @@ pub(super) fn validation(facts: &Facts) -> Vec<Reason> {
     }
 }
 
-/// Rejected or screened measurements above this share are a warning: the robust fit is still right…
+/// Rejected or screened measurements from this share on are a warning: the robust fit is still right…
 const NOTABLE: f64 = 0.05;
 
-/// …and above this one nothing is accepted: the rest was chosen by the model that it is to confirm.
+/// …and where the share of which they are a sample is above this one, nothing is accepted: the rest was chosen by the model that it
+/// is to confirm.
 pub(super) const TOO_MANY: f64 = 0.10;
 
-fn share_effect(share: f64) -> Effect {
-    match share {
-        share if share > TOO_MANY => Effect::LeavesOpen,
-        share if share >= NOTABLE => Effect::Warns,
-        _ => Effect::Supports,
+/// Chance with which a share of [`TOO_MANY`] shows itself so large.
+const CHANCE: f64 = 0.05;
+
+fn share_effect(share: Share) -> Effect {
+    if share.ratio() < NOTABLE {
+        Effect::Supports
+    } else if share.chance_of_more(TOO_MANY) < CHANCE {
+        Effect::LeavesOpen
+    } else {
+        Effect::Warns
     }
 }
 
 pub(super) fn rejected_share(facts: &Facts) -> Vec<Reason> {
-    let effect = share_effect(facts.rejected.ratio());
+    let effect = share_effect(facts.rejected);
     if effect == Effect::Supports {
         return Vec::new();
     }
@@ -89,12 +95,9 @@ pub(super) fn screened(facts: &Facts) -> Vec<Reason> {
         return Vec::new();
     }
     vec![
-        Reason::new(
-            ReasonId::ScreenedHeldOut,
-            share_effect(facts.screened.ratio()),
-        )
-        .with("screened", Fact::count(facts.screened.part))
-        .with("of", Fact::count(facts.screened.of)),
+        Reason::new(ReasonId::ScreenedHeldOut, share_effect(facts.screened))
+            .with("screened", Fact::count(facts.screened.part))
+            .with("of", Fact::count(facts.screened.of)),
     ]
 }
 

@@ -6,19 +6,18 @@ use crate::verdict::facts::{Facts, Validation};
 use crate::verdict::{Compared, Effect, Reason, ReasonId};
 use crate::{Limit, Outcome, Unit};
 
-/// An estimate above its limit rejects, whether its interval reaches below or not; one below it that its interval does not
-/// bear out leaves open what more data decide.
+/// A limit that lies in the interval of its estimate is neither met nor exceeded, on whichever side of it the estimate lies: more
+/// data decide.
 pub(super) fn limits(facts: &Facts) -> Vec<Reason> {
     if facts.limits.is_empty() {
         return vec![Reason::new(ReasonId::NoLimits, Effect::LeavesOpen)];
     }
     let reason = |limit: &Limit| {
-        let above = limit.value.is_none_or(|value| value > limit.limit);
         let (id, effect) = match limit.outcome {
             Outcome::NotEvaluated => (ReasonId::LimitNotEvaluated, Effect::LeavesOpen),
             Outcome::Met => (ReasonId::LimitMet, Effect::Supports),
-            Outcome::Undecided if !above => (ReasonId::LimitUndecided, Effect::LeavesOpen),
-            Outcome::Undecided | Outcome::Exceeded => (ReasonId::LimitExceeded, Effect::Rejects),
+            Outcome::Undecided => (ReasonId::LimitUndecided, Effect::LeavesOpen),
+            Outcome::Exceeded => (ReasonId::LimitExceeded, Effect::Rejects),
         };
         let number = |value: Option<f64>| value.map(|value| Fact::number(value, limit.unit));
         Reason::new(id, effect)
@@ -44,8 +43,8 @@ pub(super) fn limits(facts: &Facts) -> Vec<Reason> {
     facts.limits.iter().map(reason).collect()
 }
 
-/// Postures of which an estimate like this one would have its whole interval below the limit: its half-width shrinks with
-/// the square root of their number. `None` for limits of anything else, or where no number is of use.
+/// Postures of which an estimate like this one would have its whole interval on its side of the limit: its half-width shrinks
+/// with the square root of their number. `None` for limits of anything else, or where no number is of use.
 pub(super) fn enough(facts: &Facts, limit: &Limit) -> Option<usize> {
     /// Nobody records more to decide a limit.
     const TOO_MANY: f64 = 1000.0;
@@ -53,7 +52,12 @@ pub(super) fn enough(facts: &Facts, limit: &Limit) -> Option<usize> {
         return None;
     }
     let value = limit.value?;
-    let wider = (limit.high? - value) / (limit.limit - value);
+    let end = if value <= limit.limit {
+        limit.high?
+    } else {
+        limit.low.filter(|low| *low <= limit.limit)?
+    };
+    let wider = (end - value) / (limit.limit - value);
     let postures = (facts.validation.postures() as f64 * wider * wider).ceil();
     (postures > 0.0 && postures < TOO_MANY).then_some(postures as usize)
 }
