@@ -44,6 +44,7 @@
 //! | did something move meanwhile | [`Solution::changes`] |
 //! | has the noise a memory, and what does that cost | [`Solution::dependence`], [`Solution::under`] |
 //! | which model | [`compare()`] |
+//! | what is random from pose to pose | [`Solution::weighed`] |
 //! | can I trust the intervals if the noise model is wrong | [`sandwich`] |
 //! | how well does a loop close | [`ClosureStatistics`], [`Solution::pose_at_sample`] |
 //!
@@ -133,6 +134,7 @@ mod solve;
 
 pub use nalgebra;
 
+pub use analysis::admit::Admission;
 pub use analysis::bounds::Unbounded;
 pub use analysis::change::{Change, ChangeScan, ChangeSettings, Moved};
 pub use analysis::closure::{ClosureStatistics, Spread};
@@ -149,6 +151,7 @@ pub use analysis::solution::{NoiseEstimate, ParameterClass, ParameterEstimate, S
 pub use analysis::spread::{LinearPoint, Placement, PostureSpread, SizeSpread, SpreadDirection};
 pub use analysis::untested::{MovedPoint, Moves, OpenError, OpenErrors, UntestedEffect};
 pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
+pub use analysis::weigh::{NoiseCandidate, NoiseChoice, NoiseLevel, Weighed};
 pub use graph::axis::Axis;
 pub use graph::baseline::Baseline;
 pub use graph::chart::Chart;
@@ -161,7 +164,7 @@ pub use graph::measurement::{
     PoseObservation,
 };
 pub use graph::parameter::{Parameter, ParameterKind};
-pub use graph::problem::{NoiseGroup, NoiseKind, Point, Problem};
+pub use graph::problem::{NoiseGroup, NoiseKind, NoiseModel, Point, Problem};
 pub use graph::unit::{DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA, Unit};
 pub use model::derived::{Configuration, DerivedPoint, DerivedPose, Target};
 pub use model::joint::JointMotion;

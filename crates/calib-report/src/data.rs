@@ -1,4 +1,4 @@
-use crate::{ClockCheck, ErrorSource, FitEnd, NoiseKind, Unit};
+use crate::{ClockCheck, ErrorSource, FitEnd, NoiseKind, NoiseModel, Unit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -160,6 +160,40 @@ pub struct Noise {
     pub samples: usize,
     /// How it was determined, or why it was not: "variance components (REML)".
     pub text: String,
+}
+
+/// What is random from pose to pose: what was tried, and what was taken.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NoiseChoice {
+    /// The one that was taken.
+    pub chosen: NoiseModel,
+    /// What was tried, in order of growth.
+    pub candidates: Vec<NoiseCandidate>,
+    /// Poses that were left out in turn.
+    pub poses: usize,
+    /// Mean fourth power of the left-out errors over that of normal noise of their size: above 1 for heavy tails.
+    pub tails: f64,
+    /// Measurements that the robust fit rejected, where they were more than chance rejects.
+    pub rejected: usize,
+    /// Those of them that take part after all.
+    pub readmitted: usize,
+}
+
+/// One statement of what is random from pose to pose, tried on left-out poses.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NoiseCandidate {
+    /// The statement.
+    pub model: NoiseModel,
+    /// rms error of a left-out measurement, m.
+    pub left_out_rms_m: f64,
+    /// Negative log-density of a left-out pose minus the least of all candidates, nats.
+    pub surprise: f64,
+    /// Standard error of `surprise` over the poses.
+    pub surprise_error: f64,
+    /// Its weights predict left-out poses no worse than weights that trust no model of the robot.
+    pub admitted: bool,
+    /// Largest noise of a joint under it, rad; null without joint noise.
+    pub joint_sigma_rad: Option<f64>,
 }
 
 /// The offset between two clocks.

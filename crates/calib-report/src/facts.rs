@@ -160,6 +160,22 @@ pub enum NoiseKind {
     Scale,
 }
 
+/// What is random from pose to pose, beside the noise of each measurement.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum NoiseModel {
+    /// Nothing: the weights of plain least squares.
+    #[default]
+    White,
+    /// The joint positions, with one level.
+    Joint,
+    /// The pose of each body with markers.
+    BodyPose,
+    /// The joint positions, with a level for each joint.
+    JointEach,
+}
+
 /// A source of the error that remains.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

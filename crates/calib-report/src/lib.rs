@@ -51,12 +51,14 @@ mod words;
 
 pub use calib_finding::{Finding, Severity, Unit};
 pub use data::{
-    AccuracyLimit, Clock, Fates, FitSummary, Input, JointCoverage, Lost, Noise, Output,
-    RecordingSummary, RecordingUse, Rejected, RejectedFor, Workspace, WorkspacePoint,
+    AccuracyLimit, Clock, Fates, FitSummary, Input, JointCoverage, Lost, Noise, NoiseCandidate,
+    NoiseChoice, Output, RecordingSummary, RecordingUse, Rejected, RejectedFor, Workspace,
+    WorkspacePoint,
 };
 pub use error::ReportError;
 pub use facts::{
-    ClockCheck, ErrorSource, FitEnd, MissingPhysics, NextStep, NoiseKind, Physics, Scope,
+    ClockCheck, ErrorSource, FitEnd, MissingPhysics, NextStep, NoiseKind, NoiseModel, Physics,
+    Scope,
 };
 pub use held_out::{Distance, ExpectedError, HeldOut, OrientationErrors, PoseError, screen};
 pub use quantity::JointValue;

@@ -1,8 +1,9 @@
 use crate::verdict::{Effect, Judgment, Reason, ReasonId};
 use crate::{
     AccuracyLimit, Change, Clock, DataInformation, EstimatorResult, Finding, FitSummary, Input,
-    JointCoverage, LoopClosure, Noise, NotObservable, Output, Parameter, RecordingSummary,
-    Rejected, Residuals, Transform, Unit, Verification, WeakDirections, Workspace,
+    JointCoverage, LoopClosure, Noise, NoiseChoice, NotObservable, Output, Parameter,
+    RecordingSummary, Rejected, Residuals, Transform, Unit, Verification, WeakDirections,
+    Workspace,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -67,6 +68,9 @@ pub struct Report {
     /// The estimated noise.
     #[serde(default)]
     pub noise: Vec<Noise>,
+    /// What is random from pose to pose, by evidence. Null where the profile states it, and with too few poses.
+    #[serde(default)]
+    pub noise_choice: Option<NoiseChoice>,
     /// Offsets between the clocks of the recordings.
     #[serde(default)]
     pub clocks: Vec<Clock>,

@@ -112,23 +112,73 @@ pub fn solve(problem: &Problem, settings: &Settings) -> Result<Solution, Error> 
     };
     let mut theta = stated.clone();
     let (minimum, weights) = fit.robustly(&mask, &mut theta, &mut work);
-    let values = &minimum.values;
-    let outcome = Outcome {
-        rejected: explain(&model, values, &theta, &mask, &weights, &mut work),
-        iterations: fit.iterations,
-        relative_sigma: fit.relative_sigma,
-        chi2_stated: {
-            let objective = Objective {
-                model: &model,
-                weights: &weights,
-                theta: &stated,
-            };
-            data_cost(objective, values, &mut work)
-        },
+    let found = Found {
+        minimum,
         weights,
         theta,
     };
-    finish(model, minimum, outcome)
+    let outcome = fit.outcome(&found, &mask, &mut work);
+    finish(model, found.minimum, outcome)
+}
+
+/// Where a fit begins that keeps the observations it is given.
+pub(crate) struct Start {
+    pub values: Values,
+    /// Robust weight per observation.
+    pub weights: Vec<f64>,
+    /// σ² per group.
+    pub theta: Vec<f64>,
+    /// Linearizations until here.
+    pub iterations: usize,
+}
+
+/// Given observations fitted again under another statement of the same problem: the same measurements and parameters,
+/// other noise or other priors.
+pub(crate) fn refit(
+    problem: &Problem,
+    start: Start,
+    settings: &Settings,
+) -> Result<Solution, Error> {
+    let Start {
+        values,
+        weights,
+        mut theta,
+        iterations,
+    } = start;
+    let model = Model::new(problem)?;
+    let mask: Vec<f64> = model
+        .observations
+        .iter()
+        .map(|o| {
+            if model.is_held_out(o.sample) {
+                0.0
+            } else {
+                1.0
+            }
+        })
+        .collect();
+    let mut work = Workspace::new(&model);
+    let mut fit = Fit {
+        model: &model,
+        settings,
+        iterations,
+        relative_sigma: vec![None; theta.len()],
+    };
+    let minimum = fit.with_noise(&values, &weights, &mut theta, &mut work);
+    let found = Found {
+        minimum,
+        weights,
+        theta,
+    };
+    let outcome = fit.outcome(&found, &mask, &mut work);
+    finish(model, found.minimum, outcome)
+}
+
+/// Where a fit ended.
+struct Found {
+    minimum: Minimum,
+    weights: Vec<f64>,
+    theta: Vec<f64>,
 }
 
 /// What [`finish`] only passes on.
@@ -149,6 +199,30 @@ struct Fit<'a> {
 }
 
 impl Fit<'_> {
+    /// What the result needs beside the minimum.
+    fn outcome(&self, found: &Found, mask: &[f64], work: &mut Workspace) -> Outcome {
+        let Found {
+            minimum,
+            weights,
+            theta,
+        } = found;
+        let groups = self.model.problem.groups.iter();
+        let stated: Vec<f64> = groups.map(|g| g.sigma * g.sigma).collect();
+        let objective = Objective {
+            model: self.model,
+            weights,
+            theta: &stated,
+        };
+        Outcome {
+            rejected: explain(self.model, &minimum.values, theta, mask, weights, work),
+            iterations: self.iterations,
+            relative_sigma: self.relative_sigma.clone(),
+            chi2_stated: data_cost(objective, &minimum.values, work),
+            weights: weights.clone(),
+            theta: theta.clone(),
+        }
+    }
+
     /// Start, Huber and GNC, then values, noise levels and gate in turn until the gate keeps the same set.
     fn robustly(
         &mut self,
@@ -170,7 +244,7 @@ impl Fit<'_> {
             weights = kept;
         }
         for _ in 0..GATE_ROUNDS {
-            minimum = self.with_noise(&minimum, &weights, theta, work);
+            minimum = self.with_noise(&minimum.values, &weights, theta, work);
             if !robust.enabled || minimum.status == SolveStatus::NotEvaluable {
                 break;
             }
@@ -207,7 +281,7 @@ impl Fit<'_> {
     /// Values and noise levels in turn until both stay.
     fn with_noise(
         &mut self,
-        start: &Minimum,
+        start: &Values,
         weights: &[f64],
         theta: &mut Vec<f64>,
         work: &mut Workspace,
@@ -215,14 +289,14 @@ impl Fit<'_> {
         if self.settings.noise_rounds == 0 || !self.model.problem.groups.iter().any(|g| g.estimate)
         {
             return self.minimize(
-                &start.values,
+                start,
                 weights,
                 theta,
                 work,
                 self.settings.minimize.decrement,
             );
         }
-        let mut minimum = self.minimize(&start.values, weights, theta, work, BETWEEN_ROUNDS);
+        let mut minimum = self.minimize(start, weights, theta, work, BETWEEN_ROUNDS);
         for _ in 0..self.settings.noise_rounds {
             if minimum.status == SolveStatus::NotEvaluable {
                 break;

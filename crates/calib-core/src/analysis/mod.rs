@@ -1,5 +1,6 @@
 //! What a minimum means: covariance, observability, goodness of fit, prediction of new poses.
 
+pub(crate) mod admit;
 pub(crate) mod bounds;
 pub(crate) mod change;
 pub(crate) mod closure;
@@ -16,3 +17,4 @@ pub(crate) mod solution;
 pub(crate) mod spread;
 pub(crate) mod untested;
 pub(crate) mod validate;
+pub(crate) mod weigh;

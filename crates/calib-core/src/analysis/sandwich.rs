@@ -5,11 +5,15 @@
 //! C (Σ_s Aᵀ(I − Q)^(-½) w wᵀ (I − Q)^(-½) A + Λ) C                                         (1)
 //! ```
 //!
-//! Bell & McCaffrey 2002 (CR2).
+//! Bell & McCaffrey 2002 (CR2). Where the noise model is known to be wrong, the covariance in use is at least this one:
+//!
+//! ```text
+//! C = HHᵀ,   Hᵀ(Σ … + Λ)H = U diag(λ) Uᵀ,   C ← H U diag(max(1, λ)) Uᵀ Hᵀ                    (2)
+//! ```
 
 use nalgebra::DMatrix;
 
-use crate::analysis::solution::Solution;
+use crate::analysis::solution::{Solution, describe_parameters};
 use crate::model::layout::Model;
 use crate::model::values::Values;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
@@ -29,6 +33,29 @@ impl Solution {
         let sigma = |column: usize| covariance[(column, column)].max(0.0).sqrt();
         let columns = self.model.column_of.iter();
         Some(columns.map(|column| column.map(sigma)).collect())
+    }
+
+    /// The same solution with the covariance of equation (2): that of equation (1) in every direction in which it is larger.
+    /// With few poses for the number of parameters it is too large rather than too small. `None` when the model cannot be
+    /// evaluated.
+    #[must_use]
+    pub fn with_cluster_covariance(&self) -> Option<Self> {
+        let c = covariance_of(&self.information.curvature(&self.model))?;
+        let middle = middle(self.objective(), &self.values, &c);
+        let half = self.half_covariance();
+        let inside = half.tr_mul(&(middle * &half));
+        let eigen = calib_geometry::decompose::symmetric_eigen(&inside);
+        let mut wider = half * eigen.vectors;
+        for (k, value) in eigen.values.iter().enumerate() {
+            wider.column_mut(k).scale_mut(value.max(1.0).sqrt());
+        }
+        let mut out = self.clone();
+        out.information.covariance = &wider * wider.transpose();
+        let described = describe_parameters(&out.model, &out.values, &out.information);
+        for (parameter, described) in out.parameters.iter_mut().zip(described) {
+            parameter.sigma = described.sigma;
+        }
+        Some(out)
     }
 }
 
@@ -57,6 +84,11 @@ pub fn sandwich(
 
 /// Equation (1) where C is known.
 fn around(objective: Objective, values: &Values, c: &DMatrix<f64>) -> DMatrix<f64> {
+    c * middle(objective, values, c) * c
+}
+
+/// What stands between the two C of equation (1).
+fn middle(objective: Objective, values: &Values, c: &DMatrix<f64>) -> DMatrix<f64> {
     let model = objective.model;
     let n = model.free();
     let mut work = Workspace::new(model);
@@ -90,5 +122,5 @@ fn around(objective: Objective, values: &Values, c: &DMatrix<f64>) -> DMatrix<f6
         let score = s.a.tr_mul(&adjusted);
         middle.ger(1.0, &score, &score, 1.0);
     }
-    c * middle * c
+    middle
 }

@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::analysis::solution::Solution;
 use crate::graph::ids::MeasurementId;
 use crate::model::layout::Model;
+use crate::model::values::Values;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::accumulate;
 use crate::solve::whitened::{covariance_of, whitened};
@@ -130,7 +131,7 @@ impl Solution {
     /// The same for the wanted samples only: what each costs grows with the square of the parameters.
     #[must_use]
     pub fn leave_out(&self, wanted: impl Fn(usize) -> bool) -> Option<CrossValidation> {
-        self.each_prediction(&self.weights, true, &wanted)
+        predictions(self.objective(), &self.values, &self.weights, true, &wanted)
     }
 
     /// Predictions of the held-out samples by equation (2), whatever their weight in the fit was.
@@ -142,7 +143,7 @@ impl Solution {
             .iter()
             .map(|o| f64::from(u8::from(self.model.is_held_out(o.sample))))
             .collect();
-        self.each_prediction(&held, false, &|_| true)
+        predictions(self.objective(), &self.values, &held, false, &|_| true)
     }
 
     /// χ² of all held-out samples together but those of `without`, against what is stated of their prediction, with its degrees of
@@ -209,72 +210,74 @@ impl Solution {
         }
         Some(out)
     }
+}
 
-    fn each_prediction(
-        &self,
-        include: &[f64],
-        left_out: bool,
-        wanted: &dyn Fn(usize) -> bool,
-    ) -> Option<CrossValidation> {
-        let model = &self.model;
-        let mut work = Workspace::new(model);
-        let mut system = NormalEquations::new(model.free());
-        if !accumulate(self.objective(), &self.values, &mut work, &mut system) {
-            return None;
-        }
-        let c = covariance_of(&system)?;
-        let included = Objective {
-            weights: include,
-            ..self.objective()
+/// Predictions of the observations that `include` weighs, from what `objective` was fitted to: equation (1) where they
+/// took part, (2) where not. `None` when the model cannot be evaluated.
+pub(crate) fn predictions(
+    objective: Objective,
+    values: &Values,
+    include: &[f64],
+    left_out: bool,
+    wanted: &dyn Fn(usize) -> bool,
+) -> Option<CrossValidation> {
+    let model = objective.model;
+    let mut work = Workspace::new(model);
+    let mut system = NormalEquations::new(model.free());
+    if !accumulate(objective, values, &mut work, &mut system) {
+        return None;
+    }
+    let c = covariance_of(&system)?;
+    let included = Objective {
+        weights: include,
+        ..objective
+    };
+    let mut out = CrossValidation::default();
+    for sample in (0..model.problem.samples).filter(|sample| wanted(*sample)) {
+        let Some(s) = whitened(included, values, sample, &mut work) else {
+            continue;
         };
-        let mut out = CrossValidation::default();
-        for sample in (0..model.problem.samples).filter(|sample| wanted(*sample)) {
-            let Some(s) = whitened(included, &self.values, sample, &mut work) else {
-                continue;
-            };
-            let m = s.w.len();
-            let q = &s.a * &c * s.a.transpose();
-            let with_all = &s.l * (DMatrix::identity(m, m) + &q) * s.l.transpose();
-            // Covariance of the whitened prediction error and the error itself.
-            let (error, covariance) = if left_out {
-                let eigen =
-                    calib_geometry::decompose::symmetric_eigen(&(DMatrix::identity(m, m) - q));
-                if eigen.values[0] < LEVERAGE_LEFT {
-                    out.indispensable.push(sample);
-                    continue;
-                }
-                let mut scaled = eigen.vectors.clone();
-                for k in 0..m {
-                    scaled.column_mut(k).unscale_mut(eigen.values[k]);
-                }
-                let inverse = scaled * eigen.vectors.transpose();
-                (&inverse * &s.w, inverse)
-            } else {
-                (s.w.clone(), DMatrix::identity(m, m) + q)
-            };
-            let Some(cholesky) = nalgebra::Cholesky::new(covariance.clone()) else {
+        let m = s.w.len();
+        let q = &s.a * &c * s.a.transpose();
+        let with_all = &s.l * (DMatrix::identity(m, m) + &q) * s.l.transpose();
+        // Covariance of the whitened prediction error and the error itself.
+        let (error, covariance) = if left_out {
+            let eigen = calib_geometry::decompose::symmetric_eigen(&(DMatrix::identity(m, m) - q));
+            if eigen.values[0] < LEVERAGE_LEFT {
                 out.indispensable.push(sample);
                 continue;
-            };
-            let half = cholesky.l().solve_lower_triangular(&error)?;
-            let z2 = half.norm_squared();
-            let log_det = s.log_det + 2.0 * cholesky.l().diagonal().map(f64::ln).sum();
-            let e = &s.l * &error;
-            let full = &s.l * covariance * s.l.transpose();
-            out.samples.push(SamplePrediction {
-                sample,
-                vectors: s
-                    .blocks
-                    .iter()
-                    .map(|&block| vector_error(model, block, &e, [&full, &with_all]))
-                    .collect(),
-                z2,
-                rows: m,
-                log_density: -0.5 * (z2 + log_det + m as f64 * (2.0 * std::f64::consts::PI).ln()),
-            });
-        }
-        Some(out)
+            }
+            let mut scaled = eigen.vectors.clone();
+            for k in 0..m {
+                scaled.column_mut(k).unscale_mut(eigen.values[k]);
+            }
+            let inverse = scaled * eigen.vectors.transpose();
+            (&inverse * &s.w, inverse)
+        } else {
+            (s.w.clone(), DMatrix::identity(m, m) + q)
+        };
+        let Some(cholesky) = nalgebra::Cholesky::new(covariance.clone()) else {
+            out.indispensable.push(sample);
+            continue;
+        };
+        let half = cholesky.l().solve_lower_triangular(&error)?;
+        let z2 = half.norm_squared();
+        let log_det = s.log_det + 2.0 * cholesky.l().diagonal().map(f64::ln).sum();
+        let e = &s.l * &error;
+        let full = &s.l * covariance * s.l.transpose();
+        out.samples.push(SamplePrediction {
+            sample,
+            vectors: s
+                .blocks
+                .iter()
+                .map(|&block| vector_error(model, block, &e, [&full, &with_all]))
+                .collect(),
+            z2,
+            rows: m,
+            log_density: -0.5 * (z2 + log_det + m as f64 * (2.0 * std::f64::consts::PI).ln()),
+        });
     }
+    Some(out)
 }
 
 /// One vector of a sample: its observation, first row and rows; with the covariance of the error, and that of one with all samples.

@@ -7,7 +7,10 @@
 //! S holds the parameters' natural scales (prior σ, or 1°, 1 cm): what makes a linearization wrong is the size
 //! of a step in degrees, not in units of the data's precision, so weakly seen directions are held back first.
 //!
-//! Directions that neither data nor prior see have zero gradient and stay where they start.
+//! Directions that neither data nor prior see have zero gradient and stay where they start. A prior that is very wide says
+//! nearly as little: along a gauge it would draw the values to its center in hundreds of short steps that change no
+//! prediction. Such a slide is ended where it is, near the start: the data part of the step, `δᵀ(H − Λ)δ`, has vanished,
+//! and what the priors could gain is far below a σ.
 //!
 //! Where residuals are large (missing physics) and a direction is held by a weak prior only, the curvature
 //! `Σ e·∂²e` that Gauss–Newton leaves out decides along it, and Gauss–Newton creeps or overshoots. Once
@@ -78,6 +81,15 @@ const SLOW: f64 = 0.1;
 /// …once the fit is within this squared distance (in σ²) of the minimum: farther away the curvature changes
 /// from step to step and a secant of it misleads.
 const NEAR: f64 = 1.0;
+
+/// Priors that cost no more than this (in σ²) say nothing: it is all that sliding to their centers can gain…
+const NOTHING: f64 = 1e-4;
+/// …a slide gains less than this per step…
+const SLIDE: f64 = 1e-6;
+/// …and moves the predictions by less than this, squared: 1e-4 σ.
+const UNSEEN: f64 = 1e-8;
+/// A prior wider than this many typical deviations does not say how far a linearization holds.
+const WIDEST_SCALE: f64 = 30.0;
 
 /// K of equation (2).
 struct Curvature {
@@ -207,6 +219,8 @@ struct Descent<'a> {
     settings: &'a MinimizeSettings,
     /// Diagonal of S⁻².
     natural: Vec<f64>,
+    /// Diagonal of Λ.
+    prior: Vec<f64>,
     bounded: bool,
     /// Without random effects V is constant: the next linearization delivers the cost to check.
     constant_noise: bool,
@@ -234,7 +248,18 @@ impl<'a> Descent<'a> {
             settings,
             natural: columns
                 .clone()
-                .map(|&p| parameters[p].scale().powi(-2))
+                .map(|&p| {
+                    let typical = parameters[p].unit.typical_deviation();
+                    parameters[p].scale().min(WIDEST_SCALE * typical).powi(-2)
+                })
+                .collect(),
+            prior: columns
+                .clone()
+                .map(|&p| {
+                    parameters[p]
+                        .prior_sigma
+                        .map_or(0.0, |sigma| sigma.powi(-2))
+                })
                 .collect(),
             bounded: columns.clone().any(|&p| parameters[p].bounds.is_some()),
             constant_noise: model.slots.is_empty(),
@@ -334,6 +359,19 @@ impl<'a> Descent<'a> {
                 ))
     }
 
+    /// δᵀ(H − Λ)δ of the proposed step: how far it moves the predictions, in σ².
+    fn seen_by_data(&self) -> f64 {
+        let (n, h, step) = (self.system.n, &self.system.h, &self.step);
+        let mut sum = 0.0;
+        for i in 0..n {
+            sum += (h[i * n + i] - self.prior[i]) * step[i] * step[i];
+            for j in i + 1..n {
+                sum += 2.0 * h[i * n + j] * step[i] * step[j];
+            }
+        }
+        sum
+    }
+
     /// What becomes of the proposed step; `None` when it does not lower the cost. `before`: decrement of the step
     /// before.
     fn judge(&mut self, before: f64, work: &mut Workspace) -> Option<Step> {
@@ -350,7 +388,12 @@ impl<'a> Descent<'a> {
             1.0
         };
         let expected = self.decrement * rate;
-        if self.decrement <= enough || (self.constant_noise && expected <= enough) {
+        let slides = || {
+            let little = self.system.prior <= NOTHING && self.decrement <= SLIDE;
+            little && rate > SLOW && self.seen_by_data() <= UNSEEN
+        };
+        let soon = self.constant_noise && expected <= enough;
+        if self.decrement <= enough || soon || slides() {
             let fallen = self.decrement <= enough || cost(objective, &self.trial, work) <= limit;
             fallen.then_some(Step::Last)
         } else if self.constant_noise {

@@ -270,6 +270,24 @@ pub(crate) fn clean(
     Some((values, kept, iterations))
 }
 
+/// Equation (4) at given values with a limit on d that is wider by a factor.
+pub(crate) fn gate_of(
+    model: &Model,
+    values: &Values,
+    theta: &[f64],
+    mask: &[f64],
+    factor: f64,
+    work: &mut Workspace,
+) -> Option<Vec<f64>> {
+    let limits = Limits::new(&RobustSettings::default());
+    let d2 = distances(model, values, theta, mask, work)?;
+    let scale = inflation(model, &d2, mask, &limits) * factor * factor;
+    let observations = model.observations.iter().enumerate();
+    let passes = |o: usize, rows: usize| mask[o] > 0.0 && d2[o] <= limits.gate[rows] * scale;
+    let passed = observations.map(|(o, observation)| passes(o, observation.rows));
+    Some(passed.map(|p| f64::from(u8::from(p))).collect())
+}
+
 /// Equation (4) at given values.
 pub(crate) fn gate(
     model: &Model,

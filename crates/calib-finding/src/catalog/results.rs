@@ -52,6 +52,21 @@ super::topic! {
             "{physics} (`{parameter}`): explains {explains:percent} of χ², p = {p_value}.",
             "Enable the effect under `solve.free` or `solve.joints`, and compare the held-out errors.";
     }
+    /// What is random from pose to pose is no noise of a joint.
+    NOISE_IS_PHYSICS = "noise-is-physics" {
+        "swallowed": Info,
+            "Joint noise of {sigma} would make the residuals likeliest, but with its weights left-out poses are predicted worse ({poses:pose} left out in turn): physics is missing from the model. The fit uses weights that do not trust the model.",
+            "Enable the effects that `missing-physics` names, and compare the held-out errors.";
+        "no_encoder": Info,
+            "The joints seem to stop {sigma} off their readings, differently in each pose. No encoder has that noise: physics is missing from the model (backlash, compliance, eccentricity), or the readings belong to other poses.",
+            "Enable the effects that `missing-physics` names, and compare the held-out errors.";
+    }
+    /// Rejected vectors take part after all.
+    REJECTED_TAKE_PART = "rejected-take-part" {
+        "": Info,
+            "{readmitted} of {rejected} rejected measurements take part after all: left-out poses are predicted {better:percent} better with them. They are the hardest poses of a model that physics is missing from, not errors.",
+            "Enable the effects that `missing-physics` names, and compare the held-out errors.";
+    }
     /// Shapes that the 3-D view lacks.
     SHAPE_NOT_DRAWN = "shape-not-drawn" {
         "not_stl": Info,

@@ -11,7 +11,7 @@ use crate::formulate::found::Found;
 use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::solved::Solved;
-use crate::formulate::{bad_rows, clock};
+use crate::formulate::{bad_rows, clock, noise};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
 use crate::prepare::tracks::body_tracks;
@@ -56,6 +56,10 @@ pub fn likelihood(
             fit = ml::fit(full, inputs, &settings)?;
         }
     }
+    progress("choose the noise");
+    checked
+        .findings
+        .extend(noise::by_evidence(&mut fit, inputs, &settings));
     checked.findings.extend(on_their_limit(&fit));
     checked.findings.extend(of_the_wrong_sign(&fit));
     checked.findings.extend(with_memory(&mut fit));

@@ -2,7 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::{EdgeId, FrameId, GroupId, ParameterId, PointId, Problem, Solution};
+use calib_core::{
+    EdgeId, FrameId, GroupId, NoiseChoice, NoiseKind, NoiseModel, ParameterId, PointId, Problem,
+    Solution,
+};
 
 use crate::formulate::kinematics::Calibration;
 use crate::prepare::loads::FirstMoment;
@@ -74,6 +77,18 @@ pub struct NoiseGroups {
 }
 
 impl Formulation {
+    /// The same with this noise from pose to pose, where the problem has anything for it.
+    #[must_use]
+    pub fn with_noise(mut self, model: NoiseModel) -> Self {
+        if let Some(problem) = self.problem.with_noise_model(model) {
+            self.problem = problem;
+            if model != NoiseModel::Joint {
+                self.noise.joint = None;
+            }
+        }
+        self
+    }
+
     /// First sample of every recording but the first.
     #[must_use]
     pub fn borders(&self) -> Vec<usize> {
@@ -86,10 +101,24 @@ impl Formulation {
 /// A solved problem.
 #[derive(Debug, Clone)]
 pub struct MlFit {
+    /// What was tried of the noise from pose to pose; `None` where the profile states it.
+    pub noise: Option<NoiseChoice>,
     /// The problem's names.
     pub formulation: Formulation,
     /// What was found.
     pub solution: Solution,
     /// The robot that follows.
     pub calibration: Calibration,
+}
+
+impl MlFit {
+    /// Noise of a joint reading that was found, rms over the joints that have any, rad; `None` where none has.
+    #[must_use]
+    pub fn joint_sigma(&self) -> Option<f64> {
+        let noise = self.solution.noise.iter();
+        let of_joints = noise.filter(|n| n.kind == NoiseKind::Joint && n.samples > 0);
+        let squares: Vec<f64> = of_joints.map(|n| n.sigma * n.sigma).collect();
+        let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+        (!squares.is_empty()).then(|| mean.sqrt())
+    }
 }

@@ -13,6 +13,7 @@ pub(crate) mod memory;
 pub mod ml;
 pub mod model_checks;
 pub mod models;
+pub(crate) mod noise;
 pub mod row_checks;
 pub mod solved;
 pub mod structural;

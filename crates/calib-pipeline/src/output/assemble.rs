@@ -12,7 +12,7 @@ use crate::output::evidence::Evidence;
 use crate::output::facts::facts;
 use crate::output::of_data::{coverage, estimators, findings, recordings, rejected};
 use crate::output::of_fit::{
-    fit_summary, missing_physics, noise, not_observable, parameters, transform,
+    fit_summary, missing_physics, noise, noise_choice, not_observable, parameters, transform,
 };
 use crate::output::verdict::{limits, next_steps, scope};
 use crate::output::weak::{self, weak_directions};
@@ -41,7 +41,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         .collect();
     let open = weak::findings(e.inputs, weak.as_ref(), e.held_out.as_ref());
     let findings = findings(e, &missing, open);
-    let joint_sigma = e.fit.and_then(joint_sigma).unwrap_or(0.0);
+    let joint_sigma = e.fit.and_then(MlFit::joint_sigma).unwrap_or(0.0);
     let motions = motions(e.inputs, joint_sigma);
     let tracks = fates(e.inputs, e.tracks, e.fit, e.held_out.as_ref());
     let limits = limits(&profile.solve.limits, e);
@@ -86,6 +86,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         parameters,
         residuals: Residuals::from_rows(e.residuals),
         noise: e.fit.map_or_else(Vec::new, |fit| noise(e, fit)),
+        noise_choice: e.fit.and_then(noise_choice),
         clocks: crate::formulate::clock::clocks(e.inputs, e.fit),
         recordings: recordings(e.inputs, &tracks),
         coverage: coverage(e.inputs),
@@ -128,12 +129,6 @@ fn held_out(e: &Evidence<'_>) -> Option<HeldOut> {
         expected.tracker_m = e.fit.and_then(tracker_sigma);
     }
     Some(held_out)
-}
-
-/// Noise of the joint readings that was found, rad.
-fn joint_sigma(fit: &MlFit) -> Option<f64> {
-    let of_joints = |n: &&calib_core::NoiseEstimate| n.kind == calib_core::NoiseKind::Joint;
-    fit.solution.noise.iter().find(of_joints).map(|n| n.sigma)
 }
 
 /// The command that gives this report again, with the method where it is not the profile's.

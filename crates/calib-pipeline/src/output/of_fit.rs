@@ -127,7 +127,7 @@ pub(crate) fn fit_summary(profile: &Profile, fit: &MlFit, parameters: &[Paramete
         .iter()
         .map(|n| stated_sigma(profile, &n.name).unwrap_or(n.sigma));
     let chi2 = s.chi2_with(&levels.collect::<Vec<_>>()).unwrap_or(s.chi2);
-    let groups = s.noise.iter().map(|n| &n.name);
+    let groups = s.noise.iter().filter(|n| n.samples > 0).map(|n| &n.name);
     FitSummary {
         ended: fit_end(fit),
         status: fit_end(fit).after(s.iterations),
@@ -151,7 +151,7 @@ pub(crate) fn stated_sigma(profile: &Profile, group: &str) -> Option<f64> {
         "marker" => profile.tracker.marker_sigma,
         "body position" => profile.tracker.body_sigma,
         "body orientation" => profile.tracker.body_sigma_rad,
-        "joint" => profile.solve.noise.joint,
+        joint if joint == "joint" || joint.starts_with("joint ") => profile.solve.noise.joint,
         _ => None,
     }
 }
@@ -161,6 +161,7 @@ pub(crate) fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
     fit.solution
         .noise
         .iter()
+        .filter(|n| n.samples > 0)
         .map(|n| calib_report::Noise {
             group: n.name.clone(),
             kind: match n.kind {
@@ -179,6 +180,42 @@ pub(crate) fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
             text: calib_report::Noise::method(n.estimated).to_owned(),
         })
         .collect()
+}
+
+/// What was tried of the noise from pose to pose.
+pub(crate) fn noise_choice(fit: &MlFit) -> Option<calib_report::NoiseChoice> {
+    let choice = fit.noise.as_ref()?;
+    let candidates = choice.candidates.iter();
+    let of_joints = |c: &calib_core::NoiseCandidate| {
+        let joints = c.levels.iter().filter(|l| l.kind == NoiseKind::Joint);
+        joints.map(|l| l.sigma).max_by(f64::total_cmp)
+    };
+    Some(calib_report::NoiseChoice {
+        chosen: noise_model(choice.chosen),
+        poses: choice.poses,
+        tails: choice.tails,
+        rejected: choice.admission.map_or(0, |a| a.rejected),
+        readmitted: choice.admission.map_or(0, |a| a.readmitted),
+        candidates: candidates
+            .map(|c| calib_report::NoiseCandidate {
+                model: noise_model(c.model),
+                left_out_rms_m: c.left_out_rms,
+                surprise: c.surprise,
+                surprise_error: c.surprise_error,
+                admitted: c.admitted,
+                joint_sigma_rad: of_joints(c),
+            })
+            .collect(),
+    })
+}
+
+fn noise_model(model: calib_core::NoiseModel) -> calib_report::NoiseModel {
+    match model {
+        calib_core::NoiseModel::Joint => calib_report::NoiseModel::Joint,
+        calib_core::NoiseModel::BodyPose => calib_report::NoiseModel::BodyPose,
+        calib_core::NoiseModel::JointEach => calib_report::NoiseModel::JointEach,
+        _ => calib_report::NoiseModel::White,
+    }
 }
 
 /// A significant score test as the report tells it.

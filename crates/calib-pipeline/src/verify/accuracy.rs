@@ -123,11 +123,9 @@ pub(crate) fn accuracy_limits(
     let Some(measured) = held_out.and_then(|h| h.calibrated) else {
         return Vec::new();
     };
-    let groups = fit.formulation.noise;
-    let sigma_of = |group| noise_level(fit, group);
     let parameters = workspace.map_or(0.0, |w| w.rms_sigma_m);
     let tracker = tracker_sigma(fit).unwrap_or(0.0);
-    let joints = sigma_of(groups.joint).unwrap_or(0.0) * joint_lever(inputs);
+    let joints = fit.joint_sigma().unwrap_or(0.0) * joint_lever(inputs);
     let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
     let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
     let total = explained + rest.powi(2);

@@ -4,8 +4,9 @@ use super::*;
 use crate::profile::{JointException, Limits, Noise, Prior, Solve};
 use crate::raw::{
     ANGLE, MASS, MASS_CENTER, POSITION, PRIOR_KEYS, RawFree, RawJointFree, RawJointSolve,
-    RawLimits, RawPrior, RawSolve,
+    RawLimits, RawNoiseModel, RawPrior, RawSolve,
 };
+use calib_core::NoiseModel;
 use calib_core::effect::{Effect, PriorKey, Source};
 
 impl Checker<'_> {
@@ -31,6 +32,7 @@ impl Checker<'_> {
             joints,
             prior,
             noise: Noise {
+                model: noise_model(raw.noise.model),
                 joint: raw.noise.joint_deg.map(|s| s * DEG),
                 known: raw.noise.known,
             },
@@ -126,5 +128,15 @@ impl Checker<'_> {
                 .collect(),
             origin_sigma: raw.origin_sigma_mm.map(|l| l * MM),
         }
+    }
+}
+
+fn noise_model(raw: RawNoiseModel) -> Option<NoiseModel> {
+    match raw {
+        RawNoiseModel::Auto => None,
+        RawNoiseModel::White => Some(NoiseModel::White),
+        RawNoiseModel::Joint => Some(NoiseModel::Joint),
+        RawNoiseModel::BodyPose => Some(NoiseModel::BodyPose),
+        RawNoiseModel::JointEach => Some(NoiseModel::JointEach),
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{Free, JointFree, Load, Method};
 use calib_core::EFFECTS;
+use calib_core::NoiseModel;
 use calib_core::effect::Effect;
 use calib_urdf::JointId;
 use std::collections::BTreeMap;
@@ -178,6 +179,8 @@ impl Prior {
 /// Noise levels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
+    /// What is random from pose to pose; `None`: what the recordings speak for.
+    pub model: Option<NoiseModel>,
     /// Joint angle from pose to pose, rad.
     pub joint: Option<f64>,
     /// Take stated levels as true.

@@ -52,10 +52,30 @@ pub enum RawLoad {
     Measured,
 }
 
+/// What is random from pose to pose, beside the noise of each measurement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawNoiseModel {
+    /// What the recordings speak for (default): each of the others is tried on left-out poses.
+    #[default]
+    Auto,
+    /// Nothing: the weights of plain least squares.
+    White,
+    /// The joint angles, with one level.
+    Joint,
+    /// The pose of each body with three markers and more.
+    BodyPose,
+    /// The joint angles, with a level for each joint.
+    JointEach,
+}
+
 /// Noise levels: the start of their estimation, or fixed.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawNoise {
+    /// What is random from pose to pose: `auto` (default), `white`, `joint`, `body_pose` or `joint_each`.
+    #[serde(default)]
+    pub model: RawNoiseModel,
     /// Standard deviation of the joint angles from pose to pose, deg; estimated when absent.
     #[serde(default)]
     pub joint_deg: Option<f64>,

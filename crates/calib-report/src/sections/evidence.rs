@@ -3,7 +3,7 @@
 use super::{Page, code, mm};
 use crate::table::Table;
 use crate::words;
-use crate::{Report, Unit, number};
+use crate::{NoiseChoice, Report, Unit, number};
 
 /// Row numbers shown in a table cell; the rest is counted.
 const ROWS: usize = 8;
@@ -113,6 +113,42 @@ fn noise(page: &mut Page, report: &Report) {
         ]);
     }
     page.table("Noise per component:", table);
+    if let Some(choice) = &report.noise_choice {
+        noise_choice(page, choice);
+    }
+}
+
+fn noise_choice(page: &mut Page, choice: &NoiseChoice) {
+    page.text(words::noise::choice(choice));
+    let mut table = Table::new(&[
+        "<random from pose to pose",
+        ">largest joint noise",
+        ">left-out rms [mm]",
+        ">less likely by [nats per pose]",
+        "<weights",
+    ]);
+    for candidate in &choice.candidates {
+        let chosen = candidate.model == choice.chosen;
+        let joint = number::sigma(candidate.joint_sigma_rad, Unit::Radian);
+        let less_likely = format!(
+            "{} ± {}",
+            number::fixed(candidate.surprise, 2),
+            number::fixed(candidate.surprise_error, 2)
+        );
+        let weights = match (chosen, candidate.admitted) {
+            (true, _) => "taken",
+            (false, true) => "not needed",
+            (false, false) => "predict worse",
+        };
+        table.row([
+            candidate.model.words().to_owned(),
+            joint,
+            mm(candidate.left_out_rms_m),
+            less_likely,
+            weights.to_owned(),
+        ]);
+    }
+    page.table("", table);
 }
 
 fn rejected(page: &mut Page, report: &Report) {

@@ -1,7 +1,7 @@
 //! The noise of the measurements.
 
 use super::prose::{capital, full_stop, or, short};
-use crate::{Noise, NoiseKind, Report, number};
+use crate::{Noise, NoiseChoice, NoiseKind, NoiseModel, Report, number};
 
 impl Noise {
     /// How the level was determined.
@@ -42,4 +42,40 @@ pub(crate) fn noise(report: &Report, rest: &str) -> Vec<String> {
         .map(|noise| noise.sentence())
         .collect();
     or(short(&lines, rest), "Not estimated.")
+}
+
+impl NoiseModel {
+    /// What is random from pose to pose.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Self::White => "nothing (plain least squares)",
+            Self::Joint => "the joint positions, one level",
+            Self::BodyPose => "the pose of each body",
+            Self::JointEach => "the joint positions, a level each",
+        }
+    }
+}
+
+/// What was taken, and what the tails and the rejected measurements say.
+pub(crate) fn choice(choice: &NoiseChoice) -> String {
+    /// Normal noise of 100 vectors exceeds this in one of 100 fits.
+    const HEAVY: f64 = 1.5;
+    let mut text = format!(
+        "Random from pose to pose, beside the noise of each measurement: {}, by the errors of {} poses left out in turn.",
+        choice.chosen.words(),
+        choice.poses
+    );
+    if choice.tails > HEAVY {
+        text += &format!(
+            " The tails of the left-out errors are {} times those of normal noise: keep `robust` on.",
+            number::fixed(choice.tails, 1)
+        );
+    }
+    if choice.rejected > 0 {
+        text += &format!(
+            " Of {} rejected measurements, {} take part after all, because they improve the predictions.",
+            choice.rejected, choice.readmitted
+        );
+    }
+    text
 }

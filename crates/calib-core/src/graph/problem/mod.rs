@@ -12,7 +12,10 @@ use crate::graph::parameter::Parameter;
 mod edges;
 mod joints;
 mod measurements;
+mod noise;
 mod paths;
+
+pub use noise::NoiseModel;
 
 /// A point that is fixed in a frame.
 #[derive(Debug, Clone, PartialEq)]

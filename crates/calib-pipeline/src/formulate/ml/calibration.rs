@@ -10,7 +10,7 @@ use crate::formulate::kinematics::{Calibration, JointEffects};
 use crate::prepare::inputs::Inputs;
 
 /// The robot that a solution describes.
-pub(super) fn calibration(
+pub(crate) fn calibration(
     formulation: &Formulation,
     solution: &Solution,
     inputs: &Inputs,

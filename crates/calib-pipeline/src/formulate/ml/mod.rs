@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use bodies::add_bodies;
 use calib_core::{Chart, Problem, Role, Settings};
 use calib_profile::{Free, Usage};
-use calibration::calibration;
 use joints::{Row, add_joint, joint_noise_group, used_joints};
 use masses::free_masses;
 
@@ -22,7 +21,7 @@ mod calibration;
 mod joints;
 mod masses;
 
-pub(crate) use calibration::calibration_at;
+pub(crate) use calibration::{calibration, calibration_at};
 
 /// States the problem of a profile.
 #[must_use]
@@ -112,7 +111,10 @@ pub fn state(
     add_bodies(&mut formulation, inputs, tracks, start);
     add_contacts(&mut formulation, inputs);
     crate::formulate::clock::add_clocks(&mut formulation, inputs, free_set);
-    formulation
+    match profile.solve.noise.model {
+        Some(model) if free_set == FreeSet::Profile => formulation.with_noise(model),
+        _ => formulation,
+    }
 }
 
 /// Solves a stated problem.
@@ -127,6 +129,7 @@ pub fn fit(
     let solution = calib_core::solve(&formulation.problem, settings)?;
     let calibration = calibration(&formulation, &solution, inputs);
     Ok(MlFit {
+        noise: None,
         formulation,
         solution,
         calibration,

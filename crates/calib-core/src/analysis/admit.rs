@@ -1,0 +1,173 @@
+//! What the gate of the robust fit left out, by evidence: gross errors, or the hardest poses of a model that physics is
+//! missing from.
+//!
+//! The fit is repeated with a wider gate and with none, and every pose is left out in turn; all its measurements are
+//! predicted, those that took no part included:
+//!
+//! ```text
+//! δ₋ₛ = C Aᵀ (I − Q)⁻¹ w,   e₋ₛ = e + J δ₋ₛ      (A, w: what took part of the pose; J, e: all of it)      (1)
+//! ```
+//!
+//! A gross error cannot be predicted, and takes the predictions of others with it: with it they are worse. A pose that the
+//! model merely describes badly is predicted better where others like it take part.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use crate::analysis::solution::Solution;
+use crate::model::cache::State;
+use crate::model::layout::Model;
+use crate::model::path::Derivatives;
+use crate::model::values::Values;
+use crate::solve::equations::{NormalEquations, Objective, Workspace};
+use crate::solve::normal::accumulate;
+use crate::solve::robust::{RejectReason, RobustSettings, gate_of};
+use crate::solve::whitened::{covariance_of, whitened};
+
+/// What became of the rejected vectors.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Admission {
+    /// Vectors that the gate had rejected.
+    pub rejected: usize,
+    /// Vectors that take part after all.
+    pub readmitted: usize,
+    /// Left-out error of all poses (rms) with them, over that without them.
+    pub ratio: f64,
+    /// Standard errors by which the mean square is less with them (paired over the poses).
+    pub better_by_errors: f64,
+}
+
+/// Weights of the observations with a wider gate.
+pub(crate) struct Wider {
+    pub weights: Vec<f64>,
+    pub readmitted: usize,
+}
+
+/// A distance beyond the gate by this factor belongs to no tail.
+const WIDE: f64 = 2.5;
+
+/// Every observation that may take part: not held out, and not where another marker should be.
+pub(crate) fn eligible(solution: &Solution) -> Vec<f64> {
+    let model = &solution.model;
+    let swapped: BTreeSet<(usize, usize)> = solution
+        .rejected
+        .iter()
+        .filter(|r| r.reason == RejectReason::Swap)
+        .map(|r| (r.measurement.index(), r.item))
+        .collect();
+    let observations = model.observations.iter();
+    observations
+        .map(|o| {
+            let out = model.is_held_out(o.sample) || swapped.contains(&(o.measurement, o.item));
+            f64::from(u8::from(!out))
+        })
+        .collect()
+}
+
+/// More was rejected than chance explains, three times over.
+pub(crate) fn many_rejected(weights: &[f64], eligible: &[f64]) -> Option<usize> {
+    let pairs = || weights.iter().zip(eligible).filter(|(_, e)| **e > 0.0);
+    let rejected = pairs().filter(|(w, _)| **w == 0.0).count();
+    let chance = (1.0 - RobustSettings::default().gate) * pairs().count() as f64;
+    (rejected as f64 > 2.0 + 3.0 * chance).then_some(rejected)
+}
+
+/// The wider gate, and none.
+pub(crate) fn wider(
+    objective: Objective,
+    values: &Values,
+    eligible: &[f64],
+    work: &mut Workspace,
+) -> Vec<Wider> {
+    let Objective {
+        model,
+        weights,
+        theta,
+    } = objective;
+    let passed = gate_of(model, values, theta, eligible, WIDE, work);
+    let mut out: Vec<Wider> = Vec::new();
+    for set in passed.into_iter().chain([eligible.to_vec()]) {
+        let union: Vec<f64> = set.iter().zip(weights).map(|(a, b)| a.max(*b)).collect();
+        let more = union.iter().zip(weights).filter(|(a, b)| **a > **b);
+        let readmitted = more.count();
+        if readmitted > 0 && out.iter().all(|w| w.readmitted != readmitted) {
+            out.push(Wider {
+                weights: union,
+                readmitted,
+            });
+        }
+    }
+    out
+}
+
+/// Mean square of (1) over the vectors of each pose; those of `everything` are predicted, those of the objective take part.
+pub(crate) fn left_out_squares(
+    objective: Objective,
+    values: &Values,
+    everything: &[f64],
+) -> Option<BTreeMap<usize, f64>> {
+    /// An eigenvalue of I − Q below this: the pose alone determines something.
+    const LEVERAGE_LEFT: f64 = 1e-9;
+    let model = objective.model;
+    let n = model.free();
+    let mut work = Workspace::new(model);
+    let mut system = NormalEquations::new(n);
+    if !accumulate(objective, values, &mut work, &mut system) {
+        return None;
+    }
+    let c = covariance_of(&system)?;
+    let mut out = BTreeMap::new();
+    for sample in 0..model.problem.samples {
+        let mut step = DVector::zeros(n);
+        if let Some(s) = whitened(objective, values, sample, &mut work) {
+            let ac = &s.a * &c;
+            let left = DMatrix::identity(s.w.len(), s.w.len()) - &ac * s.a.transpose();
+            let eigen = calib_geometry::decompose::symmetric_eigen(&left);
+            if eigen.values[0] < LEVERAGE_LEFT {
+                continue;
+            }
+            let along = eigen.vectors.tr_mul(&s.w).component_div(&eigen.values);
+            step = ac.tr_mul(&(&eigen.vectors * along));
+        }
+        if let Some(square) = mean_square(model, values, everything, sample, &step, &mut work) {
+            out.insert(sample, square);
+        }
+    }
+    Some(out)
+}
+
+/// Mean square of e + J δ over the vectors of a pose.
+fn mean_square(
+    model: &Model,
+    values: &Values,
+    everything: &[f64],
+    sample: usize,
+    step: &DVector<f64>,
+    work: &mut Workspace,
+) -> Option<f64> {
+    let Workspace { cache, rows, .. } = work;
+    let at = State::new(&model.problem, cache, values);
+    rows.fill(model, at, everything, sample, Derivatives::All);
+    let n = rows.n;
+    let (mut sum, mut count) = (0.0, 0);
+    for &(o, first, length) in &rows.blocks {
+        let e: Vec<f64> = (first..first + length)
+            .map(|i| {
+                let j = &rows.j[i * n..(i + 1) * n];
+                rows.r[i] + j.iter().zip(step.iter()).map(|(a, b)| a * b).sum::<f64>()
+            })
+            .collect();
+        let kind = &model.problem.measurements[model.observations[o].measurement].kind;
+        let deviation = kind.of().deviation(&e);
+        sum += deviation
+            .position
+            .or(deviation.rotation)
+            .unwrap_or(0.0)
+            .powi(2);
+        count += 1;
+    }
+    (count > 0).then(|| sum / f64::from(count))
+}

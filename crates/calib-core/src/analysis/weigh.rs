@@ -1,0 +1,513 @@
+//! What is random from pose to pose, by evidence: nothing, the joints, the pose of each body.
+//!
+//! A random effect of each pose and physics that is not modeled look alike to a likelihood, but not to a prediction. Each
+//! statement of the noise is fitted to the same kept observations with its own levels (REML), then every pose is left
+//! out in turn with the weights held (C23):
+//!
+//! ```text
+//! square_s(k)  = mean over vectors of |e₋ₛ|²                                                   (1)
+//! surprise_s(k) = −log p(y_s | y₋ₛ)                                                            (2)
+//! d̄ = mean_s [square_s(k) − square_s(white)],   its standard error over the poses (paired)     (3)
+//! ```
+//!
+//! (1) decides which weights may be used. Equal weights trust no model of the robot, and neither does the pose of each body;
+//! the joints' noise trusts the robot's Jacobian. Where it predicts worse than the better of the other two, or is larger than
+//! joints scatter, it has swallowed physics, however likely it is. Among those that may be used, the smallest within two
+//! standard errors of the least (2) is taken.
+//!
+//! The gate of the robust fit is tried in the same way ([`admit`](crate::analysis::admit)): a model that physics is missing
+//! from finds its hardest poses unlikely.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Deserialize, Serialize};
+
+use crate::analysis::admit::{Admission, eligible, left_out_squares, many_rejected, wider};
+use crate::analysis::estimate::{Settings, Start, refit};
+use crate::analysis::solution::Solution;
+use crate::analysis::validate::{CrossValidation, predictions};
+use crate::graph::problem::{NoiseKind, NoiseModel, Problem};
+use crate::model::layout::Model;
+use crate::model::values::Values;
+use crate::solve::equations::{Objective, Workspace};
+use crate::solve::minimize::{MinimizeSettings, SolveStatus, minimize_in};
+use crate::solve::noise::score;
+
+/// A noise level of a candidate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct NoiseLevel {
+    /// Group.
+    pub name: String,
+    /// What it is.
+    pub kind: NoiseKind,
+    /// σ, m or rad.
+    pub sigma: f64,
+}
+
+/// One statement of the noise, fitted and tried on left-out poses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct NoiseCandidate {
+    /// The statement.
+    pub model: NoiseModel,
+    /// Its levels.
+    pub levels: Vec<NoiseLevel>,
+    /// Root of the mean of (1): left-out error of a vector, m (rad where no positions are measured).
+    pub left_out_rms: f64,
+    /// `left_out_rms` over that of equal weights.
+    pub against_white: f64,
+    /// d̄ of (3) in units of its standard error: below −2 its weights predict better.
+    pub worse_by_errors: f64,
+    /// Mean of (2) minus the least among the candidates, nats per pose.
+    pub surprise: f64,
+    /// Standard error of `surprise` over the poses (paired with the least).
+    pub surprise_error: f64,
+    /// Its weights predict no worse than those that trust no model of the robot.
+    pub admitted: bool,
+}
+
+/// Which statement of the noise was taken, and against which.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct NoiseChoice {
+    /// In order of growth, equal weights first.
+    pub candidates: Vec<NoiseCandidate>,
+    /// The one that was taken.
+    pub chosen: NoiseModel,
+    /// The likeliest of all, where it was not admitted and is likelier than all that were: residuals of a pose belong
+    /// together, by more than joints scatter or with weights that predict worse.
+    pub swallowed: Option<NoiseModel>,
+    /// Mean of z⁴ of the left-out errors over what normal noise of that size would give: 1, above it for heavy tails.
+    pub tails: f64,
+    /// Left-out poses.
+    pub poses: usize,
+    /// What became of the vectors that the gate had rejected; `None` where they were no more than chance rejects.
+    pub admission: Option<Admission>,
+}
+
+/// The noise that was chosen, and the solution under it.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Weighed {
+    /// The candidates.
+    pub choice: NoiseChoice,
+    /// The solution under the choice; `None` where it is the one that was given.
+    pub solution: Option<Solution>,
+}
+
+/// Fewer left-out poses do not tell noise models apart.
+const FEWEST: usize = 10;
+/// Poses that candidates are fitted to and tried on at most, evenly over all.
+const POSES: usize = 200;
+/// Below this ratio of rms errors nobody can tell weights apart.
+const SAME: f64 = 1.005;
+/// A larger statement must be likelier by this many standard errors. With one, every second robot whose joints are alike is
+/// given a level for each of them; with two, one in thirty.
+const SHOWN: f64 = 2.0;
+/// Levels of a candidate have settled when log σ² changes by less: 2.5 % in σ.
+const SETTLED: f64 = 0.05;
+/// Statements that trust no model of the robot.
+const SAFE: [NoiseModel; 2] = [NoiseModel::White, NoiseModel::BodyPose];
+/// Statements that a level per joint must predict as well as.
+const SMALLER: [NoiseModel; 3] = [NoiseModel::White, NoiseModel::BodyPose, NoiseModel::Joint];
+/// No joint that is measured at rest scatters by more than this, rad: 1 mm at a meter. Backlash and compliance do, but not at
+/// random, and weights that take them for noise predict other postures worse than left-out poses show.
+const JOINT_NOISE: f64 = 1e-3;
+/// Steps of scoring of a candidate at most.
+const ROUNDS: usize = 12;
+/// Values and levels of a candidate are brought together this many times.
+const TURNS: usize = 2;
+
+impl Solution {
+    /// The noise from pose to pose that the observations speak for, among `models`, and what of the rejected takes part
+    /// under it. This solution must be one of [`NoiseModel::Joint`]. `None` where there are too few poses or no two
+    /// candidates.
+    #[must_use]
+    pub fn weighed(&self, models: &[NoiseModel], settings: &Settings) -> Option<Weighed> {
+        let mut weights = self.weights.clone();
+        let (mut trials, mut choice) = self.tried(models, &weights)?;
+        let eligible = eligible(self);
+        let rejected = settings
+            .robust
+            .enabled
+            .then(|| many_rejected(&weights, &eligible))
+            .flatten();
+        if let Some(rejected) = rejected {
+            let bodies = trials.iter().find(|t| t.noise == NoiseModel::BodyPose);
+            let safe = bodies.or(trials.iter().find(|t| t.noise == NoiseModel::White))?;
+            let (admission, more) = self.admitted(safe, &eligible, rejected)?;
+            if let Some(more) = more {
+                weights = more;
+                (trials, choice) = self.tried(models, &weights)?;
+            }
+            choice.admission = Some(admission);
+        }
+        if choice.chosen == NoiseModel::Joint && weights == self.weights {
+            let solution = None;
+            return Some(Weighed { choice, solution });
+        }
+        let chosen = trials.iter().find(|t| t.noise == choice.chosen)?;
+        let start = Start {
+            values: self.values.clone(),
+            weights,
+            theta: chosen.theta.clone(),
+            iterations: self.iterations,
+        };
+        let solution = Some(refit(chosen.model.problem(), start, settings).ok()?);
+        Some(Weighed { choice, solution })
+    }
+
+    /// Every candidate, fitted to the kept observations of at most [`POSES`] poses, and the choice among them.
+    fn tried(&self, models: &[NoiseModel], weights: &[f64]) -> Option<(Vec<Trial>, NoiseChoice)> {
+        let thinned = self.thinned(weights);
+        let problem = self.model.problem();
+        let mut trials: Vec<Trial> = models
+            .iter()
+            .filter_map(|&model| Trial::new(problem, model, self, &thinned))
+            .collect();
+        trials.sort_by_key(|t| t.noise);
+        let choice = choose(&trials)?;
+        Some((trials, choice))
+    }
+
+    /// Weights without those of poses beyond [`POSES`], evenly over all.
+    fn thinned(&self, weights: &[f64]) -> Vec<f64> {
+        let observations = || self.model.observations.iter().zip(weights);
+        let kept = observations().filter(|(_, w)| **w > 0.0);
+        let samples: BTreeSet<usize> = kept.map(|(o, _)| o.sample).collect();
+        let step = samples.len().div_ceil(POSES).max(1);
+        let used: BTreeSet<usize> = samples.iter().copied().step_by(step).collect();
+        let of = |sample: usize, w: f64| if used.contains(&sample) { w } else { 0.0 };
+        observations().map(|(o, w)| of(o.sample, *w)).collect()
+    }
+
+    /// Whether the predictions of all poses gain by what the gate rejected, under noise that trusts no model of the robot;
+    /// the weights with it where they do.
+    fn admitted(
+        &self,
+        safe: &Trial,
+        eligible: &[f64],
+        rejected: usize,
+    ) -> Option<(Admission, Option<Vec<f64>>)> {
+        let everything = self.thinned(eligible);
+        let among = |weights: &[f64]| -> Vec<f64> {
+            let pairs = weights.iter().zip(&everything);
+            pairs.map(|(w, e)| w.min(*e)).collect()
+        };
+        let squares = |weights: &[f64]| {
+            let weights = among(weights);
+            let (mut theta, mut work) = (safe.theta.clone(), Workspace::new(&safe.model));
+            let values = settle(&safe.model, &self.values, &weights, &mut theta, &mut work)?;
+            let objective = Objective {
+                model: &safe.model,
+                weights: &weights,
+                theta: &theta,
+            };
+            left_out_squares(objective, &values, &everything)
+        };
+        let before = squares(&self.weights)?;
+        let objective = Objective {
+            model: &safe.model,
+            weights: &self.weights,
+            theta: &safe.theta,
+        };
+        let mut work = Workspace::new(&safe.model);
+        let mut out = Admission {
+            rejected,
+            readmitted: 0,
+            ratio: 1.0,
+            better_by_errors: 0.0,
+        };
+        let mut taken = None;
+        for wider in wider(objective, &self.values, eligible, &mut work) {
+            let Some(after) = squares(&wider.weights) else {
+                continue;
+            };
+            let both: Vec<(f64, f64)> = before
+                .iter()
+                .filter_map(|(sample, b)| Some((*after.get(sample)?, *b)))
+                .collect();
+            let (with, without): (Vec<f64>, Vec<f64>) = both.into_iter().unzip();
+            let (more, error) = paired(&with, &without);
+            let ratio = (mean(&with) / mean(&without).max(f64::MIN_POSITIVE)).sqrt();
+            if ratio < out.ratio / SAME && -more > error {
+                out.readmitted = wider.readmitted;
+                out.ratio = ratio;
+                out.better_by_errors = -more / error;
+                taken = Some(wider.weights);
+            }
+        }
+        Some((out, taken))
+    }
+}
+
+/// One candidate, fitted to the thinned poses.
+struct Trial {
+    noise: NoiseModel,
+    model: Model,
+    theta: Vec<f64>,
+    loo: CrossValidation,
+}
+
+impl Trial {
+    fn new(
+        problem: &Problem,
+        noise: NoiseModel,
+        reference: &Solution,
+        weights: &[f64],
+    ) -> Option<Self> {
+        let model = Model::new(&problem.with_noise_model(noise)?).ok()?;
+        let mut theta = start_levels(&model, reference);
+        let mut work = Workspace::new(&model);
+        let values = settle(&model, &reference.values, weights, &mut theta, &mut work)?;
+        let objective = Objective {
+            model: &model,
+            weights,
+            theta: &theta,
+        };
+        let loo = predictions(objective, &values, weights, true, &|_| true)?;
+        Some(Self {
+            noise,
+            model,
+            theta,
+            loo,
+        })
+    }
+
+    /// Its joint noise can be noise of joints.
+    fn is_of_joints(&self) -> bool {
+        let mut joints = self
+            .levels()
+            .into_iter()
+            .filter(|l| l.kind == NoiseKind::Joint);
+        joints.all(|l| l.sigma <= JOINT_NOISE)
+    }
+
+    fn levels(&self) -> Vec<NoiseLevel> {
+        let groups = self.model.problem.groups.iter().zip(&self.theta);
+        let used = groups.filter(|(group, _)| group.estimate || group.kind != NoiseKind::Joint);
+        used.map(|(group, theta)| NoiseLevel {
+            name: group.name.clone(),
+            kind: group.kind,
+            sigma: theta.sqrt(),
+        })
+        .collect()
+    }
+}
+
+/// σ² of every group: as found where the reference has it, else the joints' for a joint, else as stated.
+fn start_levels(model: &Model, reference: &Solution) -> Vec<f64> {
+    let joint = reference
+        .noise
+        .iter()
+        .find(|n| n.kind == NoiseKind::Joint)
+        .map(|n| n.sigma * n.sigma);
+    let groups = model.problem.groups.iter().enumerate();
+    groups
+        .map(|(g, group)| {
+            let found = reference.theta.get(g).copied();
+            let of_joint = joint.filter(|_| group.kind == NoiseKind::Joint);
+            found.or(of_joint).unwrap_or(group.sigma * group.sigma)
+        })
+        .collect()
+}
+
+/// Values and levels together, from where they are.
+fn settle(
+    model: &Model,
+    start: &Values,
+    weights: &[f64],
+    theta: &mut Vec<f64>,
+    work: &mut Workspace,
+) -> Option<Values> {
+    let mut values = start.clone();
+    for _ in 0..TURNS {
+        levels(model, &values, weights, theta, work);
+        values = values_at(model, &values, weights, theta, work)?;
+    }
+    levels(model, &values, weights, theta, work);
+    Some(values)
+}
+
+/// Levels at fixed values.
+fn levels(
+    model: &Model,
+    values: &Values,
+    weights: &[f64],
+    theta: &mut Vec<f64>,
+    work: &mut Workspace,
+) {
+    for _ in 0..ROUNDS {
+        let objective = Objective {
+            model,
+            weights,
+            theta,
+        };
+        let Some(next) = score(objective, values, work) else {
+            return;
+        };
+        *theta = next.theta;
+        if next.change < SETTLED {
+            return;
+        }
+    }
+}
+
+/// Values at fixed levels.
+fn values_at(
+    model: &Model,
+    start: &Values,
+    weights: &[f64],
+    theta: &[f64],
+    work: &mut Workspace,
+) -> Option<Values> {
+    /// Values need not be better than 1 % of σ to tell noise models apart.
+    const NEAR: MinimizeSettings = MinimizeSettings {
+        max_iterations: 20,
+        decrement: 1e-4,
+        damping: 1e-6,
+    };
+    let objective = Objective {
+        model,
+        weights,
+        theta,
+    };
+    let minimum = minimize_in(objective, start, &NEAR, work);
+    (minimum.status != SolveStatus::NotEvaluable).then_some(minimum.values)
+}
+
+/// (1) and (2) of every pose that all trials could predict.
+struct Scores {
+    squares: Vec<Vec<f64>>,
+    surprises: Vec<Vec<f64>>,
+}
+
+impl Scores {
+    fn of(trials: &[Trial]) -> Self {
+        let by_sample: Vec<BTreeMap<usize, (f64, f64)>> =
+            trials.iter().map(|t| of_samples(&t.loo)).collect();
+        let everywhere = |sample: &&usize| by_sample.iter().all(|s| s.contains_key(*sample));
+        let first = by_sample.first();
+        let common: Vec<usize> = first
+            .map(|s| s.keys().filter(everywhere).copied().collect())
+            .unwrap_or_default();
+        let column = |of: fn(&(f64, f64)) -> f64| -> Vec<Vec<f64>> {
+            let scores = by_sample.iter();
+            scores
+                .map(|s| common.iter().map(|sample| of(&s[sample])).collect())
+                .collect()
+        };
+        Self {
+            squares: column(|s| s.0),
+            surprises: column(|s| s.1),
+        }
+    }
+}
+
+/// (1) and (2) by sample.
+fn of_samples(loo: &CrossValidation) -> BTreeMap<usize, (f64, f64)> {
+    let predicted = loo.samples.iter().filter(|s| !s.vectors.is_empty());
+    predicted
+        .map(|s| {
+            let squares = s.vectors.iter();
+            let sum: f64 = squares
+                .map(|v| v.position.or(v.rotation).unwrap_or(0.0).powi(2))
+                .sum();
+            (s.sample, (sum / s.vectors.len() as f64, -s.log_density))
+        })
+        .collect()
+}
+
+fn mean(x: &[f64]) -> f64 {
+    x.iter().sum::<f64>() / x.len().max(1) as f64
+}
+
+/// (3): mean of the differences and its standard error.
+fn paired(a: &[f64], b: &[f64]) -> (f64, f64) {
+    let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+    let middle = mean(&differences);
+    let squares = differences.iter().map(|d| (d - middle).powi(2));
+    let n = differences.len().max(2) as f64;
+    (middle, (squares.sum::<f64>() / (n - 1.0) / n).sqrt())
+}
+
+fn choose(trials: &[Trial]) -> Option<NoiseChoice> {
+    let white = trials.iter().position(|t| t.noise == NoiseModel::White)?;
+    if trials.len() < 2 {
+        return None;
+    }
+    let scores = Scores::of(trials);
+    let poses = scores.squares[white].len();
+    if poses < FEWEST {
+        return None;
+    }
+    let least = |among: &dyn Fn(usize) -> bool| {
+        let of = |i: &usize| mean(&scores.surprises[*i]);
+        let allowed = (0..trials.len()).filter(|i| among(*i));
+        allowed.min_by(|a, b| of(a).total_cmp(&of(b)))
+    };
+    let likeliest = least(&|_| true)?;
+    let rms: Vec<f64> = scores.squares.iter().map(|s| mean(s).sqrt()).collect();
+    let least_of = |among: &[NoiseModel]| {
+        let of = (0..trials.len()).filter(|&i| among.contains(&trials[i].noise));
+        of.map(|i| rms[i]).fold(f64::INFINITY, f64::min)
+    };
+    let candidates: Vec<NoiseCandidate> = (0..trials.len())
+        .map(|i| {
+            let (worse, error) = paired(&scores.squares[i], &scores.squares[white]);
+            let (surprise, surprise_error) =
+                paired(&scores.surprises[i], &scores.surprises[likeliest]);
+            NoiseCandidate {
+                model: trials[i].noise,
+                levels: trials[i].levels(),
+                left_out_rms: rms[i],
+                against_white: rms[i] / rms[white].max(f64::MIN_POSITIVE),
+                worse_by_errors: if error > 0.0 { worse / error } else { 0.0 },
+                surprise,
+                surprise_error,
+                admitted: match trials[i].noise {
+                    NoiseModel::White => true,
+                    NoiseModel::BodyPose => rms[i] <= SAME * rms[white],
+                    NoiseModel::Joint => {
+                        rms[i] <= SAME * least_of(&SAFE) && trials[i].is_of_joints()
+                    }
+                    NoiseModel::JointEach => {
+                        rms[i] <= SAME * least_of(&SMALLER) && trials[i].is_of_joints()
+                    }
+                },
+            }
+        })
+        .collect();
+    let best = least(&|i| candidates[i].admitted)?;
+    let within = |i: &usize| {
+        let (more, error) = paired(&scores.surprises[*i], &scores.surprises[best]);
+        candidates[*i].admitted && more <= SHOWN * error
+    };
+    let chosen = (0..trials.len()).find(within)?;
+    let (less, error) = paired(&scores.surprises[best], &scores.surprises[likeliest]);
+    let swallowed = !candidates[likeliest].admitted && less > SHOWN * error;
+    Some(NoiseChoice {
+        chosen: trials[chosen].noise,
+        swallowed: swallowed.then_some(trials[likeliest].noise),
+        candidates,
+        tails: tails(&trials[chosen].loo),
+        poses,
+        admission: None,
+    })
+}
+
+/// Mean of z⁴ over d (d + 2)/d² times the squared mean of z²: 1 for normal noise of any size.
+fn tails(loo: &CrossValidation) -> f64 {
+    let all = || loo.samples.iter().flat_map(|s| &s.vectors);
+    let n = all().count().max(1) as f64;
+    let size = |v: &crate::analysis::validate::VectorError| v.z.powi(2) / v.error.len() as f64;
+    let second = all().map(size).sum::<f64>() / n;
+    let fourth: f64 = all()
+        .map(|v| {
+            let d = v.error.len() as f64;
+            size(v).powi(2) * d / (d + 2.0)
+        })
+        .sum();
+    fourth / n / second.powi(2).max(f64::MIN_POSITIVE)
+}

@@ -1,0 +1,60 @@
+//! Priors so wide that they say nothing: the fit is that without priors, and is reached as fast.
+
+mod common;
+
+use calib_core::{Settings, Solution, solve};
+use common::{Chain, Free, rng, six_r};
+
+const MARKER: f64 = 2e-4;
+
+/// A whole arm with priors of this width, rad and m.
+fn solved(seed: u64, width: Option<f64>, missing: f64, estimated: bool) -> Solution {
+    let mut r = rng(seed);
+    let free = Free {
+        prior: width.map(|w| (w, w)),
+        ..Free::everything(6)
+    };
+    let chain = Chain::nominal(six_r())
+        .posed(&mut r, 40, 1.4)
+        .deviate(&mut r, &free, 0.005, 0.001);
+    let mut h = chain.problem(&free, MARKER);
+    h.problem.group_mut(h.markers).estimate = estimated;
+    if estimated {
+        let g = h
+            .problem
+            .noise_group("joint", calib_core::NoiseKind::Joint, 1.7e-4, true);
+        for j in &h.joints {
+            h.problem.joint_noise(*j, g);
+        }
+    }
+    let q = chain.q.clone();
+    chain.observe_moved(&mut r, &mut h, MARKER, |s| {
+        q[s].iter().map(|q| missing * (2.0 * q).cos()).collect()
+    });
+    let settings = if estimated {
+        Settings::default()
+    } else {
+        Settings::plain()
+    };
+    solve(&h.problem, &settings).unwrap()
+}
+
+#[test]
+fn wide_priors_end_at_the_optimum_of_the_data() {
+    for estimated in [false, true] {
+        for missing in [0.0, 2e-3] {
+            for seed in 0..2 {
+                let free = solved(seed, None, missing, estimated);
+                for width in [0.1, 1.0, 10.0, 1e2, 1e3, 1e4, 1e6] {
+                    let wide = solved(seed, Some(width), missing, estimated);
+                    let case = format!("{estimated} {missing} {seed} {width}");
+                    println!("{case}: {} for {}", wide.iterations, free.iterations);
+                    assert!(wide.status.is_converged(), "{case}: {:?}", wide.status);
+                    assert!(wide.iterations <= 50, "{case}: {}", wide.iterations);
+                    let change = (wide.chi2 / free.chi2 - 1.0).abs();
+                    assert!(change < 1e-5, "{case}: {change}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! The noise from pose to pose by evidence, and what it says of the model.
+
+use calib_core::{NoiseKind, NoiseModel, Settings};
+use calib_finding::{About, Fact, Finding, catalog};
+
+use crate::formulate::formulation::MlFit;
+use crate::formulate::ml::calibration;
+use crate::prepare::inputs::Inputs;
+
+/// More than this is no encoder's noise, rad (0.06°): 1 mm at a meter.
+const ENCODER: f64 = 1e-3;
+
+/// Takes the noise that the recordings speak for, where the profile does not state it, with the findings that say what it
+/// means.
+pub(crate) fn by_evidence(fit: &mut MlFit, inputs: &Inputs, settings: &Settings) -> Vec<Finding> {
+    let stated = inputs.robot.profile.solve.noise;
+    if stated.model.is_none()
+        && !stated.known
+        && let Some(weighed) = fit.solution.weighed(&NoiseModel::ALL, settings)
+    {
+        let chosen = weighed.choice.chosen;
+        if let Some(solution) = weighed.solution {
+            fit.formulation = fit.formulation.clone().with_noise(chosen);
+            fit.calibration = calibration(&fit.formulation, &solution, inputs);
+            fit.solution = solution;
+        }
+        fit.noise = Some(weighed.choice);
+    }
+    let mut findings = Vec::new();
+    findings.extend(swallowed(fit).or_else(|| no_encoder(fit)));
+    findings.extend(readmitted(fit));
+    // What the residuals of a pose have in common is in no noise model then: the poses' own scatter tells what is known.
+    if !findings.is_empty()
+        && let Some(wider) = fit.solution.with_cluster_covariance()
+    {
+        fit.solution = wider;
+    }
+    findings
+}
+
+/// Joint noise would be likeliest, but it is too large for joints or its weights predict worse.
+fn swallowed(fit: &MlFit) -> Option<Finding> {
+    let choice = fit.noise.as_ref()?;
+    let model = choice.swallowed?;
+    let candidate = choice.candidates.iter().find(|c| c.model == model)?;
+    let of_joints = candidate
+        .levels
+        .iter()
+        .filter(|l| l.kind == NoiseKind::Joint);
+    let largest = of_joints.map(|l| l.sigma).fold(0.0, f64::max);
+    if largest > ENCODER {
+        return Some(of_no_encoder(largest));
+    }
+    (largest > 0.0).then(|| {
+        Finding::of_kind(catalog::NOISE_IS_PHYSICS, "swallowed", About::Fit)
+            .with("sigma", Fact::radians(largest))
+            .with("poses", Fact::count(choice.poses))
+    })
+}
+
+fn of_no_encoder(sigma: f64) -> Finding {
+    Finding::of_kind(catalog::NOISE_IS_PHYSICS, "no_encoder", About::Fit)
+        .with("sigma", Fact::radians(sigma))
+}
+
+/// The noise of a joint is far larger than that of an encoder.
+fn no_encoder(fit: &MlFit) -> Option<Finding> {
+    let noise = fit.solution.noise.iter();
+    let of_joints = noise.filter(|n| n.kind == NoiseKind::Joint && n.samples > 0 && n.estimated);
+    let largest = of_joints.map(|n| n.sigma).fold(0.0, f64::max);
+    (largest > ENCODER).then(|| of_no_encoder(largest))
+}
+
+/// Rejected vectors that take part after all.
+fn readmitted(fit: &MlFit) -> Option<Finding> {
+    let admission = fit.noise.as_ref()?.admission?;
+    (admission.readmitted > 0).then(|| {
+        Finding::new(catalog::REJECTED_TAKE_PART, About::Fit)
+            .with("readmitted", Fact::count(admission.readmitted))
+            .with("rejected", Fact::count(admission.rejected))
+            .with("better", Fact::ratio(1.0 - admission.ratio))
+    })
+}
