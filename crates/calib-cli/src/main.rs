@@ -3,7 +3,6 @@
 mod arguments;
 mod commands;
 mod error;
-mod remaining;
 mod terminal;
 
 use std::error::Error;

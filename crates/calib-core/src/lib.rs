@@ -43,7 +43,7 @@
 //! | which physics is missing | [`Solution::goodness_of_fit`], with [`Problem::candidate`] effects |
 //! | did something move meanwhile | [`Solution::changes`] |
 //! | has the noise a memory, and what does that cost | [`Solution::dependence`], [`Solution::under`] |
-//! | which model | [`compare()`] |
+//! | which model | [`compare()`]; which effects and axes it should have: [`select()`] |
 //! | what is random from pose to pose | [`Solution::weighed`] |
 //! | can I trust the intervals if the noise model is wrong | [`sandwich`] |
 //! | how well does a loop close | [`ClosureStatistics`], [`Solution::pose_at_sample`] |
@@ -147,6 +147,9 @@ pub use analysis::goodness::{GoodnessOfFit, Physics, ScoreTest};
 pub use analysis::information::{Information, NULL_TOLERANCE};
 pub use analysis::observability::{Direction, Observability, Term};
 pub use analysis::sandwich::sandwich;
+pub use analysis::select::{
+    NestedError, Part, Selection, SelectionRule, SelectionStep, StepOutcome, select,
+};
 pub use analysis::solution::{NoiseEstimate, ParameterClass, ParameterEstimate, Solution};
 pub use analysis::spread::{LinearPoint, Placement, PostureSpread, SizeSpread, SpreadDirection};
 pub use analysis::untested::{MovedPoint, Moves, OpenError, OpenErrors, UntestedEffect};

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use calib_files::OutputFile;
 use calib_profile::Method;
-use calib_report::Report;
+use calib_report::{Report, Selection};
 
 use crate::error::{ExitCode, PipelineError};
 use crate::estimate::paper;
 use crate::formulate::by_closed_forms::{paper_assumptions, paper_result};
 use crate::formulate::by_likelihood::likelihood;
 use crate::formulate::checked::check_data;
+use crate::formulate::selection::choose;
 use crate::formulate::solved::{Solved, nominal};
 use crate::output::assemble::assemble;
 use crate::output::evidence::Evidence;
@@ -37,6 +38,8 @@ pub struct RunOptions {
     pub force: bool,
     /// End with the exit code of a verdict that is not a pass where the verdict has warnings.
     pub strict: bool,
+    /// Choose what to free by prediction of left-out poses, from what the profile frees outward; implies maximum likelihood.
+    pub select: bool,
     /// Load no plugin; a profile that names one fails.
     pub no_plugins: bool,
 }
@@ -70,6 +73,23 @@ pub fn run(
     run_on(inputs, options, progress)
 }
 
+/// What `select` of [`RunOptions`] would choose, and why. Writes nothing.
+///
+/// # Errors
+/// As [`run`].
+pub fn select(
+    profile: &Path,
+    force: bool,
+    plugins: bool,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Selection, PipelineError> {
+    progress("read profile and robot");
+    let robot = load_robot(profile)?;
+    progress("read recordings");
+    let inputs = load_recordings(robot, plugins)?;
+    Ok(choose(inputs, force, progress)?.selection)
+}
+
 /// [`run`] on recordings that are in memory.
 ///
 /// # Errors
@@ -79,6 +99,14 @@ pub fn run_on(
     options: &RunOptions,
     progress: &mut dyn FnMut(&str),
 ) -> Result<RunOutput, PipelineError> {
+    let selection = match options.select {
+        true => Some(choose(inputs.clone(), options.force, progress)?),
+        false => None,
+    };
+    if let Some(chosen) = &selection {
+        inputs.robot.profile.solve = chosen.solve.clone();
+    }
+    let selection = selection.map(|chosen| chosen.selection);
     progress("check data");
     let mut of_shapes = Vec::new();
     let (outlines, meshes) = shapes::outlines(&inputs.robot, &mut of_shapes);
@@ -93,7 +121,10 @@ pub fn run_on(
         &mut checked.findings,
     )?;
     let nominal = nominal(&inputs, &checked.start);
-    let method = options.method.unwrap_or(inputs.robot.profile.solve.method);
+    let method = match options.select {
+        true => Method::Ml,
+        false => options.method.unwrap_or(inputs.robot.profile.solve.method),
+    };
     let solved = match method {
         Method::Paper => {
             checked.findings.push(paper_assumptions());
@@ -147,6 +178,7 @@ pub fn run_on(
         urdf: &urdf,
         written: &written,
         residuals: &residuals,
+        selection,
     });
     let files = files(&inputs, &report, &scene, written, &view)?;
     let exit = exit_code(&report, options.strict, fit, &origins);

@@ -2,7 +2,7 @@
 //!
 //! Twelve digits are a picometer in a meter: finer than optimizers repeat across machines and finer than measurements.
 
-use crate::{Report, ReportError};
+use crate::{Report, ReportError, Selection};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -15,6 +15,17 @@ pub const DIGITS: usize = 12;
 /// [`ReportError::NotFinite`] when a required number is NaN or infinite (an unknown one is `None`).
 pub fn report_json(report: &Report) -> Result<String, ReportError> {
     Ok(pretty(&report_value(report)?))
+}
+
+/// How a model was chosen, in the form of `selection` of the report.
+///
+/// # Errors
+/// As [`report_json`].
+pub fn selection_json(selection: &Selection) -> Result<String, ReportError> {
+    let value = rounded(to_value(selection)?);
+    serde_json::from_value::<Selection>(value.clone())
+        .map_err(|source| ReportError::NotFinite(source.to_string()))?;
+    Ok(pretty(&value))
 }
 
 /// The value behind [`report_json`].

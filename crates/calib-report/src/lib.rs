@@ -40,6 +40,7 @@ mod results;
 pub mod scene;
 mod schema;
 mod sections;
+mod selection;
 mod svg;
 mod table;
 pub mod terminal;
@@ -71,6 +72,9 @@ pub use results::{
 };
 pub use scene::Scene;
 pub use schema::{report_schema, scene_schema};
+pub use selection::{
+    ModelPart, NestedSelection, PartKind, Selection, SelectionOutcome, SelectionStep,
+};
 pub use verdict::{
     Agreement, Compared, Effect, Goodness, ImplausibleChange, Improvement, Judgment, Orientation,
     Part, Predicted, Prediction, Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver,

@@ -2,8 +2,8 @@ use crate::verdict::{Effect, Judgment, Reason, ReasonId};
 use crate::{
     AccuracyLimit, Change, Clock, DataInformation, EstimatorResult, Finding, FitSummary, Input,
     JointCoverage, LoopClosure, Noise, NoiseChoice, NotObservable, Output, Parameter,
-    RecordingSummary, Rejected, Residuals, Transform, Unit, Verification, WeakDirections,
-    Workspace,
+    RecordingSummary, Rejected, Residuals, Selection, Transform, Unit, Verification,
+    WeakDirections, Workspace,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -89,6 +89,9 @@ pub struct Report {
     /// What the data leave open at the tool. Null with `method: paper`.
     #[serde(default)]
     pub weak_directions: Option<WeakDirections>,
+    /// How the model was chosen; null where the profile's was used.
+    #[serde(default)]
+    pub selection: Option<Selection>,
     /// What limits the accuracy, largest share first.
     #[serde(default)]
     pub accuracy_limits: Vec<AccuracyLimit>,

@@ -4,6 +4,7 @@
 
 mod evidence;
 mod robot;
+mod selection;
 mod verdict;
 mod weak;
 
@@ -38,6 +39,7 @@ pub(crate) fn sections(report: &Report) -> Vec<Section> {
     verdict::head(&mut page, report);
     verdict::held_out(&mut page, report);
     verdict::open_ends(&mut page, report);
+    selection::choice(&mut page, report);
     robot::changes(&mut page, report);
     robot::transforms(&mut page, report);
     robot::loops(&mut page, report);

@@ -1,10 +1,10 @@
 //! The summary for a terminal: the verdict, its numbers, what is not observable. At most 80 columns.
 
-use crate::table::{Table, wrap};
+use crate::table::{Table, markup_free, wrap};
 use crate::words;
 use crate::words::answers::answers_in;
 use crate::words::prose::{full_stop, sentence};
-use crate::{Class, Outcome, Report, Severity, Unit, Verdict, number};
+use crate::{Class, Outcome, Report, Selection, Severity, Unit, Verdict, number};
 use anstyle::{AnsiColor, Style};
 use calib_finding::catalog;
 
@@ -28,12 +28,46 @@ pub fn summary(report: &Report, color: bool) -> String {
     screen.verdict();
     screen.limits();
     screen.held_out();
+    if let Some(choice) = &report.selection {
+        screen.heading(words::selection::HEADING);
+        screen.text += &selection(choice);
+    }
     screen.transforms();
     screen.changes();
     screen.answers();
     screen.findings();
     screen.files();
     screen.text
+}
+
+/// How a model was chosen, at most 80 columns.
+#[must_use]
+pub fn selection(selection: &Selection) -> String {
+    use words::selection::{PASTE, TRIED, saved, summary};
+    let mut text = String::new();
+    for line in summary(selection) {
+        text += &wrap(&markup_free(&line), COLUMNS, "", "");
+    }
+    let mut table = Table::new(&["<tried", ">left out", ">saved", "<outcome"]);
+    for step in &selection.steps {
+        table.row([
+            markup_free(&step.part.words()),
+            number::bare(step.after_rms_m, Unit::Meter),
+            saved(step),
+            step.short_ending().to_owned(),
+        ]);
+    }
+    if !table.is_empty() {
+        text += &wrap(TRIED, COLUMNS, "\n", "");
+        text += &table.plain(COLUMNS);
+    }
+    for step in selection.steps.iter().filter(|s| s.has_remarks()) {
+        let line = format!("{}: {}.", step.part.words(), step.ending());
+        text += &wrap(&markup_free(&line), COLUMNS, "- ", "  ");
+    }
+    text += &wrap(&markup_free(PASTE), COLUMNS, "\n", "");
+    text += &selection.solve;
+    text
 }
 
 /// A summary that is being written.

@@ -2,16 +2,13 @@
 
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use calib_files::{MANIFEST, write_results};
 use calib_pipeline::ExitCode;
-use calib_pipeline::formulate::models;
-use calib_pipeline::run::{RunOptions, RunOutput, run as run_profile};
+use calib_pipeline::run::{RunOptions, RunOutput, run as run_profile, select};
 use clap::{Args, ValueEnum};
 
 use crate::error::CliError;
-use crate::remaining::with_remaining;
 use crate::terminal::{emit, spinner};
 
 /// Arguments of `calib run`.
@@ -31,7 +28,10 @@ pub struct Run {
     /// Exit with 1 where the result is accepted with warnings
     #[arg(long)]
     pub strict: bool,
-    /// Rank models by how well they predict each fitted pose from the others; writes nothing
+    /// Choose what to free by how well left-out poses are predicted, starting from what the profile frees
+    #[arg(long)]
+    pub select: bool,
+    /// Only show what --select would choose, and why; writes nothing
     #[arg(long)]
     pub compare_models: bool,
     /// Load no plugins
@@ -61,9 +61,18 @@ pub fn run(quiet: bool, verbose: bool, options: &Run) -> Result<ExitCode, CliErr
         }
     };
     if options.compare_models {
-        let ranked = compare_models(options, &mut progress)?;
+        let chosen = select(
+            &options.profile,
+            options.force,
+            !options.no_plugins,
+            &mut progress,
+        )?;
         bar.finish_and_clear();
-        emit(&ranked);
+        emit(&if options.json {
+            calib_report::json::selection_json(&chosen)?
+        } else {
+            calib_report::terminal::selection(&chosen)
+        });
         return Ok(ExitCode::Accepted);
     }
     let run_options = RunOptions {
@@ -73,6 +82,7 @@ pub fn run(quiet: bool, verbose: bool, options: &Run) -> Result<ExitCode, CliErr
         }),
         force: options.force,
         strict: options.strict,
+        select: options.select,
         no_plugins: options.no_plugins,
     };
     let output = run_profile(&options.profile, &run_options, &mut progress)?;
@@ -107,23 +117,6 @@ fn show(output: &RunOutput, json: bool) -> Result<(), CliError> {
     let color = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     emit(&calib_report::terminal::summary(&output.report, color));
     Ok(())
-}
-
-/// The ranking of models as text.
-fn compare_models(options: &Run, progress: &mut dyn FnMut(&str)) -> Result<String, CliError> {
-    let mut began = Instant::now();
-    let mut report = |stage: &str, done: usize, all: usize| {
-        if done == 0 {
-            began = Instant::now();
-        }
-        progress(&with_remaining(stage, done, all, began.elapsed()));
-    };
-    let ranked = models::compare_models(&options.profile, options.force, &mut report)?;
-    Ok(if options.json {
-        models::json(&ranked)
-    } else {
-        models::table(&ranked)
-    })
 }
 
 fn default_folder(profile: &Path) -> PathBuf {

@@ -116,15 +116,13 @@ pub fn compare_with(
                 .zip(&scores[best])
                 .map(|(a, b)| a - b)
                 .collect();
-            let m = mean(&difference);
-            let n = difference.len().max(2) as f64;
-            let variance = difference.iter().map(|d| (d - m) * (d - m)).sum::<f64>() / (n - 1.0);
+            let (m, standard_error) = mean_and_error(&difference);
             RankedVariant {
                 name: (*name).clone(),
                 parameters: solution.information.rank,
                 loo_rms: mean(&squares[i]).sqrt(),
                 worse_by: m,
-                standard_error: (variance / n).sqrt(),
+                standard_error,
                 log_density: -densities[i].iter().sum::<f64>(),
                 noise_parameters: noise_parameters(solution),
                 chosen: false,
@@ -143,6 +141,21 @@ pub fn compare_with(
     }
     ranked.sort_by(|a, b| a.worse_by.total_cmp(&b.worse_by));
     Ok(ranked)
+}
+
+/// Mean and its standard error.
+pub(crate) fn mean_and_error(x: &[f64]) -> (f64, f64) {
+    let n = x.len();
+    let m = x.iter().sum::<f64>() / n.max(1) as f64;
+    let n = n.max(2) as f64;
+    let variance = x.iter().map(|x| (x - m) * (x - m)).sum::<f64>() / (n - 1.0);
+    (m, (variance / n).sqrt())
+}
+
+/// Mean of a − b over the samples that both have, and its standard error.
+pub(crate) fn paired(a: &[Option<f64>], b: &[Option<f64>]) -> (f64, f64) {
+    let both = a.iter().zip(b).filter_map(|(a, b)| Some((*a)? - (*b)?));
+    mean_and_error(&both.collect::<Vec<f64>>())
 }
 
 /// (sample, measurement, item) that every variant kept and could predict.

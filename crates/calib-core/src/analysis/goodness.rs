@@ -13,10 +13,11 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::analysis::score::Scored;
 use crate::analysis::solution::Solution;
 use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{EFFECTS, EffectKind, Source};
@@ -153,26 +154,31 @@ impl Solution {
                 clusters[k] += share * share;
             }
         });
-        let inflation = (self.chi2 / self.degrees_of_freedom.max(1.0)).max(1.0);
-        let one = ChiSquared::new(1.0).ok()?;
+        let excess = (self.chi2 / self.degrees_of_freedom.max(1.0)).max(1.0);
         let mut out = Vec::new();
         for (k, candidate) in candidates.iter().enumerate() {
-            let information = information[k];
+            let one = |value: f64| DMatrix::from_element(1, 1, value);
+            let scored = Scored {
+                u: &DVector::from_element(1, u[k]),
+                information: &one(information[k]),
+                raw: &raw[k..=k],
+                clusters: Some(&one(clusters[k])),
+                excess,
+                samples: model.problem.samples,
+            };
             // An effect that the parameters already imitate cannot be tested.
-            if information.is_nan() || information <= 1e-6 * raw[k] || raw[k] == 0.0 {
+            let Some(tested) = scored.test() else {
                 continue;
-            }
-            let z2 = (u[k] * u[k] / (information * inflation))
-                .min(u[k] * u[k] / clusters[k].max(1e-300));
-            let p_value = one.sf(z2);
+            };
+            let information = information[k];
             out.push(ScoreTest {
                 name: candidate.name.clone(),
                 joint: candidate.joint.clone(),
                 physics: candidate.physics,
                 estimate: -u[k] / information,
-                z2,
-                p_value,
-                p_corrected: (p_value * count as f64).min(1.0),
+                z2: tested.z2,
+                p_value: tested.p_value,
+                p_corrected: (tested.p_value * count as f64).min(1.0),
                 explains: (u[k] * u[k] / information / self.chi2.max(1e-300)).min(1.0),
             });
         }

@@ -13,6 +13,8 @@ pub(crate) mod goodness;
 pub(crate) mod information;
 pub(crate) mod observability;
 pub(crate) mod sandwich;
+pub(crate) mod score;
+pub(crate) mod select;
 pub(crate) mod solution;
 pub(crate) mod spread;
 pub(crate) mod untested;

@@ -95,6 +95,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             accuracy_limits(e.inputs, e.held_out.as_ref(), fit, workspace.as_ref())
         }),
         weak_directions: weak,
+        selection: e.selection.clone(),
         workspace,
         findings,
         inputs: e
@@ -135,6 +136,7 @@ fn held_out(e: &Evidence<'_>) -> Option<HeldOut> {
 fn reproduce(e: &Evidence<'_>) -> String {
     let file = &e.inputs.robot.file;
     match e.method {
+        _ if e.selection.is_some() => format!("calib run {file} --select"),
         method if method == e.inputs.robot.profile.solve.method => format!("calib run {file}"),
         Method::Paper => format!("calib run {file} --method paper"),
         Method::Ml => format!("calib run {file} --method ml"),

@@ -6,7 +6,7 @@ use calib_core::SolveStatus;
 use calib_files::OutputFile;
 use calib_finding::Finding;
 use calib_profile::Method;
-use calib_report::{FitEnd, HeldOut, LoopClosure, ResidualRow};
+use calib_report::{FitEnd, HeldOut, LoopClosure, ResidualRow, Selection};
 
 use crate::estimate::paper::OriginEstimate;
 use crate::formulate::formulation::MlFit;
@@ -45,6 +45,8 @@ pub struct Evidence<'a> {
     pub written: &'a [(OutputFile, String)],
     /// Residuals of the fit.
     pub residuals: &'a [ResidualRow],
+    /// How the model was chosen, where it was.
+    pub selection: Option<Selection>,
 }
 
 /// How the solver ended.

@@ -19,6 +19,7 @@ pub(crate) mod prose;
 mod rejected_for;
 pub(crate) mod rejection;
 mod scope;
+pub(crate) mod selection;
 mod terms;
 pub(crate) mod verdict;
 pub(crate) mod weak;

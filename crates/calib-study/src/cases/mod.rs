@@ -149,6 +149,7 @@ fn one_robot(robot: &RobotProfile, seed: u64) -> Result<Vec<RobotResult>, CaseEr
             method: Some(method),
             force: true,
             strict: false,
+            select: false,
             no_plugins: false,
         };
         let ran = of_tables(robot.clone(), simulated.recordings.clone())

@@ -29,7 +29,7 @@ pub(super) struct Row<'a> {
 }
 
 /// Joints between the root and any link that something is attached to or reported at, parents first.
-pub(super) fn used_joints(inputs: &Inputs, model: &RobotModel) -> Vec<JointId> {
+pub(crate) fn used_joints(inputs: &Inputs, model: &RobotModel) -> Vec<JointId> {
     let profile = &inputs.robot.profile;
     let mut links: Vec<_> = profile.bodies.values().map(|b| b.link).collect();
     links.extend(profile.origins.values().map(|o| o.link));
@@ -70,6 +70,16 @@ pub(super) fn joint_noise_group(problem: &mut Problem, profile: &Profile) -> Opt
     }
 }
 
+/// Whether the fitted samples move a joint with these readings.
+pub(crate) fn moves(problem: &Problem, readings: &[f64]) -> bool {
+    let samples = readings.iter().enumerate();
+    let fitted = samples.filter(|(i, _)| !problem.held_out.contains(i));
+    let (low, high) = fitted.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (_, q)| {
+        (l.min(*q), h.max(*q))
+    });
+    high - low > MOVED
+}
+
 pub(super) fn add_joint(
     formulation: &mut Formulation,
     inputs: &Inputs,
@@ -85,15 +95,7 @@ pub(super) fn add_joint(
         return;
     };
     let readings: Vec<f64> = rows.iter().map(|r| model.position(r.q, joint)).collect();
-    let fitted = readings
-        .iter()
-        .enumerate()
-        .filter(|(i, _)| !formulation.problem.held_out.contains(i))
-        .map(|(_, q)| *q);
-    let (low, high) = fitted.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
-        (l.min(q), h.max(q))
-    });
-    let moved = high - low > MOVED;
+    let moved = moves(&formulation.problem, &readings);
     let slides = matches!(j.kind, JointKind::Prismatic { .. });
     let free = match free_set {
         FreeSet::Profile => profile.solve.free_set(joint, moved, slides),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use bodies::add_bodies;
 use calib_core::{Chart, Problem, Role, Settings};
 use calib_profile::{Free, Usage};
-use joints::{Row, add_joint, joint_noise_group, used_joints};
+use joints::{Row, add_joint, joint_noise_group};
 use masses::free_masses;
 
 use crate::error::PipelineError;
@@ -22,6 +22,7 @@ mod joints;
 mod masses;
 
 pub(crate) use calibration::{calibration, calibration_at};
+pub(crate) use joints::{moves, used_joints};
 
 /// States the problem of a profile.
 #[must_use]

@@ -1,0 +1,132 @@
+//! The choice made again without each of some folds, which it then predicts: the error to be stated for a chosen model.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
+
+use crate::analysis::folds::folds;
+use crate::analysis::select::NestedError;
+use crate::analysis::select::linear::{Linear, Linearization, Sample};
+use crate::analysis::select::step::{Stage, additions, candidates, simplest};
+use crate::analysis::select::task::{EXCHANGES, Task};
+
+/// Samples of a fold at least: fewer say nothing of an error.
+const LEAST: usize = 3;
+
+/// Squares of position errors, and how many.
+type Squares = (f64, usize);
+
+/// What one fold gives.
+struct Fold {
+    first: Squares,
+    chosen: Squares,
+    nested: Squares,
+    added: BTreeSet<usize>,
+}
+
+/// Errors in folds, by linearized fits.
+pub(super) fn nested(
+    task: &Task<'_>,
+    linear: &Linearization,
+    chosen: &BTreeSet<usize>,
+) -> Option<NestedError> {
+    let folds = folds(task.problem, task.rule.folds);
+    let of_sample: BTreeMap<usize, usize> = folds
+        .iter()
+        .enumerate()
+        .flat_map(|(fold, samples)| samples.iter().map(move |s| (*s, fold)))
+        .collect();
+    let fold_of = |sample: usize| of_sample.get(&sample).copied();
+    if linear.samples().len() < LEAST * folds.len() || folds.len() < 2 {
+        return None;
+    }
+    let each = |fold: usize| {
+        let training = linear.of_samples(|sample| fold_of(sample) != Some(fold));
+        let samples = linear.samples().iter();
+        let held: Vec<&Sample> = samples
+            .filter(|s| fold_of(s.number) == Some(fold))
+            .collect();
+        let found = choose(task, linear, &training)?;
+        let error = |parts: &BTreeSet<usize>| {
+            let fitted = training.fit(task.active(linear, parts))?;
+            let each = held.iter().map(|s| squares(linear, s, &fitted.residual(s)));
+            Some(each.fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1)))
+        };
+        Some(Fold {
+            first: error(task.first)?,
+            chosen: error(chosen)?,
+            nested: error(&found)?,
+            added: found.difference(task.first).copied().collect(),
+        })
+    };
+    let found: Vec<Option<Fold>> = (0..folds.len()).into_par_iter().map(each).collect();
+    let found: Vec<Fold> = found.into_iter().collect::<Option<_>>()?;
+    let rms = |of: fn(&Fold) -> Squares| {
+        let all = found.iter().map(of);
+        let (sum, count) = all.fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        (sum / count.max(1) as f64).sqrt()
+    };
+    let mut added = vec![0; task.parts.len()];
+    for fold in &found {
+        fold.added.iter().for_each(|&part| added[part] += 1);
+    }
+    Some(NestedError {
+        folds: found.len(),
+        rms: rms(|fold| fold.nested),
+        rms_first: rms(|fold| fold.first),
+        rms_chosen: rms(|fold| fold.chosen),
+        added,
+    })
+}
+
+/// The choice on some samples.
+fn choose(
+    task: &Task<'_>,
+    linear: &Linearization,
+    training: &Linear<'_>,
+) -> Option<BTreeSet<usize>> {
+    let columns = task.columns(linear);
+    let mut chosen = task.first.clone();
+    let mut used = BTreeSet::new();
+    for k in 0..task.rule.steps {
+        let active = task.active(linear, &chosen);
+        let mut possible = additions(&columns, &active);
+        possible.retain(|a| !used.contains(&a.part));
+        let stage = Stage {
+            found: k,
+            significance: task.rule.significance,
+        };
+        let (found, _) = candidates(training, &active, &possible, stage)?;
+        let mut proposed = task.proposed(&found, false);
+        proposed.retain(|c| c.predicts_better());
+        if proposed.is_empty() {
+            proposed = task.proposed(&found, true);
+            proposed.retain(|c| c.predicts_better());
+        }
+        let Some((part, _)) = simplest(training, &active, &proposed, task.parts, task.rule) else {
+            break;
+        };
+        used.insert(part.part);
+        chosen = task.with_part(linear, training, &chosen, part.part).0;
+    }
+    for _ in 0..EXCHANGES {
+        let Some((out, into)) = task.exchange(linear, training, &chosen) else {
+            break;
+        };
+        chosen.remove(&out);
+        chosen.insert(into);
+    }
+    Some(chosen)
+}
+
+/// Position errors of one sample.
+fn squares(linear: &Linearization, s: &Sample, whitened: &nalgebra::DVector<f64>) -> Squares {
+    let model = linear.model();
+    let e = &s.l * whitened;
+    let each = s.blocks.iter().filter_map(|&(o, first, rows)| {
+        let kind = &model.problem.measurements[model.observations[o].measurement].kind;
+        let own = e.rows(first, rows).into_owned();
+        kind.of().deviation(own.as_slice()).position
+    });
+    each.fold((0.0, 0), |sum, p| (sum.0 + p * p, sum.1 + 1))
+}
