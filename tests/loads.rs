@@ -200,6 +200,26 @@ fn a_stated_stiffness_yields_without_being_estimated() {
     assert!(yaml.contains("compliance_rad_per_nm: 3.49"), "{yaml}");
 }
 
+#[test]
+fn the_urdf_fitted_without_effects_predicts_better_than_the_one_whose_effects_are_left_out() {
+    let arm = urdf(MASSLESS);
+    let heavy = PROFILE.replace("urdf: arm.urdf}", "urdf: arm.urdf, total_mass_kg: 30}");
+    let dir = laboratory((&arm, &heavy), (&arm, &heavy));
+    let report = ran(&dir);
+    let rms = |which: &str| {
+        let found = &report["verification"]["held_out"][which]["rms_m"];
+        found.as_f64().expect(which)
+    };
+    let refitted = rms("urdf_refitted");
+    assert!(rms("calibrated") < refitted, "{refitted}");
+    assert!(refitted < 0.9 * rms("urdf_alone"), "{refitted}");
+    // As a robot of its own, with nothing free but where it stands, the file does what was stated of it.
+    let alone = dir.read("out/arm.calibrated.alone.urdf");
+    let registered = heavy.replace(", joint_offsets, joint_axes, compliance", "");
+    let again = rms_m(&ran(&laboratory((&arm, &heavy), (&alone, &registered))));
+    assert!((again / refitted - 1.0).abs() < 0.05, "{again} {refitted}");
+}
+
 /// Masses far from rods: a light upper arm, a heavy forearm, a hand with its center aside.
 const UNEVEN: [&str; 3] = [
     "<inertial><origin xyz=\"0.03 0 0.1\"/><mass value=\"3\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>",

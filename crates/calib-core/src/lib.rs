@@ -140,7 +140,7 @@ pub use analysis::change::{Change, ChangeScan, ChangeSettings, Moved};
 pub use analysis::closure::{ClosureStatistics, Spread};
 pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};
 pub use analysis::dependence::{Dependence, MemoryOf};
-pub use analysis::estimate::{Settings, solve};
+pub use analysis::estimate::{Settings, solve, solve_kept};
 pub use analysis::folds::{folds, k_fold};
 pub use analysis::gauge::Gauge;
 pub use analysis::goodness::{GoodnessOfFit, Physics, ScoreTest};

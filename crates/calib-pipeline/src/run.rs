@@ -1,5 +1,6 @@
 //! `calib run`: everything, in order.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use calib_files::OutputFile;
@@ -13,11 +14,13 @@ use crate::formulate::by_likelihood::likelihood;
 use crate::formulate::checked::check_data;
 use crate::formulate::selection::choose;
 use crate::formulate::solved::{Solved, nominal};
+use crate::formulate::without_effects::refitted;
 use crate::output::assemble::assemble;
 use crate::output::evidence::Evidence;
 use crate::output::exit::exit_code;
 use crate::output::export::{patch_urdf, scene};
-use crate::output::files::{files, written};
+use crate::output::files::{Robots, files, written};
+use crate::output::model_file::model_file;
 use crate::output::shapes;
 use crate::output::view::{Shown, view};
 use crate::prepare::inputs::Inputs;
@@ -134,6 +137,7 @@ pub fn run_on(
     };
     progress("verify");
     let (robot, fit) = (&solved.robot, solved.fit.as_ref());
+    let refitted = refitted(&inputs, &checked, &solved)?;
     let tracks = &checked.tracks;
     // The scan for changes takes as long as the rest together.
     let (changed, (moved, loops, held_out, known, residuals)) = rayon::join(
@@ -142,7 +146,7 @@ pub fn run_on(
             (
                 moved(&inputs, tracks, robot),
                 close_loops(&inputs, tracks, &solved.body_from_origin(), &solved.fk),
-                verify::held_out(&inputs, tracks, &nominal, &solved),
+                verify::held_out(&inputs, tracks, &nominal, &solved, refitted.as_ref()),
                 fit.map_or_else(Default::default, |fit| known_numbers(&inputs, fit)),
                 residual_rows(&inputs, tracks, robot, fit),
             )
@@ -163,7 +167,14 @@ pub fn run_on(
         fit,
     };
     let view = view(&inputs, tracks, &shown, outlines);
-    let written = written(&inputs, &residuals, (&scene, &view), &urdf, robot)?;
+    let alone = refitted.map(|robot| patch_urdf(&inputs, &robot, &BTreeMap::new()));
+    let robots = Robots {
+        urdf: &urdf,
+        alone: alone.transpose()?,
+        model: &model_file(&inputs, &solved),
+        robot,
+    };
+    let written = written(&inputs, &residuals, (&scene, &view), &robots)?;
     let report = assemble(&Evidence {
         inputs: &inputs,
         tracks,

@@ -37,6 +37,7 @@ mod read;
 mod report;
 mod residuals;
 mod results;
+pub mod robot_model;
 pub mod scene;
 mod schema;
 mod sections;
@@ -71,7 +72,7 @@ pub use results::{
     Quantity, Status, Term, Transform, Unobservable,
 };
 pub use scene::Scene;
-pub use schema::{report_schema, scene_schema};
+pub use schema::{model_schema, report_schema, scene_schema};
 pub use selection::{
     ModelPart, NestedSelection, PartKind, Selection, SelectionOutcome, SelectionStep,
 };

@@ -1,3 +1,4 @@
+use crate::robot_model::RobotModelFile;
 use crate::{Report, Scene};
 use serde_json::Value;
 
@@ -11,6 +12,15 @@ pub fn report_schema() -> Value {
 #[must_use]
 pub fn scene_schema() -> Value {
     titled(schemars::schema_for!(Scene).to_value(), "calib scene")
+}
+
+/// JSON Schema (draft 2020-12) of the robot's model.
+#[must_use]
+pub fn model_schema() -> Value {
+    titled(
+        schemars::schema_for!(RobotModelFile).to_value(),
+        "calib model",
+    )
 }
 
 fn titled(mut schema: Value, title: &str) -> Value {

@@ -164,6 +164,7 @@ impl Screen<'_> {
             ("nominal", held_out.nominal),
             ("registration only", held_out.registration_only),
             ("URDF without effects", held_out.urdf_alone),
+            ("URDF fitted without effects", held_out.urdf_refitted),
             ("calibrated", held_out.calibrated),
         ] {
             let Some(stats) = stats else { continue };

@@ -30,6 +30,8 @@ enum SchemaOf {
     Report,
     /// The scene
     Scene,
+    /// The robot's model
+    Model,
     /// Parameters of estimators, readers and report writers, by kind and name
     Parameters,
 }
@@ -43,6 +45,7 @@ pub fn run(options: &Schema) -> Result<ExitCode, CliError> {
         }
         SchemaOf::Report => calib_report::report_schema(),
         SchemaOf::Scene => calib_report::scene_schema(),
+        SchemaOf::Model => calib_report::model_schema(),
         SchemaOf::Parameters => estimators(options)?.parameter_schemas(),
     };
     emit(&(calib_report::json::pretty(&schema) + "\n"));

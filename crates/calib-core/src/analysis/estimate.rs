@@ -12,7 +12,7 @@ use crate::analysis::solution::{NoiseEstimate, Solution, describe_parameters};
 use crate::graph::error::Error;
 use crate::graph::ids::GroupId;
 use crate::graph::problem::Problem;
-use crate::model::layout::Model;
+use crate::model::layout::{Model, Observation};
 use crate::model::values::Values;
 use crate::solve::equations::{Objective, Workspace};
 use crate::solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize_in};
@@ -90,14 +90,38 @@ const GATE_ROUNDS: usize = 6;
 /// [`Error`] when the problem cannot be stated; a fit that does not converge or cannot determine something
 /// is a [`Solution`] that says so.
 pub fn solve(problem: &Problem, settings: &Settings) -> Result<Solution, Error> {
+    solve_of(Model::new(problem)?, None, settings)
+}
+
+/// As [`solve`], from the observations only that `kept` kept: the solution of a problem with the same measurements.
+///
+/// # Errors
+/// As [`solve`], and [`Error::OtherMeasurements`] where the measurements are not the same.
+pub fn solve_kept(
+    problem: &Problem,
+    kept: &Solution,
+    settings: &Settings,
+) -> Result<Solution, Error> {
     let model = Model::new(problem)?;
-    // 1: fitted, 0: held out
-    let fitted = |sample: usize| if model.is_held_out(sample) { 0.0 } else { 1.0 };
-    let mask: Vec<f64> = model
-        .observations
-        .iter()
-        .map(|o| fitted(o.sample))
-        .collect();
+    let place = |o: &Observation| (o.sample, o.measurement, o.item);
+    let own = model.observations.iter().map(place);
+    if !own.eq(kept.model.observations.iter().map(place)) {
+        return Err(Error::OtherMeasurements);
+    }
+    solve_of(model, Some(&kept.weights), settings)
+}
+
+fn solve_of(model: Model, kept: Option<&[f64]>, settings: &Settings) -> Result<Solution, Error> {
+    // 1: fitted, 0: held out or rejected before
+    let fitted = |(o, observation): (usize, &Observation)| {
+        let taken = kept.is_none_or(|kept| kept[o] > 0.0);
+        if taken && !model.is_held_out(observation.sample) {
+            1.0
+        } else {
+            0.0
+        }
+    };
+    let mask: Vec<f64> = model.observations.iter().enumerate().map(fitted).collect();
     if mask.iter().all(|w| *w == 0.0) {
         return Err(Error::NoObservations);
     }

@@ -138,6 +138,12 @@ impl Solution {
         }
     }
 
+    /// Row and column of a parameter in [`Information::covariance`], by its index; `None` where it is held.
+    #[must_use]
+    pub fn column_of(&self, parameter: usize) -> Option<usize> {
+        self.model.column_of.get(parameter).copied().flatten()
+    }
+
     /// eᵀV⁻¹e of the kept observations with these noise levels instead (σ per group, in the order of the problem).
     /// `None` when there are not as many levels as groups or the model cannot be evaluated with them.
     #[must_use]

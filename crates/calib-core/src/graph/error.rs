@@ -102,6 +102,9 @@ pub enum Error {
     /// There is nothing to fit to.
     #[error("the problem has no observations")]
     NoObservations,
+    /// Observations were to be kept as in the solution of a problem with other measurements.
+    #[error("the measurements are not those of the solution whose observations are to be kept")]
+    OtherMeasurements,
     /// A builder call on an edge of another kind.
     #[error("`Problem::{call}` was called on edge `{edge}`, which is not {expected}")]
     WrongEdge {

@@ -18,3 +18,4 @@ pub mod row_checks;
 pub mod selection;
 pub mod solved;
 pub mod structural;
+pub mod without_effects;

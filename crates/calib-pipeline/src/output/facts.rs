@@ -83,6 +83,7 @@ pub(crate) fn facts(
 fn urdf_alone(e: &Evidence<'_>, held_out: &HeldOut) -> Option<UrdfAlone> {
     Some(UrdfAlone {
         rms: held_out.urdf_alone?.rms_m,
+        refitted: held_out.urdf_refitted.map(|e| e.rms_m),
         with_effects: held_out.calibrated?.rms_m,
         limit: e.inputs.robot.profile.solve.limits.held_out_rms,
     })

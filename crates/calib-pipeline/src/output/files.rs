@@ -1,23 +1,42 @@
 //! The files of a run.
 
 use calib_files::OutputFile;
+use calib_report::robot_model::RobotModelFile;
 use calib_report::{Report, ResidualRow};
 
 use crate::error::PipelineError;
 use crate::formulate::kinematics::Calibration;
-use crate::output::export::calibration_yaml;
+use crate::output::export::{PatchedUrdf, calibration_name, calibration_yaml};
+use crate::output::model_file::model_name;
 use crate::prepare::estimators::values;
 use crate::prepare::inputs::Inputs;
+
+/// The robot in its forms.
+pub(crate) struct Robots<'a> {
+    /// The patched URDF.
+    pub urdf: &'a PatchedUrdf,
+    /// The URDF that was fitted to be used without effects, where there are any.
+    pub alone: Option<PatchedUrdf>,
+    /// Everything that was found.
+    pub model: &'a RobotModelFile,
+    /// The same as the program has it.
+    pub robot: &'a Calibration,
+}
+
+/// Name of the URDF that is used without effects: `r.calibrated.urdf` gives `r.calibrated.alone.urdf`.
+fn alone_name(urdf: &str) -> String {
+    format!("{}.alone.urdf", urdf.trim_end_matches(".urdf"))
+}
 
 /// The files that do not depend on the report, and what they are in words.
 pub(crate) fn written(
     inputs: &Inputs,
     residuals: &[ResidualRow],
     (scene, view): (&calib_report::Scene, &calib_report::view3d::View3d),
-    urdf: &crate::output::export::PatchedUrdf,
-    robot: &Calibration,
+    robots: &Robots<'_>,
 ) -> Result<Vec<(OutputFile, String)>, PipelineError> {
     let outputs = &inputs.robot.profile.outputs;
+    let urdf = robots.urdf;
     let mut record = calib_report::json::exact_json(&urdf.record)?;
     record.push('\n');
     let stem = outputs.scene.trim_end_matches(".json");
@@ -31,14 +50,26 @@ pub(crate) fn written(
             "what `calib revert` needs".to_owned(),
         ),
     ];
-    if let Some(yaml) = calibration_yaml(inputs, robot) {
-        let name = crate::output::export::calibration_name(&outputs.urdf);
+    if let Some(yaml) = calibration_yaml(inputs, robots.robot) {
+        let name = calibration_name(&outputs.urdf);
         let what = "joint effects that a URDF cannot hold".to_owned();
         files.push((OutputFile::text(name, yaml), what));
     }
+    if let Some(alone) = &robots.alone {
+        let what = "URDF fitted to be used without the joint effects".to_owned();
+        let text = alone.text.clone();
+        files.push((OutputFile::text(alone_name(&outputs.urdf), text), what));
+    }
+    let mut model = calib_report::json::exact_json(robots.model)?;
+    model.push('\n');
     let mut put = |name: String, text: String, what: &str| {
         files.push((OutputFile::text(name, text), what.to_owned()));
     };
+    put(
+        model_name(&outputs.urdf),
+        model,
+        "the calibrated robot with its effects and uncertainty, for programs",
+    );
     put(
         outputs.scene.clone(),
         scene.json()?,

@@ -7,6 +7,7 @@ pub(crate) mod exit;
 pub mod export;
 mod facts;
 pub(crate) mod files;
+pub mod model_file;
 mod of_data;
 mod of_fit;
 mod open;

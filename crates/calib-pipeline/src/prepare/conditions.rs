@@ -7,7 +7,7 @@ use calib_urdf::RobotModel;
 use crate::prepare::inputs::{Inputs, Loaded};
 
 /// A joint that moves less than this from one row to the next keeps its direction of approach, rad or m.
-const STILL: f64 = 1e-5;
+pub(crate) const STILL: f64 = 1e-5;
 
 /// The circumstances of one row. The default knows nothing: every joint in the middle of its backlash, loads by gravity.
 #[derive(Debug, Clone, PartialEq, Default)]

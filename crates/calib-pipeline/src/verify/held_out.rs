@@ -27,6 +27,8 @@ pub struct Robots<'a> {
     pub calibrated: &'a Calibration,
     /// The same without the effects that a URDF cannot hold, where there are any.
     pub urdf_alone: Option<&'a Calibration>,
+    /// What was fitted to be used without effects, where there are any.
+    pub refitted: Option<&'a Calibration>,
 }
 
 /// Errors in the validation recordings; `None` without validation rows.
@@ -45,6 +47,7 @@ pub fn held_out(
     };
     let (nominal, registered) = (of(robots.nominal), of(robots.registered));
     let urdf_alone = of(robots.urdf_alone);
+    let refitted = of(robots.refitted);
     let distances = fit.map(distances).unwrap_or_default();
     let best = deviations(inputs, tracks, robots.calibrated, validation);
     if best.is_empty() {
@@ -61,6 +64,7 @@ pub fn held_out(
                 registration_only_m: length(&registered),
                 calibrated_m: Some(d.vector.norm()),
                 urdf_alone_m: length(&urdf_alone),
+                urdf_refitted_m: length(&refitted),
                 vector_m: Some(d.vector.into()),
                 nominal_rad: angle(&nominal),
                 registration_only_rad: angle(&registered),

@@ -35,6 +35,7 @@ pub fn left_out(
     let calibrated = of(robots.calibrated);
     let registered = robots.registered.map(of).unwrap_or_default();
     let urdf_alone = robots.urdf_alone.map(of).unwrap_or_default();
+    let refitted = robots.refitted.map(of).unwrap_or_default();
     // The registration has its unknowns too: compared with its fitted errors, a calibration of a few poses would look worse than it is.
     let without = registration
         .map(|fit| each_left_out(fit, step))
@@ -62,6 +63,7 @@ pub fn left_out(
                 calibrated_m: v.position.or(calibrated.get(&key).map(|d| d.vector.norm())),
                 // Fitted with this pose, too: what is left are the effects.
                 urdf_alone_m: urdf_alone.get(&key).map(|d| d.vector.norm()),
+                urdf_refitted_m: refitted.get(&key).map(|d| d.vector.norm()),
                 calibrated_rad: v.rotation.or(angles.get(&v.measurement).copied()),
                 vector_m: vector,
                 distance: v.z.is_finite().then_some(Distance {

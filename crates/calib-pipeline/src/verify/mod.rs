@@ -29,6 +29,7 @@ pub fn held_out(
     tracks: &BTreeMap<String, BodyTrack>,
     nominal: &Calibration,
     solved: &Solved,
+    refitted: Option<&Calibration>,
 ) -> Option<HeldOut> {
     let urdf_alone = solved.robot.urdf_alone();
     let robots = held_out::Robots {
@@ -36,6 +37,7 @@ pub fn held_out(
         registered: solved.registered.as_ref(),
         calibrated: &solved.robot,
         urdf_alone: urdf_alone.as_ref(),
+        refitted,
     };
     let fit = solved.fit.as_ref();
     held_out::held_out(inputs, tracks, &robots, fit)

@@ -31,6 +31,9 @@ pub struct HeldOut {
     /// What the patched URDF predicts without the joint effects that it cannot hold; null where there are none.
     #[serde(default)]
     pub urdf_alone: Option<ErrorStats>,
+    /// What the URDF predicts that was fitted to be used without effects; null where there are none.
+    #[serde(default)]
+    pub urdf_refitted: Option<ErrorStats>,
     /// Orientation errors of the same three, where a body's orientation is measured; null where none is.
     #[serde(default)]
     pub orientation: Option<OrientationErrors>,
@@ -116,6 +119,7 @@ impl HeldOut {
             registration_only: over(|pose| pose.registration_only_m),
             calibrated: over(|pose| pose.calibrated_m),
             urdf_alone: over(|pose| pose.urdf_alone_m),
+            urdf_refitted: over(|pose| pose.urdf_refitted_m),
             with_screened: ErrorStats::of(&values(&all, |pose| pose.calibrated_m))
                 .filter(|_| screened > 0),
             screened,
@@ -182,6 +186,9 @@ pub struct PoseError {
     /// The same with the patched URDF, without the effects that it cannot hold, m; null where there are none.
     #[serde(default)]
     pub urdf_alone_m: Option<f64>,
+    /// The same with the URDF that was fitted to be used without effects, m; null where there are none.
+    #[serde(default)]
+    pub urdf_refitted_m: Option<f64>,
     /// predicted − observed with the calibrated robot, in the tracker frame, m.
     pub vector_m: Option<[f64; 3]>,
     /// Angle between predicted and observed orientation with the nominal robot, rad; null where no orientation is measured.

@@ -49,6 +49,9 @@ pub(super) fn head(page: &mut Page, report: &Report) {
 /// The patched URDF without the effects that it cannot hold.
 const ALONE: &str = "URDF without effects";
 
+/// The URDF that was fitted to be used without them.
+const REFITTED: &str = "URDF fitted without effects";
+
 pub(super) fn held_out(page: &mut Page, report: &Report) {
     page.section("held-out", "Errors on held-out poses");
     let Some(held_out) = &report.verification.held_out else {
@@ -61,10 +64,11 @@ pub(super) fn held_out(page: &mut Page, report: &Report) {
         ("nominal", held_out.nominal),
         ("registration only", held_out.registration_only),
         (ALONE, held_out.urdf_alone),
+        (REFITTED, held_out.urdf_refitted),
         ("calibrated", held_out.calibrated),
     ] {
         // Not a row of its own where the URDF holds everything.
-        if stats.is_none() && name == ALONE {
+        if stats.is_none() && [ALONE, REFITTED].contains(&name) {
             continue;
         }
         let cells = match stats {

@@ -255,6 +255,8 @@ pub enum Part {
 pub struct UrdfAlone {
     /// rms error of the URDF alone, m.
     pub rms: f64,
+    /// rms error of the URDF that was fitted to be used without effects, m.
+    pub refitted: Option<f64>,
     /// rms error with the effects, m.
     pub with_effects: f64,
     /// The profile's limit of the rms error, m.

@@ -353,6 +353,13 @@ fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
                 v.number("rms"),
                 v.number("with_effects")
             );
+            let error = match v.get("refitted") {
+                Some(_) => format!(
+                    "{error}; the URDF that was fitted to be used without them {} rms",
+                    v.number("refitted")
+                ),
+                None => error,
+            };
             match (reason.effect, v.get("limit")) {
                 (Effect::Warns, Some(_)) => format!(
                     "{error} (limit {}): use it with the effects only.",

@@ -243,6 +243,7 @@ fn the_published_schemas_are_up_to_date() {
     for (file, schema) in [
         ("report.schema.json", report_schema()),
         ("scene.schema.json", scene_schema()),
+        ("model.schema.json", calib_report::model_schema()),
     ] {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("schema")

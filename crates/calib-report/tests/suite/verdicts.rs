@@ -124,6 +124,7 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
         with(|f| {
             f.urdf_alone = Some(UrdfAlone {
                 rms,
+                refitted: None,
                 with_effects,
                 limit,
             });

@@ -145,6 +145,7 @@ pub(super) fn urdf_alone(facts: &Facts) -> Vec<Reason> {
         Reason::new(ReasonId::UrdfAlone, effect)
             .with("rms", Fact::meters(alone.rms))
             .with("with_effects", Fact::meters(alone.with_effects))
+            .with_some("refitted", alone.refitted.map(Fact::meters))
             .with_some("limit", alone.limit.map(Fact::meters)),
     ]
 }

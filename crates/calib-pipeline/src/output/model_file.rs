@@ -1,0 +1,307 @@
+//! The calibrated robot as a file for programs that predict.
+
+use std::collections::BTreeMap;
+
+use calib_core::EffectKind;
+use calib_core::effect::Drives;
+use calib_geometry::decompose::symmetric_eigen;
+use calib_geometry::se3;
+use calib_profile::Usage;
+use calib_report::robot_model::{
+    ModelBody, ModelEffect, ModelJoint, ModelLink, ModelMimic, ModelMotion, ModelNumber,
+    ModelPoint, ModelPose, ModelUncertainty, RobotModelFile,
+};
+use calib_urdf::{JointId, JointKind};
+use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
+
+use crate::formulate::formulation::MlFit;
+use crate::formulate::kinematics::{Calibration, motion_axis};
+use crate::formulate::ml::calibration_at;
+use crate::formulate::solved::Solved;
+use crate::prepare::conditions::STILL;
+use crate::prepare::inputs::Inputs;
+
+/// Name of the file beside a patched URDF: `r.calibrated.urdf` gives `r.calibrated.model.json`.
+#[must_use]
+pub fn model_name(urdf: &str) -> String {
+    format!("{}.model.json", urdf.trim_end_matches(".urdf"))
+}
+
+/// The robot that a run found.
+#[must_use]
+pub fn model_file(inputs: &Inputs, solved: &Solved) -> RobotModelFile {
+    let robot = &solved.robot;
+    let profile = &inputs.robot.profile;
+    let model = &robot.model;
+    let name = |link: calib_urdf::LinkId| model.link(link).name.clone();
+    let points = profile.points.iter().map(|(point, tip)| {
+        let at = robot.contact_points.get(point).copied().unwrap_or(tip.at);
+        let xyz_m = at.coords.into();
+        let link = name(tip.link);
+        (point.clone(), ModelPoint { link, xyz_m })
+    });
+    let mut joints: Vec<JointId> = model.joint_ids().collect();
+    joints.sort_by_key(|j| (model.chain_to_root(model.joint(*j).child).len(), j.index()));
+    RobotModelFile {
+        robot: profile.robot.clone(),
+        root: name(model.root()),
+        gravity_m_s2: robot.masses.gravity().into(),
+        masses_assumed: robot.masses.assumed.is_some(),
+        links: links(robot),
+        joints: joints
+            .into_iter()
+            .map(|j| joint(inputs, robot, j))
+            .collect(),
+        approach_threshold: STILL,
+        tracker: profile.tracker.frame.clone(),
+        tracker_from_root: pose(&robot.tracker_from_root),
+        bodies: bodies(inputs, robot),
+        points: points.collect(),
+        uncertainty: solved.fit.as_ref().map(|fit| uncertainty(inputs, fit)),
+        written_by: format!("calib {}", env!("CARGO_PKG_VERSION")),
+        inputs: inputs
+            .digests
+            .iter()
+            .map(|d| calib_report::Input {
+                path: d.path.clone(),
+                sha256: d.sha256.clone(),
+            })
+            .collect(),
+        ..RobotModelFile::default()
+    }
+}
+
+fn pose(outer_from_inner: &Isometry3<f64>) -> ModelPose {
+    let q = outer_from_inner.rotation.coords;
+    ModelPose {
+        xyz_m: outer_from_inner.translation.vector.into(),
+        quat_xyzw: [q.x, q.y, q.z, q.w],
+    }
+}
+
+/// Masses and first moments: those that are given, and what was found beyond.
+fn links(robot: &Calibration) -> Vec<ModelLink> {
+    let loaded = robot.masses.loaded();
+    let link = |id: calib_urdf::LinkId| {
+        let own = loaded.link(id).inertial;
+        let given = own.map_or_else(Vector3::zeros, |i| i.center_of_mass.coords * i.mass);
+        ModelLink {
+            name: loaded.link(id).name.clone(),
+            mass_kg: own.map_or(0.0, |i| i.mass),
+            first_moment_kg_m: (given + robot.masses.beyond()[id.index()]).into(),
+        }
+    };
+    loaded.link_ids().map(link).collect()
+}
+
+fn joint(inputs: &Inputs, robot: &Calibration, id: JointId) -> ModelJoint {
+    let model = &robot.model;
+    let j = model.joint(id);
+    let mimic = j.mimic.as_ref().map(|_| ModelMimic {
+        joint: model.joint(j.law.source).name.clone(),
+        multiplier: j.law.multiplier,
+        offset: j.law.offset,
+    });
+    ModelJoint {
+        name: j.name.clone(),
+        parent: model.link(j.parent).name.clone(),
+        child: model.link(j.child).name.clone(),
+        motion: match j.kind {
+            JointKind::Fixed => ModelMotion::Fixed,
+            JointKind::Prismatic { .. } => ModelMotion::Prismatic,
+            _ => ModelMotion::Revolute,
+        },
+        parent_from_joint: pose(&j.parent_link_from_joint),
+        load_origin: pose(&robot.masses.loaded().joint(id).parent_link_from_joint),
+        axis: j.kind.axis().map(|axis| axis.into_inner().into()),
+        limits: j.limits.range().map(|(low, high)| [low, high]),
+        mimic,
+        fitted_range: fitted_range(inputs, id),
+        effects: effects(robot, id),
+    }
+}
+
+fn effects(robot: &Calibration, id: JointId) -> Vec<ModelEffect> {
+    let Some(axis) = motion_axis(&robot.model, id) else {
+        return Vec::new();
+    };
+    let slides = !robot.model.joint(id).kind.turns();
+    let entry = |kind: EffectKind, value: f64, other: Option<usize>| {
+        let term = kind.term();
+        ModelEffect {
+            kind: term.name.to_owned(),
+            formula: term.formula.to_owned(),
+            value,
+            unit: term.quantity.unit(slides).symbol().to_owned(),
+            about: match term.drives {
+                Drives::Across(k) => Some(axis.across()[k].into()),
+                _ => None,
+            },
+            other: other.map(|o| robot.model.joints()[o].name.clone()),
+        }
+    };
+    let of = &robot.effects[id.index()];
+    let own = of.coefficients.iter().filter(|(_, c)| **c != 0.0);
+    let own = own.map(|(kind, c)| entry(*kind, *c, None));
+    let coupled = of.coupling.iter();
+    let coupled = coupled.map(|(other, c)| entry(EffectKind::Coupling, *c, Some(*other)));
+    own.chain(coupled).collect()
+}
+
+/// Smallest and largest reading of the fitted rows, where the joint moved.
+fn fitted_range(inputs: &Inputs, id: JointId) -> Option<[f64; 2]> {
+    let fitted = inputs.recordings.values();
+    let fitted = fitted.filter(|r| r.spec.usage != Usage::Validation);
+    let readings = fitted.flat_map(|r| r.q.iter().flatten());
+    let model = &inputs.robot.model;
+    model.joint(id).kind.axis()?;
+    let (low, high) = readings
+        .map(|q| model.position(q, id))
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
+            (l.min(q), h.max(q))
+        });
+    (high > low).then_some([low, high])
+}
+
+fn bodies(inputs: &Inputs, robot: &Calibration) -> BTreeMap<String, ModelBody> {
+    let body = |(name, body): (&String, &calib_profile::Body)| {
+        let markers = robot.points.get(name).into_iter().flatten();
+        let markers_m = markers.map(|(marker, at)| (marker.clone(), at.coords.into()));
+        let entry = ModelBody {
+            link: robot.model.link(body.link).name.clone(),
+            link_from_body: robot.mounts.get(name).map(pose),
+            markers_m: markers_m.collect(),
+        };
+        (name.clone(), entry)
+    };
+    inputs.robot.profile.bodies.iter().map(body).collect()
+}
+
+/// Covariance of all numbers that the fit changes.
+///
+/// ```text
+/// C_numbers = G C Gᵀ = R Rᵀ,   R = G V diag(√λ),   C = V diag(λ) Vᵀ,   G = ∂numbers/∂parameters
+/// ```
+fn uncertainty(inputs: &Inputs, fit: &MlFit) -> ModelUncertainty {
+    /// Of a parameter's scale: large against rounding, and what is left out is of its size.
+    const STEP: f64 = 1e-6;
+    let solution = &fit.solution;
+    let base = calibration_at(&fit.formulation, &solution.model, &solution.values, inputs);
+    let named = names(&base);
+    let scale = &solution.information.scale;
+    let mut g = DMatrix::zeros(named.len(), scale.len());
+    for p in 0..solution.parameters.len() {
+        let Some(column) = solution.column_of(p) else {
+            continue;
+        };
+        let step = STEP * scale[column];
+        let mut values = solution.values.clone();
+        values.0[p] += step;
+        let moved = calibration_at(&fit.formulation, &solution.model, &values, inputs);
+        for (row, change) in changes(&base, &moved).into_iter().enumerate() {
+            g[(row, column)] = change / step;
+        }
+    }
+    let eigen = symmetric_eigen(&solution.information.covariance);
+    let mut half = eigen.vectors;
+    for (k, value) in eigen.values.iter().enumerate() {
+        half.column_mut(k).scale_mut(value.max(0.0).sqrt());
+    }
+    let root = g * half;
+    let rows = named.into_iter().zip(root.row_iter());
+    let known = rows.filter(|(_, row)| row.iter().any(|x| *x != 0.0));
+    let (numbers, root) = known
+        .map(|(number, row)| (number, row.iter().map(|x| rounded(*x)).collect()))
+        .unzip();
+    ModelUncertainty { numbers, root }
+}
+
+/// Nine digits: more of a standard deviation says nothing.
+fn rounded(x: f64) -> f64 {
+    format!("{x:.8e}").parse().unwrap_or(x) + 0.0
+}
+
+/// Names of the six numbers of a pose, in the order of its change [ω; v].
+const OF_POSE: [&str; 6] = ["rx", "ry", "rz", "x", "y", "z"];
+
+/// What [`changes`] lists.
+fn names(robot: &Calibration) -> Vec<ModelNumber> {
+    let model = &robot.model;
+    let mut out = Vec::new();
+    let mut push = |of: &str, name: &str, number: &str| {
+        out.push(ModelNumber {
+            of: of.to_owned(),
+            name: name.to_owned(),
+            number: number.to_owned(),
+        });
+    };
+    OF_POSE.iter().for_each(|n| push("tracker", "", n));
+    for id in model.joint_ids() {
+        let name = &model.joint(id).name;
+        OF_POSE.iter().for_each(|n| push("joint", name, n));
+        let effects = &robot.effects[id.index()];
+        for kind in effects.coefficients.keys() {
+            push("joint", name, kind.term().name);
+        }
+        for other in effects.coupling.keys() {
+            let other = &model.joints()[*other].name;
+            push("joint", name, &format!("coupling:{other}"));
+        }
+    }
+    for body in robot.mounts.keys() {
+        OF_POSE.iter().for_each(|n| push("body", body, n));
+    }
+    for (body, markers) in &robot.points {
+        for marker in markers.keys() {
+            let name = format!("{body}/{marker}");
+            OF_POSE[3..].iter().for_each(|n| push("marker", &name, n));
+        }
+    }
+    for point in robot.contact_points.keys() {
+        OF_POSE[3..].iter().for_each(|n| push("point", point, n));
+    }
+    for link in model.link_ids() {
+        let name = &model.link(link).name;
+        OF_POSE[3..].iter().for_each(|n| push("link", name, n));
+    }
+    out
+}
+
+/// From one robot to another that differs little: every number of the file.
+fn changes(base: &Calibration, moved: &Calibration) -> Vec<f64> {
+    let mut out = Vec::new();
+    let pose = |out: &mut Vec<f64>, base: &Isometry3<f64>, moved: &Isometry3<f64>| {
+        let twist = se3::log(&(base.inverse() * moved));
+        out.extend(twist.angular().iter().chain(twist.linear().iter()));
+    };
+    let point = |out: &mut Vec<f64>, base: &Point3<f64>, moved: &Point3<f64>| {
+        out.extend((moved - base).iter());
+    };
+    pose(&mut out, &base.tracker_from_root, &moved.tracker_from_root);
+    for id in base.model.joint_ids() {
+        let origin = |robot: &Calibration| robot.model.joint(id).parent_link_from_joint;
+        pose(&mut out, &origin(base), &origin(moved));
+        let (own, other) = (&base.effects[id.index()], &moved.effects[id.index()]);
+        let coefficients = own.coefficients.iter();
+        out.extend(coefficients.map(|(kind, c)| other.of(*kind) - c));
+        let coupled = own.coupling.iter();
+        out.extend(coupled.map(|(j, c)| other.coupling.get(j).copied().unwrap_or(*c) - c));
+    }
+    for (body, mount) in &base.mounts {
+        pose(&mut out, mount, moved.mounts.get(body).unwrap_or(mount));
+    }
+    for (body, markers) in &base.points {
+        for (marker, at) in markers {
+            let other = moved.points.get(body).and_then(|m| m.get(marker));
+            point(&mut out, at, other.unwrap_or(at));
+        }
+    }
+    for (name, at) in &base.contact_points {
+        point(&mut out, at, moved.contact_points.get(name).unwrap_or(at));
+    }
+    let moments = base.masses.beyond().iter().zip(moved.masses.beyond());
+    for (own, other) in moments {
+        out.extend((other - own).iter());
+    }
+    out
+}

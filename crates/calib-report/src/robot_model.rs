@@ -1,0 +1,191 @@
+//! The calibrated robot as one file: everything that a program needs to predict poses as the fit does, with uncertainty.
+//!
+//! ```text
+//! tracker_from_link = tracker_from_root · Π_joints parent_from_joint · joint_from_child                  (1)
+//! φ = q + Σ c F,  θ = Σ c F e:   joint_from_child = exp(axis φ) · Exp(θ)       turning joints
+//!                                joint_from_child = translation by axis φ       sliding joints
+//! F: 1, q, cos q − 1, sin q, cos 2q − 1, sin 2q, the load, −(direction of approach), another joint's q         (2)
+//! load about the axis = axis · Σ (moment_k − mass_k o) × g   over the links that the joint carries           (3)
+//! ```
+//!
+//! Everything is SI; readings are those of the controller. Equation (3) takes the geometry of `load_origins` at the readings; mass and moment of a link are its own, in the root's axes; o
+//! is the joint's origin. A sliding joint feels the force axis · Σ mass_k g. Loads are what gravity exerts: minus what a torque sensor reads.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{FormatVersion, Input};
+
+/// The calibrated robot. SI; quaternions x, y, z, w.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RobotModelFile {
+    /// Version of this format.
+    pub calib_model: FormatVersion,
+    /// The robot's name.
+    pub robot: String,
+    /// The link that carries all others.
+    pub root: String,
+    /// Gravity in the root's frame, m/s².
+    pub gravity_m_s2: [f64; 3],
+    /// Whether the masses were assumed, because the URDF has none: their scale then belongs to the compliances.
+    pub masses_assumed: bool,
+    /// Links, as the URDF has them, with payloads and the first moments that were found.
+    pub links: Vec<ModelLink>,
+    /// Joints; each after the one that carries it.
+    pub joints: Vec<ModelJoint>,
+    /// The joint that moves by less than this from one posture to the next keeps its direction of approach, rad or m.
+    pub approach_threshold: f64,
+    /// Name of the tracker's frame.
+    pub tracker: String,
+    /// Where the root stands in the tracker.
+    pub tracker_from_root: ModelPose,
+    /// Tracking bodies.
+    pub bodies: BTreeMap<String, ModelBody>,
+    /// Points of the robot: tool tips.
+    pub points: BTreeMap<String, ModelPoint>,
+    /// Uncertainty of all of these numbers; null with the closed forms.
+    pub uncertainty: Option<ModelUncertainty>,
+    /// Name and version of the program.
+    pub written_by: String,
+    /// All files that the result comes from.
+    pub inputs: Vec<Input>,
+}
+
+/// A pose, `outer_from_inner`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelPose {
+    /// Origin, m.
+    pub xyz_m: [f64; 3],
+    /// Orientation, unit quaternion x, y, z, w.
+    pub quat_xyzw: [f64; 4],
+}
+
+impl Default for ModelPose {
+    fn default() -> Self {
+        Self {
+            xyz_m: [0.0; 3],
+            quat_xyzw: [0.0, 0.0, 0.0, 1.0],
+        }
+    }
+}
+
+/// A link.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelLink {
+    /// Its name.
+    pub name: String,
+    /// Its mass, kg.
+    pub mass_kg: f64,
+    /// Mass times center, in the link's frame, kg m.
+    pub first_moment_kg_m: [f64; 3],
+}
+
+/// How a joint moves.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ModelMotion {
+    /// It does not.
+    #[default]
+    Fixed,
+    /// It turns, rad.
+    Revolute,
+    /// It slides, m.
+    Prismatic,
+}
+
+/// A joint.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelJoint {
+    /// Its name.
+    pub name: String,
+    /// The link that carries it.
+    pub parent: String,
+    /// The link that it moves.
+    pub child: String,
+    /// How it moves.
+    pub motion: ModelMotion,
+    /// `parent_from_joint`, calibrated, without the zero offset.
+    pub parent_from_joint: ModelPose,
+    /// The same as in the nominal URDF: loads are computed with it.
+    pub load_origin: ModelPose,
+    /// Axis in the joint's frame; null for a fixed joint.
+    pub axis: Option<[f64; 3]>,
+    /// Limits of the URDF, rad or m.
+    pub limits: Option<[f64; 2]>,
+    /// The joint whose reading it follows (a mimic joint): reading = multiplier · other + offset.
+    pub mimic: Option<ModelMimic>,
+    /// Smallest and largest reading of the recordings that were fitted: nothing is verified outside; null where it was not moved.
+    pub fitted_range: Option<[f64; 2]>,
+    /// Its effects, in the order of application.
+    pub effects: Vec<ModelEffect>,
+}
+
+/// A joint that follows another.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelMimic {
+    /// The other.
+    pub joint: String,
+    /// Multiplier.
+    pub multiplier: f64,
+    /// Offset, rad or m.
+    pub offset: f64,
+}
+
+/// One term of equation (2).
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelEffect {
+    /// Which: `zero_offset`, `gain`, `eccentricity_cos`, … `coupling`.
+    pub kind: String,
+    /// F · c in symbols.
+    pub formula: String,
+    /// Its coefficient.
+    pub value: f64,
+    /// Unit of the coefficient.
+    pub unit: String,
+    /// The axis that it turns about after the joint's own motion, in the child's frame; null: the joint's own.
+    pub about: Option<[f64; 3]>,
+    /// The joint whose reading it follows, for couplings.
+    pub other: Option<String>,
+}
+
+/// A tracking body.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelBody {
+    /// The link that it is fixed to.
+    pub link: String,
+    /// `link_from_body`; null where its markers have no frame of their own.
+    pub link_from_body: Option<ModelPose>,
+    /// Its markers in the link's frame, m.
+    pub markers_m: BTreeMap<String, [f64; 3]>,
+}
+
+/// A point of the robot.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelPoint {
+    /// The link that it is fixed to.
+    pub link: String,
+    /// In the link's frame, m.
+    pub xyz_m: [f64; 3],
+}
+
+/// Covariance C = R Rᵀ of the numbers of a model.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelUncertainty {
+    /// What each row of R is the uncertainty of.
+    pub numbers: Vec<ModelNumber>,
+    /// R by rows: independent standard deviations as columns.
+    pub root: Vec<Vec<f64>>,
+}
+
+/// A number of a model that is uncertain. Poses T change by T · exp([ω; v]).
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelNumber {
+    /// What it belongs to: `joint`, `tracker`, `body`, `marker` (body/marker), `point`, `link`.
+    pub of: String,
+    /// Its name.
+    pub name: String,
+    /// Which number: `rx`, `ry`, `rz`, `x`, `y`, `z`, or an effect (`coupling:other`).
+    pub number: String,
+}
