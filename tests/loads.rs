@@ -216,8 +216,10 @@ fn the_urdf_fitted_without_effects_predicts_better_than_the_one_whose_effects_ar
     // As a robot of its own, with nothing free but where it stands, the file does what was stated of it.
     let alone = dir.read("out/arm.calibrated.alone.urdf");
     let registered = heavy.replace(", joint_offsets, joint_axes, compliance", "");
-    let again = rms_m(&ran(&laboratory((&arm, &heavy), (&alone, &registered))));
-    assert!((again / refitted - 1.0).abs() < 0.05, "{again} {refitted}");
+    let again = ran(&laboratory((&arm, &heavy), (&alone, &registered)));
+    let again = &again["verification"]["held_out"]["registration_only"]["rms_m"];
+    let again = again.as_f64().expect("registered");
+    assert!((again / refitted - 1.0).abs() < 0.02, "{again} {refitted}");
 }
 
 /// Masses far from rods: a light upper arm, a heavy forearm, a hand with its center aside.
