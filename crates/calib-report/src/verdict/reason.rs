@@ -95,7 +95,7 @@ reasons! {
     /// The orientation of the last body is not measured.
     OrientationNotMeasured = "orientation-not-measured": Warns,
     /// One joint at a time moved.
-    SingleJointData = "single-joint-data": Warns,
+    SingleJointData = "single-joint-data": Warns | LeavesOpen,
     /// Joints that the fit used hardly move in the held-out poses.
     JointsNotVerified = "joints-not-verified": Warns,
     /// What the URDF predicts without the effects that it cannot hold.

@@ -393,9 +393,14 @@ fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
                 "held_out" => "the held-out poses",
                 _ => "all recordings",
             };
-            format!(
-                "One joint at a time moved in {data}: poses in which several joints move were not tested."
-            )
+            match reason.effect {
+                Effect::LeavesOpen => format!(
+                    "One joint at a time moved in {data}, and physics is missing from the model: what it does where several joints move is open."
+                ),
+                _ => format!(
+                    "One joint at a time moved in {data}: poses in which several joints move were not tested."
+                ),
+            }
         }
         ReasonId::JointsNotVerified => {
             let joints = match v.get("joints") {

@@ -456,6 +456,26 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
                 };
             }),
         ),
+        (
+            ReasonId::SingleJointData,
+            LeavesOpen,
+            with(|f| {
+                f.single_joint = SingleJoint {
+                    fitted: true,
+                    held_out: true,
+                };
+                f.warnings = vec!["missing-physics".into()];
+            }),
+        ),
+        (
+            ReasonId::RejectedShare,
+            LeavesOpen,
+            with(|f| {
+                f.rejected = share(6);
+                f.validation = Validation::LeaveOneOut { postures: 10 };
+                f.warnings = vec!["unsettled-rows".into()];
+            }),
+        ),
         (ReasonId::UrdfAlone, Supports, alone(0.0009, Some(0.001))),
         (ReasonId::UrdfAlone, Warns, alone(0.0011, Some(0.001))),
         (ReasonId::UrdfAlone, Supports, alone(0.0005, None)),

@@ -1,6 +1,6 @@
 //! What the data allow: rejections, what the result was verified with, how the joints moved.
 
-use calib_finding::Fact;
+use calib_finding::{Fact, catalog};
 
 use crate::verdict::facts::{Facts, Part, RejectedPart, Share, Validation};
 use crate::verdict::{Effect, Reason, ReasonId};
@@ -79,10 +79,12 @@ fn share_effect(share: Share) -> Effect {
 }
 
 pub(super) fn rejected_share(facts: &Facts) -> Vec<Reason> {
-    let effect = share_effect(facts.rejected);
-    if effect == Effect::Supports {
-        return Vec::new();
-    }
+    let effect = match share_effect(facts.rejected) {
+        Effect::Supports => return Vec::new(),
+        // Rows of a change look unsettled: without other poses nothing tells that the right ones were excluded.
+        _ if warns(facts, catalog::UNSETTLED_ROWS) && !has_recordings(facts) => Effect::LeavesOpen,
+        effect => effect,
+    };
     vec![
         Reason::new(ReasonId::RejectedShare, effect)
             .with("rejected", Fact::count(facts.rejected.part))
@@ -109,7 +111,22 @@ pub(super) fn single_joint(facts: &Facts) -> Vec<Reason> {
         (false, true) => "held_out",
         (true, true) => "all",
     };
-    vec![Reason::new(ReasonId::SingleJointData, Effect::Warns).with("data", Fact::choice(which))]
+    // What is missing was fitted to motions of one joint; nothing tells what it does where several move.
+    let seen_together = has_recordings(facts) && !single.held_out;
+    let effect = if single.fitted && !seen_together && warns(facts, catalog::MISSING_PHYSICS) {
+        Effect::LeavesOpen
+    } else {
+        Effect::Warns
+    };
+    vec![Reason::new(ReasonId::SingleJointData, effect).with("data", Fact::choice(which))]
+}
+
+fn has_recordings(facts: &Facts) -> bool {
+    matches!(facts.validation, Validation::Recordings { .. })
+}
+
+fn warns(facts: &Facts, id: catalog::Id) -> bool {
+    facts.warnings.iter().any(|warning| *warning == id.as_str())
 }
 
 pub(super) fn verified_joints(facts: &Facts) -> Vec<Reason> {
