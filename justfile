@@ -23,7 +23,7 @@ fuzz target:
 
 # The book's tests, its generated page regenerated, and its HTML where mdbook is installed
 book:
-    UPDATE_BOOK=1 cargo test -p calib-cli --test book
+    UPDATE_BOOK=1 cargo test -p calib-cli --test suite book::
     mdbook build book
 
 # The book's study pages, regenerated (a quarter of an hour of two processors)

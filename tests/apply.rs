@@ -1,7 +1,7 @@
 //! A calibration in other people's files: URDFs, xacros with properties and YAML, the kinematics YAML of a UR arm. Only the
 //! numbers change, everything can be reverted byte for byte, and what several joints share is refused.
 
-mod scratch;
+use crate::scratch;
 
 use calib_urdf::rpy::rotation_from_rpy;
 use calib_urdf::{RobotModel, UrdfEdit, patch};

@@ -1,6 +1,6 @@
 //! What a robot engineer is told who gives something wrong: the words, the exit code, and nothing written.
 
-mod scratch;
+use crate::scratch;
 
 use std::fmt::Write as _;
 

@@ -419,7 +419,7 @@ fn profile_reference(schema: &Value) -> String {
     let mut page = String::from(
         "# Profile reference\n\n\
          This page is made from `robots/profile.schema.json`, which is what `calib schema` prints; `UPDATE_BOOK=1 cargo test \
-         -p calib-cli --test book` regenerates it. Unknown keys are errors. Units stand in the key's name; paths are relative to the \
+         -p calib-cli --test suite book::` regenerates it. Unknown keys are errors. Units stand in the key's name; paths are relative to the \
          profile. *none* means that the program estimates it, chooses it, or leaves it out, as the meaning says.\n\n\
          ## profile\n\n",
     );
@@ -452,7 +452,7 @@ fn the_profile_reference_is_the_schema() {
     let written = fs::read_to_string(&file).unwrap_or_default();
     assert!(
         written == page,
-        "book/src/reference/profile.md is old: UPDATE_BOOK=1 cargo test -p calib-cli --test book"
+        "book/src/reference/profile.md is old: UPDATE_BOOK=1 cargo test -p calib-cli --test suite book::"
     );
     for (number, line) in page.lines().enumerate().filter(|(_, l)| l.starts_with('|')) {
         assert!(
@@ -478,7 +478,7 @@ fn results_page() -> String {
     let mut page = String::from(
         "# Results of the shipped robots\n\n\
          Printed by the commands shown, on the simulated recordings in `robots/`; a test compares this page with the program, and \
-         `UPDATE_BOOK=1 cargo test -p calib-cli --test book` regenerates it. Errors are positions of tracked bodies or markers on poses \
+         `UPDATE_BOOK=1 cargo test -p calib-cli --test suite book::` regenerates it. Errors are positions of tracked bodies or markers on poses \
          that were not fitted.\n",
     );
     let shelf = Shelf::new();
@@ -508,7 +508,7 @@ fn the_results_page_is_what_the_program_prints() {
     let written = fs::read_to_string(&file).unwrap_or_default();
     assert!(
         written == page,
-        "book/src/reference/results.md is old: UPDATE_BOOK=1 cargo test -p calib-cli --test book\n{page}"
+        "book/src/reference/results.md is old: UPDATE_BOOK=1 cargo test -p calib-cli --test suite book::\n{page}"
     );
     assert_eq!(page.matches("calibrated").count(), 4, "{page}");
 }

@@ -1,6 +1,6 @@
 //! What moved while the data were recorded, and rows that are not independent: said by `calib run`, with row and size.
 
-mod scratch;
+use crate::scratch;
 
 use scratch::{Ran, Scratch};
 use serde_json::Value;

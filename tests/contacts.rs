@@ -1,6 +1,6 @@
 //! Loops that close through touches: an arm without any tracker finds its zero offsets by touching things.
 
-mod scratch;
+use crate::scratch;
 
 use std::fmt::Write as _;
 

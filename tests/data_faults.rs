@@ -1,8 +1,8 @@
 //! What a laboratory gets wrong between recording and profile: each mistake put into Ripley's recordings is named by
 //! `calib check` and by `calib run`; exchanged markers are put right; the clean recordings stay silent.
 
-mod scratch;
-mod truth;
+use crate::scratch;
+use crate::truth;
 
 use scratch::Scratch;
 use serde_json::Value;

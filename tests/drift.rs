@@ -1,6 +1,6 @@
 //! Two calibrations of one arm: the same again, and with a longer forearm.
 
-mod scratch;
+use crate::scratch;
 
 use scratch::Scratch;
 use serde_json::Value;

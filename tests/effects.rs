@@ -1,6 +1,6 @@
 //! Joint effects and limits that a profile names: backlash, measured torque, an origin inside its housing.
 
-mod scratch;
+use crate::scratch;
 
 use std::fmt::Write as _;
 

@@ -1,7 +1,7 @@
 //! What laboratories do to recordings without meaning to, through the program: rows written twice, noise with a memory,
 //! joint values that lag behind.
 
-mod scratch;
+use crate::scratch;
 
 use std::collections::BTreeMap;
 

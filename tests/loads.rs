@@ -1,6 +1,6 @@
 //! What loads the joints: gravity's direction, payloads, masses that nobody stated, stiffness that is known.
 
-mod scratch;
+use crate::scratch;
 
 use scratch::Scratch;
 use serde_json::Value;

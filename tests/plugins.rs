@@ -1,7 +1,7 @@
 //! Plugins through the program: a reader in C gives the same calibration as the built-in reader, an estimator in Rust
 //! is called by its name, and what cannot be loaded is refused.
 
-mod scratch;
+use crate::scratch;
 
 use std::path::PathBuf;
 use std::process::Command;

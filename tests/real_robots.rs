@@ -2,7 +2,7 @@
 //!
 //! The tables belong to another laboratory: without them the test says that it was skipped.
 
-mod scratch;
+use crate::scratch;
 
 use std::path::PathBuf;
 

@@ -1,6 +1,6 @@
 //! `calib record` as it is used: a sender of ours on the loopback, the program beside it, the file read back.
 
-mod scratch;
+use crate::scratch;
 
 use std::collections::BTreeMap;
 use std::io::Write as _;

@@ -1,7 +1,7 @@
 //! The shipped robots from end to end: what is written, that it is true, and that it is the same every time.
 
-mod scratch;
-mod truth;
+use crate::scratch;
+use crate::truth;
 
 use scratch::{Scratch, finished};
 use serde_json::Value;

@@ -1,6 +1,6 @@
 //! `calib run --select`: the physics that the recordings support, chosen by prediction, and a run of the chosen model.
 
-mod scratch;
+use crate::scratch;
 
 use scratch::Scratch;
 use serde_json::Value;

@@ -5,7 +5,7 @@
 
 #[path = "../crates/calib-report/tests/suite/browser.rs"]
 mod browser;
-mod scratch;
+use crate::scratch;
 
 use scratch::{Scratch, finished};
 use serde_json::{Number, Value, json};

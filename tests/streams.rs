@@ -1,7 +1,7 @@
 //! Recordings with time, from two machines with two clocks: Ripley simulated, written as two files, run to the truth.
 
-mod scratch;
-mod truth;
+use crate::scratch;
+use crate::truth;
 
 use std::collections::BTreeMap;
 

@@ -1,7 +1,7 @@
 //! Structural mistakes through the program, over designs: random poses, one-joint sweeps, six poses; one to four markers.
 //! Each is named before a row is blamed, once, with its places; correct data are given no error.
 
-mod scratch;
+use crate::scratch;
 
 use scratch::Scratch;
 use serde_json::Value;

@@ -1,6 +1,6 @@
 //! `calib study` as a user runs it: small studies, and the book's pages against them.
 
-mod scratch;
+use crate::scratch;
 
 use scratch::{Scratch, root};
 

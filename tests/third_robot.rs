@@ -1,7 +1,7 @@
 //! A robot that nobody programmed for: a six-axis arm by a URDF and a profile, and nothing else.
 
-mod scratch;
-mod truth;
+use crate::scratch;
+use crate::truth;
 
 use scratch::Scratch;
 use truth::{CHI2_99_SIX, Truth, errors};

@@ -1,6 +1,6 @@
 //! The URDF that a run writes: only what was calibrated differs, it says what the report says, and it can be reverted.
 
-mod scratch;
+use crate::scratch;
 
 use calib_urdf::RobotModel;
 use scratch::{Scratch, finished};

@@ -1,6 +1,6 @@
 //! What the verdict alone must stop, through the program, and that its counts are true.
 
-mod scratch;
+use crate::scratch;
 
 use scratch::{Scratch, finished};
 use serde_json::Value;

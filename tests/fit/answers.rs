@@ -1,7 +1,7 @@
 //! The forms of answers: keys, exit codes, lists, and when a table is taken for one body.
 
+use crate::fit::{assert_near, jitter, numbers, pivot};
 use crate::scratch::{Scratch, root};
-use crate::{assert_near, jitter, numbers, pivot};
 use serde_json::Value;
 
 fn keys(value: &Value) -> Vec<&str> {

@@ -1,7 +1,7 @@
 //! Axes with a sign, frames and hand-eye transforms.
 
+use crate::fit::{jitter, numbers, pivot};
 use crate::scratch::Scratch;
-use crate::{jitter, numbers, pivot};
 use serde_json::Value;
 
 #[test]

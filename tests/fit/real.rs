@@ -1,7 +1,7 @@
 //! Measurements of other laboratories. They are not part of the project: `CALIB_REAL_DATA` points at them, or they lie in `../shared/data`.
 
+use crate::fit::{V, assert_near, cross, dot, minus, numbers, scaled, unit};
 use crate::scratch::Scratch;
-use crate::{V, assert_near, cross, dot, minus, numbers, scaled, unit};
 
 /// A file or folder of real measurements; `None`, counted as skipped, where it is not there.
 fn real(file: &str) -> Option<String> {

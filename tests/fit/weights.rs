@@ -1,7 +1,7 @@
 //! Noise and weights of samples, rows and markers.
 
+use crate::fit::{assert_near, dot, jitter, minus, numbers, pivot, unit};
 use crate::scratch::Scratch;
-use crate::{assert_near, dot, jitter, minus, numbers, pivot, unit};
 use serde_json::Value;
 
 #[test]

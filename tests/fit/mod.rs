@@ -1,7 +1,6 @@
 //! `calib fit`: measurements of other laboratories, the forms of its answers, weights and noise, frames and hand-eye transforms.
 
-#[path = "../scratch/mod.rs"]
-mod scratch;
+use crate::scratch;
 
 mod answers;
 mod frames;
