@@ -174,6 +174,28 @@ pub enum Problem {
         /// The frame.
         frame: i64,
     },
+    /// Two poses of a long table have one name.
+    #[error(
+        "pose `{pose}` has another value of joint `{joint}` in line {first}: two poses have one name"
+    )]
+    PoseTwice {
+        /// The name.
+        pose: String,
+        /// The joint.
+        joint: String,
+        /// The first line of that name.
+        first: u64,
+    },
+    /// A point occurs twice in one pose.
+    #[error("`{name}` was measured in pose `{pose}` already, in line {first}")]
+    PointTwice {
+        /// The point.
+        name: String,
+        /// The pose.
+        pose: String,
+        /// Where it was first.
+        first: u64,
+    },
     /// A quaternion that is no rotation.
     #[error("body `{body}`: the quaternion has length {norm:.6}, expected 1 within {tolerance}")]
     NotUnit {
@@ -276,6 +298,10 @@ impl Problem {
             Problem::TimeBackwards { .. } => "sort the rows by time",
             Problem::FrameBackwards { .. } => "sort the rows by frame",
             Problem::RepeatedSample { .. } => "remove one of them",
+            Problem::PoseTwice { .. } => "give every pose a name of its own",
+            Problem::PointTwice { .. } => {
+                "give a repeated measurement a pose of its own, or remove one of them"
+            }
             Problem::NotUnit { .. } | Problem::NotRotation { .. } => {
                 "check the columns' order and scale"
             }

@@ -74,8 +74,30 @@ fn every_bad_table_has_its_message() {
             "frame,marker,x_m,y_m,z_m\n2,,1,1,1\n".into(),
         ),
         (
-            "long table with joints",
-            "frame,marker,elbow_rad,x_m,y_m,z_m\n2,a,1,1,1,1\n".into(),
+            "long table with named markers",
+            "frame,point,elbow_rad,x_m,y_m,z_m,b.x_m,b.y_m,b.z_m\n2,a,1,1,1,1,1,1,1\n".into(),
+        ),
+        (
+            "two poses of one name",
+            "pose,elbow_deg,point,x_m,y_m,z_m\nP1,10,a,1,1,1\nP2,10,a,1,1,1\nP1,11,b,1,1,1\n"
+                .into(),
+        ),
+        (
+            "point twice in a pose",
+            "pose,elbow_deg,point,x_m,y_m,z_m\nP1,10,a,1,1,1\nP2,10,a,1,1,1\nP1,10,a,1,1,1\n"
+                .into(),
+        ),
+        (
+            "point without pose",
+            "pose,elbow_deg,point,x_m,y_m,z_m\n,10,a,1,1,1\n".into(),
+        ),
+        (
+            "joint of a pose not a number",
+            "pose,elbow_deg,point,x_m,y_m,z_m\nP1,nan,a,1,1,1\n".into(),
+        ),
+        (
+            "decimal commas without a map",
+            "pose;elbow_deg;point;x_mm;y_mm;z_mm\nP1;10,5;a;1,5;1;1\n".into(),
         ),
         (
             "long table without frames",

@@ -124,6 +124,92 @@ fn a_long_table_of_bodies_with_time() {
     );
 }
 
+/// Points of poses as laser trackers measure them: pose after pose, or point after point over all poses.
+#[test]
+fn rows_of_points_are_put_together_by_the_name_of_their_pose() {
+    let text = "pose,j1_deg,lift_mm,point,x_mm,y_mm,z_mm\n\
+        P1,10,5,A,1,2,3\nP2,20,6,A,4,5,6\nP10,30,7,A,,,\nP1,10.01,5,B,7,8,9\nP10,,,B,1,1,1\n";
+    let wide = poses(text);
+    assert_eq!(wide.rows, [2, 3, 4]);
+    let near = |found: Option<f64>, wanted: f64| (found.expect("given") - wanted).abs() < 1e-12;
+    let j1 = &wide.joints["j1"];
+    assert!((0..3).all(|i| near(j1[i], [10f64, 20.0, 30.0][i].to_radians())));
+    assert!((0..3).all(|i| near(wide.joints["lift"][i], [0.005, 0.006, 0.007][i])));
+    let seen = |name: &str| {
+        wide.markers[name]
+            .iter()
+            .map(Option::is_some)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(seen("A"), [true, true, false]);
+    assert_eq!(seen("B"), [true, false, true]);
+    assert_eq!(wide.markers["B"][0], Some(Point3::new(0.007, 0.008, 0.009)));
+}
+
+/// One table in every order of its rows, with commas or with semicolons and decimal commas: the same poses.
+#[test]
+fn the_order_and_the_separators_of_a_table_of_points_change_nothing() {
+    let mut state = 7_u64;
+    let mut random = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize
+    };
+    let mut rows = Vec::new();
+    for pose in 0..9 {
+        for point in ["A", "B", "C"] {
+            let (q, t) = (random() % 1800, random() % 500);
+            if random() % 4 > 0 {
+                rows.push((pose, pose * 100, point, q, t));
+            }
+        }
+    }
+    let by_name = |text: &str, options: &ReadOptions| {
+        let read = read_bytes("t.csv", text.as_bytes(), options).expect("a table");
+        let wide = read.poses(Filled::Exclude).expect("one table");
+        let keys = wide.joints["j1"]
+            .iter()
+            .map(|q| q.expect("given").to_bits())
+            .collect::<Vec<_>>();
+        let markers = wide.markers.into_iter();
+        let of = |(name, track): (String, Vec<Option<Point3<f64>>>)| {
+            let mut track: Vec<_> = keys.iter().copied().zip(track).collect();
+            track.sort_by_key(|(q, _)| *q);
+            (name, track)
+        };
+        markers
+            .map(of)
+            .collect::<std::collections::BTreeMap<_, _>>()
+    };
+    let map = ColumnMap {
+        decimal_comma: true,
+        ..ColumnMap::default()
+    };
+    let european = ReadOptions {
+        columns: Some(map),
+        ..ReadOptions::default()
+    };
+    let mut wanted = None;
+    for _ in 0..20 {
+        for i in (1..rows.len()).rev() {
+            rows.swap(i, random() % (i + 1));
+        }
+        let write = |comma: char, point: &str| {
+            let mut text = "pose,j1_deg,point,x_mm,y_mm,z_mm\n".replace(',', &comma.to_string());
+            for (pose, j, name, x, y) in &rows {
+                text += &format!(
+                    "P{pose}{comma}{j}{point}5{comma}{name}{comma}{x}{point}25{comma}{y}{comma}1\n"
+                );
+            }
+            text
+        };
+        let plain = by_name(&write(',', "."), &ReadOptions::default());
+        assert_eq!(plain, by_name(&write(';', ","), &european));
+        assert_eq!(*wanted.get_or_insert(plain.clone()), plain);
+    }
+}
+
 #[test]
 fn zeros_and_nan_are_lost_with_a_finding() {
     let recording = read(

@@ -27,6 +27,8 @@ pub(super) enum Column {
     State(usize),
     /// Name of the row's entity (long tables).
     Entity,
+    /// Name of the row's pose (long tables of static poses).
+    Pose,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,6 +89,8 @@ pub(super) struct Layout {
     pub labels: Vec<String>,
     /// Long table: column of the entity's name; the only marker or body plan is its template.
     pub entity: Option<usize>,
+    /// Long table of static poses: column of the pose's name.
+    pub pose: Option<usize>,
     pub conversions: Vec<String>,
 }
 
@@ -107,6 +111,7 @@ impl Layout {
         layout
             .by_rules(&mapped, map.is_some())
             .map_err(|problem| (at(), problem))?;
+        layout.name_poses();
         Ok(layout)
     }
 
@@ -115,6 +120,16 @@ impl Layout {
         let slot = self.slots.len() - 1;
         self.columns[column] = Column::Number { slot, scale };
         slot
+    }
+
+    /// In a long table of static poses the counter is the pose's name: any text, in any order.
+    fn name_poses(&mut self) {
+        let of_poses = self.entity.is_some() && !self.joints.is_empty() && self.time.is_none();
+        if let Some(counter) = self.counter.filter(|_| of_poses) {
+            let column = self.slots[counter].column;
+            self.columns[column] = Column::Pose;
+            self.pose = Some(column);
+        }
     }
 
     /// A joint twice (`a_rad` and `a_deg`), or a long table with other columns than it can carry.
@@ -134,10 +149,10 @@ impl Layout {
             let only_template = self.markers.len() + self.bodies.len() == 1
                 && self.markers.iter().all(|m| m.name.is_empty())
                 && self.bodies.iter().all(|b| b.name.is_empty());
-            if !only_template || !self.joints.is_empty() || !self.torques.is_empty() {
+            if !only_template {
                 return Err(Problem::Misfit {
-                    found: "a `marker` or `body` column stands beside joints or named markers".to_string(),
-                    expected: "a long table `frame,marker,x_m,y_m,z_m` or `frame,body,x_m,y_m,z_m,qx,qy,qz,qw`; write joints into a wide table".to_string(),
+                    found: "a `marker`, `point` or `body` column stands beside named markers or bodies".to_string(),
+                    expected: "a long table `pose,<joint>_deg,point,x_m,y_m,z_m` or `frame,body,x_m,y_m,z_m,qx,qy,qz,qw`".to_string(),
                 });
             }
             if self.counter.is_none() && self.time.is_none() {

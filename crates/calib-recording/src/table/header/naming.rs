@@ -3,8 +3,8 @@
 //! The rules, in this order:
 //! 1. `t_s`, `t_ms`, `t_us`: time. `host_s`: the recording computer's clock. `frame`, `pose`, `row`, `sample`, `index`, `config`: a counter.
 //!    `trial`, `group`, `label`, `phase`, `set`, `hold`, `segment`, `note`: text.
-//! 2. `marker` or `body` as a column name: a long table; the row's `x_m,y_m,z_m[,qx,qy,qz,qw]` belong to the
-//!    marker or body named there.
+//! 2. `marker`, `point` or `body` as a column name: a long table; the row's `x_m,y_m,z_m[,qx,qy,qz,qw]` belong to the
+//!    marker or body named there. Without time its rows are put together by the counter, whose cells may be any text.
 //! 3. `NAME.x_m` (`_cm`, `_mm`), `NAME.qx`, `NAME.state`: a marker, or with a quaternion a body.
 //! 4. `NAME_x_m`, `NAME_qx`: the same, if `NAME` has another coordinate in this style; a lone `NAME_x_m` is
 //!    a prismatic joint `NAME_x`.
@@ -83,7 +83,7 @@ pub(super) fn meaning(name: &str) -> Meaning<'_> {
         "t_ms" => return Meaning::Time(TimeUnit::Ms),
         "t_us" => return Meaning::Time(TimeUnit::Us),
         "host_s" => return Meaning::Received,
-        "marker" | "body" => return Meaning::Entity,
+        "marker" | "body" | "point" => return Meaning::Entity,
         _ if COUNTERS.contains(&name) => return Meaning::Counter,
         _ if LABELS.contains(&name) => return Meaning::Label,
         _ => {}
@@ -163,11 +163,9 @@ pub(super) fn nearest_rule(name: &str) -> Option<String> {
     {
         return Some(format!("{head}_{unit}"));
     }
-    let fixed = COUNTERS
-        .iter()
-        .chain(&LABELS)
-        .copied()
-        .chain(["t_s", "t_ms", "host_s", "marker", "body", "x_m", "x_mm"]);
+    let fixed = COUNTERS.iter().chain(&LABELS).copied().chain([
+        "t_s", "t_ms", "host_s", "marker", "point", "body", "x_m", "x_mm",
+    ]);
     nearest_word(name, fixed)
         .map(str::to_owned)
         .or_else(|| Some(format!("{name}_rad")))

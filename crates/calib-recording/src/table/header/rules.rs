@@ -23,6 +23,9 @@ impl Layout {
         let names = self.names.clone();
         let mut entities: BTreeMap<&str, Entity> = BTreeMap::new();
         let mut ignored = Vec::new();
+        // A column `point` beside named markers is somebody's remark.
+        let is_nameless = |name: &String| matches!(meaning(name), Meaning::Part { entity: "", .. });
+        let nameless = names.iter().any(is_nameless);
         for (i, name) in names.iter().enumerate().filter(|&(i, _)| !mapped[i]) {
             match meaning(name) {
                 Meaning::Time(unit) if self.time.is_none() => {
@@ -38,7 +41,7 @@ impl Layout {
                     self.columns[i] = Column::Label(self.labels.len());
                     self.labels.push(name.clone());
                 }
-                Meaning::Entity if self.entity.is_none() => {
+                Meaning::Entity if self.entity.is_none() && (name != "point" || nameless) => {
                     self.entity = Some(i);
                     self.columns[i] = Column::Entity;
                 }

@@ -2,10 +2,12 @@
 
 mod cell;
 mod finish;
+mod of_pose;
 mod sample;
 
 pub(crate) use sample::UNIT_TOLERANCE;
 
+use self::of_pose::PoseRows;
 use super::header::{Column, Layout};
 use crate::column_map::ColumnMap;
 use crate::error::{At, Placed, Problem, excerpt};
@@ -30,6 +32,10 @@ pub(super) struct Rows<'a> {
     values: Vec<f64>,
     states: Vec<State>,
     entity: String,
+    /// Long tables of static poses: what is known of each pose.
+    poses: PoseRows,
+    /// Index of the row's sample.
+    sample: usize,
     labels: Vec<Vec<String>>,
     texts: Vec<String>,
     timeline: Timeline,
@@ -64,6 +70,8 @@ impl<'a> Rows<'a> {
             values: vec![f64::NAN; layout.slots.len()],
             states: vec![State::Measured; layout.markers.len()],
             entity: String::new(),
+            poses: PoseRows::default(),
+            sample: 0,
             labels: vec![Vec::new(); layout.labels.len()],
             texts: vec![String::new(); layout.labels.len()],
             timeline: Timeline::default(),
@@ -137,6 +145,7 @@ impl<'a> Rows<'a> {
                 }
                 Column::Label(label) => cell.clone_into(&mut self.texts[label]),
                 Column::Entity => cell.clone_into(&mut self.entity),
+                Column::Pose => cell.clone_into(&mut self.poses.name),
                 Column::State(marker) => {
                     self.states[marker] = match cell {
                         "" | "measured" => State::Measured,
@@ -190,7 +199,11 @@ impl<'a> Rows<'a> {
         {
             return Err((At::Line(line), Problem::TimeBackwards { previous, found }));
         }
-        if self.layout.entity.is_some() {
+        if let Some(column) = self.layout.pose {
+            if self.named_pose(line, column)? {
+                return Ok(());
+            }
+        } else if self.layout.entity.is_some() {
             let frame = self.layout.counter.map(|slot| self.values[slot]).or(time);
             let Some(frame) = frame.filter(|frame| !frame.is_nan()) else {
                 let problem = Problem::Unexpected {
@@ -211,6 +224,7 @@ impl<'a> Rows<'a> {
                 _ => self.frame = Some(frame),
             }
         }
+        self.sample = self.timeline.rows.len();
         push(&mut self.timeline.rows, line);
         time.into_iter().for_each(|t| push(&mut self.times, t));
         let received = received.into_iter();
@@ -221,7 +235,8 @@ impl<'a> Rows<'a> {
         Ok(())
     }
 
-    fn wide_row(&mut self, line: u64) -> Placed<()> {
+    /// Joint positions and torques of a new sample.
+    fn robot(&mut self) {
         let given = |value: f64| if value.is_nan() { None } else { Some(value) };
         for ((_, _, slot), stream) in self.layout.joints.iter().zip(&mut self.joints) {
             push(stream, given(self.values[*slot]));
@@ -229,6 +244,10 @@ impl<'a> Rows<'a> {
         for ((_, slot), stream) in self.layout.torques.iter().zip(&mut self.torques) {
             push(stream, given(self.values[*slot]));
         }
+    }
+
+    fn wide_row(&mut self, line: u64) -> Placed<()> {
+        self.robot();
         for i in 0..self.markers.len() {
             let sample = self.marker(line, i)?;
             push(&mut self.markers[i], sample);
@@ -264,13 +283,21 @@ impl<'a> Rows<'a> {
                 stream
             }
         };
-        let sample = self.timeline.rows.len() - 1;
+        let sample = self.sample;
+        let of_robot = || self.joints.iter().chain(&self.torques);
+        if of_robot().any(|values| values.len() == sample) {
+            self.robot();
+        } else {
+            self.same_robot(line)?;
+        }
         let length = if is_body {
             self.bodies[stream].len()
         } else {
             self.markers[stream].len()
         };
-        if length > sample {
+        if self.layout.pose.is_some() {
+            self.once_per_pose(line, stream)?;
+        } else if length > sample {
             let problem = Problem::RepeatedSample {
                 entity: if is_body { "body" } else { "marker" },
                 name: self.entity.clone(),
@@ -279,16 +306,18 @@ impl<'a> Rows<'a> {
             return Err((At::Line(line), problem));
         }
         self.samples += 1;
-        self.dense += sample + 1 - length;
+        self.dense += (sample + 1).saturating_sub(length);
         self.not_too_sparse(line)?;
         if is_body {
             let pose = self.body(line, 0)?;
-            self.bodies[stream].resize(sample, None);
-            push(&mut self.bodies[stream], pose);
+            let length = length.max(sample + 1);
+            self.bodies[stream].resize(length, None);
+            self.bodies[stream][sample] = pose;
         } else {
             let point = self.marker(line, 0)?;
-            self.markers[stream].resize(sample, MarkerSample::Lost);
-            push(&mut self.markers[stream], point);
+            let length = length.max(sample + 1);
+            self.markers[stream].resize(length, MarkerSample::Lost);
+            self.markers[stream][sample] = point;
         }
         Ok(())
     }
