@@ -13,7 +13,7 @@
 //! The signs of the axes follow from the joint angles. Samples that form no planes are refused:
 //! [`crate::frame_ml`] needs none. The covariance is first order in the measured poses, the center's estimator included.
 
-use calib_estimator::{Verdict, measured::Pose};
+use calib_estimator::{InputKind, Verdict, measured::Pose};
 use calib_geometry::{
     mean::{axis_mean, weighted_chordal_mean},
     se3, so3,
@@ -28,10 +28,20 @@ use crate::{
     frame::{FrameEstimate, FrameOutcome, axes_in_body, frame_from_axes, residuals},
     frame_grid::{Grid, ID, nearest_to_axes, none},
     frame_settings::{check, judge},
+    options::{FRAMED, FrameInfo},
     outcome::NotObservable,
 };
-use calib_estimator::{
-    EstimatorError, FrameAxes, FrameSample, Input, InputKind, Options, PlaneFit, Rule,
+use calib_estimator::{EstimatorError, FrameAxes, FrameSample, Input, Options, PlaneFit, Rule};
+
+/// What `algorithm1` is and needs.
+pub(crate) const INFO: FrameInfo = FrameInfo {
+    id: "algorithm1",
+    name: "circles around both axes",
+    input: InputKind::TwoJoints,
+    options: FRAMED,
+    summary: "circles around both axes, axes rotated back by the joint angles; the paper's Algorithm 1",
+    source: "Chang & Pollard 2007; paper §4, Algorithm 1",
+    fit,
 };
 
 /// A center-of-rotation estimator of the caller, over the body's poses in the tracker's frame.

@@ -16,9 +16,21 @@ use crate::{
     axis_frame::AxisFrame,
     circles::{Axis, Free, information, linearize, minimize_line, placed, spread_out},
     judge::{Candidate, inverse_or_zero, judge, prepare},
+    options::{EstimatorInfo, PAIRS},
     outcome::Outcome,
 };
-use calib_estimator::{EstimatorError, Input, Options, cloud_of};
+use calib_estimator::{EstimatorError, Input, InputKind, Options, cloud_of};
+
+/// What `halvorsen_line` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "halvorsen_line",
+    name: "line of the displacements",
+    input: InputKind::Points,
+    options: PAIRS,
+    summary: "bisecting planes of pairs of samples",
+    source: "Halvorsen et al. 1999",
+    fit,
+};
 
 /// Halvorsen's line with the pairs of [`Options::separation`].
 ///

@@ -13,7 +13,7 @@
 //! maximum likelihood; two bodies are taken to be measured alike. It starts from [`crate::shared_axis`] and shares its verdicts.
 
 use calib_estimator::{
-    Verdict,
+    InputKind, Verdict,
     levenberg::{Problem, Stop, minimize},
     measured::{Pose, RowWeights},
 };
@@ -26,10 +26,22 @@ use nalgebra::{
 use crate::{
     axis_frame::AxisFrame,
     judge::weak_direction,
+    options::{EstimatorInfo, POSES},
     outcome::{AorEstimate, Known, Outcome},
     shared_axis,
 };
 use calib_estimator::{EstimatorError, Input, Options};
+
+/// What `hinge_poses` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "hinge_poses",
+    name: "axis of poses, errors in variables",
+    input: InputKind::OneOrTwoBodies,
+    options: POSES,
+    summary: "weighs orientations against positions, of one or two moving bodies",
+    source: "joint likelihood, see the book",
+    fit,
+};
 
 const ID: &str = "hinge_poses";
 /// Levenberg–Marquardt steps; from SARA's axis a handful suffice.

@@ -44,6 +44,7 @@ pub mod hinge_bundle;
 pub mod hinge_poses;
 mod judge;
 pub mod line_ml;
+mod options;
 mod outcome;
 pub mod planar_radial;
 pub mod plane;
@@ -60,7 +61,6 @@ pub use calib_estimator::{
 };
 pub use frame::{FrameEstimate, FrameFromAxes, FrameOutcome, frame_from_axes};
 pub use frame_planes::{Center, CenterOf};
+pub use options::{EstimatorInfo, FrameInfo};
 pub use outcome::{AorEstimate, Circle, Known, NotObservable, Outcome};
-pub use registry::{
-    EstimatorInfo, FrameInfo, estimator, estimators, fit, frame_estimator, frame_estimators,
-};
+pub use registry::{estimator, estimators, fit, frame_estimator, frame_estimators};

@@ -13,7 +13,7 @@
 //! circle's own center diverges on short arcs.
 
 use calib_estimator::factor::Factor;
-use calib_estimator::{Verdict, measured::Cloud};
+use calib_estimator::{InputKind, Verdict, measured::Cloud};
 use nalgebra::{Matrix4, Matrix6};
 
 use crate::{
@@ -22,10 +22,22 @@ use crate::{
         minimize_line, placed, spread_out,
     },
     judge::{Candidate, OwnCenter, inverse_or_zero, judge, prepare},
+    options::{COMMON, EstimatorInfo},
     outcome::{Known, Outcome},
     plane,
 };
 use calib_estimator::{EstimatorError, Input, Options, cloud_of};
+
+/// What `line_ml` is and needs.
+pub(crate) const LINE_ML: EstimatorInfo = EstimatorInfo {
+    id: "line_ml",
+    name: "common line",
+    input: InputKind::Points,
+    options: COMMON,
+    summary: "several markers around one line",
+    source: "orthogonal-distance circles, see the book",
+    fit: line,
+};
 
 /// A common line for all markers.
 ///
@@ -35,6 +47,17 @@ pub fn line(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorEr
     run("line_ml", input, options, common_line)
 }
 
+/// What `dir_ml` is and needs.
+pub(crate) const DIR_ML: EstimatorInfo = EstimatorInfo {
+    id: "dir_ml",
+    name: "common direction",
+    input: InputKind::Points,
+    options: COMMON,
+    summary: "several markers, one direction, own centers",
+    source: "orthogonal-distance circles, see the book",
+    fit: direction,
+};
+
 /// A common direction, an own center for each marker.
 ///
 /// # Errors
@@ -42,6 +65,17 @@ pub fn line(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorEr
 pub fn direction(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("dir_ml", input, options, own_centers)
 }
+
+/// What `circle_ml` is and needs.
+pub(crate) const CIRCLE_ML: EstimatorInfo = EstimatorInfo {
+    id: "circle_ml",
+    name: "orthogonal-distance circle",
+    input: InputKind::Points,
+    options: COMMON,
+    summary: "maximum likelihood circle in space; several markers share the direction",
+    source: "Gander, Golub & Strebel 1994, in space",
+    fit: circle,
+};
 
 /// The orthogonal-distance circle of one marker (several: as [`direction()`]).
 ///

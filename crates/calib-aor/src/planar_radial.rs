@@ -13,12 +13,13 @@ use argmin::{
     core::{CostFunction, Executor},
     solver::neldermead::NelderMead,
 };
-use calib_estimator::{Verdict, measured::Cloud};
+use calib_estimator::{InputKind, Verdict, measured::Cloud};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix4};
 
 use crate::{
     circles::{Axis, Free, cost, information, linearize, minimize_line, spread_out},
     judge::{Candidate, inverse_or_zero, judge, prepare},
+    options::{CENTERED, EstimatorInfo},
     outcome::{Known, Outcome},
     plane,
 };
@@ -33,6 +34,17 @@ const STANDS_STILL: f64 = 1e-13;
 /// Steps of one walk; four unknowns need a few hundred.
 const STEPS: u64 = 2000;
 
+/// What `planar_radial` is and needs.
+pub(crate) const PLANAR_RADIAL: EstimatorInfo = EstimatorInfo {
+    id: "planar_radial",
+    name: "planar and radial cost, downhill simplex",
+    input: InputKind::Points,
+    options: CENTERED,
+    summary: "the paper's AoR; center held where given, else free",
+    source: "Chang & Pollard 2007; paper §4",
+    fit: simplex,
+};
+
 /// By downhill simplex, center held ([`Options::center`]) or free.
 ///
 /// # Errors
@@ -40,6 +52,17 @@ const STEPS: u64 = 2000;
 pub fn simplex(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("planar_radial", input, options, walk)
 }
+
+/// What `planar_radial_gn` is and needs.
+pub(crate) const PLANAR_RADIAL_GN: EstimatorInfo = EstimatorInfo {
+    id: "planar_radial_gn",
+    name: "planar and radial cost, Gauss–Newton",
+    input: InputKind::Points,
+    options: CENTERED,
+    summary: "the same minimum in a few steps",
+    source: "paper §4",
+    fit: gauss_newton,
+};
 
 /// By Gauss–Newton (Levenberg–Marquardt), center held or free.
 ///

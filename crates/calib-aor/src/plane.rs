@@ -15,9 +15,21 @@ use crate::{
     axis_frame::AxisFrame,
     circles::{Axis, flat_center, information, linearize, placed, spread_out},
     judge::{Candidate, inverse_or_zero, judge, prepare},
+    options::{CENTERED, EstimatorInfo},
     outcome::Outcome,
 };
-use calib_estimator::{EstimatorError, Input, Options, cloud_of};
+use calib_estimator::{EstimatorError, Input, InputKind, Options, cloud_of};
+
+/// What `plane` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "plane",
+    name: "plane fit",
+    input: InputKind::Points,
+    options: CENTERED,
+    summary: "normal of the best plane, circle center in it: the two-step baseline",
+    source: "Gamage & Lasenby 2002; Cerveri et al. 2005",
+    fit,
+};
 
 /// The plane fit on all markers of `input`.
 ///

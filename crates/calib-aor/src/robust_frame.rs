@@ -20,6 +20,18 @@ use nalgebra::Vector3;
 use crate::{
     frame::{FrameEstimate, FrameOutcome, squares},
     frame_ml::{self, Residuals},
+    options::{FRAMED_RANDOM, FrameInfo},
+};
+
+/// What `robust_frame` is and needs.
+pub(crate) const INFO: FrameInfo = FrameInfo {
+    id: "robust_frame",
+    name: "both axes by maximum likelihood, with outliers",
+    input: InputKind::TwoJoints,
+    options: FRAMED_RANDOM,
+    summary: "least trimmed squares over random subsets, then frame_ml of the poses that belong",
+    source: "Rousseeuw & Van Driessen 1999",
+    fit,
 };
 
 const ID: &str = "robust_frame";

@@ -9,7 +9,7 @@
 //! Up to a quarter of the samples may be anywhere. Of clean recordings one in a hundred loses a sample.
 
 use calib_estimator::{
-    EstimatorError, Input, Options, Verdict, chance::f_tail, cloud_of, measured::Cloud,
+    EstimatorError, Input, InputKind, Options, Verdict, chance::f_tail, cloud_of, measured::Cloud,
 };
 use calib_geometry::statistics;
 
@@ -17,8 +17,20 @@ use crate::{
     circles::{Axis, Free, minimize_line},
     judge::{judge, prepare},
     line_ml::common_line,
+    options::{EstimatorInfo, RANDOM},
     outcome::{AorEstimate, Known, Outcome},
     plane,
+};
+
+/// What `robust_line` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "robust_line",
+    name: "common line with outliers",
+    input: InputKind::Points,
+    options: RANDOM,
+    summary: "least trimmed squares over random subsets, then maximum likelihood of the samples that belong",
+    source: "Rousseeuw & Van Driessen 1999",
+    fit,
 };
 
 const ID: &str = "robust_line";

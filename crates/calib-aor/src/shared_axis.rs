@@ -11,7 +11,7 @@
 
 use calib_estimator::pose_sums::PoseSums;
 use calib_estimator::{
-    Verdict, chance,
+    InputKind, Verdict, chance,
     measured::{DataError, Pose, RowWeights},
 };
 use calib_geometry::Line;
@@ -20,13 +20,25 @@ use nalgebra::{Matrix3, Matrix6, Point3, Unit, Vector3};
 use crate::{
     axis_frame::sign,
     judge::weak_direction,
+    options::{EstimatorInfo, ROTATIONS},
     outcome::{AorEstimate, Known, Outcome},
 };
-use calib_estimator::{EstimatorError, Input, InputKind, Options};
+use calib_estimator::{EstimatorError, Input, Options};
 
 /// λ_min / λ_mid of the rotations' spread above which no axis stands out: a hinge's noise stays far below,
 /// a ball's directions differ by less.
 const STANDS_OUT: f64 = 0.25;
+
+/// What `sara` is and needs.
+pub(crate) const SARA: EstimatorInfo = EstimatorInfo {
+    id: "sara",
+    name: "symmetrical axis of rotation",
+    input: InputKind::OneOrTwoBodies,
+    options: ROTATIONS,
+    summary: "axis that stands still in one or two moving bodies",
+    source: "Ehrig et al. 2007 (SARA)",
+    fit: sara,
+};
 
 /// SARA: direction and point. Its direction is that of the rotations alone, as [`rotation_axis`]'s; the positions place the
 /// axis. [`crate::hinge_poses`] lets them turn it too.
@@ -36,6 +48,17 @@ const STANDS_OUT: f64 = 0.25;
 pub fn sara(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     run("sara", input, options)
 }
+
+/// What `rotation_axis` is and needs.
+pub(crate) const ROTATION_AXIS: EstimatorInfo = EstimatorInfo {
+    id: "rotation_axis",
+    name: "axis of the rotations",
+    input: InputKind::OneOrTwoBodies,
+    options: ROTATIONS,
+    summary: "direction from orientations alone",
+    source: "top singular pair of the mean rotation",
+    fit: rotation_axis,
+};
 
 /// The direction from the rotations alone. The point is that of least squares for this direction, so
 /// position errors cannot tilt the axis.

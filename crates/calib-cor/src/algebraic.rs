@@ -22,10 +22,55 @@ use calib_estimator::measured::Cloud;
 use nalgebra::Vector3;
 
 use crate::{
+    options::{COMMON, EstimatorInfo},
     outcome::Outcome,
     sphere::{Candidate, judge, prepare},
 };
-use calib_estimator::{EstimatorError, Input, Options, cloud_of};
+use calib_estimator::{EstimatorError, Input, InputKind, Options, cloud_of};
+
+/// What `sfe` is and needs.
+pub(crate) const SFE: EstimatorInfo = EstimatorInfo {
+    id: "sfe",
+    name: "sphere fit, Pratt's constraint, exact",
+    input: InputKind::Points,
+    options: COMMON,
+    summary: "closed form on centered data",
+    source: "Pratt 1987; Chang & Pollard 2007; paper §3.2.1",
+    fit: |input, options| fit(Algebraic::Pratt, input, options),
+};
+
+/// What `kasa` is and needs.
+pub(crate) const KASA: EstimatorInfo = EstimatorInfo {
+    id: "kasa",
+    name: "sphere fit, linear",
+    input: InputKind::Points,
+    options: COMMON,
+    summary: "one linear solve; radius and center shrink on small ranges of motion",
+    source: "Kåsa 1976",
+    fit: |input, options| fit(Algebraic::Kasa, input, options),
+};
+
+/// What `taubin` is and needs.
+pub(crate) const TAUBIN: EstimatorInfo = EstimatorInfo {
+    id: "taubin",
+    name: "sphere fit, gradient-weighted",
+    input: InputKind::Points,
+    options: COMMON,
+    summary: "closed form, radius bias 3/5 of Pratt's",
+    source: "Taubin 1991",
+    fit: |input, options| fit(Algebraic::Taubin, input, options),
+};
+
+/// What `hyper` is and needs.
+pub(crate) const HYPER: EstimatorInfo = EstimatorInfo {
+    id: "hyper",
+    name: "sphere fit without second-order bias",
+    input: InputKind::Points,
+    options: COMMON,
+    summary: "closed form with the constraint (5T − 3P)/2",
+    source: "Al-Sharadqah & Chernov 2009, in three dimensions",
+    fit: |input, options| fit(Algebraic::Hyper, input, options),
+};
 
 /// A member of the family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -12,7 +12,7 @@
 
 use calib_estimator::noise::Level;
 use calib_estimator::{
-    Verdict,
+    InputKind, Verdict,
     levenberg::{Problem, Stop, minimize},
     measured::{Cloud, longest},
 };
@@ -20,11 +20,23 @@ use calib_geometry::{decompose::symmetric_eigen_small, so3};
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, UnitQuaternion, Vector3};
 
 use crate::{
+    options::{COMMON, EstimatorInfo},
     outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Shape},
     sphere::{Spread, leaves_its_plane, prepare},
     sphere_ml::isotropic,
 };
-use calib_estimator::{EstimatorError, Input, InputKind, Options, cloud_of};
+use calib_estimator::{EstimatorError, Input, Options, cloud_of};
+
+/// What `ball_bundle` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "ball_bundle",
+    name: "markers of a rigid body, jointly",
+    input: InputKind::Markers,
+    options: COMMON,
+    summary: "center, marker layout and all orientations at once; markers may be occluded",
+    source: "joint likelihood, see the book",
+    fit,
+};
 
 const MAX_STEPS: usize = 100;
 /// Eigenvalue of a frame's rotation block, relative to the largest, below which the frame does not see that turn.

@@ -10,11 +10,12 @@
 //! For equally many samples (1) is Kåsa's fit of several markers; for one marker (2) with (3) is Taubin's.
 
 use calib_estimator::factor::Factor;
-use calib_estimator::{Verdict, measured::Cloud};
+use calib_estimator::{InputKind, Verdict, measured::Cloud};
 use nalgebra::Vector3;
 
 use crate::{
     algebraic::{Algebraic, solve},
+    options::{COMMON, EstimatorInfo},
     outcome::Outcome,
     sphere::{Candidate, judge, prepare},
 };
@@ -22,6 +23,17 @@ use calib_estimator::{EstimatorError, Input, Options, cloud_of};
 
 /// Rounds of (2) and (3); each gains a factor σ²/s₃², so well-posed data need about ten.
 const ROUNDS: usize = 200;
+
+/// What `gamage_lasenby` is and needs.
+pub(crate) const GAMAGE_LASENBY: EstimatorInfo = EstimatorInfo {
+    id: "gamage_lasenby",
+    name: "several markers, linear",
+    input: InputKind::Points,
+    options: COMMON,
+    summary: "each marker weighs the same; the several-marker Kåsa fit",
+    source: "Gamage & Lasenby 2002",
+    fit: gamage_lasenby,
+};
 
 /// Gamage & Lasenby's linear fit.
 ///
@@ -32,6 +44,17 @@ pub fn gamage_lasenby(input: &Input<'_>, options: &Options) -> Result<Outcome, E
         solve(cloud, factor, Algebraic::Kasa)
     })
 }
+
+/// What `halvorsen` is and needs.
+pub(crate) const HALVORSEN: EstimatorInfo = EstimatorInfo {
+    id: "halvorsen",
+    name: "several markers, bias-compensated",
+    input: InputKind::Points,
+    options: COMMON,
+    summary: "Gamage & Lasenby with the noise taken off; one marker: Taubin",
+    source: "Halvorsen 2003",
+    fit: halvorsen,
+};
 
 /// Halvorsen's bias-compensated fit.
 ///

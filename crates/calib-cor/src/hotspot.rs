@@ -13,16 +13,17 @@
 //! noise lengthens M = Σ(R_i − R̄)ᵀ(R_i − R̄) by 2(n − 1)σ_r²:   δp = −Σ_k v_k (v_k·p) shift/(λ_k − shift)      (6)
 //! ```
 
+use crate::options::{EstimatorInfo, ROTATIONS};
 use calib_estimator::pose_sums::PoseSums;
 use calib_estimator::{
-    Verdict,
+    InputKind, Verdict,
     measured::{Pose, RowWeights},
 };
 use calib_geometry::Line;
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Rejected, Shape};
-use calib_estimator::{EstimatorError, Input, InputKind, Options};
+use calib_estimator::{EstimatorError, Input, Options};
 
 /// A gradient this much smaller than at the start is rounding of the sums it is made of.
 const ROUNDING: f64 = 1e-14;
@@ -97,6 +98,17 @@ impl Spread {
     }
 }
 
+/// What `hse` is and needs.
+pub(crate) const HSE: EstimatorInfo = EstimatorInfo {
+    id: "hse",
+    name: "hot spot, exact",
+    input: InputKind::Poses,
+    options: ROTATIONS,
+    summary: "linear least squares by singular values; biased by orientation noise",
+    source: "Tuceryan et al. 1995; paper §3.1.1",
+    fit: hse,
+};
+
 /// HSE.
 ///
 /// # Errors
@@ -107,6 +119,17 @@ pub fn hse(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorErr
         sums.body_point(0)
     })
 }
+
+/// What `hsa` is and needs.
+pub(crate) const HSA: EstimatorInfo = EstimatorInfo {
+    id: "hsa",
+    name: "hot spot, iterative",
+    input: InputKind::Poses,
+    options: ROTATIONS,
+    summary: "the same least squares by conjugate gradients",
+    source: "paper §3.1.2",
+    fit: hsa,
+};
 
 /// HSA: the same by conjugate gradients on the normal equations, without factorizing them.
 ///

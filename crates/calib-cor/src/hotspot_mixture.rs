@@ -7,13 +7,25 @@
 //! [`crate::hotspot_ml`] takes the most likely ratio. With six to sixteen poses that is often one at which half of the residuals vanish; the
 //! mean over all ratios is not drawn there, and its covariance holds. With hundreds of poses both are the same.
 
-use calib_estimator::{EstimatorError, Input, Options};
+use calib_estimator::{EstimatorError, Input, InputKind, Options};
 use nalgebra::Vector3;
 
 use crate::{
     hotspot::{HotSpot, Spread, finish, poses_of, prepare, single_axis, weighed},
     noise_ratio,
+    options::{EstimatorInfo, POSES},
     outcome::{Noise, Outcome},
+};
+
+/// What `hotspot_mixture` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "hotspot_mixture",
+    name: "hot spot, over all noise ratios",
+    input: InputKind::Poses,
+    options: POSES,
+    summary: "hotspot_ml with the ratio of both noises integrated over, for few poses",
+    source: "joint likelihood, half-Cauchy prior on the ratio, see the book",
+    fit,
 };
 
 const ID: &str = "hotspot_mixture";

@@ -13,7 +13,7 @@
 //! Without the test of one axis it diverges along the axis; the test is part of it.
 
 use calib_estimator::{
-    Verdict,
+    InputKind, Verdict,
     levenberg::{Stop, minimize},
     measured::Pose,
 };
@@ -22,10 +22,22 @@ use nalgebra::Matrix6;
 use crate::{
     hotspot::{HotSpot, Spread, finish, poses_of, prepare, single_axis, stack, weighed},
     noise_ratio,
+    options::{EstimatorInfo, POSES},
     outcome::{Known, Noise, NotObservable, Outcome, Rejected},
     pivot::{Likelihood, Normal},
 };
 use calib_estimator::{EstimatorError, Input, Options};
+
+/// What `hotspot_ml` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "hotspot_ml",
+    name: "hot spot, errors in variables",
+    input: InputKind::Poses,
+    options: POSES,
+    summary: "weighs orientation against position noise, stated or estimated",
+    source: "joint likelihood, see the book",
+    fit,
+};
 
 /// Levenberg–Marquardt steps; the Hessian is approximate, so some dozens at 5° of noise.
 const MAX_STEPS: usize = 200;

@@ -16,10 +16,22 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::{
     algebraic::{Algebraic, solve},
+    options::{COMMON, EstimatorInfo},
     outcome::Outcome,
     sphere::{Candidate, judge, prepare},
 };
-use calib_estimator::{EstimatorError, Input, Options, cloud_of};
+use calib_estimator::{EstimatorError, Input, InputKind, Options, cloud_of};
+
+/// What `hyper_n` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "hyper_n",
+    name: "sphere fit without second-order bias, for few samples",
+    input: InputKind::Points,
+    options: COMMON,
+    summary: "hyper with the terms of order 1/n",
+    source: "Rangarajan & Kanatani 2009 (HyperLS)",
+    fit,
+};
 
 /// HyperLS on all markers of `input`.
 ///

@@ -43,6 +43,7 @@ pub mod hotspot_mixture;
 pub mod hotspot_ml;
 pub mod hyper_n;
 mod noise_ratio;
+mod options;
 mod outcome;
 mod pivot;
 mod registry;
@@ -57,7 +58,8 @@ mod systematic;
 
 pub use calib_estimator::measured::{DataError, Pose, Tracks};
 pub use calib_estimator::{EstimatorError, Input, InputKind, OptionId, Options, Verdict};
+pub use options::EstimatorInfo;
 pub use outcome::{
     CorEstimate, Known, Noise, NotObservable, Outcome, RejectReason, Rejected, Shape,
 };
-pub use registry::{EstimatorInfo, estimator, estimators, fit};
+pub use registry::{estimator, estimators, fit};

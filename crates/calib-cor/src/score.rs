@@ -7,8 +7,9 @@
 //! Least squares over both local centers at once. Ehrig et al. 2006, J. Biomech. 39(15), 2798–2809. Seen from
 //! the second body it is the hot spot of the relative motion, so the same tests tell a hinge from a ball.
 
+use crate::options::{EstimatorInfo, ROTATIONS};
 use calib_estimator::{
-    Verdict,
+    InputKind, Verdict,
     measured::{DataError, Pose, RowWeights},
     pose_sums::PoseSums,
 };
@@ -20,7 +21,18 @@ use calib_geometry::{
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::outcome::{CorEstimate, Known, Noise, NotObservable, Outcome, Shape};
-use calib_estimator::{EstimatorError, Input, InputKind, Options};
+use calib_estimator::{EstimatorError, Input, Options};
+
+/// What `score` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "score",
+    name: "center between two moving bodies",
+    input: InputKind::TwoBodies,
+    options: ROTATIONS,
+    summary: "least squares over both local centers",
+    source: "Ehrig et al. 2006 (SCoRE)",
+    fit,
+};
 
 /// SCoRE on all rows where both bodies were seen.
 ///

@@ -12,11 +12,23 @@ use calib_estimator::measured::Cloud;
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use crate::{
+    options::{EstimatorInfo, SEEDED},
     outcome::Outcome,
     seeded::Seeded,
     sphere::{Candidate, judge, prepare},
 };
-use calib_estimator::{EstimatorError, Input, Options, cloud_of};
+use calib_estimator::{EstimatorError, Input, InputKind, Options, cloud_of};
+
+/// What `sfa` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "sfa",
+    name: "sphere fit, Pratt's constraint, COBYLA",
+    input: InputKind::Points,
+    options: SEEDED,
+    summary: "constrained linear approximation from ten seeded starts",
+    source: "Powell 1994; paper §3.2.2",
+    fit,
+};
 
 /// The paper's number of starts.
 const STARTS: usize = 10;

@@ -25,6 +25,7 @@
 //! [`crate::bounds::sphere_center_weighted`].
 
 use calib_estimator::{
+    InputKind,
     levenberg::{Problem, Stop, minimize},
     measured::Cloud,
 };
@@ -34,11 +35,23 @@ use nalgebra::{Matrix3, Vector3};
 use crate::{
     algebraic::{Algebraic, solve},
     bend::Bend,
+    options::{EstimatorInfo, WEIGHING},
     outcome::Outcome,
     sphere::{Candidate, judge, mean_radii, prepare},
     sphere_ml::{isotropic, weighted_radii, with_noise_per_marker},
 };
 use calib_estimator::{EstimatorError, Input, Options, cloud_of};
+
+/// What `sphere_eiv` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "sphere_eiv",
+    name: "several markers, errors in variables",
+    input: InputKind::Points,
+    options: WEIGHING,
+    summary: "ml_sphere with foot points in the metric of the covariances, the bias of the center taken off",
+    source: "Box 1971; Kanatani 2008",
+    fit,
+};
 
 /// Levenberg–Marquardt steps; from an algebraic start about ten suffice.
 const MAX_STEPS: usize = 100;

@@ -10,6 +10,7 @@
 //! re-estimated with its share of the degrees of freedom (restricted maximum likelihood).
 
 use calib_estimator::{
+    InputKind,
     levenberg::{Problem, Stop, minimize},
     measured::Cloud,
 };
@@ -17,10 +18,22 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::{
     algebraic::{Algebraic, solve},
+    options::{EstimatorInfo, WEIGHING},
     outcome::{Outcome, Rejected},
     sphere::{Candidate, judge, mean_radii, prepare},
 };
 use calib_estimator::{EstimatorError, Input, Options, cloud_of};
+
+/// What `ml_sphere` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "ml_sphere",
+    name: "several markers, maximum likelihood",
+    input: InputKind::Points,
+    options: WEIGHING,
+    summary: "common center, own radii; per-marker noise and 3 × 3 covariances on request",
+    source: "orthogonal-distance sphere, joint likelihood, see the book",
+    fit,
+};
 
 /// Levenberg–Marquardt steps; from an algebraic start four or five suffice.
 const MAX_STEPS: usize = 100;

@@ -12,10 +12,22 @@ use crate::{
     input::{HandEyeError, check, check_axes},
     judge::{judged, plausible, verdict},
     minimum::{Minimum, minimized},
+    options::{COMMON, HandEyeInfo},
     outcome::HandEye,
     problem::{HandEyeWeights, Weights},
     residuals::spread,
     structure,
+};
+
+/// What `handeye` is and needs.
+pub(crate) const INFO: HandEyeInfo = HandEyeInfo {
+    id: "handeye",
+    name: "robot–world and hand–eye, certified",
+    input: InputKind::PosePairs,
+    options: COMMON,
+    summary: "both transforms of A X = Z B at once, with a proof of optimality",
+    source: "quadratic cost with orthogonality constraints, see the book",
+    fit: certified,
 };
 
 /// Least squares over both transforms.

@@ -11,13 +11,31 @@
 //! K. Daniilidis 1999, Int. J. Robotics Research 18(3), 286–298. A closed form without a start and without weights: a check of
 //! the least-squares estimate that shares no code with it.
 
-use calib_estimator::{EstimatorError, Input, Options, Outcome};
+use calib_estimator::{EstimatorError, Input, InputKind, Options, Outcome};
 use calib_geometry::{decompose::symmetric_eigen_small, so3};
 use nalgebra::{
     Isometry3, Matrix3, Quaternion, SMatrix, SVector, Translation3, UnitQuaternion, Vector3,
 };
 
-use crate::{by_input, input::HandEyeError, minimum::Minimum, outcome::HandEye, problem::Weights};
+use crate::{
+    by_input,
+    input::HandEyeError,
+    minimum::Minimum,
+    options::{COMMON, HandEyeInfo},
+    outcome::HandEye,
+    problem::Weights,
+};
+
+/// What `dual_quaternion` is and needs.
+pub(crate) const INFO: HandEyeInfo = HandEyeInfo {
+    id: "dual_quaternion",
+    name: "hand-eye by dual quaternions",
+    input: InputKind::PosePairs,
+    options: COMMON,
+    summary: "X in closed form from relative motions, Z as the mean; no weights and no start",
+    source: "Daniilidis 1999",
+    fit,
+};
 
 type Eight = SMatrix<f64, 8, 8>;
 

@@ -24,10 +24,22 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Rotation3, SMatrix};
 use crate::{
     frame::{FrameEstimate, FrameOutcome, axes_in_body, residuals},
     frame_settings::{check, judge},
+    options::{FRAMED, FrameInfo},
     outcome::Known,
 };
 use model::{Joint, Matrix12, Seen, State, total};
 use start::linear_start;
+
+/// What `frame_ml` is and needs.
+pub(crate) const INFO: FrameInfo = FrameInfo {
+    id: "frame_ml",
+    name: "both axes by maximum likelihood",
+    input: InputKind::TwoJoints,
+    options: FRAMED,
+    summary: "all poses and joint angles at once by maximum likelihood",
+    source: "joint likelihood, see the book",
+    fit: by_poses,
+};
 
 const ID: &str = "frame_ml";
 const MAX_STEPS: usize = 100;

@@ -22,10 +22,22 @@ use nalgebra::{DMatrix, Matrix4, Vector3};
 use crate::{
     circles::{Axis, Free, minimize_line, spread_out},
     judge::{Candidate, judge, prepare},
+    options::{COMMON, EstimatorInfo},
     outcome::{Known, Outcome},
     plane,
 };
 use bundle::{Bundle, State, turned};
+
+/// What `hinge_bundle` is and needs.
+pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
+    id: "hinge_bundle",
+    name: "markers of a rigid body on a hinge, jointly",
+    input: InputKind::Markers,
+    options: COMMON,
+    summary: "axis, marker layout and all joint angles at once; markers may be occluded",
+    source: "joint likelihood, see the book",
+    fit,
+};
 
 const MAX_STEPS: usize = 200;
 

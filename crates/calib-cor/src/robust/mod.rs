@@ -26,10 +26,25 @@ mod evidence;
 mod hot_spots;
 mod spheres;
 
-use calib_estimator::{EstimatorError, Input, Options};
+use calib_estimator::{EstimatorError, Input, InputKind, Options};
 use nalgebra::Vector3;
 
-use crate::{outcome::Outcome, seeded::Seeded};
+use crate::{
+    options::{EstimatorInfo, RANDOM},
+    outcome::Outcome,
+    seeded::Seeded,
+};
+
+/// What `robust` is and needs.
+pub(crate) const ROBUST: EstimatorInfo = EstimatorInfo {
+    id: "robust",
+    name: "center with outliers",
+    input: InputKind::PointsOrPoses,
+    options: RANDOM,
+    summary: "consensus, then each sample belongs in part, maximum likelihood of the inliers",
+    source: "Dempster et al. 1977; evidence for each choice, see the book",
+    fit: robust,
+};
 
 /// Robust fit: spheres for points and markers, hot spot for poses.
 ///
@@ -37,15 +52,6 @@ use crate::{outcome::Outcome, seeded::Seeded};
 /// [`EstimatorError`] for data that are not finite, not rotations, or of another kind.
 pub fn robust(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
     dispatch("robust", input, options, true)
-}
-
-/// Consensus alone, inliers refitted: spheres for points and markers, the linear hot spot for poses
-/// (what the field calls RANSAC pivot calibration).
-///
-/// # Errors
-/// As [`robust`].
-pub fn consensus(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
-    dispatch("consensus", input, options, false)
 }
 
 fn dispatch(
@@ -59,6 +65,26 @@ fn dispatch(
         Input::Poses(poses) => hot_spots::fit(estimator, poses, options, reweight),
         _ => spheres::fit(estimator, input, options, reweight),
     }
+}
+
+/// What `consensus` is and needs.
+pub(crate) const CONSENSUS: EstimatorInfo = EstimatorInfo {
+    id: "consensus",
+    name: "center by random subsets",
+    input: InputKind::PointsOrPoses,
+    options: RANDOM,
+    summary: "the choice of inliers with the greatest evidence, noise stated or not; inliers refitted",
+    source: "Torr & Zisserman 2000; Moisan & Stival 2004",
+    fit: consensus,
+};
+
+/// Consensus alone, inliers refitted: spheres for points and markers, the linear hot spot for poses
+/// (what the field calls RANSAC pivot calibration).
+///
+/// # Errors
+/// As [`robust`].
+pub fn consensus(input: &Input<'_>, options: &Options) -> Result<Outcome, EstimatorError> {
+    dispatch("consensus", input, options, false)
 }
 
 /// A model that can be fitted with weights and measured against each sample.
