@@ -13,16 +13,16 @@ use scratch::Scratch;
 use serde_json::Value;
 
 /// What one touch misses by, m.
-const TOUCH: f64 = 5e-5;
+pub(crate) const TOUCH: f64 = 5e-5;
 
 /// True zero offsets, rad; the first only turns everything that is touched, unless that stands fast.
 const OFFSETS: [f64; 6] = [0.004, -0.006, 0.005, 0.008, -0.007, 0.003];
 
 /// The touching point on the last link, m, as it is; designed at 90, 0, 20 mm.
-const TRUE_TIP: [f64; 3] = [0.0912, -0.0007, 0.0195];
+pub(crate) const TRUE_TIP: [f64; 3] = [0.0912, -0.0007, 0.0195];
 
 /// Origins of the joints by design, m.
-const ORIGINS: [[f64; 3]; 6] = [
+pub(crate) const ORIGINS: [[f64; 3]; 6] = [
     [0.0, 0.0, 0.29],
     [0.03, 0.0, 0.11],
     [0.0, 0.0, 0.35],
@@ -41,7 +41,7 @@ const AXES: [[f64; 3]; 6] = [
     [1., 0., 0.],
 ];
 
-fn urdf(origins: &[[f64; 3]; 6], offsets: &[f64; 6]) -> String {
+pub(crate) fn urdf(origins: &[[f64; 3]; 6], offsets: &[f64; 6]) -> String {
     let mut text = String::from("<robot name=\"arm\">\n  <link name=\"l0\"/>\n");
     for (i, (([x, y, z], axis), offset)) in origins.iter().zip(&AXES).zip(offsets).enumerate() {
         // All axes are coordinate axes: an offset is that angle of roll, pitch or yaw.
@@ -65,7 +65,7 @@ fn urdf(origins: &[[f64; 3]; 6], offsets: &[f64; 6]) -> String {
 
 /// What is touched, and where it truly is in the root.
 #[derive(Clone, Copy)]
-enum Thing {
+pub(crate) enum Thing {
     Plane(Vector3<f64>, Unit<Vector3<f64>>),
     Line(Vector3<f64>, Unit<Vector3<f64>>),
     Point(Vector3<f64>),
@@ -106,7 +106,7 @@ fn thing(contact: &str) -> Thing {
 }
 
 /// Postures in which the true tip touches, with the noise of a touch.
-fn touches(arm: &RobotModel, thing: Thing, n: usize, rng: &mut ChaCha8Rng) -> String {
+pub(crate) fn touches(arm: &RobotModel, thing: Thing, n: usize, rng: &mut ChaCha8Rng) -> String {
     let tip_link = arm.link_id("l6").expect("there");
     let tip = Point3::from(Vector3::from(TRUE_TIP));
     let mut table = String::from("j1_rad,j2_rad,j3_rad,j4_rad,j5_rad,j6_rad\n");
@@ -154,7 +154,7 @@ fn touches(arm: &RobotModel, thing: Thing, n: usize, rng: &mut ChaCha8Rng) -> St
     table
 }
 
-fn normal(rng: &mut impl Rng) -> f64 {
+pub(crate) fn normal(rng: &mut impl Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
@@ -200,14 +200,14 @@ fn laboratory(profile: &str) -> Scratch {
     dir
 }
 
-fn parameter<'a>(report: &'a Value, name: &str) -> &'a Value {
+pub(crate) fn parameter<'a>(report: &'a Value, name: &str) -> &'a Value {
     let all = report["parameters"].as_array().expect("parameters");
     let found = all.iter().find(|p| p["name"] == name);
     found.unwrap_or_else(|| panic!("no parameter `{name}`"))
 }
 
 /// (value − truth)/σ
-fn z(report: &Value, name: &str, truth: f64) -> f64 {
+pub(crate) fn z(report: &Value, name: &str, truth: f64) -> f64 {
     let p = parameter(report, name);
     (p["value"].as_f64().expect("a number") - truth) / p["sigma"].as_f64().expect("a number")
 }

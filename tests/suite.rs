@@ -12,6 +12,7 @@ mod effects;
 mod facts;
 mod fit;
 mod hygiene;
+mod inputs;
 mod laboratory;
 mod layering;
 mod loads;

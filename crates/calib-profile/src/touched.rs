@@ -5,10 +5,13 @@
 //! ```text
 //! plane p_z = 0     line p_x = p_y = 0     point p = 0     distance |p| = ℓ     cylinder √(p_x² + p_y²) = r     (1)
 //! ```
+//!
+//! Where the rows of a recording say which point was touched (`coordinates`, `spots`), p is relative to that point.
 
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 use crate::units::MM;
 
@@ -51,6 +54,24 @@ pub enum RawTouched {
         /// Distance of the contact point from the axis, mm: the radius, plus that of a ball which touches from outside.
         radius_mm: f64,
     },
+    /// A point whose coordinates each row states, e.g. as a coordinate measuring machine measured it.
+    Coordinates {
+        /// Columns of the recording: with `target` these are `target.x_mm`, `target.y_mm` and `target.z_mm`. They are in the
+        /// frame of what the thing is fixed to, or in that of the artifact where its place is estimated.
+        columns: String,
+    },
+    /// One of several spots of a rigid thing, whose name each row states.
+    Spots {
+        /// Text column of the recording with the name of the touched spot.
+        named_in: String,
+        /// Where each spot is, mm. Without any, every spot is unknown: then it shows that the same spot was touched
+        /// again, and nothing else.
+        #[serde(default)]
+        at_mm: BTreeMap<String, [f64; 3]>,
+        /// Standard deviation of each stated coordinate, mm: the spots are estimated; exact when absent.
+        #[serde(default)]
+        sigma_mm: Option<f64>,
+    },
 }
 
 /// What is touched, in its own frame.
@@ -66,6 +87,10 @@ pub enum Touched {
     Distance(f64),
     /// The cylinder of this radius about z, m.
     Cylinder(f64),
+    /// A point that each row states.
+    Listed,
+    /// Spots of which nothing is known but that they are the same ones.
+    Unknown,
 }
 
 /// What a written kind of contact consists of.
@@ -95,6 +120,11 @@ impl RawTouched {
             touched,
         };
         match *self {
+            Self::Coordinates { .. } => plain([0.0; 3], None, Touched::Listed),
+            Self::Spots { ref at_mm, .. } if at_mm.is_empty() => {
+                plain([0.0; 3], None, Touched::Unknown)
+            }
+            Self::Spots { .. } => plain([0.0; 3], None, Touched::Listed),
             Self::Plane { through_mm, normal } => {
                 plain(through_mm, Some(("normal", normal)), Touched::Plane)
             }
@@ -142,6 +172,8 @@ impl Touched {
             Self::Plane => ([true, true, false], [false, false, true]),
             Self::Line | Self::Cylinder(_) => ([true, true, false], [true, true, false]),
             Self::Point | Self::Distance(_) => ([false; 3], [true; 3]),
+            Self::Listed => ([true; 3], [true; 3]),
+            Self::Unknown => ([false; 3], [false; 3]),
         }
     }
 
@@ -151,7 +183,7 @@ impl Touched {
         match self {
             Self::Plane => Vector3::new(0.0, 0.0, p.z),
             Self::Line => Vector3::new(p.x, p.y, 0.0),
-            Self::Point => *p,
+            Self::Point | Self::Listed | Self::Unknown => *p,
             Self::Distance(distance) if p.norm() > 0.0 => p * (1.0 - distance / p.norm()),
             Self::Distance(distance) => Vector3::new(0.0, 0.0, -distance),
             Self::Cylinder(radius) => {

@@ -90,8 +90,8 @@ const JUSTIN: &[Slip] = &[
     ("  heT: {link", "  heI: {link", "heI", 28),
     ("from: head", "from: haed", "head", 42),
     ("    neck: {free", "    nek: {free", "neck", 48),
-    ("right_0: 0.006", "rigth_0: 0.006", "right_0", 73),
-    ("torso_0_deg: [0,", "torsoo_0_deg: [0,", "torso_0", 112),
+    ("right_0: 0.006", "rigth_0: 0.006", "right_0", 76),
+    ("torso_0_deg: [0,", "torsoo_0_deg: [0,", "torso_0", 115),
     (
         "right_5_deg: [-45, 80], r",
         "right_5_degg: [-45, 80], r",

@@ -88,6 +88,12 @@ super::topic! {
             "The joint equals `{other}` in all {rows:row}.",
             "Check the export: one column was written twice. A mimic joint need not be recorded.";
     }
+    /// Joints with readings that never change.
+    JOINTS_STOOD_STILL = "joints-stood-still" {
+        "": Info,
+            "No recording moves {joints}, so their axes and zeros are not calibrated, and postures in which they stand elsewhere are not covered.",
+            "Move them in some recordings. If something other than its own motor moves one of them (a passive joint), declare what: `<mimic>` in the URDF, or `coupled_to` under `solve: {joints: …}`. With `free: []` there you state that it is locked.";
+    }
     /// The load is to be measured, and joints have no torque.
     TORQUE_MISSING = "torque-missing" {
         "": Warning,

@@ -66,6 +66,42 @@ pub enum DataProblem {
     /// `timing` for joints without time.
     #[error("the joints' rows have no time")]
     NoJointTime,
+    /// A contact's coordinates are not in its recording.
+    #[error(
+        "contact `{contact}` takes coordinates from `{columns}`, which the table does not have"
+    )]
+    NoCoordinates {
+        /// The contact.
+        contact: String,
+        /// Stem of the columns.
+        columns: String,
+        /// What the table has that is called almost like it.
+        meant: Option<String>,
+    },
+    /// The names of a contact's spots are not in its recording.
+    #[error(
+        "contact `{contact}` takes the spots' names from column `{column}`, which the table does not have"
+    )]
+    NoSpotNames {
+        /// The contact.
+        contact: String,
+        /// The column.
+        column: String,
+        /// What the table has that is called almost like it.
+        meant: Option<String>,
+    },
+    /// A row touches a spot that the profile does not know.
+    #[error("row {row}: contact `{contact}` has no spot `{spot}`")]
+    UnknownSpot {
+        /// The contact.
+        contact: String,
+        /// What the row says.
+        spot: String,
+        /// The row, as findings number them.
+        row: u64,
+        /// The spot that is called almost like it.
+        meant: Option<String>,
+    },
     /// The tracker's streams make no table.
     #[error("{0}")]
     NotATrack(NotATrack),
@@ -147,11 +183,22 @@ impl DataProblem {
                 "hold each posture for a second, or take rows of the motion: `timing: {poses: continuous}`"
             }
             Self::BodyNotSeen { meant, .. } => {
-                let meant = meant.as_ref();
-                let near = meant.map_or_else(String::new, |m| format!("did you mean `{m}`? "));
+                let remedy = "record it, check the column names, or remove it from the profile";
+                return format!("{}{remedy}", did_you_mean(meant));
+            }
+            Self::NoCoordinates { columns, meant, .. } => {
+                let near = did_you_mean(meant);
                 return format!(
-                    "{near}record it, check the column names, or remove it from the profile"
+                    "{near}name the columns `{columns}.x_mm`, `{columns}.y_mm`, `{columns}.z_mm`"
                 );
+            }
+            Self::NoSpotNames { meant, .. } => {
+                let near = did_you_mean(meant);
+                return format!("{near}add the column: the name of the touched spot in every row");
+            }
+            Self::UnknownSpot { spot, meant, .. } => {
+                let near = did_you_mean(meant);
+                return format!("{near}correct the name, or state where `{spot}` is under `at_mm`");
             }
             Self::NotABody { .. } => {
                 "mount at least three markers that span a plane, and check their names"
@@ -159,6 +206,11 @@ impl DataProblem {
         };
         text.to_owned()
     }
+}
+
+fn did_you_mean(meant: &Option<String>) -> String {
+    let meant = meant.as_ref();
+    meant.map_or_else(String::new, |m| format!("did you mean `{m}`? "))
 }
 
 fn errors(findings: &[Finding]) -> impl Iterator<Item = &Finding> {

@@ -53,8 +53,11 @@ const MUCH: f64 = 2.0;
 /// Start values from all fitted recordings.
 #[must_use]
 pub fn start(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Start {
-    let tracker_from_root =
-        from_known_mounts(inputs, tracks).unwrap_or_else(|| from_points(inputs, tracks));
+    let measured = inputs.robot.profile.tracker.from_root.as_ref();
+    let tracker_from_root = measured
+        .map(|measured| measured.pose)
+        .or_else(|| from_known_mounts(inputs, tracks))
+        .unwrap_or_else(|| from_points(inputs, tracks));
     let mut start = Start {
         tracker_from_root,
         mounts: BTreeMap::new(),

@@ -1,17 +1,21 @@
 //! Touches: loops that close through a plane, a line, a point or a ball bar instead of through the tracker.
 //!
-//! Its place and the point are unknowns where the profile gives them a prior.
+//! Its place and the point are unknowns where the profile gives them a prior. Where the rows say which point was touched, by
+//! coordinates or by the name of a spot, the place is that of their common frame.
+
+use std::collections::BTreeMap;
 
 use calib_core::{
-    Chart, EdgeId, FrameId, GroupId, MarkerObservation, Measurement, MeasurementKind, NoiseKind,
-    PointId, Problem, Role, measurement,
+    Chart, EdgeId, EdgeKind, FrameId, GroupId, MarkerObservation, Measurement, MeasurementKind,
+    NoiseKind, PointId, Problem, Role, measurement,
 };
-use calib_profile::{Contact, ContactBase, Touched};
+use calib_geometry::registration::rigid_registration;
+use calib_profile::{ByRow, Contact, ContactBase, Spots, Touched};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::formulate::formulation::Formulation;
 use crate::formulate::kinematics::Calibration;
-use crate::prepare::inputs::Inputs;
+use crate::prepare::inputs::{Inputs, Loaded};
 
 /// Adds every contact of the profile to the problem.
 pub fn add_contacts(formulation: &mut Formulation, inputs: &Inputs) {
@@ -29,23 +33,154 @@ pub fn add_contacts(formulation: &mut Formulation, inputs: &Inputs) {
         let (Some(base), Some(link)) = (base, formulation.links[carrier.index()]) else {
             continue;
         };
-        let touches = touches(formulation, contact);
-        let problem = &mut formulation.problem;
-        let (place, place_frame) = add_place(problem, name, contact, base);
-        let noise = problem.noise_group(
+        let (place, place_frame) = add_place(&mut formulation.problem, name, contact, base);
+        if contact.touched == Touched::Listed && contact.place_sigma_rad.is_some() {
+            start_place(formulation, inputs, contact, place);
+        }
+        let noise = formulation.problem.noise_group(
             &format!("contact {name}"),
             NoiseKind::Position,
             contact.sigma,
             !profile.solve.noise.known,
         );
-        problem.add_measurement(Measurement {
-            name: name.clone(),
-            from: place_frame,
-            to: link,
-            path: None,
-            kind: touched(contact.touched, point, noise, touches),
-        });
         formulation.contacts.insert(name.clone(), place);
+        let of = Touching {
+            name,
+            contact,
+            point,
+            link,
+            noise,
+        };
+        match contact.spots() {
+            Some(spots) if spots.sigma.is_some() || spots.at.is_empty() => {
+                add_spots(formulation, inputs, &of, spots, place_frame);
+            }
+            _ => {
+                let touches = touches(formulation, inputs, contact);
+                of.measure(&mut formulation.problem, place_frame, touches);
+            }
+        }
+    }
+}
+
+/// A contact whose parts in the problem are known.
+struct Touching<'a> {
+    name: &'a str,
+    contact: &'a Contact,
+    point: PointId,
+    /// Link of the point.
+    link: FrameId,
+    noise: GroupId,
+}
+
+impl Touching<'_> {
+    fn measure(&self, problem: &mut Problem, from: FrameId, touches: Vec<Touch>) {
+        problem.add_measurement(Measurement {
+            name: self.name.to_owned(),
+            from,
+            to: self.link,
+            path: None,
+            kind: touched(self.contact.touched, self.point, self.noise, touches),
+        });
+    }
+}
+
+/// A sample, and where the touched point is in the place's frame, m.
+type Touch = (usize, Point3<f64>);
+
+/// The spots of a contact as unknown places: with their prior, or with nothing known but that they are the same ones.
+fn add_spots(
+    formulation: &mut Formulation,
+    inputs: &Inputs,
+    of: &Touching<'_>,
+    spots: &Spots,
+    place: FrameId,
+) {
+    let mut touches: BTreeMap<&String, Vec<usize>> = BTreeMap::new();
+    for (sample, (recording, row)) in formulation.samples.iter().enumerate() {
+        let labels = inputs.recordings[recording]
+            .poses
+            .labels
+            .get(&spots.named_in);
+        let here = of.contact.recordings.contains(recording);
+        if let Some(spot) = labels.map(|l| &l[*row]).filter(|s| here && !s.is_empty()) {
+            touches.entry(spot).or_default().push(sample);
+        }
+    }
+    for (spot, samples) in touches {
+        let stated = spots.at.get(spot).copied();
+        let Some(at) = stated.or_else(|| first_touched(formulation, inputs, of.contact, &samples))
+        else {
+            // Touched in held-out rows only: nothing says where it is.
+            continue;
+        };
+        let name = format!("{}.{spot}", of.name);
+        let problem = &mut formulation.problem;
+        let frame = problem.frame(&name);
+        let at = Isometry3::from(at);
+        let edge = problem.unknown(&name, place, frame, at, Chart::of(SHIFTS));
+        problem.set_role(edge, Role::World, None);
+        problem.set_prior(edge, None, spots.sigma);
+        let samples = samples.into_iter().map(|s| (s, Point3::origin()));
+        of.measure(problem, frame, samples.collect());
+        let known = formulation.spots.entry(of.name.to_owned()).or_default();
+        known.insert(spot.clone(), edge);
+    }
+}
+
+/// A place without orientation: its rotations about and translations along x, y, z.
+const SHIFTS: [bool; 6] = [false, false, false, true, true, true];
+
+/// Where the nominal robot has its point in these fitted samples on average, in what the touched thing is fixed to, m.
+fn first_touched(
+    formulation: &Formulation,
+    inputs: &Inputs,
+    contact: &Contact,
+    samples: &[usize],
+) -> Option<Point3<f64>> {
+    let held_out = &formulation.problem.held_out;
+    let fitted = samples.iter().filter(|s| !held_out.contains(s));
+    let tips: Vec<_> = fitted
+        .filter_map(|s| nominal_tip(formulation, inputs, contact, *s))
+        .collect();
+    let sum: Vector3<f64> = tips.iter().map(|tip| tip.coords).sum();
+    (!tips.is_empty()).then(|| Point3::from(sum / tips.len() as f64))
+}
+
+/// Where the nominal robot has the touching point in a sample, in what the touched thing is fixed to, m.
+fn nominal_tip(
+    formulation: &Formulation,
+    inputs: &Inputs,
+    contact: &Contact,
+    sample: usize,
+) -> Option<Point3<f64>> {
+    let (recording, row) = &formulation.samples[sample];
+    let q = inputs.recordings[recording].q[*row].as_ref()?;
+    let tip = inputs.robot.profile.points.get(&contact.point)?;
+    let root_from_link = inputs.robot.model.forward_kinematics(q);
+    let base_from_root = match contact.on {
+        ContactBase::Link(base) => root_from_link[base.index()].inverse(),
+        ContactBase::Tracker => match &formulation.problem.edges()[formulation.root.index()].kind {
+            EdgeKind::Unknown(root) => root.nominal,
+            _ => return None,
+        },
+    };
+    Some(base_from_root * root_from_link[tip.link.index()] * tip.at)
+}
+
+/// An artifact may lie anywhere: its place starts where the nominal robot's touches fit it best.
+fn start_place(formulation: &mut Formulation, inputs: &Inputs, contact: &Contact, place: EdgeId) {
+    let touches = touches(formulation, inputs, contact);
+    let fitted = touches
+        .into_iter()
+        .filter(|(s, _)| !formulation.problem.held_out.contains(s));
+    let pairs = fitted.filter_map(|(s, at)| {
+        let tip = nominal_tip(formulation, inputs, contact, s)?;
+        Some((at, tip))
+    });
+    let (at, tips): (Vec<_>, Vec<_>) = pairs.unzip();
+    if let Ok(found) = rigid_registration(&at, &tips, None) {
+        formulation.problem.set_start(place, &found.b_from_a);
     }
 }
 
@@ -65,15 +200,34 @@ fn add_points(formulation: &mut Formulation, inputs: &Inputs) {
     }
 }
 
-/// The samples of the recordings in which the contact holds.
-fn touches(formulation: &Formulation, contact: &Contact) -> Vec<usize> {
-    formulation
-        .samples
-        .iter()
-        .enumerate()
-        .filter(|(_, (recording, _))| contact.recordings.contains(recording))
-        .map(|(sample, _)| sample)
-        .collect()
+/// The samples in which the contact holds, and where the touched point is where that is stated.
+fn touches(formulation: &Formulation, inputs: &Inputs, contact: &Contact) -> Vec<Touch> {
+    let samples = formulation.samples.iter().enumerate();
+    let here = samples.filter(|(_, (recording, _))| contact.recordings.contains(recording));
+    let touch = |(sample, (recording, row)): (usize, &(String, usize))| {
+        let stated = contact.spots().map(|spots| &spots.at);
+        let at = touched_at(contact, stated, (&inputs.recordings[recording], *row))?;
+        Some((sample, at))
+    };
+    here.filter_map(touch).collect()
+}
+
+/// Where the point that a row touches is in the frame of the touched thing, m, `spots` being known; `None` where it touches
+/// nothing that is known.
+#[must_use]
+pub fn touched_at(
+    contact: &Contact,
+    spots: Option<&BTreeMap<String, Point3<f64>>>,
+    (loaded, row): (&Loaded, usize),
+) -> Option<Point3<f64>> {
+    match &contact.by_row {
+        None => Some(Point3::origin()),
+        Some(ByRow::Coordinates(columns)) => loaded.poses.markers.get(columns)?[row],
+        Some(ByRow::Spots(of)) => {
+            let spot = &loaded.poses.labels.get(&of.named_in)?[row];
+            spots?.get(spot).copied()
+        }
+    }
 }
 
 /// Where the touched thing is: an unknown with the prior of the profile, and its frame.
@@ -97,14 +251,16 @@ fn touched(
     touched: Touched,
     point: PointId,
     noise: GroupId,
-    samples: Vec<usize>,
+    touches: Vec<Touch>,
 ) -> MeasurementKind {
+    let at = touches.iter().copied();
+    let samples = touches.iter().map(|(sample, _)| *sample).collect();
     match touched {
         Touched::Plane => MeasurementKind::Plane(measurement::Plane {
             point,
             normal: Vector3::z_axis(),
             noise,
-            observations: samples.into_iter().map(|s| (s, 0.0)).collect(),
+            observations: at.map(|(s, _)| (s, 0.0)).collect(),
         }),
         Touched::Line => MeasurementKind::Line(measurement::Line {
             point,
@@ -113,23 +269,23 @@ fn touched(
             noise,
             samples,
         }),
-        Touched::Point => MeasurementKind::Markers(measurement::Markers {
-            noise,
-            observations: samples
-                .into_iter()
-                .map(|sample| MarkerObservation {
-                    sample,
-                    point,
-                    position: Point3::origin(),
-                    shape: None,
-                })
-                .collect(),
-        }),
+        Touched::Point | Touched::Listed | Touched::Unknown => {
+            let seen = |(sample, position)| MarkerObservation {
+                sample,
+                point,
+                position,
+                shape: None,
+            };
+            MeasurementKind::Markers(measurement::Markers {
+                noise,
+                observations: at.map(seen).collect(),
+            })
+        }
         Touched::Distance(distance) => MeasurementKind::Distance(measurement::Distance {
             point,
             anchor: Point3::origin(),
             noise,
-            observations: samples.into_iter().map(|s| (s, distance)).collect(),
+            observations: at.map(|(s, _)| (s, distance)).collect(),
         }),
         Touched::Cylinder(radius) => MeasurementKind::Cylinder(measurement::Cylinder {
             point,
@@ -153,13 +309,14 @@ fn place_chart(contact: &Contact) -> Chart {
 }
 
 /// How far a touch misses: predicted − touched, tracker frame, m; `None` where the robot knows no
-/// such contact.
+/// such contact, or the row touches nothing that is known.
 #[must_use]
 pub fn miss(
     inputs: &Inputs,
     name: &str,
     robot: &Calibration,
     root_from_link: &[Isometry3<f64>],
+    row: (&Loaded, usize),
 ) -> Option<Vector3<f64>> {
     let profile = &inputs.robot.profile;
     let contact = profile.contacts.get(name)?;
@@ -171,7 +328,8 @@ pub fn miss(
     let tracker_from_place = tracker_from_base * robot.places.get(name)?;
     let tip = robot.contact_points.get(&contact.point)?;
     let touching = robot.tracker_from_root * root_from_link[carrier.index()] * tip;
-    let p = tracker_from_place.inverse_transform_point(&touching).coords;
+    let at = touched_at(contact, robot.spots.get(name), row)?;
+    let p = tracker_from_place.inverse_transform_point(&touching) - at;
     let off = contact.touched.off(&p);
     Some(tracker_from_place.rotation * off)
 }

@@ -46,6 +46,8 @@ pub struct Formulation {
     pub contact_points: BTreeMap<String, PointId>,
     /// Places of what is touched, by contact.
     pub contacts: BTreeMap<String, EdgeId>,
+    /// Places of spots that are estimated, by contact and spot.
+    pub spots: BTreeMap<String, BTreeMap<String, EdgeId>>,
     /// First moments that are estimated beyond the given masses.
     pub masses: Vec<(FirstMoment, ParameterId)>,
     /// What is left of the clocks' offset, by recording.

@@ -61,6 +61,8 @@ pub struct Calibration {
     pub contact_points: BTreeMap<String, Point3<f64>>,
     /// Frames of touched things (z along normal or direction) in what they are fixed to, by contact.
     pub places: BTreeMap<String, Isometry3<f64>>,
+    /// Spots in the frames of touched things, m, by contact and spot.
+    pub spots: BTreeMap<String, BTreeMap<String, Point3<f64>>>,
 }
 
 impl Calibration {
@@ -85,6 +87,7 @@ impl Calibration {
             points: BTreeMap::new(),
             contact_points: BTreeMap::new(),
             places: BTreeMap::new(),
+            spots: BTreeMap::new(),
         }
     }
 

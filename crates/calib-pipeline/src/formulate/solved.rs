@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::{Isometry3, Matrix6, Point3};
 
 use crate::estimate::start::Start;
 use crate::formulate::formulation::MlFit;
@@ -53,8 +53,16 @@ pub(crate) fn nominal(inputs: &Inputs, start: &Start) -> Calibration {
     let tips = profile.points.iter();
     robot.contact_points = tips.map(|(name, tip)| (name.clone(), tip.at)).collect();
     let contacts = profile.contacts.iter();
+    robot.spots = stated_spots(inputs);
     robot.places = contacts
         .map(|(name, contact)| (name.clone(), contact.base_from_place))
         .collect();
     robot
+}
+
+/// The spots of touched things where the profile states them, m, by contact and spot.
+pub(crate) fn stated_spots(inputs: &Inputs) -> BTreeMap<String, BTreeMap<String, Point3<f64>>> {
+    let contacts = inputs.robot.profile.contacts.iter();
+    let stated = contacts.filter_map(|(name, c)| Some((name.clone(), c.spots()?.at.clone())));
+    stated.collect()
 }

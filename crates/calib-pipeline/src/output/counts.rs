@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use calib_profile::{BodyKind, Usage};
+use calib_profile::{BodyKind, ByRow, Contact, Usage};
 use calib_report::{HeldOut, Part, RejectedPart, Share, Unit};
 
 use crate::formulate::formulation::MlFit;
@@ -114,8 +114,26 @@ fn subjects(
     }
     let touched = profile.contacts.iter();
     let touched = touched.filter(|(_, contact)| contact.recordings.contains(&loaded.name));
-    out.extend(touched.map(|(name, _)| (name.clone(), vec![true; loaded.poses.len()])));
+    out.extend(touched.map(|(name, contact)| {
+        let touches = (0..loaded.poses.len()).map(|row| is_touch(contact, loaded, row));
+        (name.clone(), touches.collect())
+    }));
     out
+}
+
+/// Whether a row touches something: where rows state what, it is stated.
+fn is_touch(contact: &Contact, loaded: &Loaded, row: usize) -> bool {
+    match &contact.by_row {
+        None => true,
+        Some(ByRow::Coordinates(columns)) => {
+            let track = loaded.poses.markers.get(columns);
+            track.is_some_and(|track| track[row].is_some())
+        }
+        Some(ByRow::Spots(spots)) => {
+            let names = loaded.poses.labels.get(&spots.named_in);
+            names.is_some_and(|names| !names[row].is_empty())
+        }
+    }
 }
 
 /// How many of each fate.

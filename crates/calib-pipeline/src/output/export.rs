@@ -15,6 +15,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 use crate::error::PipelineError;
 use crate::formulate::found::Found;
 use crate::formulate::kinematics::{Calibration, JointEffects, motion_axis};
+use crate::output::points::{added_frames, body_frame, point_frames};
 use crate::prepare::inputs::{Digest, Inputs};
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::known::{Known, Number};
@@ -59,18 +60,7 @@ pub fn patch_urdf(
             });
         }
     }
-    for body in &inputs.robot.profile.outputs.add_bodies {
-        if let Some(mount) = robot.mounts.get(body) {
-            let link = inputs.robot.profile.bodies[body].link;
-            edits.push(UrdfEdit::AddFixedFrame {
-                name: body.clone(),
-                parent_link: nominal.link(link).name.clone(),
-                joint_name: format!("{body}_mount"),
-                parent_from_frame: *mount,
-                comment: Some(format!("tracking body {body}")),
-            });
-        }
-    }
+    edits.extend(added_frames(inputs, robot));
     let file = &inputs.robot.profile.urdf;
     let fail = |cause: calib_urdf::EditError| PipelineError::Patch {
         file: file.clone(),
@@ -142,7 +132,10 @@ fn number_changes(
                 ..
             } => {
                 let new = numbers(parent_from_frame);
-                for (k, what) in MOUNT_NUMBERS.iter().enumerate() {
+                // A point has no orientation.
+                let turned = parent_from_frame.rotation.angle() > 0.0;
+                let numbers = if turned { 6 } else { 3 };
+                for (k, what) in MOUNT_NUMBERS.iter().enumerate().take(numbers) {
                     changes.push(Change {
                         joint: joint_name.clone(),
                         what: format!("added {name} {what}"),
@@ -317,6 +310,7 @@ pub fn scene(
     ];
     frames.extend(link_frames(inputs, &model));
     frames.extend(body_frames(inputs, robot, &model));
+    frames.extend(point_frames(inputs, robot, &model));
     frames.extend(origin_frames(inputs, robot, &model, found));
     Scene {
         name: inputs.robot.file.clone(),
@@ -435,14 +429,5 @@ fn provenance(inputs: &Inputs) -> Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         profile: inputs.robot.file.clone(),
         inputs: inputs.digests.iter().map(input).collect(),
-    }
-}
-
-/// Name of a body's frame in the scene: its own, unless a link has it.
-fn body_frame(model: &RobotModel, body: &str) -> String {
-    if model.link_id(body).is_ok() {
-        format!("{body}_body")
-    } else {
-        body.to_owned()
     }
 }

@@ -11,6 +11,7 @@ pub mod model_file;
 mod of_data;
 mod of_fit;
 mod open;
+mod points;
 pub mod shapes;
 mod verdict;
 pub mod view;

@@ -1,12 +1,15 @@
 //! Data checks before anything is fitted: what the recordings say against what the profile asks.
 
-use std::collections::BTreeMap;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::rigid_body::Template;
 use calib_checks::{Expectations, checks, held_out_in_training};
 use calib_core::effect::{Drives, Effect, Source};
 use calib_finding::{About, Fact, Finding, Severity, Subject, Unit, catalog};
-use calib_profile::{BodyKind, Free, JointFree, Load, Usage};
+use calib_profile::{BodyKind, Contact, Free, JointFree, Load, Usage};
+use calib_recording::Poses;
+use calib_urdf::JointId;
 
 use crate::prepare::conditions::missing_torques;
 use crate::prepare::inputs::{Inputs, Loaded};
@@ -19,7 +22,8 @@ const MIN_POSES: usize = 5;
 pub fn check(inputs: &Inputs) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (name, loaded) in &inputs.recordings {
-        for mut finding in checks(&loaded.poses, &expectations(inputs, loaded)) {
+        let tracked = without_coordinates(inputs, loaded);
+        for mut finding in checks(&tracked, &expectations(inputs, loaded)) {
             let same = |earlier: &&mut Finding| {
                 earlier.id == catalog::MISSING_MARKER
                     && earlier.facts == finding.facts
@@ -48,7 +52,74 @@ pub fn check(inputs: &Inputs) -> Vec<Finding> {
     }
     findings.extend(missing_torques(inputs));
     findings.extend(no_masses(inputs));
+    findings.extend(stood_still(inputs));
     findings
+}
+
+/// What the tracker saw: coordinates of touched points are stated, and in a frame of their own.
+fn without_coordinates<'a>(inputs: &Inputs, loaded: &'a Loaded) -> Cow<'a, Poses> {
+    let mut poses = Cow::Borrowed(&loaded.poses);
+    let contacts = inputs.robot.profile.contacts.values();
+    for columns in contacts.filter_map(Contact::coordinates) {
+        if poses.markers.contains_key(columns) {
+            poses.to_mut().markers.remove(columns);
+        }
+    }
+    poses
+}
+
+/// Rows that a recording needs. Static poses may be spread over as many recordings as one likes.
+fn fewest_poses(inputs: &Inputs, loaded: &Loaded) -> usize {
+    let of_static = inputs.recordings.values();
+    let of_static = of_static.filter(|r| r.spec.usage == Usage::Static);
+    let poses: usize = of_static.map(|r| r.poses.len()).sum();
+    match loaded.spec.usage {
+        Usage::Validation => 1,
+        Usage::Static if poses >= MIN_POSES => 1,
+        Usage::Static | Usage::Sweep => MIN_POSES,
+    }
+}
+
+/// A joint that moves less than this stood still, rad or m: encoders flicker by less.
+const STILL: f64 = 1e-3;
+
+/// Joints of what is measured that are in the recordings and that no recording moves.
+fn stood_still(inputs: &Inputs) -> Option<Finding> {
+    let model = &inputs.robot.model;
+    let profile = &inputs.robot.profile;
+    let bodies = profile.bodies.values().map(|b| b.link);
+    let links = bodies.chain(profile.points.values().map(|p| p.link));
+    let carrying: BTreeSet<JointId> = links
+        .flat_map(|link| model.chain(model.root(), link))
+        .map(|step| step.joint)
+        .collect();
+    let declared = |joint: &JointId| {
+        let own = profile.solve.joints.get(joint);
+        own.is_some_and(|own| {
+            let held = own.free.as_ref().is_some_and(BTreeSet::is_empty);
+            held || !own.coupled_to.is_empty()
+        })
+    };
+    let still = |joint: &JointId| {
+        let name = &model.joint(*joint).name;
+        let columns = inputs.recordings.values();
+        let columns = columns.filter_map(|r| r.poses.joints.get(name));
+        let mut values = columns.flatten().flatten().copied().peekable();
+        values.peek().is_some() && {
+            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
+                (l.min(q), h.max(q))
+            });
+            high - low < STILL
+        }
+    };
+    let names: Vec<String> = carrying
+        .into_iter()
+        .filter(|j| model.joint(*j).mimic.is_none() && !declared(j) && still(j))
+        .map(|j| model.joint(j).name.clone())
+        .collect();
+    (!names.is_empty()).then(|| {
+        Finding::new(catalog::JOINTS_STOOD_STILL, About::Fit).with("joints", Fact::names(names))
+    })
 }
 
 /// The masses were assumed, and an effect of their load is free.
@@ -134,11 +205,7 @@ fn expectations(inputs: &Inputs, loaded: &Loaded) -> Expectations {
             .map(|(id, range)| (name(id), *range))
             .collect(),
         reach: None,
-        min_poses: if loaded.spec.usage == Usage::Validation {
-            1
-        } else {
-            MIN_POSES
-        },
+        min_poses: fewest_poses(inputs, loaded),
         marker_sigma: profile.tracker.marker_sigma,
     }
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use calib_plugin::{Control, Source};
-use calib_profile::{RecordingSpec, RobotLog};
+use calib_profile::{Profile, RecordingSpec, RobotLog};
 use calib_recording::{ColumnMap, Filled, Meta, Poses, ReadOptions, Recording};
 use calib_urdf::sha256_hex;
 
@@ -39,7 +39,8 @@ pub fn load_recordings(robot: RobotProfile, plugins: bool) -> Result<Inputs, Pip
             sha256: sha256_hex(&bytes),
         });
         let shown = path.display().to_string();
-        let mut recording = read(spec, &shown, &bytes, &estimators)?;
+        let texts = texts(&robot.profile, name, spec);
+        let mut recording = read(spec, &texts, &shown, &bytes, &estimators)?;
         if let Some(log) = &spec.robot_log {
             let of_robot = read_robot_log(&robot, name, spec, log, &estimators, &mut digests)?;
             recording = with_robot_log(recording, of_robot);
@@ -106,7 +107,7 @@ fn read_robot_log(
         columns: log.columns.clone(),
         ..spec.clone()
     };
-    let recording = read(&own, &shown, &bytes, estimators)?;
+    let recording = read(&own, &[], &shown, &bytes, estimators)?;
     if recording.joints.is_empty() {
         return Err(PipelineError::data(shown, DataProblem::NoJointsInLog));
     }
@@ -176,6 +177,7 @@ pub fn of_tables(
 /// Reads one file with the profile's reader: a built-in one directly, a plugin's across the border.
 fn read(
     spec: &RecordingSpec,
+    texts: &[&String],
     shown: &str,
     bytes: &[u8],
     estimators: &Estimators,
@@ -202,7 +204,7 @@ fn read(
         format => {
             let options = ReadOptions {
                 format: format.clone(),
-                columns: column_map(spec),
+                columns: column_map(spec, texts),
                 ..ReadOptions::default()
             };
             Ok(calib_recording::read_bytes(shown, bytes, &options)?)
@@ -210,14 +212,24 @@ fn read(
     }
 }
 
-/// The profile's column map, with its group column among the texts to keep.
-fn column_map(spec: &RecordingSpec) -> Option<ColumnMap> {
-    let Some(group) = &spec.group else {
+/// Text columns that the profile needs of a recording: its groups, and the names of touched spots.
+fn texts<'a>(profile: &'a Profile, name: &String, spec: &'a RecordingSpec) -> Vec<&'a String> {
+    let contacts = profile.contacts.values();
+    let here = contacts.filter(|c| c.recordings.contains(name));
+    let spots = here.filter_map(|c| Some(&c.spots()?.named_in));
+    spec.group.iter().chain(spots).collect()
+}
+
+/// The profile's column map, with these texts among those to keep.
+fn column_map(spec: &RecordingSpec, texts: &[&String]) -> Option<ColumnMap> {
+    if texts.is_empty() {
         return spec.columns.clone();
-    };
+    }
     let mut map = spec.columns.clone().unwrap_or_default();
-    if !map.labels.contains(group) {
-        map.labels.push(group.clone());
+    for text in texts {
+        if !map.labels.contains(*text) {
+            map.labels.push((*text).clone());
+        }
     }
     Some(map)
 }

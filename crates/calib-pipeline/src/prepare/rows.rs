@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use calib_finding::{Fact, Finding, Subject, catalog};
-use calib_profile::RecordingSpec;
+use calib_finding::{Fact, Finding, Subject, catalog, nearest_word};
+use calib_profile::{ByRow, Contact, Profile, RecordingSpec};
 use calib_recording::{JointUnit, Meta, Poses};
 use calib_urdf::RobotModel;
 
@@ -56,6 +56,7 @@ pub(crate) fn prepare(
             }));
         }
     }
+    touched_by_row(&robot.profile, name, &poses).map_err(error)?;
     let q = joint_vectors(model, spec, &poses);
     let velocities = speeds(&poses);
     Ok(Loaded {
@@ -68,6 +69,49 @@ pub(crate) fn prepare(
         velocities,
         shapes: BTreeMap::new(),
     })
+}
+
+/// The coordinates and the names of spots that contacts take from a recording are there.
+fn touched_by_row(profile: &Profile, recording: &str, poses: &Poses) -> Result<(), DataProblem> {
+    fn near<'n>(name: &str, names: impl Iterator<Item = &'n String>) -> Option<String> {
+        nearest_word(name, names.map(String::as_str)).map(str::to_owned)
+    }
+    let here = |c: &Contact| c.recordings.iter().any(|r| r == recording);
+    for (contact, spec) in profile.contacts.iter().filter(|(_, c)| here(c)) {
+        let contact = contact.clone();
+        match &spec.by_row {
+            Some(ByRow::Coordinates(columns)) if !poses.markers.contains_key(columns) => {
+                let meant = near(columns, poses.markers.keys());
+                return Err(DataProblem::NoCoordinates {
+                    contact,
+                    columns: columns.clone(),
+                    meant,
+                });
+            }
+            Some(ByRow::Spots(spots)) => {
+                let Some(names) = poses.labels.get(&spots.named_in) else {
+                    return Err(DataProblem::NoSpotNames {
+                        contact,
+                        column: spots.named_in.clone(),
+                        meant: near(&spots.named_in, poses.labels.keys()),
+                    });
+                };
+                let named = |spot: &String| spots.at.is_empty() || spots.at.contains_key(spot);
+                // A row without a name touches nothing.
+                let unknown = |spot: &&String| !spot.is_empty() && !named(spot);
+                if let Some(row) = names.iter().position(|spot| unknown(&spot)) {
+                    return Err(DataProblem::UnknownSpot {
+                        contact,
+                        spot: names[row].clone(),
+                        row: poses.rows[row],
+                        meant: near(&names[row], spots.at.keys()),
+                    });
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// In a table with a column map, a column that only looks like a joint is ignored, and said so.

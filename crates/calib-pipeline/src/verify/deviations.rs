@@ -74,7 +74,8 @@ pub fn deviations(
             };
             for (contact_name, contact) in &profile.contacts {
                 if contact.recordings.contains(name)
-                    && let Some(off) = miss(inputs, contact_name, robot, &root_from_link)
+                    && let Some(off) =
+                        miss(inputs, contact_name, robot, &root_from_link, (loaded, row))
                 {
                     push(contact_name, off, None);
                 }

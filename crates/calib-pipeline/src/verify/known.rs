@@ -87,6 +87,40 @@ pub fn known_numbers(inputs: &Inputs, fit: &MlFit) -> BTreeMap<Number, Known> {
             }
         }
     }
+    known.extend(points(inputs, fit));
+    known
+}
+
+/// σ of the coordinates of points without orientation, which are parameters of their own.
+fn points(inputs: &Inputs, fit: &MlFit) -> BTreeMap<Number, Known> {
+    let formulation = &fit.formulation;
+    let of_bodies = formulation.points.iter();
+    let of_bodies = of_bodies.filter(|(body, _)| !formulation.bodies.contains_key(*body));
+    let of_bodies = of_bodies.flat_map(|(body, markers)| {
+        let one = markers.len() == 1;
+        let named = move |marker: &String| if one { body } else { marker }.clone();
+        let ids = markers.iter();
+        ids.map(move |(marker, id)| (named(marker), *id))
+    });
+    let touching = inputs.robot.profile.points.keys();
+    let touching = touching.filter_map(|name| {
+        let id = formulation.contact_points.get(name)?;
+        Some((name.clone(), *id))
+    });
+    let mut known = BTreeMap::new();
+    for (name, id) in of_bodies.chain(touching) {
+        let coordinates = formulation.problem.points()[id.index()].parameters;
+        for (k, parameter) in coordinates.into_iter().flatten().enumerate() {
+            let found = &fit.solution.parameters[parameter.index()];
+            if let Some(sigma) = found.sigma {
+                let number = Known {
+                    sigma,
+                    data_share: None,
+                };
+                known.insert(Number::Mount(name.clone(), k), number);
+            }
+        }
+    }
     known
 }
 

@@ -34,6 +34,9 @@ pub fn left_out(fit: &MlFit) -> BTreeSet<(String, usize, String)> {
 pub fn subject(fit: &MlFit, measurement: MeasurementId, item: usize) -> String {
     let problem = &fit.formulation.problem;
     let measurement = &problem.measurements()[measurement.index()];
+    if fit.formulation.contacts.contains_key(&measurement.name) {
+        return measurement.name.clone();
+    }
     let marker = match &measurement.kind {
         MeasurementKind::Markers(calib_core::measurement::Markers { observations, .. }) => {
             observations.get(item)
@@ -136,7 +139,13 @@ impl Sample<'_> {
         let missed = |(name, _): (&String, &Contact)| {
             Some(Difference {
                 subject: name.clone(),
-                position: miss(self.inputs, name, self.robot, root_from_link)?,
+                position: miss(
+                    self.inputs,
+                    name,
+                    self.robot,
+                    root_from_link,
+                    (self.loaded, self.row),
+                )?,
                 rotation: None,
             })
         };

@@ -58,9 +58,21 @@ impl Checker<'_> {
                 BodyKind::Pose
             }
         };
+        if let Some(sigma) = raw.template_sigma_mm {
+            let path = ["bodies", name, "template_sigma_mm"];
+            self.positive(&path, sigma);
+            if raw.template_mm.is_empty() {
+                self.key_problem(
+                    &path,
+                    "no template is stated that this could be the standard deviation of",
+                    "state the marker positions under `template_mm`, or remove the key: they are estimated then",
+                );
+            }
+        }
         Some(Body {
             link: link?,
             kind,
+            template_sigma: raw.template_sigma_mm.map(|s| s * MM),
             mount: raw.mount.as_ref().map(pose),
             split: raw.split.clone(),
         })

@@ -3,7 +3,7 @@
 use nalgebra::UnitQuaternion;
 
 use super::*;
-use crate::profile::{Contact, ContactBase, Tip};
+use crate::profile::{ByRow, Contact, ContactBase, Spots, Tip};
 use crate::raw::RawContact;
 use crate::touched::{RawTouched, Touched};
 
@@ -86,23 +86,88 @@ impl Checker<'_> {
         }
         let (base_from_place, touched) = self.touched(name, &raw.touches);
         let (turns, _) = touched.seen();
-        if raw.place_sigma_deg.is_some() && turns == [false; 3] {
+        if touched == Touched::Unknown {
+            self.nothing_known(name, raw);
+        } else if raw.place_sigma_deg.is_some() && turns == [false; 3] {
             self.problem(
                 &["contacts", name, "place_sigma_deg"],
                 "a point has no orientation",
                 "remove the key",
             );
         }
+        let by_row = self.by_row(name, &raw.touches);
+        let place = match (&raw.place, &by_row) {
+            (Some(_), None) => {
+                self.key_problem(
+                    &["contacts", name, "place"],
+                    "`touches` states where the thing is already",
+                    "remove the key: `place` belongs to `coordinates` and `spots`",
+                );
+                Isometry3::identity()
+            }
+            (Some(place), Some(_)) => pose(place),
+            (None, _) => Isometry3::identity(),
+        };
+        let base_from_place = place * base_from_place;
         Some(Contact {
             recordings: raw.recordings.clone(),
             point: raw.point.clone(),
             on: on?,
+            by_row,
             touched,
             base_from_place,
             place_sigma: raw.place_sigma_mm.map(|s| s * MM),
             place_sigma_rad: raw.place_sigma_deg.map(|s| s * DEG),
             sigma: raw.sigma_mm * MM,
         })
+    }
+
+    /// Spots that are all unknown have no frame of their own.
+    fn nothing_known(&mut self, name: &str, raw: &RawContact) {
+        let given = [
+            ("place", raw.place.is_some()),
+            ("place_sigma_mm", raw.place_sigma_mm.is_some()),
+            ("place_sigma_deg", raw.place_sigma_deg.is_some()),
+        ];
+        for (key, _) in given.iter().filter(|(_, given)| *given) {
+            self.key_problem(
+                &["contacts", name, key],
+                "the spots have no stated coordinates, so each is unknown already",
+                "remove the key, or state where the spots are under `at_mm`",
+            );
+        }
+    }
+
+    /// What the rows say of the touched point.
+    fn by_row(&mut self, name: &str, touches: &RawTouched) -> Option<ByRow> {
+        match touches {
+            RawTouched::Coordinates { columns } => Some(ByRow::Coordinates(columns.clone())),
+            RawTouched::Spots {
+                named_in,
+                at_mm,
+                sigma_mm,
+            } => {
+                let path = ["contacts", name, "touches", "spots", "sigma_mm"];
+                if let Some(sigma) = sigma_mm {
+                    self.positive(&path, *sigma);
+                    if at_mm.is_empty() {
+                        self.problem(
+                            &path,
+                            "no coordinates are stated that this could be the standard deviation of",
+                            "state them under `at_mm`, or remove the key: the spots are unknown then",
+                        );
+                    }
+                }
+                let point = |at: &[f64; 3]| Point3::from(Vector3::from(*at) * MM);
+                let at = at_mm.iter().map(|(spot, at)| (spot.clone(), point(at)));
+                Some(ByRow::Spots(Spots {
+                    named_in: named_in.clone(),
+                    at: at.collect(),
+                    sigma: sigma_mm.map(|s| s * MM),
+                }))
+            }
+            _ => None,
+        }
     }
 
     /// What is touched, and the pose of its frame in what carries it.

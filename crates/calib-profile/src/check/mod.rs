@@ -7,8 +7,8 @@ use nalgebra::{Isometry3, Point3, Translation3, Unit, Vector3};
 
 use crate::error::{Problem, ProfileError, expected, one_of};
 use crate::locate::{Place, Places};
-use crate::profile::{Outputs, Profile, Tracker};
-use crate::raw::{RawPose, RawProfile};
+use crate::profile::{FromRoot, Outputs, Profile, Tracker};
+use crate::raw::{RawFree, RawFromRoot, RawPose, RawProfile};
 use crate::units::{DEG, MM, split_joint_key};
 
 /// The only version of the format so far.
@@ -145,6 +145,11 @@ impl<'a> Checker<'a> {
                 body_sigma: raw.tracker.body_sigma_mm.map(|s| s * MM),
                 body_sigma_rad: raw.tracker.body_sigma_deg.map(|s| s * DEG),
                 up_axis: raw.tracker.up_axis,
+                from_root: raw
+                    .tracker
+                    .from_root
+                    .as_ref()
+                    .map(|f| self.measured_root(f)),
             },
             bodies: self.bodies(),
             recordings: raw
@@ -168,11 +173,44 @@ impl<'a> Checker<'a> {
         }
     }
 
+    /// Where the root was measured to be.
+    fn measured_root(&mut self, raw: &RawFromRoot) -> FromRoot {
+        for (key, value) in [("sigma_mm", raw.sigma_mm), ("sigma_deg", raw.sigma_deg)] {
+            self.positive(&["tracker", "from_root", key], value);
+        }
+        if self.raw.bodies.is_empty() {
+            self.key_problem(
+                &["tracker", "from_root"],
+                "no body is tracked, so nothing relates the tracker to the robot",
+                "remove the key, or declare a body",
+            );
+        }
+        if !self.raw.solve.free.contains(&RawFree::Tracker) {
+            self.key_problem(
+                &["tracker", "from_root"],
+                "`tracker` is not free, so the measured pose would be ignored",
+                "add `tracker` to `solve.free`",
+            );
+        }
+        FromRoot {
+            pose: pose(&RawPose {
+                xyz_mm: raw.xyz_mm,
+                rpy_deg: raw.rpy_deg,
+            }),
+            sigma: raw.sigma_mm * MM,
+            sigma_rad: raw.sigma_deg * DEG,
+        }
+    }
+
     fn outputs(&mut self) -> Outputs {
         let raw = &self.raw.outputs;
         for (i, body) in raw.add_bodies.iter().enumerate() {
             let path = ["outputs", "add_bodies", &i.to_string()];
             self.known("body", &path, body, self.raw.bodies.keys());
+        }
+        for (i, point) in raw.add_points.iter().enumerate() {
+            let path = ["outputs", "add_points", &i.to_string()];
+            self.known("point", &path, point, self.raw.points.keys());
         }
         let named = |name: &Option<String>, suffix: &str| {
             name.clone()
@@ -182,6 +220,7 @@ impl<'a> Checker<'a> {
             urdf: named(&raw.urdf, ".calibrated.urdf"),
             scene: named(&raw.scene, ".scene.json"),
             add_bodies: raw.add_bodies.clone(),
+            add_points: raw.add_points.clone(),
             reports: raw.reports.clone(),
         };
         for (key, file) in [("urdf", &outputs.urdf), ("scene", &outputs.scene)] {

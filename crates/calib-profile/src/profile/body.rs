@@ -13,6 +13,8 @@ pub struct Body {
     pub link: LinkId,
     /// What is recorded of it.
     pub kind: BodyKind,
+    /// Prior σ of each coordinate of the template, m; `None`: exact.
+    pub template_sigma: Option<f64>,
     /// `link_from_body` where known by construction.
     pub mount: Option<Isometry3<f64>>,
     /// Where it moved on its link, in the numbers of the recordings' rows.

@@ -3,6 +3,7 @@
 use calib_urdf::LinkId;
 use nalgebra::Isometry3;
 use nalgebra::Point3;
+use std::collections::BTreeMap;
 
 use crate::touched::Touched;
 
@@ -26,6 +27,8 @@ pub struct Contact {
     pub point: String,
     /// What carries the thing that is touched.
     pub on: ContactBase,
+    /// Where the rows state what was touched.
+    pub by_row: Option<ByRow>,
     /// What is touched; at `base_from_place` its own frame stands, with z along normal or direction.
     pub touched: Touched,
     /// Pose of the touched thing's frame in its base.
@@ -36,6 +39,46 @@ pub struct Contact {
     pub place_sigma_rad: Option<f64>,
     /// σ of one touch, m.
     pub sigma: f64,
+}
+
+/// How the rows of a recording state which point was touched.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ByRow {
+    /// By its coordinates, recorded as those of a marker of this name.
+    Coordinates(String),
+    /// By its name in this text column.
+    Spots(Spots),
+}
+
+/// Named spots of a rigid thing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spots {
+    /// The text column.
+    pub named_in: String,
+    /// Where each is, m; empty: all unknown.
+    pub at: BTreeMap<String, Point3<f64>>,
+    /// Prior σ of each coordinate where they are estimated, m.
+    pub sigma: Option<f64>,
+}
+
+impl Contact {
+    /// The marker name under which the touched points are recorded.
+    #[must_use]
+    pub fn coordinates(&self) -> Option<&String> {
+        match &self.by_row {
+            Some(ByRow::Coordinates(columns)) => Some(columns),
+            _ => None,
+        }
+    }
+
+    /// The named spots.
+    #[must_use]
+    pub fn spots(&self) -> Option<&Spots> {
+        match &self.by_row {
+            Some(ByRow::Spots(spots)) => Some(spots),
+            _ => None,
+        }
+    }
 }
 
 /// What a touched thing is fixed to.

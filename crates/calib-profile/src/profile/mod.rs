@@ -10,7 +10,7 @@ mod solve;
 
 pub use crate::touched::Touched;
 pub use body::{Body, BodyKind};
-pub use contact::{Contact, ContactBase, Tip};
+pub use contact::{ByRow, Contact, ContactBase, Spots, Tip};
 pub use load::RobotLoad;
 pub use origin::{LinkTransform, Loop, Orientation, Origin, PointChoice, SweptAxis};
 pub use recording::{RecordingSpec, RobotLog, Timing};
@@ -26,6 +26,7 @@ pub use crate::raw::{
 };
 pub use crate::raw::{RawPlugin as Plugin, RawValue as ParameterValue};
 
+use nalgebra::Isometry3;
 use std::collections::BTreeMap;
 
 /// A checked profile. Lengths m, angles rad, torques N m.
@@ -78,6 +79,19 @@ pub struct Tracker {
     pub body_sigma_rad: Option<f64>,
     /// Axis of the tracker's frame along which the robot's root has its z, where it was said.
     pub up_axis: Option<UpAxis>,
+    /// Measured pose of the robot's root.
+    pub from_root: Option<FromRoot>,
+}
+
+/// A measured `tracker_from_root`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FromRoot {
+    /// The pose.
+    pub pose: Isometry3<f64>,
+    /// σ of each coordinate of the position, m.
+    pub sigma: f64,
+    /// σ of the orientation about each axis, rad.
+    pub sigma_rad: f64,
 }
 
 /// What is written.
@@ -89,6 +103,8 @@ pub struct Outputs {
     pub scene: String,
     /// Bodies added to the patched URDF.
     pub add_bodies: Vec<String>,
+    /// Points added to the patched URDF.
+    pub add_points: Vec<String>,
     /// Report writers to run too, with their parameters.
     pub reports: BTreeMap<String, BTreeMap<String, ParameterValue>>,
 }

@@ -20,6 +20,10 @@ pub struct RawBody {
     /// Marker positions in the body frame, mm, where the tracker's definition of the body is known.
     #[serde(default)]
     pub template_mm: BTreeMap<String, [f64; 3]>,
+    /// Standard deviation of each coordinate of `template_mm`, mm, as the instrument that measured them states it: the positions
+    /// are estimated; exact when absent.
+    #[serde(default)]
+    pub template_sigma_mm: Option<f64>,
     /// Pose of the body on its link where it is known by construction (`link_from_body`): it is then not estimated.
     #[serde(default)]
     pub mount: Option<RawPose>,

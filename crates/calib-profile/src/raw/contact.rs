@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::RawPose;
 use crate::touched::RawTouched;
 
 /// A point of a link, e.g. the end of a stylus or the center of a ball.
@@ -32,10 +33,13 @@ pub struct RawContact {
     pub on: Option<String>,
     /// What is touched.
     pub touches: RawTouched,
+    /// Where the frame of the coordinates or spots is in what it is fixed to; the same frame when absent.
+    #[serde(default)]
+    pub place: Option<RawPose>,
     /// Prior standard deviation of where it is, mm: its place is estimated; exact when absent.
     #[serde(default)]
     pub place_sigma_mm: Option<f64>,
-    /// Prior standard deviation of its orientation (planes and lines), deg: estimated; exact when absent.
+    /// Prior standard deviation of its orientation (planes, lines, coordinates and spots), deg: estimated; exact when absent.
     #[serde(default)]
     pub place_sigma_deg: Option<f64>,
     /// Standard deviation of one contact, mm.

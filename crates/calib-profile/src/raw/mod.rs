@@ -89,6 +89,25 @@ pub struct RawTracker {
     /// upright before a tracker whose z is up. Only compared with what the recordings show, never assumed.
     #[serde(default)]
     pub up_axis: Option<RawUpAxis>,
+    /// Where the robot's root was measured to be in the tracker's frame (`tracker_from_root`), e.g. by its reference holes.
+    #[serde(default)]
+    pub from_root: Option<RawFromRoot>,
+}
+
+/// A measured pose of the robot's root in the tracker's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawFromRoot {
+    /// Position, mm.
+    #[serde(default)]
+    pub xyz_mm: [f64; 3],
+    /// Roll, pitch, yaw about fixed axes, deg.
+    #[serde(default)]
+    pub rpy_deg: [f64; 3],
+    /// Standard deviation of each coordinate of the position, mm.
+    pub sigma_mm: f64,
+    /// Standard deviation of the orientation about each axis, deg.
+    pub sigma_deg: f64,
 }
 
 /// An axis of the tracker's world frame, with its sign.
@@ -161,8 +180,10 @@ pub struct RawOutputs {
     pub urdf: Option<String>,
     /// Name of the scene; `<robot>.scene.json` when absent.
     pub scene: Option<String>,
-    /// Tracking bodies to add to the patched URDF as fixed joints and links.
+    /// Tracking bodies to add to the patched URDF as fixed joints and links; of a body with one or two markers, the points.
     pub add_bodies: Vec<String>,
+    /// Points (of `points`) to add to the patched URDF as fixed joints and links, e.g. a tool center point.
+    pub add_points: Vec<String>,
     /// Report writers to run too, built-in or of a plugin, each with its parameters.
     pub reports: BTreeMap<String, BTreeMap<String, RawValue>>,
 }

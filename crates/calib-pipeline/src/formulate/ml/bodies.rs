@@ -74,7 +74,13 @@ pub(super) fn add_bodies(
                     .poses(name, formulation.tracker, frame, noise, seen);
             }
             (BodyKind::Markers { names, .. }, Some(noise), _) => {
-                let points = add_points(&mut formulation.problem, names, track, start, name, frame);
+                let sigma = body.template_sigma;
+                let places = Places {
+                    track,
+                    start,
+                    sigma,
+                };
+                let points = add_points(&mut formulation.problem, names, &places, name, frame);
                 let mut seen = Vec::new();
                 for (sample, (recording, row)) in formulation.samples.iter().enumerate() {
                     for (marker, point) in &points {
@@ -142,18 +148,30 @@ fn noise_groups(
     (marker_noise, body_noise)
 }
 
-/// Points of a marker body. A given template is known. A learned one is estimated with the fit, held to the frame's
+/// What is known of the places of a body's markers.
+struct Places<'a> {
+    track: &'a BodyTrack,
+    start: &'a Start,
+    /// Prior σ of the coordinates of a given template, m.
+    sigma: Option<f64>,
+}
+
+/// Points of a marker body. A given template is known, or estimated with its prior. A learned one is estimated with the fit, held to the frame's
 /// convention: first marker at the origin, second on x, the third that is off that line in the xy plane.
 fn add_points(
     problem: &mut Problem,
     names: &[String],
-    track: &BodyTrack,
-    start: &Start,
+    places: &Places<'_>,
     body: &str,
     frame: FrameId,
 ) -> Vec<(String, PointId)> {
     /// Off the x axis by more than this counts as the marker that defines the plane, m.
     const OFF_AXIS: f64 = 1e-9;
+    let Places {
+        track,
+        start,
+        sigma,
+    } = *places;
     let mut points = Vec::new();
     let mut plane_defined = false;
     for (i, marker) in names.iter().enumerate() {
@@ -171,6 +189,11 @@ fn add_points(
             continue;
         };
         let place = template.points[i];
+        if let Some(sigma) = sigma.filter(|_| !track.learned) {
+            let point = problem.unknown_point(marker, frame, place, Some(sigma));
+            points.push((marker.clone(), point));
+            continue;
+        }
         if !track.learned || i == 0 {
             points.push((marker.clone(), problem.known_point(marker, frame, place)));
             continue;

@@ -7,6 +7,7 @@ use nalgebra::Isometry3;
 
 use crate::formulate::formulation::Formulation;
 use crate::formulate::kinematics::{Calibration, JointEffects};
+use crate::formulate::solved::stated_spots;
 use crate::prepare::inputs::Inputs;
 
 /// The robot that a solution describes.
@@ -67,6 +68,13 @@ pub(crate) fn calibration_at(
     }
     for (name, place) in &formulation.contacts {
         robot.places.insert(name.clone(), pose(*place));
+    }
+    robot.spots = stated_spots(inputs);
+    for (name, spots) in &formulation.spots {
+        let of = robot.spots.entry(name.clone()).or_default();
+        for (spot, edge) in spots {
+            of.insert(spot.clone(), pose(*edge).translation.vector.into());
+        }
     }
     robot
 }

@@ -67,14 +67,13 @@ pub fn state(
     } else {
         Chart::none()
     };
-    let root = problem.unknown(
-        "tracker_from_root",
-        tracker,
-        root_frame,
-        start.tracker_from_root,
-        chart,
-    );
+    let measured = profile.tracker.from_root.as_ref();
+    let nominal = measured.map_or(start.tracker_from_root, |measured| measured.pose);
+    let root = problem.unknown("tracker_from_root", tracker, root_frame, nominal, chart);
     problem.set_role(root, Role::World, None);
+    if let Some(measured) = measured {
+        problem.set_prior(root, Some(measured.sigma_rad), Some(measured.sigma));
+    }
     let mut formulation = Formulation {
         problem,
         tracker,
@@ -87,6 +86,7 @@ pub fn state(
         points: BTreeMap::new(),
         contact_points: BTreeMap::new(),
         contacts: BTreeMap::new(),
+        spots: BTreeMap::new(),
         masses: Vec::new(),
         clocks: BTreeMap::new(),
         noise: NoiseGroups::default(),
