@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::design::{Body, Design, Validation, random};
 use super::disturbance::Disturbance;
 use super::fault::Fault;
-use super::robot::{BIG, Robot, SMALL};
+use super::robot::{Errors, Robot, Transmission};
 use crate::noise::Noise;
 
 /// Tracker noise of each coordinate, m.
@@ -17,7 +17,7 @@ pub(crate) const SIGMA: f64 = 3e-4;
 /// Orientation noise of a 6-DoF body, rad.
 pub(super) const SIGMA_ORIENTATION: f64 = 1e-3;
 /// Noise of the joints from pose to pose, rad (0.01°).
-const SIGMA_JOINT: f64 = 1.75e-4;
+pub(super) const SIGMA_JOINT: f64 = 1.75e-4;
 /// Postures at which a result is compared with the truth.
 const EVALUATED: usize = 24;
 
@@ -32,16 +32,17 @@ pub struct Cell {
     pub validation: Validation,
     /// What the tracker sees.
     pub body: Body,
-    /// The nominal robot is off by 1°, 5 mm instead of 0.3°, 1 mm.
-    pub big: bool,
+    /// How far the nominal robot is off.
+    pub errors: Errors,
 }
 
 /// A case, drawn.
+#[derive(Clone)]
 pub(crate) struct Case {
     pub cell: Cell,
     pub robot: Robot,
     pub disturbance: Disturbance,
-    tracker_from_root: Isometry3<f64>,
+    pub(super) tracker_from_root: Isometry3<f64>,
     tip_from_body: Isometry3<f64>,
     pub(super) markers: Vec<Point3<f64>>,
     pub(super) readings: Vec<(&'static str, Vec<Vec<f64>>)>,
@@ -54,7 +55,7 @@ pub(super) const LAST: &str = "checks";
 impl Case {
     /// Case `number` of a cell.
     pub fn draw(cell: Cell, number: u64, noise: &mut Noise) -> Self {
-        let robot = Robot::draw(number, if cell.big { BIG } else { SMALL }, noise);
+        let robot = Robot::draw(number, cell.errors.sizes(), noise);
         let mut readings = cell.design.readings(&robot, noise);
         if let Some(held_out) = cell.validation.readings(cell.design, &robot, noise) {
             readings.push((LAST, held_out));
@@ -72,7 +73,7 @@ impl Case {
         );
         let tip_from_body = Isometry3::from_parts(mount, noise.turn(2.0));
         let tracker_from_root = Isometry3::from_parts(noise.vector(1.5).into(), noise.turn(2.0));
-        let disturbance = Disturbance::draw(cell.fault, &robot, noise);
+        let disturbance = Disturbance::draw(cell.fault, cell.design, &robot, noise);
         Self {
             cell,
             robot,
@@ -98,7 +99,10 @@ impl Case {
             let first = before == 0;
             let seen: Vec<Seen> = self.seen(name, rows, (before, total), first, noise);
             before += rows.len();
-            tables.insert((*name).to_owned(), self.written(name, rows, &seen, noise));
+            tables.insert(
+                (*name).to_owned(),
+                self.written(name, rows, &seen, Some(noise)),
+            );
         }
         if self.has(Fault::HeldOutCopies)
             && let Some(first) = self.readings.first().map(|(name, _)| tables[*name].clone())
@@ -139,15 +143,10 @@ impl Case {
         } else {
             1
         };
-        let change = (self.disturbance.from * rows.len() as f64) as usize;
         let mut memory = vec![Vector3::zeros(); self.markers.len().max(1)];
         let mut out = Vec::new();
         for (i, q) in rows.iter().enumerate() {
-            let state = State {
-                late: !first || i >= change,
-                last: self.in_one(name),
-                share: (before + i) as f64 / total as f64,
-            };
+            let state = self.state(name, i, rows.len(), (before, total), first);
             let moving: Vec<f64> = q
                 .iter()
                 .map(|q| q + SIGMA_JOINT * noise.vector(1.0).x)
@@ -161,6 +160,72 @@ impl Case {
             }
         }
         out
+    }
+
+    /// The row of the first recording from which a change holds.
+    pub(super) fn change(&self, rows: usize) -> usize {
+        (self.disturbance.from * rows as f64) as usize
+    }
+
+    fn state(
+        &self,
+        name: &str,
+        row: usize,
+        rows: usize,
+        (before, total): (usize, usize),
+        first: bool,
+    ) -> State {
+        State {
+            late: !first || row >= self.change(rows),
+            last: self.in_one(name),
+            share: (before + row) as f64 / total as f64,
+        }
+    }
+
+    /// The fitted recordings without noise: true readings, and the body as a perfect tracker would see it.
+    pub(super) fn perfect(&self) -> Vec<(Vec<f64>, Seen)> {
+        let total: usize = self.readings.iter().map(|(_, rows)| rows.len()).sum();
+        let mut out = Vec::new();
+        let fitted = self.readings.iter().filter(|(name, _)| *name != LAST);
+        for (name, rows) in fitted {
+            let before = out.len();
+            for (i, q) in rows.iter().enumerate() {
+                let state = self.state(name, i, rows.len(), (before, total), before == 0);
+                out.push((q.clone(), self.ideal(q, &state)));
+            }
+        }
+        out
+    }
+
+    /// The same robot, poses and mount with nothing wrong.
+    pub(super) fn without_fault(&self) -> Self {
+        let mut out = self.clone();
+        out.disturbance.faults = vec![Fault::None];
+        out.disturbance.transmission = Transmission::default();
+        out
+    }
+
+    /// The tables that the nominal robot would give without noise, under the fault.
+    pub(super) fn twin(&self) -> BTreeMap<String, Poses> {
+        let mut nominal = self.clone();
+        for joint in &mut nominal.robot.joints {
+            joint.actual = joint.nominal;
+        }
+        let total: usize = self.readings.iter().map(|(_, rows)| rows.len()).sum();
+        let mut tables = BTreeMap::new();
+        let mut before = 0;
+        for (name, rows) in &self.readings {
+            let see = |(i, q): (usize, &Vec<f64>)| {
+                let state = self.state(name, i, rows.len(), (before, total), before == 0);
+                let mut seen = nominal.ideal(q, &state);
+                self.misread(&mut seen, self.in_one(name));
+                seen
+            };
+            let seen: Vec<Seen> = rows.iter().enumerate().map(see).collect();
+            before += rows.len();
+            tables.insert((*name).to_owned(), self.written(name, rows, &seen, None));
+        }
+        tables
     }
 
     /// The body as a perfect tracker would see it.
@@ -200,7 +265,7 @@ impl Case {
         if self.has(Fault::TrackerMoved) && state.last {
             tracker = d.moved * tracker;
         }
-        if self.has(Fault::Slip) && state.late {
+        if (self.has(Fault::Slip) || self.has(Fault::SmallSlip)) && state.late {
             mount *= d.step;
         }
         if self.has(Fault::Remounted) && state.last {
@@ -285,7 +350,13 @@ impl Case {
         q
     }
 
-    fn written(&self, name: &str, rows: &[Vec<f64>], seen: &[Seen], noise: &mut Noise) -> Poses {
+    fn written(
+        &self,
+        name: &str,
+        rows: &[Vec<f64>],
+        seen: &[Seen],
+        mut noise: Option<&mut Noise>,
+    ) -> Poses {
         let d = &self.disturbance;
         let repeats = seen.len() / rows.len().max(1);
         let mut q: Vec<Vec<f64>> = rows
@@ -310,7 +381,10 @@ impl Case {
             .flat_map(|i| std::iter::repeat_n(i, copies))
             .collect();
         // Copies differ by what a text file rounds.
-        let mut round = |p: &Point3<f64>| p + noise.vector(1e-7);
+        let mut round = |p: &Point3<f64>| match &mut noise {
+            Some(noise) => p + noise.vector(1e-7),
+            None => *p,
+        };
         let n = self.robot.joints.len();
         let mut table = Poses {
             rows: (0..order.len() as u64).map(|i| i + 2).collect(),
@@ -392,7 +466,11 @@ impl Cell {
     pub(crate) fn id(&self) -> String {
         format!(
             "{:?}/{:?}/{:?}/{:?}/{}",
-            self.fault, self.design, self.validation, self.body, self.big
+            self.fault,
+            self.design,
+            self.validation,
+            self.body,
+            self.errors.id()
         )
     }
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3};
 
+use super::design::Design;
 use super::fault::Fault;
 use super::robot::{Robot, Transmission};
 use crate::noise::Noise;
@@ -14,7 +15,7 @@ pub(crate) struct Disturbance {
     pub joint: usize,
     pub other: usize,
     pub transmission: Transmission,
-    /// A step of a pose: 2 mm for slips and bumps.
+    /// A step of a pose: 2 mm for slips and bumps, two and one tracker σ for small slips.
     pub step: Isometry3<f64>,
     /// Pose by which a body was mounted again, or the tracker moved.
     pub moved: Isometry3<f64>,
@@ -29,7 +30,7 @@ pub(crate) struct Disturbance {
 }
 
 impl Disturbance {
-    pub fn draw(fault: Fault, robot: &Robot, noise: &mut Noise) -> Self {
+    pub fn draw(fault: Fault, design: Design, robot: &Robot, noise: &mut Noise) -> Self {
         let n = robot.joints.len();
         let joint = noise.below(n);
         // Exchanged columns are of one unit.
@@ -103,7 +104,14 @@ impl Disturbance {
             joint,
             other,
             transmission,
-            step: step(2.0, noise),
+            step: step(
+                match (fault, design) {
+                    (Fault::SmallSlip, Design::Stream) => 0.3,
+                    (Fault::SmallSlip, _) => 0.6,
+                    _ => 2.0,
+                },
+                noise,
+            ),
             moved: step(40.0, noise),
             from: noise.between(0.3, 0.7),
             lag: if noise.uniform() < 0.5 { 1 } else { -1 },

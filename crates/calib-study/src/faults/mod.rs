@@ -15,7 +15,9 @@
 mod case;
 mod design;
 mod disturbance;
+mod evidence;
 mod fault;
+mod goals;
 mod names;
 mod outcome;
 mod profile;
@@ -30,5 +32,6 @@ pub use design::{Body, Design, Validation};
 pub use fault::{Class, Fault};
 pub use outcome::{CaseResult, Outcome, report_of};
 pub use render::{csv, json, markdown};
+pub use robot::Errors;
 pub use run::{FaultResult, run_faults};
 pub use settings::FaultOptions;

@@ -36,6 +36,7 @@ fn fits(expected: &Expected, finding: &Finding) -> bool {
     let direct = expected.ids.contains(&id.as_str())
         && (expected.joints.is_empty() || expected.joints.iter().any(|j| joints.contains(j)));
     let alike = [
+        "parameter",
         "equivalent",
         "alternatives",
         "leading",
@@ -86,7 +87,10 @@ fn expected(case: &Case, fault: Fault) -> Expected {
         Fault::Coupling | Fault::Crosstalk => one(
             &["joint-coupling"],
             &joint,
-            vec![format!("coupling({joint}, {other}")],
+            vec![
+                format!("coupling({joint}, {other}"),
+                format!("{joint}.coupling.{other}"),
+            ],
         ),
         Fault::QuarterTurn => one(
             &["joint-offset"],
@@ -107,12 +111,12 @@ fn expected(case: &Case, fault: Fault) -> Expected {
         Fault::TrackerMoved => any(&["tracker-moved"], &["moved(tracker)"]),
         Fault::Remounted => any(&["body-remounted"], &["remounted("]),
         Fault::Gain => one(
-            &["joint-gain", "missing-physics"],
+            &["joint-gain"],
             &joint,
-            vec![format!("gain({joint}")],
+            vec![format!("gain({joint}"), format!("{joint}.gain")],
         ),
         Fault::Eccentricity | Fault::Compliance => any(&["missing-physics"], &[]),
-        Fault::Slip | Fault::Bump | Fault::Drift | Fault::OffsetStep => any(
+        Fault::Slip | Fault::SmallSlip | Fault::Bump | Fault::Drift | Fault::OffsetStep => any(
             &["changed-while-recording", "body-remounted", "tracker-moved"],
             &[],
         ),

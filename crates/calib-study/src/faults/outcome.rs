@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use calib_finding::{Finding, Severity};
+use calib_finding::{Fact, Finding, Severity, catalog};
 use calib_pipeline::error::DataProblem;
 use calib_pipeline::formulate::kinematics::Calibration;
 use calib_pipeline::formulate::solved::Solved;
@@ -15,9 +15,11 @@ use calib_report::verdict::{Effect, ReasonId};
 use calib_urdf::RobotModel;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::case::{Case, Cell, LIMIT_MM, Seen};
 use super::design::{Design, Validation};
+use super::evidence::shown;
 use super::fault::{Class, Fault};
 use super::names::names_the_cause;
 use crate::noise::Noise;
@@ -63,6 +65,21 @@ pub struct CaseResult {
     pub registered_rms_m: Option<f64>,
     /// Largest χ² of a predicted position over its threshold: above 1 the stated uncertainty does not cover the error.
     pub worst_z: Option<f64>,
+    /// What the fitted recordings show of an effect or a change to a test that knows it, σ.
+    #[serde(default)]
+    pub evidence: Option<f64>,
+    /// The evidence that a test needs which does not know the noise, σ.
+    #[serde(default)]
+    pub needed: Option<f64>,
+    /// What the fault moves the residual of a registration of the nominal robot by, rms, m.
+    #[serde(default)]
+    pub moved_m: Option<f64>,
+    /// Rows by which a named change lies off the true one.
+    #[serde(default)]
+    pub row_off: Option<i64>,
+    /// Share of the postures whose error lies within the 95 % region that the fit states.
+    #[serde(default)]
+    pub covered: Option<f64>,
 }
 
 impl CaseResult {
@@ -106,6 +123,22 @@ impl CaseResult {
         self.refused() && !self.truly_undecided()
     }
 
+    /// Good data of which a finding names a cause.
+    #[must_use]
+    pub fn false_name(&self) -> bool {
+        let names = |id: &String| NAMES.contains(&id.as_str());
+        self.cell.fault.class() == Class::Clean && self.findings.iter().any(names)
+    }
+
+    /// Whether all that kept it from acceptance is that the data are too few to decide.
+    #[must_use]
+    pub fn only_undecided(&self) -> bool {
+        let nothing_held_out = self.cell.validation == Validation::Absent;
+        let too_few =
+            |id: &ReasonId| TOO_FEW.contains(id) || (nothing_held_out && NOT_VERIFIED.contains(id));
+        !self.refused_by.is_empty() && self.refused_by.iter().all(too_few)
+    }
+
     /// Good data of which a finding or a reason says what is not true. What a design does not show, outliers
     /// that there are, and a calibration that is worse at new poses, are said with reason.
     #[must_use]
@@ -136,6 +169,30 @@ impl CaseResult {
     }
 }
 
+/// Findings that name a cause.
+const NAMES: [&str; 20] = [
+    "joint-sign",
+    "joint-order",
+    "unit-mismatch",
+    "joint-coupling",
+    "joint-offset",
+    "joint-gain",
+    "clock-lag",
+    "joint-column-missing",
+    "wrong-mount",
+    "mirrored",
+    "quaternion-order",
+    "pose-convention",
+    "tracker-moved",
+    "body-remounted",
+    "body-flip",
+    "missing-physics",
+    "changed-while-recording",
+    "rows-repeated",
+    "noise-has-memory",
+    "held-out-in-training",
+];
+
 /// Reasons that say of the data that they are too few, and nothing of what is wrong: they ask for more poses.
 const TOO_FEW: [ReasonId; 4] = [
     ReasonId::LimitUndecided,
@@ -154,6 +211,7 @@ const TRUE_OF_FEW: [&str; 3] = ["held-by-priors", "size-not-seen", "not-checked"
 struct Error {
     rms_m: f64,
     worst_z: Option<f64>,
+    covered: Option<f64>,
 }
 
 /// χ² with three degrees of freedom that is exceeded once in 1 000 sets of 24 postures, taken as independent: 99.996 %.
@@ -180,10 +238,37 @@ fn wider(freedom: f64) -> f64 {
 /// Draws a case and runs the program on it.
 pub(crate) fn run_case(cell: Cell, number: u64, seed: u64) -> CaseResult {
     let (case, ran) = run(cell, number, seed);
-    match ran {
+    let result = match ran {
         Ok(output) => judged(&case, number, &output),
         Err(error) => stopped(&case, number, error),
+    };
+    with_shown(&case, result)
+}
+
+/// The result beside what the recordings show of the fault.
+fn with_shown(case: &Case, result: CaseResult) -> CaseResult {
+    let shown = shown(case);
+    CaseResult {
+        evidence: shown.evidence,
+        needed: shown.needed,
+        moved_m: shown.moved_m,
+        ..result
     }
+}
+
+/// How far from the true row a finding says that something changed in the first recording.
+fn row_off(case: &Case, findings: &[Finding]) -> Option<i64> {
+    let (name, rows) = case.readings.first()?;
+    let about = |name: &str, f: &Finding| match f.facts.get(name) {
+        Some(Fact::Name(word)) => Some(word.to_string()),
+        _ => None,
+    };
+    let found = findings.iter().find(|f| {
+        f.id == catalog::CHANGED_WHILE_RECORDING && about("recording", f).as_deref() == Some(name)
+    })?;
+    // Rows of a table are counted from 2, below its header.
+    let row: i64 = about("row", found)?.parse().ok()?;
+    Some(row - 2 - case.change(rows.len()) as i64)
 }
 
 fn run(cell: Cell, number: u64, seed: u64) -> (Case, Result<RunOutput, PipelineError>) {
@@ -207,10 +292,14 @@ pub fn report_of(
 ) -> (CaseResult, Result<calib_report::Report, String>) {
     let (case, ran) = run(cell, number, seed);
     match ran {
-        Ok(output) => (judged(&case, number, &output), Ok(output.report)),
+        Ok(output) => {
+            let result = judged(&case, number, &output);
+            (with_shown(&case, result), Ok(output.report))
+        }
         Err(error) => {
             let text = error.to_string();
-            (stopped(&case, number, error), Err(text))
+            let result = stopped(&case, number, error);
+            (with_shown(&case, result), Err(text))
         }
     }
 }
@@ -241,6 +330,11 @@ fn stopped(case: &Case, number: u64, error: PipelineError) -> CaseResult {
         rms_m: None,
         registered_rms_m: None,
         worst_z: None,
+        evidence: None,
+        needed: None,
+        moved_m: None,
+        row_off: None,
+        covered: None,
     }
 }
 
@@ -306,6 +400,11 @@ fn judged(case: &Case, number: u64, output: &RunOutput) -> CaseResult {
         rms_m: Some(error.rms_m),
         registered_rms_m: output.solved.registered.as_ref().map(|r| rms(case, r)),
         worst_z: error.worst_z,
+        evidence: None,
+        needed: None,
+        moved_m: None,
+        row_off: row_off(case, findings),
+        covered: error.covered,
     }
 }
 
@@ -323,6 +422,7 @@ fn widened(output: &RunOutput) -> f64 {
 /// The calibrated robot against the truth at new poses; z is the largest χ² over its threshold.
 fn error(case: &Case, solved: &Solved, widened: f64) -> Error {
     let mut worst: Option<f64> = None;
+    let (mut covered, mut postures) = (0.0, 0.0);
     for (q, seen) in case.truth() {
         let off = off(case, &solved.robot, &q, &seen);
         let framed = body_frame(&seen).and(off.first());
@@ -331,13 +431,22 @@ fn error(case: &Case, solved: &Solved, widened: f64) -> Error {
         };
         let freedom = solved.fit.as_ref();
         let freedom = freedom.map_or(0.0, |f| f.solution.degrees_of_freedom);
+        postures += 1.0;
+        covered += if chi2 <= region(freedom) { 1.0 } else { 0.0 };
         let z = chi2 / (CHI2_OF_THREE * wider(freedom) * widened);
         worst = Some(worst.map_or(z, |w| w.max(z)));
     }
     Error {
         rms_m: rms(case, &solved.robot),
         worst_z: worst,
+        covered: (postures > 0.0).then(|| covered / postures),
     }
+}
+
+/// χ² of a 3-vector that 95 % do not exceed, where its noise is known to so many degrees of freedom.
+fn region(freedom: f64) -> f64 {
+    let f = FisherSnedecor::new(3.0, freedom.max(1.0));
+    f.map_or(f64::INFINITY, |f| 3.0 * f.inverse_cdf(0.95))
 }
 
 /// rms error of a robot at new poses, m.

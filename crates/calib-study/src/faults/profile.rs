@@ -2,8 +2,23 @@
 
 use super::case::{Case, LAST, LIMIT_MM, SIGMA, SIGMA_ORIENTATION};
 use super::fault::Fault;
+use super::robot::{Errors, NominalErrors};
 
 impl Case {
+    /// How far the nominal robot may be off, as the profile says.
+    pub(super) fn prior(&self) -> NominalErrors {
+        let (angle, origin_mm) = match self.cell.errors {
+            Errors::Small => (0.5, 2.0),
+            Errors::Big => (1.0, 5.0),
+            Errors::Huge => (3.0, 20.0),
+        };
+        NominalErrors {
+            offset_deg: angle,
+            origin_mm,
+            tilt_deg: angle,
+        }
+    }
+
     /// The profile as YAML.
     pub fn profile(&self) -> String {
         let n = self.robot.joints.len();
@@ -28,11 +43,11 @@ impl Case {
                 format!("  {name}: {{file: {name}.csv, use: {usage}}}")
             })
             .collect();
-        let sigma = if self.cell.big {
-            "{position_mm: 5, angle_deg: 1, offset_deg: 1}"
-        } else {
-            "{position_mm: 2, angle_deg: 0.5, offset_deg: 0.5}"
-        };
+        let prior = self.prior();
+        let sigma = format!(
+            "{{position_mm: {}, angle_deg: {}, offset_deg: {}}}",
+            prior.origin_mm, prior.tilt_deg, prior.offset_deg
+        );
         let tracker = if markers.is_empty() {
             format!(
                 "body_sigma_mm: {}, body_sigma_deg: {:.4}",

@@ -7,6 +7,7 @@ use calib_report::verdict::ReasonId;
 
 use super::design::{Body, Design};
 use super::fault::{Class, Fault};
+use super::goals::goals;
 use super::outcome::{CaseResult, Outcome};
 use super::run::FaultResult;
 use crate::settings::StudyError;
@@ -84,6 +85,7 @@ pub fn markdown(result: &FaultResult) -> String {
         all.len(),
         clean.len()
     );
+    text += &goals(all);
     text += &table(
         "fault",
         Fault::ALL.map(|fault| {
@@ -134,7 +136,7 @@ fn table<const N: usize>(first: &str, rows: [(String, Count); N]) -> String {
 }
 
 /// The word of a value in JSON, as the files have it.
-fn word(value: &impl serde::Serialize) -> String {
+pub(super) fn word(value: &impl serde::Serialize) -> String {
     match serde_json::to_value(value) {
         Ok(serde_json::Value::String(word)) => word.replace('_', " "),
         _ => String::new(),
@@ -151,7 +153,7 @@ fn words(reasons: &BTreeSet<ReasonId>) -> String {
 #[must_use]
 pub fn csv(result: &FaultResult) -> String {
     let mut text = String::from(
-        "fault,design,validation,body,big,number,outcome,named,verdict,rms_mm,worst_z,findings,reasons,refused_by\n",
+        "fault,design,validation,body,errors,number,outcome,named,verdict,rms_mm,worst_z,findings,reasons,refused_by\n",
     );
     for r in &result.results {
         let number = |x: Option<f64>, scale: f64| {
@@ -165,7 +167,7 @@ pub fn csv(result: &FaultResult) -> String {
             word(&r.cell.design),
             word(&r.cell.validation),
             word(&r.cell.body),
-            r.cell.big,
+            word(&r.cell.errors),
             r.number,
             word(&r.outcome),
             r.named,

@@ -8,6 +8,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt::Write;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
 
 use crate::noise::Noise;
 
@@ -20,17 +21,55 @@ pub(crate) struct NominalErrors {
 }
 
 /// As a good manufacturer's drawing is.
-pub(crate) const SMALL: NominalErrors = NominalErrors {
+const SMALL: NominalErrors = NominalErrors {
     offset_deg: 0.3,
     origin_mm: 1.0,
     tilt_deg: 0.2,
 };
 /// As after a repair without alignment.
-pub(crate) const BIG: NominalErrors = NominalErrors {
+const BIG: NominalErrors = NominalErrors {
     offset_deg: 1.0,
     origin_mm: 5.0,
     tilt_deg: 0.5,
 };
+/// As of a robot that was built from another drawing.
+const HUGE: NominalErrors = NominalErrors {
+    offset_deg: 3.0,
+    origin_mm: 20.0,
+    tilt_deg: 2.0,
+};
+
+/// How far the nominal robot is off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Errors {
+    /// Zero offsets by 0.3°, origins by 1 mm, axes by 0.2°.
+    Small,
+    /// By 1°, 5 mm, 0.5°.
+    Big,
+    /// By 3°, 20 mm, 2°.
+    Huge,
+}
+
+impl Errors {
+    /// The standard deviations.
+    pub(super) fn sizes(self) -> NominalErrors {
+        match self {
+            Self::Small => SMALL,
+            Self::Big => BIG,
+            Self::Huge => HUGE,
+        }
+    }
+
+    /// Its word in the name of a cell, from which draws follow.
+    pub(super) fn id(self) -> &'static str {
+        match self {
+            Self::Small => "false",
+            Self::Big => "true",
+            Self::Huge => "huge",
+        }
+    }
+}
 
 /// One joint; it moves about or along its own z.
 #[derive(Debug, Clone)]

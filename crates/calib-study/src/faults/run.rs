@@ -10,6 +10,7 @@ use super::case::Cell;
 use super::design::{Body, Design, Validation};
 use super::fault::{Class, Fault};
 use super::outcome::{CaseResult, run_case};
+use super::robot::Errors;
 use super::settings::FaultOptions;
 use super::state::State;
 use crate::settings::StudyError;
@@ -40,14 +41,19 @@ pub(super) fn matrix(only: &[Fault]) -> Vec<Cell> {
                 let order = std::iter::once(first).chain(validations);
                 let fits = |v: &Validation| fault.applies(design, body, *v);
                 if let Some(validation) = order.into_iter().find(fits) {
-                    let big = (f + d + 2 * b) % 3 == 0;
-                    cells.push(Cell {
+                    let cell = |errors| Cell {
                         fault: *fault,
                         design,
                         validation,
                         body,
-                        big,
-                    });
+                        errors,
+                    };
+                    let big = (f + d + 2 * b) % 3 == 0;
+                    cells.push(cell(if big { Errors::Big } else { Errors::Small }));
+                    // A third of the discrete faults once more with a robot that is far off.
+                    if fault.class() == Class::Discrete && (f + 2 * d + b) % 3 == 0 {
+                        cells.push(cell(Errors::Huge));
+                    }
                 }
             }
         }
@@ -107,7 +113,7 @@ pub fn run_faults(
     })?;
     lock().close(&results)?;
     Ok(FaultResult {
-        calib_fault_study: 1,
+        calib_fault_study: 2,
         seed: options.seed,
         cases: options.cases,
         results,

@@ -66,6 +66,10 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     if let Some(sigma) = inputs.robot.profile.tracker.marker_sigma {
         options.sigma = sigma;
     }
+    // A profile that expects more of the drawing than is usual is believed.
+    let prior = &inputs.robot.profile.solve.prior;
+    options.prior_angle = options.prior_angle.max(prior.angle);
+    options.prior_length = options.prior_length.max(prior.position);
     // Without a body there is nothing to compare; what a reader lets through does not contradict itself.
     let Ok(outcome) = explain(&layout.data, &options) else {
         return found;
