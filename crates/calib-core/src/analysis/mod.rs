@@ -11,6 +11,7 @@ pub(crate) mod folds;
 pub(crate) mod gauge;
 pub(crate) mod goodness;
 pub(crate) mod information;
+mod less_noise;
 pub(crate) mod observability;
 pub(crate) mod sandwich;
 pub(crate) mod score;

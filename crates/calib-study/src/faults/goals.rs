@@ -12,8 +12,8 @@ use std::fmt::Write as _;
 use super::design::{Body, Design};
 use super::fault::{Class, Fault};
 use super::outcome::{CaseResult, Outcome};
-use super::render::word;
 use super::robot::Errors;
+use super::words::word;
 
 /// Normal quantile of 97.5 %.
 const Z: f64 = 1.96;

@@ -26,6 +26,7 @@ mod robot;
 mod run;
 mod settings;
 mod state;
+mod words;
 
 pub use case::Cell;
 pub use design::{Body, Design, Validation};

@@ -10,6 +10,7 @@ use super::fault::{Class, Fault};
 use super::goals::goals;
 use super::outcome::{CaseResult, Outcome};
 use super::run::FaultResult;
+use super::words::word;
 use crate::settings::StudyError;
 
 /// How many cases ended how.
@@ -133,14 +134,6 @@ fn table<const N: usize>(first: &str, rows: [(String, Count); N]) -> String {
         text += &count.row(name);
     }
     text + "\n"
-}
-
-/// The word of a value in JSON, as the files have it.
-pub(super) fn word(value: &impl serde::Serialize) -> String {
-    match serde_json::to_value(value) {
-        Ok(serde_json::Value::String(word)) => word.replace('_', " "),
-        _ => String::new(),
-    }
 }
 
 /// The ids of reasons, in one field.

@@ -13,6 +13,9 @@
 //! are differences of cumulative sums: the cost is linear in the samples. S is the end of one recording from some sample on,
 //! with other recordings as a whole on either side, because the order in which recordings were made is not known.
 //!
+//! With few samples a change is taken for noise of the joints or of the bodies: the level of that noise is then chosen again with each
+//! change (`levels`).
+//!
 //! How large T becomes by chance over all ranges is simulated from the model. Candidates have up to six columns, so
 //! every T counts from its own quantile of that simulation; the largest excess is compared with the quantile of the
 //! largest excess. What it does **not** protect against: physics that is missing in the model and follows the order of the samples, as
@@ -20,6 +23,7 @@
 
 mod chance;
 mod columns;
+mod levels;
 mod sums;
 
 use serde::{Deserialize, Serialize};
@@ -28,7 +32,8 @@ use crate::analysis::solution::Solution;
 use crate::graph::ids::{EdgeId, FrameId};
 use chance::Chance;
 use columns::{Candidates, Pattern};
-use sums::{Design, Found, LEAST, SIMULATED};
+use levels::{Best, Levels};
+use sums::{Design, LEAST, SIMULATED};
 
 /// What may have moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -199,26 +204,25 @@ impl Solution {
         let thin = every(&used, used.len().div_ceil(SIMULATED));
         let borders = &settings.borders;
         let stride = used.len().div_ceil(EDGES);
-        let design = Design::new(self, &candidates, &used, &every(&used, stride), borders)?;
-        let found: Vec<Option<Found>> = (0..candidates.list.len())
-            .map(|k| design.best(k, &design.tests(k), &design.u[k]))
-            .collect();
+        let levels = Levels::new(self, &candidates, &used, &every(&used, stride), borders)?;
+        let design = &levels.designs[0];
+        let found = levels.best(&levels.tests(), &levels.seen());
         let seen: Vec<f64> = found
             .iter()
-            .map(|f| f.as_ref().map_or(0.0, |f| design.score(f.gain)))
+            .map(|f| f.as_ref().map_or(0.0, |f| f.score))
             .collect();
         // With few samples the scan itself is small enough to be simulated.
         let fewer = (thin.len() < used.len())
             .then(|| Design::new(self, &candidates, &thin, &thin, borders));
         let chance = match fewer {
-            Some(simulated) => Chance::simulate(&simulated?, &seen, settings),
-            None => Chance::simulate(&design, &seen, settings),
+            Some(simulated) => Chance::simulate(&Levels::of(simulated?), &seen, settings),
+            None => Chance::simulate(&levels, &seen, settings),
         };
         let mut changes: Vec<(usize, Change)> = Vec::new();
         for (k, (candidate, found)) in candidates.list.iter().zip(&found).enumerate() {
             if let Some(found) = found {
-                let quantile = chance.quantiles[k];
-                changes.push((k, change(candidate.moved, found, &design, quantile)));
+                let (quantile, at) = (chance.quantiles[k], &levels.designs[found.level]);
+                changes.push((k, change(candidate.moved, found, at, quantile)));
             }
         }
         changes.sort_by(|(_, a), (_, b)| b.excess.total_cmp(&a.excess).then(a.moved.cmp(&b.moved)));
@@ -227,9 +231,15 @@ impl Solution {
             && candidates.list[*k].pattern == Pattern::Step
             && let Some(coarse) = &found[*k]
         {
-            let edges = design.finer(&coarse.after, &used);
+            let edges = design.finer(&coarse.found.after, &used);
             let fine = Design::new(self, &candidates, &used, &edges, borders)?;
-            if let Some(found) = fine.best_near(*k, &design, &coarse.after) {
+            if let Some(found) = fine.best_near(*k, design, &coarse.found.after) {
+                let score = fine.score(found.gain);
+                let found = Best {
+                    found,
+                    level: 0,
+                    score,
+                };
                 *first = change(first.moved, &found, &fine, chance.quantiles[*k]);
             }
         }
@@ -257,17 +267,17 @@ fn every(samples: &[usize], stride: usize) -> Vec<usize> {
     samples.iter().step_by(stride).copied().collect()
 }
 
-fn change(moved: Moved, found: &Found, design: &Design, quantile: f64) -> Change {
+fn change(moved: Moved, best: &Best, design: &Design, quantile: f64) -> Change {
+    let Best { found, score, .. } = best;
     let (first, end) = design.samples_of(&found.after);
     // Noise as found: s² = (F − Δ) / ν. N would make the jumps of ten poses look three times as certain as they are.
     let s2 = (design.cost - found.gain) / design.freedom(found.jump.len());
-    let score = design.score(found.gain);
     Change {
         moved,
         first,
         end,
         also: design.also(&found.after),
-        score,
+        score: *score,
         excess: score - quantile,
         explains: found.gain / design.cost,
         jump: found.jump.clone(),

@@ -41,6 +41,9 @@ pub(super) struct Found {
 pub(super) struct Kept {
     pub a: DMatrix<f64>,
     pub b: DMatrix<f64>,
+    /// L and L⁻¹.
+    pub l: DMatrix<f64>,
+    pub l_inverse: DMatrix<f64>,
 }
 
 /// E, C E and Σ B̃ᵀB̃ of one candidate over a set of samples.
@@ -103,6 +106,8 @@ pub(super) struct Design {
     pub cost: f64,
     /// N of equation (2).
     pub rows: f64,
+    /// Σ ln|V| over the samples.
+    pub log_det: f64,
     pub patterns: Vec<Pattern>,
     pub columns: Vec<std::ops::Range<usize>>,
     /// By candidate: cumulative sums up to each edge; for other patterns than steps nothing and the whole.
@@ -155,6 +160,7 @@ impl Design {
             priors: Vec::new(),
             cost: 0.0,
             rows: 0.0,
+            log_det: 0.0,
             patterns: list.iter().map(|c| c.pattern).collect(),
             columns: list.iter().map(|c| c.columns.clone()).collect(),
             cumulative: Vec::new(),
@@ -209,6 +215,7 @@ impl Design {
             let bw = b.tr_mul(&rows.w);
             self.cost += rows.w.norm_squared();
             self.rows += rows.w.len() as f64;
+            self.log_det += rows.log_det;
             for k in 0..sizes.len() {
                 let columns = &self.columns[k];
                 let factor = self.factor(k, place, samples.len());
@@ -216,8 +223,10 @@ impl Design {
                 sums[k].add(&ab, &bb, columns, factor);
             }
             if keep {
-                let Whitened { a, .. } = rows;
-                self.kept.push(Kept { a, b });
+                let Whitened {
+                    a, l, l_inverse, ..
+                } = rows;
+                self.kept.push(Kept { a, b, l, l_inverse });
             }
         }
         for (k, (sum, u)) in sums.into_iter().zip(us).enumerate() {

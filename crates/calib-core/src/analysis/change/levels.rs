@@ -1,0 +1,123 @@
+//! A scan under several levels of the noise from pose to pose.
+//!
+//! T and the reasons for it: `less_noise`. With one level T is that of the scan.
+
+use nalgebra::{Cholesky, DVector};
+
+use super::columns::Candidates;
+use super::sums::{Design, Found, Test, score};
+use crate::analysis::less_noise::{Level, profiled};
+use crate::analysis::solution::Solution;
+
+/// Designs of the same samples, the one at the noise that was found first.
+pub(super) struct Levels {
+    pub designs: Vec<Design>,
+    /// Σ ln|V| + ln|H| of each.
+    log_dets: Vec<f64>,
+}
+
+/// The best change of a candidate.
+pub(super) struct Best {
+    pub found: Found,
+    /// Number of its design.
+    pub level: usize,
+    /// T.
+    pub score: f64,
+}
+
+/// What residuals give under one design: F, and U of every candidate.
+pub(super) struct Drawn {
+    pub cost: f64,
+    pub u: Vec<Vec<DVector<f64>>>,
+}
+
+impl Levels {
+    /// At the level that was found, and with few samples at lower ones.
+    pub fn new(
+        solution: &Solution,
+        candidates: &Candidates,
+        samples: &[usize],
+        edges: &[usize],
+        borders: &[usize],
+    ) -> Option<Self> {
+        let own = Design::new(solution, candidates, samples, edges, borders)?;
+        let mut out = Self::of(own);
+        for lower in solution.with_less_noise(samples.len()) {
+            let design = Design::new(&lower, candidates, samples, edges, borders)?;
+            out.log_dets.push(log_det(&design)?);
+            out.designs.push(design);
+        }
+        Some(out)
+    }
+
+    /// One level.
+    pub fn of(design: Design) -> Self {
+        Self {
+            log_dets: log_det(&design).into_iter().collect(),
+            designs: vec![design],
+        }
+    }
+
+    /// The tests of every candidate, by level.
+    pub fn tests(&self) -> Vec<Vec<Vec<Test>>> {
+        let of = |design: &Design| (0..design.columns.len()).map(|k| design.tests(k)).collect();
+        self.designs.iter().map(of).collect()
+    }
+
+    /// The residuals as they are.
+    pub fn seen(&self) -> Vec<Drawn> {
+        let of = |design: &Design| Drawn {
+            cost: design.cost,
+            u: design.u.clone(),
+        };
+        self.designs.iter().map(of).collect()
+    }
+
+    /// The best change of every candidate, for residuals that gave these sums.
+    pub fn best(&self, tests: &[Vec<Vec<Test>>], drawn: &[Drawn]) -> Vec<Option<Best>> {
+        let count = self.designs[0].columns.len();
+        (0..count).map(|k| self.best_of(k, tests, drawn)).collect()
+    }
+
+    fn best_of(&self, k: usize, tests: &[Vec<Vec<Test>>], drawn: &[Drawn]) -> Option<Best> {
+        let levels = self.designs.iter().enumerate();
+        let found = levels.filter_map(|(level, design)| {
+            let own = &drawn[level];
+            let found = design.best(k, &tests[level][k], &own.u[k])?;
+            let score = self.score(level, drawn, found.gain);
+            Some(Best {
+                found,
+                level,
+                score,
+            })
+        });
+        found.max_by(|a, b| a.score.total_cmp(&b.score))
+    }
+
+    fn score(&self, level: usize, drawn: &[Drawn], gain: f64) -> f64 {
+        let first = &self.designs[0];
+        if self.designs.len() == 1 {
+            return score(first.rows, drawn[0].cost, gain);
+        }
+        let pairs = drawn.iter().zip(&self.log_dets);
+        let levels: Vec<Level> = pairs
+            .map(|(own, &log_det)| Level {
+                cost: own.cost,
+                log_det,
+            })
+            .collect();
+        profiled(first.freedom(0), &levels, level, gain)
+    }
+}
+
+/// Σ ln|V| + ln|H|.
+fn log_det(design: &Design) -> Option<f64> {
+    let factor = Cholesky::new(design.covariance.clone())?;
+    let of_covariance: f64 = factor
+        .l_dirty()
+        .diagonal()
+        .iter()
+        .map(|x| 2.0 * x.ln())
+        .sum();
+    Some(design.log_det - of_covariance)
+}
