@@ -75,16 +75,37 @@ impl Arm {
         tracker: &Isometry3<f64>,
         seen: &[usize],
     ) -> String {
+        self.table(first..first + poses, tracker, seen, <[f64]>::to_vec)
+    }
+
+    /// The same for all reflectors; `actual` says where the joints are at their readings.
+    fn points_of(
+        &mut self,
+        poses: usize,
+        tracker: &Isometry3<f64>,
+        actual: impl Fn(&[f64]) -> Vec<f64>,
+    ) -> String {
+        self.table(1..poses + 1, tracker, &[0, 1, 2], actual)
+    }
+
+    fn table(
+        &mut self,
+        poses: std::ops::Range<usize>,
+        tracker: &Isometry3<f64>,
+        seen: &[usize],
+        actual: impl Fn(&[f64]) -> Vec<f64>,
+    ) -> String {
         let mut table =
             String::from("pose,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,point,x_mm,y_mm,z_mm\n");
-        for pose in first..first + poses {
+        for pose in poses {
             let q = self.posture();
+            let there = actual(&q);
             for (k, (name, link, at)) in REFLECTORS.iter().enumerate() {
                 // Every fifth is hidden.
                 if !seen.contains(&k) || (pose + k).is_multiple_of(5) {
                     continue;
                 }
-                let p = tracker * Point3::from(self.point(&q, link, *at) + self.noise(SMR));
+                let p = tracker * Point3::from(self.point(&there, link, *at) + self.noise(SMR));
                 let q: Vec<String> = q.iter().map(|q| format!("{:.6}", q.to_degrees())).collect();
                 let p = p * 1e3;
                 let _ = writeln!(
@@ -449,4 +470,51 @@ fn joints_that_no_recording_moves_are_named() {
     let dir = folder(TRACKED).file("arm/points.csv", &table);
     let ran = dir.calib(["check", "arm.yaml"]);
     assert!(!ran.stdout.contains("joints-stood-still"), "{}", ran.stdout);
+}
+
+/// Drives err in what the profile states of them: harmonics of the motor, and backlash on the loaded flank.
+#[test]
+fn effects_of_a_drive_are_found_where_its_gear_ratio_is_stated() {
+    const RATIO: f64 = 81.0;
+    const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+    let (mut z, mut flanks) = (Vec::new(), Vec::new());
+    for seed in 0..10 {
+        let mut arm = Arm::new(600 + seed);
+        let tracker = arm.somewhere();
+        let [cos, sin, flank] = [3e-4, -5e-4, 8e-4].map(|c| c * (1.0 + 0.2 * normal(&mut arm.rng)));
+        // The loads of a robot without masses are those of rods along its links.
+        let rods = RobotModel::from_urdf_text(&urdf(&ORIGINS, &[0.0; 6]), "rods");
+        let rods = rods.expect("a robot").with_rods(15.0);
+        let (j2, j3) = (1, 2);
+        let table = arm.points_of(60, &tracker, |q| {
+            let load = -rods.gravity_torques(q, &GRAVITY)[j3];
+            let mut moved = q.to_vec();
+            moved[j2] += cos * ((RATIO * q[j2]).cos() - 1.0) + sin * (RATIO * q[j2]).sin();
+            moved[j3] += flank * load.signum();
+            moved
+        });
+        let profile = TRACKED
+            .replace("arm.urdf}", "arm.urdf, gear_ratio: {j2: 81}}")
+            .replace(
+                "solve:\n",
+                "solve:\n  joints: {j2: {free: [offset, motor_eccentricity]}, j3: {free: [offset, flank_backlash]}}\n",
+            );
+        let report = run(&folder(&profile).file("arm/points.csv", table));
+        z.push(crate::contacts::z(
+            &report,
+            "j2.motor_eccentricity_cos",
+            cos,
+        ));
+        z.push(crate::contacts::z(
+            &report,
+            "j2.motor_eccentricity_sin",
+            sin,
+        ));
+        flanks.push(crate::contacts::z(&report, "j3.flank_backlash", flank));
+    }
+    covered("motor eccentricity", &z);
+    covered("flank backlash", &flanks);
+    let bad = TRACKED.replace("joint_offsets]", "joint_offsets, motor_eccentricity]");
+    let ran = folder(&bad).calib(["run", "arm.yaml"]).expect(2);
+    assert!(ran.stderr.contains("gear_ratio"), "{}", ran.stderr);
 }

@@ -46,6 +46,17 @@ pub enum DriftError {
         /// The robot.
         robot: String,
     },
+    /// Loads or approach of a report may have the signs of an earlier version.
+    #[error(
+        "{file}: it was written before reports stated the signs of loads: whether {} is counted as giving way is not known\n  help: run that calibration again with this version of calib, from the same recordings",
+        parameters.join(", ")
+    )]
+    OldSigns {
+        /// The report.
+        file: String,
+        /// Its parameters that have a sign.
+        parameters: Vec<String>,
+    },
     /// No parameter of the robot is estimated in both.
     #[error(
         "{old} and {new} have no parameter of the robot in common\n  help: estimate the same parameters in both calibrations"
@@ -67,7 +78,10 @@ impl DriftError {
     pub fn is_refusal(&self) -> bool {
         matches!(
             self,
-            Self::OtherRobot { .. } | Self::OtherNominal { .. } | Self::NothingInCommon { .. }
+            Self::OtherRobot { .. }
+                | Self::OtherNominal { .. }
+                | Self::OldSigns { .. }
+                | Self::NothingInCommon { .. }
         )
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_geometry::decompose;
-use calib_report::{Report, Unit};
+use calib_report::{DataInformation, Parameter, Report, Unit};
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::DriftError;
@@ -73,6 +73,27 @@ fn scale(unit: Unit) -> f64 {
     }
 }
 
+/// Refuses parameters that follow loads or the approach where a report does not state their signs.
+fn signs_are_known(
+    info: &DataInformation,
+    parameters: &[&Parameter],
+    file: &str,
+) -> Result<(), DriftError> {
+    /// Kinds of parameters that existed when the signs were the other ones.
+    const SIGNED: [&str; 3] = ["torque_compliance", "lateral_compliance", "backlash"];
+    let signed = parameters
+        .iter()
+        .filter(|p| SIGNED.contains(&p.kind.as_str()));
+    let signed: Vec<String> = signed.map(|p| format!("`{}`", p.name)).collect();
+    if info.effect_signs.is_some() || signed.is_empty() {
+        return Ok(());
+    }
+    Err(DriftError::OldSigns {
+        file: file.to_owned(),
+        parameters: signed,
+    })
+}
+
 impl Evidence {
     /// From a report.
     ///
@@ -110,6 +131,7 @@ impl Evidence {
             .map(|name| known.get(name.as_str()).copied())
             .collect();
         let parameters = parameters.ok_or_else(damaged)?;
+        signs_are_known(info, &parameters, file)?;
         let scale = DVector::from_iterator(n, parameters.iter().map(|p| scale(p.unit)));
         let mut root = DMatrix::zeros(n, n);
         for (r, row) in info.root.iter().enumerate() {

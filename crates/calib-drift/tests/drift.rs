@@ -88,6 +88,7 @@ fn session(rng: &mut ChaCha8Rng, robot: &[f64; 6]) -> Report {
                 .map(|r| root.view((r, r), (1, n - r)).iter().copied().collect())
                 .collect(),
             degrees_of_freedom: dof,
+            effect_signs: None,
             quantities: vec![Quantity {
                 name: "zero.elbow".to_owned(),
                 text: "zero of the elbow".to_owned(),
@@ -292,4 +293,29 @@ fn degenerate_information_stays_finite() {
     let drift = drift.expect("one robot");
     assert!(!drift.changed && drift.joint.degrees_of_freedom == 0 && drift.joint.p_value == 1.0);
     assert!(drift.numbers.is_empty());
+}
+
+/// A compliance that lifts in one report and gives way in the other would look like a change, or hide one.
+#[test]
+fn reports_from_before_the_signs_of_loads_were_stated_are_refused_where_it_matters() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut report = session(&mut rng, &[0.0; 6]);
+    assert!(Evidence::of(&report, "old").is_ok());
+    for kind in ["torque_compliance", "lateral_compliance", "backlash"] {
+        report.parameters[2].kind = kind.to_owned();
+        let refused = Evidence::of(&report, "old").expect_err("no signs");
+        assert!(refused.is_refusal());
+        let said = refused.to_string();
+        assert!(
+            said.contains("`elbow.x`") && said.contains("run that calibration again"),
+            "{said}"
+        );
+        let mut stated = report.clone();
+        stated
+            .data_information
+            .as_mut()
+            .expect("there")
+            .effect_signs = Some(2);
+        assert!(Evidence::of(&stated, "new").is_ok());
+    }
 }

@@ -62,7 +62,12 @@ fn calibrated(model: &RobotModel, r: &mut ChaCha8Rng) -> Calibration {
         Translation3::new(0.4, -0.2, 0.9),
         UnitQuaternion::from_euler_angles(0.1, 0.2, 0.7),
     );
-    let mut robot = Calibration::nominal(model, &RobotLoad::default(), place);
+    let mut load = RobotLoad::default();
+    for joint in model.joint_ids() {
+        load.gear_ratio.insert(joint, r.random_range(20.0..120.0));
+        load.friction.insert(joint, r.random_range(0.0..5.0));
+    }
+    let mut robot = Calibration::nominal(model, &load, place);
     for joint in model.joint_ids() {
         let Some(axis) = motion_axis(model, joint) else {
             continue;

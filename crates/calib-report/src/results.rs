@@ -298,6 +298,10 @@ pub struct DataInformation {
     pub degrees_of_freedom: f64,
     /// Quantities of the robot that do not depend on the choice of frames.
     pub quantities: Vec<Quantity>,
+    /// Signs of loads and approach, as `calib_effects` of the effects file counts them: 2; null in reports of versions that may have
+    /// counted a compliance as lift, or a backlash with the direction of approach.
+    #[serde(default)]
+    pub effect_signs: Option<u32>,
 }
 
 /// A quantity of the robot that does not depend on the choice of frames, such as the distance between two axes.

@@ -4,7 +4,9 @@
 //! tracker_from_link = tracker_from_root · Π_joints parent_from_joint · joint_from_child                  (1)
 //! φ = q + Σ c F,  θ = Σ c F e:   joint_from_child = exp(axis φ) · Exp(θ)       turning joints
 //!                                joint_from_child = translation by axis φ       sliding joints
-//! F: 1, q, cos q − 1, sin q, cos 2q − 1, sin 2q, the load, −(direction of approach), another joint's q         (2)
+//! F: 1, q, cos q − 1, sin q, cos 2q − 1, sin 2q, the same of n q and 2 n q (n: gear ratio), the load,
+//!    −(direction of approach), the sign of the load or −(direction of approach) where |load| ≤ friction,
+//!    −(direction of approach) |load|, another joint's q                                                        (2)
 //! load about the axis = axis · Σ (moment_k − mass_k o) × g   over the links that the joint carries           (3)
 //! ```
 //!
@@ -148,6 +150,12 @@ pub struct ModelEffect {
     pub about: Option<[f64; 3]>,
     /// The joint whose reading it follows, for couplings.
     pub other: Option<String>,
+    /// n, turns of the motor per turn of the joint, for effects at the motor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gear_ratio: Option<f64>,
+    /// Load that friction holds, N m or N, for effects of the loaded flank and of friction.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<f64>,
 }
 
 /// A tracking body.

@@ -182,8 +182,12 @@ pub fn joint_state(
     under: &Conditions,
 ) -> JointState {
     let index = joint.index();
+    let drive = loads.drives[index];
+    let position = model.position(q, joint);
     JointState {
-        q: model.position(q, joint),
+        q: position,
+        motor: drive.gear_ratio * position,
+        friction: drive.friction,
         torque: loads.about_axis[index],
         across: loads.across[index],
         approach: under.approach_of(index),

@@ -92,7 +92,11 @@ pub(crate) fn everything(inputs: &Inputs, open: &[JointId]) -> Solve {
             _ => JointFree::Axis,
         });
         if moved {
+            // What has no place in a ladder is taken where the profile frees it.
+            let stated = solve.free_set(joint, moved, slides).effects;
+            let stated = |e: &Effect| stated.iter().any(|f| f.effect == e);
             let effects = EFFECTS.iter().filter(|e| e.profile.is_some());
+            let effects = effects.filter(|e| e.ladder.is_some() || stated(e));
             free.extend(effects.map(|e| JointFree::Effect(e)));
         }
         let exception = solve.joints.entry(joint).or_default();

@@ -208,6 +208,7 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
          # torque: what the load exerts about the axis, N m (minus what the joint holds); torque_across: about the two axes\n\
          # across, which turn with the joint. A compliance above 0 gives way.\n\
          # approach: +1 where the joint came from below, -1 from above; backlash is half of the clearance.\n\
+         # n: gear_ratio of the joint; friction: what it holds, N m.\n\
          # Version 1 had torque and approach of the other sign.\n\
          calib_effects: 2\n{}joints:\n",
         sum(Drives::About),
@@ -233,6 +234,7 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
                 }
             }
         }
+        text.push_str(&drive_yaml(robot, joint, e));
         if !e.coupling.is_empty() {
             text.push_str("    coupling:\n");
             for (other, share) in &e.coupling {
@@ -243,9 +245,29 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
     Some(text)
 }
 
+/// What the formulas of a joint's effects need of its drive.
+fn drive_yaml(robot: &Calibration, joint: JointId, effects: &JointEffects) -> String {
+    let drive = robot.masses.drives()[joint.index()];
+    let needs = |source: Source| {
+        let mut own = effects.coefficients.iter();
+        own.any(|(kind, c)| *c != 0.0 && kind.term().source == source)
+    };
+    let mut text = String::new();
+    if needs(Source::Motor) {
+        let _ = writeln!(text, "    gear_ratio: {}", drive.gear_ratio);
+    }
+    if needs(Source::Friction) {
+        let _ = writeln!(text, "    friction: {}", drive.friction);
+    }
+    text
+}
+
 /// What loads the joints: gravity and the masses that the compliances belong to; empty where no joint yields to them.
 fn loads_yaml(inputs: &Inputs, robot: &Calibration) -> String {
-    let by_load = |kind: &EffectKind| kind.term().source == Source::Load;
+    let by_load = |kind: &EffectKind| {
+        let source = kind.term().source;
+        source == Source::Load || source == Source::Friction
+    };
     let yields = |e: &JointEffects| {
         let mut found = e.coefficients.iter();
         found.any(|(kind, c)| by_load(kind) && *c != 0.0)

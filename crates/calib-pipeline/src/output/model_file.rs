@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_core::EffectKind;
-use calib_core::effect::Drives;
+use calib_core::effect::{Drives, Source};
 use calib_geometry::decompose::symmetric_eigen;
 use calib_geometry::se3;
 use calib_profile::Usage;
@@ -126,6 +126,7 @@ fn effects(robot: &Calibration, id: JointId) -> Vec<ModelEffect> {
         return Vec::new();
     };
     let slides = !robot.model.joint(id).kind.turns();
+    let drive = robot.masses.drives()[id.index()];
     let entry = |kind: EffectKind, value: f64, other: Option<usize>| {
         let term = kind.term();
         ModelEffect {
@@ -138,6 +139,8 @@ fn effects(robot: &Calibration, id: JointId) -> Vec<ModelEffect> {
                 _ => None,
             },
             other: other.map(|o| robot.model.joints()[o].name.clone()),
+            gear_ratio: (term.source == Source::Motor).then_some(drive.gear_ratio),
+            friction: (term.source == Source::Friction).then_some(drive.friction),
         }
     };
     let of = &robot.effects[id.index()];

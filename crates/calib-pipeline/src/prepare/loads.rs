@@ -25,6 +25,8 @@ pub struct Masses {
     beyond: Vec<Vector3<f64>>,
     /// Joints, each before the one that carries it.
     leaves_first: Vec<JointId>,
+    /// By joint index.
+    drives: Vec<Drive>,
     /// Mass that was assumed because the URDF has none, kg.
     pub assumed: Option<f64>,
 }
@@ -32,9 +34,20 @@ pub struct Masses {
 /// A first moment as a parameter: of this link, along this axis of its frame.
 pub type FirstMoment = (LinkId, usize);
 
-/// What the load exerts on the joints at one posture.
+/// What is stated of a joint's drive.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Drive {
+    /// Turns of the motor per turn of the joint; 0 where it is not stated.
+    pub gear_ratio: f64,
+    /// Load that friction holds, N m or N.
+    pub friction: f64,
+}
+
+/// What the load exerts on the joints at one posture, and what their drives are.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loads {
+    /// By joint index.
+    pub drives: Vec<Drive>,
     /// About each joint's axis, N m; along that of a prismatic one, N; by joint index.
     pub about_axis: Vec<f64>,
     /// About the two axes across, N m.
@@ -53,6 +66,13 @@ impl Masses {
         });
         Self {
             gravity: load.gravity(),
+            drives: model
+                .joint_ids()
+                .map(|joint| Drive {
+                    gear_ratio: load.gear_ratio.get(&joint).copied().unwrap_or(0.0),
+                    friction: load.friction.get(&joint).copied().unwrap_or(0.0),
+                })
+                .collect(),
             beyond: vec![Vector3::zeros(); model.links().len()],
             leaves_first,
             assumed: (!model.has_masses()).then(|| unladen.total_mass()),
@@ -76,6 +96,12 @@ impl Masses {
     #[must_use]
     pub fn gravity(&self) -> Vector3<f64> {
         self.gravity
+    }
+
+    /// Drives by joint index.
+    #[must_use]
+    pub fn drives(&self) -> &[Drive] {
+        &self.drives
     }
 
     /// The nominal robot with all masses that are given or assumed.
@@ -103,6 +129,7 @@ impl Masses {
         let poses = model.forward_kinematics(q);
         let (mass, moment) = self.carried(&poses);
         let mut loads = Loads {
+            drives: self.drives.clone(),
             about_axis: vec![0.0; n],
             across: vec![[0.0; 2]; n],
         };

@@ -49,8 +49,12 @@ pub fn data_information(inputs: &Inputs, fit: &MlFit) -> DataInformation {
             .collect(),
         degrees_of_freedom: solution.degrees_of_freedom,
         quantities: quantities(inputs, fit),
+        effect_signs: Some(EFFECT_SIGNS),
     }
 }
+
+/// Signs as in version 2 of the effects file: compliance gives way, backlash is against the approach.
+const EFFECT_SIGNS: u32 = 2;
 
 /// A step for central differences: far above rounding, far below anything that bends (in the parameter's unit).
 const STEP: f64 = 1e-5;

@@ -1,9 +1,11 @@
 //! What loads the joints.
 
+use calib_core::effect::{Effect, Source};
 use calib_urdf::Inertial;
 
 use super::*;
 use crate::profile::RobotLoad;
+use crate::raw::{RawFree, RawJointFree};
 
 impl Checker<'_> {
     pub(super) fn load(&mut self) -> RobotLoad {
@@ -47,7 +49,54 @@ impl Checker<'_> {
             }
             load.stiffness.insert(joint, *stiffness);
         }
+        self.drives(&mut load);
         load
+    }
+
+    /// Gear ratios and friction.
+    fn drives(&mut self, load: &mut RobotLoad) {
+        let raw = &self.raw.robot;
+        for (name, ratio) in &raw.gear_ratio {
+            let path = ["robot", "gear_ratio", name.as_str()];
+            let Some(joint) = self.joint(&path, name) else {
+                continue;
+            };
+            if !self.robot.joint(joint).kind.turns() {
+                let finding = format!("joint `{name}` does not turn");
+                self.key_problem(&path, finding, "name a revolute joint");
+            } else if *ratio == 0.0 {
+                let remedy = "give turns of the motor per turn of the joint, e.g. 100";
+                self.problem(&path, "0 is not a gear ratio", remedy);
+            }
+            load.gear_ratio.insert(joint, *ratio);
+        }
+        for (name, friction) in &raw.friction_nm {
+            let path = ["robot", "friction_nm", name.as_str()];
+            self.not_negative(&path, *friction);
+            let joint = self.joint(&path, name);
+            load.friction.extend(joint.map(|joint| (joint, *friction)));
+        }
+        let freed = |wanted: fn(&Effect) -> bool| {
+            let mut all = self.raw.solve.free.iter();
+            let all = all.any(|f| matches!(f, RawFree::Effect(e) if wanted(e)));
+            let own = self
+                .raw
+                .solve
+                .joints
+                .values()
+                .flat_map(|j| &j.free)
+                .flatten();
+            let mut own = own.filter(|f| matches!(f, RawJointFree::Effect(e) if wanted(e)));
+            all || own.next().is_some()
+        };
+        let at_motor: fn(&Effect) -> bool = |e| e.terms.iter().any(|t| t.source == Source::Motor);
+        if raw.gear_ratio.is_empty() && freed(at_motor) {
+            self.problem(
+                &["solve"],
+                "an effect at the motor is free, and no gear ratio is stated",
+                "state turns of the motor per turn of the joint: `robot: {gear_ratio: {<joint>: 100}}`",
+            );
+        }
     }
 
     fn mass(&mut self, path: &[&str], mass: f64) {

@@ -22,6 +22,10 @@ pub struct RobotLoad {
     pub payload: BTreeMap<LinkId, Inertial>,
     /// Known stiffness by joint, N m per rad.
     pub stiffness: BTreeMap<JointId, f64>,
+    /// Turns of the motor per turn of the joint.
+    pub gear_ratio: BTreeMap<JointId, f64>,
+    /// Load that friction holds, N m or N.
+    pub friction: BTreeMap<JointId, f64>,
 }
 
 impl Default for RobotLoad {
@@ -32,6 +36,8 @@ impl Default for RobotLoad {
             total_mass: None,
             payload: BTreeMap::new(),
             stiffness: BTreeMap::new(),
+            gear_ratio: BTreeMap::new(),
+            friction: BTreeMap::new(),
         }
     }
 }

@@ -31,6 +31,13 @@ pub struct RawRobot {
     /// compliance that is freed is expected there.
     #[serde(default)]
     pub stiffness_nm_per_rad: BTreeMap<String, f64>,
+    /// Turns of the motor per turn of the joint, by joint, for effects at the motor.
+    #[serde(default)]
+    pub gear_ratio: BTreeMap<String, f64>,
+    /// Load that the joint's friction holds, N m (N of a prismatic joint), by joint: below it the direction of approach decides on
+    /// which flank a gear rests; 0 when absent.
+    #[serde(default)]
+    pub friction_nm: BTreeMap<String, f64>,
 }
 
 /// A mass on a link.

@@ -19,10 +19,17 @@ pub mod compliance;
 pub mod coupling;
 pub mod eccentricity;
 pub mod eccentricity_2;
+pub mod flank_backlash;
+pub mod friction;
 pub mod gain;
 pub mod lateral_compliance;
+pub mod motor_eccentricity;
+pub mod motor_eccentricity_2;
 pub mod offset;
 pub mod other;
+mod prior;
+
+pub use prior::{Prior, PriorKey};
 
 /// All joint effects, in the order in which their parameters are created.
 pub static EFFECTS: &[&Effect] = &[
@@ -30,9 +37,13 @@ pub static EFFECTS: &[&Effect] = &[
     &gain::EFFECT,
     &eccentricity::EFFECT,
     &eccentricity_2::EFFECT,
+    &motor_eccentricity::EFFECT,
+    &motor_eccentricity_2::EFFECT,
     &compliance::EFFECT,
     &lateral_compliance::EFFECT,
     &backlash::EFFECT,
+    &flank_backlash::EFFECT,
+    &friction::EFFECT,
     &coupling::EFFECT,
     &clock_offset::EFFECT,
     &other::EFFECT,
@@ -55,14 +66,30 @@ pub enum EffectKind {
     Eccentricity2Cos,
     /// F = sin 2q.
     Eccentricity2Sin,
+    /// F = cos nq − 1.
+    #[serde(rename = "motor_eccentricity_cos")]
+    MotorCos,
+    /// F = sin nq.
+    #[serde(rename = "motor_eccentricity_sin")]
+    MotorSin,
+    /// F = cos 2nq − 1.
+    #[serde(rename = "motor_eccentricity_2_cos")]
+    Motor2Cos,
+    /// F = sin 2nq.
+    #[serde(rename = "motor_eccentricity_2_sin")]
+    Motor2Sin,
     /// F = torque about (force along) the axis, N·m (N).
     TorqueCompliance,
     /// Rotation about the first axis across, F = torque about it, N·m.
     Lateral1,
     /// Rotation about the second axis across, F = torque about it, N·m.
     Lateral2,
-    /// F = ∓1: against the direction of approach (or tanh τ/ε).
+    /// F = ∓1: against the direction of approach.
     Backlash,
+    /// F = ±1: along the load, or against the direction of approach where friction holds the load.
+    FlankBacklash,
+    /// F = −approach · |torque|.
+    Friction,
     /// F = another joint's reading.
     Coupling,
     /// F = joint velocity, rad/s (m/s); the coefficient is a time.
@@ -84,6 +111,10 @@ pub struct JointState {
     pub across: [f64; 2],
     /// Direction of approach: +1, −1, or 0 where it is not known.
     pub approach: f64,
+    /// Angle of the motor: gear ratio times reading, rad; 0 where the ratio is not known.
+    pub motor: f64,
+    /// Load that the joint's friction holds, N·m (N).
+    pub friction: f64,
     /// Reading of the joint that this one is coupled to, rad or m.
     pub other: f64,
     /// Regressor that the caller supplies.
@@ -102,6 +133,10 @@ pub enum Source {
     Load,
     /// The direction of approach.
     Approach,
+    /// The angle of the motor.
+    Motor,
+    /// The load and the direction of approach, not in proportion to the load.
+    Friction,
     /// Another joint's reading.
     OtherJoint,
     /// The joint's velocity.
@@ -186,30 +221,6 @@ pub struct ProfileKeys {
     pub own_text: &'static str,
 }
 
-/// A prior standard deviation that a profile can change.
-#[derive(Debug)]
-pub struct PriorKey {
-    /// Key under `solve.prior`, unit included.
-    pub key: &'static str,
-    /// What it is, with its unit.
-    pub text: &'static str,
-    /// Default, in the unit of the key.
-    pub default: f64,
-    /// SI per unit of the key.
-    pub si: f64,
-}
-
-/// Prior of an effect's coefficients: the same key for both kinds of joint where there is only one.
-#[derive(Debug)]
-pub struct Prior {
-    /// At revolute joints.
-    pub revolute: &'static PriorKey,
-    /// At prismatic joints.
-    pub prismatic: &'static PriorKey,
-    /// σ is never below this (SI).
-    pub least: f64,
-}
-
 /// Which other parameters an effect can be confounded with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -274,39 +285,6 @@ impl Term {
     }
 }
 
-impl PriorKey {
-    /// A key in degrees.
-    pub(crate) const fn deg(key: &'static str, text: &'static str, default: f64) -> Self {
-        Self {
-            key,
-            text,
-            default,
-            si: DEG,
-        }
-    }
-
-    /// A key in millimeters.
-    pub(crate) const fn mm(key: &'static str, text: &'static str, default: f64) -> Self {
-        Self {
-            key,
-            text,
-            default,
-            si: MM,
-        }
-    }
-}
-
-impl Prior {
-    /// The same key at revolute and prismatic joints.
-    pub(crate) const fn of(key: &'static PriorKey) -> Self {
-        Self {
-            revolute: key,
-            prismatic: key,
-            least: 0.0,
-        }
-    }
-}
-
 impl Effect {
     /// What an entry leaves unsaid: any joint, no profile key, always estimable and testable, confounded with nothing.
     pub(crate) const PLAIN: Self = Self {
@@ -325,11 +303,6 @@ impl Effect {
     };
 }
 
-/// Radians per degree: priors in profiles are in degrees.
-const DEG: f64 = std::f64::consts::PI / 180.0;
-/// Meters per millimeter.
-const MM: f64 = 1e-3;
-
 /// At any samples.
 pub(crate) fn always(_: &[JointState]) -> bool {
     true
@@ -341,6 +314,11 @@ const NO_LOAD: f64 = 1e-9;
 /// Where something loads the joint about its axis in some sample.
 pub(crate) fn loaded(states: &[JointState]) -> bool {
     states.iter().any(|s| s.torque.abs() > NO_LOAD)
+}
+
+/// Where the gear ratio is known and the joint turns its motor.
+pub(crate) fn geared(states: &[JointState]) -> bool {
+    states.iter().any(|s| s.motor != 0.0)
 }
 
 /// Where something loads the joint across its axis in some sample.

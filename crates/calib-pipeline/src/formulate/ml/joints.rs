@@ -184,7 +184,7 @@ fn add_effects(
                     parameter.nominal = compliance;
                     parameter.start = compliance;
                 }
-                loaded |= term.source == Source::Load;
+                loaded |= matches!(term.source, Source::Load | Source::Friction | Source::Motor);
             }
         } else if let Some(compliance) = given.filter(|_| *effect == COMPLIANCE.effect()) {
             let p = problem.free_effect_at(edge, COMPLIANCE, &states, None);
