@@ -485,8 +485,9 @@ fn results_page() -> String {
     for robot in ["ripley", "justin"] {
         page.push_str(&format!("\n## {robot}\n"));
         for method in ["ml", "paper"] {
-            let command =
-                format!("calib run robots/{robot}.yaml --method {method} --out {robot}-{method}");
+            let command = format!(
+                "calib run robots/{robot}.yaml --method {method} --out {robot}-{method} --full"
+            );
             let (code, output) = shelf.run(&command);
             let code = code.map_or("a signal".to_owned(), |code| code.to_string());
             page.push_str(&format!(

@@ -79,7 +79,7 @@ fn changed_from(
 }
 
 fn run(dir: &Scratch) -> (Ran, Value) {
-    let ran = dir.calib(["run", PROFILE, "--out", "out"]);
+    let ran = dir.calib(["run", PROFILE, "--out", "out", "--full"]);
     let report = dir.json("out/report.json");
     (ran, report)
 }
@@ -219,7 +219,7 @@ fn frames_of_one_pose_count_once() {
     let found = finding(&report, "frames-merged").expect("said");
     // On one line of a terminal, and in the report.
     assert!(
-        ran.stdout.contains("The 320 rows show 40 poses"),
+        ran.words().contains("The 320 rows show 40 poses"),
         "{}",
         ran.stdout
     );
@@ -259,7 +259,7 @@ fn copies_of_a_row_count_once_and_are_said() {
     let found = finding(&report, "frames-merged").expect("said");
     assert_eq!(found["facts"]["poses"], 40);
     assert_eq!(found["facts"]["copies"], 80);
-    assert!(ran.stdout.contains("80 rows repeat"), "{}", ran.stdout);
+    assert!(ran.words().contains("80 rows repeat"), "{}", ran.stdout);
 }
 
 #[test]

@@ -21,6 +21,7 @@ mod real_robots;
 mod record;
 mod robots;
 mod scratch;
+mod screens;
 mod selection;
 mod shown;
 mod streams;

@@ -118,11 +118,30 @@ impl Scratch {
     }
 
     pub fn calib_with(&self, arguments: &[&str]) -> Ran {
+        self.calib_in(arguments, &[])
+    }
+
+    /// Runs the program in this folder with environment variables.
+    pub fn calib_in(&self, arguments: &[&str], variables: &[(&str, &str)]) -> Ran {
+        self.ran("", arguments, variables)
+    }
+
+    /// Runs a command that a report quotes, in a folder below this one.
+    pub fn quoted(&self, folder: &str, command: &str) -> Ran {
+        let mut words = command.split_whitespace();
+        assert_eq!(words.next(), Some("calib"), "{command}");
+        self.ran(folder, &words.collect::<Vec<_>>(), &[])
+    }
+
+    fn ran(&self, folder: &str, arguments: &[&str], variables: &[(&str, &str)]) -> Ran {
         let output = Command::new(env!("CARGO_BIN_EXE_calib"))
             .args(arguments)
-            .current_dir(self.0.path())
+            .current_dir(self.path(folder))
             .env_remove("COLUMNS")
             .env_remove("RUST_LOG")
+            .env_remove("NO_COLOR")
+            .env_remove("CLICOLOR_FORCE")
+            .envs(variables.iter().copied())
             .stdin(Stdio::null())
             .output()
             .expect("the program starts");
@@ -155,6 +174,11 @@ impl Ran {
             self.stdout, self.stderr
         );
         self
+    }
+
+    /// Standard output without its line breaks.
+    pub fn words(&self) -> String {
+        self.stdout.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
     pub fn json(&self) -> Value {

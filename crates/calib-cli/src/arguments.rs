@@ -6,6 +6,7 @@ use crate::commands::{
     apply, check, completions, convert, diff, drift, fit, plugins, record, revert, run, schema,
     simulate, study,
 };
+use crate::terminal::Console;
 
 /// Calibrates the kinematic model of a robot: finds where its joints are relative to the bodies that an optical tracker
 /// sees.
@@ -18,12 +19,9 @@ pub struct Arguments {
     /// The command
     #[command(subcommand)]
     pub command: Command,
-    /// Print only results and errors
-    #[arg(short, long, global = true)]
-    pub quiet: bool,
-    /// Print more on standard error
-    #[arg(short, long, global = true)]
-    pub verbose: bool,
+    /// What every command takes
+    #[command(flatten)]
+    pub console: Console,
 }
 
 /// The commands.

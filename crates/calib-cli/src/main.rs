@@ -11,18 +11,37 @@ use std::process::ExitCode;
 use clap::Parser;
 
 fn main() -> ExitCode {
-    let arguments = arguments::Arguments::parse();
+    let arguments = match arguments::Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return misused(&error),
+    };
     match commands::run(&arguments) {
         Ok(code) => ExitCode::from(code as u8),
         Err(error) => {
-            let said = with_causes(&error);
+            let (said, code) = (with_causes(&error), error.exit_code() as u8);
+            if arguments.console.json {
+                terminal::emit_error(&said, error.remedy(), code);
+                return ExitCode::from(code);
+            }
             eprintln!("error: {said}");
             if let (Some(remedy), false) = (error.remedy(), said.contains("\n  help: ")) {
                 eprintln!("  help: {remedy}");
             }
-            ExitCode::from(error.exit_code() as u8)
+            ExitCode::from(code)
         }
     }
+}
+
+/// Help, the version, or a wrong call.
+fn misused(error: &clap::Error) -> ExitCode {
+    let json = std::env::args_os().any(|argument| argument == "--json");
+    if !(json && error.use_stderr()) {
+        error.exit();
+    }
+    let text = error.render().to_string();
+    let said = text.trim().trim_start_matches("error: ");
+    terminal::emit_error(said, None, calib_pipeline::ExitCode::Usage as u8);
+    ExitCode::from(calib_pipeline::ExitCode::Usage as u8)
 }
 
 /// The error and what caused it, each thing said once.

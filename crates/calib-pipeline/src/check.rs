@@ -1,36 +1,30 @@
 //! `calib check`.
 
-use std::fmt::Write as _;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use calib_finding::{Finding, Severity, catalog};
+use calib_geometry::statistics::median;
+use calib_profile::{BodyKind, Usage};
+use calib_report::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck, DataChecks};
 
 use crate::error::{ExitCode, PipelineError};
 use crate::estimate::start::start;
 use crate::formulate::{bad_rows, model_checks};
+use crate::output::of_data::{coverage, lost, used_for};
+use crate::prepare::aligned::Alignment;
 use crate::prepare::checks;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
 use crate::prepare::relabel::relabel;
 use crate::prepare::robot::load_robot;
-use crate::prepare::tracks::body_tracks;
-
-/// What `calib check` found.
-#[derive(Debug, Clone)]
-pub struct Checked {
-    /// Robot name.
-    pub robot: String,
-    /// One line per recording.
-    pub recordings: Vec<String>,
-    /// Findings, worst first.
-    pub findings: Vec<Finding>,
-}
+use crate::prepare::tracks::{BodyTrack, body_tracks};
 
 /// Checks a profile, its robot and its recordings; solves nothing.
 ///
 /// # Errors
 /// [`PipelineError`] for what cannot be read at all.
-pub fn check(profile: &Path) -> Result<Checked, PipelineError> {
+pub fn check(profile: &Path) -> Result<DataChecks, PipelineError> {
     let mut inputs = load_recordings(load_robot(profile)?, true)?;
     let mut findings = inputs.findings.clone();
     if inputs.robot.profile.solve.robust {
@@ -41,8 +35,12 @@ pub fn check(profile: &Path) -> Result<Checked, PipelineError> {
     let is_wrong = |f: &Finding| f.severity == Severity::Error && f.id != catalog::DUPLICATE_COLUMN;
     let wrong = of_data.iter().any(is_wrong);
     findings.extend(of_data);
+    let mut noise = Vec::new();
+    let mut moved = false;
     match body_tracks(&inputs, &mut findings) {
         Ok(tracks) => {
+            noise = noise_of(&inputs, &tracks);
+            moved = true;
             let start = start(&inputs, &tracks);
             model_checks::before_the_fit(&inputs, &tracks, &start, &mut findings);
             let wrong = findings.iter().any(is_wrong);
@@ -55,82 +53,86 @@ pub fn check(profile: &Path) -> Result<Checked, PipelineError> {
         Err(error) => return Err(error),
     }
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
-    Ok(Checked {
+    Ok(DataChecks {
         robot: inputs.robot.profile.robot.clone(),
-        recordings: lines(&inputs),
+        recordings: recordings(&inputs),
+        coverage: coverage(&inputs),
+        noise,
+        checks: checks_of(&inputs, &findings, moved),
         findings,
     })
 }
 
-fn lines(inputs: &Inputs) -> Vec<String> {
-    let line = |r: &crate::prepare::inputs::Loaded| {
-        let usage = match r.spec.usage {
-            calib_profile::Usage::Sweep => "sweep",
-            calib_profile::Usage::Static => "static poses",
-            calib_profile::Usage::Validation => "validation",
-        };
-        let mut line = format!(
-            "{} ({usage}): {} rows, {} joints, {} bodies, {} markers",
-            r.name,
-            r.poses.len(),
-            r.poses.joints.len(),
-            r.poses.bodies.len(),
-            r.poses.markers.len()
-        );
-        if let Some(alignment) = &r.alignment {
-            line += "\n    ";
-            line += &alignment.text();
-        }
-        line
-    };
-    inputs.recordings.values().map(line).collect()
+/// 3 with an error among the findings, else 0.
+#[must_use]
+pub fn exit_code(of: &DataChecks) -> ExitCode {
+    if checks::stops(&of.findings) {
+        ExitCode::Data
+    } else {
+        ExitCode::Accepted
+    }
 }
 
-impl Checked {
-    /// For people.
-    #[must_use]
-    pub fn text(&self) -> String {
-        let mut text = format!("{}\n", self.robot);
-        for line in &self.recordings {
-            let _ = writeln!(text, "  {line}");
-        }
-        if self.findings.is_empty() {
-            text.push_str("no findings\n");
-        }
-        for f in &self.findings {
-            let _ = write!(text, "{}[{}] {}", f.severity, f.id, f.subject);
-            if !f.rows.is_empty() {
-                let shown: Vec<String> = f.rows.iter().take(8).map(u64::to_string).collect();
-                let more = if f.rows.len() > 8 {
-                    format!(" and {} more", f.rows.len() - 8)
-                } else {
-                    String::new()
-                };
-                let _ = write!(text, " (rows {}{more})", shown.join(", "));
-            }
-            let _ = writeln!(text, "\n  {}\n  help: {}", f.text(), f.remedy());
-        }
-        text
-    }
+/// Scatter of the markers of each body about it, of all recordings together.
+fn noise_of(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Vec<BodyNoise> {
+    let bodies = inputs.robot.profile.bodies.keys();
+    let of = bodies.map(|body| BodyNoise {
+        body: body.clone(),
+        sigma_m: tracks.get(body).and_then(|track| track.marker_sigma),
+    });
+    of.collect()
+}
 
-    /// For machines.
-    ///
-    /// # Errors
-    /// [`PipelineError::Report`] when a number has no JSON form.
-    pub fn json(&self) -> Result<String, PipelineError> {
-        let value = serde_json::json!({ "robot": self.robot, "recordings": self.recordings, "findings": self.findings });
-        let mut text = calib_report::json::pretty(&value);
-        text.push('\n');
-        Ok(text)
-    }
+fn recordings(inputs: &Inputs) -> Vec<CheckedRecording> {
+    let of = inputs.recordings.values().map(|r| CheckedRecording {
+        name: r.name.clone(),
+        used_for: used_for(r.spec.usage),
+        rows: r.poses.len(),
+        joints: r.poses.joints.len(),
+        bodies: r.poses.bodies.len(),
+        markers: r.poses.markers.len(),
+        rate_hz: r.poses.t.as_deref().and_then(rate),
+        lost: lost(inputs, &r.name),
+        alignment: r
+            .alignment
+            .as_ref()
+            .map_or_else(String::new, Alignment::text),
+    });
+    of.collect()
+}
 
-    /// 3 with an error among the findings, else 0.
-    #[must_use]
-    pub fn exit_code(&self) -> ExitCode {
-        if checks::stops(&self.findings) {
-            ExitCode::Data
-        } else {
-            ExitCode::Accepted
-        }
-    }
+/// Rows per second, by the median step of time.
+fn rate(t: &[f64]) -> Option<f64> {
+    let steps = t.windows(2).map(|pair| pair[1] - pair[0]);
+    let steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
+    median(steps).map(|step| 1.0 / step)
+}
+
+/// Every check, how it ended, and why it could not be made where it could not.
+fn checks_of(inputs: &Inputs, findings: &[Finding], moved: bool) -> Vec<Checked> {
+    let model = &inputs.robot.model;
+    let mut joints = model.independent_joints();
+    let limited = joints.any(|id| model.joint(id).limits.range().is_some());
+    let bodies = inputs.robot.profile.bodies.values();
+    let rigid = bodies.clone().any(|body| match &body.kind {
+        BodyKind::Markers { names, .. } => names.len() > 2,
+        BodyKind::Pose => true,
+    });
+    let recordings = || inputs.recordings.values();
+    let validation = recordings().any(|r| r.spec.usage == Usage::Validation);
+    let streams = recordings().any(|r| r.alignment.is_some());
+    let unless = |check: DataCheck| {
+        let (possible, why) = match check {
+            DataCheck::JointLimits => (limited, CheckOutcome::NoJointLimits),
+            DataCheck::RigidBodies => (rigid, CheckOutcome::NoRigidBody),
+            DataCheck::Validation => (validation, CheckOutcome::NoValidation),
+            DataCheck::Structure => (moved, CheckOutcome::AfterErrors),
+            DataCheck::Clocks => (streams, CheckOutcome::OneTable),
+            _ => (true, CheckOutcome::Passed),
+        };
+        (!possible).then_some(why)
+    };
+    let all = DataCheck::ALL.into_iter();
+    all.map(|check| check.ended(findings, unless(check)))
+        .collect()
 }

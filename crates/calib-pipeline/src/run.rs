@@ -47,6 +47,20 @@ pub struct RunOptions {
     pub no_plugins: bool,
 }
 
+impl RunOptions {
+    /// The same as arguments of `calib run`; the method is added where it is not the profile's.
+    fn arguments(&self) -> Vec<&'static str> {
+        let all = [
+            (self.select, "--select"),
+            (self.force, "--force"),
+            (self.strict, "--strict"),
+            (self.no_plugins, "--no-plugins"),
+        ];
+        let given = all.into_iter().filter(|(given, _)| *given);
+        given.map(|(_, argument)| argument).collect()
+    }
+}
+
 /// What a run gives.
 #[derive(Debug, Clone)]
 pub struct RunOutput {
@@ -190,6 +204,7 @@ pub fn run_on(
         written: &written,
         residuals: &residuals,
         selection,
+        arguments: options.arguments(),
     });
     let files = files(&inputs, &report, &scene, written, &view)?;
     let exit = exit_code(&report, options.strict, fit, &origins);

@@ -1,13 +1,17 @@
 //! `report.html`: one file that opens from disk, without network, in light and dark, on paper and by keyboard.
 //!
-//! The first screen answers twelve questions ([`crate::answers`]), or links to the answers where it is too small; the 3-D view and the sections of the Markdown report follow,
-//! with the plots of [`crate::plots`]. A content security policy forbids the page to load anything.
+//! The first screen has the verdict, one large number with what it is made of, the warnings, the next command and a picture of
+//! the worst pose; short answers to the reader's questions ([`crate::answers`]), the 3-D view and the sections of the Markdown
+//! report follow, with the plots of [`crate::plots`]. A content security policy forbids the page to load anything.
 
-use crate::plots::plots;
+use crate::plots::{Plot, plots};
 use crate::sections::{Block, sections};
-use crate::svg::{escape, svg};
-use crate::table::Align;
-use crate::{Report, ReportError, Verdict, View3d, answers};
+use crate::svg::{escape, strip, svg};
+use crate::table::{Align, Table};
+use crate::words::diagnosis::{apply, diagnosis, nominal_urdf};
+use crate::words::headline::{self, headline, limit};
+use crate::words::remarks::remarks;
+use crate::{Effect, Report, ReportError, Verdict, View3d, answers};
 use askama::Template;
 
 #[derive(Template)]
@@ -18,9 +22,32 @@ struct Page<'a> {
     script: &'static str,
     verdict_class: &'static str,
     verdict_mark: &'static str,
+    head: HeadPart,
     answers: Vec<AnswerPart>,
     view: Option<ViewPart>,
     sections: Vec<SectionPart>,
+}
+
+/// The first screen.
+struct HeadPart {
+    identification: String,
+    number: headline::Headline,
+    parts: Markup,
+    strip: Option<Markup>,
+    use_for: Vec<Markup>,
+    not_for: Option<Markup>,
+    interval: Markup,
+    diagnosis: Option<[Markup; 2]>,
+    remarks: Vec<RemarkPart>,
+    next: Option<Markup>,
+    worst: String,
+}
+
+struct RemarkPart {
+    word: &'static str,
+    text: Markup,
+    remedy: Markup,
+    place: &'static str,
 }
 
 struct AnswerPart {
@@ -50,6 +77,11 @@ enum BlockPart {
     Table {
         label: String,
         caption: Markup,
+        heads: Vec<Cell>,
+        rows: Vec<Vec<Cell>>,
+    },
+    Folded {
+        summary: Markup,
         heads: Vec<Cell>,
         rows: Vec<Vec<Cell>>,
     },
@@ -102,8 +134,13 @@ impl Markup {
 /// # Errors
 /// [`ReportError::Html`] when the template fails, [`ReportError::Json`] when the view has no JSON form.
 pub fn html(report: &Report, view: Option<&View3d>) -> Result<String, ReportError> {
+    let worst = report.verification.held_out.as_ref();
+    let worst = worst.and_then(|held_out| held_out.worst.as_ref());
     let view = view
-        .map(View3d::thinned)
+        .map(|view| match worst {
+            Some(worst) => view.clone().beginning_with(&worst.pose).thinned(),
+            None => view.thinned(),
+        })
         .filter(|view| !view.poses.is_empty() || !view.clouds.is_empty());
     let view = view.map(|view| {
         let part = |data| ViewPart {
@@ -120,7 +157,9 @@ pub fn html(report: &Report, view: Option<&View3d>) -> Result<String, ReportErro
         Verdict::Rejected => ("rejected", "✗"),
         Verdict::NotEvaluated => ("open", "?"),
     };
+    let sections = section_parts(report);
     let page = Page {
+        head: head_part(report, &sections),
         report,
         css: include_str!("../templates/report.css"),
         script: include_str!("../templates/view3d.js"),
@@ -140,25 +179,74 @@ pub fn html(report: &Report, view: Option<&View3d>) -> Result<String, ReportErro
             })
             .collect(),
         view: view.transpose()?,
-        sections: section_parts(report),
+        sections,
     };
     page.render()
         .map_err(|source| ReportError::Html(source.to_string()))
 }
 
+fn head_part(report: &Report, sections: &[SectionPart]) -> HeadPart {
+    let steps = headline::steps(report);
+    let strip = (steps.len() > 1).then(|| Markup(strip(&steps, limit(report).map(|l| l.limit))));
+    let number = headline(report);
+    let [interval, limit] = [&number.interval, &number.limit];
+    let interval = [interval, limit].map(String::as_str);
+    let interval = interval.into_iter().filter(|text| !text.is_empty());
+    let interval = interval.collect::<Vec<_>>().join(" · ");
+    let has = |id: &str| sections.iter().any(|section| section.id == id);
+    let remarks = remarks(report).into_iter();
+    let texts = |words: [String; 2]| words.map(|words| Markup::from_text(&words));
+    let urdf = nominal_urdf(report).and_then(|path| std::path::Path::new(path).file_name());
+    let command =
+        urdf.and_then(|urdf| apply(report, ".", &format!("PATH/{}", urdf.to_string_lossy())));
+    let worst = report.verification.held_out.as_ref();
+    let worst = worst.and_then(|held_out| held_out.worst.as_ref());
+    HeadPart {
+        identification: headline::identification(report),
+        parts: Markup::from_text(&number.parts.join(" · ")),
+        number,
+        strip,
+        use_for: report.scope.iter().map(|s| Markup::from_text(s)).collect(),
+        not_for: (!report.not_for.is_empty())
+            .then(|| Markup::from_text(&format!("{}.", report.not_for.join("; ")))),
+        interval: Markup::from_text(&interval),
+        diagnosis: diagnosis(report).map(texts),
+        remarks: remarks
+            .map(|remark| RemarkPart {
+                word: match remark.effect {
+                    Effect::Rejects => "Rejected",
+                    Effect::LeavesOpen => "Open",
+                    Effect::Warns | Effect::Supports => "Warning",
+                },
+                text: Markup::from_text(&remark.text),
+                remedy: Markup::from_text(&remark.remedy),
+                place: if has(remark.place) {
+                    remark.place
+                } else {
+                    "verdict"
+                },
+            })
+            .collect(),
+        next: command.map(|c| Markup::from_text(&format!("In the folder of the results: `{c}`"))),
+        worst: worst.and_then(headline::largest).unwrap_or_default(),
+    }
+}
+
 fn section_parts(report: &Report) -> Vec<SectionPart> {
     let plots = plots(report);
     let plots_of = |id: &str| {
-        plots
-            .iter()
-            .filter(|plot| plot.section == id)
-            .map(|plot| PlotPart {
-                id: plot.id.clone(),
-                title: plot.title.clone(),
-                description: plot.description.clone(),
-                svg: Markup(svg(plot)),
-            })
-            .collect()
+        let own: Vec<_> = plots.iter().filter(|plot| plot.section == id).collect();
+        let part = |(i, plot): (usize, &&Plot)| PlotPart {
+            id: plot.id.clone(),
+            title: plot.title.clone(),
+            // Plots of a kind share one caption.
+            description: match own.get(i + 1) {
+                Some(next) if next.description == plot.description => String::new(),
+                _ => plot.description.clone(),
+            },
+            svg: Markup(svg(plot)),
+        };
+        own.iter().enumerate().map(part).collect()
     };
     let part = |(i, section): (usize, crate::sections::Section)| {
         let title = if i == 0 {
@@ -193,18 +281,7 @@ fn block_part(block: Block, title: &str) -> BlockPart {
             )
         }
         Block::Table(caption, table) => {
-            let class = |align: Align| if align == Align::Right { "n" } else { "" };
-            let aligns: Vec<Align> = table.heads().iter().map(|head| head.1).collect();
-            let row = |cells: &Vec<String>| {
-                cells
-                    .iter()
-                    .zip(&aligns)
-                    .map(|(text, align)| Cell {
-                        class: class(*align),
-                        text: Markup::from_text(text),
-                    })
-                    .collect()
-            };
+            let (heads, rows) = cells(&table);
             BlockPart::Table {
                 label: if caption.is_empty() {
                     title.to_owned()
@@ -212,15 +289,16 @@ fn block_part(block: Block, title: &str) -> BlockPart {
                     caption.replace('`', "")
                 },
                 caption: Markup::from_text(caption.trim_end_matches(':')),
-                heads: table
-                    .heads()
-                    .iter()
-                    .map(|(text, align)| Cell {
-                        class: class(*align),
-                        text: Markup::from_text(text),
-                    })
-                    .collect(),
-                rows: table.rows().iter().map(row).collect(),
+                heads,
+                rows,
+            }
+        }
+        Block::Folded(summary, table) => {
+            let (heads, rows) = cells(&table);
+            BlockPart::Folded {
+                summary: Markup::from_text(&summary),
+                heads,
+                rows,
             }
         }
         Block::Code("diff", text) => {
@@ -237,6 +315,22 @@ fn block_part(block: Block, title: &str) -> BlockPart {
         }
         Block::Code(_, text) => BlockPart::Code(text),
     }
+}
+
+/// Heads and rows of a table.
+fn cells(table: &Table) -> (Vec<Cell>, Vec<Vec<Cell>>) {
+    let class = |align: Align| if align == Align::Right { "n" } else { "" };
+    let cell = |(text, align): (&String, Align)| Cell {
+        class: class(align),
+        text: Markup::from_text(text),
+    };
+    let heads = table.heads().iter();
+    let aligns: Vec<Align> = heads.clone().map(|head| head.1).collect();
+    let row = |texts: &Vec<String>| texts.iter().zip(aligns.clone()).map(cell).collect();
+    (
+        heads.map(|(text, align)| cell((text, *align))).collect(),
+        table.rows().iter().map(row).collect(),
+    )
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //!
 //! Twelve digits are a picometer in a meter: finer than optimizers repeat across machines and finer than measurements.
 
-use crate::{Report, ReportError, Selection};
+use crate::{DataChecks, Report, ReportError, Selection};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -26,6 +26,17 @@ pub fn selection_json(selection: &Selection) -> Result<String, ReportError> {
     serde_json::from_value::<Selection>(value.clone())
         .map_err(|source| ReportError::NotFinite(source.to_string()))?;
     Ok(pretty(&value))
+}
+
+/// What was checked of recordings.
+///
+/// # Errors
+/// As [`report_json`].
+pub fn checks_json(checks: &DataChecks) -> Result<String, ReportError> {
+    let value = rounded(to_value(checks)?);
+    serde_json::from_value::<DataChecks>(value.clone())
+        .map_err(|source| ReportError::NotFinite(source.to_string()))?;
+    Ok(pretty(&value) + "\n")
 }
 
 /// The value behind [`report_json`].

@@ -21,13 +21,16 @@
 //! What this crate does **not** protect against: a report that was filled with wrong data. It reads no clock and takes no
 //! absolute path: the caller passes paths relative to the profile. The same report gives the same bytes.
 
+mod check;
 pub mod csv;
 mod data;
+mod diagnosis;
 mod error;
 mod facts;
 pub mod glb;
 mod held_out;
 pub mod html;
+mod identification;
 pub mod json;
 pub mod markdown;
 pub mod number;
@@ -37,6 +40,7 @@ mod read;
 mod report;
 mod residuals;
 mod results;
+mod robot_change;
 pub mod robot_model;
 pub mod scene;
 mod schema;
@@ -52,17 +56,20 @@ mod weak;
 mod words;
 
 pub use calib_finding::{Finding, Severity, Unit};
+pub use check::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck, DataChecks};
 pub use data::{
     AccuracyLimit, Clock, Fates, FitSummary, Input, JointCoverage, Lost, Noise, NoiseCandidate,
     NoiseChoice, Output, RecordingSummary, RecordingUse, Rejected, RejectedFor, Workspace,
     WorkspacePoint,
 };
+pub use diagnosis::Diagnosis;
 pub use error::ReportError;
 pub use facts::{
     ClockCheck, ErrorSource, FitEnd, MissingPhysics, NextStep, NoiseKind, NoiseModel, Physics,
     Scope,
 };
 pub use held_out::{Distance, ExpectedError, HeldOut, OrientationErrors, PoseError, screen};
+pub use identification::Identification;
 pub use quantity::JointValue;
 pub use read::{NotAReport, REPORT, read_report, report_path};
 pub use report::{FormatVersion, Limit, Limited, Method, Outcome, Report, Verdict};
@@ -71,6 +78,7 @@ pub use results::{
     Cause, Change, Class, DataInformation, EstimatorResult, Meaning, NotObservable, Parameter,
     Quantity, Status, Term, Transform, Unobservable,
 };
+pub use robot_change::RobotChange;
 pub use scene::Scene;
 pub use schema::{model_schema, report_schema, scene_schema};
 pub use selection::{

@@ -34,7 +34,9 @@ fn markdown_of(block: &Block) -> String {
             })
             .collect(),
         Block::Table(caption, table) if caption.is_empty() => table.markdown(),
-        Block::Table(caption, table) => format!("{}\n\n{}", markup_free(caption), table.markdown()),
+        Block::Table(caption, table) | Block::Folded(caption, table) => {
+            format!("{}\n\n{}", markup_free(caption), table.markdown())
+        }
         Block::Code(language, text) => {
             // A fence longer than any run of backticks in the text.
             let longest = text.split(|c| c != '`').map(str::len).max().unwrap_or(0);

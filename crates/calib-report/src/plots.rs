@@ -1,6 +1,6 @@
 //! The plots of `report.html` as data: every plotted number, in the unit of its axis.
 
-use crate::{Change, JointResiduals, Report, ResidualGroup, Unit, number};
+use crate::{JointResiduals, Report, ResidualGroup, RobotChange, Unit, number};
 use serde::Serialize;
 
 /// A plot.
@@ -113,9 +113,6 @@ pub struct Panel {
 /// Rows in one plot: more are not readable.
 const ROWS: usize = 40;
 
-/// Half width of an error bar in standard deviations: about 95 %.
-const SIGMAS: f64 = 2.0;
-
 /// All plots of a report, in the order of the page.
 #[must_use]
 pub fn plots(report: &Report) -> Vec<Plot> {
@@ -205,49 +202,38 @@ fn held_out(plots: &mut Vec<Plot>, report: &Report) {
     }
 }
 
+/// Changes in units of their σ: hundredths of a millimeter and degrees on one axis.
 fn changes(plots: &mut Vec<Plot>, report: &Report) {
-    for (unit, id, title) in [
-        (Unit::Meter, "plot-changes-length", "Changed lengths"),
-        (Unit::Radian, "plot-changes-angle", "Changed angles"),
-    ] {
-        let scale = if unit == Unit::Meter {
-            1e3
-        } else {
-            180.0 / std::f64::consts::PI
-        };
-        let row = |change: &Change| {
-            let delta = change.delta?;
-            let reach = change
-                .sigma
-                .filter(|sigma| sigma.is_finite())
-                .map(|sigma| SIGMAS * sigma);
-            Some(PlotRow {
-                label: format!("{} {}", change.joint, change.what),
-                mark: Some(delta * scale),
-                whisker: reach.map(|reach| [(delta - reach) * scale, (delta + reach) * scale]),
-                text: number::change(delta, change.sigma, unit),
-                ..PlotRow::default()
-            })
-        };
-        let rows: Vec<PlotRow> = report
-            .changes
-            .iter()
-            .filter(|change| change.unit == unit)
-            .filter_map(row)
-            .take(ROWS)
-            .collect();
-        if !rows.is_empty() {
-            let axis = format!("change [{}]", number::unit_name(unit));
-            plots.push(Plot {
-                id: id.into(),
-                section: "changes",
-                title: title.into(),
-                description:
-                    "Dot: change; line: ± 2 σ. A change whose line crosses zero is not significant."
-                        .into(),
-                kind: PlotKind::Rows { axis, rows },
-            });
-        }
+    let all = [
+        report.robot_changes.clone(),
+        crate::words::robot::effects(report),
+    ]
+    .concat();
+    let all = RobotChange::sorted(all);
+    let row = |change: &RobotChange| {
+        let z = change.significance()?;
+        let signed = z.copysign(change.change.unwrap_or(0.0));
+        Some(PlotRow {
+            label: change.name.clone(),
+            bar: Some(signed),
+            text: number::change(change.change?, change.sigma, change.unit),
+            ..PlotRow::default()
+        })
+    };
+    let measured = all.iter().filter(|change| change.measured);
+    let rows: Vec<PlotRow> = measured.filter_map(row).take(ROWS).collect();
+    if !rows.is_empty() {
+        plots.push(Plot {
+            id: "plot-changes".into(),
+            section: "changes",
+            title: "Changes in standard deviations".into(),
+            description: "Bar: change divided by its σ; beyond ± 2.6 it is significant (99 %)."
+                .into(),
+            kind: PlotKind::Rows {
+                axis: "change / σ".into(),
+                rows,
+            },
+        });
     }
 }
 

@@ -1,9 +1,9 @@
 use crate::verdict::{Effect, Judgment, Reason, ReasonId};
 use crate::{
-    AccuracyLimit, Change, Clock, DataInformation, EstimatorResult, Finding, FitSummary, Input,
-    JointCoverage, LoopClosure, Noise, NoiseChoice, NotObservable, Output, Parameter,
-    RecordingSummary, Rejected, Residuals, Selection, Transform, Unit, Verification,
-    WeakDirections, Workspace,
+    AccuracyLimit, Change, Clock, DataInformation, Diagnosis, EstimatorResult, Finding, FitSummary,
+    Identification, Input, JointCoverage, LoopClosure, Noise, NoiseChoice, NotObservable, Output,
+    Parameter, RecordingSummary, Rejected, Residuals, RobotChange, Selection, Transform, Unit,
+    Verification, WeakDirections, Workspace,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -19,6 +19,9 @@ pub struct Report {
     pub profile: String,
     /// The robot's name.
     pub robot: String,
+    /// What was measured, by whom, when and with what, as the profile states it.
+    #[serde(default)]
+    pub identification: Identification,
     /// The solution method.
     pub method: Method,
     /// Whether the result may be used.
@@ -34,6 +37,12 @@ pub struct Report {
     /// What the verdict is valid for: one sentence each (tool point, joint ranges, load).
     #[serde(default)]
     pub scope: Vec<String>,
+    /// What it must not be used for: one phrase each.
+    #[serde(default)]
+    pub not_for: Vec<String>,
+    /// Why the result was not accepted, as far as the facts say it; null where it was.
+    #[serde(default)]
+    pub diagnosis: Option<Diagnosis>,
     /// The limits of the profile and whether they were met.
     #[serde(default)]
     pub limits: Vec<Limit>,
@@ -44,6 +53,9 @@ pub struct Report {
     pub transforms: Vec<Transform>,
     /// Every scalar unknown.
     pub parameters: Vec<Parameter>,
+    /// What changed of the robot itself, in numbers that no choice of frames changes; the most significant first.
+    #[serde(default)]
+    pub robot_changes: Vec<RobotChange>,
     /// The changed values of the URDF, one entry each.
     #[serde(default)]
     pub changes: Vec<Change>,
@@ -123,12 +135,16 @@ impl Report {
     #[must_use]
     pub fn judged(self, judgment: Judgment) -> Self {
         let reasons = &judgment.reasons;
-        Self {
+        let judged = Self {
             verdict: judgment.verdict,
             reasons: reasons.iter().map(Reason::sentence).collect(),
             reason_ids: reasons.iter().map(|reason| reason.id).collect(),
             reason_facts: judgment.reasons,
             ..self
+        };
+        Self {
+            diagnosis: Diagnosis::of(&judged),
+            ..judged
         }
     }
 

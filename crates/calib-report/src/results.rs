@@ -205,6 +205,8 @@ pub enum Class {
     Weak,
     /// Determined by the prior alone.
     Prior,
+    /// An arbitrary convention: no prediction depends on the value.
+    Convention,
     /// Not identifiable.
     #[default]
     NotObservable,

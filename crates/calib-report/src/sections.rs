@@ -29,6 +29,8 @@ pub(crate) enum Block {
     List(Vec<(String, String)>),
     /// A table under its caption; the caption may be empty.
     Table(String, Table),
+    /// A table that a page shows on request, under its summary.
+    Folded(String, Table),
     /// Language and text.
     Code(&'static str, String),
 }
@@ -48,6 +50,7 @@ pub(crate) fn sections(report: &Report) -> Vec<Section> {
     evidence::residuals(&mut page, report);
     weak::directions(&mut page, report);
     evidence::accuracy(&mut page, report);
+    robot::urdf(&mut page, report);
     robot::parameters(&mut page, report);
     evidence::files(&mut page, report);
     page.0
@@ -88,6 +91,15 @@ impl Page {
         if !table.is_empty() {
             self.push(Block::Table(
                 caption.to_owned(),
+                table.without_empty_columns(),
+            ));
+        }
+    }
+
+    fn folded(&mut self, summary: &str, table: Table) {
+        if !table.is_empty() {
+            self.push(Block::Folded(
+                summary.to_owned(),
                 table.without_empty_columns(),
             ));
         }

@@ -2,6 +2,9 @@
 
 mod kinds;
 mod scale;
+mod strip;
+
+pub(crate) use strip::strip;
 
 use crate::plots::{Plot, PlotKind};
 use std::fmt::Write;

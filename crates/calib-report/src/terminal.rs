@@ -1,15 +1,20 @@
-//! The summary for a terminal: the verdict, its numbers, what is not observable. At most 80 columns.
+//! What a terminal shows: a summary of at most 20 lines, everything, or one line.
+
+mod check;
+mod look;
+mod short;
+
+pub use check::data_checks;
+pub use look::{Look, Places};
 
 use crate::table::{Table, markup_free, wrap};
 use crate::words;
 use crate::words::answers::answers_in;
 use crate::words::prose::{full_stop, sentence};
-use crate::{Class, Outcome, Report, Selection, Severity, Unit, Verdict, number};
+use crate::{Outcome, Report, RobotChange, Selection, Severity, Unit, number};
 use anstyle::{AnsiColor, Style};
 use calib_finding::catalog;
-
-/// Columns of the narrowest terminal in use.
-const COLUMNS: usize = 80;
+use look::{COLUMNS, painted};
 
 /// Text wrapped to the width of a terminal; `first` precedes the first line, `rest` the others.
 #[must_use]
@@ -17,15 +22,27 @@ pub fn wrapped(text: &str, first: &str, rest: &str) -> String {
     wrap(text, COLUMNS, first, rest)
 }
 
-/// The summary; `color` adds ANSI styles (the caller checks what the terminal supports).
+/// At most 20 lines, the verdict and the report's path last.
 #[must_use]
-pub fn summary(report: &Report, color: bool) -> String {
+pub fn summary(report: &Report, look: Look, places: Places<'_>) -> String {
+    short::summary(report, look, places)
+}
+
+/// One line: verdict, robot, error, report.
+#[must_use]
+pub fn line(report: &Report, look: Look, places: Places<'_>) -> String {
+    short::line(report, look, places)
+}
+
+/// Everything that a terminal can show of a report; what [`summary`] shows comes last.
+#[must_use]
+pub fn full(report: &Report, look: Look, places: Places<'_>) -> String {
     let mut screen = Screen {
         report,
-        color,
+        look,
         text: String::new(),
     };
-    screen.verdict();
+    screen.scope();
     screen.limits();
     screen.held_out();
     if let Some(choice) = &report.selection {
@@ -37,7 +54,10 @@ pub fn summary(report: &Report, color: bool) -> String {
     screen.answers();
     screen.findings();
     screen.files();
-    screen.text
+    screen.remarks();
+    screen.heading("Summary");
+    screen.text += &short::summary(report, look, places);
+    screen.text.trim_start().to_owned()
 }
 
 /// How a model was chosen, at most 80 columns.
@@ -70,20 +90,16 @@ pub fn selection(selection: &Selection) -> String {
     text
 }
 
-/// A summary that is being written.
+/// A text that is being written.
 struct Screen<'a> {
     report: &'a Report,
-    color: bool,
+    look: Look,
     text: String,
 }
 
 impl Screen<'_> {
     fn paint(&self, style: Style, text: &str) -> String {
-        if self.color {
-            format!("{style}{text}{style:#}")
-        } else {
-            text.to_owned()
-        }
+        painted(self.look, style, text)
     }
 
     fn heading(&mut self, text: &str) {
@@ -91,32 +107,18 @@ impl Screen<'_> {
         self.text += &format!("\n{title}\n");
     }
 
-    /// What was calibrated, the verdict, its reasons, and what it holds for.
-    fn verdict(&mut self) {
-        self.text = wrap(
-            &format!(
-                "calib {} · {} · {} · method {}",
-                self.report.version,
-                self.report.robot,
-                self.report.profile,
-                self.report.method.name()
-            ),
-            COLUMNS,
-            "",
-            "  ",
-        );
-
-        self.text += &self.paint(
-            verdict_style(self.report.verdict),
-            &self.report.verdict_line().to_uppercase(),
-        );
-        self.text.push('\n');
-        // The table of limits already lists what was met.
-        for reason in self.report.objections() {
-            self.text += &wrap(&sentence(reason), COLUMNS, "- ", "  ");
+    /// What it holds for.
+    fn scope(&mut self) {
+        if self.report.scope.is_empty() {
+            return;
         }
+        self.heading("Valid for");
         for scope in &self.report.scope {
-            self.text += &wrap(&full_stop(scope), COLUMNS, "  valid for: ", "             ");
+            self.text += &wrap(&full_stop(scope), self.look.columns, "  - ", "    ");
+        }
+        if !self.report.not_for.is_empty() {
+            let not = format!("Not for: {}.", self.report.not_for.join("; "));
+            self.text += &wrap(&not, self.look.columns, "  - ", "    ");
         }
     }
 
@@ -136,7 +138,7 @@ impl Screen<'_> {
                 number::plain(limit.limit, limit.unit),
             ]);
         }
-        self.text += &table.plain(COLUMNS);
+        self.text += &table.plain(self.look.columns);
         for limit in self
             .report
             .limits
@@ -145,7 +147,7 @@ impl Screen<'_> {
         {
             self.text += &wrap(
                 &format!("{}: {}", limit.name, limit.reason),
-                COLUMNS,
+                self.look.columns,
                 "  ",
                 "    ",
             );
@@ -172,9 +174,9 @@ impl Screen<'_> {
                 .map(|m| number::bare(m, Unit::Meter));
             table.row([name.to_owned()].into_iter().chain(cells));
         }
-        self.text += &table.plain(COLUMNS);
+        self.text += &table.plain(self.look.columns);
         for line in words::held_out::expected_lines(held_out) {
-            self.text += &wrap(&line, COLUMNS, "  ", "  ");
+            self.text += &wrap(&line, self.look.columns, "  ", "  ");
         }
         if let Some(angle) = held_out.orientation.and_then(|o| o.calibrated) {
             let line = format!(
@@ -182,7 +184,7 @@ impl Screen<'_> {
                 number::plain(angle.rms_rad, Unit::Radian),
                 number::plain(angle.max_rad, Unit::Radian)
             );
-            self.text += &wrap(&line, COLUMNS, "  ", "  ");
+            self.text += &wrap(&line, self.look.columns, "  ", "  ");
         }
     }
 
@@ -211,45 +213,30 @@ impl Screen<'_> {
                 status.to_owned(),
             ]);
         }
-        self.text += &table.plain(COLUMNS);
+        self.text += &table.plain(self.look.columns);
     }
 
-    /// Numbers of the URDF that changed.
+    /// What changed of the robot itself.
     fn changes(&mut self) {
-        if self.report.changes.is_empty() {
+        let effects = words::robot::effects(self.report);
+        let all = [self.report.robot_changes.clone(), effects].concat();
+        let all: Vec<_> = RobotChange::sorted(all)
+            .into_iter()
+            .filter(|c| c.measured)
+            .collect();
+        if all.is_empty() {
             return;
         }
-        let weak = self
-            .report
-            .parameters
-            .iter()
-            .filter(|parameter| parameter.class != Class::Solid)
-            .count();
-        self.heading(&format!(
-            "URDF: {} values changed",
-            self.report.changes.len()
-        ));
-        let mut table = Table::new(&["<", "<", ">change", ">data share"]);
-        for change in self.report.changes.iter().take(CHANGES) {
-            let delta = change.delta.map_or_else(
-                || "added".to_owned(),
-                |delta| number::change(delta, change.sigma, change.unit),
-            );
-            let share = change.data_share.map_or_else(String::new, number::percent);
-            table.row([change.joint.clone(), change.what.clone(), delta, share]);
+        self.heading("What changed");
+        let mut table = Table::new(&["<", ">nominal", ">calibrated ± σ", ">change"]);
+        for change in all.iter().take(CHANGES) {
+            let [before, after] = words::robot::before_and_after(change);
+            let z = words::robot::significance(change);
+            table.row([change.text.clone(), before, after, z]);
         }
-        self.text += &table.plain(COLUMNS);
-        if self.report.changes.len() > CHANGES {
-            self.text += &format!(
-                "  … and {} more in the report.\n",
-                self.report.changes.len() - CHANGES
-            );
-        }
-        if weak > 0 {
-            self.text += &format!(
-                "  {weak} of {} parameters depend on their priors: see the report.\n",
-                self.report.parameters.len()
-            );
+        self.text += &table.plain(self.look.columns);
+        if all.len() > CHANGES {
+            self.text += &format!("  … and {} more in the report.\n", all.len() - CHANGES);
         }
     }
 
@@ -260,7 +247,7 @@ impl Screen<'_> {
             if let Some(answer) = all.iter().find(|answer| answer.id == id) {
                 self.heading(title);
                 for line in &answer.lines {
-                    self.text += &wrap(line, COLUMNS, "  ", "    ");
+                    self.text += &wrap(line, self.look.columns, "  ", "    ");
                 }
             }
         }
@@ -280,22 +267,28 @@ impl Screen<'_> {
                     Severity::Warning => AnsiColor::Yellow,
                     Severity::Info => AnsiColor::Cyan,
                 };
+                let columns = self.look.columns;
+                let (word, of) = (finding.severity.word(), &finding.subject);
                 let line = wrap(
-                    &format!(
-                        "{} {}: {} {}",
-                        finding.severity.word(),
-                        finding.subject,
-                        finding.text(),
-                        finding.remedy()
-                    ),
-                    COLUMNS,
+                    &format!("{word} {of}: {}", finding.text()),
+                    columns,
                     "  ",
                     "    ",
                 );
+                let remedy = wrap(&finding.remedy(), columns, "    ", "    ");
                 // Only the first word is colored: a color over several lines breaks pagers.
-                let word = finding.severity.word();
                 self.text += &line.replacen(word, &self.paint(style.on_default(), word), 1);
+                self.text += &remedy;
             }
+        }
+    }
+
+    /// Everything that speaks against the result.
+    fn remarks(&mut self) {
+        let lines = short::remark_lines(self.report, self.look);
+        if !lines.is_empty() {
+            self.heading("Against the result");
+            self.text += &(lines.join("\n") + "\n");
         }
     }
 
@@ -304,7 +297,7 @@ impl Screen<'_> {
         if !self.report.next_steps.is_empty() {
             self.heading("Next steps");
             for step in &self.report.next_steps {
-                self.text += &wrap(&sentence(step), COLUMNS, "  - ", "    ");
+                self.text += &wrap(&sentence(step), self.look.columns, "  - ", "    ");
             }
         }
         if !self.report.outputs.is_empty() {
@@ -313,22 +306,13 @@ impl Screen<'_> {
             for output in &self.report.outputs {
                 table.row([output.path.clone(), output.what.clone()]);
             }
-            self.text += &table.plain(COLUMNS);
+            self.text += &table.plain(self.look.columns);
         }
         for command in &self.report.undo {
-            self.text += &wrap(&format!("undo: {command}"), COLUMNS, "  ", "    ");
+            self.text += &wrap(&format!("undo: {command}"), self.look.columns, "  ", "    ");
         }
     }
 }
 
-/// Changes shown: a screen has 24 lines.
-const CHANGES: usize = 8;
-
-fn verdict_style(verdict: Verdict) -> Style {
-    match verdict {
-        Verdict::Accepted => AnsiColor::Green.on_default().bold(),
-        Verdict::AcceptedWithWarnings => AnsiColor::Yellow.on_default().bold(),
-        Verdict::Rejected => AnsiColor::Red.on_default().bold(),
-        Verdict::NotEvaluated => AnsiColor::Yellow.on_default().bold(),
-    }
-}
+/// Changes shown: more are in the report.
+const CHANGES: usize = 12;

@@ -4,9 +4,9 @@ mod outline;
 
 pub use outline::Outline;
 
-use crate::ReportError;
 use crate::json::{rounded_to, to_value};
 use crate::svg::Body;
+use crate::{ReportError, number};
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::Serialize;
 
@@ -228,6 +228,16 @@ impl View3d {
         view
     }
 
+    /// The same with this pose first; as it is where no pose has the name.
+    #[must_use]
+    pub fn beginning_with(mut self, pose: &str) -> Self {
+        if let Some(i) = self.poses.iter().position(|p| p.name == pose) {
+            let first = self.poses.remove(i);
+            self.poses.insert(0, first);
+        }
+        self
+    }
+
     /// JSON for a `<script type="application/json">` element: one line, no `<`.
     ///
     /// # Errors
@@ -251,12 +261,11 @@ impl View3d {
             let seen = pose.markers.iter().filter_map(|marker| marker.observed);
             pose.calibrated.iter().map(origin).chain(seen)
         });
-        let swept = self
-            .clouds
-            .iter()
-            .flat_map(|cloud| cloud.points.iter().copied());
-        // Axes that move with the robot do not enlarge the image.
-        let still = || self.axes.iter().filter(|axis| axis.frame.is_none());
+        // Sweeps and centers would make the robot small.
+        let bare = self.poses.is_empty();
+        let clouds: &[Cloud] = if bare { &self.clouds } else { &[] };
+        let swept = clouds.iter().flat_map(|cloud| cloud.points.iter().copied());
+        let still = || self.axes.iter().filter(|axis| bare && axis.frame.is_none());
         let axes = still().flat_map(|axis| [axis.end(-1.0), axis.end(1.0)]);
         let everything = robot.chain(swept).chain(axes);
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
@@ -277,7 +286,7 @@ impl View3d {
             [0, 1].map(|k| 0.5 * SIZE[k] + scale * (at[k] - 0.5 * (low[k] + high[k])))
         };
         let mut body = Body(String::new());
-        for cloud in &self.clouds {
+        for cloud in clouds {
             // The static image shows an impression of the sweep, not every point.
             for point in cloud
                 .points
@@ -287,10 +296,10 @@ impl View3d {
                 body.circle("dot", place(point), 1.2);
             }
         }
-        for sphere in &self.spheres {
+        for sphere in self.spheres.iter().filter(|_| bare) {
             body.circle("thin", place(&sphere.center), sphere.radius * scale);
         }
-        for circle in &self.circles {
+        for circle in self.circles.iter().filter(|_| bare) {
             let turn =
                 UnitQuaternion::rotation_between(&Vector3::z(), &Vector3::from(circle.normal))
                     .unwrap_or_default();
@@ -330,15 +339,37 @@ impl View3d {
                     }
                 }
             }
-            for observed in pose.markers.iter().filter_map(|marker| marker.observed) {
+            for marker in &pose.markers {
+                let Some(observed) = marker.observed else {
+                    continue;
+                };
                 body.circle("mark s3", place(&observed), 3.0);
+                let k = self.magnification;
+                let end = [0, 1, 2].map(|i| observed[i] + k * (marker.predicted[i] - observed[i]));
+                body.line("line error", place(&observed), place(&end));
             }
         }
+        let [left, bottom] = [16.0, SIZE[1] - 16.0];
+        let bar = round_length(90.0 / scale);
+        body.line("axis", [left, bottom], [left + bar * scale, bottom]);
+        body.text(
+            "tick",
+            left,
+            bottom - 6.0,
+            &number::plain(bar, crate::Unit::Meter),
+        );
         format!(
-            "<svg role=\"img\" viewBox=\"0 0 {} {}\" aria-label=\"The robot in its first pose: calibrated solid, nominal dashed, markers as dots\">{}</svg>",
+            "<svg role=\"img\" viewBox=\"0 0 {} {}\" aria-label=\"The robot in the pose with the largest error: calibrated solid, nominal dashed, markers as dots, errors as magnified lines\">{}</svg>",
             SIZE[0], SIZE[1], body.0
         )
     }
+}
+
+/// The largest of 1, 2, 5 × 10ⁿ m that is not above a length.
+fn round_length(m: f64) -> f64 {
+    let power = 10f64.powf(m.max(1e-6).log10().floor());
+    let digit = [5.0, 2.0].into_iter().find(|d| d * power <= m);
+    digit.unwrap_or(1.0) * power
 }
 
 fn isometry(row: &[f64; 7]) -> Isometry3<f64> {

@@ -13,14 +13,14 @@
   let size = 1, floor = 0, pose = 0, colors = {}, factor = view.magnification;
   const layers = [
     ["calibrated", "Calibrated", "s0", true], ["outlines", "Outlines", "soft", true], ["nominal", "Nominal", "s1", true], ["markers", "Markers", "s3", true],
-    ["residuals", "Errors", "bad", true], ["sweeps", "Sweeps", "soft", true], ["joints", "Spheres, circles, axes", "s2", true], ["names", "Names", "ink", false],
+    ["residuals", "Errors", "bad", true], ["sweeps", "Sweeps", "soft", false], ["joints", "Spheres, circles, axes", "s2", true], ["names", "Names", "ink", false],
   ];
   const shown = {};
 
   function places() {
     const all = [];
     for (const p of view.poses) { for (const row of p.calibrated) all.push(row); for (const m of p.markers) all.push(m.observed || m.predicted); }
-    for (const cloud of view.clouds) for (const point of cloud.points) all.push(point);
+    if (!all.length) for (const cloud of view.clouds) for (const point of cloud.points) all.push(point);
     return all;
   }
   function frameAll() {

@@ -18,7 +18,7 @@ pub struct Apply {
     /// File to change: a URDF, a xacro, or a kinematics YAML
     target: PathBuf,
     /// Write to this file, or to this folder if the xacro's YAML changes too
-    #[arg(long)]
+    #[arg(short, long)]
     out: Option<PathBuf>,
     /// Overwrite the target and write the change record for `calib revert` beside it
     #[arg(long)]

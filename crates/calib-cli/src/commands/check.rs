@@ -7,25 +7,25 @@ use calib_pipeline::check;
 use clap::Args;
 
 use crate::error::CliError;
-use crate::terminal::emit;
+use crate::terminal::{When, emit, look};
 
 /// Arguments of `calib check`.
 #[derive(Debug, Args)]
 pub struct Check {
     /// The robot's profile
     profile: PathBuf,
-    /// Print findings as JSON
+    /// Print JSON
     #[arg(long)]
     json: bool,
 }
 
 /// Prints what the checks found.
-pub fn run(options: &Check) -> Result<ExitCode, CliError> {
+pub fn run(color: When, options: &Check) -> Result<ExitCode, CliError> {
     let checked = check::check(&options.profile)?;
     emit(&if options.json {
-        checked.json()?
+        calib_report::json::checks_json(&checked)?
     } else {
-        checked.text()
+        calib_report::terminal::data_checks(&checked, look(color))
     });
-    Ok(checked.exit_code())
+    Ok(check::exit_code(&checked))
 }

@@ -8,7 +8,7 @@ use calib_recording::{ReadOptions, WriteOptions, read_path_with, write_recording
 use clap::Args;
 
 use crate::error::CliError;
-use crate::terminal::{byte_bar, emit_paths};
+use crate::terminal::{Console, byte_bar, emit_paths};
 
 /// Arguments of `calib convert`.
 #[derive(Debug, Args)]
@@ -23,8 +23,8 @@ pub struct Convert {
 }
 
 /// Converts, and prints the names of the tables.
-pub fn run(quiet: bool, options: &Convert) -> Result<ExitCode, CliError> {
-    let bar = byte_bar(quiet);
+pub fn run(console: &Console, options: &Convert) -> Result<ExitCode, CliError> {
+    let bar = byte_bar(console.quiet);
     let progress = &mut |read, all| {
         bar.set_length(all);
         bar.set_position(read);
@@ -35,7 +35,10 @@ pub fn run(quiet: bool, options: &Convert) -> Result<ExitCode, CliError> {
     for note in &converted.notes {
         eprintln!("calib: {note}");
     }
-    emit_paths(&write_new(&converted.folder, &converted.files)?);
+    emit_paths(
+        console.json,
+        &write_new(&converted.folder, &converted.files)?,
+    );
     Ok(ExitCode::Accepted)
 }
 

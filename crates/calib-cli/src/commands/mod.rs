@@ -23,18 +23,19 @@ use crate::error::CliError;
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
+    let console = &arguments.console;
     match &arguments.command {
-        Command::Run(options) => run::run(arguments.quiet, arguments.verbose, options),
-        Command::Check(options) => check::run(options),
-        Command::Simulate(options) => simulate::run(options),
+        Command::Run(options) => run::run(console, options),
+        Command::Check(options) => check::run(console.color, options),
+        Command::Simulate(options) => simulate::run(console, options),
         Command::Fit(options) => fit::run(options),
         Command::Apply(options) => apply::run(options),
         Command::Diff(options) => diff::run(options),
         Command::Drift(options) => drift::run(options),
-        Command::Revert(options) => revert::run(options),
-        Command::Study(options) => study::run(arguments.quiet, options),
-        Command::Record(options) => record::run(arguments.quiet, options),
-        Command::Convert(options) => convert::run(arguments.quiet, options),
+        Command::Revert(options) => revert::run(console, options),
+        Command::Study(options) => study::run(console.quiet, options),
+        Command::Record(options) => record::run(console.quiet, options),
+        Command::Convert(options) => convert::run(console, options),
         Command::Plugins(options) => plugins::run(options),
         Command::Schema(options) => schema::run(options),
         Command::Completions(options) => Ok(completions::run(options, &mut Arguments::command())),

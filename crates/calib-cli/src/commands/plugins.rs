@@ -37,7 +37,7 @@ enum Plugins {
         #[arg(long, default_value = "rust")]
         lang: String,
         /// Folder to create it in
-        #[arg(long, default_value = ".")]
+        #[arg(short, long, default_value = ".")]
         out: PathBuf,
     },
     /// Print the C header of the plugin interface, calib_plugin.h

@@ -6,7 +6,7 @@ use calib_pipeline::ExitCode;
 use clap::Args;
 
 use crate::error::CliError;
-use crate::terminal::emit_paths;
+use crate::terminal::{Console, emit_paths};
 
 /// Arguments of `calib revert`.
 #[derive(Debug, Args)]
@@ -14,7 +14,7 @@ pub struct Revert {
     /// The changed file, with its change record `<file>.changes.json` beside it
     file: PathBuf,
     /// Where to write the original
-    #[arg(long, required_unless_present = "in_place")]
+    #[arg(short, long, required_unless_present = "in_place")]
     out: Option<PathBuf>,
     /// Overwrite the changed file and remove the record
     #[arg(long, conflicts_with = "out")]
@@ -22,11 +22,11 @@ pub struct Revert {
 }
 
 /// Restores the original.
-pub fn run(options: &Revert) -> Result<ExitCode, CliError> {
+pub fn run(console: &Console, options: &Revert) -> Result<ExitCode, CliError> {
     let written = match &options.out {
         Some(out) => calib_apply::revert(&options.file, out)?,
         None => calib_apply::revert_in_place(&options.file)?,
     };
-    emit_paths(&[written]);
+    emit_paths(console.json, &[written]);
     Ok(ExitCode::Accepted)
 }

@@ -1,15 +1,15 @@
 //! `calib run`.
 
-use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
-use calib_files::{MANIFEST, write_results};
+use calib_files::write_results;
 use calib_pipeline::ExitCode;
 use calib_pipeline::run::{RunOptions, RunOutput, run as run_profile, select};
+use calib_report::terminal::{self, Places};
 use clap::{Args, ValueEnum};
 
 use crate::error::CliError;
-use crate::terminal::{emit, spinner};
+use crate::terminal::{Console, emit, emit_stage, look, spinner};
 
 /// Arguments of `calib run`.
 #[derive(Debug, Args)]
@@ -17,7 +17,7 @@ pub struct Run {
     /// The robot's profile
     pub profile: PathBuf,
     /// Folder to write to [default: results/PROFILE]
-    #[arg(long)]
+    #[arg(short, long)]
     pub out: Option<PathBuf>,
     /// Method to use instead of the profile's
     #[arg(long, value_enum)]
@@ -37,8 +37,11 @@ pub struct Run {
     /// Load no plugins
     #[arg(long)]
     pub no_plugins: bool,
-    /// Print the report as JSON instead of the summary
+    /// Print all tables, not only the summary
     #[arg(long)]
+    pub full: bool,
+    /// Print the report as JSON instead of the summary
+    #[arg(long, conflicts_with = "full")]
     pub json: bool,
 }
 
@@ -52,11 +55,13 @@ pub enum MethodName {
 }
 
 /// Calibrates, or compares models.
-pub fn run(quiet: bool, verbose: bool, options: &Run) -> Result<ExitCode, CliError> {
-    let bar = spinner(quiet);
+pub fn run(console: &Console, options: &Run) -> Result<ExitCode, CliError> {
+    let bar = spinner(console.quiet);
     let mut progress = |stage: &str| {
         bar.set_message(stage.to_owned());
-        if verbose {
+        if console.json && !console.quiet {
+            emit_stage(stage);
+        } else if console.verbose {
             eprintln!("calib: {stage}");
         }
     };
@@ -91,31 +96,38 @@ pub fn run(quiet: bool, verbose: bool, options: &Run) -> Result<ExitCode, CliErr
         .out
         .clone()
         .unwrap_or_else(|| default_folder(&options.profile));
-    let written = write_results(&out, &output.files)?;
+    write_results(&out, &output.files)?;
     bar.finish_and_clear();
-    show(&output, options.json)?;
-    if !options.json && !quiet {
-        // Their names stand in the summary.
-        let results = written
-            .iter()
-            .filter(|p| p.file_name().is_some_and(|n| n != MANIFEST));
-        emit(&format!(
-            "wrote {} files to {}\n",
-            results.count(),
-            out.display()
-        ));
-    }
+    show(console, options, (&output, &out))?;
     Ok(output.exit)
 }
 
-/// The report as JSON, or its summary.
-fn show(output: &RunOutput, json: bool) -> Result<(), CliError> {
-    if json {
+/// The report as JSON, one line of it, its summary, or all of it.
+fn show(
+    console: &Console,
+    options: &Run,
+    (output, out): (&RunOutput, &Path),
+) -> Result<(), CliError> {
+    if options.json {
         emit(&calib_report::json::report_json(&output.report)?);
         return Ok(());
     }
-    let color = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    emit(&calib_report::terminal::summary(&output.report, color));
+    let (folder, page) = (out.display().to_string(), out.join("report.html"));
+    let (profile, page) = (
+        options.profile.display().to_string(),
+        page.display().to_string(),
+    );
+    let places = Places {
+        profile: &profile,
+        folder: &folder,
+        page: &page,
+    };
+    let render = match (console.quiet, options.full) {
+        (true, _) => terminal::line,
+        (false, true) => terminal::full,
+        (false, false) => terminal::summary,
+    };
+    emit(&render(&output.report, look(console.color), places));
     Ok(())
 }
 

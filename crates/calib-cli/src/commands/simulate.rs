@@ -9,7 +9,7 @@ use calib_recording::WriteOptions;
 use clap::Args;
 
 use crate::error::CliError;
-use crate::terminal::emit_paths;
+use crate::terminal::{Console, emit_paths};
 
 /// Arguments of `calib simulate`.
 #[derive(Debug, Args)]
@@ -20,15 +20,15 @@ pub struct Simulate {
     #[arg(long)]
     seed: Option<u64>,
     /// Folder to write to
-    #[arg(long)]
+    #[arg(short, long)]
     out: PathBuf,
 }
 
 /// Simulates, and prints the names of the files.
-pub fn run(options: &Simulate) -> Result<ExitCode, CliError> {
+pub fn run(console: &Console, options: &Simulate) -> Result<ExitCode, CliError> {
     let robot = load_robot(&options.profile)?;
     let files = simulate(&robot, options.seed)?;
-    emit_paths(&write_results(&options.out, &files)?);
+    emit_paths(console.json, &write_results(&options.out, &files)?);
     Ok(ExitCode::Accepted)
 }
 

@@ -26,7 +26,7 @@ pub struct StudyRun {
     #[arg(long)]
     threads: Option<usize>,
     /// Folder for the tables and figures; an interrupted study continues there
-    #[arg(long)]
+    #[arg(short, long)]
     out: Option<PathBuf>,
     /// Profile for a case study [default: robots/justin.yaml or robots/ripley.yaml]
     #[arg(long)]

@@ -2,8 +2,8 @@
 
 use calib_profile::Method;
 use calib_report::{
-    HeldOut, Input, MissingPhysics, NextStep, Output, Report, Residuals, Scope, Verdict,
-    Verification, judge,
+    HeldOut, Identification, Input, MissingPhysics, NextStep, Output, Report, Residuals, Scope,
+    Verdict, Verification, judge,
 };
 
 use crate::formulate::formulation::MlFit;
@@ -17,7 +17,9 @@ use crate::output::of_fit::{
 use crate::output::verdict::{limits, next_steps, scope};
 use crate::output::weak::{self, weak_directions};
 use crate::verify::accuracy::{accuracy_limits, tracker_sigma, workspace};
+use crate::verify::information::data_information;
 use crate::verify::motions::motions;
+use crate::verify::robot_changes::robot_changes;
 
 /// The report of a run.
 #[must_use]
@@ -48,6 +50,8 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
     let judgment = judge(&facts(e, &findings, &limits, &motions, &tracks));
     let verdict = judgment.verdict;
     let parameters = e.fit.map_or_else(Vec::new, parameters);
+    let scope = scope(e, &motions);
+    let information = e.fit.map(|fit| data_information(e.inputs, fit));
     let report = Report {
         profile: file.clone(),
         robot: profile.robot.clone(),
@@ -55,13 +59,19 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             Method::Paper => calib_report::Method::Paper,
             Method::Ml => calib_report::Method::Ml,
         },
-        scope: scope(e, &motions).iter().map(Scope::sentence).collect(),
+        identification: identification(e),
+        scope: scope.iter().map(Scope::sentence).collect(),
+        not_for: scope.iter().filter_map(Scope::excluded).collect(),
         limits,
         next_steps: next_steps(e, verdict, &missing)
             .iter()
             .map(NextStep::sentence)
             .collect(),
         transforms: e.found.iter().map(transform).collect(),
+        robot_changes: e
+            .fit
+            .zip(information.as_ref())
+            .map_or_else(Vec::new, |(fit, of)| robot_changes(e.inputs, fit, of)),
         changes: e.urdf.changes.clone(),
         urdf_diff: e.urdf.diff.clone(),
         not_observable: e.fit.map_or_else(Vec::new, not_observable),
@@ -92,7 +102,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         coverage: coverage(e.inputs),
         rejected: rejected(e.inputs, e.fit, e.held_out.as_ref()),
         accuracy_limits: e.fit.map_or_else(Vec::new, |fit| {
-            accuracy_limits(e.inputs, e.held_out.as_ref(), fit, workspace.as_ref())
+            accuracy_limits(e.inputs, e.held_out.as_ref(), fit)
         }),
         weak_directions: weak,
         selection: e.selection.clone(),
@@ -114,9 +124,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             profile.outputs.urdf
         )],
         seed: 0,
-        data_information: e
-            .fit
-            .map(|fit| crate::verify::information::data_information(e.inputs, fit)),
+        data_information: information,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         ..Report::default()
     };
@@ -132,14 +140,27 @@ fn held_out(e: &Evidence<'_>) -> Option<HeldOut> {
     Some(held_out)
 }
 
-/// The command that gives this report again, with the method where it is not the profile's.
+/// The command that gives this report again in the folder of the profile, with the method where it is not the profile's.
 fn reproduce(e: &Evidence<'_>) -> String {
-    let file = &e.inputs.robot.file;
-    match e.method {
-        _ if e.selection.is_some() => format!("calib run {file} --select"),
-        method if method == e.inputs.robot.profile.solve.method => format!("calib run {file}"),
-        Method::Paper => format!("calib run {file} --method paper"),
-        Method::Ml => format!("calib run {file} --method ml"),
+    let own = e.method == e.inputs.robot.profile.solve.method || e.selection.is_some();
+    let method = match e.method {
+        _ if own => None,
+        Method::Paper => Some("--method paper"),
+        Method::Ml => Some("--method ml"),
+    };
+    let words = ["calib run", &e.inputs.robot.file].into_iter();
+    let words = words.chain(method).chain(e.arguments.iter().copied());
+    words.collect::<Vec<_>>().join(" ")
+}
+
+/// What the profile says of the measurement.
+fn identification(e: &Evidence<'_>) -> Identification {
+    let stated = &e.inputs.robot.profile.identification;
+    Identification {
+        serial_number: stated.serial_number.clone(),
+        operator: stated.operator.clone(),
+        date: stated.date.clone(),
+        tracker: stated.tracker.clone(),
     }
 }
 

@@ -47,6 +47,8 @@ pub struct Evidence<'a> {
     pub residuals: &'a [ResidualRow],
     /// How the model was chosen, where it was.
     pub selection: Option<Selection>,
+    /// Options of the run that are not the profile's, as arguments.
+    pub arguments: Vec<&'static str>,
 }
 
 /// How the solver ended.

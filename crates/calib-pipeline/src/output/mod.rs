@@ -8,7 +8,7 @@ pub mod export;
 mod facts;
 pub(crate) mod files;
 pub mod model_file;
-mod of_data;
+pub(crate) mod of_data;
 mod of_fit;
 mod open;
 mod points;

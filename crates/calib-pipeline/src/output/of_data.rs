@@ -25,11 +25,7 @@ pub(crate) fn recordings(inputs: &Inputs, tracks: &Tracks) -> Vec<RecordingSumma
         out.push(RecordingSummary {
             name: name.clone(),
             path: r.spec.file.clone(),
-            used_for: match r.spec.usage {
-                Usage::Sweep => RecordingUse::Sweep,
-                Usage::Static => RecordingUse::Static,
-                Usage::Validation => RecordingUse::Validation,
-            },
+            used_for: used_for(r.spec.usage),
             rows: rows.of,
             used: rows.used,
             rejected: rows.rejected,
@@ -44,8 +40,17 @@ pub(crate) fn recordings(inputs: &Inputs, tracks: &Tracks) -> Vec<RecordingSumma
     out
 }
 
+/// What a recording is used for.
+pub(crate) fn used_for(usage: Usage) -> RecordingUse {
+    match usage {
+        Usage::Sweep => RecordingUse::Sweep,
+        Usage::Static => RecordingUse::Static,
+        Usage::Validation => RecordingUse::Validation,
+    }
+}
+
 /// Samples that the tracker did not see, by marker and body of the file; what was excluded had been seen.
-fn lost(inputs: &Inputs, recording: &str) -> Vec<Lost> {
+pub(crate) fn lost(inputs: &Inputs, recording: &str) -> Vec<Lost> {
     let poses = &inputs.recordings[recording].poses;
     let markers = poses.markers.iter().map(|(name, track)| {
         let seen: Vec<bool> = track.iter().map(Option::is_some).collect();

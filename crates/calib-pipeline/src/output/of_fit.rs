@@ -1,5 +1,7 @@
 //! The fit as the report's data.
 
+use std::collections::BTreeSet;
+
 use calib_core::{Gauge, NoiseKind};
 use calib_geometry::statistics::median;
 use calib_profile::Profile;
@@ -42,6 +44,7 @@ pub(crate) fn parameters(fit: &MlFit) -> Vec<Parameter> {
         .enumerate()
         .filter(|(i, _)| !held(*i));
     let robust = fit.solution.cluster_robust_sigmas().unwrap_or_default();
+    let conventions = conventions(fit);
     all.map(|(i, p)| Parameter {
         name: p.name.clone(),
         joint: p.joint.clone(),
@@ -63,10 +66,27 @@ pub(crate) fn parameters(fit: &MlFit) -> Vec<Parameter> {
             calib_core::ParameterClass::Solid => calib_report::Class::Solid,
             calib_core::ParameterClass::Weak => calib_report::Class::Weak,
             calib_core::ParameterClass::Prior => calib_report::Class::Prior,
+            calib_core::ParameterClass::NotObservable if conventions.contains(&i) => {
+                calib_report::Class::Convention
+            }
             calib_core::ParameterClass::NotObservable => calib_report::Class::NotObservable,
         },
     })
     .collect()
+}
+
+/// Parameters whose values no prediction depends on: every combination that leaves them open is a convention.
+fn conventions(fit: &MlFit) -> BTreeSet<usize> {
+    let observability = &fit.solution.observability;
+    let of = |convention: bool| -> BTreeSet<usize> {
+        let directions = observability.null.iter();
+        let of = directions.filter(|d| {
+            (cause(d.gauge).meaning() == calib_report::Meaning::Convention) == convention
+        });
+        of.flat_map(|d| d.terms.iter().map(|t| t.parameter.index()))
+            .collect()
+    };
+    &of(true) - &of(false)
 }
 
 pub(crate) fn not_observable(fit: &MlFit) -> Vec<NotObservable> {

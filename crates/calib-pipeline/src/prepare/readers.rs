@@ -42,9 +42,15 @@ pub fn built_in_reports() -> Vec<Entry<dyn calib_plugin::ReportWriter>> {
             "report.html",
             |r| calib_report::html::html(r, None),
         ),
-        ("summary", "what the terminal shows", "summary.txt", |r| {
-            Ok(calib_report::terminal::summary(r, false))
-        }),
+        (
+            "summary",
+            "what the terminal shows in full",
+            "summary.txt",
+            |r| {
+                use calib_report::terminal::{Look, Places, full};
+                Ok(full(r, Look::default(), Places::default()))
+            },
+        ),
     ];
     writers
         .into_iter()

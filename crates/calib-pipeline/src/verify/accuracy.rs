@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use calib_core::effect::Source;
 use calib_core::{Configuration, EffectKind, GroupId, NoiseKind};
 use calib_geometry::so3;
-use calib_profile::{BodyKind, Usage};
-use calib_report::{AccuracyLimit, ErrorSource, HeldOut, Workspace, WorkspacePoint};
+use calib_profile::{Body, BodyKind, Usage};
+use calib_report::{AccuracyLimit, ErrorSource, HeldOut, PoseError, Workspace, WorkspacePoint};
 use calib_urdf::LinkId;
 use nalgebra::Matrix6;
 
@@ -113,19 +113,19 @@ fn noise_level(fit: &MlFit, group: Option<GroupId>) -> Option<f64> {
     Some(level.sigma)
 }
 
-/// What a tool error on a new pose is made of: rms over the held-out poses, in meters.
+/// What a held-out error is made of: rms over the bodies and postures that were held out, in meters.
 pub(crate) fn accuracy_limits(
     inputs: &Inputs,
     held_out: Option<&HeldOut>,
     fit: &MlFit,
-    workspace: Option<&Workspace>,
 ) -> Vec<AccuracyLimit> {
-    let Some(measured) = held_out.and_then(|h| h.calibrated) else {
+    let Some((held_out, measured)) = held_out.and_then(|h| Some((h, h.calibrated?))) else {
         return Vec::new();
     };
-    let parameters = workspace.map_or(0.0, |w| w.rms_sigma_m);
+    let of_errors = OfErrors::of(inputs, held_out, fit);
+    let parameters = of_errors.parameters;
     let tracker = tracker_sigma(fit).unwrap_or(0.0);
-    let joints = fit.joint_sigma().unwrap_or(0.0) * joint_lever(inputs);
+    let joints = fit.joint_sigma().unwrap_or(0.0) * of_errors.lever;
     let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
     let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
     let total = explained + rest.powi(2);
@@ -147,6 +147,93 @@ pub(crate) fn accuracy_limits(
     .into();
     limits.sort_by(|a, b| b.share.unwrap_or(0.0).total_cmp(&a.share.unwrap_or(0.0)));
     limits
+}
+
+/// Held-out errors that are looked at, at most: more change nothing but the time.
+const ERRORS: usize = 120;
+
+/// What the joints and the parameters do to the bodies and in the postures that were held out.
+#[derive(Debug, Clone, Copy, Default)]
+struct OfErrors {
+    /// Root sum of squares over the joints of how far the body moves per radian, rms over the errors, m.
+    lever: f64,
+    /// σ of the body's predicted position, rms over the errors, m.
+    parameters: f64,
+}
+
+impl OfErrors {
+    fn of(inputs: &Inputs, held_out: &HeldOut, fit: &MlFit) -> Self {
+        let errors: Vec<&PoseError> = held_out.poses.iter().filter(|p| !p.screened).collect();
+        let step = errors.len().div_ceil(ERRORS).max(1);
+        let rows = rows_by_label(inputs);
+        let (mut levers, mut variances, mut n) = (0.0, 0.0, 0.0);
+        // Markers of one body and posture are alike.
+        let mut known: BTreeMap<(&String, &String), (f64, f64)> = BTreeMap::new();
+        for error in errors.into_iter().step_by(step) {
+            let of_body = body_of(inputs, &error.subject);
+            let (Some(q), Some((name, body))) = (rows.get(&error.pose), of_body) else {
+                continue;
+            };
+            let key = (&error.pose, name);
+            let (lever, variance) = *known.entry(key).or_insert_with(|| {
+                let variance = variance_of(inputs, fit, (name, body.link), q);
+                (squared_lever(inputs, body.link, q), variance)
+            });
+            levers += lever;
+            variances += variance;
+            n += 1.0;
+        }
+        let rms = |sum: f64| (sum / f64::max(n, 1.0)).sqrt();
+        Self {
+            lever: rms(levers),
+            parameters: rms(variances),
+        }
+    }
+}
+
+/// Joint positions by the labels of held-out poses.
+fn rows_by_label(inputs: &Inputs) -> BTreeMap<String, &Vec<f64>> {
+    let recordings = inputs.recordings.values();
+    let of_recording = recordings.flat_map(|r| {
+        let rows = r.poses.rows.iter().zip(&r.q);
+        rows.filter_map(|(row, q)| Some((format!("{}:{row}", r.name), q.as_ref()?)))
+    });
+    of_recording.collect()
+}
+
+/// The body that a held-out error is of: by its own name, or by a marker's.
+fn body_of<'a>(inputs: &'a Inputs, subject: &String) -> Option<(&'a String, &'a Body)> {
+    let mut bodies = inputs.robot.profile.bodies.iter();
+    bodies.find(|(name, body)| {
+        *name == subject
+            || matches!(&body.kind, BodyKind::Markers { names, .. } if names.contains(subject))
+    })
+}
+
+/// Variance of a body's position as the tracker sees it, by the parameters alone, m².
+fn variance_of(inputs: &Inputs, fit: &MlFit, (name, link): (&String, LinkId), q: &[f64]) -> f64 {
+    let of_body = fit.formulation.bodies.get(name).copied();
+    let Some(target) = of_body.or(fit.formulation.links[link.index()]) else {
+        return 0.0;
+    };
+    let at = configuration(inputs, fit, q);
+    let seen = fit
+        .solution
+        .relative_pose(fit.formulation.tracker, target, &at);
+    let covariance = seen.ok().and_then(|seen| seen.covariance);
+    covariance.map_or(0.0, |c| c.fixed_view::<3, 3>(3, 3).trace().max(0.0))
+}
+
+/// Sum of squares over the joints of how far a link moves per radian, m².
+fn squared_lever(inputs: &Inputs, link: LinkId, q: &[f64]) -> f64 {
+    let model = &inputs.robot.model;
+    let columns = model.jacobian(q, link);
+    let turning = columns
+        .iter()
+        .filter(|(id, _)| model.joint(*id).kind.turns());
+    turning
+        .map(|(_, c)| c.fixed_rows::<3>(3).norm_squared())
+        .sum()
 }
 
 /// The body that the longest chain of joints carries.
@@ -215,30 +302,4 @@ pub(crate) fn tracker_sigma(fit: &MlFit) -> Option<f64> {
     let sigma =
         noise_level(fit, groups.marker).or_else(|| noise_level(fit, groups.body_position))?;
     Some(sigma * 3.0_f64.sqrt())
-}
-
-/// Root sum of squares over the joints of how far the tool moves per radian, rms over held-out poses, m.
-fn joint_lever(inputs: &Inputs) -> f64 {
-    let model = &inputs.robot.model;
-    let Some(tool) = tool_link(inputs) else {
-        return 0.0;
-    };
-    let rows: Vec<&Vec<f64>> = inputs
-        .recordings
-        .values()
-        .filter(|r| r.spec.usage == Usage::Validation)
-        .flat_map(|r| r.q.iter().flatten())
-        .collect();
-    let squares: f64 = rows
-        .iter()
-        .map(|q| {
-            let columns = model.jacobian(q, tool);
-            columns
-                .iter()
-                .filter(|(id, _)| model.joint(*id).kind.turns())
-                .map(|(_, c)| c.fixed_rows::<3>(3).norm_squared())
-                .sum::<f64>()
-        })
-        .sum();
-    (squares / rows.len().max(1) as f64).sqrt()
 }

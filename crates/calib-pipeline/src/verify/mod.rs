@@ -12,6 +12,7 @@ pub mod left_out;
 pub(crate) mod motions;
 pub mod moved;
 pub mod residuals;
+pub mod robot_changes;
 
 use std::collections::BTreeMap;
 

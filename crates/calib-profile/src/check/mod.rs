@@ -138,6 +138,7 @@ impl<'a> Checker<'a> {
             robot: raw.robot.name.clone(),
             urdf: raw.robot.urdf.clone(),
             packages: raw.robot.packages.clone(),
+            identification: raw.identification.clone(),
             load: self.load(),
             tracker: Tracker {
                 frame: raw.tracker.frame.clone(),

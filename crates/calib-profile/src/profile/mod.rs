@@ -20,9 +20,9 @@ pub use solve::{
 };
 
 pub use crate::raw::{
-    RawClocks as Clocks, RawFree as Free, RawJointFree as JointFree, RawLoad as Load,
-    RawMethod as Method, RawSplit as Split, RawTimedPoses as TimedPoses, RawUpAxis as UpAxis,
-    RawUse as Usage,
+    RawClocks as Clocks, RawFree as Free, RawIdentification as Identification,
+    RawJointFree as JointFree, RawLoad as Load, RawMethod as Method, RawSplit as Split,
+    RawTimedPoses as TimedPoses, RawUpAxis as UpAxis, RawUse as Usage,
 };
 pub use crate::raw::{RawPlugin as Plugin, RawValue as ParameterValue};
 
@@ -40,6 +40,8 @@ pub struct Profile {
     pub packages: BTreeMap<String, String>,
     /// What loads the joints.
     pub load: RobotLoad,
+    /// What was measured, by whom, when and with what.
+    pub identification: Identification,
     /// The tracker.
     pub tracker: Tracker,
     /// Tracking bodies by name.

@@ -35,6 +35,9 @@ pub struct RawProfile {
     pub calib: u32,
     /// The robot and its description.
     pub robot: RawRobot,
+    /// What was measured, by whom, when and with what: shown in reports, used for nothing else.
+    #[serde(default)]
+    pub identification: RawIdentification,
     /// The optical tracker.
     pub tracker: RawTracker,
     /// What the tracker sees, by name, and which link each body is bolted to.
@@ -68,6 +71,24 @@ pub struct RawProfile {
     /// How `calib simulate` makes recordings with known truth for this robot.
     #[serde(default)]
     pub simulate: Option<RawSimulate>,
+}
+
+/// What identifies a measurement in reports. No clock is read: a date stands here or nowhere.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawIdentification {
+    /// Serial number of the robot.
+    #[serde(default)]
+    pub serial_number: Option<String>,
+    /// Who measured.
+    #[serde(default)]
+    pub operator: Option<String>,
+    /// When it was measured, `2026-11-03`.
+    #[serde(default)]
+    pub date: Option<String>,
+    /// Maker and model of the tracker, number of cameras, serial number.
+    #[serde(default)]
+    pub tracker: Option<String>,
 }
 
 /// The optical tracker.

@@ -2,13 +2,67 @@
 
 use super::{Page, code};
 use crate::table::Table;
-use crate::{LoopClosure, LoopGroup, Report, Stats, Unit, number, words};
+use crate::{LoopClosure, LoopGroup, Report, RobotChange, Stats, Unit, number, words};
 
+/// What changed of the robot itself.
 pub(super) fn changes(page: &mut Page, report: &Report) {
-    page.section("changes", "Changes to the URDF");
+    page.section("changes", "What changed");
+    let effects = words::robot::effects(report);
+    if report.robot_changes.is_empty() && effects.is_empty() {
+        page.text("No dimension of the robot was estimated that no choice of frames changes.");
+    } else {
+        page.text("Dimensions of the robot that no choice of frames changes, and effects of its joints; the most significant first.");
+    }
+    let all = RobotChange::sorted([report.robot_changes.clone(), effects].concat());
+    let (measured, open): (Vec<_>, Vec<_>) = all.into_iter().partition(|c| c.measured);
+    page.table("", changed(&measured));
+    if !open.is_empty() {
+        let names: Vec<String> = open.iter().map(|c| c.text.clone()).collect();
+        page.text(format!(
+            "Not determined by the data alone: {}.",
+            names.join("; ")
+        ));
+    }
+    if let Some(line) = words::robot::parameters(report) {
+        page.text(format!("{line} {}", words::robot::CONVENTIONS));
+    }
+}
+
+fn changed(changes: &[RobotChange]) -> Table {
+    let mut table = Table::new(&[
+        "<quantity",
+        ">nominal",
+        ">calibrated ± σ",
+        ">change ± σ",
+        ">change",
+    ]);
+    for change in changes {
+        let [before, after] = words::robot::before_and_after(change);
+        let delta = change.change.map_or_else(
+            || number::UNKNOWN.to_owned(),
+            |delta| number::change(delta, change.sigma, change.unit),
+        );
+        let z = words::robot::significance(change);
+        table.row([change.text.clone(), before, after, delta, z]);
+    }
+    table
+}
+
+/// The changed values of the URDF, conventions included.
+pub(super) fn urdf(page: &mut Page, report: &Report) {
+    page.section("urdf", "Changed values of the URDF");
     if report.changes.is_empty() {
         page.text("No value of the URDF changed.");
+        return;
     }
+    page.text("x, y, z along the axes of the parent link; rotations about the axes of the joint's original frame. Data share: fraction of the prior variance removed by the data (100 %: fully measured); a value with a small share is a convention or comes from its prior.");
+    page.folded("Values before and after", urdf_values(report));
+    if !report.urdf_diff.is_empty() {
+        page.code("diff", &report.urdf_diff);
+    }
+}
+
+fn urdf_values(report: &Report) -> Table {
     let mut table = Table::new(&[
         "<joint",
         "<value",
@@ -45,13 +99,7 @@ pub(super) fn changes(page: &mut Page, report: &Report) {
                 .map_or_else(|| number::UNKNOWN.to_owned(), number::percent),
         ]);
     }
-    if !report.changes.is_empty() {
-        page.text("x, y, z along the axes of the parent link; rotations about the axes of the joint's original frame. Data share: fraction of the prior variance removed by the data (100 %: fully measured).");
-    }
-    page.table("", table);
-    if !report.urdf_diff.is_empty() {
-        page.code("diff", &report.urdf_diff);
-    }
+    table
 }
 
 pub(super) fn transforms(page: &mut Page, report: &Report) {
@@ -274,7 +322,7 @@ pub(super) fn parameters(page: &mut Page, report: &Report) {
             parameter.class.word().to_owned(),
         ]);
     }
-    page.table("", table);
+    page.folded("Every parameter of the fit", table);
     let fit = report.fit.as_ref();
     if let Some(ratio) = fit.and_then(|fit| fit.cluster_robust_ratio) {
         page.text(words::fit::cluster_robust(ratio));

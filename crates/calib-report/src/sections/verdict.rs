@@ -18,8 +18,15 @@ pub(super) fn head(page: &mut Page, report: &Report) {
     if report.verdict == Verdict::NotEvaluated {
         page.text("Nothing says that the result is wrong, and the evidence that it is right does not suffice: it is not accepted.");
     }
+    if let Some(diagnosis) = words::diagnosis::diagnosis(report) {
+        page.text(format!("Diagnosis: {}", diagnosis.join(" ")));
+    }
     // The table of limits already lists what was met.
-    page.list(report.objections().map(|reason| sentence(reason)));
+    let remarks = words::remarks::remarks(report).into_iter();
+    let remarks: Vec<_> = remarks.map(|r| (r.text, r.remedy)).collect();
+    if !remarks.is_empty() {
+        page.push(Block::List(remarks));
+    }
     let mut limits = Table::new(&["<limit", ">value", ">limit", "<", "<reason"]);
     for limit in &report.limits {
         limits.row([
@@ -34,6 +41,13 @@ pub(super) fn head(page: &mut Page, report: &Report) {
     if !report.scope.is_empty() {
         page.text("Valid for:");
         page.list(report.scope.iter().map(|scope| sentence(scope)));
+    }
+    if !report.not_for.is_empty() {
+        page.text(format!("Not for: {}.", report.not_for.join("; ")));
+    }
+    let identification = words::headline::identification(report);
+    if !identification.is_empty() {
+        page.text(format!("{}.", words::prose::capital(&identification)));
     }
     let fit = report
         .fit

@@ -1,12 +1,14 @@
-//! The twelve questions that the first screen answers, in the words of each notion.
+//! The questions that the first screen answers, in the words of each notion.
 
 use super::clock::clocks;
-use super::files::{changed, reproduce};
+use super::files::{changed, in_results, reproduce};
 use super::held_out::{expected_error, worst_pose};
 use super::noise::noise;
 use super::observability::unobservable;
-use super::prose::{commands, or, sentence, short};
+use super::prose::{or, sentence, short};
 use super::rejection::rejected;
+use super::remarks::warnings;
+use super::robot;
 use super::verdict::trust;
 use crate::Report;
 
@@ -23,7 +25,7 @@ pub struct Answer {
     pub lines: Vec<String>,
 }
 
-/// The twelve answers, in the order of the first screen.
+/// The answers, the most important first.
 #[must_use]
 pub fn answers(report: &Report) -> Vec<Answer> {
     answers_in(report, "below")
@@ -34,79 +36,78 @@ pub(crate) fn answers_in(report: &Report, rest: &str) -> Vec<Answer> {
     let short = |items: &[String]| short(items, rest);
     let sentences =
         |items: &[String]| short(&items.iter().map(|i| sentence(i)).collect::<Vec<_>>());
-    let answer = |id, question, lines| Answer {
-        id,
-        question,
-        short: short_name(id),
-        lines,
-    };
+    let next = sentences(&report.next_steps);
     vec![
-        answer("trust", "Can I trust it?", trust(report, rest)),
+        answer("trust", trust(report, rest)),
+        answer("scope", scope(report)),
+        answer("expected-error", expected_error(report)),
+        answer("worst-pose", worst_pose(report, rest)),
+        answer("warnings", or(short(&warnings(report)), "None.")),
+        answer("unobservable", unobservable(report, rest)),
+        answer("next", or(next, "Nothing.")),
         answer(
-            "scope",
-            "What is it valid for?",
-            or(
-                sentences(&report.scope),
-                "Only for poses similar to those that were recorded: the profile states no scope.",
-            ),
+            "changed",
+            [robot::changed(report), changed(report)].concat(),
         ),
-        answer(
-            "expected-error",
-            "What error is expected on a new pose?",
-            expected_error(report),
-        ),
-        answer(
-            "worst-pose",
-            "Which pose has the largest error?",
-            worst_pose(report, rest),
-        ),
-        answer(
-            "unobservable",
-            "What is not observable?",
-            unobservable(report, rest),
-        ),
-        answer(
-            "next",
-            "What should I do next?",
-            or(sentences(&report.next_steps), "Nothing."),
-        ),
-        answer("changed", "Which files changed?", changed(report)),
-        answer(
-            "rejected",
-            "What was rejected, and why?",
-            rejected(report, rest),
-        ),
-        answer("noise", "How noisy was the tracker?", noise(report, rest)),
-        answer(
-            "clocks",
-            "Were the clocks synchronized?",
-            clocks(report, rest),
-        ),
+        answer("rejected", rejected(report, rest)),
+        answer("noise", noise(report, rest)),
+        answer("clocks", clocks(report, rest)),
         answer(
             "undo",
-            "How do I undo it?",
             or(
-                commands(&report.undo),
+                in_results(&report.undo),
                 "Nothing to undo: none of your files was changed.",
             ),
         ),
-        answer("reproduce", "How do I reproduce it?", reproduce(report)),
+        answer("reproduce", reproduce(report)),
     ]
 }
 
-fn short_name(id: &str) -> &'static str {
-    match id {
-        "trust" => "Trust",
-        "scope" => "Scope",
-        "expected-error" => "Error",
-        "worst-pose" => "Largest error",
-        "unobservable" => "Not observable",
-        "next" => "Next",
-        "changed" => "Files",
-        "rejected" => "Rejected",
-        "noise" => "Noise",
-        "clocks" => "Clocks",
-        "undo" => "Undo",
-        _ => "Reproduce",
+/// What it holds for, and what it excludes.
+fn scope(report: &Report) -> Vec<String> {
+    let holds: Vec<String> = report.scope.iter().map(|item| sentence(item)).collect();
+    let holds = or(
+        holds,
+        "Only for poses similar to those that were recorded: the profile states no scope.",
+    );
+    let excluded =
+        (!report.not_for.is_empty()).then(|| format!("Not for: {}.", report.not_for.join("; ")));
+    holds.into_iter().chain(excluded).collect()
+}
+
+/// Id, question, and the same in a word or two.
+const QUESTIONS: [(&str, &str, &str); 13] = [
+    ("trust", "Can I trust it?", "Trust"),
+    ("scope", "What is it valid for?", "Scope"),
+    (
+        "expected-error",
+        "What error is expected on a new pose?",
+        "Error",
+    ),
+    (
+        "worst-pose",
+        "Which pose has the largest error?",
+        "Largest error",
+    ),
+    ("warnings", "What are the warnings?", "Warnings"),
+    ("unobservable", "What is not observable?", "Not observable"),
+    ("next", "What should I do next?", "Next"),
+    ("changed", "What changed?", "Changes"),
+    ("rejected", "What was rejected, and why?", "Rejected"),
+    ("noise", "How noisy was the tracker?", "Noise"),
+    ("clocks", "Were the clocks synchronized?", "Clocks"),
+    ("undo", "How do I undo it?", "Undo"),
+    ("reproduce", "How do I reproduce it?", "Reproduce"),
+];
+
+fn answer(id: &'static str, lines: Vec<String>) -> Answer {
+    let mut questions = QUESTIONS.into_iter();
+    let known = questions.find(|known| known.0 == id);
+    let (_, question, short) = known.unwrap_or((id, id, id));
+    Answer {
+        id,
+        question,
+        short,
+        lines,
     }
 }

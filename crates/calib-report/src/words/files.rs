@@ -27,13 +27,24 @@ pub(crate) fn changed(report: &Report) -> Vec<String> {
 }
 
 pub(crate) fn reproduce(report: &Report) -> Vec<String> {
-    let mut lines = or(commands(&report.reproduce), "Run the same profile again.");
+    let again: Vec<String> = commands(&report.reproduce);
+    let again: Vec<String> = again
+        .into_iter()
+        .map(|command| format!("In the folder of the profile: {command}"))
+        .collect();
+    let mut lines = or(again, "Run the same profile again.");
     lines.push(format!(
         "{}; {} identified by SHA-256 below.",
         version(report),
         counted(report.inputs.len(), "input")
     ));
     lines
+}
+
+/// Commands that run where the results are.
+pub(crate) fn in_results(of: &[String]) -> Vec<String> {
+    let with_place = |command| format!("In the folder of the results: {command}");
+    commands(of).into_iter().map(with_place).collect()
 }
 
 /// Program and seed, below the table of files.

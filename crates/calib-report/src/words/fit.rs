@@ -1,7 +1,8 @@
 //! How the solver ended.
 
 use super::prose::counted;
-use crate::{FitEnd, FitSummary, number};
+use super::rejection::rejected_of;
+use crate::{FitEnd, FitSummary, Report, Unit, number};
 
 impl FitEnd {
     /// How the solver ended, after this many iterations: `converged after 7 iterations`.
@@ -32,6 +33,33 @@ pub(crate) fn summary(fit: &FitSummary) -> String {
         "{} ({} measured poses and points, {} unknowns{chi2})",
         fit.status, fit.observations, fit.unknowns
     )
+}
+
+/// `Fit: converged after 7 iterations, χ²/dof 1.03, rms residual 0.51 mm, 5 of 2935 measurements rejected.`
+pub(crate) fn in_short(report: &Report) -> String {
+    let chi2 = |fit: &FitSummary| {
+        let chi2 = fit.chi2_per_dof?;
+        let own = if fit.stated_noise.is_empty() {
+            " (1 by construction)"
+        } else {
+            ""
+        };
+        Some(format!("χ²/dof {}{own}", number::fixed(chi2, 2)))
+    };
+    let fit = report.fit.as_ref();
+    let all = report.residuals.all.as_ref();
+    let rejected = rejected_of(report);
+    let parts = [
+        fit.map(|fit| fit.status.clone()),
+        fit.and_then(chi2),
+        all.map(|all| format!("rms residual {}", number::plain(all.rms_m, Unit::Meter))),
+        rejected.map(|[part, of]| format!("{part} of {of} measurements rejected")),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    match parts.is_empty() {
+        true => "Fit: none.".to_owned(),
+        false => format!("Fit: {}.", parts.join(", ")),
+    }
 }
 
 /// How the uncertainty compares with one that does not trust the noise model.

@@ -6,9 +6,12 @@
 
 pub(crate) mod accuracy;
 pub(crate) mod answers;
+pub(crate) mod check;
 pub(crate) mod clock;
+pub(crate) mod diagnosis;
 pub(crate) mod files;
 pub(crate) mod fit;
+pub(crate) mod headline;
 pub(crate) mod held_out;
 mod limit;
 mod next_steps;
@@ -18,6 +21,8 @@ mod physics;
 pub(crate) mod prose;
 mod rejected_for;
 pub(crate) mod rejection;
+pub(crate) mod remarks;
+pub(crate) mod robot;
 mod scope;
 pub(crate) mod selection;
 mod terms;

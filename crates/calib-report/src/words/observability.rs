@@ -6,7 +6,7 @@ use crate::{Cause, Meaning, NotObservable, Report, Term, Transform, Unobservable
 /// Parameters of a combination that are named; the rest is counted.
 const NAMED: usize = 4;
 
-/// Items in the short answer, which shares the first screen with eleven others; the rest is counted.
+/// Items in the short answer, which shares the first screen with the others; the rest is counted.
 const ANSWERED: usize = 2;
 
 /// Where nothing is missing.

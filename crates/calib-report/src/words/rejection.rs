@@ -6,12 +6,18 @@ use crate::{RecordingSummary, RecordingUse, Rejected, Report, number};
 /// Share of good measurements that the fit's gate rejects by chance.
 const BY_CHANCE: f64 = 0.001;
 
-/// How many measurements of the fit the gate rejected, and how many it rejects by chance alone.
-fn by_chance(report: &Report) -> Option<String> {
+/// Rejected measurements of the fit, and all of them; `None` where nothing was counted.
+pub(crate) fn rejected_of(report: &Report) -> Option<[usize; 2]> {
     let fitted = |r: &&RecordingSummary| r.used_for != RecordingUse::Validation;
     let counts = || report.recordings.iter().filter(fitted);
     let rejected: usize = counts().map(|r| r.measurements.rejected).sum();
     let tested: usize = counts().map(|r| r.measurements.used).sum::<usize>() + rejected;
+    (tested > 0).then_some([rejected, tested])
+}
+
+/// How many measurements of the fit the gate rejected, and how many it rejects by chance alone.
+fn by_chance(report: &Report) -> Option<String> {
+    let [rejected, tested] = rejected_of(report)?;
     (rejected > 0).then(|| {
         format!(
             "{rejected} of {tested} fitted measurements were rejected; about {} of as many good ones are, by chance.",

@@ -55,4 +55,24 @@ impl Scope {
             }
         }
     }
+
+    /// What the condition excludes, as a phrase.
+    #[must_use]
+    pub fn excluded(&self) -> Option<String> {
+        let excluded = match self {
+            Self::TrackedBodies { .. } | Self::Contacts => {
+                "joint ranges and loads that were not recorded".to_owned()
+            }
+            Self::SingleJointMotions => "poses in which several joints move".to_owned(),
+            Self::PositionsOnly => "orientations".to_owned(),
+            Self::HeldOutPoses { still, .. } if !still.is_empty() => {
+                let joints: Vec<String> = still.iter().map(|joint| code(joint)).collect();
+                format!("motions of {}", joints.join(", "))
+            }
+            Self::LeftOutPoses { .. } => "claims about another day".to_owned(),
+            Self::EffectsOf { file } => format!("the URDF without `{file}`"),
+            Self::HeldOutPoses { .. } | Self::OriginsOneByOne => return None,
+        };
+        Some(excluded)
+    }
 }

@@ -36,6 +36,7 @@ impl Class {
             Self::Solid => "identifiable",
             Self::Weak => "weakly identifiable",
             Self::Prior => "prior only",
+            Self::Convention => "convention",
             Self::NotObservable => "not identifiable",
         }
     }

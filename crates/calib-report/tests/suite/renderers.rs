@@ -3,6 +3,7 @@
 use crate::examples;
 use crate::parts::parts;
 
+use calib_report::terminal::{Look, Places};
 use calib_report::{answers, json, markdown, report_schema, scene_schema, terminal};
 use insta::assert_snapshot;
 
@@ -22,11 +23,56 @@ fn markdown_of_the_examples() {
 #[test]
 fn terminal_of_the_examples() {
     for (name, report) in examples::all() {
-        assert_snapshot!(
-            format!("terminal_{name}"),
-            terminal::summary(&report, false)
-        );
+        let full = terminal::full(&report, Look::default(), PLACES);
+        assert_snapshot!(format!("terminal_{name}"), full);
+        let short = terminal::summary(&report, Look::default(), PLACES);
+        assert!(full.ends_with(&short), "{full}");
+        assert!(short.lines().count() <= 20, "{short}");
     }
+}
+
+/// As `calib run robots/arm.yaml --out results/arm`.
+const PLACES: Places<'_> = Places {
+    profile: "robots/arm.yaml",
+    folder: "results/arm",
+    page: "results/arm/report.html",
+};
+
+/// The first screen of a page in words, and the last lines of a terminal.
+#[test]
+fn first_screens_of_the_examples() {
+    for (name, report) in examples::all() {
+        let terminal = terminal::summary(&report, Look::default(), PLACES);
+        let line = terminal::line(&report, Look::default(), PLACES);
+        assert_eq!(line.lines().count(), 1, "{line}");
+        let screen = format!("{terminal}---\n{line}---\n{}", first_screen(&report));
+        assert_snapshot!(format!("first_screen_{name}"), screen);
+    }
+}
+
+/// Text of the page down to the questions, one line per element.
+fn first_screen(report: &calib_report::Report) -> String {
+    let page = calib_report::html::html(report, None).expect("a page");
+    let from = page.find("<header>").expect("a header");
+    let to = page.find("<nav class=\"quick\"").expect("questions");
+    let mut text = String::new();
+    let mut rest = &page[from..to];
+    while let Some((before, after)) = rest.split_once('<') {
+        text += before;
+        let (tag, after) = after.split_once('>').expect("an element ends");
+        if tag.starts_with("/p") || tag.starts_with("/li") || tag.starts_with("/h1") {
+            text.push('\n');
+        }
+        rest = after;
+    }
+    let lines = text
+        .lines()
+        .map(|l| l.split_whitespace().collect::<Vec<_>>().join(" "));
+    lines
+        .filter(|l| !l.is_empty())
+        .collect::<Vec<_>>()
+        .join("\n")
+        + "\n"
 }
 
 #[test]
@@ -63,10 +109,10 @@ fn json_of_the_examples() {
 }
 
 #[test]
-fn the_twelve_answers_of_the_examples() {
+fn the_answers_of_the_examples() {
     for (name, report) in examples::all() {
         let answers = answers(&report);
-        assert_eq!(answers.len(), 12);
+        assert_eq!(answers.len(), 13);
         assert!(
             answers.iter().all(|answer| !answer.lines.is_empty()
                 && answer.lines.iter().all(|line| !line.is_empty())),
@@ -88,7 +134,7 @@ fn the_twelve_answers_of_the_examples() {
 }
 
 #[test]
-fn the_terminal_summary_fits_eighty_columns_whatever_the_names() {
+fn the_terminal_text_fits_its_columns_whatever_the_names() {
     for (name, mut report) in examples::all() {
         let long = "a_name_that_somebody_generated_from_a_path/".repeat(4);
         for transform in &mut report.transforms {
@@ -102,8 +148,15 @@ fn the_terminal_summary_fits_eighty_columns_whatever_the_names() {
         }
         report.undo.push(long.clone());
         report.profile = long;
-        for line in terminal::summary(&report, false).lines() {
-            assert!(line.chars().count() <= 80, "{name}: {line}");
+        for columns in [60, 80, 120] {
+            let look = Look {
+                columns,
+                ..Look::default()
+            };
+            let text = terminal::full(&report, look, Places::default());
+            for line in text.lines() {
+                assert!(line.chars().count() <= columns, "{name}: {line}");
+            }
         }
     }
 }
@@ -111,7 +164,11 @@ fn the_terminal_summary_fits_eighty_columns_whatever_the_names() {
 #[test]
 fn color_changes_nothing_but_color() {
     for (_, report) in examples::all() {
-        let colored = terminal::summary(&report, true);
+        let look = Look {
+            color: true,
+            ..Look::default()
+        };
+        let colored = terminal::full(&report, look, PLACES);
         let mut plain = String::new();
         let mut rest = colored.as_str();
         while let Some((before, after)) = rest.split_once('\u{1b}') {
@@ -120,7 +177,7 @@ fn color_changes_nothing_but_color() {
         }
         plain += rest;
         assert!(colored.contains('\u{1b}'));
-        assert_eq!(plain, terminal::summary(&report, false));
+        assert_eq!(plain, terminal::full(&report, Look::default(), PLACES));
     }
 }
 
@@ -128,7 +185,8 @@ fn color_changes_nothing_but_color() {
 fn an_empty_report_is_not_accepted_and_renders() {
     let report = calib_report::Report::default();
     assert!(markdown::markdown(&report).contains("not decided"));
-    assert!(terminal::summary(&report, false).contains("NOT DECIDED"));
+    let text = terminal::summary(&report, Look::default(), PLACES);
+    assert!(text.contains("NOT DECIDED"));
     assert!(
         json::report_json(&report)
             .expect("finite")

@@ -37,7 +37,7 @@ pub struct Record {
     #[arg(long)]
     pub(super) recording: Option<String>,
     /// The CSV to write, which must not exist [default: the recording's file]
-    #[arg(long)]
+    #[arg(short, long)]
     pub(super) out: Option<PathBuf>,
     /// Append to an existing file
     #[arg(long)]
