@@ -290,7 +290,9 @@ fn help() {
     let page = help_page(&dir, &[]);
     insta::assert_snapshot!("help", page);
     for name in commands_of(&page) {
-        insta::assert_snapshot!(format!("help_{name}"), help_pages(&dir, &[name]));
+        for (command, page) in help_pages(&dir, &[name]) {
+            insta::assert_snapshot!(format!("help_{command}"), page);
+        }
     }
 }
 
@@ -313,13 +315,14 @@ fn commands_of(page: &str) -> Vec<&str> {
         .collect()
 }
 
-/// The page of a command and the pages of all commands below it.
-fn help_pages(dir: &Scratch, command: &[&str]) -> String {
-    let mut text = help_page(dir, command);
-    for name in commands_of(&text.clone()) {
-        text += &help_pages(dir, &[command, &[name]].concat());
+/// The page of a command and the pages of all commands below it, by their names.
+fn help_pages(dir: &Scratch, command: &[&str]) -> Vec<(String, String)> {
+    let page = help_page(dir, command);
+    let mut pages = vec![(command.join("_"), page.clone())];
+    for name in commands_of(&page) {
+        pages.extend(help_pages(dir, &[command, &[name]].concat()));
     }
-    text
+    pages
 }
 
 #[test]
