@@ -132,7 +132,7 @@ fn run(dir: &Scratch) -> Value {
     let ran = dir.calib(["run", "arm.yaml", "--out", "out"]);
     // Without limits nothing is decided, and that is not what is tested here.
     assert!(
-        ran.stdout.contains("report.json"),
+        ran.stdout.contains("report: out/report.html"),
         "{}\n{}",
         ran.stdout,
         ran.stderr
