@@ -24,6 +24,7 @@ mod scratch;
 mod screens;
 mod selection;
 mod shown;
+mod sizes;
 mod streams;
 mod structural;
 mod studies;

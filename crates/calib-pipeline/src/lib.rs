@@ -15,9 +15,11 @@ pub mod check;
 pub mod error;
 pub mod estimate;
 pub mod formulate;
+pub mod options;
 pub mod output;
 pub mod prepare;
 pub mod run;
+pub mod select;
 pub mod verify;
 
 pub use error::{ExitCode, PipelineError};

@@ -3,16 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+pub use crate::options::RunOptions;
 use calib_files::OutputFile;
 use calib_profile::Method;
-use calib_report::{Report, Selection};
+use calib_report::Report;
 
 use crate::error::{ExitCode, PipelineError};
 use crate::estimate::paper;
 use crate::formulate::by_closed_forms::{paper_assumptions, paper_result};
 use crate::formulate::by_likelihood::likelihood;
 use crate::formulate::checked::check_data;
-use crate::formulate::selection::choose;
 use crate::formulate::solved::{Solved, nominal};
 use crate::formulate::without_effects::refitted;
 use crate::output::assemble::assemble;
@@ -26,26 +26,8 @@ use crate::output::view::{Shown, view};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
 use crate::prepare::robot::load_robot;
-use crate::verify::changes::changes;
-use crate::verify::known::known_numbers;
-use crate::verify::moved::moved;
-use crate::verify::residuals::residual_rows;
-use crate::verify::{self, closure::close_loops};
-
-/// How to run.
-#[derive(Debug, Clone, Default)]
-pub struct RunOptions {
-    /// Instead of the profile's method.
-    pub method: Option<Method>,
-    /// Go on although the data checks found errors.
-    pub force: bool,
-    /// End with the exit code of a verdict that is not a pass where the verdict has warnings.
-    pub strict: bool,
-    /// Choose what to free by prediction of left-out poses, from what the profile frees outward; implies maximum likelihood.
-    pub select: bool,
-    /// Load no plugin; a profile that names one fails.
-    pub no_plugins: bool,
-}
+use crate::select::selected;
+use crate::verify::verified;
 
 impl RunOptions {
     /// The same as arguments of `calib run`; the method is added where it is not the profile's.
@@ -90,23 +72,6 @@ pub fn run(
     run_on(inputs, options, progress)
 }
 
-/// What `select` of [`RunOptions`] would choose, and why. Writes nothing.
-///
-/// # Errors
-/// As [`run`].
-pub fn select(
-    profile: &Path,
-    force: bool,
-    plugins: bool,
-    progress: &mut dyn FnMut(&str),
-) -> Result<Selection, PipelineError> {
-    progress("read profile and robot");
-    let robot = load_robot(profile)?;
-    progress("read recordings");
-    let inputs = load_recordings(robot, plugins)?;
-    Ok(choose(inputs, force, progress)?.selection)
-}
-
 /// [`run`] on recordings that are in memory.
 ///
 /// # Errors
@@ -117,13 +82,9 @@ pub fn run_on(
     progress: &mut dyn FnMut(&str),
 ) -> Result<RunOutput, PipelineError> {
     let selection = match options.select {
-        true => Some(choose(inputs.clone(), options.force, progress)?),
+        true => Some(selected(&mut inputs, options.force, progress)?),
         false => None,
     };
-    if let Some(chosen) = &selection {
-        inputs.robot.profile.solve = chosen.solve.clone();
-    }
-    let selection = selection.map(|chosen| chosen.selection);
     progress("check data");
     let mut of_shapes = Vec::new();
     let (outlines, meshes) = shapes::outlines(&inputs.robot, &mut of_shapes);
@@ -138,10 +99,7 @@ pub fn run_on(
         &mut checked.findings,
     )?;
     let nominal = nominal(&inputs, &checked.start);
-    let method = match options.select {
-        true => Method::Ml,
-        false => options.method.unwrap_or(inputs.robot.profile.solve.method),
-    };
+    let method = options.method(&inputs.robot.profile);
     let solved = match method {
         Method::Paper => {
             checked.findings.push(paper_assumptions());
@@ -150,26 +108,13 @@ pub fn run_on(
         Method::Ml => likelihood(&mut inputs, &mut checked, progress)?,
     };
     progress("verify");
-    let (robot, fit) = (&solved.robot, solved.fit.as_ref());
     let refitted = refitted(&inputs, &checked, &solved)?;
     let tracks = &checked.tracks;
-    // The scan for changes takes as long as the rest together.
-    let (changed, (moved, loops, held_out, known, residuals)) = rayon::join(
-        || fit.and_then(|fit| changes(&inputs, fit)),
-        || {
-            (
-                moved(&inputs, tracks, robot),
-                close_loops(&inputs, tracks, &solved.body_from_origin(), &solved.fk),
-                verify::held_out(&inputs, tracks, &nominal, &solved, refitted.as_ref()),
-                fit.map_or_else(Default::default, |fit| known_numbers(&inputs, fit)),
-                residual_rows(&inputs, tracks, robot, fit),
-            )
-        },
-    );
-    checked.findings.extend(changed);
-    checked.findings.extend(moved);
+    let verified = verified(&inputs, tracks, &nominal, &solved, refitted.as_ref());
+    checked.findings.extend(verified.findings);
+    let (robot, fit) = (&solved.robot, solved.fit.as_ref());
     progress("patch the URDF");
-    let urdf = patch_urdf(&inputs, robot, &known)?;
+    let urdf = patch_urdf(&inputs, robot, &verified.known)?;
     let covariance = solved.root_covariance.as_ref();
     let scene = scene(&inputs, tracks, robot, covariance, &solved.found);
     progress("write the report");
@@ -177,7 +122,7 @@ pub fn run_on(
         nominal: &nominal,
         robot,
         origins: &origins,
-        held_out: held_out.as_ref(),
+        held_out: verified.held_out.as_ref(),
         fit,
     };
     let view = view(&inputs, tracks, &shown, outlines);
@@ -188,7 +133,7 @@ pub fn run_on(
         model: &model_file(&inputs, &solved),
         robot,
     };
-    let written = written(&inputs, &residuals, (&scene, &view), &robots)?;
+    let written = written(&inputs, &verified.residuals, (&scene, &view), &robots)?;
     let report = assemble(&Evidence {
         inputs: &inputs,
         tracks,
@@ -198,11 +143,11 @@ pub fn run_on(
         found: &solved.found,
         fit,
         robot,
-        loops,
-        held_out,
+        loops: verified.loops,
+        held_out: verified.held_out,
         urdf: &urdf,
         written: &written,
-        residuals: &residuals,
+        residuals: &verified.residuals,
         selection,
         arguments: options.arguments(),
     });

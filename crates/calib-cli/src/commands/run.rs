@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use calib_files::write_results;
 use calib_pipeline::ExitCode;
-use calib_pipeline::run::{RunOptions, RunOutput, run as run_profile, select};
+use calib_pipeline::run::{RunOptions, RunOutput, run as run_profile};
+use calib_pipeline::select::select;
 use calib_report::terminal::{self, Places};
 use clap::{Args, ValueEnum};
 

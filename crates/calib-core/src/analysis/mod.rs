@@ -15,6 +15,7 @@ mod less_noise;
 pub(crate) mod observability;
 pub(crate) mod sandwich;
 pub(crate) mod score;
+pub(crate) mod scores;
 pub(crate) mod select;
 pub(crate) mod solution;
 pub(crate) mod spread;

@@ -18,12 +18,13 @@
 //! The gate of the robust fit is tried in the same way ([`admit`](crate::analysis::admit)): a model that physics is missing
 //! from finds its hardest poses unlikely.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
 use crate::analysis::admit::{Admission, eligible, left_out_squares, many_rejected, wider};
 use crate::analysis::estimate::{Settings, Start, refit};
+use crate::analysis::scores::{Scores, mean, paired, tails};
 use crate::analysis::solution::Solution;
 use crate::analysis::validate::{CrossValidation, predictions};
 use crate::graph::problem::{NoiseKind, NoiseModel, Problem};
@@ -377,67 +378,12 @@ fn values_at(
     (minimum.status != SolveStatus::NotEvaluable).then_some(minimum.values)
 }
 
-/// (1) and (2) of every pose that all trials could predict.
-struct Scores {
-    squares: Vec<Vec<f64>>,
-    surprises: Vec<Vec<f64>>,
-}
-
-impl Scores {
-    fn of(trials: &[Trial]) -> Self {
-        let by_sample: Vec<BTreeMap<usize, (f64, f64)>> =
-            trials.iter().map(|t| of_samples(&t.loo)).collect();
-        let everywhere = |sample: &&usize| by_sample.iter().all(|s| s.contains_key(*sample));
-        let first = by_sample.first();
-        let common: Vec<usize> = first
-            .map(|s| s.keys().filter(everywhere).copied().collect())
-            .unwrap_or_default();
-        let column = |of: fn(&(f64, f64)) -> f64| -> Vec<Vec<f64>> {
-            let scores = by_sample.iter();
-            scores
-                .map(|s| common.iter().map(|sample| of(&s[sample])).collect())
-                .collect()
-        };
-        Self {
-            squares: column(|s| s.0),
-            surprises: column(|s| s.1),
-        }
-    }
-}
-
-/// (1) and (2) by sample.
-fn of_samples(loo: &CrossValidation) -> BTreeMap<usize, (f64, f64)> {
-    let predicted = loo.samples.iter().filter(|s| !s.vectors.is_empty());
-    predicted
-        .map(|s| {
-            let squares = s.vectors.iter();
-            let sum: f64 = squares
-                .map(|v| v.position.or(v.rotation).unwrap_or(0.0).powi(2))
-                .sum();
-            (s.sample, (sum / s.vectors.len() as f64, -s.log_density))
-        })
-        .collect()
-}
-
-fn mean(x: &[f64]) -> f64 {
-    x.iter().sum::<f64>() / x.len().max(1) as f64
-}
-
-/// (3): mean of the differences and its standard error.
-fn paired(a: &[f64], b: &[f64]) -> (f64, f64) {
-    let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
-    let middle = mean(&differences);
-    let squares = differences.iter().map(|d| (d - middle).powi(2));
-    let n = differences.len().max(2) as f64;
-    (middle, (squares.sum::<f64>() / (n - 1.0) / n).sqrt())
-}
-
 fn choose(trials: &[Trial]) -> Option<NoiseChoice> {
     let white = trials.iter().position(|t| t.noise == NoiseModel::White)?;
     if trials.len() < 2 {
         return None;
     }
-    let scores = Scores::of(trials);
+    let scores = Scores::of(&trials.iter().map(|t| &t.loo).collect::<Vec<_>>());
     let poses = scores.squares[white].len();
     if poses < FEWEST {
         return None;
@@ -495,19 +441,4 @@ fn choose(trials: &[Trial]) -> Option<NoiseChoice> {
         poses,
         admission: None,
     })
-}
-
-/// Mean of z⁴ over d (d + 2)/d² times the squared mean of z²: 1 for normal noise of any size.
-fn tails(loo: &CrossValidation) -> f64 {
-    let all = || loo.samples.iter().flat_map(|s| &s.vectors);
-    let n = all().count().max(1) as f64;
-    let size = |v: &crate::analysis::validate::VectorError| v.z.powi(2) / v.error.len() as f64;
-    let second = all().map(size).sum::<f64>() / n;
-    let fourth: f64 = all()
-        .map(|v| {
-            let d = v.error.len() as f64;
-            size(v).powi(2) * d / (d + 2.0)
-        })
-        .sum();
-    fourth / n / second.powi(2).max(f64::MIN_POSITIVE)
 }

@@ -303,15 +303,14 @@ impl CompiledPath {
                     }
                     suffix = x.oriented(*inverse).then(&suffix);
                 }
-                Step::Random { inverse, noise } => {
-                    if random {
-                        // ±Ad(P⁻¹) δ: X is the identity
-                        let sign = if *inverse { -1.0 } else { 1.0 };
-                        for (direction, s) in noise {
-                            out.slots[*s] += suffix.pull_back(direction) * sign;
-                        }
+                Step::Random { inverse, noise } if random => {
+                    // ±Ad(P⁻¹) δ: X is the identity
+                    let sign = if *inverse { -1.0 } else { 1.0 };
+                    for (direction, s) in noise {
+                        out.slots[*s] += suffix.pull_back(direction) * sign;
                     }
                 }
+                Step::Random { .. } => {}
             }
         }
         suffix

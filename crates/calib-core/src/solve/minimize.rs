@@ -27,6 +27,7 @@ use crate::graph::edge::EdgeKind;
 use crate::model::layout::Model;
 use crate::model::values::{Values, coordinates};
 use crate::solve::bounded::bounded_step;
+use crate::solve::curvature::{Curvature, dot};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::{accumulate, cost};
 
@@ -90,64 +91,6 @@ const SLIDE: f64 = 1e-6;
 const UNSEEN: f64 = 1e-8;
 /// A prior wider than this many typical deviations does not say how far a linearization holds.
 const WIDEST_SCALE: f64 = 30.0;
-
-/// K of equation (2).
-struct Curvature {
-    n: usize,
-    s: Vec<f64>,
-    slow: bool,
-    known: bool,
-}
-
-impl Curvature {
-    fn new(n: usize) -> Self {
-        Self {
-            n,
-            s: vec![0.0; n * n],
-            slow: false,
-            known: false,
-        }
-    }
-
-    fn learn(&mut self, before: &NormalEquations, after: &NormalEquations, step: &[f64]) {
-        if !self.slow {
-            return;
-        }
-        let n = self.n;
-        let mut v = vec![0.0; n];
-        for i in 0..n {
-            let mut predicted = 0.0;
-            for j in 0..n {
-                predicted += (after.h[i.min(j) * n + i.max(j)] + self.s[i * n + j]) * step[j];
-            }
-            v[i] = after.g[i] - before.g[i] - predicted;
-        }
-        let along = dot(&v, step);
-        // In units of √H_ii, so that meters and radians count alike.
-        let size = |x: &[f64], power: i32| -> f64 {
-            (0..n)
-                .map(|i| {
-                    let d = after.h[i * n + i];
-                    if d > 0.0 {
-                        x[i] * x[i] * d.powi(power)
-                    } else {
-                        0.0
-                    }
-                })
-                .sum::<f64>()
-                .sqrt()
-        };
-        if along.abs() <= 1e-8 * size(&v, -1) * size(step, 1) {
-            return;
-        }
-        for i in 0..n {
-            for j in 0..n {
-                self.s[i * n + j] += v[i] * v[j] / along;
-            }
-        }
-        self.known = true;
-    }
-}
 
 /// What became of a proposed step.
 enum Step {
@@ -408,10 +351,6 @@ impl<'a> Descent<'a> {
             None
         }
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// Solves (1), with (2) where it is known, by Cholesky of the column-scaled system; `false` when it is not

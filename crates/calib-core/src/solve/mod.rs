@@ -3,6 +3,7 @@
 pub(crate) mod bounded;
 pub(crate) mod components;
 pub(crate) mod compressed;
+pub(crate) mod curvature;
 pub(crate) mod dense;
 pub(crate) mod equations;
 pub(crate) mod minimize;

@@ -76,21 +76,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         urdf_diff: e.urdf.diff.clone(),
         not_observable: e.fit.map_or_else(Vec::new, not_observable),
         loops: e.loops.clone(),
-        verification: Verification {
-            held_out: held_out(e),
-            outcome: match (&e.held_out, verdict) {
-                (None, _) | (_, Verdict::NotEvaluated) => calib_report::Outcome::NotEvaluated,
-                (_, Verdict::Accepted | Verdict::AcceptedWithWarnings) => {
-                    calib_report::Outcome::Met
-                }
-                (_, Verdict::Rejected) => calib_report::Outcome::Exceeded,
-            },
-            reason: if e.held_out.is_none() {
-                "The profile names no validation recording.".to_owned()
-            } else {
-                String::new()
-            },
-        },
+        verification: verification(e, verdict),
         estimators: estimators(e),
         fit: e.fit.map(|fit| fit_summary(profile, fit, &parameters)),
         parameters,
@@ -129,6 +115,23 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         ..Report::default()
     };
     report.judged(judgment)
+}
+
+/// What the held-out recordings say.
+fn verification(e: &Evidence<'_>, verdict: Verdict) -> Verification {
+    Verification {
+        held_out: held_out(e),
+        outcome: match (&e.held_out, verdict) {
+            (None, _) | (_, Verdict::NotEvaluated) => calib_report::Outcome::NotEvaluated,
+            (_, Verdict::Accepted | Verdict::AcceptedWithWarnings) => calib_report::Outcome::Met,
+            (_, Verdict::Rejected) => calib_report::Outcome::Exceeded,
+        },
+        reason: if e.held_out.is_none() {
+            "The profile names no validation recording.".to_owned()
+        } else {
+            String::new()
+        },
+    }
 }
 
 /// The held-out errors with the share of the tracker's noise.

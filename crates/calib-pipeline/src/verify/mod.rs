@@ -16,12 +16,57 @@ pub mod robot_changes;
 
 use std::collections::BTreeMap;
 
-use calib_report::HeldOut;
+use calib_finding::Finding;
+use calib_report::{HeldOut, LoopClosure, ResidualRow};
 
 use crate::formulate::kinematics::Calibration;
 use crate::formulate::solved::Solved;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
+use crate::verify::changes::changes;
+use crate::verify::closure::close_loops;
+use crate::verify::known::{Known, Number, known_numbers};
+use crate::verify::moved::moved;
+use crate::verify::residuals::residual_rows;
+
+/// What a solution is worth.
+#[derive(Debug)]
+pub struct Verified {
+    /// Changes while a recording ran or between two.
+    pub findings: Vec<Finding>,
+    /// The loops of the frame graph.
+    pub loops: Vec<LoopClosure>,
+    /// Errors on poses that were not fitted.
+    pub held_out: Option<HeldOut>,
+    /// The numbers of the URDF that are known, with σ.
+    pub known: BTreeMap<Number, Known>,
+    /// Every residual.
+    pub residuals: Vec<ResidualRow>,
+}
+
+/// Verifies `solved`; the scan for changes takes as long as the rest together and runs beside it.
+#[must_use]
+pub fn verified(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    nominal: &Calibration,
+    solved: &Solved,
+    refitted: Option<&Calibration>,
+) -> Verified {
+    let fit = solved.fit.as_ref();
+    let (changed, mut verified) = rayon::join(
+        || fit.and_then(|fit| changes(inputs, fit)),
+        || Verified {
+            findings: moved(inputs, tracks, &solved.robot),
+            loops: close_loops(inputs, tracks, &solved.body_from_origin(), &solved.fk),
+            held_out: held_out(inputs, tracks, nominal, solved, refitted),
+            known: fit.map_or_else(Default::default, |fit| known_numbers(inputs, fit)),
+            residuals: residual_rows(inputs, tracks, &solved.robot, fit),
+        },
+    );
+    verified.findings.splice(0..0, changed);
+    verified
+}
 
 /// Errors on held-out recordings; without any, on fitted poses that are left out in turn.
 #[must_use]

@@ -1,0 +1,28 @@
+//! How to run.
+
+use calib_profile::{Method, Profile};
+
+/// How to run.
+#[derive(Debug, Clone, Default)]
+pub struct RunOptions {
+    /// Instead of the profile's method.
+    pub method: Option<Method>,
+    /// Go on although the data checks found errors.
+    pub force: bool,
+    /// End with the exit code of a verdict that is not a pass where the verdict has warnings.
+    pub strict: bool,
+    /// Choose what to free by prediction of left-out poses, from what the profile frees outward; implies maximum likelihood.
+    pub select: bool,
+    /// Load no plugin; a profile that names one fails.
+    pub no_plugins: bool,
+}
+
+impl RunOptions {
+    /// How the transforms are found.
+    pub(crate) fn method(&self, profile: &Profile) -> Method {
+        match self.select {
+            true => Method::Ml,
+            false => self.method.unwrap_or(profile.solve.method),
+        }
+    }
+}

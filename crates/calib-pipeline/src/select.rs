@@ -1,0 +1,39 @@
+//! `calib run --select`: the choice of what to free.
+
+use std::path::Path;
+
+use calib_report::Selection;
+
+use crate::error::PipelineError;
+use crate::formulate::selection::choose;
+use crate::prepare::inputs::Inputs;
+use crate::prepare::load::load_recordings;
+use crate::prepare::robot::load_robot;
+
+/// What `select` of [`RunOptions`](crate::options::RunOptions) would choose, and why. Writes nothing.
+///
+/// # Errors
+/// As [`run`](crate::run::run).
+pub fn select(
+    profile: &Path,
+    force: bool,
+    plugins: bool,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Selection, PipelineError> {
+    progress("read profile and robot");
+    let robot = load_robot(profile)?;
+    progress("read recordings");
+    let inputs = load_recordings(robot, plugins)?;
+    Ok(choose(inputs, force, progress)?.selection)
+}
+
+/// Chooses the effects and puts what was chosen into the profile's `solve:`.
+pub(crate) fn selected(
+    inputs: &mut Inputs,
+    force: bool,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Selection, PipelineError> {
+    let chosen = choose(inputs.clone(), force, progress)?;
+    inputs.robot.profile.solve = chosen.solve;
+    Ok(chosen.selection)
+}
