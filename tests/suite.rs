@@ -16,6 +16,7 @@ mod inputs;
 mod laboratory;
 mod layering;
 mod loads;
+mod outputs;
 mod plugins;
 mod real_robots;
 mod record;

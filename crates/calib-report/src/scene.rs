@@ -45,6 +45,9 @@ pub struct SceneRobot {
     pub base: String,
     /// Joint positions of the scene.
     pub joints: Vec<JointValue>,
+    /// Whether every link has a mass, of its own or of a link it is fixed to: simulators drop links without.
+    #[serde(default)]
+    pub has_masses: bool,
 }
 
 /// A frame and where it is.

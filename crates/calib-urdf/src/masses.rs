@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::model::{Inertial, LinkId, RobotModel};
+use crate::model::{Inertial, JointKind, LinkId, RobotModel};
 
 /// A moved link is as heavy as a rod of this length at least, m: the joints of a wrist that lie in one point have motors too, and
 /// the last link has a flange. What the rods to the next joints lack lies at the link's origin.
@@ -20,6 +20,30 @@ impl RobotModel {
     pub fn total_mass(&self) -> f64 {
         let inertials = self.links.iter().filter_map(|l| l.inertial);
         inertials.map(|i| i.mass).sum()
+    }
+
+    /// Whether every link has a mass, of its own or of one that it is fixed to. Simulators drop links without.
+    #[must_use]
+    pub fn every_link_has_mass(&self) -> bool {
+        let mut mass = vec![0.0; self.links.len()];
+        for id in self.link_ids() {
+            let own = self.links[id.index()].inertial.map_or(0.0, |i| i.mass);
+            mass[self.carrier(id).index()] += own;
+        }
+        self.link_ids()
+            .all(|id| mass[self.carrier(id).index()] > 0.0)
+    }
+
+    /// The link that `link` is fixed to: the first above it, or itself, that a joint can move or that is the root.
+    fn carrier(&self, mut link: LinkId) -> LinkId {
+        while let Some(joint) = self.link(link).parent_joint {
+            let joint = self.joint(joint);
+            if joint.kind != JointKind::Fixed {
+                break;
+            }
+            link = joint.parent;
+        }
+        link
     }
 
     /// The same robot with uniform rods for links: from each link's origin to every place where a joint that moves, or

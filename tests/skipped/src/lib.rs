@@ -26,6 +26,9 @@ pub const NO_REAL_DATA: &str = "no measurements of other laboratories (CALIB_REA
 /// Why a test was skipped where no browser is installed.
 pub const NO_BROWSER: &str = "no Chromium";
 
+/// Why a test was skipped where a format's reference checker is missing.
+pub const NO_CHECKER: &str = "no reference checkers of output formats (CALIB_CHECKERS)";
+
 /// Files of runs that printed no summary are removed after a day.
 const STALE: Duration = Duration::from_secs(24 * 3600);
 
@@ -47,6 +50,18 @@ pub fn skip(reason: &str) {
 #[must_use]
 pub fn real_data(path: &str) -> Option<PathBuf> {
     find("CALIB_REAL_DATA", "data", path, NO_REAL_DATA)
+}
+
+/// The reference checker of an output format: a program in the folder that `CALIB_CHECKERS` names, filled by
+/// `tests/checkers/install.sh`. `None`, counted as skipped, where it is not there.
+#[must_use]
+pub fn checker(format: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("CALIB_CHECKERS").map(PathBuf::from);
+    let program = folder.map(|f| f.join(format)).filter(|p| p.is_file());
+    if program.is_none() {
+        skip(NO_CHECKER);
+    }
+    program
 }
 
 /// A file of independent results: in the folder that `CALIB_GOLDEN` names, else in `tests/golden`.

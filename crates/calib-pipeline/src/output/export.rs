@@ -341,6 +341,7 @@ pub fn scene(
             urdf: profile.outputs.urdf.clone(),
             base: root,
             joints: Vec::new(),
+            has_masses: inputs.robot.model.every_link_has_mass(),
         },
         frames,
         bodies: scene_bodies(inputs, tracks, robot, &model),

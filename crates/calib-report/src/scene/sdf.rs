@@ -17,10 +17,15 @@ pub(super) fn sdf(scene: &Scene) -> String {
         .iter()
         .map(|frame| (frame.name.as_str(), frame))
         .collect();
+    if !scene.robot.has_masses {
+        text.push_str(
+            "    <!-- The robot's links are frames, at the scene's joint positions: its URDF states no masses, and a simulator drops links without. -->\n",
+        );
+    }
     for frame in scene
         .frames
         .iter()
-        .filter(|frame| !frame.in_urdf && frame.name != "world")
+        .filter(|frame| !(frame.in_urdf && scene.robot.has_masses) && frame.name != "world")
     {
         let _ = writeln!(text, "    <!-- {} -->", frame.status.word());
         let _ = writeln!(
@@ -40,7 +45,7 @@ pub(super) fn sdf(scene: &Scene) -> String {
         );
         text.push_str("    </frame>\n");
     }
-    if !scene.robot.urdf.is_empty() {
+    if scene.robot.has_masses && !scene.robot.urdf.is_empty() {
         let _ = writeln!(
             text,
             "    <include>\n      <name>{}</name>\n      <uri>{}</uri>",
@@ -101,9 +106,9 @@ fn attached_to(scene: &Scene, frames: &BTreeMap<&str, &SceneFrame>, frame: &Scen
     }
 }
 
-/// Links of the robot are addressed through its model: `ripley::gripper`.
+/// Links of a robot that is included are addressed through its model: `ripley::gripper`.
 fn name_in_world(scene: &Scene, frames: &BTreeMap<&str, &SceneFrame>, name: &str) -> String {
-    if frames.get(name).is_some_and(|frame| frame.in_urdf) {
+    if scene.robot.has_masses && frames.get(name).is_some_and(|frame| frame.in_urdf) {
         format!("{}::{name}", scene.robot.name)
     } else {
         name.to_owned()

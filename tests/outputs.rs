@@ -1,0 +1,120 @@
+//! Every output is read by the reference checker of its format. `tests/checkers/install.sh FOLDER` gets the checkers, and
+//! `CALIB_CHECKERS` names that folder; without one the checks are counted as skipped.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::scratch::Scratch;
+
+/// Errors that the checker of `format` finds in `file`; `None` where there is no checker here.
+fn faults(format: &str, file: &Path) -> Option<Vec<String>> {
+    let checker = skipped_tests::checker(format)?;
+    let out = Command::new(checker)
+        .arg(file)
+        .output()
+        .expect("a checker that is there starts");
+    if out.status.success() {
+        return Some(Vec::new());
+    }
+    let said = [out.stdout, out.stderr].concat();
+    let said = String::from_utf8_lossy(&said).into_owned();
+    Some(said.lines().map(str::to_owned).collect())
+}
+
+/// Gives every link of a URDF that has none a box to see and, with `masses`, an inertia; the box is an STL file.
+fn dressed(urdf: &str, masses: bool) -> String {
+    let mass = "<inertial><origin xyz=\"0.01 0 0\"/><mass value=\"1.5\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" iyz=\"0\" izz=\"0.01\"/></inertial>";
+    let visual = "<visual><geometry><mesh filename=\"part.stl\" scale=\"0.001 0.001 0.001\"/></geometry></visual>";
+    let inside = format!("{}{visual}", if masses { mass } else { "" });
+    let mut out = String::new();
+    for line in urdf.split_inclusive('\n') {
+        match line.trim_end().strip_suffix("/>") {
+            Some(open) if line.trim_start().starts_with("<link ") => {
+                out += &format!("{}>{inside}</link>\n", open.trim_end());
+            }
+            _ if line.trim_start().starts_with("<link ") && line.trim_end().ends_with('>') => {
+                out += &line.replacen('>', &format!(">{inside}"), 1);
+            }
+            _ => out += line,
+        }
+    }
+    out
+}
+
+/// A binary STL of one tetrahedron, 100 mm.
+fn tetrahedron() -> Vec<u8> {
+    let corners: [[f32; 3]; 4] = [
+        [0.0; 3],
+        [100.0, 0.0, 0.0],
+        [0.0, 100.0, 0.0],
+        [0.0, 0.0, 100.0],
+    ];
+    let mut bytes = vec![b' '; 80];
+    bytes.extend(4_u32.to_le_bytes());
+    for face in [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] {
+        bytes.extend([0_u8; 12]);
+        for corner in face {
+            bytes.extend(corners[corner].iter().flat_map(|x: &f32| x.to_le_bytes()));
+        }
+        bytes.extend([0_u8; 2]);
+    }
+    bytes
+}
+
+/// Runs `robots/<robot>.yaml` and has every file of the results checked.
+fn check(dir: &Scratch, robot: &str) {
+    let ran = dir.calib(["run", &format!("robots/{robot}.yaml"), "--out", "out"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
+    let mut found = Vec::new();
+    for (format, file) in [
+        ("urdf", format!("{robot}.calibrated.urdf")),
+        ("sdf", format!("{robot}.scene.sdf")),
+        ("gltf", format!("{robot}.scene.glb")),
+    ] {
+        let path = dir.path(&format!("out/{file}"));
+        let faults = faults(format, &path).unwrap_or_default();
+        found.extend(faults.iter().map(|fault| format!("{file}: {fault}")));
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn the_outputs_of_the_shipped_robots_pass() {
+    for robot in ["ripley", "justin"] {
+        check(&Scratch::new().robot(robot), robot);
+    }
+}
+
+/// With masses the robot is included in the SDF world, without it stands there as frames; meshes go into the GLB file.
+#[test]
+fn the_outputs_of_a_robot_with_meshes_pass() {
+    for masses in [true, false] {
+        let dir = Scratch::new().robot("ripley");
+        let urdf = std::fs::read_to_string(dir.path("robots/ripley/r17.urdf")).expect("a URDF");
+        let dir = dir
+            .file("robots/ripley/r17.urdf", dressed(&urdf, masses))
+            .file("robots/ripley/part.stl", tetrahedron());
+        check(&dir, "ripley");
+        let sdf = std::fs::read_to_string(dir.path("out/ripley.scene.sdf")).expect("an SDF world");
+        assert_eq!(sdf.contains("<include>"), masses);
+    }
+}
+
+/// The checkers do find errors: a test that calls none would pass with anything.
+#[test]
+fn what_is_wrong_is_found() {
+    let dir = Scratch::new()
+        .file("bad.urdf", "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/></robot>")
+        .file("bad.sdf", "<sdf version=\"1.9\"><world name=\"w\"><frame name=\"a\" attached_to=\"b\"/></world></sdf>")
+        .file("bad.glb", "glTF");
+    for format in ["urdf", "sdf", "gltf"] {
+        let file = if format == "gltf" {
+            "bad.glb".into()
+        } else {
+            format!("bad.{format}")
+        };
+        if let Some(faults) = faults(format, &dir.path(&file)) {
+            assert!(!faults.is_empty(), "{file} passed");
+        }
+    }
+}
