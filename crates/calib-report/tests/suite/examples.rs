@@ -686,6 +686,7 @@ pub fn scene() -> Scene {
             urdf: "ripley.calibrated.urdf".into(),
             base: "base_link".into(),
             joints: joint_values(&[0.1, -0.2, 0.3, 0.0, 1.0 / 3.0]),
+            has_masses: true,
         },
         frames: vec![
             SceneFrame::root("vicon", Status::Measured),
