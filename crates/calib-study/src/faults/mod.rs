@@ -26,6 +26,7 @@ mod robot;
 mod run;
 mod settings;
 mod state;
+mod true_error;
 mod words;
 
 pub use case::Cell;
