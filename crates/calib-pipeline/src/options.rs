@@ -25,4 +25,16 @@ impl RunOptions {
             false => self.method.unwrap_or(profile.solve.method),
         }
     }
+
+    /// The same as arguments of `calib run`; the method is added where it is not the profile's.
+    pub(crate) fn arguments(&self) -> Vec<&'static str> {
+        let all = [
+            (self.select, "--select"),
+            (self.force, "--force"),
+            (self.strict, "--strict"),
+            (self.no_plugins, "--no-plugins"),
+        ];
+        let given = all.into_iter().filter(|(given, _)| *given);
+        given.map(|(_, argument)| argument).collect()
+    }
 }

@@ -29,20 +29,6 @@ use crate::prepare::robot::load_robot;
 use crate::select::selected;
 use crate::verify::verified;
 
-impl RunOptions {
-    /// The same as arguments of `calib run`; the method is added where it is not the profile's.
-    fn arguments(&self) -> Vec<&'static str> {
-        let all = [
-            (self.select, "--select"),
-            (self.force, "--force"),
-            (self.strict, "--strict"),
-            (self.no_plugins, "--no-plugins"),
-        ];
-        let given = all.into_iter().filter(|(given, _)| *given);
-        given.map(|(_, argument)| argument).collect()
-    }
-}
-
 /// What a run gives.
 #[derive(Debug, Clone)]
 pub struct RunOutput {

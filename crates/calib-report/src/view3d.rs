@@ -317,37 +317,7 @@ impl View3d {
             body.line("line s2", place(&axis.end(-1.0)), place(&axis.end(1.0)));
         }
         if let Some(pose) = self.poses.first() {
-            for outline in &self.outlines {
-                let Some(row) = pose.calibrated.get(outline.frame) else {
-                    continue;
-                };
-                let world_from_frame = isometry(row);
-                let end = |x: f64, y: f64, z: f64| {
-                    place(&(world_from_frame * Point3::new(x, y, z)).into())
-                };
-                for [ax, ay, az, bx, by, bz] in outline.lines.iter().take(STILL_LINES) {
-                    body.line("thin", end(*ax, *ay, *az), end(*bx, *by, *bz));
-                }
-            }
-            for (class, rows) in [
-                ("line thick s0", &pose.calibrated),
-                ("line dashed s1", &pose.nominal),
-            ] {
-                for (row, frame) in rows.iter().zip(&self.frames) {
-                    if let Some(parent) = frame.parent.and_then(|parent| rows.get(parent)) {
-                        body.line(class, place(&origin(parent)), place(&origin(row)));
-                    }
-                }
-            }
-            for marker in &pose.markers {
-                let Some(observed) = marker.observed else {
-                    continue;
-                };
-                body.circle("mark s3", place(&observed), 3.0);
-                let k = self.magnification;
-                let end = [0, 1, 2].map(|i| observed[i] + k * (marker.predicted[i] - observed[i]));
-                body.line("line error", place(&observed), place(&end));
-            }
+            self.draw_pose(&mut body, pose, &place);
         }
         let [left, bottom] = [16.0, SIZE[1] - 16.0];
         let bar = round_length(90.0 / scale);
@@ -362,6 +332,40 @@ impl View3d {
             "<svg role=\"img\" viewBox=\"0 0 {} {}\" aria-label=\"The robot in the pose with the largest error: calibrated solid, nominal dashed, markers as dots, errors as magnified lines\">{}</svg>",
             SIZE[0], SIZE[1], body.0
         )
+    }
+
+    /// The robot in a pose: outlines, links as lines, markers with their errors.
+    fn draw_pose(&self, body: &mut Body, pose: &ViewPose, place: &dyn Fn(&[f64; 3]) -> [f64; 2]) {
+        for outline in &self.outlines {
+            let Some(row) = pose.calibrated.get(outline.frame) else {
+                continue;
+            };
+            let world_from_frame = isometry(row);
+            let end =
+                |x: f64, y: f64, z: f64| place(&(world_from_frame * Point3::new(x, y, z)).into());
+            for [ax, ay, az, bx, by, bz] in outline.lines.iter().take(STILL_LINES) {
+                body.line("thin", end(*ax, *ay, *az), end(*bx, *by, *bz));
+            }
+        }
+        for (class, rows) in [
+            ("line thick s0", &pose.calibrated),
+            ("line dashed s1", &pose.nominal),
+        ] {
+            for (row, frame) in rows.iter().zip(&self.frames) {
+                if let Some(parent) = frame.parent.and_then(|parent| rows.get(parent)) {
+                    body.line(class, place(&origin(parent)), place(&origin(row)));
+                }
+            }
+        }
+        for marker in &pose.markers {
+            let Some(observed) = marker.observed else {
+                continue;
+            };
+            body.circle("mark s3", place(&observed), 3.0);
+            let k = self.magnification;
+            let end = [0, 1, 2].map(|i| observed[i] + k * (marker.predicted[i] - observed[i]));
+            body.line("line error", place(&observed), place(&end));
+        }
     }
 }
 
