@@ -70,6 +70,8 @@ fn check(dir: &Scratch, robot: &str) {
         ("urdf", format!("{robot}.calibrated.urdf")),
         ("sdf", format!("{robot}.scene.sdf")),
         ("gltf", format!("{robot}.scene.glb")),
+        ("html", "report.html".to_owned()),
+        ("axe", "report.html".to_owned()),
     ] {
         let path = dir.path(&format!("out/{file}"));
         let faults = faults(format, &path).unwrap_or_default();
@@ -106,14 +108,17 @@ fn what_is_wrong_is_found() {
     let dir = Scratch::new()
         .file("bad.urdf", "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/></robot>")
         .file("bad.sdf", "<sdf version=\"1.9\"><world name=\"w\"><frame name=\"a\" attached_to=\"b\"/></world></sdf>")
-        .file("bad.glb", "glTF");
-    for format in ["urdf", "sdf", "gltf"] {
-        let file = if format == "gltf" {
-            "bad.glb".into()
-        } else {
-            format!("bad.{format}")
-        };
-        if let Some(faults) = faults(format, &dir.path(&file)) {
+        .file("bad.glb", "glTF")
+        .file("bad.html", "<!DOCTYPE html><html lang=\"en\"><head><title>t</title></head><body><img src=\"a\"></body></html>");
+    let bad = [
+        ("urdf", "bad.urdf"),
+        ("sdf", "bad.sdf"),
+        ("gltf", "bad.glb"),
+        ("html", "bad.html"),
+        ("axe", "bad.html"),
+    ];
+    for (format, file) in bad {
+        if let Some(faults) = faults(format, &dir.path(file)) {
             assert!(!faults.is_empty(), "{file} passed");
         }
     }

@@ -24,12 +24,20 @@ if [ -n "$(library)" ]; then
   g++ -std=c++17 "$here/sdf.cc" -o "$folder/sdf" $(pkg-config --cflags --libs "$(library)") >>"$folder/install.log" 2>&1
 fi
 
-if command -v npm >/dev/null && (cd "$folder" && npm install --no-audit --no-fund --silent gltf-validator@2.0.0-dev.3.10 >>install.log 2>&1); then
-  cp "$here/gltf.js" "$folder/gltf.js"
-  printf '#!/bin/sh\nexec node "%s/gltf.js" "$@"\n' "$folder" >"$folder/gltf"
-  chmod +x "$folder/gltf"
+# program NAME COMMAND: a checker that is a script of node.
+program() {
+  printf '#!/bin/sh\nexec %s "$@"\n' "$2" >"$folder/$1"
+  chmod +x "$folder/$1"
+}
+if command -v npm >/dev/null && (cd "$folder" && npm install --no-audit --no-fund --silent \
+  gltf-validator@2.0.0-dev.3.10 html-validate@10.17.0 axe-core@4.14.1 >>install.log 2>&1); then
+  cp "$here/gltf.js" "$here/axe.js" "$folder"
+  program gltf "node \"$folder/gltf.js\""
+  program html "\"$folder/node_modules/.bin/html-validate\""
+  browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome) \
+    && program axe "node \"$folder/axe.js\" \"$browser\""
 fi
 
-for checker in urdf sdf gltf; do
+for checker in urdf sdf gltf html axe; do
   [ -x "$folder/$checker" ] && echo "$checker" || echo "no checker of $checker here"
 done

@@ -11,6 +11,7 @@ use crate::table::{Align, Table};
 use crate::words::diagnosis::{apply, diagnosis, nominal_urdf};
 use crate::words::headline::{self, headline, limit};
 use crate::words::remarks::remarks;
+use crate::words::scope::{not_for, valid_for};
 use crate::{Effect, Report, ReportError, Verdict, View3d, answers};
 use askama::Template;
 
@@ -206,9 +207,11 @@ fn head_part(report: &Report, sections: &[SectionPart]) -> HeadPart {
         parts: Markup::from_text(&number.parts.join(" · ")),
         number,
         strip,
-        use_for: report.scope.iter().map(|s| Markup::from_text(s)).collect(),
-        not_for: (!report.not_for.is_empty())
-            .then(|| Markup::from_text(&format!("{}.", report.not_for.join("; ")))),
+        use_for: valid_for(report)
+            .iter()
+            .map(|s| Markup::from_text(s))
+            .collect(),
+        not_for: not_for(report).map(|excluded| Markup::from_text(&excluded)),
         interval: Markup::from_text(&interval),
         diagnosis: diagnosis(report).map(texts),
         remarks: remarks

@@ -109,16 +109,10 @@ impl Screen<'_> {
 
     /// What it holds for.
     fn scope(&mut self) {
-        if self.report.scope.is_empty() {
-            return;
-        }
         self.heading("Valid for");
-        for scope in &self.report.scope {
-            self.text += &wrap(&full_stop(scope), self.look.columns, "  - ", "    ");
-        }
-        if !self.report.not_for.is_empty() {
-            let not = format!("Not for: {}.", self.report.not_for.join("; "));
-            self.text += &wrap(&not, self.look.columns, "  - ", "    ");
+        let holds = words::scope::valid_for(self.report).into_iter();
+        for line in holds.chain(words::scope::not_for_line(self.report)) {
+            self.text += &wrap(&full_stop(&line), self.look.columns, "  - ", "    ");
         }
     }
 

@@ -38,12 +38,10 @@ pub(super) fn head(page: &mut Page, report: &Report) {
         ]);
     }
     page.table("", limits);
-    if !report.scope.is_empty() {
-        page.text("Valid for:");
-        page.list(report.scope.iter().map(|scope| sentence(scope)));
-    }
-    if !report.not_for.is_empty() {
-        page.text(format!("Not for: {}.", report.not_for.join("; ")));
+    page.text("Valid for:");
+    page.list(words::scope::valid_for(report));
+    if let Some(excluded) = words::scope::not_for_line(report) {
+        page.text(excluded);
     }
     let identification = words::headline::identification(report);
     if !identification.is_empty() {

@@ -9,6 +9,7 @@ use super::prose::{or, sentence, short};
 use super::rejection::rejected;
 use super::remarks::warnings;
 use super::robot;
+use super::scope;
 use super::verdict::trust;
 use crate::Report;
 
@@ -65,14 +66,8 @@ pub(crate) fn answers_in(report: &Report, rest: &str) -> Vec<Answer> {
 
 /// What it holds for, and what it excludes.
 fn scope(report: &Report) -> Vec<String> {
-    let holds: Vec<String> = report.scope.iter().map(|item| sentence(item)).collect();
-    let holds = or(
-        holds,
-        "Only for poses similar to those that were recorded: the profile states no scope.",
-    );
-    let excluded =
-        (!report.not_for.is_empty()).then(|| format!("Not for: {}.", report.not_for.join("; ")));
-    holds.into_iter().chain(excluded).collect()
+    let holds = scope::valid_for(report).into_iter();
+    holds.chain(scope::not_for_line(report)).collect()
 }
 
 /// Id, question, and the same in a word or two.

@@ -23,7 +23,7 @@ mod rejected_for;
 pub(crate) mod rejection;
 pub(crate) mod remarks;
 pub(crate) mod robot;
-mod scope;
+pub(crate) mod scope;
 pub(crate) mod selection;
 mod terms;
 pub(crate) mod verdict;

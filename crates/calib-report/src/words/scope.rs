@@ -1,7 +1,36 @@
 //! What a result is valid for.
 
-use super::prose::{code, counted};
-use crate::Scope;
+use super::prose::{code, counted, sentence};
+use crate::{Report, Scope, Verdict};
+
+/// What the result may be used for, a sentence each: nothing, unless it was accepted.
+pub(crate) fn valid_for(report: &Report) -> Vec<String> {
+    let only = match report.verdict {
+        Verdict::Rejected => "Nothing: the result is rejected.",
+        Verdict::NotEvaluated => "Nothing yet: the evidence does not suffice for a verdict.",
+        Verdict::Accepted | Verdict::AcceptedWithWarnings if report.scope.is_empty() => {
+            "Only for poses similar to those that were recorded: the profile states no scope."
+        }
+        Verdict::Accepted | Verdict::AcceptedWithWarnings => {
+            return report.scope.iter().map(|item| sentence(item)).collect();
+        }
+    };
+    vec![only.to_owned()]
+}
+
+/// What an accepted result must not be used for, in one sentence without its heading.
+pub(crate) fn not_for(report: &Report) -> Option<String> {
+    let accepted = matches!(
+        report.verdict,
+        Verdict::Accepted | Verdict::AcceptedWithWarnings
+    );
+    (accepted && !report.not_for.is_empty()).then(|| format!("{}.", report.not_for.join("; ")))
+}
+
+/// The same with its heading, as a list shows it.
+pub(crate) fn not_for_line(report: &Report) -> Option<String> {
+    not_for(report).map(|excluded| format!("Not for: {excluded}"))
+}
 
 impl Scope {
     /// The condition as a sentence.
