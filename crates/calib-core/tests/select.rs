@@ -31,6 +31,8 @@ struct Robot {
     first: BTreeSet<usize>,
     /// The parts that the robot has.
     truth: BTreeSet<usize>,
+    /// What each part is called.
+    names: Vec<String>,
 }
 
 /// What is drawn.
@@ -202,6 +204,7 @@ fn robot(seed: u64, design: Design, effects: &[Truth]) -> Robot {
         parts,
         first,
         truth,
+        names,
     }
 }
 
@@ -310,8 +313,8 @@ impl Robot {
         .unwrap()
     }
 
-    /// Position error on the new poses, rms, m.
-    fn error(&self, parts: &BTreeSet<usize>) -> f64 {
+    /// The problem with these parts free.
+    fn with(&self, parts: &BTreeSet<usize>) -> Problem {
         let mut problem = self.problem.clone();
         let free: BTreeSet<ParameterId> = parts
             .iter()
@@ -320,7 +323,48 @@ impl Robot {
         for id in self.parts.iter().flat_map(|p| &p.parameters) {
             problem.parameter_mut(*id).fixed = !free.contains(id);
         }
-        let solution = solve(&problem, &Settings::default()).unwrap();
+        problem
+    }
+
+    /// The likeliest model of as many parts as the robot has, by exchanges from the true one (Akaike's 2 a parameter): what a
+    /// choice could do at best that knew their number.
+    fn of_true_size(&self) -> BTreeSet<usize> {
+        let noise = solve(&self.with(&self.truth), &Settings::default())
+            .unwrap()
+            .noise;
+        let cost = |parts: &BTreeSet<usize>| {
+            let mut problem = self.with(parts);
+            for level in &noise {
+                let group = problem.group_mut(level.id);
+                (group.sigma, group.estimate) = (level.sigma, false);
+            }
+            let free = parts.iter().map(|p| self.parts[*p].parameters.len());
+            solve(&problem, &Settings::plain()).unwrap().chi2 + 2.0 * free.sum::<usize>() as f64
+        };
+        let mut parts = self.truth.clone();
+        let mut now = cost(&parts);
+        loop {
+            let mut better = None;
+            let single = |p: &usize| !parts.contains(p) && !self.names[*p].starts_with("all.");
+            for into in (0..self.parts.len()).filter(single) {
+                for out in parts.difference(&self.first) {
+                    let mut other = parts.clone();
+                    other.remove(out);
+                    other.insert(into);
+                    let c = cost(&other);
+                    if c < now {
+                        (now, better) = (c, Some(other));
+                    }
+                }
+            }
+            let Some(other) = better else { return parts };
+            parts = other;
+        }
+    }
+
+    /// Position error on the new poses, rms, m.
+    fn error(&self, parts: &BTreeSet<usize>) -> f64 {
+        let solution = solve(&self.with(parts), &Settings::default()).unwrap();
         let held_out = solution.held_out().unwrap();
         calib_core::ErrorSummary::positions(&held_out.samples).rms
     }
@@ -332,6 +376,7 @@ struct Judged {
     /// Parts that the robot lacks.
     lacked: usize,
     found: Selection,
+    robot: Robot,
 }
 
 fn judged(seed: u64, design: Design, effects: &[Truth]) -> Judged {
@@ -341,6 +386,7 @@ fn judged(seed: u64, design: Design, effects: &[Truth]) -> Judged {
         ratio: robot.error(&found.parts) / robot.error(&robot.truth),
         lacked: found.parts.difference(&robot.truth).count(),
         found,
+        robot,
     }
 }
 
@@ -456,10 +502,15 @@ fn study() {
                 .iter()
                 .filter_map(|(j, _)| Some(j.found.nested.as_ref()?.rms / j.found.rms.1));
             let nested: Vec<f64> = nested.collect();
+            let known = each.iter().map(|(j, _)| &j.robot);
+            let known: Vec<f64> = known
+                .map(|r| r.error(&r.of_true_size()) / r.error(&r.truth))
+                .collect();
+            let known = |limit: f64| share(known.iter().filter(|r| **r <= limit).count());
             println!(
                 "{poses} poses, {label}: {n} robots; something added {:.0} %, a part that the robot lacks {:.1} %; \
                  error / true model's: median {:.3}, ≤ 1.05 in {:.0} %, ≤ 1.2 in {:.0} %, largest {:.2}; \
-                 nested / left out {:.3}",
+                 nested / left out {:.3}; likeliest of the true size: ≤ 1.05 in {:.0} %, ≤ 1.2 in {:.0} %",
                 share(each.iter().filter(|(_, added)| *added).count()),
                 share(each.iter().filter(|(j, _)| j.lacked > 0).count()),
                 ratios[n / 2],
@@ -467,6 +518,8 @@ fn study() {
                 within(1.2),
                 ratios[n - 1],
                 nested.iter().sum::<f64>() / nested.len().max(1) as f64,
+                known(1.05),
+                known(1.2),
             );
         }
     }

@@ -16,6 +16,8 @@ pub enum PartKind {
     Origin,
     /// A share of another joint's motion.
     Coupling,
+    /// The first moments of all links, beyond the given masses.
+    Masses,
 }
 
 /// Parameters that are free together.

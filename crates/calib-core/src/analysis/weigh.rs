@@ -127,7 +127,8 @@ impl Solution {
     #[must_use]
     pub fn weighed(&self, models: &[NoiseModel], settings: &Settings) -> Option<Weighed> {
         let mut weights = self.weights.clone();
-        let (mut trials, mut choice) = self.tried(models, &weights)?;
+        let stated = self.model.problem();
+        let (mut trials, mut choice) = self.tried(stated, models, &weights)?;
         let eligible = eligible(self);
         let rejected = settings
             .robust
@@ -140,7 +141,7 @@ impl Solution {
             let (admission, more) = self.admitted(safe, &eligible, rejected)?;
             if let Some(more) = more {
                 weights = more;
-                (trials, choice) = self.tried(models, &weights)?;
+                (trials, choice) = self.tried(stated, models, &weights)?;
             }
             choice.admission = Some(admission);
         }
@@ -159,10 +160,28 @@ impl Solution {
         Some(Weighed { choice, solution })
     }
 
+    /// The noise from pose to pose whose weights may be used on the observations that this fit kept: that of the joints where
+    /// it predicts no worse than equal weights, else the chosen one. `stated` is the problem with [`NoiseModel::Joint`]. `None` as in
+    /// [`weighed`](Self::weighed).
+    pub(crate) fn noise_of(&self, stated: &Problem) -> Option<NoiseModel> {
+        let (_, choice) = self.tried(stated, &NoiseModel::ALL, &self.weights)?;
+        let mut candidates = choice.candidates.iter();
+        let of_joints = candidates.any(|c| c.model == NoiseModel::Joint && c.admitted);
+        Some(if of_joints {
+            NoiseModel::Joint
+        } else {
+            choice.chosen
+        })
+    }
+
     /// Every candidate, fitted to the kept observations of at most [`POSES`] poses, and the choice among them.
-    fn tried(&self, models: &[NoiseModel], weights: &[f64]) -> Option<(Vec<Trial>, NoiseChoice)> {
+    fn tried(
+        &self,
+        problem: &Problem,
+        models: &[NoiseModel],
+        weights: &[f64],
+    ) -> Option<(Vec<Trial>, NoiseChoice)> {
         let thinned = self.thinned(weights);
-        let problem = self.model.problem();
         let mut trials: Vec<Trial> = models
             .iter()
             .filter_map(|&model| Trial::new(problem, model, self, &thinned))

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use calib_core::effect::{Effect, coupling};
+use calib_core::effect::{Effect, Source, coupling};
 use calib_core::{EFFECTS, EdgeKind, Joint, ParameterId, Part};
 use calib_profile::{Free, JointFree, OriginFreeSet, Solve};
 use calib_urdf::{JointId, JointKind, RobotModel};
@@ -22,6 +22,8 @@ pub enum What {
     Effect(&'static Effect),
     /// A share of another joint's motion.
     Coupling(JointId),
+    /// The first moments of all links.
+    Masses,
 }
 
 /// A part and what it is in the robot.
@@ -50,6 +52,8 @@ const AXES: u8 = 2;
 const COUPLINGS: u8 = 100;
 /// Place of fixed joints: their origins are seldom wrong where the axes are right.
 const FIXED: u8 = 101;
+/// Place of the masses: what they load comes first.
+const MASSES: u8 = 102;
 /// Groups come after all that they consist of.
 const GROUPS: u8 = 200;
 
@@ -82,6 +86,7 @@ fn edge(formulation: &Formulation, joint: JointId) -> Option<&Joint> {
 pub(crate) fn everything(inputs: &Inputs, open: &[JointId]) -> Solve {
     let model = &inputs.robot.model;
     let mut solve = inputs.robot.profile.solve.clone();
+    solve.free.insert(Free::Masses);
     for &joint in open {
         let slides = matches!(model.joint(joint).kind, JointKind::Prismatic { .. });
         let moved = model.joint(joint).kind != JointKind::Fixed;
@@ -151,6 +156,7 @@ impl Parts {
         for &joint in open {
             parts.of_joint(inputs, open, joint, formulation);
         }
+        parts.masses(inputs, formulation);
         parts.groups();
         parts
     }
@@ -167,6 +173,7 @@ impl Parts {
             What::Origin => FIXED,
             What::Effect(effect) => effect.ladder.map_or(COUPLINGS, |(place, _)| place),
             What::Coupling(_) => COUPLINGS,
+            What::Masses => MASSES,
         };
         self.parts.push(Part { parameters, place });
         self.named.push(RobotPart {
@@ -223,12 +230,31 @@ impl Parts {
         }
     }
 
+    /// First moments beyond the given ones: they show by what yields to them, and only together.
+    fn masses(&mut self, inputs: &Inputs, formulation: &Formulation) {
+        let parameters: Vec<ParameterId> = formulation.masses.iter().map(|m| m.1).collect();
+        if parameters.is_empty() {
+            return;
+        }
+        if inputs.robot.profile.solve.free.contains(&Free::Masses) {
+            self.first.insert(self.parts.len());
+        }
+        self.parts.push(Part {
+            parameters,
+            place: MASSES,
+        });
+        self.named.push(RobotPart {
+            what: What::Masses,
+            joint: None,
+        });
+    }
+
     /// Each effect of all joints, and all axes.
     fn groups(&mut self) {
         let mut kinds: Vec<What> = Vec::new();
         for part in &self.named {
-            if !matches!(part.what, What::Coupling(_) | What::Origin) && !kinds.contains(&part.what)
-            {
+            let alone = matches!(part.what, What::Coupling(_) | What::Origin | What::Masses);
+            if !alone && !kinds.contains(&part.what) {
                 kinds.push(part.what);
             }
         }
@@ -262,13 +288,32 @@ pub(crate) fn with_parts(inputs: &Inputs, added: &[RobotPart]) -> Solve {
                 list.insert(match what {
                     What::Axis => JointFree::Axis,
                     What::Effect(effect) => JointFree::Effect(effect),
-                    What::Origin | What::Coupling(_) => JointFree::Origin,
+                    What::Origin | What::Coupling(_) | What::Masses => JointFree::Origin,
                 });
                 exception.free = Some(list);
             }
         }
     }
+    let with_masses = added.iter().any(|part| part.what == What::Masses);
+    if with_masses && yields(&solve) {
+        solve.free.insert(Free::Masses);
+    }
     solve
+}
+
+/// Whether something yields to a load: a profile may free masses only there.
+fn yields(solve: &Solve) -> bool {
+    let by_load = |e: &&Effect| e.terms.iter().any(|t| t.source == Source::Load);
+    let all = solve.free.iter().filter_map(|free| match free {
+        Free::Effect(effect) => Some(*effect),
+        _ => None,
+    });
+    let lists = solve.joints.values().filter_map(|e| e.free.as_ref());
+    let own = lists.flatten().filter_map(|free| match free {
+        JointFree::Effect(effect) => Some(*effect),
+        _ => None,
+    });
+    all.chain(own).any(|e| by_load(&e))
 }
 
 /// What is free of one joint, as a list of its own.

@@ -54,12 +54,17 @@ pub fn choose(
     let parts = Parts::of(&inputs, &open, &stated);
     let mut settings = Settings::default();
     settings.robust.enabled = profile.solve.robust;
+    let stated_noise = profile.solve.noise.model.is_some() || profile.solve.noise.known;
+    let rule = SelectionRule {
+        noise_by_evidence: !stated_noise,
+        ..SelectionRule::default()
+    };
     let found = calib_core::select(
         &stated.problem,
         &parts.parts,
         &parts.first,
         &settings,
-        &SelectionRule::default(),
+        &rule,
         &mut |fits| progress(&format!("choose effects: {fits} models fitted")),
     )?;
     let added: Vec<RobotPart> = found
@@ -107,6 +112,7 @@ impl Facts<'_> {
             What::Origin => (PartKind::Origin, None, None),
             What::Effect(effect) => (PartKind::Effect, Some(effect.id.to_owned()), None),
             What::Coupling(other) => (PartKind::Coupling, None, Some(name(other))),
+            What::Masses => (PartKind::Masses, None, None),
         };
         ModelPart {
             kind,

@@ -7,12 +7,16 @@ impl ModelPart {
     /// "compliance of `elbow`", "axes of all joints".
     #[must_use]
     pub fn words(&self) -> String {
+        if self.kind == PartKind::Masses {
+            return "masses of all links".to_owned();
+        }
         let effect = self.effect.as_deref().unwrap_or_default();
         let noun = match (self.kind, effect) {
             (PartKind::Axis, _) if self.joint.is_none() => "axes".to_owned(),
             (PartKind::Axis, _) => "axis".to_owned(),
             (PartKind::Origin, _) => "origin".to_owned(),
             (PartKind::Coupling, _) => "coupling".to_owned(),
+            (PartKind::Masses, _) => "masses".to_owned(),
             (PartKind::Effect, "offset") => "zero offset".to_owned(),
             (PartKind::Effect, "eccentricity_2") => "second harmonic".to_owned(),
             (PartKind::Effect, id) => id.replace('_', " "),

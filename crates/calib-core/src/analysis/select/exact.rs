@@ -4,16 +4,22 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Cholesky, DVector};
 
+use crate::analysis::admit::eligible;
 use crate::analysis::compare::mean_and_error;
 use crate::analysis::estimate::solve;
 use crate::analysis::select::linear::{Linearization, measured_covariance};
 use crate::analysis::select::task::Task;
 use crate::analysis::solution::Solution;
-use crate::analysis::validate::VectorError;
+use crate::analysis::validate::{CrossValidation, VectorError, predictions};
+use crate::graph::edge::EdgeKind;
 use crate::graph::error::Error;
-use crate::graph::ids::MeasurementId;
-use crate::graph::problem::Problem;
+use crate::graph::ids::{MeasurementId, ParameterId};
+use crate::graph::problem::{NoiseModel, Problem};
 use crate::model::layout::Model;
+
+/// Square of an error a row, in units of the noise, beyond which a vector counts as gross: 3 σ. What is not physics then costs all models
+/// the same, and what a model explains after all is its gain.
+const LARGEST: f64 = 9.0;
 
 /// Sample, measurement, item.
 type Key = (usize, MeasurementId, usize);
@@ -30,6 +36,8 @@ struct Predicted {
 /// A model fitted in full.
 pub(super) struct Fitted {
     pub solution: Solution,
+    /// What is random from pose to pose.
+    pub noise: NoiseModel,
     /// σ² of D per noise group: those of the first model.
     levels: Vec<f64>,
     predicted: BTreeMap<Key, Predicted>,
@@ -49,10 +57,27 @@ impl Compared {
     }
 }
 
+/// Takes out the effects that are held at nothing: they cost time at every evaluation.
+fn without_idle_effects(problem: &mut Problem) {
+    let parameters = &problem.parameters;
+    let idle = |id: ParameterId| {
+        let parameter = &parameters[id.index()];
+        parameter.fixed && parameter.start == 0.0 && parameter.nominal == 0.0
+    };
+    for edge in &mut problem.edges {
+        if let EdgeKind::Joint(joint) = &mut edge.kind {
+            joint.effects.retain(|e| !idle(e.parameter));
+            for effect in &mut joint.effects {
+                effect.shares.retain(|s| !idle(s.parameter));
+            }
+        }
+    }
+}
+
 impl Task<'_> {
     /// The problem with these parts free, the others at their nominal values.
-    fn with(&self, chosen: &BTreeSet<usize>, near: Option<&Fitted>) -> Problem {
-        let mut problem = self.problem.clone();
+    fn with(&self, chosen: &BTreeSet<usize>, near: Option<&Fitted>, noise: NoiseModel) -> Problem {
+        let mut problem = self.under(noise);
         let values = near.map_or(&[][..], |fit| &fit.solution.values.0);
         for (parameter, value) in problem.parameters.iter_mut().zip(values) {
             parameter.start = *value;
@@ -65,30 +90,79 @@ impl Task<'_> {
                 parameter.start = parameter.nominal;
             }
         }
+        without_idle_effects(&mut problem);
         problem
     }
 
-    /// A model fitted in full, from the values of another one where there is one.
+    /// The problem, all parts free, with this noise from pose to pose.
+    fn under(&self, noise: NoiseModel) -> Problem {
+        let problem = match noise {
+            NoiseModel::Joint => None,
+            other => self.problem.with_noise_model(other),
+        };
+        problem.unwrap_or_else(|| self.problem.clone())
+    }
+
+    /// A model fitted in full, from the values of another one where there is one, under the same noise.
     pub(super) fn fitted(
         &self,
         chosen: &BTreeSet<usize>,
         near: Option<&Fitted>,
     ) -> Result<Fitted, Error> {
-        let solution = solve(&self.with(chosen, near), self.settings)?;
+        let noise = near.map_or(NoiseModel::Joint, |fit| fit.noise);
+        self.fitted_under(chosen, near, noise)
+    }
+
+    /// The same model under the noise that its left-out poses speak for; `None` where it is the one that it has.
+    pub(super) fn renewed(
+        &self,
+        chosen: &BTreeSet<usize>,
+        fit: &Fitted,
+    ) -> Result<Option<Fitted>, Error> {
+        if !self.rule.noise_by_evidence {
+            return Ok(None);
+        }
+        let stated = self.with(chosen, Some(fit), NoiseModel::Joint);
+        match fit.solution.noise_of(&stated) {
+            Some(noise) if noise != fit.noise => {
+                self.fitted_under(chosen, Some(fit), noise).map(Some)
+            }
+            _ => Ok(None),
+        }
+    }
+
+    fn fitted_under(
+        &self,
+        chosen: &BTreeSet<usize>,
+        near: Option<&Fitted>,
+        noise: NoiseModel,
+    ) -> Result<Fitted, Error> {
+        let solution = solve(&self.with(chosen, near, noise), self.settings)?;
         let levels = near.map_or_else(|| solution.theta.clone(), |first| first.levels.clone());
         let step = self.step();
-        let left_out = solution.leave_out(|sample| sample % step == 0);
+        let wanted = |sample: usize| sample.is_multiple_of(step);
+        let left_out = solution.leave_out(wanted).ok_or(Error::NotEvaluable)?;
+        let most = match self.settings.robust.enabled {
+            true => LARGEST,
+            false => f64::INFINITY,
+        };
         let mut predicted = BTreeMap::new();
-        for sample in left_out.ok_or(Error::NotEvaluable)?.samples {
-            for v in &sample.vectors {
-                let key = (sample.sample, v.measurement, v.item);
-                if let Some(found) = Predicted::of(&solution.model, &levels, sample.sample, v) {
-                    predicted.insert(key, found);
+        for of in [Some(left_out), rejected(&solution, &wanted)]
+            .iter()
+            .flatten()
+        {
+            for sample in &of.samples {
+                for v in &sample.vectors {
+                    let key = (sample.sample, v.measurement, v.item);
+                    if let Some(found) = Predicted::of(&solution.model, &levels, sample.sample, v) {
+                        predicted.entry(key).or_insert(found.at_most(most));
+                    }
                 }
             }
         }
         Ok(Fitted {
             solution,
+            noise,
             levels,
             predicted,
         })
@@ -96,13 +170,32 @@ impl Task<'_> {
 
     /// Linearized in everything that a part can free.
     pub(super) fn linearized(&self, at: &Fitted) -> Result<Linearization, Error> {
-        let model = Model::new(self.problem)?;
+        let model = Model::new(&self.under(at.noise))?;
         let linear = Linearization::at(&at.solution, model, &at.levels, self.step());
         linear.ok_or(Error::NotEvaluable)
     }
 }
 
+/// What the gate rejected, predicted from what it kept: a better model may explain it.
+fn rejected(solution: &Solution, wanted: &dyn Fn(usize) -> bool) -> Option<CrossValidation> {
+    let pairs = eligible(solution).into_iter().zip(&solution.weights);
+    let rejected: Vec<f64> = pairs.map(|(e, w)| if *w > 0.0 { 0.0 } else { e }).collect();
+    if rejected.iter().all(|r| *r == 0.0) {
+        return None;
+    }
+    let objective = solution.objective();
+    predictions(objective, &solution.values, &rejected, false, wanted)
+}
+
 impl Predicted {
+    /// The same with a square of at most so much a row.
+    fn at_most(self, most: f64) -> Self {
+        Self {
+            square: self.square.min(most * self.rows as f64),
+            ..self
+        }
+    }
+
     fn of(model: &Model, levels: &[f64], sample: usize, v: &VectorError) -> Option<Self> {
         let mut observations = model.of_sample[sample].clone();
         let observation = observations.find(|&o| {

@@ -387,12 +387,14 @@ impl Fitted<'_> {
         (least * least > LEVERAGE_LEFT).then(|| factor.inverse())
     }
 
-    /// Losses of each sample predicted from the others; `None` where it cannot be.
+    /// Whitened error of a sample predicted from the others; `None` where it cannot be.
+    pub(super) fn predicted(&self, s: &Sample) -> Option<DVector<f64>> {
+        Some(self.left_out(&self.own(s))? * self.residual(s))
+    }
+
+    /// Losses of each sample predicted from the others.
     pub(super) fn losses(&self) -> Vec<Option<f64>> {
-        let loss = |s: &&Sample| {
-            let g = self.left_out(&self.own(s))?;
-            Some(s.loss(&(g * self.residual(s))))
-        };
+        let loss = |s: &&Sample| Some(s.loss(&self.predicted(s)?));
         self.linear.samples.par_iter().map(loss).collect()
     }
 

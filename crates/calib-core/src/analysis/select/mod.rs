@@ -44,7 +44,6 @@ pub struct Part {
 
 /// How parts are chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub struct SelectionRule {
     /// α of equation (3).
     pub significance: f64,
@@ -54,6 +53,9 @@ pub struct SelectionRule {
     pub folds: usize,
     /// Parts that are added at most.
     pub steps: usize,
+    /// What is random from pose to pose is chosen by evidence, first and whenever parts were added; otherwise it is as the
+    /// problem states it.
+    pub noise_by_evidence: bool,
 }
 
 impl Default for SelectionRule {
@@ -64,6 +66,7 @@ impl Default for SelectionRule {
             samples: 500,
             folds: 5,
             steps: 40,
+            noise_by_evidence: true,
         }
     }
 }

@@ -92,10 +92,7 @@ fn choose(
         let active = task.active(linear, &chosen);
         let mut possible = additions(&columns, &active);
         possible.retain(|a| !used.contains(&a.part));
-        let stage = Stage {
-            found: k,
-            significance: task.rule.significance,
-        };
+        let stage = Stage::after(k, task.rule);
         let (found, _) = candidates(training, &active, &possible, stage)?;
         let mut proposed = task.proposed(&found, false);
         proposed.retain(|c| c.predicts_better());
@@ -117,6 +114,20 @@ fn choose(
         chosen.insert(into);
     }
     Some(chosen)
+}
+
+/// Position error of what a linearized fit predicts from the other samples, root mean square, m.
+pub(super) fn left_out_rms(
+    task: &Task<'_>,
+    linearization: &Linearization,
+    linear: &Linear<'_>,
+    chosen: &BTreeSet<usize>,
+) -> Option<f64> {
+    let fitted = linear.fit(task.active(linearization, chosen))?;
+    let of = |s: &&Sample| Some(squares(linearization, s, &fitted.predicted(s)?));
+    let each = linear.samples.iter().filter_map(of);
+    let (sum, count) = each.fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    Some((sum / count.max(1) as f64).sqrt())
 }
 
 /// Position errors of one sample.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::analysis::select::exact::Fitted;
 use crate::analysis::select::linear::Linearization;
-use crate::analysis::select::nested::nested;
+use crate::analysis::select::nested::{left_out_rms, nested};
 use crate::analysis::select::step::{Candidate, Stage, additions, candidates, simplest};
 use crate::analysis::select::task::{EXCHANGES, Task};
 use crate::analysis::select::{Selection, SelectionStep, StepOutcome};
@@ -17,9 +17,6 @@ const REPORTED: usize = 5;
 
 /// [`crate::select`].
 pub(super) fn select(task: &Task<'_>, progress: &mut dyn FnMut(usize)) -> Result<Selection, Error> {
-    let first = task.fitted(task.first, None)?;
-    let mut fits = 1;
-    progress(fits);
     let mut course = Course {
         task,
         chosen: task.first.clone(),
@@ -27,15 +24,23 @@ pub(super) fn select(task: &Task<'_>, progress: &mut dyn FnMut(usize)) -> Result
         tested: 0,
         refused: BTreeSet::new(),
         used: BTreeSet::new(),
+        fits: 0,
+        progress,
     };
+    let first = course.fit(task.first, None)?;
+    let first = task.renewed(task.first, &first)?.unwrap_or(first);
     let mut last: Option<Fitted> = None;
     for _ in 0..task.rule.steps {
         let current = last.as_ref().unwrap_or(&first);
         let linear = task.linearized(current)?;
-        let Some(next) = course.forward(&linear, current, &mut fits, progress)? else {
+        let Some(next) = course.forward(&linear, current)? else {
             break;
         };
-        last = Some(next);
+        last = Some(match task.renewed(&course.chosen, &next)? {
+            // Noise that predicts the poses worse is not taken.
+            Some(renewed) if !renewed.against(&next).is_better() => renewed,
+            _ => next,
+        });
     }
     let mut linear = task.linearized(last.as_ref().unwrap_or(&first))?;
     for _ in 0..EXCHANGES {
@@ -43,14 +48,10 @@ pub(super) fn select(task: &Task<'_>, progress: &mut dyn FnMut(usize)) -> Result
         let Some(next) = course.exchange(&linear, current)? else {
             break;
         };
-        fits += 1;
-        progress(fits);
         linear = task.linearized(&next)?;
         last = Some(next);
     }
     while let Some(next) = course.backward(&linear, last.as_ref().unwrap_or(&first))? {
-        fits += 1;
-        progress(fits);
         linear = task.linearized(&next)?;
         last = Some(next);
     }
@@ -78,6 +79,15 @@ struct Course<'a> {
     refused: BTreeSet<usize>,
     /// Parts that were added once: what is left of a group is not tried again.
     used: BTreeSet<usize>,
+    /// Models that were fitted in full.
+    fits: usize,
+    progress: &'a mut dyn FnMut(usize),
+}
+
+/// Parts that were added in one linearization, not yet fitted in full.
+struct Batch {
+    chosen: BTreeSet<usize>,
+    steps: Vec<SelectionStep>,
 }
 
 impl Course<'_> {
@@ -85,23 +95,93 @@ impl Course<'_> {
         self.chosen.difference(self.task.first).count()
     }
 
-    /// The model with one part more; `None` where no part makes it better.
+    fn fit(&mut self, chosen: &BTreeSet<usize>, near: Option<&Fitted>) -> Result<Fitted, Error> {
+        let fitted = self.task.fitted(chosen, near)?;
+        self.fits += 1;
+        (self.progress)(self.fits);
+        Ok(fitted)
+    }
+
+    /// The model with more parts; `None` where no part makes it better.
     fn forward(
         &mut self,
         linear: &Linearization,
         current: &Fitted,
-        fits: &mut usize,
-        progress: &mut dyn FnMut(usize),
+    ) -> Result<Option<Fitted>, Error> {
+        let batch = self.batch(linear)?;
+        if batch.steps.len() > 1 {
+            let next = self.fit(&batch.chosen, Some(current))?;
+            if current.against(&next).is_better() {
+                self.take(batch);
+                return Ok(Some(next));
+            }
+        }
+        self.one_more(linear, current)
+    }
+
+    fn take(&mut self, batch: Batch) {
+        self.chosen = batch.chosen;
+        self.refused.clear();
+        self.used.extend(batch.steps.iter().map(|s| s.part));
+        self.steps.extend(batch.steps);
+    }
+
+    /// Parts that each predict better than without them, as long as the linearization holds: weights and outliers are those of
+    /// a model whose errors are not much larger.
+    fn batch(&self, linearization: &Linearization) -> Result<Batch, Error> {
+        /// Of the mean square at which it is linearized.
+        const LEFT: f64 = 0.3;
+        let task = self.task;
+        let linear = linearization.all();
+        let columns = task.columns(linearization);
+        let mut batch = Batch {
+            chosen: self.chosen.clone(),
+            steps: Vec::new(),
+        };
+        let mut used = self.used.clone();
+        let mut left = 1.0;
+        let mut before = None;
+        while left > LEFT && batch.steps.len() < task.rule.steps {
+            let active = task.active(linearization, &batch.chosen);
+            let mut possible = additions(&columns, &active);
+            possible.retain(|a| !used.contains(&a.part));
+            let stage = Stage::after(self.added() + batch.steps.len(), task.rule);
+            let found = candidates(&linear, &active, &possible, stage);
+            let (found, _) = found.ok_or(Error::NotEvaluable)?;
+            let mut proposed = task.proposed(&found, false);
+            proposed.retain(|c| !self.refused.contains(&c.part) && c.predicts_better());
+            let Some((part, alike)) = simplest(&linear, &active, &proposed, task.parts, task.rule)
+            else {
+                break;
+            };
+            let rms = |chosen: &BTreeSet<usize>| left_out_rms(task, linearization, &linear, chosen);
+            let from = before.or_else(|| rms(&batch.chosen)).unwrap_or(0.0);
+            batch.chosen.insert(part.part);
+            used.insert(part.part);
+            let to = rms(&batch.chosen).unwrap_or(from);
+            before = Some(to);
+            left *= 1.0 - part.gain.0;
+            batch.steps.push(SelectionStep {
+                rms: (from, to),
+                alike,
+                ..step_of(part, StepOutcome::Added)
+            });
+        }
+        Ok(batch)
+    }
+
+    /// The model with one part more, or the members of one group.
+    fn one_more(
+        &mut self,
+        linear: &Linearization,
+        current: &Fitted,
     ) -> Result<Option<Fitted>, Error> {
         let task = self.task;
         let all = linear.all();
         let active = task.active(linear, &self.chosen);
         let mut possible = additions(&task.columns(linear), &active);
         possible.retain(|a| !self.used.contains(&a.part));
-        let stage = Stage {
-            found: self.added(),
-            significance: task.rule.significance,
-        };
+        let stage = Stage::after(self.added(), task.rule);
         let found = candidates(&all, &active, &possible, stage);
         let (found, count) = found.ok_or(Error::NotEvaluable)?;
         self.tested = self.tested.max(count);
@@ -115,28 +195,29 @@ impl Course<'_> {
                     break;
                 };
                 let (with, members) = task.with_part(linear, &all, &self.chosen, part.part);
-                let next = task.fitted(&with, Some(current))?;
-                *fits += 1;
-                progress(*fits);
+                let next = self.fit(&with, Some(current))?;
                 let compared = current.against(&next);
                 let better = compared.is_better();
                 let outcome = match better {
                     true => StepOutcome::Added,
                     false => StepOutcome::NoBetter,
                 };
-                self.steps.push(SelectionStep {
+                let step = SelectionStep {
                     gain: compared.gain,
                     rms: compared.rms,
                     alike,
                     members,
                     ..step_of(part, outcome)
-                });
+                };
                 if better {
-                    self.chosen = with;
-                    self.refused.clear();
-                    self.used.insert(part.part);
+                    let steps = vec![step];
+                    self.take(Batch {
+                        chosen: with,
+                        steps,
+                    });
                     return Ok(Some(next));
                 }
+                self.steps.push(step);
                 self.refused.insert(part.part);
             }
         }
@@ -179,7 +260,7 @@ impl Course<'_> {
         let mut with = self.chosen.clone();
         with.remove(&out);
         with.insert(into);
-        let next = self.task.fitted(&with, Some(current))?;
+        let next = self.fit(&with, Some(current))?;
         if next.against(current).is_better() {
             return Ok(None);
         }
@@ -212,7 +293,8 @@ impl Course<'_> {
             return Ok(None);
         };
         self.chosen.remove(&least.part);
-        let next = self.task.fitted(&self.chosen, Some(current))?;
+        let chosen = self.chosen.clone();
+        let next = self.fit(&chosen, Some(current))?;
         if next.against(current).is_better() {
             self.chosen.insert(least.part);
             return Ok(None);

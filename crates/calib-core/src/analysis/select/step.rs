@@ -55,6 +55,8 @@ impl Candidate {
 pub(super) struct Stage {
     pub found: usize,
     pub significance: f64,
+    /// Parts that are looked at in every sample at most, those with the least probability by chance.
+    pub most: usize,
 }
 
 impl Stage {
@@ -62,7 +64,19 @@ impl Stage {
     pub(super) const ALL: Self = Self {
         found: 0,
         significance: 1.0,
+        most: usize::MAX,
     };
+
+    /// After so many parts were found.
+    pub(super) fn after(found: usize, rule: &SelectionRule) -> Self {
+        /// The best of so many by the sums is the best of all by the samples, but for the noise of both.
+        const MOST: usize = 32;
+        Self {
+            found,
+            significance: rule.significance,
+            most: MOST,
+        }
+    }
 }
 
 /// Parts looked at in every sample although the score test does not ask for them: for the report.
@@ -110,7 +124,8 @@ pub(super) fn candidates(
     let factor = count as f64 / (stage.found + 1) as f64;
     first.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let kept = first.iter().enumerate();
-    let kept = kept.filter(|(place, (p, _))| *place < SHOWN || p * factor <= stage.significance);
+    let asked = |p: f64| p * factor <= stage.significance;
+    let kept = kept.filter(|(place, (p, _))| *place < SHOWN || (*place < stage.most && asked(*p)));
     let looked_at: Vec<Addition> = kept.map(|(_, (_, i))| additions[*i].clone()).collect();
     let (beside, blocks) = self::blocks(&fitted, &looked_at);
     let base = fitted.losses();
