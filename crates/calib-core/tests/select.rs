@@ -5,10 +5,11 @@ mod common;
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_core::{
-    Axis, Chart, EdgeKind, EffectKind, ParameterId, Part, Problem, Selection, SelectionRule,
-    Settings, StepOutcome, select, solve,
+    Axis, Chart, Configuration, EdgeKind, EffectKind, FrameId, ParameterId, Part, Problem, Selection,
+    SelectionRule, Settings, StepOutcome, select, solve,
 };
 use common::{Chain, Free, Handles, normal, rng, six_r};
+use nalgebra::Point3;
 use rand::RngExt;
 
 const DEG: f64 = std::f64::consts::PI / 180.0;
@@ -33,6 +34,11 @@ struct Robot {
     truth: BTreeSet<usize>,
     /// What each part is called.
     names: Vec<String>,
+    tracker: FrameId,
+    body: FrameId,
+    /// One point of the body, and where it is in each new pose.
+    point: Point3<f64>,
+    places: Vec<Point3<f64>>,
 }
 
 /// What is drawn.
@@ -179,7 +185,7 @@ fn robot(seed: u64, design: Design, effects: &[Truth]) -> Robot {
     for edge in h.joints.clone() {
         h.problem.joint_noise(edge, noise);
     }
-    observe(&chain, &mut h, seed, design, |s| {
+    let moved = |s: usize| {
         let mut extra = [0.0; 6];
         for t in effects {
             let kinds = EFFECTS.iter().find(|e| e.0 == t.effect).unwrap().1;
@@ -188,7 +194,12 @@ fn robot(seed: u64, design: Design, effects: &[Truth]) -> Robot {
             }
         }
         extra
-    });
+    };
+    observe(&chain, &mut h, seed, design, moved);
+    let point = chain.markers[0];
+    let places = (design.poses..n)
+        .map(|s| chain.tracker_from_body(&chain.q[s], &moved(s)) * point)
+        .collect();
     h.problem.held_out = (design.poses..n).collect();
     let (parts, names, first) = everything(&mut h, &regressors);
     let truth = effects
@@ -200,6 +211,10 @@ fn robot(seed: u64, design: Design, effects: &[Truth]) -> Robot {
         .chain(first.iter().copied())
         .collect();
     Robot {
+        tracker: h.tracker,
+        body: h.body,
+        point,
+        places,
         problem: h.problem,
         parts,
         first,
@@ -368,6 +383,51 @@ impl Robot {
         let held_out = solution.held_out().unwrap();
         calib_core::ErrorSummary::positions(&held_out.samples).rms
     }
+
+    /// Part of the coordinates of the point at the new poses that lie within their 95 % intervals: of what the parameters leave
+    /// uncertain, without noise. `None` where a joint has two couplings, which a configuration cannot tell apart.
+    fn coverage(&self, parts: &BTreeSet<usize>) -> Option<f64> {
+        /// Two-sided 95 %.
+        const Z95: f64 = 1.96;
+        let solution = solve(&self.with(parts), &Settings::default()).unwrap();
+        let first = self.problem.samples() - self.places.len();
+        let free: BTreeSet<ParameterId> = parts
+            .iter()
+            .flat_map(|p| self.parts[*p].parameters.clone())
+            .collect();
+        let mut inside = 0;
+        for (s, truth) in self.places.iter().enumerate() {
+            let at = self.configuration(first + s, &free)?;
+            let found = solution.predict_point(self.tracker, self.body, &self.point, &at);
+            let found = found.unwrap();
+            let covariance = found.covariance.unwrap();
+            let close =
+                |&i: &usize| (found.position[i] - truth[i]).abs() < Z95 * covariance[(i, i)].sqrt();
+            inside += (0..3).filter(close).count();
+        }
+        Some(inside as f64 / (3 * self.places.len()) as f64)
+    }
+
+    /// Readings and regressors of a sample; `None` as in [`coverage`](Self::coverage).
+    fn configuration(&self, s: usize, free: &BTreeSet<ParameterId>) -> Option<Configuration> {
+        let mut at = Configuration::zero();
+        for (e, edge) in self.problem.edges().iter().enumerate() {
+            let EdgeKind::Joint(joint) = &edge.kind else {
+                continue;
+            };
+            let id = self.problem.find_edge(&edge.name).unwrap();
+            assert_eq!(id.index(), e);
+            at = at.with(id, joint.q[s]);
+            for effect in joint.effects.iter().filter(|f| free.contains(&f.parameter)) {
+                let Some(values) = &effect.values else { continue };
+                let known = at.regressors.insert((id, effect.kind), values[s]);
+                if known.is_some() {
+                    return None;
+                }
+            }
+        }
+        Some(at)
+    }
 }
 
 /// What a robot with effects costs: error on new poses against that of the true model.
@@ -497,6 +557,16 @@ fn study() {
             ratios.sort_by(f64::total_cmp);
             let n = ratios.len();
             let share = |count: usize| 100.0 * count as f64 / n as f64;
+            let covered = |of: fn(&Judged) -> &BTreeSet<usize>| {
+                let each = each.iter().filter_map(|(j, _)| j.robot.coverage(of(j)));
+                let each: Vec<f64> = each.collect();
+                100.0 * each.iter().sum::<f64>() / each.len().max(1) as f64
+            };
+            println!(
+                "coverage of 95 % intervals: selected {:.1} %, true model {:.1} %",
+                covered(|j| &j.found.parts),
+                covered(|j| &j.robot.truth),
+            );
             let within = |limit: f64| share(ratios.iter().filter(|r| **r <= limit).count());
             let nested = each
                 .iter()

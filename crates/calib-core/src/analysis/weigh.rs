@@ -387,6 +387,7 @@ fn values_at(
         max_iterations: 20,
         decrement: 1e-4,
         damping: 1e-6,
+        active_sets: false,
     };
     let objective = Objective {
         model,

@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use crate::graph::edge::EdgeKind;
 use crate::model::layout::Model;
 use crate::model::values::{Values, coordinates};
-use crate::solve::bounded::bounded_step;
+use crate::solve::bounded::{Damped, bounded_step};
 use crate::solve::curvature::{Curvature, dot};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::{accumulate, cost};
@@ -65,6 +65,8 @@ pub struct MinimizeSettings {
     pub decrement: f64,
     /// First damping λ: 1e-3 is a prior of 30 natural scales (30°, 30 cm) on the step.
     pub damping: f64,
+    /// Limits that are reached are found by active sets instead of an interior point: faster where many models are tried.
+    pub active_sets: bool,
 }
 
 impl Default for MinimizeSettings {
@@ -73,6 +75,7 @@ impl Default for MinimizeSettings {
             max_iterations: 100,
             decrement: 1e-12,
             damping: 1e-3,
+            active_sets: false,
         }
     }
 }
@@ -295,9 +298,12 @@ impl<'a> Descent<'a> {
                     self.objective.model,
                     &self.values,
                     &self.system,
-                    curvature.known.then_some(curvature.s.as_slice()),
-                    &self.natural,
-                    self.damping,
+                    Damped {
+                        curvature: curvature.known.then_some(curvature.s.as_slice()),
+                        natural: &self.natural,
+                        damping: self.damping,
+                        active_sets: self.settings.active_sets,
+                    },
                     &mut self.step,
                 ))
     }

@@ -200,6 +200,7 @@ pub(crate) fn clean(
         max_iterations: 4,
         decrement: 1e-3,
         damping: 1e-6,
+        active_sets: false,
     };
     let limits = Limits::new(settings);
     let rows = |o: usize| model.observations[o].rows;

@@ -144,7 +144,8 @@ fn effects(robot: &Calibration, id: JointId) -> Vec<ModelEffect> {
         }
     };
     let of = &robot.effects[id.index()];
-    let own = of.coefficients.iter().filter(|(_, c)| **c != 0.0);
+    // One that a physical limit holds at 0 was estimated too, and its uncertainty is in the file.
+    let own = of.coefficients.iter();
     let own = own.map(|(kind, c)| entry(*kind, *c, None));
     let coupled = of.coupling.iter();
     let coupled = coupled.map(|(other, c)| entry(EffectKind::Coupling, *c, Some(*other)));

@@ -165,12 +165,15 @@ pub fn select(
     rule: &SelectionRule,
     progress: &mut dyn FnMut(usize),
 ) -> Result<Selection, Error> {
+    // Trials are many, and decide by what they predict.
+    let mut settings = settings.clone();
+    settings.minimize.active_sets = true;
     path::select(
         &task::Task {
             problem,
             parts,
             first,
-            settings,
+            settings: &settings,
             rule,
         },
         progress,
