@@ -5,8 +5,8 @@ mod common;
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_core::{
-    Axis, Chart, Configuration, EdgeKind, EffectKind, FrameId, ParameterId, Part, Problem, Selection,
-    SelectionRule, Settings, StepOutcome, select, solve,
+    Axis, Chart, Configuration, EdgeKind, EffectKind, FrameId, ParameterId, Part, Problem,
+    Selection, SelectionRule, Settings, StepOutcome, select, solve,
 };
 use common::{Chain, Free, Handles, normal, rng, six_r};
 use nalgebra::Point3;
@@ -419,7 +419,9 @@ impl Robot {
             assert_eq!(id.index(), e);
             at = at.with(id, joint.q[s]);
             for effect in joint.effects.iter().filter(|f| free.contains(&f.parameter)) {
-                let Some(values) = &effect.values else { continue };
+                let Some(values) = &effect.values else {
+                    continue;
+                };
                 let known = at.regressors.insert((id, effect.kind), values[s]);
                 if known.is_some() {
                     return None;
