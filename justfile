@@ -31,7 +31,7 @@ studies:
     cargo run --release -q -p calib-cli -- study cor --trials 1500 --seed 1 --out target/studies
     cargo run --release -q -p calib-cli -- study aor --trials 1500 --seed 1 --out target/studies
     for study in justin ripley; do cargo run --release -q -p calib-cli -- study $study --trials 50 --seed 1 --out target/studies; done
-    cargo run --release -q -p calib-cli -- study faults --trials 2 --seed 1 --out target/studies
+    cargo run --release -q -p calib-cli -- study faults --trials 2 --seed 131 --out target/studies
     mkdir -p book/src/studies && cp target/studies/*.md book/src/studies/
 
 # Review changed snapshots
@@ -43,6 +43,6 @@ snapshots:
 package:
     target=$(mktemp -d) && cargo publish --dry-run --workspace --target-dir "$target" && rm -r "$target"
 
-# Licences and sources of the dependencies
+# Licenses and sources of the dependencies
 deny:
     cargo deny --offline check licenses bans sources

@@ -31,5 +31,6 @@ mod structural;
 mod studies;
 mod third_robot;
 mod truth;
+mod tutorial;
 mod urdf_out;
 mod verdict;

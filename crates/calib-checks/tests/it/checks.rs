@@ -275,7 +275,7 @@ pub fn faults() -> Vec<(&'static str, &'static str, bool, Fault)> {
         ),
         (
             "not-rigid",
-            "a loose marker, 2 mm to and fro",
+            "a loose marker, 2 mm back and forth",
             false,
             |r, rng| {
                 for point in marker(r, "hand_3").iter_mut().flatten() {
@@ -300,7 +300,7 @@ pub fn faults() -> Vec<(&'static str, &'static str, bool, Fault)> {
         ),
         (
             "body-redefined",
-            "a marker knocked by 4 mm half way",
+            "a marker knocked by 4 mm halfway",
             false,
             |r, rng| {
                 let row = rng.random_range(8..28);

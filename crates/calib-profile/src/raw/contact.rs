@@ -9,7 +9,7 @@ use crate::touched::RawTouched;
 /// A point of a link, e.g. the end of a stylus or the center of a ball.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct RawTip {
+pub struct RawContactPoint {
     /// The link that carries it.
     pub link: String,
     /// Where it is in the frame of that link, mm.

@@ -14,7 +14,7 @@ mod solve;
 
 pub use crate::touched::RawTouched;
 pub use body::{RawBody, RawPose, RawSplit};
-pub use contact::{RawContact, RawTip};
+pub use contact::{RawContact, RawContactPoint};
 pub(crate) use free::{ANGLE, MASS, MASS_CENTER, POSITION, PRIOR_KEYS};
 pub use free::{RawFree, RawJointFree, RawPrior};
 pub use origin::{RawLoop, RawOrientation, RawOrigin, RawPoint, RawTransform};
@@ -58,7 +58,7 @@ pub struct RawProfile {
     pub loops: BTreeMap<String, RawLoop>,
     /// Contact points of links, by name.
     #[serde(default)]
-    pub points: BTreeMap<String, RawTip>,
+    pub points: BTreeMap<String, RawContactPoint>,
     /// Contacts: a point of one link on a plane, line, point or at a distance fixed to another link, by name.
     #[serde(default)]
     pub contacts: BTreeMap<String, RawContact>,

@@ -71,7 +71,7 @@ pub struct RawRobotLog {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawTimedPoses {
-    /// Every hold gives one static pose: robust mean, weighted by its scatter.
+    /// Every hold gives one static pose: medians (of orientations the chordal mean), weighted by their scatter.
     #[default]
     Settle,
     /// Rows of the motion itself, at `rate_hz`; the fit estimates what is left of the clocks' offset.

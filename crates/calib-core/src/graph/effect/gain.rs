@@ -5,7 +5,7 @@ use super::{Confounded, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quanti
 /// Prior of gains, shared by couplings.
 pub(super) static PRIOR: PriorKey = PriorKey {
     key: "gain_percent",
-    text: "Gains and couplings, per cent.",
+    text: "Gains and couplings, percent.",
     default: 1.0,
     si: 0.01,
 };
