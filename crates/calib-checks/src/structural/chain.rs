@@ -193,19 +193,6 @@ impl Chain {
         readings
     }
 
-    /// Whether the reading of a joint moves a link.
-    pub(crate) fn reads(&self, link: LinkIndex, joint: usize) -> bool {
-        let mut at = link;
-        while let Some(own) = self.joints.iter().find(|own| own.child == at) {
-            let term = |term: &(JointIndex, f64)| term.0.0 == joint && term.1 != 0.0;
-            if own.motion != Motion::Fixed && own.law.iter().any(term) {
-                return true;
-            }
-            at = own.parent;
-        }
-        false
-    }
-
     /// The link at the root side of all fixed joints above a link: links with the same one move together.
     pub(crate) fn rigid_group(&self, link: LinkIndex) -> LinkIndex {
         let mut at = link;
@@ -333,7 +320,7 @@ impl Walk {
 }
 
 /// Rodrigues: `R = cos q · I + sin q · [a]ₓ + (1 − cos q) · a aᵀ`.
-fn rotation(axis: &Unit<Vector3<f64>>, angle: f64) -> Matrix3<f64> {
+pub(super) fn rotation(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
     let (s, c) = angle.sin_cos();
     let (x, y, z) = (axis.x, axis.y, axis.z);
     let k = 1.0 - c;

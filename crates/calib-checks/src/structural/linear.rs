@@ -44,7 +44,7 @@ pub(crate) struct Model<'a> {
 
 /// Sums of a whitened model.
 pub(crate) struct Sums {
-    /// (columns + 1)², the residual last.
+    /// (columns + 1)², the residual last; of two tests there is no product.
     pub gram: DMatrix<f64>,
     pub log_det: f64,
     pub observations: f64,
@@ -89,7 +89,7 @@ impl<'a> Model<'a> {
     pub(crate) fn sums(&self, lambda: f64) -> Sums {
         let width = self.columns() + 1;
         let mut gram = DMatrix::zeros(width, width);
-        let mut tall = Tall::new(width);
+        let mut tall = Tall::new(width, width - 1 - self.tests.len());
         let (mut log_det, mut observations) = (0.0, 0.0);
         let links: Vec<LinkIndex> = self.scan.data.bodies.iter().map(|b| b.link).collect();
         let mut walk = Walk::new(&self.scan.data.chain, &links);
@@ -210,16 +210,19 @@ impl<'a> Model<'a> {
 struct Tall {
     rows: DMatrix<f64>,
     filled: usize,
+    /// Columns before those of the tests.
+    first: usize,
 }
 
 impl Tall {
     /// Rows at a time: with a hundred columns they stay in the cache.
     const ROWS: usize = 128;
 
-    fn new(width: usize) -> Self {
+    fn new(width: usize, first: usize) -> Self {
         Self {
             rows: DMatrix::zeros(Self::ROWS, width),
             filled: 0,
+            first,
         }
     }
 
@@ -237,8 +240,19 @@ impl Tall {
 
     fn flush(&mut self, gram: &mut DMatrix<f64>) {
         let rows = self.rows.rows(0, self.filled);
+        let (first, last) = (self.first, rows.ncols() - 1);
         // The product of a transpose has no fast kernel.
-        gram.gemm(1.0, &rows.transpose(), &rows, 1.0);
+        let transposed = rows.columns(0, first).transpose();
+        gram.rows_mut(0, first).gemm(1.0, &transposed, &rows, 1.0);
+        // Tests are scored one by one.
+        let residual = rows.column(last);
+        for test in first..=last {
+            let own = rows.column(test);
+            gram[(test, last)] += own.dot(&residual);
+            if test < last {
+                gram[(test, test)] += own.norm_squared();
+            }
+        }
         self.filled = 0;
     }
 }

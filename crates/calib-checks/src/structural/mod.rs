@@ -60,6 +60,7 @@ mod hypothesis;
 mod ids;
 mod linear;
 mod moments;
+mod moved;
 mod outcome;
 mod registration;
 mod rotation;

@@ -40,6 +40,21 @@ impl Moments {
         let z = Vector4::new(y.x, y.y, y.z, 1.0);
         self.w += w;
         self.z.ger(w, &z, &z, 1.0);
+        self.add_pose(y, link, w);
+    }
+
+    /// What of the sums depends on the measured points alone; the poses are to be added again.
+    pub(crate) fn without_poses(&self) -> Self {
+        Moments {
+            w: self.w,
+            z: self.z,
+            ..Self::ZERO
+        }
+    }
+
+    /// What of a sample depends on the link's pose.
+    pub(crate) fn add_pose(&mut self, y: &Vector3<f64>, link: &Pose, w: f64) {
+        let z = Vector4::new(y.x, y.y, y.z, 1.0);
         self.t.ger(w, &link.t, &z, 1.0);
         for a in 0..4 {
             let wz = w * z[a];

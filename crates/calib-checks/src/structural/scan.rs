@@ -1,14 +1,17 @@
 //! Scores of hypotheses: the residual of the best registration under each.
 
+use std::sync::OnceLock;
+
 use nalgebra::Vector3;
 
 use super::chain::{Pose, Walk};
 use super::channels::{Channel, channels_of, mounts, point};
-use super::correct::{correct, remount, shifted_row};
+use super::correct::{correct, remount};
 use super::data::{Data, Measured};
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{LinkIndex, RecordingIndex, SampleIndex};
 use super::moments::{Moments, Normal, Registration};
+use super::moved::Axis;
 
 /// Residual of a hypothesis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,17 +37,19 @@ pub(crate) struct Scan<'a> {
     /// rows × joints; an empty column is 0.
     readings: Vec<f64>,
     /// The row has every reading that it needs.
-    usable: Vec<bool>,
+    pub(super) usable: Vec<bool>,
     /// rows × channels, m, centered.
-    points: Vec<Vector3<f64>>,
+    pub(super) points: Vec<Vector3<f64>>,
     /// rows × channels; 0 where lost, screened or without readings.
     pub weights: Vec<f64>,
     center: Vector3<f64>,
     /// rows × bodies.
-    poses: Vec<Pose>,
+    pub(super) poses: Vec<Pose>,
     /// recordings × channels.
-    sums: Vec<Moments>,
-    walk: Walk,
+    pub(super) sums: Vec<Moments>,
+    pub(super) walk: Walk,
+    /// rows × joints; found when a hypothesis first asks.
+    pub(super) axes: OnceLock<Vec<Axis>>,
 }
 
 /// A registration with the points in their links, for residuals.
@@ -88,6 +93,7 @@ impl<'a> Scan<'a> {
             poses: vec![Pose::IDENTITY; rows * data.bodies.len()],
             sums: Vec::new(),
             walk: Walk::new(&data.chain, &links),
+            axes: OnceLock::new(),
             usable,
             channels,
         };
@@ -159,12 +165,12 @@ impl<'a> Scan<'a> {
         self.sums = sums;
     }
 
-    fn row(&self, i: usize) -> &[f64] {
+    pub(super) fn row(&self, i: usize) -> &[f64] {
         let joints = self.data.chain.joints.len();
         &self.readings[i * joints..(i + 1) * joints]
     }
 
-    fn add_row(
+    pub(super) fn add_row(
         &self,
         sums: &mut [Moments],
         i: usize,
@@ -209,85 +215,6 @@ impl<'a> Scan<'a> {
             Scored { scoped, score }
         };
         scopes.iter().map(one).collect()
-    }
-
-    /// The sums under a hypothesis that changes readings or links alone, in the recordings of the scopes.
-    fn moved_sums(&self, h: &Hypothesis, scopes: &[Scope]) -> Option<Vec<Moments>> {
-        let changes = h.affine().is_some()
-            || matches!(
-                h,
-                Hypothesis::Exchange { .. }
-                    | Hypothesis::Units { .. }
-                    | Hypothesis::RowShift { .. }
-                    | Hypothesis::WrongLink { .. }
-            );
-        if !changes {
-            return None;
-        }
-        // Bodies that the hypothesis does not move keep their sums.
-        let mut links: Vec<Option<LinkIndex>> = (0..self.data.bodies.len())
-            .map(|b| self.moves(h, b).then(|| self.data.bodies[b].link))
-            .collect();
-        if let Hypothesis::WrongLink { body, link } = *h {
-            links[body.0] = Some(link);
-        }
-        let moved: Vec<LinkIndex> = links.iter().copied().flatten().collect();
-        let mut walk = Walk::new(&self.data.chain, &moved);
-        let mut sums = self.sums.clone();
-        let n = self.channels.len();
-        for (at, sum) in sums.iter_mut().enumerate() {
-            if links[self.channels[at % n].body].is_some() {
-                *sum = Moments::ZERO;
-            }
-        }
-        let mut row = Vec::new();
-        for i in 0..self.data.readings.len() {
-            let asked = scopes.iter().any(|s| s.contains(self.data.recording[i]));
-            if !asked || !self.moved_readings(h, i, &mut row) {
-                continue;
-            }
-            walk.go(&self.data.chain, &row);
-            let pose = |body: usize| links[body].map(|link| walk.root_from_link[link.0]);
-            self.add_row(&mut sums, i, pose, &self.points);
-        }
-        Some(sums)
-    }
-
-    /// Whether a hypothesis about readings or links moves a body.
-    fn moves(&self, h: &Hypothesis, body: usize) -> bool {
-        let reads = |joint: usize| self.data.chain.reads(self.data.bodies[body].link, joint);
-        match *h {
-            Hypothesis::Exchange { first, second } => reads(first.0) || reads(second.0),
-            Hypothesis::WrongLink { body: moved, .. } => moved.0 == body,
-            _ => h.affine().is_none_or(|a| reads(a.joint)),
-        }
-    }
-
-    /// The corrected readings of a row; false where the correction leaves it without any.
-    fn moved_readings(&self, h: &Hypothesis, i: usize, out: &mut Vec<f64>) -> bool {
-        out.clear();
-        let from = match *h {
-            Hypothesis::RowShift { rows } => shifted_row(&self.data.recording, i, rows),
-            _ => Some(i),
-        };
-        let Some(from) = from.filter(|&from| self.usable[from]) else {
-            return false;
-        };
-        out.extend_from_slice(self.row(from));
-        if let Hypothesis::Exchange { first, second } = *h {
-            out.swap(first.0, second.0);
-        }
-        if let Hypothesis::Units { mistake } = *h {
-            for (joint, q) in out.iter_mut().enumerate() {
-                if self.data.chain.turns(joint) == Some(mistake.of_angles()) {
-                    *q *= mistake.factor();
-                }
-            }
-        }
-        if let Some(a) = h.affine() {
-            out[a.joint] = a.factor * out[a.joint] + a.coupling * out[a.source] + a.offset;
-        }
-        true
     }
 
     /// Solves with the corrected sums inside the scope and the uncorrected ones outside.
