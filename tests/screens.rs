@@ -161,7 +161,7 @@ fn quoted_commands_run() {
     let page = dir.read("robots/results/ripley/report.html");
     let next = text_between(&page, "<strong>Next:", "</p>");
     let next = next.split("calib apply ").nth(1).expect("a command");
-    let next = format!("calib apply {}", next.replace("PATH/", "../../ripley/"));
+    let next = format!("calib apply {}", next.replace("/path/to/", "../../ripley/"));
     let shown = dir.quoted("robots/results/ripley", &next).expect(0);
     assert!(shown.stdout.contains("+++"), "{}", shown.stdout);
     // What the terminal quotes works where it was shown.

@@ -182,7 +182,7 @@ fn the_log_of_another_motion_is_refused() {
         [
             "correlate",
             "equally well",
-            "disagree with the nominal robot"
+            "fit the nominal robot to"
         ]
         .iter()
         .any(|words| refused.stderr.contains(words)),

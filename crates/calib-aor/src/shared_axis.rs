@@ -35,7 +35,7 @@ pub(crate) const SARA: EstimatorInfo = EstimatorInfo {
     name: "symmetrical axis of rotation",
     input: InputKind::OneOrTwoBodies,
     options: ROTATIONS,
-    summary: "axis that stands still in one or two moving bodies",
+    summary: "axis that is fixed in one or two moving bodies",
     source: "Ehrig et al. 2007 (SARA)",
     fit: sara,
 };

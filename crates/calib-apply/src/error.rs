@@ -43,7 +43,7 @@ pub enum ApplyError {
     /// The calibration was not accepted, and the caller did not force it.
     #[error(
         "{}: the verdict of this calibration is \"{}\": {}\n  help: improve the calibration first, or apply it at your own risk with --force",
-        path.display(), verdict.word(), reasons.join("; ")
+        path.display(), verdict.word(), reasons.iter().map(|r| r.trim_end_matches('.')).collect::<Vec<_>>().join("; ")
     )]
     NotAccepted {
         /// The result.

@@ -331,6 +331,61 @@ fn an_empty_column_is_named() {
     );
 }
 
+/// Outcomes where a joint has no column and stood at `value` throughout.
+fn locked(value: f64) -> Vec<(u64, Option<Hypothesis>)> {
+    let bodies = [
+        BodyKind::Markers(1),
+        BodyKind::Markers(2),
+        BodyKind::Markers(4),
+        BodyKind::Pose,
+    ];
+    let settings = (0..24_u64).map(|seed| {
+        let errors = if seed % 2 == 0 { SMALL } else { BIG };
+        let body = bodies[seed as usize % 4];
+        let mut setting = Setting::new(31_000 + seed, Plan::Poses(40), body, errors);
+        // A joint in the middle, revolute: it moves the body.
+        let joints = setting.nominal.joints();
+        let revolute = |j: &usize| matches!(joints[*j].motion, Motion::Revolute(_));
+        let joint = (1..joints.len() - 1).find(revolute).expect("one of two");
+        setting.readings.iter_mut().for_each(|q| q[joint] = value);
+        let mut data = setting.data(true);
+        data.readings.iter_mut().for_each(|row| row[joint] = None);
+        let named = match explain(&data, &options()).unwrap().decision {
+            Decision::Named(named) => Some(named.correction[0].hypothesis),
+            _ => None,
+        };
+        (seed, named)
+    });
+    settings.collect()
+}
+
+/// A locked joint without a column is no error: what a reading of its own in every row explains are nominal errors.
+#[test]
+fn a_joint_that_stood_at_zero_needs_no_column() {
+    let found = locked(0.0);
+    // Power: were one of ten named, none of 24 would pass with probability 8 %.
+    assert!(found.iter().all(|f| f.1.is_none()), "{found:?}");
+}
+
+#[test]
+fn a_joint_that_stood_elsewhere_is_named_with_its_place() {
+    for value in [-1.2, 0.5, 1.57] {
+        let found = locked(value);
+        let right = |h: &Hypothesis| match h {
+            Hypothesis::StoodAt { value: at, .. } => (at - value).abs() < 0.15,
+            _ => false,
+        };
+        let named = found.iter().filter_map(|f| f.1.as_ref());
+        assert!(
+            named.clone().filter(|h| right(h)).count() >= 18,
+            "{found:?}"
+        );
+        // Never that it moved.
+        let moved = |h: &Hypothesis| matches!(h, Hypothesis::MissingColumn { .. });
+        assert!(!named.clone().any(moved), "{found:?}");
+    }
+}
+
 #[test]
 fn many_rows_are_thinned_out() {
     let setting = Setting::new(5, Plan::Poses(20_000), BodyKind::Markers(2), SMALL);

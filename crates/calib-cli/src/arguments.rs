@@ -39,7 +39,7 @@ pub enum Command {
     Apply(apply::Apply),
     /// Compare two robots: URDFs, xacros or kinematics YAMLs
     Diff(diff::Diff),
-    /// Test whether a robot changed between two calibrations (1 % false alarms); exit code 1 if it did
+    /// Test whether a robot changed between two calibrations (false-alarm rate 1 %); exit code 1 if it did
     Drift(drift::Drift),
     /// Restore the original of a changed URDF, xacro or YAML
     Revert(revert::Revert),

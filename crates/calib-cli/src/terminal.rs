@@ -34,7 +34,7 @@ pub struct Console {
 /// When to color.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum When {
-    /// On a terminal; NO_COLOR forbids it, CLICOLOR_FORCE demands it
+    /// On a terminal; NO_COLOR forbids it, CLICOLOR_FORCE forces it
     Auto,
     /// Always
     Always,

@@ -51,7 +51,7 @@ pub(crate) const HALVORSEN: EstimatorInfo = EstimatorInfo {
     name: "several markers, bias-compensated",
     input: InputKind::Points,
     options: COMMON,
-    summary: "Gamage & Lasenby with the noise taken off; one marker: Taubin",
+    summary: "Gamage & Lasenby, noise-corrected; one marker: Taubin",
     source: "Halvorsen 2003",
     fit: halvorsen,
 };

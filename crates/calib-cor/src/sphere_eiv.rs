@@ -1,4 +1,4 @@
-//! Sphere by errors in variables: foot points in the metric of each sample, and the bias of the center taken off.
+//! Sphere by errors in variables: foot points in the metric of each sample, and the bias of the center corrected.
 //!
 //! ```text
 //! minimize Σ (x_k − f_k)ᵀ Σ_k⁻¹ (x_k − f_k)   over the center m, the radii and feet |f_k − m| = r_p          (1)
@@ -48,7 +48,7 @@ pub(crate) const INFO: EstimatorInfo = EstimatorInfo {
     name: "several markers, errors in variables",
     input: InputKind::Points,
     options: WEIGHING,
-    summary: "ml_sphere with foot points in the metric of the covariances, the bias of the center taken off",
+    summary: "ml_sphere with foot points in the metric of the covariances, the bias of the center corrected",
     source: "Box 1971; Kanatani 2008",
     fit,
 };

@@ -17,7 +17,7 @@ pub fn text(drift: &Drift) -> String {
     let (free, entangled): (Vec<&Changed>, Vec<&Changed>) =
         significant.iter().partition(|n| n.gauge_free);
     out += match (drift.changed, significant.is_empty()) {
-        (false, _) => "NO CHANGE that the data show\n",
+        (false, _) => "NO SIGNIFICANT CHANGE\n",
         (true, false) => "CHANGED\n",
         (true, true) => "CHANGED, and no single number shows where\n",
     };
@@ -33,7 +33,7 @@ pub fn text(drift: &Drift) -> String {
     );
     out += &terminal::wrapped(
         &format!(
-            "one by one: {} of {} numbers changed (Holm); {} % false alarms for everything said here",
+            "one by one: {} of {} numbers changed (Holm); false-alarm rate {} % for the whole comparison",
             significant.len(),
             drift.numbers.len(),
             number::fixed(100.0 * drift.false_alarms, 0)

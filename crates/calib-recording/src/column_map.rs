@@ -25,9 +25,9 @@ pub struct ColumnMap {
     pub names: Vec<String>,
     /// Numbers are written `1,5`.
     pub decimal_comma: bool,
-    /// Unit of joint angles, rotation vectors and Euler angles in the mapped columns.
+    /// Unit of joint angles, rotation vectors and Euler angles in the mapped columns; a name that ends in `_deg` says it itself.
     pub angles: AngleUnit,
-    /// Unit of positions and prismatic joints in the mapped columns.
+    /// Unit of positions and prismatic joints in the mapped columns; a name that ends in `_mm` says it itself.
     pub lengths: LengthUnit,
     /// The column of time, and its unit.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,6 +1,6 @@
 //! Why a result was not accepted, as far as the facts of a report say it.
 
-use calib_finding::{Fact, catalog};
+use calib_finding::{Fact, Id, catalog};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +25,11 @@ pub enum Diagnosis {
         /// Id of the finding or the reason that says so.
         evidence: String,
     },
+    /// A finding that is no error by itself names what made the errors: a body that slipped, clocks that differ.
+    NamedCause {
+        /// Id of the finding.
+        evidence: String,
+    },
     /// The residuals show an effect that the model lacks.
     MissingEffect {
         /// Its parameter: `elbow.compliance`.
@@ -32,13 +37,26 @@ pub enum Diagnosis {
     },
     /// The estimate meets the limits, and its uncertainty does not decide, or nothing was verified.
     TooFewPoses {
-        /// Postures that would decide it; null where that is not known.
+        /// Validation postures that would decide it; null where that is not known.
         postures: Option<usize>,
+        /// Whether poses of the fit help more: that many validation postures are out of proportion.
+        #[serde(default)]
+        fitted: bool,
+    },
+    /// No limit is exceeded, but predictions are less certain than the result states.
+    BeyondStated {
+        /// Id of the reason that says so.
+        evidence: String,
     },
     /// The profile sets no limits.
     NoLimits,
     /// The error is larger than the limit, and nothing in the report says why.
     Unexplained,
+    /// No limit is exceeded, and a rule of the verdict leaves it open.
+    Open {
+        /// Id of the rule.
+        evidence: String,
+    },
 }
 
 impl Diagnosis {
@@ -52,9 +70,13 @@ impl Diagnosis {
             return None;
         }
         let found = below_noise(report)
-            .or_else(|| structural(report))
+            .or_else(|| error(report))
+            .or_else(|| changed(report))
             .or_else(|| missing_effect(report))
-            .or_else(|| undecided(report));
+            .or_else(|| named(report))
+            .or_else(|| structural(report))
+            .or_else(|| undecided(report))
+            .or_else(|| open(report));
         Some(found.unwrap_or(Self::Unexplained))
     }
 }
@@ -93,19 +115,50 @@ const STRUCTURAL: [ReasonId; 6] = [
     ReasonId::OrientationOff,
 ];
 
-fn structural(report: &Report) -> Option<Diagnosis> {
-    let error =
+/// An error of the data or the model.
+fn error(report: &Report) -> Option<Diagnosis> {
+    let is_error =
         |f: &&crate::Finding| f.severity == Severity::Error && f.id != catalog::MISSING_PHYSICS;
-    let of_findings = report.findings.iter().find(error);
-    let of_reasons = || {
-        let mut reasons = report.reason_facts.iter();
-        reasons.find(|r| r.effect != Effect::Supports && STRUCTURAL.contains(&r.id))
+    let finding = report.findings.iter().find(is_error)?;
+    Some(Diagnosis::StructuralFault {
+        evidence: finding.id.as_str().to_owned(),
+    })
+}
+
+fn structural(report: &Report) -> Option<Diagnosis> {
+    let mut reasons = report.reason_facts.iter();
+    let reason = reasons.find(|r| r.effect != Effect::Supports && STRUCTURAL.contains(&r.id))?;
+    Some(Diagnosis::StructuralFault {
+        evidence: reason.id.as_str().to_owned(),
+    })
+}
+
+/// What moved during recording, unless a missing effect explains more.
+fn changed(report: &Report) -> Option<Diagnosis> {
+    let mut findings = report.findings.iter();
+    let of = findings.find(|f| f.id == catalog::CHANGED_WHILE_RECORDING)?;
+    let own = of.facts.get("physics").is_none();
+    own.then(|| Diagnosis::NamedCause {
+        evidence: of.id.as_str().to_owned(),
+    })
+}
+
+/// Findings that name a cause of errors, the most likely first.
+const CAUSES: [Id; 3] = [
+    catalog::CLOCK_LAG,
+    catalog::JOINT_GAIN,
+    catalog::JOINT_COUPLING,
+];
+
+fn named(report: &Report) -> Option<Diagnosis> {
+    let warns = |id: &Id| {
+        let mut findings = report.findings.iter();
+        findings.any(|f| f.id == *id && f.severity >= Severity::Warning)
     };
-    let evidence = match of_findings {
-        Some(finding) => finding.id.as_str().to_owned(),
-        None => of_reasons()?.id.as_str().to_owned(),
-    };
-    Some(Diagnosis::StructuralFault { evidence })
+    let id = CAUSES.into_iter().find(warns)?;
+    Some(Diagnosis::NamedCause {
+        evidence: id.as_str().to_owned(),
+    })
 }
 
 fn missing_effect(report: &Report) -> Option<Diagnosis> {
@@ -117,15 +170,48 @@ fn missing_effect(report: &Report) -> Option<Diagnosis> {
     })
 }
 
+/// A validation that would need more than this many times its postures is not what decides.
+const OUT_OF_PROPORTION: usize = 3;
+
+fn any_exceeded(report: &Report) -> bool {
+    let mut limits = report.limits.iter();
+    limits.any(|limit| limit.outcome == Outcome::Exceeded)
+}
+
+/// What leaves a verdict open although no limit is exceeded.
+fn open(report: &Report) -> Option<Diagnosis> {
+    if any_exceeded(report) {
+        return None;
+    }
+    let mut reasons = report.reason_facts.iter();
+    let reason = reasons.find(|r| matches!(r.effect, Effect::LeavesOpen | Effect::Rejects))?;
+    let evidence = reason.id.as_str().to_owned();
+    Some(match reason.id {
+        ReasonId::HeldOutBeyondStated
+        | ReasonId::UncertaintyTooSmall
+        | ReasonId::GoodnessOfFit
+        | ReasonId::NoiseAboveStated => Diagnosis::BeyondStated { evidence },
+        _ => Diagnosis::Open { evidence },
+    })
+}
+
 fn undecided(report: &Report) -> Option<Diagnosis> {
+    // More poses do not mend an error that is larger than a limit.
+    if any_exceeded(report) {
+        return None;
+    }
     let has = |id| {
         let mut reasons = report.reason_facts.iter();
         reasons.find(|r| r.id == id && r.effect != Effect::Supports)
     };
     if let Some(open) = has(ReasonId::LimitUndecided) {
         let postures = open.values.get("postures").and_then(Fact::value);
+        let postures = postures.map(|n| n as usize).filter(|n| *n > 0);
+        let held_out = report.verification.held_out.as_ref();
+        let now = held_out.map_or(0, |h| if h.left_out { 0 } else { h.postures });
         return Some(Diagnosis::TooFewPoses {
-            postures: postures.map(|n| n as usize).filter(|n| *n > 0),
+            postures,
+            fitted: now > 0 && postures.is_some_and(|n| n > OUT_OF_PROPORTION * now),
         });
     }
     if has(ReasonId::NoLimits).is_some() {
@@ -141,5 +227,8 @@ fn undecided(report: &Report) -> Option<Diagnosis> {
     ]
     .into_iter()
     .find_map(has)
-    .map(|_| Diagnosis::TooFewPoses { postures: None })
+    .map(|_| Diagnosis::TooFewPoses {
+        postures: None,
+        fitted: false,
+    })
 }

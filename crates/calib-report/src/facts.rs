@@ -36,6 +36,8 @@ pub enum Scope {
     EffectsOf {
         /// The file that holds them.
         file: String,
+        /// The URDF that was fitted to be used without them, where one was written.
+        alone: Option<String>,
     },
     /// Origins were estimated one by one, with nominal link geometry.
     OriginsOneByOne,

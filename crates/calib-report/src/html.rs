@@ -199,7 +199,7 @@ fn head_part(report: &Report, sections: &[SectionPart]) -> HeadPart {
     let texts = |words: [String; 2]| words.map(|words| Markup::from_text(&words));
     let urdf = nominal_urdf(report).and_then(|path| std::path::Path::new(path).file_name());
     let command =
-        urdf.and_then(|urdf| apply(report, ".", &format!("PATH/{}", urdf.to_string_lossy())));
+        urdf.and_then(|urdf| apply(report, ".", &format!("/path/to/{}", urdf.to_string_lossy())));
     let worst = report.verification.held_out.as_ref();
     let worst = worst.and_then(|held_out| held_out.worst.as_ref());
     HeadPart {

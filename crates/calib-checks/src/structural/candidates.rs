@@ -60,6 +60,7 @@ pub(crate) fn span(data: &Data, joint: JointIndex) -> f64 {
 fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
     use UnitMistake::*;
     let joints = data.relevant_joints();
+    let empty = data.assumed_zero();
     let mut add = |h: Hypothesis| list.push((h, scopes.to_vec()));
     for &joint in &joints {
         let Some(revolute) = data.chain.turns(joint.0) else {
@@ -76,7 +77,8 @@ fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
                 .into_iter()
                 .for_each(|mistake| add(Hypothesis::Unit { joint, mistake }));
         }
-        if revolute {
+        // Of an empty column it is asked where the joint stood.
+        if revolute && !empty.iter().any(|e| e.0 == joint) {
             for turns in [
                 QuarterTurns::Plus90,
                 QuarterTurns::Minus90,

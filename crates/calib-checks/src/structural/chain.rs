@@ -205,8 +205,8 @@ impl Chain {
         at
     }
 
-    /// Whether the joint turns (or slides) something itself; `None` for a fixed one.
-    pub(crate) fn turns(&self, joint: usize) -> Option<bool> {
+    /// Whether the joint turns (or slides) something itself; `None` for a fixed one. The joint is one of the chain.
+    pub fn turns(&self, joint: usize) -> Option<bool> {
         match self.joints[joint].motion {
             Motion::Fixed => None,
             Motion::Revolute(_) => Some(true),

@@ -26,6 +26,12 @@ pub(crate) fn correct(scoped: &Scoped, data: &Data) -> Data {
         Hypothesis::Remounted { body } => remount(&mut corrected, scoped.scope, body),
         Hypothesis::TrackerMoved | Hypothesis::MissingColumn { .. } => {}
         Hypothesis::Lag { recording, seconds } => later(&mut corrected, recording, seconds),
+        Hypothesis::StoodAt { joint, value } => {
+            let rows = corrected.readings.iter_mut().zip(&inside);
+            for (row, _) in rows.filter(|(_, inside)| **inside) {
+                row[joint.0].get_or_insert(value);
+            }
+        }
         _ => {
             correct_readings(&mut corrected, h, &inside);
             correct_measured(&mut corrected, h, &inside);

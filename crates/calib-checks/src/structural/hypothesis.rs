@@ -148,6 +148,13 @@ pub enum Hypothesis {
         /// Joint.
         joint: JointIndex,
     },
+    /// The joint stood elsewhere than at 0 although its column is empty.
+    StoodAt {
+        /// Joint.
+        joint: JointIndex,
+        /// Where it stood, rad or m.
+        value: f64,
+    },
     /// The body is mounted on another link.
     WrongLink {
         /// Body.

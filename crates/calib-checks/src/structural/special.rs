@@ -167,19 +167,60 @@ pub(crate) fn rigid_motion(scope: Scope, from: &Data, to: &Data) -> Option<Isome
     Some(rigid_registration(&a, &b, None).ok()?.b_from_a)
 }
 
+/// Where a joint without a column was, row by row.
+pub(crate) struct Whereabouts {
+    /// Median, rad or m.
+    pub(crate) middle: f64,
+    /// Median distance from it, rad or m.
+    pub(crate) spread: f64,
+}
+
+/// The readings that [`apply`] put into an empty column, in short; `None` where it has no rows.
+pub(crate) fn whereabouts(
+    scope: Scope,
+    joint: JointIndex,
+    data: &Data,
+    filled: &Data,
+) -> Option<Whereabouts> {
+    let turns = data.chain.turns(joint.0) == Some(true);
+    let apart = |a: f64, b: f64| match turns {
+        true => (a - b).sin().atan2((a - b).cos()).abs(),
+        false => (a - b).abs(),
+    };
+    let rows = empty_rows(scope, joint, data).into_iter();
+    let found: Vec<f64> = rows.filter_map(|i| filled.readings[i][joint.0]).collect();
+    let median = |from: f64| -> f64 {
+        let mut distances: Vec<f64> = found.iter().map(|q| apart(*q, from)).collect();
+        distances.sort_by(f64::total_cmp);
+        distances[distances.len() / 2]
+    };
+    let all = found.iter().map(|q| (median(*q), *q));
+    let (spread, middle) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(Whereabouts { middle, spread })
+}
+
+/// Half the range of readings that is searched for an empty column, rad or m.
+pub(crate) fn range(data: &Data, joint: JointIndex) -> f64 {
+    match data.chain.joints().get(joint.0).map(|j| j.motion) {
+        Some(Motion::Prismatic(_)) => STROKE,
+        _ => std::f64::consts::PI,
+    }
+}
+
+fn empty_rows(scope: Scope, joint: JointIndex, data: &Data) -> Vec<usize> {
+    let rows = 0..data.readings.len();
+    rows.filter(|&i| scope.contains(data.recording[i]) && data.readings[i][joint.0].is_none())
+        .collect()
+}
+
 fn missing_column(scope: Scope, joint: JointIndex, data: &Data) -> Data {
-    let rows: Vec<usize> = (0..data.readings.len())
-        .filter(|&i| scope.contains(data.recording[i]) && data.readings[i][joint.0].is_none())
-        .collect();
+    let rows = empty_rows(scope, joint, data);
     let mut filled = data.clone();
     rows.iter()
         .for_each(|&i| filled.readings[i][joint.0] = Some(0.0));
     let links: Vec<LinkIndex> = data.bodies.iter().map(|b| b.link).collect();
     let mut walk = Walk::new(&data.chain, &links);
-    let range = match data.chain.joints().get(joint.0).map(|j| j.motion) {
-        Some(Motion::Prismatic(_)) => STROKE,
-        _ => std::f64::consts::PI,
-    };
+    let range = range(data, joint);
     let mut last = f64::INFINITY;
     for _ in 0..ALTERNATIONS {
         let found: Vec<f64> = {

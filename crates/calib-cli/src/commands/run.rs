@@ -29,7 +29,7 @@ pub struct Run {
     /// Exit with 1 where the result is accepted with warnings
     #[arg(long)]
     pub strict: bool,
-    /// Choose what to free by how well left-out poses are predicted, starting from what the profile frees
+    /// Select what to free by cross-validation, starting from what the profile frees
     #[arg(long)]
     pub select: bool,
     /// Only show what --select would choose, and why; writes nothing

@@ -41,7 +41,7 @@ pub(crate) const ROBUST: EstimatorInfo = EstimatorInfo {
     name: "center with outliers",
     input: InputKind::PointsOrPoses,
     options: RANDOM,
-    summary: "consensus, then each sample belongs in part, maximum likelihood of the inliers",
+    summary: "consensus, then weighted by membership, maximum likelihood of the inliers",
     source: "Dempster et al. 1977; evidence for each choice, see the book",
     fit: robust,
 };
@@ -73,7 +73,7 @@ pub(crate) const CONSENSUS: EstimatorInfo = EstimatorInfo {
     name: "center by random subsets",
     input: InputKind::PointsOrPoses,
     options: RANDOM,
-    summary: "the choice of inliers with the greatest evidence, noise stated or not; inliers refitted",
+    summary: "inliers selected by marginal likelihood, noise stated or not; inliers refitted",
     source: "Torr & Zisserman 2000; Moisan & Stival 2004",
     fit: consensus,
 };

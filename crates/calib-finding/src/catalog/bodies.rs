@@ -14,7 +14,7 @@ super::topic! {
             "Fix the marker, or leave it out of the body.";
         "bends": Error,
             "The body bends: the distance between `{first}` and `{second}` varies by {range}; {rows:row} affected.",
-            "Stiffen the body, or make bodies of the markers that keep their distances.";
+            "Stiffen the body, or define bodies from markers whose mutual distances are constant.";
         "template": Error,
             "The body differs from its template by up to {difference} in a distance.",
             "Check the order of the markers, or remove the template so that it is learned from the recording.";
@@ -43,7 +43,7 @@ super::topic! {
             "The body fits the mirror image of its template to {mirrored}, the template only to {plain}.",
             "Check the axes of the export: the recording's frame is left-handed, or an axis has the wrong sign.";
         "tracker": Error,
-            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with one axis of the tracker reversed[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with one axis of the tracker reversed[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Check the axes of the export: the tracker's frame is left-handed, or an axis has the wrong sign.";
     }
     /// A marker moves on its body over all recordings together.

@@ -34,7 +34,7 @@ super::topic! {
     /// Another number of frames than the header says.
     FRAME_COUNT_DIFFERS = "frame-count-differs" {
         "": Warning,
-            "The header announces {promised:frame}, the file has {found}.",
+            "The header states {promised:frame}, the file has {found}.",
             "Check that the file was written to its end.";
     }
     /// A file that does not say its unit.

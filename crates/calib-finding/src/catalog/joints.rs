@@ -11,16 +11,16 @@ super::topic! {
     UNIT_MISMATCH = "unit-mismatch" {
         "degrees": Error,
             "The joint reaches {largest:rad} ({largest:turns}).",
-            "Check whether the column is in degrees: name it `…_deg`, or set `columns: {angles: deg}` for the recording.";
+            "Check whether the column is in degrees: name it `…_deg`. Columns without a unit in their name follow `columns: {angles: deg}`.";
         "radians": Error,
             "The joint moves by {moved}, the profile asks for {asked}: a ratio of {ratio}.",
-            "Check whether the column is in radians: name it `…_rad`, or set `columns: {angles: rad}` for the recording.";
+            "Check whether the column is in radians: name it `…_rad`. Columns without a unit in their name follow `columns: {angles: rad}`.";
         "millimeters": Error,
             "The points spread over {spread:m}, up to {farthest:m} from the tracker's origin.",
-            "Check whether these are millimeters: name the columns `…_mm`, or set `columns: {lengths: mm}` for the recording.";
+            "Check whether these are millimeters: name the columns `…_mm`. Columns without a unit in their name follow `columns: {lengths: mm}`.";
         "meters": Error,
             "All points lie within {farthest} of the tracker's origin.",
-            "Check whether these are meters: name the columns `…_m`, or set `columns: {lengths: m}` for the recording.";
+            "Check whether these are meters: name the columns `…_m`. Columns without a unit in their name follow `columns: {lengths: m}`.";
         "template_millimeters": Error,
             "The body is {ratio} times as large as its template: millimeters were read as meters.",
             "Correct the unit of length of the recording or of the template.";
@@ -31,35 +31,35 @@ super::topic! {
             "The body is {ratio} times as large as its template: a factor of ten.",
             "Correct the unit of length of the recording or of the template.";
         "all_degrees": Error,
-            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with all joint angles read as degrees[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
-            "Correct the unit in the columns' names, or set `columns: {angles: deg}` for the recording.";
+            "The recordings fit the nominal robot to {none} rms, but to {best} with all joint angles read as degrees[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Correct the unit in the columns' names. Columns without a unit in their name follow `columns: {angles: deg}`.";
         "all_radians": Error,
-            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with all joint angles read as radians[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
-            "Correct the unit in the columns' names, or set `columns: {angles: rad}` for the recording.";
+            "The recordings fit the nominal robot to {none} rms, but to {best} with all joint angles read as radians[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Correct the unit in the columns' names. Columns without a unit in their name follow `columns: {angles: rad}`.";
         "all_millimeters": Error,
-            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with all prismatic joints read as millimeters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
-            "Correct the unit in the columns' names, or set `columns: {lengths: mm}` for the recording.";
+            "The recordings fit the nominal robot to {none} rms, but to {best} with all prismatic joints read as millimeters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Correct the unit in the columns' names. Columns without a unit in their name follow `columns: {lengths: mm}`.";
         "all_meters": Error,
-            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with all prismatic joints read as meters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
-            "Correct the unit in the columns' names, or set `columns: {lengths: m}` for the recording.";
+            "The recordings fit the nominal robot to {none} rms, but to {best} with all prismatic joints read as meters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Correct the unit in the columns' names. Columns without a unit in their name follow `columns: {lengths: m}`.";
         "joint_degrees": Error,
-            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with joint `{joint}` read as degrees[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with joint `{joint}` read as degrees[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Name the column `{joint}_deg`.";
         "joint_radians": Error,
-            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with joint `{joint}` read as radians[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with joint `{joint}` read as radians[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Name the column `{joint}_rad`.";
         "joint_millimeters": Error,
-            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with joint `{joint}` read as millimeters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with joint `{joint}` read as millimeters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Name the column `{joint}_mm`.";
         "joint_meters": Error,
-            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with joint `{joint}` read as meters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with joint `{joint}` read as meters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Name the column `{joint}_m`.";
         "lengths_too_large": Error,
-            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with the tracker's lengths a thousand times smaller[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
-            "Correct the unit in the columns' names, or set `columns: {lengths: mm}` for the recording.";
+            "The recordings fit the nominal robot to {none} rms, but to {best} with the tracker's lengths a thousand times smaller[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Correct the unit in the columns' names. Columns without a unit in their name follow `columns: {lengths: mm}`.";
         "lengths_too_small": Error,
-            "The recordings disagree with the nominal robot by {none} rms, but only by {best} with the tracker's lengths a thousand times larger[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ What remains exceeds the {limit} that nominal errors explain: look for a second mistake.]]",
-            "Correct the unit in the columns' names, or set `columns: {lengths: m}` for the recording.";
+            "The recordings fit the nominal robot to {none} rms, but to {best} with the tracker's lengths a thousand times larger[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Correct the unit in the columns' names. Columns without a unit in their name follow `columns: {lengths: m}`.";
     }
     /// A joint has values beyond its limits.
     JOINT_OUTSIDE_LIMITS = "joint-outside-limits" {

@@ -13,8 +13,8 @@ super::topic! {
             "The sweep `{sweep}` does not determine the origin: the two axes give no frame ({said}).",
             "Sweep two joints whose axes meet in the origin over more of their range, or ask for a line with one axis.";
         "orientation": Error,
-            "The sweep `{sweep}` does not determine the origin: the orientation that the nominal URDF would give, or the reference point along the axis, is not known.",
-            "Name two axes, or a reference point that is known.";
+            "The sweep `{sweep}` does not determine the origin: the orientation of the nominal URDF, or the reference point along the axis, is not stated.",
+            "Name two axes, or state a reference point.";
         "mean_axis": Error,
             "The sweep `{sweep}` does not determine the origin: the axis has no mean direction in the body.",
             "Check the poses of the body in the sweep.";
@@ -34,16 +34,16 @@ super::topic! {
     /// A coefficient that physics allows on one side of 0 only, and that the data put on the other.
     WRONG_SIGN = "wrong-sign" {
         "": Warning,
-            "The estimate is held at 0, the limit of the physics ({physics}); without the limit it would be {value} ± {sigma}.",
-            "Look for an effect that is not enabled, a torque column of the other sign, the direction of gravity (`robot.gravity`), or wrong masses; or do not free this effect here.";
+            "The estimate is fixed at 0, the physical bound ({physics}); without the bound it would be {value} ± {sigma}.",
+            "Check the sign of the torque column, the direction of gravity (`robot.gravity`) and the masses. If they are right, an effect that is not enabled may be the cause; otherwise do not free this effect here.";
     }
     /// Compliance is estimated under loads of masses that nobody stated.
     NO_MASSES = "no-masses" {
         "assumed": Warning,
-            "The URDF has no masses: the loads are those of uniform rods between the joints, assumed to weigh {mass} in all. Compliances are per N m of these loads, so that their scale is not known; what the robot yields depends only on the proportions.",
+            "The URDF has no masses: the loads are those of uniform rods between the joints, assumed to weigh {mass} in all. The scale of the compliances is therefore unknown; the deflections depend only on the mass ratios.",
             "Add `<inertial>` to the links or state `robot.total_mass_kg` and `robot.payload`; free `masses` to let the data find the proportions.";
         "stated": Warning,
-            "The URDF has no masses: the loads are those of uniform rods between the joints, which weigh the stated {mass} in all. What the robot yields depends on their proportions.",
+            "The URDF has no masses: the loads are those of uniform rods between the joints, which weigh the stated {mass} in all. The deflections depend on their mass ratios.",
             "Add `<inertial>` to the links, or free `masses` to let the data find the proportions.";
     }
     /// The residuals show an effect that is not in the model.
@@ -55,16 +55,16 @@ super::topic! {
     /// What is random from pose to pose is no noise of a joint.
     NOISE_IS_PHYSICS = "noise-is-physics" {
         "swallowed": Info,
-            "Joint noise of {sigma} would make the residuals likeliest, but with its weights left-out poses are predicted worse ({poses:pose} left out in turn): physics is missing from the model. The fit uses weights that do not trust the model.",
+            "Joint noise of {sigma} maximizes the likelihood, but predicts left-out poses worse ({poses:pose} left out in turn): physics is missing from the model. The fit uses weights that do not depend on the robot model.",
             "Enable the effects that `missing-physics` names, and compare the held-out errors.";
         "no_encoder": Info,
-            "The joints seem to stop {sigma} off their readings, differently in each pose. No encoder has that noise: physics is missing from the model (backlash, compliance, eccentricity), or the readings belong to other poses.",
+            "Joint positions deviate from their readings by {sigma} (σ), differently in each pose. No encoder has that noise: physics is missing from the model (backlash, compliance, eccentricity), or the readings belong to other poses.",
             "Enable the effects that `missing-physics` names, and compare the held-out errors.";
     }
     /// Rejected vectors take part after all.
     REJECTED_TAKE_PART = "rejected-take-part" {
         "": Info,
-            "{readmitted} of {rejected} rejected measurements take part after all: left-out poses are predicted {better:percent} better with them. They are the hardest poses of a model that physics is missing from, not errors.",
+            "{readmitted} of {rejected} rejected measurements were readmitted: left-out poses are predicted {better:percent} better with them. They are poses that the incomplete model fits worst, not errors.",
             "Enable the effects that `missing-physics` names, and compare the held-out errors.";
     }
     /// Shapes that the 3-D view lacks.
@@ -85,32 +85,32 @@ super::topic! {
             "{missing} of {total:shape} of the links are missing in the 3-D view: the files have more than 128 MB: {shapes:code}[[ and {more} more]].",
             "Reduce the meshes to see them. No number depends on it.";
         "damaged": Info,
-            "{missing} of {total:shape} of the links are missing in the 3-D view: the files are no whole STL mesh: {shapes:code}[[ and {more} more]].",
+            "{missing} of {total:shape} of the links are missing in the 3-D view: the files are not complete STL meshes: {shapes:code}[[ and {more} more]].",
             "Export the meshes again to see them. No number depends on it.";
         "undefined": Info,
-            "{missing} of {total:shape} of the links are missing in the 3-D view: a shape of the link is none that the URDF format defines: {shapes:code}[[ and {more} more]].",
+            "{missing} of {total:shape} of the links are missing in the 3-D view: the URDF format does not define the shape: {shapes:code}[[ and {more} more]].",
             "Correct the `<visual>` elements to see them. No number depends on it.";
     }
     /// The data do not see how large the robot is.
     SIZE_NOT_SEEN = "size-not-seen" {
         "contacts": Error,
-            "The data do not see the size of the robot: contacts close as well on a robot of another size, so held-out contacts cannot tell. The priors alone hold it to ±{sigma:percent}, {at_reach} at the reach of {reach:m}[[, and the fit changed it by {change:percent}, which no measurement supports]].",
+            "The size of the robot is not observable: a scaled robot satisfies the contacts equally well, so held-out contacts cannot detect it. The priors alone determine it to ±{sigma:percent}, {at_reach} at the reach of {reach:m}[[, and the fit changed it by {change:percent}, which no measurement supports]].",
             "Provide one length: a ball bar, two places at a known distance, or a tracked body on the robot; or state lengths that were measured with their σ.";
         "tracked": Warning,
-            "The data do not see the size of the robot: the priors alone hold it to ±{sigma:percent}, {at_reach} at the reach of {reach:m}.",
+            "The size of the robot is not observable: the priors alone determine it to ±{sigma:percent}, {at_reach} at the reach of {reach:m}.",
             "Record poses in which the joints move together over their ranges.";
     }
     /// Priors, not data, hold what matters at the tool.
     HELD_BY_PRIORS = "held-by-priors" {
         "contacts": Error,
-            "Over the joint ranges the priors alone hold {held} rms at the tool, more than the limit of {limit}: held-out contacts cannot tell.",
-            "Touch more things, in postures spread over the joint ranges, or measure lengths and state them with their σ.";
+            "Over the joint ranges, {held} rms of the uncertainty at the tool is determined by the priors alone, more than the limit of {limit}; held-out contacts cannot detect an error there.",
+            "Add contacts in postures spread over the joint ranges, or measure lengths and state them with their σ.";
         "tracked": Warning,
-            "Over the joint ranges the priors alone hold {held} rms at the tool, more than the limit of {limit}.",
+            "Over the joint ranges, {held} rms of the uncertainty at the tool is determined by the priors alone, more than the limit of {limit}.",
             "Record poses in which the joints move together over their ranges.";
         "open_contacts": Error,
             "A combination of parameters that neither data nor priors determine moves the tool: its position is unknown.",
-            "State a σ for the places that are touched and for what is free, or touch more things.";
+            "State a σ for the places that are touched and for what is free, or add contacts.";
         "open_tracked": Warning,
             "A combination of parameters that neither data nor priors determine moves the tool in other postures.",
             "Record poses in which the joints move together over their ranges, or keep the priors.";

@@ -9,7 +9,7 @@ use calib_urdf::{JointKind, UnknownName};
 #[derive(Debug, thiserror::Error)]
 pub enum DataProblem {
     /// The data checks found errors.
-    #[error("the data checks found {} error(s)\n{}", errors(.0).count(), listed(.0))]
+    #[error("the data checks found {}\n{}", errors(.0).count().to_string() + if errors(.0).count() == 1 { " error" } else { " errors" }, listed(.0))]
     Checks(Vec<Finding>),
     /// A table without a row.
     #[error("has no poses")]
@@ -161,7 +161,7 @@ impl DataProblem {
     #[must_use]
     pub fn remedy(&self) -> String {
         let text = match self {
-            Self::Checks(_) => "correct the data, or go on at your own risk with --force",
+            Self::Checks(_) => "correct the data, or continue at your own risk with --force",
             Self::NoPoses => "record at least one row",
             Self::NotOneTable(_) => {
                 "add `timing: {}` to the recording in the profile: holds become poses, and the clocks are brought together"

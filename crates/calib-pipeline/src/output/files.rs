@@ -24,7 +24,7 @@ pub(crate) struct Robots<'a> {
 }
 
 /// Name of the URDF that is used without effects: `r.calibrated.urdf` gives `r.calibrated.alone.urdf`.
-fn alone_name(urdf: &str) -> String {
+pub(crate) fn alone_name(urdf: &str) -> String {
     format!("{}.alone.urdf", urdf.trim_end_matches(".urdf"))
 }
 
@@ -73,7 +73,7 @@ pub(crate) fn written(
     put(
         outputs.scene.clone(),
         scene.json()?,
-        "scene for the situation model",
+        "scene: frames with poses and uncertainty (JSON)",
     );
     put(
         format!("{stem}.launch.py"),

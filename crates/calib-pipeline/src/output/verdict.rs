@@ -5,6 +5,7 @@ use calib_report::{HeldOut, Limit, Limited, MissingPhysics, NextStep, Scope, Ver
 
 use crate::output::evidence::Evidence;
 use crate::output::export::calibration_name;
+use crate::output::files::alone_name;
 use crate::verify::motions::Motions;
 
 pub(crate) fn limits(limits: &Limits, e: &Evidence<'_>) -> Vec<Limit> {
@@ -100,7 +101,9 @@ pub(crate) fn scope(e: &Evidence<'_>, motions: &Motions) -> Vec<Scope> {
         }
         None => {}
     }
-    scope.extend(effects_file(e).map(|file| Scope::EffectsOf { file }));
+    let refitted = e.held_out.as_ref().and_then(|h| h.urdf_refitted);
+    let alone = refitted.map(|_| alone_name(&e.inputs.robot.profile.outputs.urdf));
+    scope.extend(effects_file(e).map(|file| Scope::EffectsOf { file, alone }));
     if e.method == Method::Paper {
         scope.push(Scope::OriginsOneByOne);
     }

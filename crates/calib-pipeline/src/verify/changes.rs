@@ -169,15 +169,10 @@ impl Names<'_> {
             .filter(|name| !changed.contains(name))
             .cloned()
             .collect();
-        let shown = |(name, row): (&String, u64)| {
-            if name == recording {
-                row.to_string()
-            } else {
-                format!("{row} of `{name}`")
-            }
-        };
+        let within = before.0 == recording;
         finding
-            .with("before", Fact::name(shown(before)))
+            .with("before", Fact::name(before.1.to_string()))
+            .with_some("before_in", (!within).then(|| Fact::name(before.0.clone())))
             .with("row", Fact::name(after.to_string()))
             .with("recording", Fact::name(recording.clone()))
             .with_some(

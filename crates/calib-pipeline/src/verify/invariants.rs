@@ -154,7 +154,7 @@ fn pair(a: &Line, b: &Line, found: &mut Vec<Invariant>) {
             // Signed along a × b: smooth also where the axes meet.
             push(
                 InvariantKind::Distance,
-                format!("distance between {axes}"),
+                format!("signed distance between {axes}"),
                 Unit::Meter,
                 between.dot(&(cross / cross.norm())),
             );
@@ -175,13 +175,13 @@ fn pair(a: &Line, b: &Line, found: &mut Vec<Invariant>) {
     );
     push(
         InvariantKind::Tilt,
-        format!("tilt of {} towards {}", b.name, a.name),
+        format!("tilt of {} toward {}", b.name, a.name),
         Unit::Radian,
         (sign * b.direction.dot(&towards)).asin(),
     );
     push(
         InvariantKind::Twist,
-        format!("twist of {} against {}", b.name, a.name),
+        format!("tilt of {} out of its plane with {}", b.name, a.name),
         Unit::Radian,
         (sign * b.direction.dot(&a.direction.cross(&towards))).asin(),
     );

@@ -16,7 +16,7 @@ pub mod robot_changes;
 
 use std::collections::BTreeMap;
 
-use calib_finding::Finding;
+use calib_finding::{Fact, Finding};
 use calib_report::{HeldOut, LoopClosure, ResidualRow};
 
 use crate::formulate::kinematics::Calibration;
@@ -64,8 +64,36 @@ pub fn verified(
             residuals: residual_rows(inputs, tracks, &solved.robot, fit),
         },
     );
-    verified.findings.splice(0..0, changed);
+    if let Some(changed) = changed {
+        verified.findings = one_cause(changed, verified.findings);
+    }
     verified
+}
+
+/// What moved within the fitted recordings seems to have moved before the validation too: the fit has the mean of both places.
+/// One cause, one finding: the change, as severe as the worse of the two.
+fn one_cause(changed: Finding, before_validation: Vec<Finding>) -> Vec<Finding> {
+    // Nothing for the tracker.
+    let body = |finding: &Finding| {
+        finding
+            .facts
+            .get("body")
+            .and_then(Fact::word)
+            .map(str::to_owned)
+    };
+    let places = ["body", "tracker"];
+    let kind = changed.facts.get("kind").and_then(Fact::word);
+    if changed.facts.get("physics").is_some() || !kind.is_some_and(|kind| places.contains(&kind)) {
+        return std::iter::once(changed).chain(before_validation).collect();
+    }
+    let (same, other): (Vec<Finding>, Vec<Finding>) = before_validation
+        .into_iter()
+        .partition(|f| body(f) == body(&changed));
+    let severity = same.iter().map(|f| f.severity).max();
+    let severity = severity.map_or(changed.severity, |s| s.max(changed.severity));
+    std::iter::once(changed.with_severity(severity))
+        .chain(other)
+        .collect()
 }
 
 /// Errors on held-out recordings; without any, on fitted poses that are left out in turn.

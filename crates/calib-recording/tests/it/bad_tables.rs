@@ -1,7 +1,8 @@
 //! What is wrong with a table is said with a place: the messages are what a person reads.
 
 use calib_recording::{
-    BodyColumns, ColumnMap, Error, ReadOptions, read_bytes, read_path, read_path_with,
+    AngleUnit, BodyColumns, ColumnMap, Error, Filled, LengthUnit, ReadOptions, read_bytes,
+    read_path, read_path_with,
 };
 
 fn error(text: impl AsRef<[u8]>) -> String {
@@ -172,6 +173,37 @@ fn mapped(map: ColumnMap, text: &str) -> Result<(), Error> {
         },
     )
     .map(|_| ())
+}
+
+#[test]
+fn a_mapped_column_that_ends_in_a_unit_has_that_unit() {
+    let read = |angles, lengths| {
+        let map = ColumnMap {
+            angles,
+            lengths,
+            joints: [("a".to_owned(), "b_deg".to_owned())].into(),
+            prismatic: [("s".to_owned(), "t_mm".to_owned())].into(),
+            ..ColumnMap::default()
+        };
+        let options = ReadOptions {
+            columns: Some(map),
+            ..ReadOptions::default()
+        };
+        let recording = read_bytes("log.csv", b"b_deg,t_mm\n90,250\n", &options)?;
+        let poses = recording.poses(Filled::Exclude).expect("one table");
+        let value = |joint: &str| poses.joints[joint][0].expect("a value");
+        Ok::<_, Error>((value("a"), value("s")))
+    };
+    for angles in [AngleUnit::Rad, AngleUnit::Deg] {
+        let (angle, length) = read(angles, LengthUnit::M).expect("units are in the names");
+        assert!((angle - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+        assert_eq!(length, 0.25);
+    }
+    let message = read(AngleUnit::Rad, LengthUnit::Cm).expect_err("two units");
+    assert!(
+        message.to_string().contains("`t_mm` and `lengths: cm`"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -124,7 +124,7 @@ fn noise_choice(page: &mut Page, choice: &NoiseChoice) {
         "<random from pose to pose",
         ">largest joint noise",
         ">left-out rms [mm]",
-        ">less likely by [nats per pose]",
+        ">log-likelihood deficit per pose [nats]",
         "<weights",
     ]);
     for candidate in &choice.candidates {
@@ -136,9 +136,9 @@ fn noise_choice(page: &mut Page, choice: &NoiseChoice) {
             number::fixed(candidate.surprise_error, 2)
         );
         let weights = match (chosen, candidate.admitted) {
-            (true, _) => "taken",
+            (true, _) => "selected",
             (false, true) => "not needed",
-            (false, false) => "predict worse",
+            (false, false) => "predicts worse",
         };
         table.row([
             candidate.model.words().to_owned(),

@@ -13,19 +13,19 @@ impl ErrorSource {
                 "Average several frames per pose.",
             ],
             Self::JointNoise => [
-                "joint noise",
+                "joint repeatability",
                 "the joint position differs from the encoder reading, differently in each pose",
                 "Let the robot settle before each measurement, and warm it up first.",
             ],
             Self::Parameters => [
-                "parameters",
+                "geometry",
                 "uncertainty of the estimated geometry",
                 "Record more poses, spread over the range of motion.",
             ],
             Self::NotModeled => [
-                "not modeled",
+                "unexplained",
                 "residual that neither noise nor parameter uncertainty explains",
-                "See the missing effects under Findings.",
+                "Run again with `--select`, which tries the effects that the model lacks.",
             ],
         }
     }

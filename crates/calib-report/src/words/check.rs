@@ -8,7 +8,7 @@ impl DataCheck {
     pub(crate) fn words(self) -> &'static str {
         match self {
             Self::Units => "units and conventions",
-            Self::JointLimits => "joint readings inside of their limits",
+            Self::JointLimits => "joint readings within their limits",
             Self::JointMotion => "joints of the sweeps move",
             Self::Markers => "markers measured, none frozen or written twice",
             Self::RigidBodies => "bodies rigid, markers not swapped",

@@ -1,14 +1,14 @@
 //! Why a result was not accepted, and the command that comes next.
 
-use super::prose::code;
-use crate::{Diagnosis, Output, Report, Unit, Verdict, number};
+use super::prose::{code, full_stop};
+use crate::{Diagnosis, Output, ReasonId, Report, Unit, Verdict, number};
 
 /// Multiples of the tracker's noise that a limit of the rms error should leave room for.
 const ROOM: f64 = 1.5;
 
 impl Diagnosis {
-    /// The diagnosis and the remedy, a sentence each; `again` is the command that runs the profile.
-    pub(crate) fn words(&self, again: &str) -> [String; 2] {
+    /// The diagnosis and the remedy, a sentence or two each; `again` is the command that runs the profile.
+    pub(crate) fn words(&self, report: &Report, again: &str) -> [String; 2] {
         match self {
             Self::LimitBelowNoise {
                 limit_name,
@@ -26,13 +26,31 @@ impl Diagnosis {
                     ),
                 ]
             }
-            Self::StructuralFault { evidence } => [
-                format!(
-                    "The data or the model have an error that more poses do not remove ({}).",
-                    code(evidence)
-                ),
-                format!("Correct it, then run `{again}`."),
-            ],
+            Self::StructuralFault { evidence } | Self::NamedCause { evidence } => of_finding(
+                report, evidence, again,
+            )
+            .or_else(|| of_reason(report, evidence, again))
+            .unwrap_or_else(|| {
+                let id = code(evidence);
+                [
+                    format!(
+                        "The data or the model have an error ({id}) that more poses cannot remove."
+                    ),
+                    format!("Correct it, then run `{again}`."),
+                ]
+            }),
+            Self::BeyondStated { evidence } | Self::Open { evidence } => {
+                let because = of_reason(report, evidence, again);
+                because.unwrap_or_else(|| {
+                    let id = code(evidence);
+                    [
+                        format!(
+                            "No limit is exceeded, but a rule of the verdict leaves it open ({id})."
+                        ),
+                        format!("Look at this rule in the report, then run `{again}`."),
+                    ]
+                })
+            }
             Self::MissingEffect { parameter } => [
                 format!(
                     "The residuals show an effect that the model lacks: {}.",
@@ -40,9 +58,12 @@ impl Diagnosis {
                 ),
                 format!("Let `{again} --select` choose the effects to free."),
             ],
-            Self::TooFewPoses { postures } => [
-                "The poses do not decide it.".to_owned(),
+            Self::TooFewPoses { postures, fitted } => [
+                "There are too few poses to decide whether the limit is met.".to_owned(),
                 match postures {
+                    Some(n) if *fitted => format!(
+                        "Record more poses for the fit, in which all joints move, and run `{again}`: this error would need about {n} validation postures, a smaller one needs fewer."
+                    ),
                     Some(n) => format!(
                         "Record about {n} validation postures in which all joints move, then run `{again}`."
                     ),
@@ -63,6 +84,69 @@ impl Diagnosis {
     }
 }
 
+/// The first finding of an id, and its remedy.
+fn of_finding(report: &Report, id: &str, again: &str) -> Option<[String; 2]> {
+    let mut findings = report.findings.iter();
+    let finding = findings.find(|f| f.id.as_str() == id)?;
+    Some([
+        format!("{}: {}", finding.subject, full_stop(&finding.text())),
+        format!("{} Then run `{again}`.", full_stop(&finding.remedy())),
+    ])
+}
+
+/// A reason of the verdict, and what can be done about it.
+fn of_reason(report: &Report, id: &str, again: &str) -> Option<[String; 2]> {
+    let mut reasons = report.reason_facts.iter();
+    let reason = reasons.find(|r| r.id.as_str() == id)?;
+    let remedy = match reason.id {
+        ReasonId::ReversedAxis => {
+            format!(
+                "Correct the sign of this joint in the URDF or in the recordings, then run `{again}`."
+            )
+        }
+        ReasonId::NotConverged => {
+            format!(
+                "Free less under `solve`, or record more poses in which all joints move, then run `{again}`."
+            )
+        }
+        ReasonId::OriginNotDetermined => {
+            format!("Sweep the joints of this origin over more of their range, then run `{again}`.")
+        }
+        ReasonId::RejectedPart => {
+            format!(
+                "Check what is special about this part of the recordings; record it again, then run `{again}`."
+            )
+        }
+        ReasonId::OrientationOff => {
+            format!(
+                "Check the bodies' orientations and mounts, or set `solve.limits.held_out_rms_deg`, then run `{again}`."
+            )
+        }
+        ReasonId::WorseThanRegistration | ReasonId::NotBetterThanRegistration => {
+            format!(
+                "Check that joints and tracker recorded the same motion at the same times, and record more poses; then run `{again}`."
+            )
+        }
+        ReasonId::HeldOutBeyondStated => {
+            format!(
+                "Look at the poses with the largest errors in the report; if they are right, let `{again} --select` try the effects that the model lacks."
+            )
+        }
+        ReasonId::ImplausibleChange => {
+            format!(
+                "Compare the value with the mechanical drawing, or hold out poses in which all joints move; then run `{again}`."
+            )
+        }
+        ReasonId::UncertaintyTooSmall
+        | ReasonId::PredictionUndecided
+        | ReasonId::EffectsNotExcluded => {
+            format!("Then run `{again}`.")
+        }
+        _ => format!("Correct it, then run `{again}`."),
+    };
+    Some([reason.sentence(), remedy])
+}
+
 /// The command that runs a profile again.
 pub(crate) fn again(profile: &str) -> String {
     format!("calib run {profile}")
@@ -71,7 +155,7 @@ pub(crate) fn again(profile: &str) -> String {
 /// Diagnosis and remedy of a result that was not accepted; `again` is the command that runs the profile.
 pub(crate) fn diagnosis_from(report: &Report, again: &str) -> Option<[String; 2]> {
     let diagnosis = report.diagnosis.as_ref()?;
-    Some(diagnosis.words(again))
+    Some(diagnosis.words(report, again))
 }
 
 /// The same from the folder of the profile.

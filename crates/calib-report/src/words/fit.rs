@@ -19,7 +19,7 @@ impl FitEnd {
     }
 }
 
-/// `converged after 7 iterations (354 measured poses and points, 89 unknowns, χ²/dof 1.03 (at the stated noise: marker))`
+/// `converged after 7 iterations (354 measured poses and points, 88 unknowns, χ²/dof 1.03 (at the stated noise: marker))`
 pub(crate) fn summary(fit: &FitSummary) -> String {
     let against = if fit.stated_noise.is_empty() {
         "1 by construction: the profile states no noise".to_owned()
@@ -65,7 +65,7 @@ pub(crate) fn in_short(report: &Report) -> String {
 /// How the uncertainty compares with one that does not trust the noise model.
 pub(crate) fn cluster_robust(ratio: f64) -> String {
     format!(
-        "Cluster-robust standard deviations (CR2, postures as clusters) do not trust the noise model: in the median they are {} times the ones above.",
+        "Cluster-robust standard deviations (CR2, postures as clusters) do not assume the noise model: their median ratio to the values above is {}.",
         number::fixed(ratio, 2)
     )
 }

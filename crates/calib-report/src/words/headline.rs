@@ -63,7 +63,7 @@ pub(crate) fn headline(report: &Report) -> Headline {
     let robot = held_out.expected.and_then(|e| e.without_tracker());
     Headline {
         quantity: if held_out.left_out {
-            "Position error of poses left out in turn"
+            "Position error, leave-one-out"
         } else {
             none.quantity
         },

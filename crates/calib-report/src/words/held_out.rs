@@ -59,7 +59,7 @@ fn screened(held_out: &HeldOut) -> Option<String> {
 /// Above the table of a terminal: `Held-out errors [mm], 20 values`.
 pub(crate) fn heading(held_out: &HeldOut) -> String {
     let which = if held_out.left_out {
-        "Errors of poses left out in turn"
+        "Leave-one-out errors"
     } else {
         "Held-out errors"
     };
@@ -194,8 +194,8 @@ impl HeldOut {
     #[must_use]
     pub fn quantity_of(bodies: bool, touches: bool) -> &'static str {
         match (bodies, touches) {
-            (false, _) => "how far touches miss",
-            (true, true) => "position of the tracked bodies, and how far touches miss",
+            (false, _) => "contact residual",
+            (true, true) => "position of the tracked bodies, and contact residual",
             (true, false) => "position of the tracked bodies",
         }
     }

@@ -70,13 +70,13 @@ impl Limited {
 
     fn held_out(name: &str, quantity: &str, unit: Unit, left_out: bool) -> Self {
         let poses = if left_out {
-            "poses left out in turn"
+            ", leave-one-out"
         } else {
-            "held-out poses"
+            " on held-out poses"
         };
         Self {
             name: name.to_owned(),
-            quantity: format!("{quantity} on {poses}"),
+            quantity: format!("{quantity}{poses}"),
             unit,
         }
     }

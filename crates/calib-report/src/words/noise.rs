@@ -48,7 +48,7 @@ impl NoiseModel {
     /// What is random from pose to pose.
     pub(crate) fn words(self) -> &'static str {
         match self {
-            Self::White => "nothing (plain least squares)",
+            Self::White => "none (ordinary least squares)",
             Self::Joint => "the joint positions, one level",
             Self::BodyPose => "the pose of each body",
             Self::JointEach => "the joint positions, a level each",
@@ -61,20 +61,20 @@ pub(crate) fn choice(choice: &NoiseChoice) -> String {
     /// Normal noise of 100 vectors exceeds this in one of 100 fits.
     const HEAVY: f64 = 1.5;
     let mut text = format!(
-        "Random from pose to pose, beside the noise of each measurement: {}, by the errors of {} poses left out in turn.",
+        "Noise from pose to pose, beside that of each measurement: {}, selected by leave-one-out prediction over {} poses.",
         choice.chosen.words(),
         choice.poses
     );
     if choice.tails > HEAVY {
         text += &format!(
-            " The tails of the left-out errors are {} times those of normal noise: keep `robust` on.",
+            " The tails of the leave-one-out errors are {} times those of normal noise: keep `robust` on.",
             number::fixed(choice.tails, 1)
         );
     }
     if choice.rejected > 0 {
         text += &format!(
-            " Of {} rejected measurements, {} take part after all, because they improve the predictions.",
-            choice.rejected, choice.readmitted
+            " {} of {} rejected measurements were readmitted, because they improve the predictions.",
+            choice.readmitted, choice.rejected
         );
     }
     text

@@ -7,7 +7,9 @@ impl RejectedFor {
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {
-            Self::OnTheWay => "not settled: it lies on the way to a neighboring row",
+            Self::OnTheWay => {
+                "not settled: explained by interpolating the joint values toward an adjacent row"
+            }
             Self::RestlessHold => "not settled: the hold drifts or scatters",
             Self::NotSettled => {
                 "not settled: the whole body is displaced, or a joint reading is wrong"

@@ -20,7 +20,7 @@ fn by_chance(report: &Report) -> Option<String> {
     let [rejected, tested] = rejected_of(report)?;
     (rejected > 0).then(|| {
         format!(
-            "{rejected} of {tested} fitted measurements were rejected; about {} of as many good ones are, by chance.",
+            "{rejected} of {tested} fitted measurements were rejected; about {} would be rejected by chance alone.",
             number::fixed(BY_CHANCE * tested as f64, 1)
         )
     })

@@ -79,16 +79,17 @@ pub(crate) fn changed(report: &Report) -> Vec<String> {
     lines
 }
 
-/// How the parameters of the fit are known: "Of 61 parameters, 21 are measured; 40 are conventions."
+/// How the parameters of the fit are known: "61 parameters: 21 identifiable, 40 arbitrary conventions."
 pub(crate) fn parameters(report: &Report) -> Option<String> {
     let of = |classes: &[Class]| {
         let parameters = report.parameters.iter();
         parameters.filter(|p| classes.contains(&p.class)).count()
     };
     let parts = [
-        (of(&[Class::Solid]), "measured"),
-        (of(&[Class::Weak, Class::Prior]), "held by their priors"),
-        (of(&[Class::NotObservable]), "not measured"),
+        (of(&[Class::Solid]), "identifiable"),
+        (of(&[Class::Weak]), "weakly identifiable"),
+        (of(&[Class::Prior]), "known by their priors only"),
+        (of(&[Class::NotObservable]), "not identifiable"),
         (of(&[Class::Convention]), "arbitrary conventions"),
     ];
     let shown: Vec<String> = parts
@@ -101,4 +102,4 @@ pub(crate) fn parameters(report: &Report) -> Option<String> {
 }
 
 /// What the conventions mean.
-pub(crate) const CONVENTIONS: &str = "Where an origin lies on its joint's axis and how it is rotated about it are conventions that no measurement determines: their values may differ by millimeters between two equal calibrations, and no prediction depends on them.";
+pub(crate) const CONVENTIONS: &str = "The position of an origin along its joint axis and its rotation about that axis are arbitrary. Two equally good calibrations may differ by millimeters there; no prediction changes.";

@@ -38,10 +38,10 @@ impl Scope {
     pub fn sentence(&self) -> String {
         match self {
             Self::TrackedBodies { frame } => format!(
-                "Positions of the tracked bodies in the tracker frame `{frame}`, within the recorded joint ranges and at the recorded load."
+                "Positions of the tracked bodies in the tracker frame `{frame}`, within the joint ranges of the fit and at the recorded load."
             ),
             Self::Contacts => {
-                "The recorded contacts, within the recorded joint ranges and at the recorded load."
+                "The recorded contacts, within the joint ranges of the fit and at the recorded load."
                     .to_owned()
             }
             Self::SingleJointMotions => {
@@ -57,8 +57,8 @@ impl Scope {
                 still,
             } => {
                 let range = match outside {
-                    0 => "all of them within the joint ranges of the fit".to_owned(),
-                    n => format!("{n} of them beyond the joint ranges of the fit"),
+                    0 => "all within these ranges".to_owned(),
+                    n => format!("{n} of them beyond these ranges"),
                 };
                 let joints: Vec<String> = still.iter().map(|joint| code(joint)).collect();
                 let still = if joints.is_empty() {
@@ -72,12 +72,17 @@ impl Scope {
                 )
             }
             Self::LeftOutPoses { postures } => format!(
-                "Verified on {} of the fit, each left out in turn: poses like those, on the same day.",
+                "Verified by leaving out each of {} of the fit in turn: valid for similar poses recorded on the same day.",
                 counted(*postures, "posture")
             ),
-            Self::EffectsOf { file } => format!(
-                "Only together with the joint effects in `{file}`: a URDF cannot represent them."
-            ),
+            Self::EffectsOf { file, alone } => {
+                let without = alone.as_ref().map_or_else(String::new, |urdf| {
+                    format!(" Without them, use `{urdf}`.")
+                });
+                format!(
+                    "Together with the joint effects in `{file}`, which a URDF cannot represent.{without}"
+                )
+            }
             Self::OriginsOneByOne => {
                 "Origins were estimated one at a time (`method: paper`); the link geometry is that of the nominal URDF."
                     .to_owned()
@@ -98,8 +103,8 @@ impl Scope {
                 let joints: Vec<String> = still.iter().map(|joint| code(joint)).collect();
                 format!("motions of {}", joints.join(", "))
             }
-            Self::LeftOutPoses { .. } => "claims about another day".to_owned(),
-            Self::EffectsOf { file } => format!("the URDF without `{file}`"),
+            Self::LeftOutPoses { .. } => "poses of another day".to_owned(),
+            Self::EffectsOf { file, .. } => format!("the calibrated URDF without `{file}`"),
             Self::HeldOutPoses { .. } | Self::OriginsOneByOne => return None,
         };
         Some(excluded)

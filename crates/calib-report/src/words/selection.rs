@@ -102,7 +102,7 @@ pub(crate) fn summary(selection: &Selection) -> Vec<String> {
     }];
     if let Some(nested) = &selection.nested {
         lines.push(format!(
-            "The choice looked at these poses. Repeated without each of {} folds, it predicts the fold to {} rms (profile's model {}): state this error for the chosen model.",
+            "These poses were used to select the model. In {}-fold cross-validation of the selection the error is {} rms (profile's model: {}): quote this value.",
             nested.folds,
             length(nested.rms_m),
             length(nested.first_rms_m)

@@ -138,7 +138,7 @@ fn of_limit(reason: &Reason, v: &Values<'_>) -> String {
         ReasonId::LimitUndecided => {
             let enough = match v.count("postures") {
                 0 => String::new(),
-                n => format!(" About {n} postures would decide it."),
+                n => format!(" About {n} validation postures are needed to decide."),
             };
             let of = |name| v.get(name).and_then(Fact::value);
             let above = |name| {
@@ -147,11 +147,11 @@ fn of_limit(reason: &Reason, v: &Values<'_>) -> String {
                     .is_some_and(|(x, limit)| x > limit)
             };
             let open = if above("low") || (above("value") && of("low").is_none()) {
-                "exceeded with a pose less, undecided with all of them"
+                "exceeded in leave-one-out prediction, undecided for the full fit"
             } else if above("value") {
-                "exceeded by the estimate, undecided by its interval"
+                "the estimate is above the limit, but its interval includes the limit"
             } else {
-                "met by the estimate, undecided by its interval"
+                "the estimate is below the limit, but its interval includes the limit"
             };
             format!(
                 "{quantity}: {}{interval}, limit {limit}: {open}.{enough}",
@@ -196,7 +196,7 @@ fn of_fit(reason: &Reason, v: &Values<'_>) -> String {
             )
         }
         ReasonId::NoiseAboveStated => format!(
-            "The noise of {} that was found is {} times the stated one: the model lacks something; the stated uncertainty includes it.",
+            "The estimated noise of {} is {} times the stated noise: the model is incomplete. The reported uncertainty includes the excess.",
             v.name("group"),
             v.number("factor")
         ),
@@ -236,9 +236,7 @@ fn of_rejection(reason: &Reason, v: &Values<'_>) -> String {
                 format!("of the measurements of recording {}", v.code("recording"))
             };
             let share = v.share("rejected", "of");
-            format!(
-                "{share} {what} were rejected: the model contradicts that part of the data as a whole."
-            )
+            format!("{share} {what} were rejected: the model does not fit this part of the data.")
         }
         ReasonId::RejectedShare => format!(
             "{} fitted measurements were rejected.",
@@ -263,7 +261,7 @@ fn of_change(reason: &Reason, v: &Values<'_>) -> String {
             v.number("change")
         ),
         _ => format!(
-            "{} changed by {}, {} standard deviations of its prior{more}: check the drawing.",
+            "{} changed by {}, {} standard deviations of its prior{more}: compare the value with the mechanical drawing.",
             v.code("name"),
             v.number("change"),
             v.number("sigmas")
@@ -281,25 +279,25 @@ fn effect(v: &Values<'_>) -> String {
     match v.name("effect") {
         "gain" => format!("a gain of {of}"),
         "eccentricity" => format!("an eccentricity of {of}"),
-        "compliance" => format!("gravity bending {of}"),
+        "compliance" => format!("compliance of {of} under gravity"),
         "coupling" => format!("a share of the motion of {other} in that of {of}"),
-        "step" => format!("a step of the zero of {of} while the data were recorded"),
+        "step" => format!("a step of the zero of {of} during recording"),
         "drift" => format!("a drift of {of}"),
-        "bump" => format!("a step of {of} while the data were recorded"),
-        _ => format!("a slip of {of} while the data were recorded"),
+        "bump" => format!("a displacement of {of} during recording"),
+        _ => format!("a slip of {of} during recording"),
     }
 }
 
 fn of_prediction(reason: &Reason, v: &Values<'_>) -> String {
     match reason.id {
         ReasonId::PredictionUndecided => format!(
-            "Over the recorded joint ranges the data leave an error of {} rms open (99 % upper limit {}), limit {}: record more poses in which the joints move together.",
+            "Over the recorded joint ranges, the position error that the data cannot exclude is {} rms (99 % upper limit {}), limit {}. Record more poses in which the joints move together.",
             v.number("expected"),
             v.number("upper"),
             v.number("limit")
         ),
         ReasonId::EffectsNotExcluded => format!(
-            "The data do not exclude {}, with an error of {} rms over the recorded joint ranges (99 % upper limit {}), limit {}: record more poses in which the joints move together.",
+            "The data do not exclude {}, with an error of {} rms over the recorded joint ranges (99 % upper limit {}), limit {}. Record more poses in which the joints move together.",
             effect(v),
             v.number("expected"),
             v.number("upper"),
@@ -311,7 +309,7 @@ fn of_prediction(reason: &Reason, v: &Values<'_>) -> String {
             v.number("high")
         ),
         ReasonId::UncertaintyTooSmall => format!(
-            "The fit states {} rms over the recorded joint ranges, and the data do not exclude {} with {} rms: record more poses in which the joints move together.",
+            "The fit states {} rms over the recorded joint ranges, and the data do not exclude {} with {} rms. Record more poses in which the joints move together.",
             v.number("stated"),
             effect(v),
             v.number("expected")
@@ -322,7 +320,7 @@ fn of_prediction(reason: &Reason, v: &Values<'_>) -> String {
                 None => String::new(),
             };
             format!(
-                "Over the recorded joint ranges, predicted positions are expected to be off by {} rms (99 % upper limit {}){with}; the fit alone states {}.",
+                "Over the recorded joint ranges, the error of a predicted position is expected to be {} rms (99 % upper limit {}){with}; the fit alone states {}.",
                 v.number("expected"),
                 v.number("upper"),
                 v.number("stated")
@@ -395,7 +393,7 @@ fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
             };
             match reason.effect {
                 Effect::LeavesOpen => format!(
-                    "One joint at a time moved in {data}, and physics is missing from the model: what it does where several joints move is open."
+                    "One joint at a time moved in {data}, and physics is missing from the model: its effect on poses in which several joints move is unknown."
                 ),
                 _ => format!(
                     "One joint at a time moved in {data}: poses in which several joints move were not tested."
@@ -408,7 +406,7 @@ fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
                 _ => Vec::new(),
             };
             format!(
-                "The held-out poses hardly move {}: what was found there is not verified.",
+                "The held-out poses hardly move {}: their calibration is not verified.",
                 or(joints.iter().map(|j| code(j)).collect(), "a joint").join(", ")
             )
         }

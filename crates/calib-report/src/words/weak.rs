@@ -8,7 +8,7 @@ impl RobotSize {
     #[must_use]
     pub fn sentence(&self) -> String {
         format!(
-            "The size of the robot: ±{}, {} at the reach of {}; {} of this is held by the priors.",
+            "The size of the robot: ±{}, {} at the reach of {}; {} of this is determined by the priors.",
             relative(self.sigma),
             number::plain(self.at_reach_m(), Unit::Meter),
             number::plain(self.reach_m, Unit::Meter),
@@ -51,10 +51,10 @@ pub(crate) fn summary(weak: &WeakDirections) -> Vec<String> {
         "up to a rigid motion of the whole robot"
     };
     let recorded = weak.recorded_rms_sigma_m.map_or_else(String::new, |m| {
-        format!(" (fitted postures: {} rms)", length(m))
+        format!(" (the postures of the fit: {} rms)", length(m))
     });
     let mut lines = vec![format!(
-        "Predicted position of {} {seen}, over {} postures spread over the recorded joint ranges, joints combined freely: σ = {} rms, {} maximum{recorded}. The priors alone hold {} of the variance, {} rms.",
+        "Predicted position of {} {seen}, over {} postures spread over the recorded joint ranges, joints combined freely: σ = {} rms, {} maximum{recorded}. The priors determine {} of the variance, {} rms.",
         code(&weak.point),
         weak.postures,
         length(weak.rms_sigma_m),
@@ -64,7 +64,7 @@ pub(crate) fn summary(weak: &WeakDirections) -> Vec<String> {
     )];
     if weak.unbounded {
         lines.push(
-            "A combination of parameters that neither data nor priors determine moves it as well: the numbers here leave it out."
+            "A combination of parameters that neither data nor priors determine moves it as well: the values here exclude it."
                 .to_owned(),
         );
     }

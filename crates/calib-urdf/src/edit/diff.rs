@@ -303,7 +303,7 @@ impl fmt::Display for ModelDiff {
             writeln!(
                 f,
                 "{:width$}  {:>9} {:>9} {:>9} {:>9} {:>9}",
-                "joint", "Δx mm", "Δy mm", "Δz mm", "|Δ| mm", "turn °"
+                "joint", "Δx mm", "Δy mm", "Δz mm", "|Δ| mm", "rotation °"
             )?;
             for joint in moved {
                 let [x, y, z] = joint.translation_mm.map(plain_zero);

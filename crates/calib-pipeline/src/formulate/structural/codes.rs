@@ -52,6 +52,10 @@ fn of_hypothesis(layout: &Layout<'_>, hypothesis: &Hypothesis) -> String {
         }
         Hypothesis::RowShift { rows } => format!("rows({rows:+})"),
         Hypothesis::MissingColumn { joint: j } => format!("column({})", joint(j)),
+        Hypothesis::StoodAt { joint: j, value } => {
+            let (value, unit) = layout.shown(j, value);
+            format!("stood({}, {value:.0} {unit})", joint(j))
+        }
         Hypothesis::WrongLink { body, link } => {
             format!("link({}, {})", layout.body(body), layout.link(link))
         }

@@ -135,6 +135,15 @@ impl<'a> Layout<'a> {
         id.map_or("", |id: JointId| &model.joint(id).name)
     }
 
+    /// A joint's value in the unit that a profile states it in, and that unit: degrees or millimeters.
+    #[must_use]
+    pub fn shown(&self, joint: JointIndex, value: f64) -> (f64, &'static str) {
+        match self.data.chain.turns(joint.0) {
+            Some(false) => (1e3 * value, "mm"),
+            _ => (value.to_degrees(), "deg"),
+        }
+    }
+
     /// Name of a link.
     #[must_use]
     pub fn link(&self, link: LinkIndex) -> &'a str {

@@ -27,10 +27,12 @@ pub fn findings(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
 /// Joints above a body that were taken to stand at 0, one finding for each.
 fn assumed_zero(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
     let named = |joint: JointIndex| match &outcome.decision {
-        Decision::Named(named) => named
-            .correction
-            .iter()
-            .any(|s| s.hypothesis == Hypothesis::MissingColumn { joint }),
+        Decision::Named(named) => named.correction.iter().any(|s| match s.hypothesis {
+            Hypothesis::MissingColumn { joint: j } | Hypothesis::StoodAt { joint: j, .. } => {
+                j == joint
+            }
+            _ => false,
+        }),
         _ => false,
     };
     let mut joints: BTreeMap<JointIndex, Vec<String>> = BTreeMap::new();
@@ -39,21 +41,18 @@ fn assumed_zero(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
         joints.entry(*joint).or_default().push(name);
     }
     joints.retain(|joint, _| !named(*joint));
-    let model = &layout.inputs.robot.model;
     let finding = |(joint, recordings): (JointIndex, Vec<String>)| {
         let name = layout.joint(joint);
         let subject = Subject {
             recordings,
             ..Subject::joint(name)
         };
-        let turns = model.joint_ids().nth(joint.0);
-        let turns = turns.is_none_or(|id| model.joint(id).kind.turns());
         let bodies = layout.bodies.iter().zip(&layout.data.bodies);
         let moved = bodies.filter(|(_, body)| layout.data.chain.path(body.link).contains(&joint));
         Finding::of_kind(catalog::JOINT_COLUMN_MISSING, "assumed_zero", subject)
             .with("joint", Fact::name(name))
             .with("bodies", Fact::names(moved.map(|(name, _)| *name)))
-            .with("unit", Fact::choice(if turns { "deg" } else { "mm" }))
+            .with("unit", Fact::choice(layout.shown(joint, 0.0).1))
     };
     joints.into_iter().map(finding).collect()
 }

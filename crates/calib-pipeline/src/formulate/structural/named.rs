@@ -92,6 +92,15 @@ fn of_hypothesis(layout: &Layout<'_>, scoped: &Scoped) -> Finding {
             let subject = Subject::joint(layout.joint(joint));
             Finding::of_kind(catalog::JOINT_COLUMN_MISSING, "moved", subject)
                 .with("joint", Fact::name(layout.joint(joint)))
+                .with("unit", Fact::choice(layout.shown(joint, 0.0).1))
+        }
+        Hypothesis::StoodAt { joint, value } => {
+            let subject = Subject::joint(layout.joint(joint));
+            let (shown, unit) = layout.shown(joint, value);
+            Finding::of_kind(catalog::JOINT_COLUMN_MISSING, "stood", subject)
+                .with("joint", Fact::name(layout.joint(joint)))
+                .with("at", Fact::name(format!("{shown:.0}")))
+                .with("unit", Fact::choice(unit))
         }
         Hypothesis::Unit { joint, mistake } => {
             let subject = Subject::joint(layout.joint(joint));

@@ -4,6 +4,7 @@ use super::{BodyPlan, Column, Layout, MarkerPlan, Rotation, SlotKind};
 use crate::column_map::{BodyColumns, ColumnMap, LongColumns};
 use crate::error::Problem;
 use crate::model::JointUnit;
+use crate::units::{AngleUnit, LengthUnit};
 use calib_finding::nearest_word;
 
 /// Takes the columns that the map names into the layout and marks them in `mapped`.
@@ -15,8 +16,8 @@ pub(super) fn apply(
     let mut columns = Mapping {
         layout,
         mapped,
-        angle: map.angles.per_radian(),
-        length: map.lengths.per_meter(),
+        angle: map.angles,
+        length: map.lengths,
     };
     if let Some(time) = &map.time {
         let scale = time.unit.per_second();
@@ -45,15 +46,23 @@ pub(super) fn apply(
     Ok(())
 }
 
+/// A column whose name ends in another unit than the map states.
+fn contradicts(column: &str, stated: &str) -> Problem {
+    Problem::Misfit {
+        found: format!("the name of column `{column}` and `{stated}` in the column map differ"),
+        expected: "one unit: correct the map, or the name of the column".to_string(),
+    }
+}
+
 /// A layout while a map is applied.
 struct Mapping<'a> {
     layout: &'a mut Layout,
     /// Columns that the map used so far.
     mapped: &'a mut [bool],
-    /// Units of the map's angles in a radian.
-    angle: f64,
-    /// Units of the map's lengths in a meter.
-    length: f64,
+    /// Unit of angles in columns whose names end in none.
+    angle: AngleUnit,
+    /// Unit of lengths in columns whose names end in none.
+    length: LengthUnit,
 }
 
 impl Mapping<'_> {
@@ -94,13 +103,36 @@ impl Mapping<'_> {
         &mut self,
         what: &str,
         columns: &[String; 3],
-        scale: f64,
+        scale: impl Fn(&Self, &str) -> Result<f64, Problem>,
     ) -> Result<[usize; 3], Problem> {
         let mut slots = [0; 3];
         for (slot, column) in slots.iter_mut().zip(columns) {
+            let scale = scale(self, column)?;
             *slot = self.take(what, column, SlotKind::Tracker, scale)?;
         }
         Ok(slots)
+    }
+
+    /// Units per radian of a column: of its name where that ends in a unit, else of the map.
+    fn angles(&self, column: &str) -> Result<f64, Problem> {
+        match column.rsplit_once('_').map(|(_, unit)| unit) {
+            Some("deg") => Ok(AngleUnit::Deg.per_radian()),
+            Some("rad") if self.angle == AngleUnit::Deg => Err(contradicts(column, "angles: deg")),
+            _ => Ok(self.angle.per_radian()),
+        }
+    }
+
+    /// Units per meter of a column: of its name where that ends in a unit, else of the map.
+    fn lengths(&self, column: &str) -> Result<f64, Problem> {
+        match column.rsplit_once('_').map(|(_, unit)| unit) {
+            Some("mm") if self.length == LengthUnit::Cm => Err(contradicts(column, "lengths: cm")),
+            Some("mm") => Ok(LengthUnit::Mm.per_meter()),
+            Some("m") if self.length != LengthUnit::M => {
+                let stated = format!("lengths: {}", self.length.name());
+                Err(contradicts(column, &stated))
+            }
+            _ => Ok(self.length.per_meter()),
+        }
     }
 
     /// Joints and torques.
@@ -122,8 +154,8 @@ impl Mapping<'_> {
 
     fn joint(&mut self, joint: &str, column: &str, unit: JointUnit) -> Result<(), Problem> {
         let scale = match unit {
-            JointUnit::Angle => self.angle,
-            JointUnit::Length => self.length,
+            JointUnit::Angle => self.angles(column)?,
+            JointUnit::Length => self.lengths(column)?,
         };
         let what = format!("joint `{joint}`");
         let slot = self.take(&what, column, SlotKind::Robot, scale)?;
@@ -134,7 +166,7 @@ impl Mapping<'_> {
     /// Markers by name, or the template of a long table.
     fn markers(&mut self, map: &ColumnMap) -> Result<(), Problem> {
         for (name, columns) in &map.markers {
-            let slots = self.three(&format!("marker `{name}`"), columns, self.length)?;
+            let slots = self.three(&format!("marker `{name}`"), columns, Self::lengths)?;
             self.layout.markers.push(MarkerPlan {
                 name: name.clone(),
                 slots,
@@ -142,7 +174,7 @@ impl Mapping<'_> {
         }
         let long = map.long.as_ref().and_then(|long| long.marker.as_ref());
         if let Some(columns) = long {
-            let slots = self.three("the markers", columns, self.length)?;
+            let slots = self.three("the markers", columns, Self::lengths)?;
             self.layout.markers.push(MarkerPlan {
                 name: String::new(),
                 slots,
@@ -157,7 +189,7 @@ impl Mapping<'_> {
         let long = map.long.as_ref().and_then(|long| long.body.as_ref());
         for (name, columns) in named.chain(long.map(|c| ("", c))) {
             let what = format!("body `{name}`");
-            let position = self.three(&what, &columns.position, self.length)?;
+            let position = self.three(&what, &columns.position, Self::lengths)?;
             let rotation = self.rotation(&what, columns)?;
             self.layout.bodies.push(BodyPlan {
                 name: name.to_string(),
@@ -185,7 +217,8 @@ impl Mapping<'_> {
                 fixed_xyz: None,
                 ..
             } => {
-                let [x, y, z] = self.three(what, &[x.clone(), y.clone(), z.clone()], 1.0)?;
+                let [x, y, z] =
+                    self.three(what, &[x.clone(), y.clone(), z.clone()], |_, _| Ok(1.0))?;
                 let i = self.position(what, w)?;
                 let w = self.layout.slot(i, SlotKind::Tracker, 1.0);
                 Ok(Rotation::Quaternion([x, y, z, w]))
@@ -196,14 +229,18 @@ impl Mapping<'_> {
                 quaternion_wxyz: None,
                 fixed_xyz: None,
                 ..
-            } => Ok(Rotation::Vector(self.three(what, columns, self.angle)?)),
+            } => Ok(Rotation::Vector(self.three(what, columns, Self::angles)?)),
             BodyColumns {
                 fixed_xyz: Some(columns),
                 quaternion_xyzw: None,
                 quaternion_wxyz: None,
                 rotation_vector: None,
                 ..
-            } => Ok(Rotation::FixedXyz(self.three(what, columns, self.angle)?)),
+            } => Ok(Rotation::FixedXyz(self.three(
+                what,
+                columns,
+                Self::angles,
+            )?)),
             _ => Err(Problem::Misfit {
                 found: format!("the column map gives {what} none or several rotations"),
                 expected: "one of quaternion_xyzw, quaternion_wxyz, rotation_vector, fixed_xyz"
