@@ -89,7 +89,11 @@ fn a_longer_forearm_is_found_and_the_rest_is_not() {
     let dir = session(dir, "same", 2, 0.0);
     let dir = session(dir, "longer", 3, 1.0);
     let same = dir.calib(["drift", "old", "same"]).expect(0);
-    assert!(same.stdout.contains("NO SIGNIFICANT CHANGE"), "{}", same.stdout);
+    assert!(
+        same.stdout.contains("NO SIGNIFICANT CHANGE"),
+        "{}",
+        same.stdout
+    );
     let found = dir.calib(["drift", "old", "longer/report.json"]).expect(1);
     insta::with_settings!({filters => [(r"\d+\.\d+", "#"), (r"p [=<] [\de #-]+ \(", "p # ("), (r" +# σ", " # σ")]}, {
         insta::assert_snapshot!("longer", found.stdout);

@@ -179,13 +179,9 @@ fn the_log_of_another_motion_is_refused() {
     let refused = dir.calib(["run", "robots/ripley.yaml", "--out", "out"]);
     assert_eq!(refused.code, 3, "{}", refused.stdout);
     assert!(
-        [
-            "correlate",
-            "equally well",
-            "fit the nominal robot to"
-        ]
-        .iter()
-        .any(|words| refused.stderr.contains(words)),
+        ["correlate", "equally well", "fit the nominal robot to"]
+            .iter()
+            .any(|words| refused.stderr.contains(words)),
         "{}",
         refused.stderr
     );

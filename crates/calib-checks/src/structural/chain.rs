@@ -319,8 +319,47 @@ impl Walk {
     }
 }
 
+/// The axis of a joint in the root frame, at one row.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Axis {
+    direction: Vector3<f64>,
+    /// A point of it, m.
+    origin: Vector3<f64>,
+}
+
+impl Axis {
+    /// Of a joint whose frame stands here.
+    pub(super) fn of(root_from_joint: &Pose, motion: &Motion) -> Self {
+        Self {
+            direction: match motion {
+                Motion::Fixed => Vector3::zeros(),
+                Motion::Revolute(axis) | Motion::Prismatic(axis) => {
+                    root_from_joint.r * axis.into_inner()
+                }
+            },
+            origin: root_from_joint.t,
+        }
+    }
+
+    /// A pose behind the joint, with the joint `by` (rad or m) further.
+    pub(super) fn moved(&self, turns: bool, by: f64, pose: &Pose) -> Pose {
+        if turns {
+            let r = rotation(&self.direction, by);
+            Pose {
+                r: r * pose.r,
+                t: self.origin + r * (pose.t - self.origin),
+            }
+        } else {
+            Pose {
+                r: pose.r,
+                t: pose.t + self.direction * by,
+            }
+        }
+    }
+}
+
 /// Rodrigues: `R = cos q · I + sin q · [a]ₓ + (1 − cos q) · a aᵀ`.
-pub(super) fn rotation(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
+fn rotation(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
     let (s, c) = angle.sin_cos();
     let (x, y, z) = (axis.x, axis.y, axis.z);
     let k = 1.0 - c;

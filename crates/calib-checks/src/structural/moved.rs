@@ -9,22 +9,12 @@
 //! S_j is the motion by δ_j about axis j as it stands in the root frame at the readings as they are, from the root outward. One
 //! sine and a few products replace the walk from the root to the link.
 
-use nalgebra::Vector3;
-
-use super::chain::{Motion, Pose, Walk, rotation};
+use super::chain::{Axis, Pose, Walk};
 use super::correct::shifted_row;
 use super::hypothesis::{Hypothesis, Scope};
 use super::ids::{JointIndex, LinkIndex};
 use super::moments::Moments;
 use super::scan::Scan;
-
-/// The axis of a joint in the root frame, at one row.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Axis {
-    direction: Vector3<f64>,
-    /// A point of it, m.
-    origin: Vector3<f64>,
-}
 
 /// A joint that a change of readings moves: by how much for each of (at most two) changed readings.
 struct Moving {
@@ -174,15 +164,7 @@ impl Scan<'_> {
             for i in 0..self.data.readings.len() {
                 walk.go(chain, self.row(i));
                 let own = walk.root_from_joint.iter().zip(&chain.joints);
-                axes.extend(own.map(|(at, joint)| Axis {
-                    direction: match joint.motion {
-                        Motion::Fixed => Vector3::zeros(),
-                        Motion::Revolute(axis) | Motion::Prismatic(axis) => {
-                            at.r * axis.into_inner()
-                        }
-                    },
-                    origin: at.t,
-                }));
+                axes.extend(own.map(|(at, joint)| Axis::of(at, &joint.motion)));
             }
             axes
         })
@@ -226,29 +208,11 @@ impl Scan<'_> {
     }
 }
 
-impl Axis {
-    /// A pose behind the joint, with the joint `by` (rad or m) further.
-    fn moved(&self, turns: bool, by: f64, pose: &Pose) -> Pose {
-        if turns {
-            let r = rotation(&self.direction, by);
-            Pose {
-                r: r * pose.r,
-                t: self.origin + r * (pose.t - self.origin),
-            }
-        } else {
-            Pose {
-                r: pose.r,
-                t: pose.t + self.direction * by,
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Isometry3, Point3, Unit};
+    use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-    use super::super::chain::{Chain, ChainJoint};
+    use super::super::chain::{Chain, ChainJoint, Motion};
     use super::super::correct::correct;
     use super::super::data::{Body, Data, Measured};
     use super::super::hypothesis::{QuarterTurns, Scoped, UnitMistake};

@@ -4,14 +4,13 @@ use std::sync::OnceLock;
 
 use nalgebra::Vector3;
 
-use super::chain::{Pose, Walk};
+use super::chain::{Axis, Pose, Walk};
 use super::channels::{Channel, channels_of, mounts, point};
 use super::correct::{correct, remount};
 use super::data::{Data, Measured};
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{LinkIndex, RecordingIndex, SampleIndex};
 use super::moments::{Moments, Normal, Registration};
-use super::moved::Axis;
 
 /// Residual of a hypothesis.
 #[derive(Debug, Clone, Copy, PartialEq)]
