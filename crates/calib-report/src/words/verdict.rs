@@ -393,7 +393,7 @@ fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
             };
             match reason.effect {
                 Effect::LeavesOpen => format!(
-                    "One joint at a time moved in {data}, and physics is missing from the model: its effect on poses in which several joints move is unknown."
+                    "One joint at a time moved in {data}, and physics is missing from the model or something changed during recording: the effect on poses in which several joints move is unknown."
                 ),
                 _ => format!(
                     "One joint at a time moved in {data}: poses in which several joints move were not tested."

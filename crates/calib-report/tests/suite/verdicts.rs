@@ -468,6 +468,17 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
             }),
         ),
         (
+            ReasonId::SingleJointData,
+            LeavesOpen,
+            with(|f| {
+                f.single_joint = SingleJoint {
+                    fitted: true,
+                    held_out: true,
+                };
+                f.warnings = vec!["changed-while-recording".into()];
+            }),
+        ),
+        (
             ReasonId::RejectedShare,
             LeavesOpen,
             with(|f| {

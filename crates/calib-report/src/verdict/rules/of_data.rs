@@ -111,9 +111,12 @@ pub(super) fn single_joint(facts: &Facts) -> Vec<Reason> {
         (false, true) => "held_out",
         (true, true) => "all",
     };
-    // What is missing was fitted to motions of one joint; nothing tells what it does where several move.
+    // What is missing was fitted to motions of one joint; nothing tells what it does where several move. Joints that are swept one
+    // after another make missing physics look like a change between two sweeps.
     let seen_together = has_recordings(facts) && !single.held_out;
-    let effect = if single.fitted && !seen_together && warns(facts, catalog::MISSING_PHYSICS) {
+    let missing = [catalog::MISSING_PHYSICS, catalog::CHANGED_WHILE_RECORDING];
+    let missing = missing.into_iter().any(|id| warns(facts, id));
+    let effect = if single.fitted && !seen_together && missing {
         Effect::LeavesOpen
     } else {
         Effect::Warns
