@@ -77,6 +77,17 @@ impl Scene {
     }
 }
 
+impl Scene {
+    /// Motion and condition.
+    pub(crate) fn words(&self) -> String {
+        if self.condition.is_empty() {
+            self.motion.clone()
+        } else {
+            format!("{}, {}", self.motion, self.condition)
+        }
+    }
+}
+
 /// At most four decimals, without the rounding of unit conversion.
 pub(crate) fn shortest(x: f64) -> String {
     format!("{}", (x * 1e4).round() / 1e4)
@@ -106,8 +117,8 @@ impl Quantity {
             Self::Center => "center",
             Self::Direction => "direction",
             Self::Offset => "offset",
-            Self::Turn => "turn",
-            Self::Shift => "shift",
+            Self::Turn => "rotation",
+            Self::Shift => "translation",
         }
     }
 

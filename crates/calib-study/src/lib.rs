@@ -43,6 +43,6 @@ mod tally;
 pub use cell::{Cell, Part, Quantity, Scene};
 pub use claims::{Claim, Measured};
 pub use held::{Standard, Standing, Worst};
-pub use render::{Figure, csv, json, markdown, svg, write};
+pub use render::{Figure, csv, json, long_tables, markdown, svg, write};
 pub use run::{StudyResult, run};
 pub use settings::{Study, StudyError, StudyOptions};

@@ -75,25 +75,25 @@ fn frames(cells: &[Cell]) -> Vec<Standard> {
     };
     vec![
         judge(
-            "frame ML: efficiency of the turn",
+            "frame ML: efficiency of the rotation",
             0.97,
             true,
             of(Part::Frame, Quantity::Turn, "frame_ml"),
         ),
         judge(
-            "frame ML: efficiency of the shift",
+            "frame ML: efficiency of the translation",
             0.97,
             true,
             of(Part::Frame, Quantity::Shift, "frame_ml"),
         ),
         judge(
-            "frame ML on 6 × 6, 1 mm, 0.5°, in the tracker: rms of the turn, degrees",
+            "frame ML on 6 × 6, 1 mm, 0.5°, in the tracker: rms of the rotation, degrees",
             0.165,
             false,
             frame(Quantity::Turn, 180.0 / std::f64::consts::PI, 1e-3, 0.5),
         ),
         judge(
-            "frame ML on 6 × 6, 1 mm, 0.5°, in the tracker: rms of the shift, mm",
+            "frame ML on 6 × 6, 1 mm, 0.5°, in the tracker: rms of the translation, mm",
             0.375,
             false,
             frame(Quantity::Shift, 1e3, 1e-3, 0.5),

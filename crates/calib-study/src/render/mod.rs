@@ -12,7 +12,7 @@ use calib_files::{FileError, replace};
 use crate::{run::StudyResult, settings::StudyError};
 
 pub use csv::csv;
-pub use markdown::markdown;
+pub use markdown::{long_tables, markdown};
 pub use svg::{Figure, svg};
 
 /// All of the result, every bit kept.
@@ -24,7 +24,7 @@ pub fn json(result: &StudyResult) -> String {
     text
 }
 
-/// Writes `<study>.csv`, `.json`, `.md` and `<study>-<figure>.svg` into `folder`; returns the paths.
+/// Writes `<study>.csv`, `.json`, `.md`, `<study>-tables.csv` and `<study>-<figure>.svg` into `folder`; returns the paths.
 ///
 /// # Errors
 /// [`StudyError::File`] where the folder or a file cannot be written.
@@ -38,6 +38,10 @@ pub fn write(result: &StudyResult, folder: &Path) -> Result<Vec<PathBuf>, StudyE
         (format!("{word}.csv"), csv(result)),
         (format!("{word}.json"), json(result)),
         (format!("{word}.md"), markdown(result)),
+        (
+            markdown::long_tables_name(result.study),
+            long_tables(result),
+        ),
     ];
     for figure in svg(result) {
         files.push((format!("{}.svg", figure.name), figure.svg));

@@ -1,10 +1,13 @@
 //! Tables of the study of axes and frames.
 
-use super::table::{Table, against_bound, efficiency, table};
+use super::{
+    page::Page,
+    table::{Table, against_bound, efficiency, table},
+};
 use crate::cell::{Cell, Part, Quantity};
 
 /// All tables, in the order of the page.
-pub(super) fn tables(out: &mut String, cells: &[Cell]) {
+pub(super) fn tables(out: &mut Page, cells: &[Cell]) {
     one_body(out, cells);
     four_markers(out, cells);
     frames(out, cells);
@@ -19,7 +22,7 @@ fn circle(c: &Cell) -> bool {
 }
 
 /// One circle, and the poses of one body.
-fn one_body(out: &mut String, cells: &[Cell]) {
+fn one_body(out: &mut Page, cells: &[Cell]) {
     table(
         out,
         cells,
@@ -53,7 +56,7 @@ fn one_body(out: &mut String, cells: &[Cell]) {
 }
 
 /// Four markers of a body.
-fn four_markers(out: &mut String, cells: &[Cell]) {
+fn four_markers(out: &mut Page, cells: &[Cell]) {
     table(
         out,
         cells,
@@ -87,12 +90,12 @@ fn four_markers(out: &mut String, cells: &[Cell]) {
 }
 
 /// The frame from two axes.
-fn frames(out: &mut String, cells: &[Cell]) {
+fn frames(out: &mut Page, cells: &[Cell]) {
     table(
         out,
         cells,
         &Table {
-            title: "The frame: rms turn / bound, degrees",
+            title: "The frame: rms rotation / bound, degrees",
             note: "",
             picked: &|c| c.quantity == Quantity::Turn,
             shown: &against_bound,
@@ -102,7 +105,7 @@ fn frames(out: &mut String, cells: &[Cell]) {
         out,
         cells,
         &Table {
-            title: "The frame: rms shift / bound, mm",
+            title: "The frame: rms translation / bound, mm",
             note: "",
             picked: &|c| c.quantity == Quantity::Shift,
             shown: &against_bound,

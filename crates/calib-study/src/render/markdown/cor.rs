@@ -2,14 +2,17 @@
 
 use std::fmt::Write;
 
-use super::table::{Table, against_bound, efficiency, rates, shown, table, table_beside};
+use super::{
+    page::Page,
+    table::{Table, against_bound, efficiency, rates, shown, table, table_beside},
+};
 use crate::{
     cell::{Cell, Part},
     render::text::three_or_dash,
 };
 
 /// All tables, in the order of the page.
-pub(super) fn tables(out: &mut String, cells: &[Cell]) {
+pub(super) fn tables(out: &mut Page, cells: &[Cell]) {
     grid(out, cells);
     markers_and_depth(out, cells);
     arcs_and_outliers(out, cells);
@@ -34,7 +37,7 @@ fn paper(c: &Cell) -> bool {
 }
 
 /// The grid of the paper.
-fn grid(out: &mut String, cells: &[Cell]) {
+fn grid(out: &mut Page, cells: &[Cell]) {
     table(
         out,
         cells,
@@ -105,7 +108,7 @@ fn grid(out: &mut String, cells: &[Cell]) {
 }
 
 /// Several markers, noise along the line of sight, two bodies.
-fn markers_and_depth(out: &mut String, cells: &[Cell]) {
+fn markers_and_depth(out: &mut Page, cells: &[Cell]) {
     table(
         out,
         cells,
@@ -145,7 +148,7 @@ fn markers_and_depth(out: &mut String, cells: &[Cell]) {
 }
 
 /// Short arcs, outliers, and rates of refusal.
-fn arcs_and_outliers(out: &mut String, cells: &[Cell]) {
+fn arcs_and_outliers(out: &mut Page, cells: &[Cell]) {
     table(
         out,
         cells,

@@ -2,17 +2,35 @@
 
 mod aor;
 mod cor;
+mod page;
 mod table;
 
 use std::fmt::Write;
 
+use page::Page;
+
 use super::text::three;
 use crate::{held::Standing, run::StudyResult, settings::Study};
 
-/// The whole study as Markdown.
+/// The study as Markdown; of long tables it names the file that [`long_tables`] is.
 #[must_use]
 pub fn markdown(result: &StudyResult) -> String {
-    let mut out = String::new();
+    page(result).text()
+}
+
+/// The long tables of the study as CSV: one line for each scene and method.
+#[must_use]
+pub fn long_tables(result: &StudyResult) -> String {
+    page(result).csv()
+}
+
+/// Name of the file with the long tables.
+pub(super) fn long_tables_name(study: Study) -> String {
+    format!("{}-tables.csv", study.word())
+}
+
+fn page(result: &StudyResult) -> Page {
+    let mut out = Page::new(long_tables_name(result.study));
     let (title, section) = match result.study {
         Study::Cor => ("Centers of rotation", "§3.3"),
         Study::Aor => ("Axes of rotation and frames", "§4 and §5.2"),
@@ -38,7 +56,7 @@ pub fn markdown(result: &StudyResult) -> String {
     out
 }
 
-fn standards(out: &mut String, result: &StudyResult) {
+fn standards(out: &mut Page, result: &StudyResult) {
     let _ = writeln!(
         out,
         "## What is required\n\n\
@@ -79,7 +97,7 @@ fn standards(out: &mut String, result: &StudyResult) {
     out.push('\n');
 }
 
-fn claims(out: &mut String, result: &StudyResult) {
+fn claims(out: &mut Page, result: &StudyResult) {
     let _ = writeln!(
         out,
         "## What the paper says\n\n\

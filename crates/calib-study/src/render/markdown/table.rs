@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::page::Page;
 use crate::{
     cell::{Cell, Scene, shortest},
     render::text::{probability, three, three_or_dash, with_error},
@@ -29,13 +30,16 @@ pub(super) struct Table<'a> {
 /// A column that belongs to the scene, whatever the method.
 pub(super) type Beside = (&'static str, fn(&Cell) -> Option<f64>);
 
+/// A table of more scenes than this is not on the page.
+const LONG: usize = 24;
+
 /// Lines are scenes, columns methods; a method that does not occur in a scene leaves a blank.
-pub(super) fn table(out: &mut String, cells: &[Cell], t: &Table<'_>) {
+pub(super) fn table(out: &mut Page, cells: &[Cell], t: &Table<'_>) {
     table_beside(out, cells, t, &[]);
 }
 
 /// The same with columns of the scene itself after the methods'.
-pub(super) fn table_beside(out: &mut String, cells: &[Cell], t: &Table<'_>, beside: &[Beside]) {
+pub(super) fn table_beside(out: &mut Page, cells: &[Cell], t: &Table<'_>, beside: &[Beside]) {
     let picked: Vec<&Cell> = cells.iter().filter(|c| (t.picked)(c)).collect();
     let (mut scenes, mut methods): (Vec<&Scene>, Vec<&str>) = (Vec::new(), Vec::new());
     for cell in &picked {
@@ -52,6 +56,10 @@ pub(super) fn table_beside(out: &mut String, cells: &[Cell], t: &Table<'_>, besi
     let _ = writeln!(out, "## {}\n", t.title);
     if !t.note.is_empty() {
         let _ = writeln!(out, "{}\n", t.note);
+    }
+    if scenes.len() > LONG {
+        long(out, (&scenes, &methods), &picked, (t, beside));
+        return;
     }
     let _ = writeln!(
         out,
@@ -74,21 +82,48 @@ pub(super) fn table_beside(out: &mut String, cells: &[Cell], t: &Table<'_>, besi
     out.push('\n');
 }
 
+/// A long table: its size on the page, its lines beside it.
+fn long(
+    out: &mut Page,
+    (scenes, methods): (&[&Scene], &[&str]),
+    picked: &[&Cell],
+    (t, beside): (&Table<'_>, &[Beside]),
+) {
+    for scene in scenes {
+        let here: Vec<_> = picked.iter().filter(|c| c.scene == **scene).collect();
+        for method in methods {
+            if let Some(cell) = here.iter().find(|c| c.method == *method) {
+                out.line(t.title, scene, method, (t.shown)(cell));
+            }
+        }
+        for (name, value) in beside {
+            if let Some(value) = here.first().and_then(|c| value(c)) {
+                out.line(t.title, scene, name, format!("{value:.3}"));
+            }
+        }
+    }
+    let file = out.beside().to_owned();
+    let methods: Vec<String> = methods.iter().map(|m| format!("`{m}`")).collect();
+    let _ = writeln!(
+        out,
+        "{} scenes, with {}: [{file}]({file}).\n",
+        scenes.len(),
+        methods.join(", ")
+    );
+}
+
 /// One line of a table: a scene, the methods' values, and those of the scene itself.
 fn line(
-    out: &mut String,
+    out: &mut Page,
     scene: &Scene,
     picked: &[&Cell],
     methods: &[&str],
     (t, beside): (&Table<'_>, &[Beside]),
 ) {
-    let mut motion = scene.motion.clone();
-    if !scene.condition.is_empty() {
-        motion = format!("{motion}, {}", scene.condition);
-    }
     let _ = write!(
         out,
-        "| {motion} | {} | {} | {} | {} |",
+        "| {} | {} | {} | {} | {} |",
+        scene.words(),
         scene.samples,
         shortest(scene.radius_m * 1e3),
         shortest(scene.sigma_t_m * 1e3),
@@ -132,7 +167,7 @@ pub(super) fn efficiency(cell: &Cell) -> String {
 
 /// Counts with the upper end of their interval.
 pub(super) fn rates(
-    out: &mut String,
+    out: &mut Page,
     cells: &[Cell],
     title: &str,
     picked: &dyn Fn(&Cell) -> bool,
