@@ -5,6 +5,7 @@ mod apply;
 mod bad_input;
 mod book;
 mod changes;
+mod clocks;
 mod contacts;
 mod data_faults;
 mod drift;

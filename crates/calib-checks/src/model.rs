@@ -155,6 +155,9 @@ pub fn alignment(outcome: &OffsetOutcome, tolerance: f64) -> Option<Finding> {
         OffsetOutcome::NotExcited { deviation, needed } => of_kind("not_excited")
             .with("deviation", Fact::number(deviation, Unit::RadianPerSecond))
             .with("needed", Fact::number(needed, Unit::RadianPerSecond)),
+        OffsetOutcome::NotMoved { motion, needed } => of_kind("not_moved")
+            .with("motion", Fact::meters(motion))
+            .with("needed", Fact::meters(needed)),
         OffsetOutcome::NoMatch {
             correlation,
             needed,

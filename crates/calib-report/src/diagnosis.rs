@@ -35,6 +35,11 @@ pub enum Diagnosis {
         /// Its parameter: `elbow.compliance`.
         parameter: String,
     },
+    /// Joint values and tracker data of the rows of a recording are not of the same time.
+    ClockOffset {
+        /// The recording.
+        recording: String,
+    },
     /// The estimate meets the limits, and its uncertainty does not decide, or nothing was verified.
     TooFewPoses {
         /// Validation postures that would decide it; null where that is not known.
@@ -70,6 +75,7 @@ impl Diagnosis {
             return None;
         }
         let found = below_noise(report)
+            .or_else(|| clock_offset(report))
             .or_else(|| error(report))
             .or_else(|| changed(report))
             .or_else(|| missing_effect(report))
@@ -158,6 +164,24 @@ fn named(report: &Report) -> Option<Diagnosis> {
     let id = CAUSES.into_iter().find(warns)?;
     Some(Diagnosis::NamedCause {
         evidence: id.as_str().to_owned(),
+    })
+}
+
+/// A clock explains most of what the model lacks; where an error was found it must have been seen before the fit, too.
+fn clock_offset(report: &Report) -> Option<Diagnosis> {
+    let missing = report.findings.iter();
+    let missing = missing.filter(|f| f.id == catalog::MISSING_PHYSICS);
+    let explains = |f: &crate::Finding| f.facts.get("explains").and_then(Fact::value);
+    let most = missing.max_by(|a, b| {
+        let [a, b] = [a, b].map(|f| explains(f).unwrap_or(0.0));
+        a.total_cmp(&b)
+    })?;
+    let recording = most.facts.get("recording").and_then(Fact::word)?;
+    let mut findings = report.findings.iter();
+    let seen_before = report.findings.iter().any(|f| f.id == catalog::CLOCK_LAG);
+    let error = findings.any(|f| f.severity == Severity::Error && f.id != catalog::MISSING_PHYSICS);
+    (seen_before || !error).then(|| Diagnosis::ClockOffset {
+        recording: recording.to_owned(),
     })
 }
 

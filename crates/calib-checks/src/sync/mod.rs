@@ -10,6 +10,8 @@
 
 mod holds;
 mod offset;
+mod point;
 
 pub use holds::{Hold, HoldSettings, StaticPoses, holds, static_poses};
 pub use offset::{ClockMap, OffsetOutcome, OffsetSettings, RotationTrack, clock_offset};
+pub use point::{LinkTrack, PointTrack, clock_offset_of_point};

@@ -2,7 +2,7 @@
 
 use crate::statistics::median;
 use calib_geometry::so3;
-use nalgebra::{Matrix4, UnitQuaternion, Vector4};
+use nalgebra::{Matrix4, SMatrix, SVector, UnitQuaternion, Vector4};
 
 /// Orientations at times of one clock; lost samples are left out.
 #[derive(Clone, Debug, Default)]
@@ -88,6 +88,13 @@ pub enum OffsetOutcome {
         /// Standard deviation of the angular speed, rad/s, of the calmer track.
         deviation: f64,
         /// What is needed, rad/s.
+        needed: f64,
+    },
+    /// The marker hardly moves.
+    NotMoved {
+        /// Its motion, m rms.
+        motion: f64,
+        /// What is needed, m.
         needed: f64,
     },
     /// The two do not move alike at any offset considered.
@@ -360,31 +367,55 @@ fn refine(
         map.drift += change[1];
         gain += change[2];
         constant += change[3];
-        let sandwich = covariance * meat(&rows) * covariance;
-        map.offset_sigma = sandwich[(0, 0)].sqrt();
-        map.drift_sigma = sandwich[(1, 1)].sqrt();
         if change[0].abs() < 1e-7 && change[1].abs() < 1e-9 {
             break;
         }
     }
+    let spread = jackknife(&rows);
+    map.offset_sigma = spread[(0, 0)].sqrt();
+    map.drift_sigma = spread[(1, 1)].sqrt();
     OffsetOutcome::Found(map)
 }
 
-/// Blocks of time for the variance: each much longer than a chord, enough of them to estimate a variance from.
-const BLOCKS: usize = 20;
+/// Blocks of time for the variance: each much longer than a chord and than what a robot takes from one posture to the next,
+/// enough of them to estimate a variance from.
+pub(super) const BLOCKS: usize = 8;
+/// 97.5 % point of Student's t with as many degrees of freedom as blocks but one, in units of the normal one: twice a
+/// stated σ covers what it says.
+const STUDENT: f64 = 2.365 / 1.960;
 
-/// Variance of Σ Jᵀr from the sums over blocks of time. Neighboring residuals share their chord and, one chord later,
-/// share noise with the other sign, which nearly cancels: formulas for independent residuals would be several times
-/// too large.
-fn meat(rows: &[(Vector4<f64>, f64)]) -> Matrix4<f64> {
+/// Variance from the sum of squared changes of an answer without one block each, with (BLOCKS − 1) / BLOCKS of the jackknife.
+pub(super) const OF_BLOCKS: f64 = STUDENT * STUDENT * (BLOCKS - 1) as f64 / BLOCKS as f64;
+
+/// Covariance of least squares in `N` unknowns at the minimum, from rows of derivatives and residuals in order of time:
+/// the spread of the answers without one block of time each. Neighboring residuals depend on each other, by noise that
+/// they share and by errors of the kinematics that last as long as a posture: formulas for independent residuals are
+/// wrong either way.
+fn jackknife<const N: usize>(rows: &[(SVector<f64, N>, f64)]) -> SMatrix<f64, N, N> {
+    let normal_of = |rows: &[(SVector<f64, N>, f64)]| {
+        let mut normal = SMatrix::<f64, N, N>::zeros();
+        let mut right = SVector::<f64, N>::zeros();
+        for (jacobian, residual) in rows {
+            normal += jacobian * jacobian.transpose();
+            right += jacobian * *residual;
+        }
+        (normal, right)
+    };
+    let (normal, right) = normal_of(rows);
+    // Columns of very different size: scale by the diagonal before inverting.
+    let scale = normal
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
+    let scale = SMatrix::<f64, N, N>::from_diagonal(&scale);
     let blocks = rows.chunks(rows.len().div_ceil(BLOCKS).max(1));
-    let count = blocks.len() as f64;
-    let sums = blocks.map(|block| {
-        block
-            .iter()
-            .map(|(jacobian, residual)| jacobian * *residual)
-            .sum::<Vector4<f64>>()
-    });
-    let squares: Matrix4<f64> = sums.map(|sum| sum * sum.transpose()).sum();
-    squares * (count / (count - 4.0).max(1.0))
+    let mut squares = SMatrix::<f64, N, N>::zeros();
+    for block in blocks {
+        let (own, of_block) = normal_of(block);
+        let Some(inverse) = (scale * (normal - own) * scale).try_inverse() else {
+            return SMatrix::repeat(f64::INFINITY);
+        };
+        let moved = scale * inverse * scale * (right - of_block);
+        squares += moved * moved.transpose();
+    }
+    squares * OF_BLOCKS
 }

@@ -1,7 +1,8 @@
 //! Holds and clock offsets.
 
 use calib_checks::sync::{
-    HoldSettings, OffsetOutcome, OffsetSettings, RotationTrack, clock_offset, holds, static_poses,
+    ClockMap, HoldSettings, LinkTrack, OffsetOutcome, OffsetSettings, PointTrack, RotationTrack,
+    clock_offset, clock_offset_of_point, holds, static_poses,
 };
 use calib_recording::{JointUnit, Poses};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -82,6 +83,145 @@ fn offset_and_drift_are_found_within_two_milliseconds() {
         "σ is wrong by a factor {}",
         squares.sqrt()
     );
+}
+
+/// Six joints at angles of slow sines, with errors of `crooked` rad in every axis and 10 `crooked` m in every link.
+fn arm(t: f64, seed: u64, crooked: f64) -> Isometry3<f64> {
+    let mut motion = ChaCha8Rng::seed_from_u64(seed);
+    let mut errors = ChaCha8Rng::seed_from_u64(seed + 1000);
+    let mut pose = Isometry3::identity();
+    for j in 0..6 {
+        let mut q = 0.0;
+        for _ in 0..3 {
+            let rate = std::f64::consts::TAU * motion.random_range(0.02..0.12);
+            q += 0.5 * (rate * t + motion.random_range(0.0..std::f64::consts::TAU)).sin();
+        }
+        let wrong = noise(&mut errors, crooked);
+        let axis = [Vector3::z(), Vector3::y(), Vector3::y(), Vector3::x()][j % 4] + wrong;
+        let turn = UnitQuaternion::from_scaled_axis(axis.normalize() * q);
+        let along = Vector3::new(0.05, 0.0, 0.3) + noise(&mut errors, 0.1 * crooked);
+        pose *= Isometry3::from_parts(along.into(), turn);
+    }
+    pose
+}
+
+const POINT_OFFSET: f64 = 3.7;
+const POINT_DRIFT: f64 = 40e-6;
+
+/// One marker on a crooked arm, 50 Hz for 60 s, moving or in holds of 1.5 s, and the straight arm's link; the same of turns.
+fn seen_and_nominal(
+    seed: u64,
+    held: bool,
+) -> (PointTrack, LinkTrack, RotationTrack, RotationTrack) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed + 2000);
+    let world = Isometry3::new(Vector3::new(1.2, -0.4, 0.9), Vector3::new(0.3, -1.0, 2.0));
+    let when = |t: f64| {
+        let (hold, part) = ((t / 3.0).floor(), (t / 3.0).fract());
+        let way = ((part - 0.5) / 0.5).clamp(0.0, 1.0);
+        if held {
+            9.0 * (hold + way * way * (3.0 - 2.0 * way))
+        } else {
+            t
+        }
+    };
+    let times: Vec<f64> = (0..3000).map(|i| f64::from(i) * 0.02).collect();
+    let tracker = |t: f64| t + POINT_OFFSET + POINT_DRIFT * (t - 29.99);
+    let seen: Vec<(f64, Point3<f64>, UnitQuaternion<f64>)> = times
+        .iter()
+        .map(|&t| {
+            let pose = world * arm(when(t), seed, 0.005);
+            let point = pose * Point3::new(0.03, 0.05, 0.02) + noise(&mut rng, 2e-4);
+            let turn = UnitQuaternion::from_scaled_axis(noise(&mut rng, 1e-3));
+            (tracker(t), point, pose.rotation * turn)
+        })
+        .collect();
+    let link: Vec<(f64, Isometry3<f64>)> = times
+        .iter()
+        .map(|&t| (t, arm(when(t), seed, 0.0)))
+        .collect();
+    (
+        PointTrack::new(seen.iter().map(|s| (s.0, Some(s.1)))),
+        LinkTrack::new(link.iter().map(|l| (l.0, Some(l.1)))),
+        RotationTrack::new(seen.iter().map(|s| (s.0, Some(s.2)))),
+        RotationTrack::new(link.iter().map(|l| (l.0, Some(l.1.rotation)))),
+    )
+}
+
+/// Errors of an estimate in units of its σ at the middle, and of its drift.
+fn in_sigma(map: &ClockMap) -> [f64; 2] {
+    let at = map.to_a(map.reference) - map.reference - POINT_OFFSET;
+    [
+        at / map.offset_sigma,
+        (map.drift - POINT_DRIFT) / map.drift_sigma,
+    ]
+}
+
+#[test]
+fn a_stated_sigma_covers_the_truth_on_a_robot_with_nominal_errors() {
+    let (mut covered, mut all, mut squares) = (0, 0, 0.0);
+    for seed in 0..20 {
+        for held in [false, true] {
+            let (point, link, turns, of_link) = seen_and_nominal(seed, held);
+            let settings = OffsetSettings::default();
+            let found = [
+                clock_offset_of_point(&point, &link, &settings),
+                clock_offset(&turns, &of_link, &settings),
+            ];
+            for outcome in found {
+                let OffsetOutcome::Found(map) = outcome else {
+                    panic!("seed {seed}, held {held}: {outcome:?}")
+                };
+                assert!((map.offset - POINT_OFFSET).abs() < 0.02, "{map:?}");
+                println!(
+                    "seed {seed}, held {held}: {:.2?} σ of {:.2} ms",
+                    in_sigma(&map),
+                    map.offset_sigma * 1e3
+                );
+                for z in in_sigma(&map) {
+                    all += 1;
+                    squares += z * z;
+                    covered += i32::from(z.abs() < 2.0);
+                }
+            }
+        }
+    }
+    println!(
+        "{covered} of {all} within 2 σ, rms {:.2} σ",
+        (squares / f64::from(all)).sqrt()
+    );
+    // 95 % less three standard deviations of a count.
+    assert!(
+        f64::from(covered) > 0.9 * f64::from(all),
+        "{covered} of {all}"
+    );
+    assert!(squares > 0.2 * f64::from(all), "σ is much too large");
+}
+
+#[test]
+fn a_marker_of_another_motion_or_at_rest_is_refused() {
+    let settings = OffsetSettings::default();
+    for seed in 0..4 {
+        let (point, _, _, _) = seen_and_nominal(seed, false);
+        let (_, link, _, _) = seen_and_nominal(seed + 50, false);
+        let outcome = clock_offset_of_point(&point, &link, &settings);
+        assert!(
+            matches!(
+                outcome,
+                OffsetOutcome::NoMatch { .. } | OffsetOutcome::Ambiguous { .. }
+            ),
+            "seed {seed}: {outcome:?}"
+        );
+        let still =
+            PointTrack::new((0..500).map(|i| (f64::from(i) * 0.02, Some(Point3::origin()))));
+        let outcome = clock_offset_of_point(&still, &link, &settings);
+        assert!(
+            matches!(outcome, OffsetOutcome::NotMoved { .. }),
+            "{outcome:?}"
+        );
+        let short = PointTrack::new((0..20).map(|i| (f64::from(i), Some(Point3::origin()))));
+        let outcome = clock_offset_of_point(&short, &link, &settings);
+        assert_eq!(outcome, OffsetOutcome::TooShort);
+    }
 }
 
 #[test]

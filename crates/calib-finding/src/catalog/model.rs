@@ -86,10 +86,16 @@ super::topic! {
             "Synchronize the two, or record in holds: the joint values lag behind the tracker.";
         "behind": Warning,
             "The joint values of {recording:code} lag {offset} ± {sigma} behind the tracker's data of their rows: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
-            "Correct the times of the joint values, record in holds, or give tracker and joints as two files with their own times, so that `timing` aligns them.";
+            "Let the fit estimate it: `timing: {poses: continuous, clock: estimate}` in {recording:code} and in the recordings made in the same way. Or record in holds.";
         "ahead": Warning,
             "The joint values of {recording:code} are {offset} ± {sigma} ahead of the tracker's data of their rows: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
-            "Correct the times of the joint values, record in holds, or give tracker and joints as two files with their own times, so that `timing` aligns them.";
+            "Let the fit estimate it: `timing: {poses: continuous, clock: estimate}` in {recording:code} and in the recordings made in the same way. Or record in holds.";
+        "corrected_behind": Warning,
+            "The joint values of {recording:code} lag {offset} ± {sigma} behind the tracker's data of their rows. This was estimated from the motion and corrected.",
+            "Correct the times of the joint values if you can. The offset is taken into account.";
+        "corrected_ahead": Warning,
+            "The joint values of {recording:code} are {offset} ± {sigma} ahead of the tracker's data of their rows. This was estimated from the motion and corrected.",
+            "Correct the times of the joint values if you can. The offset is taken into account.";
         "offset": Warning,
             "The tracker's clock is {offset} ± {sigma} ahead of the robot's and runs {drift:ppm} faster.",
             "Use a shared clock if you can. The offset is taken into account.";
@@ -99,9 +105,12 @@ super::topic! {
         "not_excited": Error,
             "The angular speed varies by {deviation}; aligning the clocks needs {needed}.",
             "Move faster, or record static poses.";
+        "not_moved": Error,
+            "The marker moves by {motion} rms; aligning the clocks needs {needed}.",
+            "Move more joints, or record static poses.";
         "no_match": Error,
             "The two motions correlate by {correlation} at most; {needed} is needed.",
-            "Check that both recordings are of the same motion, and check the body's link.";
+            "Check that both recordings are of the same motion, and check the body's link, the names and signs of the joints, and `max_offset_s`.";
         "too_short": Error,
             "Tracker and robot have too few samples in common.",
             "Record at least several seconds with both clocks running.";

@@ -51,6 +51,9 @@ super::topic! {
         "": Warning,
             "{physics} (`{parameter}`): explains {explains:percent} of χ², p = {p_value}.",
             "Enable the effect under `solve.free` or `solve.joints`, and compare the held-out errors.";
+        "clock": Warning,
+            "{physics} (`{parameter}`): explains {explains:percent} of χ², p = {p_value}.",
+            "Let the fit estimate it: `timing: {poses: continuous, clock: estimate}` in {recording:code} and in the recordings made in the same way. Or record in holds.";
     }
     /// What is random from pose to pose is no noise of a joint.
     NOISE_IS_PHYSICS = "noise-is-physics" {

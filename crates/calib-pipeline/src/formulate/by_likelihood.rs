@@ -10,13 +10,19 @@ use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::found::Found;
 use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
+use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
 use crate::formulate::{bad_rows, clock, noise};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
 use crate::prepare::tracks::body_tracks;
 
-/// Fits all loops at once; rows that had not settled are excluded and the fit is repeated.
+/// Rows of a motion are taken again at better times at most this often; the first time leaves what is of second order.
+const ALIGNMENTS: usize = 3;
+/// Times that change by less, s, are right: at 1 m/s it is a hundredth of a millimeter.
+const ALIGNED: f64 = 1e-5;
+
+/// Fits all loops at once; rows of a motion are taken at the times that the fit gives, rows that had not settled are excluded and the fit is repeated.
 ///
 /// # Errors
 /// [`PipelineError::Solve`], and those of the body tracks.
@@ -31,6 +37,40 @@ pub fn likelihood(
         checked.findings.extend(merged);
         checked.tracks = body_tracks(inputs, &mut Vec::new())?;
     }
+    let mut settings = Settings::default();
+    settings.robust.enabled = inputs.robot.profile.solve.robust;
+    let (mut registered, mut fit, mut of_rows) = fits(inputs, checked, &settings, progress)?;
+    for _ in 0..ALIGNMENTS {
+        if !realign(inputs, &checked.tracks, &fit, ALIGNED) {
+            break;
+        }
+        progress("fit again with the clocks brought together");
+        let again = fits(inputs, checked, &settings, progress)?;
+        (registered, fit) = (again.0, again.1);
+        // Rows that had not settled are out; others are judged again.
+        of_rows.retain(|f| f.id == catalog::UNSETTLED_ROWS);
+        of_rows.extend(again.2);
+    }
+    checked.findings.extend(of_rows);
+    progress("choose the noise");
+    checked
+        .findings
+        .extend(noise::by_evidence(&mut fit, inputs, &settings));
+    checked.findings.extend(on_their_limit(&fit));
+    checked.findings.extend(of_the_wrong_sign(&fit));
+    checked.findings.extend(with_memory(&mut fit));
+    clock::noticed(&mut checked.findings, inputs, &fit);
+    *inputs = clock::corrected(inputs, &fit);
+    ml_result(inputs, fit, registered)
+}
+
+/// The fit of mounts and place alone, that of everything, and what is wrong with the rows that it left out.
+fn fits(
+    inputs: &mut Inputs,
+    checked: &mut Checked,
+    settings: &Settings,
+    progress: &mut dyn FnMut(&str),
+) -> Result<(MlFit, MlFit, Vec<Finding>), PipelineError> {
     progress("fit registration only");
     // The baseline is plain least squares: what is left then is the geometry's fault, not noise to be estimated.
     let baseline = ml::state(
@@ -41,30 +81,21 @@ pub fn likelihood(
     );
     let registered = ml::fit(baseline, inputs, &Settings::plain())?;
     progress("fit all loops");
-    let mut settings = Settings::default();
-    settings.robust.enabled = inputs.robot.profile.solve.robust;
     let full = ml::state(inputs, &checked.tracks, &checked.start, FreeSet::Profile);
-    let mut fit = ml::fit(full, inputs, &settings)?;
+    let mut fit = ml::fit(full, inputs, settings)?;
+    let mut findings = Vec::new();
     if settings.robust.enabled {
         let bad = bad_rows::bad_rows(inputs, &checked.tracks, &fit);
-        checked.findings.extend(bad.findings);
+        findings = bad.findings;
         if !bad.unsettled.is_empty() {
             progress("fit again without the unsettled rows");
             inputs.exclude(bad.unsettled);
             checked.tracks = body_tracks(inputs, &mut Vec::new())?;
             let full = ml::state(inputs, &checked.tracks, &checked.start, FreeSet::Profile);
-            fit = ml::fit(full, inputs, &settings)?;
+            fit = ml::fit(full, inputs, settings)?;
         }
     }
-    progress("choose the noise");
-    checked
-        .findings
-        .extend(noise::by_evidence(&mut fit, inputs, &settings));
-    checked.findings.extend(on_their_limit(&fit));
-    checked.findings.extend(of_the_wrong_sign(&fit));
-    checked.findings.extend(with_memory(&mut fit));
-    *inputs = clock::corrected(inputs, &fit);
-    ml_result(inputs, fit, registered)
+    Ok((registered, fit, findings))
 }
 
 /// Numbers that a physical limit of the profile stopped.

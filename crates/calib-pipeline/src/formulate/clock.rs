@@ -9,16 +9,18 @@
 //!
 //! so one c₀ and one c₁ are shared by all joints of a recording ([`calib_core::EffectKind::ClockOffset`]).
 
+use calib_checks::sync::ClockMap;
 use calib_core::{EffectKind, Parameter, ParameterId, ParameterKind, Problem, Unit};
+use calib_finding::{About, Fact, Finding, Subject, catalog};
 use calib_profile::Usage;
 use calib_report::{Clock, ClockCheck};
 
 use crate::formulate::formulation::{ClockParameters, Formulation, FreeSet, MlFit};
-use crate::prepare::aligned::ClockState;
+use crate::prepare::aligned::{Alignment, ClockState, ClockUnknowns, SAME_TIME};
 use crate::prepare::inputs::{Inputs, Loaded};
 
 /// Prior σ of c₀ and c₁, s: ten times what the alignment leaves on a bad recording.
-const PRIOR: f64 = 5e-3;
+pub(crate) const PRIOR: f64 = 5e-3;
 
 /// The clocks of one recording as the whole fit sees them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,23 +43,21 @@ fn span(loaded: &Loaded) -> Option<(f64, f64)> {
 }
 
 /// u of equation (1).
-fn position(loaded: &Loaded, row: usize) -> Option<f64> {
+pub(crate) fn position(loaded: &Loaded, row: usize) -> Option<f64> {
     let (first, last) = span(loaded)?;
     let t = *loaded.poses.t.as_ref()?.get(row)?;
     Some((2.0 * t - first - last) / (last - first))
 }
 
-/// Frees c₀ and c₁ of every fitted recording whose clocks were found from its motion; where the clocks are one, or
-/// declared so, the offset is only offered to the test for missing physics.
+/// Frees c₀ and c₁ of every fitted recording whose clocks were found from its motion, and c₀ where the clocks are one; where
+/// they are declared so, or no `timing` is given, the offset is only offered to the test for missing physics.
 pub fn add_clocks(formulation: &mut Formulation, inputs: &Inputs, free_set: FreeSet) {
     for (name, loaded) in &inputs.recordings {
         if loaded.spec.usage == Usage::Validation || loaded.velocities.is_empty() {
             continue;
         }
-        let found = loaded
-            .alignment
-            .as_ref()
-            .is_some_and(|a| matches!(a.clocks, ClockState::Found { .. }));
+        let alignment = loaded.alignment.as_ref();
+        let unknowns = alignment.map_or(ClockUnknowns::None, Alignment::unknowns);
         for (joint, speeds) in &loaded.velocities {
             let Some(edge) = inputs
                 .robot
@@ -78,25 +78,28 @@ pub fn add_clocks(formulation: &mut Formulation, inputs: &Inputs, free_set: Free
                 formulation.samples.iter().map(value).collect()
             };
             let constant = regressor(&|_| 1.0);
-            if !found || free_set == FreeSet::RegistrationOnly {
+            if unknowns == ClockUnknowns::None || free_set == FreeSet::RegistrationOnly {
                 let problem = &mut formulation.problem;
                 let clock = format!("{name}.clock_offset");
                 problem.shared_candidate(edge, EffectKind::ClockOffset, clock, constant);
                 continue;
             }
+            let drifts = unknowns == ClockUnknowns::OffsetAndDrift;
             let linear = regressor(&|row| position(loaded, row).unwrap_or(0.0));
             let problem = &mut formulation.problem;
             let clock = formulation.clocks.entry(name.clone());
             let ClockParameters { offset, drift } =
-                *clock.or_insert_with(|| clock_parameters(problem, name));
+                *clock.or_insert_with(|| clock_parameters(problem, name, drifts));
             problem.share_effect(edge, EffectKind::ClockOffset, Some(constant), offset);
-            problem.share_effect(edge, EffectKind::ClockOffset, Some(linear), drift);
+            if let Some(drift) = drift {
+                problem.share_effect(edge, EffectKind::ClockOffset, Some(linear), drift);
+            }
         }
     }
 }
 
-/// c₀ and c₁ of a recording.
-fn clock_parameters(problem: &mut Problem, recording: &str) -> ClockParameters {
+/// c₀ of a recording, and c₁ where the clocks are two.
+fn clock_parameters(problem: &mut Problem, recording: &str, drifts: bool) -> ClockParameters {
     let mut parameter = |what: &str| {
         problem.parameter(Parameter {
             name: format!("{recording}.{what}"),
@@ -112,46 +115,109 @@ fn clock_parameters(problem: &mut Problem, recording: &str) -> ClockParameters {
     };
     ClockParameters {
         offset: parameter("clock_offset"),
-        drift: parameter("clock_drift"),
+        drift: drifts.then(|| parameter("clock_drift")),
     }
 }
 
 /// Values and σ of c₀ and c₁ of a recording; `None` where the fit does not estimate them.
-fn estimates(fit: &MlFit, recording: &str) -> Option<[(f64, Option<f64>); 2]> {
+pub(crate) fn estimates(fit: &MlFit, recording: &str) -> Option<[(f64, Option<f64>); 2]> {
     let clock = fit.formulation.clocks.get(recording)?;
     let estimate = |id: ParameterId| {
         let found = &fit.solution.parameters[id.index()];
         (found.value, found.sigma)
     };
-    Some([clock.offset, clock.drift].map(estimate))
+    let drift = clock.drift.map_or((0.0, None), estimate);
+    Some([estimate(clock.offset), drift])
 }
 
-/// The clocks of a recording: from the fit where it estimates them, else from the alignment; `None` where nothing was
-/// estimated.
+/// The clocks of a recording: from the fit where it estimates them, from a held-out recording's own rows and the calibrated
+/// robot, else from the alignment; `None` where nothing was estimated.
 #[must_use]
 pub fn clock_estimate(loaded: &Loaded, fit: Option<&MlFit>) -> Option<ClockEstimate> {
-    let ClockState::Found { map, .. } = &loaded.alignment.as_ref()?.clocks else {
-        return None;
+    let alignment = loaded.alignment.as_ref()?;
+    let same = ClockMap {
+        offset: 0.0,
+        drift: 0.0,
+        reference: 0.0,
+        offset_sigma: 0.0,
+        drift_sigma: 0.0,
+        correlation: 1.0,
+        second: 0.0,
     };
-    let aligned = ClockEstimate {
+    let (map, aligned) = match &alignment.clocks {
+        ClockState::Found { map, .. } => (*map, true),
+        ClockState::OneWithLag => (same, false),
+        ClockState::One | ClockState::Declared => return None,
+    };
+    let by_correlation = aligned.then_some(ClockEstimate {
         offset: map.offset,
         sigma: Some(map.offset_sigma),
         drift: map.drift,
         drift_sigma: Some(map.drift_sigma),
+    });
+    let Some((first, last)) = span(loaded) else {
+        return by_correlation;
     };
-    let (Some(fit), Some((first, last))) = (fit, span(loaded)) else {
-        return Some(aligned);
-    };
-    let Some([(c0, sigma), (c1, drift_sigma)]) = estimates(fit, &loaded.name) else {
-        return Some(aligned);
-    };
+    let refined = alignment.refined.as_ref();
+    let [k0, k1] = refined.map_or([0.0; 2], |r| r.shift);
+    let own = refined.and_then(|r| r.sigma);
+    let ([c0, c1], [sigma, drift_sigma]) =
+        match (fit.and_then(|fit| estimates(fit, &loaded.name)), own) {
+            (Some([(c0, s0), (c1, s1)]), _) => ([k0 + c0, k1 + c1], [s0, s1]),
+            (None, Some([s0, s1])) => ([k0, k1], [Some(s0), Some(s1)]),
+            (None, None) => return by_correlation,
+        };
     let (middle, half) = (0.5 * (first + last), 0.5 * (last - first));
     Some(ClockEstimate {
         offset: middle - map.to_b(middle) - c0,
         sigma,
         drift: map.drift - c1 / half,
-        drift_sigma: drift_sigma.map(|s| s / half),
+        drift_sigma: drift_sigma.filter(|_| aligned).map(|s| s / half),
     })
+}
+
+/// What the fit says of the clocks, in place of what was noticed before it: the numbers of an offset, and joint values that
+/// were read late.
+pub fn noticed(findings: &mut Vec<Finding>, inputs: &Inputs, fit: &MlFit) {
+    for loaded in inputs.recordings.values() {
+        let Some(alignment) = &loaded.alignment else {
+            continue;
+        };
+        let Some(clock) = clock_estimate(loaded, Some(fit)) else {
+            continue;
+        };
+        let sigma = clock.sigma.unwrap_or_default();
+        if alignment.unknowns() == ClockUnknowns::OffsetAndDrift {
+            let own = findings.iter_mut().filter(|f| {
+                f.id == catalog::CLOCK_LAG && f.subject.recordings.contains(&loaded.name)
+            });
+            for finding in own {
+                *finding = finding
+                    .clone()
+                    .with("offset", Fact::seconds(clock.offset))
+                    .with("sigma", Fact::seconds(sigma))
+                    .with("drift", Fact::ratio(clock.drift));
+            }
+        } else if alignment.unknowns() == ClockUnknowns::Offset
+            && clock.offset.abs() > SAME_TIME.max(4.0 * sigma)
+        {
+            // Late joint values show the tracker's event later on the robot's clock.
+            let kind = match clock.offset < 0.0 {
+                true => "corrected_behind",
+                false => "corrected_ahead",
+            };
+            let subject = Subject {
+                recordings: vec![loaded.name.clone()],
+                ..About::Clocks.into()
+            };
+            findings.push(
+                Finding::of_kind(catalog::CLOCK_LAG, kind, subject)
+                    .with("recording", Fact::name(&loaded.name))
+                    .with("offset", Fact::seconds(clock.offset.abs()))
+                    .with("sigma", Fact::seconds(sigma)),
+            );
+        }
+    }
 }
 
 /// The inputs with joint values at the times that the fit found, for residuals and predictions.
@@ -225,19 +291,32 @@ pub fn clocks(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Clock> {
         .collect()
 }
 
+/// Where the clocks of rows of a motion come from.
+fn estimated(r: &Loaded, clock: &ClockEstimate) -> String {
+    let refined = r.alignment.as_ref().and_then(|a| a.refined.as_ref());
+    let from = match refined.and_then(|r| r.sigma) {
+        Some(_) => {
+            "estimated from its own rows with the calibrated robot (for each tenth of them from the other nine)"
+        }
+        None => "estimated from all loops",
+    };
+    let drift = clock.drift_sigma.map_or_else(String::new, |sigma| {
+        format!(", {:+.0} ± {:.0} ppm", clock.drift * 1e6, sigma * 1e6)
+    });
+    format!(
+        "; {from}: {:+.5} s ± {:.3} ms at mid-recording{drift}, and corrected",
+        clock.offset,
+        clock.sigma.unwrap_or_default() * 1e3,
+    )
+}
+
 /// The clocks of a recording whose rows were made from streams.
 fn aligned_clock(r: &Loaded, fit: Option<&MlFit>) -> Option<Clock> {
     let alignment = r.alignment.as_ref()?;
     let estimate = clock_estimate(r, fit);
     let mut text = alignment.text();
     if let Some(clock) = estimate.filter(|_| alignment.holds.is_none()) {
-        text += &format!(
-            "; estimated from all loops: {:+.4} s ± {:.2} ms at mid-recording, {:+.0} ± {:.0} ppm, and corrected",
-            clock.offset,
-            clock.sigma.unwrap_or_default() * 1e3,
-            clock.drift * 1e6,
-            clock.drift_sigma.unwrap_or_default() * 1e6
-        );
+        text += &estimated(r, &clock);
     } else if estimate.is_some() {
         text += "; the remaining offset has no effect on holds";
     }

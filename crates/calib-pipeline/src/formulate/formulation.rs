@@ -63,8 +63,8 @@ pub struct Formulation {
 pub struct ClockParameters {
     /// In the middle of the recording.
     pub offset: ParameterId,
-    /// From there to its end.
-    pub drift: ParameterId,
+    /// From there to its end, where the clocks are two.
+    pub drift: Option<ParameterId>,
 }
 
 /// Noise levels of a problem.

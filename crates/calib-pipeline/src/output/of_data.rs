@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_core::RejectReason;
+use calib_core::effect::clock_offset;
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_profile::{Method, Usage};
 use calib_report::{
@@ -182,15 +183,32 @@ pub(crate) fn findings(
 ) -> Vec<Finding> {
     let mut findings = e.findings.to_vec();
     findings.extend(open);
-    findings.extend(missing.iter().map(|m| {
-        Finding::new(catalog::MISSING_PHYSICS, About::Fit)
-            .with("physics", Fact::choice(m.physics.words()))
-            .with("parameter", Fact::name(&m.parameter))
-            .with("explains", Fact::ratio(m.explains))
-            .with("p_value", Fact::ratio(m.p_value.max(f64::MIN_POSITIVE)))
-    }));
+    findings.extend(missing.iter().map(|m| missing_finding(e, m)));
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     findings
+}
+
+/// Physics that the residuals show; a clock is not freed as an effect is.
+pub(crate) fn missing_finding(e: &Evidence<'_>, missing: &MissingPhysics) -> Finding {
+    let clock = clock_offset::EFFECT.terms.iter().find_map(|term| {
+        let name = missing.parameter.strip_suffix(term.name)?;
+        let recording = name.strip_suffix('.')?;
+        let known = e.inputs.recordings.contains_key(recording);
+        known.then_some(recording)
+    });
+    let finding = match clock {
+        Some(recording) => Finding::of_kind(catalog::MISSING_PHYSICS, "clock", About::Fit)
+            .with("recording", Fact::name(recording)),
+        None => Finding::new(catalog::MISSING_PHYSICS, About::Fit),
+    };
+    finding
+        .with("physics", Fact::choice(missing.physics.words()))
+        .with("parameter", Fact::name(&missing.parameter))
+        .with("explains", Fact::ratio(missing.explains))
+        .with(
+            "p_value",
+            Fact::ratio(missing.p_value.max(f64::MIN_POSITIVE)),
+        )
 }
 
 /// The closed forms against the result, and against each other.

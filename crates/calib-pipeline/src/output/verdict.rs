@@ -6,6 +6,7 @@ use calib_report::{HeldOut, Limit, Limited, MissingPhysics, NextStep, Scope, Ver
 use crate::output::evidence::Evidence;
 use crate::output::export::calibration_name;
 use crate::output::files::alone_name;
+use crate::output::of_data::missing_finding;
 use crate::verify::motions::Motions;
 
 pub(crate) fn limits(limits: &Limits, e: &Evidence<'_>) -> Vec<Limit> {
@@ -132,8 +133,16 @@ pub(crate) fn next_steps(
         Verdict::Rejected | Verdict::NotEvaluated => NextStep::FixProblems,
     }];
     if let Some(first) = missing.first() {
-        steps.push(NextStep::EnableEffect {
-            missing: first.clone(),
+        let finding = missing_finding(e, first);
+        steps.push(match finding.facts.get("recording").is_some() {
+            true => NextStep::Resolve {
+                subject: finding.subject.to_string(),
+                finding: finding.id.to_string(),
+                remedy: finding.remedy(),
+            },
+            false => NextStep::EnableEffect {
+                missing: first.clone(),
+            },
         });
     }
     if let Some(worst) = e

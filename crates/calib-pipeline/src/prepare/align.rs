@@ -6,11 +6,13 @@
 //!
 //! One clock: nothing to do. Two clocks that the profile declares to be one: δ = ρ = 0. Else δ and ρ come from the angular
 //! speed of a tracking body against that of its link ([`calib_checks::sync`]), which needs no calibration; where they
-//! cannot be told, the recording is refused. Then either every hold gives one static pose (an error of δ costs
-//! nothing), or rows are taken from the motion, and the fit estimates what is left of δ and ρ
-//! ([`mod@crate::formulate::clock`]).
+//! cannot be told, the recording is refused. A body without orientation tells them by the place of a marker instead. Then
+//! either every hold gives one static pose (an error of δ costs nothing), or rows are taken from the motion, and the fit
+//! estimates what is left of δ and ρ ([`mod@crate::formulate::clock`], [`mod@crate::formulate::realign`]); of one clock it
+//! estimates δ, by which joint values that were read late are late.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use calib_checks::model::alignment;
 use calib_checks::sync::OffsetOutcome;
@@ -27,7 +29,7 @@ use crate::prepare::streams::Scalars;
 use crate::prepare::timelines::{estimate, tracker_table, tracker_timeline};
 
 /// Half of the time over which a joint's speed is measured, s: several samples of any controller.
-const HALF_CHORD: f64 = 0.02;
+pub(crate) const HALF_CHORD: f64 = 0.02;
 
 /// The table of a timed recording, and of the robot's own log where that is another file.
 ///
@@ -103,6 +105,8 @@ fn aligned(
             clocks,
             holds: None,
             samples: streams.times.len(),
+            joints: Arc::default(),
+            refined: None,
         },
         findings,
         excluded: Vec::new(),
@@ -118,6 +122,7 @@ fn aligned(
             }
         }
         TimedPoses::Continuous => {
+            aligned.alignment.joints = Arc::new(streams.joints.clone());
             let rows = thinned(&full, &streams.times, timing.rate);
             aligned.poses = full.select(&rows);
             aligned.velocities = velocities
@@ -158,7 +163,13 @@ impl<'a> Streams<'a> {
         let of_robot = self.joints.values().next();
         let one_line = of_robot.is_none_or(|j| j.timeline == self.line);
         if one_line || self.robot_clock == self.tracker_clock {
-            Some(ClockState::One)
+            let estimated = timing.poses == TimedPoses::Continuous
+                && timing.clock == Clocks::Estimate
+                && !self.joints.is_empty();
+            Some(match estimated {
+                true => ClockState::OneWithLag,
+                false => ClockState::One,
+            })
         } else if timing.clock == Clocks::Shared {
             Some(ClockState::Declared)
         } else {

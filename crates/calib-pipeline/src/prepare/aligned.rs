@@ -1,6 +1,7 @@
 //! How the clocks of a recording go together, and the table of poses that follows.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use calib_checks::sync::ClockMap;
 use calib_finding::Finding;
@@ -8,6 +9,7 @@ use calib_recording::Poses;
 use nalgebra::Matrix3;
 
 use crate::prepare::excluded::Excluded;
+use crate::prepare::streams::Scalars;
 
 /// An offset below this, s, is none: at 0.5 rad/s and 1 m it is a tenth of a millimeter.
 pub(crate) const SAME_TIME: f64 = 2e-4;
@@ -17,6 +19,8 @@ pub(crate) const SAME_TIME: f64 = 2e-4;
 pub enum ClockState {
     /// They are one: the streams name the same clock.
     One,
+    /// They are one, and by how much the joint values are late is found from the motion.
+    OneWithLag,
     /// The profile declares them to be one.
     Declared,
     /// Found from the motion of a body.
@@ -34,9 +38,31 @@ impl ClockState {
     pub fn at_robot(&self, t: f64) -> f64 {
         match self {
             Self::Found { map, .. } => map.to_b(t),
-            Self::One | Self::Declared => t,
+            Self::One | Self::OneWithLag | Self::Declared => t,
         }
     }
+}
+
+/// What of the clocks of rows of a motion is estimated with everything else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ClockUnknowns {
+    /// Nothing: the rows are held, or the profile declares one clock.
+    None,
+    /// The offset.
+    Offset,
+    /// Offset and drift.
+    OffsetAndDrift,
+}
+
+/// What a robot that is calibrated says of the clocks, beyond [`ClockState`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refined {
+    /// Added to the robot's time of each row, s.
+    pub by_row: Vec<f64>,
+    /// The same in the middle of the recording, and from there to its end, from all rows, s.
+    pub shift: [f64; 2],
+    /// Their standard deviations, where they come from the recording's own rows and a robot that was held fixed, s.
+    pub sigma: Option<[f64; 2]>,
 }
 
 /// How the clocks of one recording go together.
@@ -52,9 +78,24 @@ pub struct Alignment {
     pub holds: Option<usize>,
     /// Rows of the tracker's stream.
     pub samples: usize,
+    /// The joints over the robot's own time, where rows of a motion may have to be taken again at better times.
+    pub joints: Arc<BTreeMap<String, Scalars>>,
+    /// What the calibrated robot says of the clocks; `None` before.
+    pub refined: Option<Refined>,
 }
 
 impl Alignment {
+    /// What of the clocks is estimated with everything else.
+    #[must_use]
+    pub fn unknowns(&self) -> ClockUnknowns {
+        match self.clocks {
+            _ if self.holds.is_some() => ClockUnknowns::None,
+            ClockState::One | ClockState::Declared => ClockUnknowns::None,
+            ClockState::OneWithLag => ClockUnknowns::Offset,
+            ClockState::Found { .. } => ClockUnknowns::OffsetAndDrift,
+        }
+    }
+
     /// One line for people: where the poses come from, and how the clocks go together.
     #[must_use]
     pub fn text(&self) -> String {
@@ -64,6 +105,9 @@ impl Alignment {
         };
         let clocks = match &self.clocks {
             ClockState::One => "one clock".to_owned(),
+            ClockState::OneWithLag => {
+                "one clock; the fit estimates by how much the joint values are late".to_owned()
+            }
             ClockState::Declared => "clocks stated to be the same".to_owned(),
             ClockState::Found { body, map } => format!(
                 "the tracker clock is offset by {:+.4} s ± {:.2} ms from the robot clock and runs {:+.0} ± {:.0} ppm fast (motion of `{body}`: correlation {:.3}, second peak {:.2})",

@@ -8,8 +8,11 @@ use nalgebra::{Isometry3, Point3};
 /// Longest gap, in units of the usual step, that is interpolated.
 const MAX_GAP: f64 = 5.0;
 
+/// Steps shorter than this share of the usual one, or as much longer, are no samples of a cubic.
+const UNEVEN: f64 = 0.5;
+
 /// A number over time.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Scalars {
     /// Times, s, never decreasing; empty where the stream has none.
     pub t: Vec<f64>,
@@ -74,6 +77,32 @@ impl Scalars {
         }
         let b = *self.values.get(j)?.as_ref()?;
         Some(a + f * (b - a))
+    }
+
+    /// The same on the cubic through the two samples before and the two after, where they are evenly there: a line cuts the
+    /// bends of a motion that is sampled slowly.
+    #[must_use]
+    pub fn smooth_at(&self, t: f64) -> Option<f64> {
+        let line = self.at(t)?;
+        let (i, j, f) = between(&self.t, t, self.step)?;
+        let cubic = || {
+            let four = i.checked_sub(1)?..j + 2;
+            let times = self.t.get(four.clone())?;
+            let values: Option<Vec<f64>> = self.values.get(four)?.iter().copied().collect();
+            let even = |w: &[f64]| (UNEVEN..1.0 / UNEVEN).contains(&((w[1] - w[0]) / self.step));
+            let values = values.filter(|_| times.windows(2).all(even))?;
+            let weight = |k: usize| {
+                let others = (0..times.len()).filter(|m| *m != k);
+                let factors = others.map(|m| (t - times[m]) / (times[k] - times[m]));
+                factors.product::<f64>()
+            };
+            Some((0..times.len()).map(|k| weight(k) * values[k]).sum())
+        };
+        if f == 0.0 {
+            Some(line)
+        } else {
+            cubic().or(Some(line))
+        }
     }
 
     /// Speed at `t`, per s, over the chord `t ± half` (at least one sample to either side).

@@ -4,10 +4,14 @@ use std::collections::BTreeMap;
 
 use calib_checks::model::alignment;
 use calib_checks::rigid_body::{Template, body_poses};
-use calib_checks::sync::{ClockMap, OffsetOutcome, OffsetSettings, RotationTrack, clock_offset};
+use calib_checks::sync::{
+    ClockMap, LinkTrack, OffsetOutcome, OffsetSettings, PointTrack, RotationTrack, clock_offset,
+    clock_offset_of_point,
+};
 use calib_finding::{About, Finding, catalog};
 use calib_profile::{BodyKind, RecordingSpec, Timing};
 use calib_recording::{Filled, Poses, Recording};
+use calib_urdf::LinkId;
 use nalgebra::{Isometry3, Point3};
 
 use crate::error::NotATrack;
@@ -116,7 +120,8 @@ pub(crate) fn tracker_table(
     Ok(poses)
 }
 
-/// Equation (1) from the body that tells it best; else why not.
+/// Equation (1) from the body that tells it best, by its angular speed; where none has an orientation, from single markers. Else
+/// why not.
 pub(crate) fn estimate(
     robot: &RobotProfile,
     spec: &RecordingSpec,
@@ -128,39 +133,44 @@ pub(crate) fn estimate(
         max_offset: timing.max_offset,
         ..OffsetSettings::default()
     };
-    let longest = joints.values().max_by_key(|j| j.t.len());
-    let robot_times: &[f64] = longest.map_or(&[], |j| &j.t);
+    let mut turning = Vec::new();
+    let mut moving = Vec::new();
+    for (name, body) in &robot.profile.bodies {
+        let link = link_poses(robot, spec, joints, body.link);
+        let link = || link.iter().copied();
+        if let Some(seen) = orientation(table, name, &body.kind) {
+            let link = RotationTrack::new(link().map(|(t, pose)| (t, pose.map(|p| p.rotation))));
+            turning.push((name.clone(), clock_offset(&seen, &link, &settings)));
+        } else {
+            let link = LinkTrack::new(link());
+            for seen in points(table, &body.kind) {
+                let outcome = clock_offset_of_point(&seen, &link, &settings);
+                moving.push((name.clone(), outcome));
+            }
+        }
+    }
+    let outcomes = if turning.is_empty() { moving } else { turning };
+    best(outcomes)
+}
+
+/// The answer with the smallest σ, or the most telling refusal.
+fn best(outcomes: Vec<(String, OffsetOutcome)>) -> Result<(String, ClockMap), Box<Finding>> {
     let mut best: Option<(String, ClockMap)> = None;
     let mut worst: Option<OffsetOutcome> = None;
-    for (name, body) in &robot.profile.bodies {
-        let Some(seen) = orientation(table, name, &body.kind) else {
-            continue;
-        };
-        let link = robot_times.iter().map(|&t| {
-            let mut q = robot.model.zero_positions();
-            for (joint, value) in &spec.hold {
-                q[joint.index()] = *value;
-            }
-            for (joint, stream) in joints {
-                let id = robot.model.joint_id(joint).ok()?;
-                q[id.index()] = stream.at(t)?;
-            }
-            Some(robot.model.root_from_link(&q, body.link).rotation)
-        });
-        let link = RotationTrack::new(robot_times.iter().copied().zip(link));
-        match clock_offset(&seen, &link, &settings) {
+    for (name, outcome) in outcomes {
+        match outcome {
             OffsetOutcome::Found(map) => {
                 let better =
                     |(_, known): &(String, ClockMap)| map.offset_sigma < known.offset_sigma;
                 if best.as_ref().is_none_or(better) {
-                    best = Some((name.clone(), map));
+                    best = Some((name, map));
                 }
             }
             // A body that hardly moves says nothing; one that moves and does not fit says why.
-            outcome @ (OffsetOutcome::NotExcited { .. } | OffsetOutcome::TooShort) => {
-                worst = worst.or(Some(outcome));
-            }
-            outcome => worst = Some(outcome),
+            OffsetOutcome::NotExcited { .. }
+            | OffsetOutcome::NotMoved { .. }
+            | OffsetOutcome::TooShort => worst = worst.or(Some(outcome)),
+            _ => worst = Some(outcome),
         }
     }
     let outcome = worst.unwrap_or(OffsetOutcome::TooShort);
@@ -171,6 +181,41 @@ pub(crate) fn estimate(
             }),
         )
     })
+}
+
+/// Poses of a link by the nominal robot at the times of the longest stream of joints.
+fn link_poses(
+    robot: &RobotProfile,
+    spec: &RecordingSpec,
+    joints: &BTreeMap<String, Scalars>,
+    link: LinkId,
+) -> Vec<(f64, Option<Isometry3<f64>>)> {
+    let longest = joints.values().max_by_key(|j| j.t.len());
+    let times: &[f64] = longest.map_or(&[], |j| &j.t);
+    let pose = |t: f64| {
+        let mut q = robot.model.zero_positions();
+        for (joint, value) in &spec.hold {
+            q[joint.index()] = *value;
+        }
+        for (joint, stream) in joints {
+            let id = robot.model.joint_id(joint).ok()?;
+            q[id.index()] = stream.at(t)?;
+        }
+        Some(robot.model.root_from_link(&q, link))
+    };
+    times.iter().map(|&t| (t, pose(t))).collect()
+}
+
+/// The markers of a body over the tracker's time.
+fn points(table: &Poses, kind: &BodyKind) -> Vec<PointTrack> {
+    let (BodyKind::Markers { names, .. }, Some(times)) = (kind, &table.t) else {
+        return Vec::new();
+    };
+    let track = |name: &String| {
+        let seen = table.markers.get(name)?.iter().copied();
+        Some(PointTrack::new(times.iter().copied().zip(seen)))
+    };
+    names.iter().filter_map(track).collect()
 }
 
 /// A body's orientation over the tracker's time, where it has one.

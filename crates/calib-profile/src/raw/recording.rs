@@ -82,7 +82,7 @@ pub enum RawTimedPoses {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawClocks {
-    /// Two clocks: offset and drift are found from the motion.
+    /// Two clocks: offset and drift are found. One clock: in rows of a motion, how late joint values are.
     #[default]
     Estimate,
     /// One clock (synchronized machines): the times are used unchanged.

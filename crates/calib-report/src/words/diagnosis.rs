@@ -51,6 +51,16 @@ impl Diagnosis {
                     ]
                 })
             }
+            Self::ClockOffset { recording } => [
+                format!(
+                    "Joint values and tracker data in the rows of {} are not of the same time.",
+                    code(recording)
+                ),
+                format!(
+                    "Set `timing: {{poses: continuous, clock: estimate}}` in {} and in the recordings made in the same way, then run `{again}`.",
+                    code(recording)
+                ),
+            ],
             Self::MissingEffect { parameter } => [
                 format!(
                     "The residuals show an effect that the model lacks: {}.",

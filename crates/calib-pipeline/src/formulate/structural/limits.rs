@@ -9,6 +9,7 @@ use calib_finding::{About, Fact, Finding, Subject, Unit, catalog};
 
 use super::codes;
 use super::layout::Layout;
+use crate::prepare::aligned::ClockUnknowns;
 
 /// Findings beside the decision.
 #[must_use]
@@ -158,8 +159,12 @@ fn continuous_finding(layout: &Layout<'_>, found: &Continuous) -> Option<Finding
     )
 }
 
-/// The profile frees an effect of the joint, or declares the coupling: the fit accounts for it.
+/// The profile frees an effect of the joint, declares the coupling, or lets the clock be estimated: the fit accounts for it.
 fn is_declared(layout: &Layout<'_>, hypothesis: &Hypothesis) -> bool {
+    if let Hypothesis::Lag { recording, .. } = *hypothesis {
+        let alignment = layout.recordings[recording.0].alignment.as_ref();
+        return alignment.is_some_and(|a| a.unknowns() != ClockUnknowns::None);
+    }
     let (Hypothesis::Gain { joint, .. } | Hypothesis::Coupling { joint, .. }) = *hypothesis else {
         return false;
     };
