@@ -33,7 +33,7 @@ fn result(dir: Scratch, folder: &str, urdf: &str, joints: &[&str]) -> Scratch {
         .file(&format!("{folder}/r.calibrated.urdf.changes.json"), record)
 }
 
-const RESULT: &str = "result/r.calibrated.urdf";
+pub const RESULT: &str = "result/r.calibrated.urdf";
 
 /// The text with every number replaced by `#`: what no calibration may touch.
 fn without_numbers(text: &str) -> String {
@@ -163,7 +163,7 @@ const ARM: &str = r#"<robot name="arm">
 </robot>
 "#;
 
-const PROPERTIES: &str = r#"<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+pub const PROPERTIES: &str = r#"<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
   <!-- lengths in meters -->
   <xacro:property name="upper_length" value="0.4"/>
   <xacro:property name="calibration" value="${xacro.load_yaml('$(find my_arm)/config/arm.yaml')}"/>
@@ -188,7 +188,7 @@ const PROPERTIES: &str = r#"<robot name="arm" xmlns:xacro="http://www.ros.org/wi
 
 const YAML: &str = "# wrist of cell 3\njoints:\n  wrist: {x: 0.25, y: 0.0, z: 0.0, roll: 0.0, pitch: 0.0, yaw: 0.0} # at its zero configuration\n";
 
-fn with_xacro(xacro: &str) -> Scratch {
+pub fn with_xacro(xacro: &str) -> Scratch {
     result(
         Scratch::new(),
         "result",

@@ -122,6 +122,44 @@ fn untrusted_svd(line: &str) -> Option<&'static str> {
     .then_some("uses nalgebra's SVD instead of calib_geometry::decompose")
 }
 
+/// Every output goes through `calib-files`, every input of a person's file too: links, pipes, full disks and stops are its business.
+fn past_the_road(name: &str, line: &str) -> Option<&'static str> {
+    let ours = name.starts_with("crates/") && name.contains("/src/") && name.ends_with(".rs");
+    if !ours || name.starts_with("crates/calib-files/") || line.trim_start().starts_with("//") {
+        return None;
+    }
+    let writes = [
+        "fs::write(",
+        "File::create",
+        "OpenOptions",
+        "fs::rename(",
+        "fs::remove_",
+        "fs::create_dir",
+        "fs::copy(",
+        "fs::hard_link(",
+        "set_permissions(",
+        "create_new(",
+    ];
+    let reads = ["fs::read(", "fs::read_to_string(", "fs::File::open("];
+    // The kernel's own files are no person's.
+    let of_system = line.contains("/proc/self");
+    if writes.iter().any(|call| line.contains(call)) {
+        return Some("writes past calib-files");
+    }
+    let reads = reads.iter().any(|call| line.contains(call)) && !of_system;
+    reads.then_some("reads past calib_files::input")
+}
+
+#[test]
+fn files_go_one_road() {
+    let found = bad_lines(&texts(), past_the_road);
+    assert!(found.is_empty(), "{}", found.join("\n"));
+    let is_bad = |line: &str| past_the_road("crates/calib-x/src/a.rs", line).is_some();
+    assert!(is_bad("    std::fs::write(&path, text)?;"));
+    assert!(is_bad("let bytes = fs::read(path)?;"));
+    assert!(!is_bad("calib_files::replace(path, bytes)?;"));
+}
+
 #[test]
 fn nothing_names_a_machine_a_registry_or_unfinished_work() {
     let texts = texts();

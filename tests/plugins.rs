@@ -170,6 +170,7 @@ fn an_estimator_in_rust_is_named_like_a_built_in_one() {
         "paper",
         "--out",
         "out",
+        "--allow-plugins",
     ]);
     assert!(ran.code == 0 || ran.code == 1, "{}", ran.stderr);
     let built_in = Scratch::new().robot("justin");

@@ -296,7 +296,7 @@ fn a_folder_that_cannot_be_written_to_ends_with_seven() {
         ])
         .expect(7);
     assert!(
-        ran.stderr.contains("taken/out: cannot be written"),
+        ran.stderr.contains("taken: cannot be written"),
         "{}",
         ran.stderr
     );

@@ -447,13 +447,16 @@ fn shapes_of_the_urdf_are_drawn_and_missing_meshes_are_told() {
         mesh("package://unknown/box.stl"),
         mesh("broken.stl"),
         mesh("gone.stl"),
+        mesh("../../private.stl"),
         mesh("body.dae"),
         visual("<capsule radius=\"1\"/>"),
     ];
     let dir = Scratch::new()
         .robot("ripley")
         .file("robots/meshes/box.stl", box_stl())
+        .file("robots/package.xml", "<package/>")
         .file("robots/arm_description/one.STL", TEXT_STL)
+        .file("private.stl", box_stl())
         .file("packages/elsewhere/box.stl", box_stl())
         .file("robots/ripley/broken.stl", &box_stl()[..500])
         .file("robots/ripley/body.dae", "<COLLADA/>")

@@ -2,6 +2,8 @@
 //!
 //! Memory is watched by the fuzzer itself (`-malloc_limit_mb`, `-rss_limit_mb`), time by `-timeout`.
 
+pub mod robot;
+
 use calib_capture::{Order, dtrack, parse_joints, vrpn};
 use calib_recording::{
     At, ColumnMap, Filled, ReadOptions, Recording, WriteOptions, read_bytes, write_recording,

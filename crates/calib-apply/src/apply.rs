@@ -58,8 +58,11 @@ const SAME_ROBOT: f64 = 1e-6;
 /// [`ApplyError`] with place, finding and remedy; nothing is written then.
 pub fn apply(request: &ApplyRequest) -> Result<Applied, ApplyError> {
     let result = result::find(&request.result, request.force)?;
-    let target = Target::read(&request.target, request.yaml.as_deref())?;
+    let mut target = Target::read(&request.target, request.yaml.as_deref())?;
     let mut notes = result.notes.clone();
+    if request.destination == Destination::InPlace {
+        target.recover(&mut notes)?;
+    }
     let edits = result.edits(target.kind, &mut notes);
     let patched = target.patch(&result, &edits)?;
     let state = compare(&result, &patched.before, &request.target)?;
@@ -93,6 +96,13 @@ pub fn apply(request: &ApplyRequest) -> Result<Applied, ApplyError> {
         }
     }
     target.add_notes(&files, &mut notes);
+    if request.destination == Destination::InPlace {
+        let many = files.iter().filter(|file| has_other_names(&file.path));
+        notes.extend(many.map(|file| {
+            let file = file.path.display();
+            format!("{file} has other names (hard links): those keep the old numbers")
+        }));
+    }
     let mut applied = Applied {
         from: result.urdf.clone(),
         target: request.target.clone(),
@@ -104,6 +114,15 @@ pub fn apply(request: &ApplyRequest) -> Result<Applied, ApplyError> {
     };
     files::write(&mut applied.files, &request.destination)?;
     Ok(applied)
+}
+
+/// Whether a file has more than one name; the system may not tell.
+fn has_other_names(path: &Path) -> bool {
+    #[cfg(unix)]
+    let names = std::fs::metadata(path).map(|m| std::os::unix::fs::MetadataExt::nlink(&m));
+    #[cfg(not(unix))]
+    let names = std::fs::metadata(path).map(|_| 1);
+    names.is_ok_and(|n| n > 1)
 }
 
 /// How a target stands to a result.

@@ -2,60 +2,85 @@
 
 use std::path::{Path, PathBuf};
 
-use calib_files::{OutputFile, replace, write_new};
+use calib_files::{FileError, OutputFile, folder_of, remove, replace, write_new};
 
 use crate::change::{Destination, FileChange};
 use crate::error::ApplyError;
-use crate::revert::record_path;
+use crate::revert::{Recorded, record_path, recorded};
 
 /// Writes the files, each with its record; nothing where they go nowhere.
 pub(super) fn write(files: &mut [FileChange], destination: &Destination) -> Result<(), ApplyError> {
     let places = match destination {
         Destination::Nowhere => return Ok(()),
         Destination::InPlace => {
-            for file in files.iter() {
-                let record = record_path(&file.path);
-                if record.exists() {
-                    return Err(ApplyError::ChangedAlready {
-                        file: file.path.clone(),
-                        record,
-                    });
-                }
-            }
+            over(files)?;
             files.iter().map(|f| f.path.clone()).collect()
         }
-        Destination::To(out) => out_places(files, out),
-    };
-    for (file, place) in files.iter_mut().zip(&places) {
-        let mut record = calib_report::json::exact_json(&file.record)?;
-        if !record.ends_with('\n') {
-            record.push('\n');
-        }
-        let folder = match place.parent() {
-            Some(folder) if folder != Path::new("") => folder,
-            _ => Path::new("."),
-        };
-        let name = |path: &Path| {
-            path.file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned()
-        };
-        let record = OutputFile::text(name(&record_path(place)), record);
-        let changed = OutputFile::text(name(place), file.patched.text.clone());
-        if *destination == Destination::InPlace {
-            // The record first: whatever happens then, the original can be had.
-            write_new(folder, &[record])?;
-            if let Err(error) = replace(place, &changed.bytes) {
-                let _ = std::fs::remove_file(record_path(place));
-                return Err(error.into());
+        Destination::To(out) => {
+            let places = out_places(files, out);
+            for (file, place) in files.iter().zip(&places) {
+                let changed = OutputFile::text(name(place), file.patched.text.clone());
+                let record = OutputFile::text(name(&record_path(place)), record_text(file)?);
+                write_new(folder_of(place), &[changed, record])?;
             }
-        } else {
-            write_new(folder, &[changed, record])?;
+            places
         }
-        file.written = Some(place.clone());
+    };
+    for (file, place) in files.iter_mut().zip(places) {
+        file.written = Some(place);
     }
     Ok(())
+}
+
+/// Over the targets: first all records, then the files. Whatever stops it, every file that was changed has its record, and
+/// a record without its change is recognized by the next call.
+fn over(files: &[FileChange]) -> Result<(), ApplyError> {
+    let mut records = Vec::new();
+    for file in files {
+        let record = record_path(&file.path);
+        if record.exists() && recorded(&file.path, &file.original) != Recorded::Before {
+            return Err(ApplyError::ChangedAlready {
+                file: file.path.clone(),
+                record,
+            });
+        }
+        records.push((record, record_text(file)?));
+    }
+    let write_all = || -> Result<(), FileError> {
+        for (record, text) in &records {
+            replace(record, text.as_bytes())?;
+        }
+        files
+            .iter()
+            .try_for_each(|file| replace(&file.path, file.patched.text.as_bytes()))
+    };
+    write_all().map_err(|error| {
+        // The error that counts is the first; a record stays where its file could not be restored.
+        for (file, (record, _)) in files.iter().zip(&records) {
+            let changed = recorded(&file.path, &text_of(&file.path)) == Recorded::After;
+            if !changed || replace(&file.path, file.original.as_bytes()).is_ok() {
+                let _ = remove(record);
+            }
+        }
+        error.into()
+    })
+}
+
+fn text_of(path: &Path) -> String {
+    calib_urdf::source::read_text(path, "").unwrap_or_default()
+}
+
+fn record_text(file: &FileChange) -> Result<String, ApplyError> {
+    let mut record = calib_report::json::exact_json(&file.record)?;
+    if !record.ends_with('\n') {
+        record.push('\n');
+    }
+    Ok(record)
+}
+
+fn name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
 }
 
 fn out_places(files: &[FileChange], out: &Path) -> Vec<PathBuf> {

@@ -13,6 +13,7 @@ use crate::change::FileChange;
 use crate::error::ApplyError;
 use crate::kind::Kind;
 use crate::result::Calibrated;
+use crate::revert::{Recorded, read_record, recorded, reverted};
 
 /// A target as read.
 #[derive(Debug, Clone)]
@@ -142,6 +143,27 @@ impl Target {
         Ok(())
     }
 
+    /// Goes back, in memory, behind a change of several files that was stopped after the first of them.
+    ///
+    /// # Errors
+    /// [`ApplyError`] when a record beside a changed file is damaged.
+    pub(super) fn recover(&mut self, notes: &mut Vec<String>) -> Result<(), ApplyError> {
+        let yaml = self.yaml_paths.iter().zip(&mut self.companions.yaml);
+        let mut files = vec![(&self.path, &mut self.text)];
+        files.extend(yaml.map(|(path, companion)| (path, &mut companion.text)));
+        let stands: Vec<Recorded> = files.iter().map(|(p, t)| recorded(p, t)).collect();
+        if !(stands.contains(&Recorded::Before) && stands.contains(&Recorded::After)) {
+            return Ok(());
+        }
+        for ((path, text), stand) in files.into_iter().zip(stands) {
+            if stand == Recorded::After {
+                *text = reverted(path, text, &read_record(path)?)?;
+            }
+        }
+        notes.push("an earlier change was stopped between two files: it was done again".to_owned());
+        Ok(())
+    }
+
     /// Makes the edits; nothing is written.
     pub(super) fn patch(
         &self,
@@ -263,7 +285,7 @@ fn resolve(xacro: &Path, argument: &str) -> Option<PathBuf> {
     let mut up = folder.to_path_buf();
     for ancestor in absolute.ancestors() {
         let named = ancestor.file_name().is_some_and(|n| n == package)
-            || std::fs::read_to_string(ancestor.join("package.xml"))
+            || source::read_text(&ancestor.join("package.xml"), "")
                 .is_ok_and(|xml| xml.contains(&format!("<name>{package}</name>")));
         let place = up.join(rest);
         if named && place.is_file() {

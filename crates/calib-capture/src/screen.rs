@@ -2,6 +2,8 @@
 
 use std::io::Write;
 
+use calib_finding::printable;
+
 /// Maximum length of a line.
 pub const WIDTH: usize = 80;
 
@@ -53,7 +55,11 @@ impl<W: Write> Screen for Terminal<W> {
         }
         self.last = Some(now);
         self.shown = true;
-        let short: String = text.chars().take(WIDTH - 1).collect();
+        let short: String = printable(text)
+            .replace('\n', " ")
+            .chars()
+            .take(WIDTH - 1)
+            .collect();
         let _ = write!(self.out, "\r\x1b[K{short}");
         let _ = self.out.flush();
     }
@@ -99,7 +105,8 @@ impl<W: Write> Screen for Lines<W> {
 /// The text in lines of at most [`WIDTH`] characters, broken at spaces, continuation lines indented by two spaces.
 fn folded(text: &str) -> Vec<String> {
     let mut lines = Vec::new();
-    for part in text.lines() {
+    // Names of trackers and bodies come from the network.
+    for part in printable(text).lines() {
         let indent = part
             .chars()
             .take_while(|c| *c == ' ')

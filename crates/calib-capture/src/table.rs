@@ -1,9 +1,11 @@
 //! The file that grows while it is recorded: whole rows, on the disk every second.
 
 use calib_recording::{ReadOptions, WRITTEN_LIVE, read_bytes};
-use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Seek, SeekFrom, Write};
+use std::fs::File;
+use std::io::Write;
 use std::path::Path;
+
+use calib_files::{FileError, input};
 
 /// Rows wait at most this long for the disk, s.
 const EVERY: f64 = 1.0;
@@ -27,6 +29,9 @@ pub enum TableError {
         /// What differs.
         problem: String,
     },
+    /// The file cannot be started or continued.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The operating system refused.
     #[error("{path}: cannot be written: {source}")]
     Io {
@@ -60,20 +65,6 @@ impl Table {
     /// [`TableError`].
     pub fn create(path: &Path, comments: &[String], header: &str) -> Result<Table, TableError> {
         let shown = path.display().to_string();
-        let io = |source| TableError::Io {
-            path: shown.clone(),
-            source,
-        };
-        if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-            std::fs::create_dir_all(folder).map_err(io)?;
-        }
-        let opened = OpenOptions::new().write(true).create_new(true).open(path);
-        let mut file = opened.map_err(|source| match source.kind() {
-            ErrorKind::AlreadyExists => TableError::Exists {
-                path: shown.clone(),
-            },
-            _ => io(source),
-        })?;
         let mut text = String::new();
         for comment in comments.iter().map(String::as_str).chain([WRITTEN_LIVE]) {
             text.push_str("# ");
@@ -82,8 +73,12 @@ impl Table {
         }
         text.push_str(header);
         text.push('\n');
-        file.write_all(text.as_bytes()).map_err(io)?;
-        file.sync_data().map_err(io)?;
+        let file = calib_files::start(path, text.as_bytes()).map_err(|error| match error {
+            FileError::Exists { .. } => TableError::Exists {
+                path: shown.clone(),
+            },
+            error => error.into(),
+        })?;
         Ok(Table {
             file,
             path: shown,
@@ -109,7 +104,7 @@ impl Table {
             path: shown.clone(),
             problem,
         };
-        let bytes = std::fs::read(path).map_err(io)?;
+        let bytes = input::read(path, u64::MAX).map_err(io)?;
         let whole = bytes.iter().rposition(|&b| b == b'\n').map_or(0, |i| i + 1);
         let text = std::str::from_utf8(&bytes[..whole]).map_err(|e| other(e.to_string()))?;
         let mut lines = text
@@ -141,9 +136,7 @@ impl Table {
                 held.dedup();
             }
         }
-        let mut file = OpenOptions::new().write(true).open(path).map_err(io)?;
-        file.set_len(whole as u64).map_err(io)?;
-        file.seek(SeekFrom::End(0)).map_err(io)?;
+        let file = calib_files::resume(path, whole as u64)?;
         Ok(Table {
             file,
             path: shown,

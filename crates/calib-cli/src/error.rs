@@ -1,5 +1,7 @@
 //! What a command ends with: an error of one of the libraries, its exit code and its remedy.
 
+pub mod place;
+
 use calib_apply::ApplyError;
 use calib_capture::{CaptureError, SourceError};
 use calib_drift::DriftError;
@@ -80,7 +82,22 @@ pub enum CliError {
     Capture(#[from] CaptureError),
     /// A plugin project cannot be made.
     #[error("{0}\n  help: calib plugins new NAME --lang rust|c --out FOLDER")]
-    NewPlugin(#[from] NewProjectError),
+    NewPlugin(NewProjectError),
+    /// What a command printed is lost.
+    #[error(
+        "standard output cannot be written: {0}\n  help: make room, or send the output elsewhere"
+    )]
+    Stdout(std::io::Error),
+}
+
+// Not a `#[from]`: a file that cannot be written is the same error in every command.
+impl From<NewProjectError> for CliError {
+    fn from(error: NewProjectError) -> Self {
+        match error {
+            NewProjectError::File(error) => Self::File(error),
+            error => Self::NewPlugin(error),
+        }
+    }
 }
 
 impl CliError {
@@ -91,11 +108,15 @@ impl CliError {
             Self::Pipeline(error) => error.exit_code(),
             Self::Apply(error) => of_apply(error),
             Self::Drift(error) if error.is_refusal() => ExitCode::VerdictFail,
-            Self::Drift(DriftError::Unwritable(_)) | Self::Report(_) => ExitCode::NotWritten,
+            Self::Drift(DriftError::Unwritable(_)) | Self::Report(_) | Self::Stdout(_) => {
+                ExitCode::NotWritten
+            }
             Self::Drift(_)
             | Self::Recording(_)
             | Self::Fit(FitError::Data { .. } | FitError::Recording(_)) => ExitCode::Data,
-            Self::File(error) => of_file(error),
+            Self::File(error)
+            | Self::Study(StudyError::File(error))
+            | Self::Cases(CaseError::State(error)) => of_file(error),
             Self::Table { code, .. } => *code,
             Self::Cases(CaseError::Profile(error)) => error.exit_code(),
             Self::Capture(CaptureError::Source(SourceError::Port { .. })) => ExitCode::Usage,
@@ -141,7 +162,9 @@ fn of_apply(error: &ApplyError) -> ExitCode {
 
 fn of_file(error: &FileError) -> ExitCode {
     match error {
-        FileError::SameName { .. } => ExitCode::Usage,
+        FileError::SameName { .. } | FileError::Name { .. } | FileError::OtherState { .. } => {
+            ExitCode::Usage
+        }
         _ => ExitCode::NotWritten,
     }
 }

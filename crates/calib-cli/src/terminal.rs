@@ -1,12 +1,15 @@
 //! What a command shows: results on standard output, progress on standard error.
 
-use std::io::{IsTerminal as _, Write as _};
+use std::io::{ErrorKind, IsTerminal as _, Write as _};
 use std::path::PathBuf;
 use std::time::Duration;
 
+use calib_finding::{printable, printable_in_color};
 use calib_report::terminal::Look;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::error::CliError;
 
 /// What every command takes.
 #[derive(Debug, Clone, Copy, Args)]
@@ -14,7 +17,7 @@ pub struct Console {
     /// Print only results and errors; `run` prints one line
     #[arg(short, long, global = true)]
     pub quiet: bool,
-    /// Print JSON; progress and errors are JSON lines on standard error
+    /// Print JSON, errors too; progress is JSON lines on standard error
     #[arg(long, global = true)]
     pub json: bool,
     /// When to color the output; NO_COLOR and CLICOLOR_FORCE decide with `auto`
@@ -74,32 +77,55 @@ pub fn look(color: When) -> Look {
     }
 }
 
-/// Writes results to standard output; a reader that went away (`| head`) is not an error.
-pub fn emit(text: &str) {
-    let _ = std::io::stdout().lock().write_all(text.as_bytes());
+/// Writes results to standard output, with no control characters but those of colors.
+///
+/// # Errors
+/// [`CliError::Stdout`] where they are lost; a reader that went away (`| head`) has what it wanted.
+pub fn emit(text: &str) -> Result<(), CliError> {
+    emit_bytes(printable_in_color(text).as_bytes())
 }
 
-/// An error as a JSON line on standard error.
-pub fn emit_error(said: &str, remedy: Option<&str>, exit_code: u8) {
-    let line = serde_json::json!({"error": said, "help": remedy, "exit_code": exit_code});
-    eprintln!("{line}");
+/// [`emit`] for what programs read byte by byte: unchanged where it does not go to a terminal.
+///
+/// # Errors
+/// As [`emit`].
+pub fn emit_raw(text: &str) -> Result<(), CliError> {
+    match std::io::stdout().is_terminal() {
+        true => emit(text),
+        false => emit_bytes(text.as_bytes()),
+    }
+}
+
+fn emit_bytes(bytes: &[u8]) -> Result<(), CliError> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(CliError::Stdout(error)),
+        _ => Ok(()),
+    }
+}
+
+/// A line on standard error. Where that is closed or full, the exit code still tells.
+pub fn say(text: &str) {
+    let line = format!("{}\n", printable(text));
+    let _ = std::io::stderr().lock().write_all(line.as_bytes());
 }
 
 /// The name of a stage as a JSON line on standard error.
-pub fn emit_stage(stage: &str) {
-    eprintln!("{}", serde_json::json!({"progress": stage}));
+pub fn say_stage(stage: &str) {
+    say(&serde_json::json!({"progress": stage}).to_string());
 }
 
 /// Lists files that were written, one per line, or as JSON.
-pub fn emit_paths(json: bool, paths: &[PathBuf]) {
+///
+/// # Errors
+/// As [`emit`].
+pub fn emit_paths(json: bool, paths: &[PathBuf]) -> Result<(), CliError> {
     if json {
         let paths: Vec<String> = paths.iter().map(|p| p.display().to_string()).collect();
-        emit(&format!("{}\n", serde_json::json!({"written": paths})));
-        return;
+        return emit(&format!("{}\n", serde_json::json!({"written": paths})));
     }
-    for path in paths {
-        emit(&format!("{}\n", path.display()));
-    }
+    let lines = paths.iter().map(|path| format!("{}\n", path.display()));
+    emit(&lines.collect::<String>())
 }
 
 /// A bar that counts `what`, on a terminal; nothing elsewhere.

@@ -3,6 +3,8 @@
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
+use crate::name::NameFault;
+
 /// Why a file was not written; the file that was there before is untouched.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -35,6 +37,20 @@ pub enum FileError {
         /// The file.
         path: PathBuf,
     },
+    /// Another program writes there.
+    #[error("{}: another run of this program is writing there\n  help: {}", path.display(), self.remedy())]
+    Busy {
+        /// The folder or file.
+        path: PathBuf,
+    },
+    /// No file can have this name.
+    #[error("no file can be called {name:?}: {fault}\n  help: {}", self.remedy())]
+    Name {
+        /// The name.
+        name: String,
+        /// Why.
+        fault: NameFault,
+    },
     /// Two results have one name.
     #[error("two results would be written to `{name}`\n  help: {}", self.remedy())]
     SameName {
@@ -64,10 +80,26 @@ impl FileError {
             Self::Foreign { .. } => {
                 "it was not made by this program: choose another folder with --out"
             }
+            Self::Busy { .. } => "wait until it has ended, or choose another folder with --out",
+            Self::Name { .. } => "choose another name",
             Self::SameName { .. } => "give each output of the profile a name of its own",
             Self::OtherState { .. } => {
                 "choose another folder with --out, or start over with --restart"
             }
+        }
+    }
+
+    /// The file or folder.
+    #[must_use]
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Write { path, .. }
+            | Self::Read { path, .. }
+            | Self::Exists { path }
+            | Self::Foreign { path }
+            | Self::Busy { path }
+            | Self::OtherState { path, .. } => Some(path),
+            Self::Name { .. } | Self::SameName { .. } => None,
         }
     }
 

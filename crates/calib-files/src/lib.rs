@@ -1,9 +1,24 @@
 #![doc = include_str!("../README.md")]
 
+mod disk;
 mod error;
+#[cfg(test)]
+mod fault;
+mod file;
+mod folder;
+pub mod input;
+mod name;
 mod output;
+mod results;
+mod staged;
 mod state;
+#[cfg(test)]
+mod walk;
 
 pub use error::{FileError, cannot_write};
-pub use output::{MANIFEST, OutputFile, replace, write_new, write_results};
+pub use file::OutputFile;
+pub use folder::{folder_of, make_folder};
+pub use name::{LONGEST_NAME, MANIFEST, NameFault, check_name};
+pub use output::{new_folder, remove, replace, resume, start, write_new};
+pub use results::{ResultsFolder, is_unfinished, write_results};
 pub use state::StateFile;

@@ -1,143 +1,140 @@
-//! Whole files: each beside its place, synchronized, then renamed.
+//! Whole files: each staged beside its place, synchronized, then renamed.
 
-use std::fs::{self, File};
-use std::io::Write as _;
+use std::fs::{self, File, OpenOptions};
+use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
+use crate::disk::{self, is_there};
 use crate::error::FileError;
+use crate::file::{OutputFile, check_names};
+use crate::folder::{folder_of, make_folder};
+use crate::input;
+use crate::staged::{Staged, clean};
 
-/// A file to be written.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OutputFile {
-    /// Name within the output folder.
-    pub name: String,
-    /// Its bytes.
-    pub bytes: Vec<u8>,
-}
-
-impl OutputFile {
-    /// A text file.
-    pub fn text(name: impl Into<String>, text: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            bytes: text.into().into_bytes(),
-        }
-    }
-}
-
-/// Name of the list in a folder of results: what this program wrote there and may replace.
-pub const MANIFEST: &str = "calib.manifest";
-
-/// Writes a folder of results: all files, or none; returns their paths.
-///
-/// Files of an earlier run, listed in the folder's [`MANIFEST`], are replaced. Any other file of the same name is kept,
-/// and the call fails before a byte is written.
+/// Writes files that must not exist yet, outside a folder of results: no manifest is kept. A file that is there with the very
+/// same bytes is done already, so that a call that was stopped can be repeated.
 ///
 /// # Errors
-/// [`FileError::SameName`], [`FileError::Foreign`] or [`FileError::Write`].
-pub fn write_results(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>, FileError> {
-    let ours: Vec<String> = fs::read_to_string(folder.join(MANIFEST))
-        .map(|text| text.lines().map(str::to_owned).collect())
-        .unwrap_or_default();
-    for (i, file) in files.iter().enumerate() {
-        if files[..i].iter().any(|earlier| earlier.name == file.name) {
-            return Err(FileError::SameName {
-                name: file.name.clone(),
-            });
-        }
+/// [`FileError::Name`], [`FileError::SameName`], [`FileError::Exists`] or [`FileError::Write`].
+pub fn write_new(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>, FileError> {
+    check_names(files)?;
+    let mut missing = Vec::new();
+    for file in files {
         let path = folder.join(&file.name);
-        if path.exists() && !ours.contains(&file.name) {
-            return Err(FileError::Foreign { path });
+        if !is_there(&path) {
+            missing.push((file, path));
+        } else if !holds(&path, &file.bytes) {
+            return Err(FileError::Exists { path });
         }
     }
-    fs::create_dir_all(folder).map_err(FileError::write(folder))?;
+    make_folder(folder)?;
+    clean(folder);
     let mut staged = Vec::new();
-    for file in files.iter().chain([&manifest(folder, &ours, files)]) {
-        match stage(folder, file) {
-            Ok(temporary) => staged.push((temporary, folder.join(&file.name))),
-            Err(error) => {
-                for (temporary, _) in &staged {
-                    let _ = fs::remove_file(temporary);
-                }
-                return Err(error);
-            }
-        }
+    for (file, path) in missing {
+        let one = Staged::file(folder, &file.bytes).map_err(FileError::write(&path))?;
+        staged.push((one, path));
     }
-    let mut written = Vec::new();
-    for (temporary, path) in staged {
-        fs::rename(&temporary, &path).map_err(FileError::write(&path))?;
-        written.push(path);
+    for (one, path) in staged {
+        one.place(&path).map_err(FileError::write(&path))?;
     }
-    Ok(written)
+    disk::sync_folder(folder).map_err(FileError::write(folder))?;
+    Ok(files.iter().map(|file| folder.join(&file.name)).collect())
 }
 
-/// The names of these files, and those of earlier files that are still there.
-fn manifest(folder: &Path, ours: &[String], files: &[OutputFile]) -> OutputFile {
-    let mut names: Vec<&str> = files.iter().map(|f| f.name.as_str()).collect();
-    names.extend(
-        ours.iter()
-            .map(String::as_str)
-            .filter(|n| folder.join(n).exists()),
-    );
-    names.sort_unstable();
-    names.dedup();
-    OutputFile::text(MANIFEST, names.join("\n") + "\n")
+fn holds(path: &Path, bytes: &[u8]) -> bool {
+    let is_file = fs::symlink_metadata(path).is_ok_and(|m| m.is_file());
+    is_file && input::read(path, bytes.len() as u64).is_ok_and(|there| there == bytes)
 }
 
-/// Writes files that must not exist yet, outside a folder of results: no manifest is kept.
+/// Makes a folder that must not exist, with files in it and below (`src/lib.rs`): all of them, or nothing.
 ///
 /// # Errors
 /// [`FileError::Exists`] or [`FileError::Write`].
-pub fn write_new(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>, FileError> {
-    let paths: Vec<PathBuf> = files.iter().map(|file| folder.join(&file.name)).collect();
-    if let Some(path) = paths.iter().find(|path| path.exists()) {
-        return Err(FileError::Exists { path: path.clone() });
+pub fn new_folder(path: &Path, files: &[OutputFile]) -> Result<(), FileError> {
+    if is_there(path) {
+        return Err(FileError::Exists {
+            path: path.to_path_buf(),
+        });
     }
-    fs::create_dir_all(folder).map_err(FileError::write(folder))?;
-    for (file, path) in files.iter().zip(&paths) {
-        let temporary = stage(folder, file)?;
-        fs::rename(&temporary, path).map_err(FileError::write(path))?;
+    let parent = folder_of(path);
+    make_folder(parent)?;
+    clean(parent);
+    let staged = Staged::folder(parent).map_err(FileError::write(path))?;
+    for file in files {
+        let place = staged.path().join(&file.name);
+        make_folder(folder_of(&place))?;
+        let written = disk::create_new(&place).and_then(|mut out| {
+            disk::write(&mut out, &file.bytes)?;
+            disk::sync(&out)
+        });
+        written.map_err(FileError::write(&path.join(&file.name)))?;
     }
-    Ok(paths)
+    staged.place(path).map_err(FileError::write(path))?;
+    disk::sync_folder(parent).map_err(FileError::write(parent))
 }
 
-/// Replaces a file, or makes it; its permissions stay. A symbolic link stays a link: the file behind it is replaced.
+/// Replaces a file, or makes it; its permissions stay. A symbolic link stays a link: the file behind it is replaced. A hard
+/// link is broken: the other names keep the old bytes.
 ///
 /// # Errors
 /// [`FileError::Write`]; the old file is untouched then.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     let path = &fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let folder = match path.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
-    let file = OutputFile {
-        name: name.into_owned(),
-        bytes: bytes.to_vec(),
-    };
-    let temporary = stage(folder, &file)?;
+    let folder = folder_of(path);
+    clean(folder);
+    let staged = Staged::file(folder, bytes).map_err(FileError::write(path))?;
     let kept = fs::metadata(path).map(|old| old.permissions());
-    let done = kept
-        .map_or(Ok(()), |permissions| {
-            fs::set_permissions(&temporary, permissions)
-        })
-        .and_then(|()| fs::rename(&temporary, path));
-    done.map_err(|source| {
-        let _ = fs::remove_file(&temporary);
-        FileError::write(path)(source)
+    kept.map_or(Ok(()), |permissions| {
+        disk::set_permissions(staged.path(), permissions)
     })
+    .and_then(|()| staged.place(path).map(drop))
+    .and_then(|()| disk::sync_folder(folder))
+    .map_err(FileError::write(path))
 }
 
-/// Writes the file beside its place; returns where.
-fn stage(folder: &Path, file: &OutputFile) -> Result<PathBuf, FileError> {
-    let temporary = folder.join(format!(".{}.part", file.name));
-    let mut out = File::create(&temporary).map_err(FileError::write(&temporary))?;
-    match out.write_all(&file.bytes).and_then(|()| out.sync_all()) {
-        Ok(()) => Ok(temporary),
-        Err(source) => {
-            let _ = fs::remove_file(&temporary);
-            Err(FileError::write(&folder.join(&file.name))(source))
-        }
+/// Removes a file.
+///
+/// # Errors
+/// [`FileError::Write`].
+pub fn remove(path: &Path) -> Result<(), FileError> {
+    disk::remove_file(path)
+        .and_then(|()| disk::sync_folder(folder_of(path)))
+        .map_err(FileError::write(path))
+}
+
+/// Starts a file that grows: it must not exist, and appears with these bytes in it. The file is locked while it is open.
+///
+/// # Errors
+/// [`FileError::Exists`] or [`FileError::Write`].
+pub fn start(path: &Path, bytes: &[u8]) -> Result<File, FileError> {
+    if is_there(path) {
+        return Err(FileError::Exists {
+            path: path.to_path_buf(),
+        });
     }
+    let folder = folder_of(path);
+    make_folder(folder)?;
+    clean(folder);
+    Staged::file(folder, bytes)
+        .and_then(|staged| staged.place(path))
+        .and_then(|file| file.ok_or_else(|| Error::from(ErrorKind::NotFound)))
+        .and_then(|file| disk::sync_folder(folder).map(|()| file))
+        .map_err(FileError::write(path))
+}
+
+/// Opens a regular file that grows, locked while it is open; the bytes after the first `whole` are cut off.
+///
+/// # Errors
+/// [`FileError::Busy`] while another program appends to it; [`FileError::Write`].
+pub fn resume(path: &Path, whole: u64) -> Result<File, FileError> {
+    input::open(path).map_err(FileError::write(path))?;
+    let file = OpenOptions::new().append(true).open(path);
+    let file = file.map_err(FileError::write(path))?;
+    if let Err(fs::TryLockError::WouldBlock) = file.try_lock() {
+        return Err(FileError::Busy {
+            path: path.to_path_buf(),
+        });
+    }
+    file.set_len(whole).map_err(FileError::write(path))?;
+    Ok(file)
 }

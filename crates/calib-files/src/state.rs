@@ -1,11 +1,12 @@
 //! A file that a long computation resumes from.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::Write as _;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use crate::error::FileError;
-use crate::output::replace;
+use crate::folder::{folder_of, make_folder};
+use crate::output::{self, replace};
+use crate::{disk, input};
 
 /// One line for the settings, then one for each finished part, appended as parts finish, in any order.
 ///
@@ -32,12 +33,10 @@ impl StateFile {
         resume: bool,
         is_whole: impl Fn(&str) -> bool,
     ) -> Result<(Self, Vec<String>), FileError> {
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(FileError::write(folder))?;
-        }
+        make_folder(folder_of(path))?;
         let mut finished = Vec::new();
         if resume && path.exists() {
-            let text = fs::read_to_string(path).map_err(|source| FileError::Read {
+            let text = input::read_text(path, u64::MAX).map_err(|source| FileError::Read {
                 path: path.to_path_buf(),
                 source,
             })?;
@@ -53,10 +52,8 @@ impl StateFile {
             finished = lines.filter(|l| is_whole(l)).map(str::to_owned).collect();
         }
         rewrite(path, header, &finished)?;
-        let file = OpenOptions::new()
-            .append(true)
-            .open(path)
-            .map_err(FileError::write(path))?;
+        let length = std::fs::metadata(path).map_err(FileError::write(path))?;
+        let file = output::resume(path, length.len())?;
         let state = Self {
             path: path.to_path_buf(),
             header: header.to_owned(),
@@ -70,8 +67,7 @@ impl StateFile {
     /// # Errors
     /// [`FileError::Write`].
     pub fn append(&mut self, line: &str) -> Result<(), FileError> {
-        self.file
-            .write_all(format!("{line}\n").as_bytes())
+        disk::write(&mut self.file, format!("{line}\n").as_bytes())
             .map_err(FileError::write(&self.path))
     }
 

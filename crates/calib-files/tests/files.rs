@@ -2,7 +2,10 @@
 
 use std::fs;
 
-use calib_files::{FileError, MANIFEST, OutputFile, StateFile, replace, write_new, write_results};
+use calib_files::{
+    FileError, MANIFEST, OutputFile, ResultsFolder, StateFile, input, replace, write_new,
+    write_results,
+};
 
 #[test]
 fn results_replace_their_own_files_and_no_others() {
@@ -32,7 +35,9 @@ fn new_files_do_not_overwrite() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = [OutputFile::text("a.txt", "1")];
     write_new(folder.path(), &file).expect("nothing is there");
-    let error = write_new(folder.path(), &file).expect_err("it is there");
+    write_new(folder.path(), &file).expect("the same bytes are there");
+    let other = [OutputFile::text("a.txt", "2")];
+    let error = write_new(folder.path(), &other).expect_err("it is there");
     assert!(matches!(error, FileError::Exists { .. }), "{error}");
 }
 
@@ -73,4 +78,82 @@ fn a_computation_resumes_where_it_was_interrupted() {
     assert_eq!(text, "settings\n{1}\n{2}\n");
     let (_, finished) = StateFile::open(&path, "others", false, whole).expect("started over");
     assert!(finished.is_empty());
+}
+
+#[test]
+fn a_second_run_into_a_folder_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let inner = folder.path().join("a/b");
+    let first = ResultsFolder::open(&inner).expect("a free folder");
+    let error = ResultsFolder::open(&inner).expect_err("it is taken");
+    assert!(matches!(error, FileError::Busy { .. }), "{error}");
+    drop(first);
+    assert!(!folder.path().join("a").exists(), "nothing is left behind");
+    let second = ResultsFolder::open(&inner).expect("it is free again");
+    second
+        .write(&[OutputFile::text("a.txt", "1")])
+        .expect("written");
+}
+
+#[test]
+fn names_that_no_folder_can_hold_are_refused_before_anything_is_made() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let inner = folder.path().join("results");
+    for name in ["", ".", "..", "a/b", "a\nb", "con.txt", "calib.manifest"] {
+        let error = write_results(&inner, &[OutputFile::text(name, "1")]).expect_err(name);
+        assert!(matches!(error, FileError::Name { .. }), "{error}");
+    }
+    let twice = [OutputFile::text("a.txt", ""), OutputFile::text("A.TXT", "")];
+    let error = write_results(&inner, &twice).expect_err("one file on other systems");
+    assert!(matches!(error, FileError::SameName { .. }), "{error}");
+    assert!(!inner.exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn planted_links_are_never_followed() {
+    use std::os::unix::fs::symlink;
+    let folder = tempfile::tempdir().expect("a folder");
+    let (inside, outside) = (folder.path().join("in"), folder.path().join("out.txt"));
+    fs::create_dir(&inside).expect("a folder");
+    fs::write(&outside, "mine").expect("a file of somebody");
+    for name in [".a.txt.part", ".calib-0123456789abcdef.part", "b.txt"] {
+        symlink(&outside, inside.join(name)).expect("a link");
+    }
+    let a = [OutputFile::text("a.txt", "1")];
+    write_results(&inside, &a).expect("written past the links");
+    // A link in the place of a file of ours is replaced, one in the place of another is refused; a link to nothing too.
+    fs::remove_file(inside.join("a.txt")).expect("a.txt");
+    symlink(&outside, inside.join("a.txt")).expect("a link");
+    write_results(&inside, &a).expect("the link is replaced");
+    assert!(!inside.join("a.txt").is_symlink());
+    symlink(folder.path().join("nowhere"), inside.join("c.txt")).expect("a link");
+    for name in ["b.txt", "c.txt"] {
+        let one = [OutputFile::text(name, "1")];
+        let error = write_results(&inside, &one).expect_err("a link of somebody");
+        assert!(matches!(error, FileError::Foreign { .. }), "{error}");
+        let error = write_new(&inside, &one).expect_err("a link of somebody");
+        assert!(matches!(error, FileError::Exists { .. }), "{error}");
+    }
+    assert_eq!(fs::read_to_string(&outside).expect("out.txt"), "mine");
+    assert!(!folder.path().join("nowhere").exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn only_regular_files_are_read_and_none_beyond_its_limit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = folder.path().join("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.is_ok_and(|status| status.success()), "mkfifo");
+    for path in [pipe.as_path(), std::path::Path::new("/dev/zero")] {
+        let error = input::read(path, 10).expect_err("not regular");
+        assert_eq!(error.kind(), std::io::ErrorKind::InvalidInput);
+    }
+    let file = folder.path().join("file");
+    fs::write(&file, "12345").expect("a file");
+    assert_eq!(input::read(&file, 5).expect("five bytes"), b"12345");
+    let error = input::read(&file, 4).expect_err("too many");
+    assert_eq!(error.kind(), std::io::ErrorKind::FileTooLarge);
+    assert!(input::read(folder.path(), 10).is_err());
 }

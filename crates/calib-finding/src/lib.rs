@@ -21,12 +21,13 @@
 //! `rows`, `text`, `remedy`, `facts` and `about` (the typed subject).
 //!
 //! The crate also has the one [`Unit`] of numbers whose kind is only known at run time, and [`nearest_word`] for
-//! remedies of the form *did you mean*.
+//! remedies of the form *did you mean*, and [`printable`] for what goes to a terminal.
 
 pub mod catalog;
 mod fact;
 mod finding;
 mod nearest;
+mod printable;
 mod subject;
 mod template;
 mod unit;
@@ -35,5 +36,6 @@ pub use catalog::Id;
 pub use fact::{Fact, Facts};
 pub use finding::{Finding, Severity};
 pub use nearest::nearest_word;
+pub use printable::{cell, from_cell, printable, printable_in_color};
 pub use subject::{About, Subject};
 pub use unit::Unit;

@@ -11,6 +11,7 @@ use calib_report::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck
 use crate::error::{ExitCode, PipelineError};
 use crate::estimate::start::start;
 use crate::formulate::{bad_rows, model_checks};
+use crate::options::Plugins;
 use crate::output::of_data::{coverage, lost, used_for};
 use crate::prepare::aligned::Alignment;
 use crate::prepare::checks;
@@ -24,8 +25,8 @@ use crate::prepare::tracks::{BodyTrack, body_tracks};
 ///
 /// # Errors
 /// [`PipelineError`] for what cannot be read at all.
-pub fn check(profile: &Path) -> Result<DataChecks, PipelineError> {
-    let mut inputs = load_recordings(load_robot(profile)?, true)?;
+pub fn check(profile: &Path, plugins: Plugins) -> Result<DataChecks, PipelineError> {
+    let mut inputs = load_recordings(load_robot(profile)?, plugins)?;
     let mut findings = inputs.findings.clone();
     if inputs.robot.profile.solve.robust {
         findings.extend(relabel(&mut inputs));

@@ -13,8 +13,20 @@ pub struct RunOptions {
     pub strict: bool,
     /// Choose what to free by prediction of left-out poses, from what the profile frees outward; implies maximum likelihood.
     pub select: bool,
-    /// Load no plugin; a profile that names one fails.
-    pub no_plugins: bool,
+    /// Which plugins of the profile are loaded.
+    pub plugins: Plugins,
+}
+
+/// Which plugins of a profile are loaded. The variable `CALIB_NO_PLUGINS`, set to anything, is [`Plugins::Refused`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Plugins {
+    /// None; a profile that names one fails.
+    Refused,
+    /// Those beside the profile, those in plugin folders, and those that the profile pins by their hash.
+    #[default]
+    Placed,
+    /// All that it names.
+    Allowed,
 }
 
 impl RunOptions {
@@ -32,7 +44,8 @@ impl RunOptions {
             (self.select, "--select"),
             (self.force, "--force"),
             (self.strict, "--strict"),
-            (self.no_plugins, "--no-plugins"),
+            (self.plugins == Plugins::Refused, "--no-plugins"),
+            (self.plugins == Plugins::Allowed, "--allow-plugins"),
         ];
         let given = all.into_iter().filter(|(given, _)| *given);
         given.map(|(_, argument)| argument).collect()

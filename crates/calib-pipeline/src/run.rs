@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-pub use crate::options::RunOptions;
+pub use crate::options::{Plugins, RunOptions};
 use calib_files::OutputFile;
 use calib_profile::Method;
 use calib_report::Report;
@@ -54,7 +54,7 @@ pub fn run(
     progress("read profile and robot");
     let robot = load_robot(profile)?;
     progress("read recordings");
-    let inputs = load_recordings(robot, !options.no_plugins)?;
+    let inputs = load_recordings(robot, options.plugins)?;
     run_on(inputs, options, progress)
 }
 

@@ -6,6 +6,7 @@ use calib_report::Selection;
 
 use crate::error::PipelineError;
 use crate::formulate::selection::choose;
+use crate::options::Plugins;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
 use crate::prepare::robot::load_robot;
@@ -17,7 +18,7 @@ use crate::prepare::robot::load_robot;
 pub fn select(
     profile: &Path,
     force: bool,
-    plugins: bool,
+    plugins: Plugins,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Selection, PipelineError> {
     progress("read profile and robot");

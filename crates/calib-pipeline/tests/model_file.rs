@@ -5,6 +5,7 @@ use std::path::Path;
 
 use calib_core::Configuration;
 use calib_pipeline::formulate::kinematics::joint_state;
+use calib_pipeline::options::Plugins;
 use calib_pipeline::prepare::conditions::Conditions;
 use calib_pipeline::prepare::load::load_recordings;
 use calib_pipeline::prepare::load::load_robot;
@@ -163,7 +164,7 @@ fn moved(file: &RobotModelFile, number: &ModelNumber, by: f64) -> RobotModelFile
 fn ran(robot: &str) -> (RunOutput, calib_pipeline::prepare::inputs::Inputs) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../robots/{robot}.yaml"));
     let profile = load_robot(&path).expect("shipped");
-    let inputs = load_recordings(profile, false).expect("shipped");
+    let inputs = load_recordings(profile, Plugins::Refused).expect("shipped");
     let output = run_on(inputs.clone(), &RunOptions::default(), &mut |_| {}).expect("a result");
     (output, inputs)
 }

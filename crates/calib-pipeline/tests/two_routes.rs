@@ -7,6 +7,7 @@ use calib_pipeline::estimate::start::start;
 use calib_pipeline::formulate::formulation::FreeSet;
 use calib_pipeline::formulate::kinematics::joint_state;
 use calib_pipeline::formulate::ml::{fit, state};
+use calib_pipeline::options::Plugins;
 use calib_pipeline::prepare::conditions::Conditions;
 use calib_pipeline::prepare::load::{load_recordings, load_robot};
 use calib_pipeline::prepare::tracks::body_tracks;
@@ -26,7 +27,7 @@ fn the_calibrated_robot_is_the_solution() {
             Free::Effect(&effect::eccentricity::EFFECT),
             Free::Effect(&effect::lateral_compliance::EFFECT),
         ]);
-        let inputs = load_recordings(profile, false).expect("shipped");
+        let inputs = load_recordings(profile, Plugins::Refused).expect("shipped");
         let mut findings = Vec::new();
         let tracks = body_tracks(&inputs, &mut findings).expect("bodies");
         let start = start(&inputs, &tracks);

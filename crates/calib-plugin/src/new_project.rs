@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use calib_files::{FileError, OutputFile, new_folder};
+
 /// The language of a new plugin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Language {
@@ -44,20 +46,9 @@ pub enum NewProjectError {
         /// What was asked for.
         got: String,
     },
-    /// Something is there already.
-    #[error("{path} exists already")]
-    Exists {
-        /// The folder.
-        path: String,
-    },
-    /// The files cannot be written.
-    #[error("{path}: cannot be written: {source}")]
-    Write {
-        /// The file or folder.
-        path: String,
-        /// Why.
-        source: std::io::Error,
-    },
+    /// Something is there already, or the files cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
 }
 
 /// `calib-plugin/src` of a Rust project: this crate's own files.
@@ -102,39 +93,12 @@ pub fn new_project(
         });
     }
     let project = folder.join(name);
-    if project.exists() {
-        return Err(NewProjectError::Exists {
-            path: project.display().to_string(),
-        });
-    }
-    // Written beside and renamed: no half a project.
-    let beside = folder.join(format!(".{name}.new"));
-    let made = write_all(&beside, &files(name, language)).and_then(|()| {
-        std::fs::rename(&beside, &project).map_err(|source| failed(&project, source))
-    });
-    if made.is_err() {
-        // The error that counts is the first.
-        let _ = std::fs::remove_dir_all(&beside);
-    }
-    made.map(|()| project)
-}
-
-fn failed(path: &Path, source: std::io::Error) -> NewProjectError {
-    NewProjectError::Write {
-        path: path.display().to_string(),
-        source,
-    }
-}
-
-fn write_all(folder: &Path, files: &[(String, String)]) -> Result<(), NewProjectError> {
-    for (name, text) in files {
-        let path = folder.join(name);
-        if let Some(parent) = path.parent() {
-            std::fs::create_dir_all(parent).map_err(|source| failed(parent, source))?;
-        }
-        std::fs::write(&path, text).map_err(|source| failed(&path, source))?;
-    }
-    Ok(())
+    let files: Vec<OutputFile> = files(name, language)
+        .into_iter()
+        .map(|(name, text)| OutputFile::text(name, text))
+        .collect();
+    new_folder(&project, &files)?;
+    Ok(project)
 }
 
 fn files(name: &str, language: Language) -> Vec<(String, String)> {

@@ -53,6 +53,12 @@ impl ProfileError {
 }
 
 impl ProfileError {
+    /// The profile, as the caller named it.
+    #[must_use]
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
     /// One problem at the value that `path` (keys, or list positions as decimal numbers) leads to.
     pub fn at(
         file: &str,

@@ -1,6 +1,7 @@
 //! Lines, cells and numbers of text files: streamed, counted, and checked as they come.
 
 use crate::error::{At, Placed, Problem, excerpt};
+use calib_finding::from_cell;
 use std::io::{BufRead, Read};
 
 /// Longest line that is still a table: a Nexus row with a thousand markers has about 30 kB.
@@ -101,6 +102,11 @@ pub(crate) fn cells(line: &str, separator: Separator) -> Cells<'_> {
         rest: Some(rest),
         separator,
     }
+}
+
+/// The name in a cell: a doubled quote is one, and a `'` before a formula is none of it.
+pub(crate) fn unquoted(cell: &str) -> String {
+    from_cell(&cell.replace("\"\"", "\"")).to_owned()
 }
 
 pub(crate) struct Cells<'a> {

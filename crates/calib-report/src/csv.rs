@@ -1,6 +1,7 @@
 //! Residuals as CSV: one row per observation, lengths in m, angles in rad, empty = unknown.
 
 use crate::{ReportError, ResidualRow, Unit, number};
+use calib_finding::cell as safe;
 use std::collections::BTreeMap;
 
 /// `recording,row,t_s,subject,x_m,y_m,z_m,norm_m,rotation_rad,normalised,used,<joint>_rad|_m…`; predicted − observed in the tracker frame.
@@ -40,16 +41,16 @@ pub fn residuals_csv(rows: &[ResidualRow]) -> Result<String, ReportError> {
     let header = fixed.iter().map(ToString::to_string).chain(
         columns
             .iter()
-            .map(|(joint, unit)| format!("{joint}_{unit}")),
+            .map(|(joint, unit)| safe(&format!("{joint}_{unit}")).into_owned()),
     );
     writer.write_record(header).map_err(failed)?;
     for row in rows {
         let [x, y, z] = row.residual_m;
         let mut cells = vec![
-            row.recording.clone(),
+            safe(&row.recording).into_owned(),
             row.row.to_string(),
             row.time_s.map_or_else(String::new, cell),
-            row.subject.clone(),
+            safe(&row.subject).into_owned(),
             cell(x),
             cell(y),
             cell(z),

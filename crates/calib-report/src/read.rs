@@ -2,7 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use calib_files::{folder_of, input, is_unfinished};
+
 use crate::{Report, ReportError, json};
+
+/// Reports of hundreds of poses stay under a few megabytes; this is a recording given by mistake.
+const LARGEST: u64 = 1 << 30;
 
 /// Name of the report as data in a folder of results.
 pub const REPORT: &str = "report.json";
@@ -19,6 +24,15 @@ pub enum NotAReport {
         /// Why.
         source: std::io::Error,
     },
+    /// A run was stopped while it replaced the files of the folder.
+    #[error(
+        "{}: a run was stopped while it wrote here; the files are of two runs\n  help: {}",
+        path.display(), self.remedy()
+    )]
+    Unfinished {
+        /// The folder.
+        path: PathBuf,
+    },
     /// The file is not the JSON of a report.
     #[error("{}: is not a report: {source}\n  help: {}", path.display(), self.remedy())]
     Invalid {
@@ -30,10 +44,23 @@ pub enum NotAReport {
 }
 
 impl NotAReport {
+    /// The file or folder.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Unreadable { path, .. }
+            | Self::Unfinished { path }
+            | Self::Invalid { path, .. } => path,
+        }
+    }
+
     /// What to do.
     #[must_use]
     pub fn remedy(&self) -> &'static str {
-        "give a report.json, or the folder, that `calib run` wrote"
+        match self {
+            Self::Unfinished { .. } => "run the calibration again",
+            _ => "give a report.json, or the folder, that `calib run` wrote",
+        }
     }
 }
 
@@ -43,7 +70,13 @@ impl NotAReport {
 /// [`NotAReport`] with the file and the reason.
 pub fn read_report(path: &Path) -> Result<Report, NotAReport> {
     let path = report_path(path);
-    let text = std::fs::read_to_string(&path).map_err(|source| NotAReport::Unreadable {
+    let folder = folder_of(&path);
+    if is_unfinished(folder) {
+        return Err(NotAReport::Unfinished {
+            path: folder.to_path_buf(),
+        });
+    }
+    let text = input::read_text(&path, LARGEST).map_err(|source| NotAReport::Unreadable {
         path: path.clone(),
         source,
     })?;

@@ -1,5 +1,7 @@
 //! Text tables with aligned columns, for Markdown and the terminal.
 
+use calib_finding::printable;
+
 /// Alignment of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Align {
@@ -185,9 +187,11 @@ fn cell(text: &str) -> String {
     markup_free(text).replace('|', "\\|")
 }
 
-/// One line without HTML; text of names and files stands as it is.
+/// One line without HTML, links, images and control characters; text of names and files stands as it is.
 pub(crate) fn markup_free(text: &str) -> String {
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    // A viewer would fetch an image, which tells its sender who reads; our own texts have neither.
+    let line = printable(&line).replace("](", "]\\(");
     // Only `<` before a letter, `/`, `!` or `?` begins markup; "< 1 %" reads better as it is.
     let mut out = String::with_capacity(line.len());
     let mut letters = line.chars().peekable();
@@ -251,6 +255,13 @@ mod tests {
                         | ---------------- | --: |\n\
                         | a\\|b &lt;script> |   1 |\n";
         assert_eq!(table.markdown(), expected);
+    }
+
+    #[test]
+    fn a_name_is_no_link_no_image_and_no_sequence_of_the_terminal() {
+        let name = "![x](http://example.org/a.png) [y](z) \u{1b}[2J\u{202e}";
+        let shown = "![x]\\(http://example.org/a.png) [y]\\(z) \\u001b[2J\\u202e";
+        assert_eq!(markup_free(name), shown);
     }
 
     #[test]

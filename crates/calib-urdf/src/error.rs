@@ -53,6 +53,10 @@ pub enum Problem {
     Utf16,
     #[error("not well-formed XML: {reason}")]
     Xml { reason: String },
+    #[error("elements are nested in more than {limit} levels")]
+    TooDeep { limit: usize },
+    #[error("the file has a document type definition (<!DOCTYPE>), which is not read")]
+    Dtd,
     #[error("the root element is <{found}>, expected <robot>")]
     NotARobot { found: String },
     #[error("this is a xacro file: {evidence}")]
@@ -205,6 +209,8 @@ impl Problem {
             Self::Xml { .. } => {
                 "correct the XML here or just before: an unclosed tag, quote or comment is detected only later"
             }
+            Self::TooDeep { .. } => "this is not a URDF; export the nominal URDF again",
+            Self::Dtd => "delete it, and write the text of each entity where it is used",
             Self::NotARobot { found } if found == "sdf" => "convert the SDF to URDF first",
             Self::NotARobot { found } if found == "mujoco" => "convert the MJCF to URDF first",
             Self::NotARobot { .. } => "give the URDF file of the robot",
@@ -318,6 +324,15 @@ pub struct ReadError {
 }
 
 impl ReadError {
+    /// These findings, of which there is at least one, in a file.
+    #[must_use]
+    pub fn new(file: &str, problems: Vec<ReadProblem>) -> Self {
+        Self {
+            file: file.to_owned(),
+            problems,
+        }
+    }
+
     pub(crate) fn one(file: &str, problem: ReadProblem) -> Self {
         Self {
             file: file.to_owned(),

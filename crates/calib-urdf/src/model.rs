@@ -1,5 +1,6 @@
 //! The robot as a plain arena: links, joints, typed indices.
 
+use crate::error::ReadProblem;
 use calib_finding::nearest_word;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
@@ -247,6 +248,7 @@ pub struct RobotModel {
     pub(crate) from_root: Vec<JointId>,
     pub(crate) link_ids: BTreeMap<String, LinkId>,
     pub(crate) joint_ids: BTreeMap<String, JointId>,
+    pub(crate) warnings: Vec<ReadProblem>,
 }
 
 impl RobotModel {
@@ -284,6 +286,13 @@ impl RobotModel {
             let joint = self.joint(*id);
             joint.kind != JointKind::Fixed && joint.mimic.is_none()
         })
+    }
+
+    /// What is wrong in the file and no reason to refuse the robot: a mimic of a fixed joint (the joint stands still),
+    /// limits in the wrong order (the joint then has none).
+    #[must_use]
+    pub fn warnings(&self) -> &[ReadProblem] {
+        &self.warnings
     }
 
     /// The only link without a parent.

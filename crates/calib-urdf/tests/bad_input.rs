@@ -296,12 +296,70 @@ fn a_file_with_a_hundred_thousand_mistakes_is_answered_soon() {
 }
 
 #[test]
-fn entities_are_read() {
+fn what_bears_on_no_kinematics_is_a_warning_with_its_place() {
+    let still = "<link name=\"plate\"/><joint name=\"still\" type=\"fixed\"><parent link=\"base\"/><child link=\"plate\"/></joint>\n</robot>";
+    let text = GOOD
+        .replace("lower=\"-1\"", "lower=\"3\"")
+        .replace(
+            "<axis xyz=\"0 1 0\"/>\n  </joint>",
+            "<axis xyz=\"0 1 0\"/><mimic joint=\"still\" offset=\"0.5\"/></joint>",
+        )
+        .replace("</robot>", still);
+    let model = RobotModel::from_urdf_text(&text, "arm.urdf").unwrap();
+    let said: Vec<String> = model
+        .warnings()
+        .iter()
+        .map(|w| format!("{}: {}", w.place.expect("a place"), w.problem))
+        .collect();
+    assert_eq!(said.len(), 2, "{said:?}");
+    assert!(said[0].starts_with("10:5: the lower limit 3"), "{said:?}");
+    assert!(
+        said[1].contains("mimics the fixed joint `still`"),
+        "{said:?}"
+    );
+    let joint = |name: &str| model.joint(model.joint_id(name).unwrap());
+    assert_eq!(joint("shoulder").limits.range(), None);
+    // It stands still, at its offset.
+    let law = joint("elbow").law;
+    assert_eq!((law.multiplier, law.offset), (0.0, 0.5));
+}
+
+#[test]
+fn a_document_type_definition_is_refused_with_its_place() {
     let text = format!(
-        "<!DOCTYPE robot [<!ENTITY d \"0.4\">]>\n{}",
+        "<?xml version=\"1.0\"?>\n<!DOCTYPE robot [<!ENTITY d \"0.4\">]>\n{}",
         GOOD.replace("0.4 0 0", "&d; 0 &#48;")
     );
-    let model = RobotModel::from_urdf_text(&text, "arm.urdf").unwrap();
-    let elbow = model.joint_id("elbow").unwrap();
-    assert_eq!(model.joint(elbow).parent_link_from_joint.translation.x, 0.4);
+    let message = message_of(&text);
+    assert!(message.starts_with("arm.urdf:2:1: "), "{message}");
+    assert!(message.contains("document type definition"), "{message}");
+    // A kilobyte of entities that stand for gigabytes: no parser sees it.
+    let bomb = text.replace("&d;", &"&d;".repeat(1_000_000));
+    let begin = std::time::Instant::now();
+    assert!(message_of(&bomb).contains("document type definition"));
+    assert!(begin.elapsed().as_secs() < 1, "{:?}", begin.elapsed());
+}
+
+#[test]
+fn nesting_is_bounded_before_any_parser_runs() {
+    for (levels, accepted) in [(900, true), (1_100, false), (200_000, false)] {
+        let inside = "<x>".repeat(levels) + &"</x>".repeat(levels);
+        let text = GOOD.replacen("</robot>", &format!("<gazebo>{inside}</gazebo></robot>"), 1);
+        let message = message_of(&text);
+        assert_eq!(message == "accepted", accepted, "{levels}: {message}");
+        assert!(
+            accepted || message.contains("nested in more than 1000 levels"),
+            "{message}"
+        );
+        if accepted {
+            // The other readers take it too: a patch is verified by them.
+            let model = RobotModel::from_urdf_text(&text, "arm.urdf").unwrap();
+            let joint = &model.joints()[0];
+            let edit = calib_urdf::UrdfEdit::SetOrigin {
+                joint: joint.name.clone(),
+                parent_link_from_joint: calib_urdf::nalgebra::Isometry3::translation(0.1, 0.2, 0.3),
+            };
+            calib_urdf::patch(&text, "arm.urdf", &[edit]).unwrap();
+        }
+    }
 }

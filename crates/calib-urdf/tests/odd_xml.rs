@@ -59,18 +59,31 @@ fn prefixed_elements() {
 }
 
 #[test]
-fn a_joint_out_of_an_entity_is_patched_where_it_is_written() {
-    let begin = PLAIN.find("  <joint").unwrap();
-    let end = PLAIN.find("</robot>").unwrap();
-    let joint = PLAIN[begin..end].replace('"', "'");
-    let text = format!(
-        "<!DOCTYPE robot [\n<!ENTITY arm \"{joint}\">\n]>\n{}&arm;\n{}",
-        &PLAIN[..begin],
-        &PLAIN[end..]
-    );
-    assert!(RobotModel::from_urdf_text(&text, "odd.urdf").is_ok());
+fn attributes_of_other_namespaces_are_nobodys_numbers() {
+    let text = PLAIN
+        .replace("<robot", "<robot xmlns:x=\"http://example.org/x\"")
+        .replace(
+            "<origin xyz=\"1 2 3\"",
+            "<origin x:xyz=\"7 7 7\" x:rpy=\"1 1 1\" xyz=\"1 2 3\"",
+        );
+    let model = RobotModel::from_urdf_text(&text, "odd.urdf").unwrap();
+    let plain = RobotModel::from_urdf_text(PLAIN, "odd.urdf").unwrap();
+    let origin = |m: &RobotModel| m.joints()[0].parent_link_from_joint;
+    assert_eq!(origin(&model), origin(&plain));
     let got = patched(&text);
-    assert!(got.contains("xyz='1 2 4'"), "{got}");
+    assert!(
+        got.contains("x:xyz=\"7 7 7\" x:rpy=\"1 1 1\" xyz=\"1 2 4\""),
+        "{got}"
+    );
+    // Where the URDF's own attribute is missing, the foreign one does not stand for it.
+    let alone = text.replace(" xyz=\"1 2 3\"", "");
+    let model = RobotModel::from_urdf_text(&alone, "odd.urdf").unwrap();
+    assert_eq!(origin(&model).translation.vector.norm(), 0.0);
+    let got = patched(&alone);
+    assert!(
+        got.contains("x:xyz=\"7 7 7\"") && got.contains(" xyz=\"1 2 4\""),
+        "{got}"
+    );
 }
 
 #[test]

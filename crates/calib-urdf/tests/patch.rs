@@ -200,24 +200,6 @@ fn an_inserted_attribute_takes_the_style_of_its_neighbor() {
 }
 
 #[test]
-fn entities_stay_where_their_number_stays() {
-    let text = ARM
-        .replace(
-            "<robot",
-            "<!DOCTYPE robot [<!ENTITY h \"3e-1\"><!ENTITY all \"0 0 0.75\">]>\n<robot",
-        )
-        .replace("0.10	0 3e-1", "0.10	0 &h;")
-        .replace("xyz=\"0.25 0 0\"", "xyz=\"&all;\"");
-    let got = patched(
-        &text,
-        &[origin("shoulder", [0.11, 0.0, 0.3], [0.0, 0.0, 1.5])],
-    );
-    assert_eq!(got, text.replace("0.10	0 &h;", "0.11	0 &h;"));
-    let got = patched(&text, &[origin("wrist", [0.0, 0.0, 0.8], [0.0; 3])]);
-    assert_eq!(got, text.replace("\"&all;\"", "\"0 0 0.8\""));
-}
-
-#[test]
 fn quaternions_of_urdf_1_1_are_patched_as_quaternions() {
     let text = ARM
         .replace("<robot", "<robot version=\"1.1\"")

@@ -55,6 +55,6 @@ pub fn run(options: &Apply) -> Result<ExitCode, CliError> {
         calib_apply::json(&applied)?
     } else {
         calib_apply::text(&applied)
-    });
+    })?;
     Ok(ExitCode::Accepted)
 }

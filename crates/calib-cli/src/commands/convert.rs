@@ -8,7 +8,7 @@ use calib_recording::{ReadOptions, WriteOptions, read_path_with, write_recording
 use clap::Args;
 
 use crate::error::CliError;
-use crate::terminal::{Console, byte_bar, emit_paths};
+use crate::terminal::{Console, byte_bar, emit_paths, say};
 
 /// Arguments of `calib convert`.
 #[derive(Debug, Args)]
@@ -33,12 +33,12 @@ pub fn run(console: &Console, options: &Convert) -> Result<ExitCode, CliError> {
     bar.finish_and_clear();
     let converted = converted?;
     for note in &converted.notes {
-        eprintln!("calib: {note}");
+        say(&format!("calib: {note}"));
     }
     emit_paths(
         console.json,
         &write_new(&converted.folder, &converted.files)?,
-    );
+    )?;
     Ok(ExitCode::Accepted)
 }
 

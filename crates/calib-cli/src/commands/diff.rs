@@ -7,7 +7,7 @@ use calib_pipeline::ExitCode;
 use clap::{Args, ValueEnum};
 
 use crate::error::CliError;
-use crate::terminal::emit;
+use crate::terminal::{emit, emit_raw};
 
 /// Arguments of `calib diff`.
 #[derive(Debug, Args)]
@@ -39,6 +39,10 @@ pub fn run(options: &Diff) -> Result<ExitCode, CliError> {
         DiffFormat::Json => diff_json(&options.a, &options.b)?,
         DiffFormat::Unified => diff_unified(&options.a, &options.b)?,
     };
-    emit(&text);
+    match options.format {
+        // A patch has to have the bytes of its files.
+        DiffFormat::Unified => emit_raw(&text)?,
+        _ => emit(&text)?,
+    }
     Ok(ExitCode::Accepted)
 }

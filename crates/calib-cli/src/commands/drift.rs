@@ -27,7 +27,7 @@ pub fn run(options: &Drift) -> Result<ExitCode, CliError> {
         calib_drift::json(&drift)?
     } else {
         calib_drift::text(&drift)
-    });
+    })?;
     Ok(if drift.changed {
         ExitCode::VerdictFail
     } else {

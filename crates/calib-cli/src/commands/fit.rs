@@ -184,7 +184,7 @@ pub fn run(options: &FitCommand) -> Result<ExitCode, CliError> {
         Fit::Frame(f) => f.json,
         Fit::Handeye(f) => f.json,
     };
-    emit(if json { &answer.json } else { &answer.text });
+    emit(if json { &answer.json } else { &answer.text })?;
     Ok(if answer.observable {
         ExitCode::Accepted
     } else {

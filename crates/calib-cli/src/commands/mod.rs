@@ -7,6 +7,7 @@ pub mod convert;
 pub mod diff;
 pub mod drift;
 pub mod fit;
+mod plugin_options;
 pub mod plugins;
 pub mod record;
 pub mod revert;
@@ -38,6 +39,6 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
         Command::Convert(options) => convert::run(console, options),
         Command::Plugins(options) => plugins::run(options),
         Command::Schema(options) => schema::run(options),
-        Command::Completions(options) => Ok(completions::run(options, &mut Arguments::command())),
+        Command::Completions(options) => completions::run(options, &mut Arguments::command()),
     }
 }

@@ -11,7 +11,7 @@ use calib_plugin::{HEADER, Host, Kind, Language, SearchPath, new_project};
 use clap::{Args, Subcommand};
 
 use crate::error::CliError;
-use crate::terminal::emit;
+use crate::terminal::{emit, emit_raw, say};
 
 /// Arguments of `calib plugins`.
 #[derive(Debug, Args)]
@@ -48,20 +48,20 @@ enum Plugins {
 pub fn run(options: &PluginsCommand) -> Result<ExitCode, CliError> {
     match &options.what {
         None => {
-            emit(&list()?);
+            emit(&list()?)?;
             Ok(ExitCode::Accepted)
         }
         Some(Plugins::Header) => {
-            emit(HEADER);
+            emit_raw(HEADER)?;
             Ok(ExitCode::Accepted)
         }
         Some(Plugins::Check { plugin }) => {
             let host = Host::new(SearchPath::from_environment(None), true);
             let conformance = check(&host, plugin, &Limits::default());
-            emit(&format!("{}\n", conformance.to_string().trim_end()));
+            emit(&format!("{}\n", conformance.to_string().trim_end()))?;
             if !conformance.passed() {
-                eprintln!(
-                    "  help: give the library's file with its folder (`./libname.so`), or a name on CALIB_PLUGIN_PATH; the contract is `calib plugins header`"
+                say(
+                    "  help: give the library's file with its folder (`./libname.so`), or a name on CALIB_PLUGIN_PATH; the contract is `calib plugins header`",
                 );
             }
             Ok(if conformance.passed() {
@@ -72,7 +72,7 @@ pub fn run(options: &PluginsCommand) -> Result<ExitCode, CliError> {
         }
         Some(Plugins::New { name, lang, out }) => {
             let folder = new_project(name, Language::from_name(lang)?, out)?;
-            emit(&format!("{}\n", folder.display()));
+            emit(&format!("{}\n", folder.display()))?;
             Ok(ExitCode::Accepted)
         }
     }

@@ -27,6 +27,6 @@ pub fn run(console: &Console, options: &Revert) -> Result<ExitCode, CliError> {
         Some(out) => calib_apply::revert(&options.file, out)?,
         None => calib_apply::revert_in_place(&options.file)?,
     };
-    emit_paths(console.json, &[written]);
+    emit_paths(console.json, &[written])?;
     Ok(ExitCode::Accepted)
 }

@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use calib_files::write_results;
+use calib_files::ResultsFolder;
 use calib_pipeline::ExitCode;
 use calib_pipeline::run::{RunOptions, RunOutput, run as run_profile};
 use calib_pipeline::select::select;
 use calib_report::terminal::{self, Places};
 use clap::{Args, ValueEnum};
 
+use super::plugin_options::PluginOptions;
 use crate::error::CliError;
-use crate::terminal::{Console, emit, emit_stage, look, spinner};
+use crate::terminal::{Console, emit, look, say, say_stage, spinner};
 
 /// Arguments of `calib run`.
 #[derive(Debug, Args)]
@@ -35,9 +36,9 @@ pub struct Run {
     /// Only show what --select would choose, and why; writes nothing
     #[arg(long)]
     pub compare_models: bool,
-    /// Load no plugins
-    #[arg(long)]
-    pub no_plugins: bool,
+    /// Which plugins are loaded
+    #[command(flatten)]
+    pub plugins: PluginOptions,
     /// Print all tables, not only the summary
     #[arg(long)]
     pub full: bool,
@@ -61,16 +62,16 @@ pub fn run(console: &Console, options: &Run) -> Result<ExitCode, CliError> {
     let mut progress = |stage: &str| {
         bar.set_message(stage.to_owned());
         if console.json && !console.quiet {
-            emit_stage(stage);
+            say_stage(stage);
         } else if console.verbose {
-            eprintln!("calib: {stage}");
+            say(&format!("calib: {stage}"));
         }
     };
     if options.compare_models {
         let chosen = select(
             &options.profile,
             options.force,
-            !options.no_plugins,
+            options.plugins.plugins(),
             &mut progress,
         )?;
         bar.finish_and_clear();
@@ -78,7 +79,7 @@ pub fn run(console: &Console, options: &Run) -> Result<ExitCode, CliError> {
             calib_report::json::selection_json(&chosen)?
         } else {
             calib_report::terminal::selection(&chosen)
-        });
+        })?;
         return Ok(ExitCode::Accepted);
     }
     let run_options = RunOptions {
@@ -89,15 +90,17 @@ pub fn run(console: &Console, options: &Run) -> Result<ExitCode, CliError> {
         force: options.force,
         strict: options.strict,
         select: options.select,
-        no_plugins: options.no_plugins,
+        plugins: options.plugins.plugins(),
     };
-    let output = run_profile(&options.profile, &run_options, &mut progress)?;
-    progress("write results");
     let out = options
         .out
         .clone()
         .unwrap_or_else(|| default_folder(&options.profile));
-    write_results(&out, &output.files)?;
+    // Before the fit: a second run into the same folder would wait for nothing.
+    let folder = ResultsFolder::open(&out)?;
+    let output = run_profile(&options.profile, &run_options, &mut progress)?;
+    progress("write results");
+    folder.write(&output.files)?;
     bar.finish_and_clear();
     show(console, options, (&output, &out))?;
     Ok(output.exit)
@@ -110,8 +113,7 @@ fn show(
     (output, out): (&RunOutput, &Path),
 ) -> Result<(), CliError> {
     if options.json {
-        emit(&calib_report::json::report_json(&output.report)?);
-        return Ok(());
+        return emit(&calib_report::json::report_json(&output.report)?);
     }
     let (folder, page) = (out.display().to_string(), out.join("report.html"));
     let (profile, page) = (
@@ -128,8 +130,7 @@ fn show(
         (false, true) => terminal::full,
         (false, false) => terminal::summary,
     };
-    emit(&render(&output.report, look(console.color), places));
-    Ok(())
+    emit(&render(&output.report, look(console.color), places))
 }
 
 fn default_folder(profile: &Path) -> PathBuf {

@@ -7,6 +7,7 @@ use calib_pipeline::prepare::estimators::Estimators;
 use calib_pipeline::prepare::load::load_robot;
 use clap::{Args, ValueEnum};
 
+use super::plugin_options::PluginOptions;
 use crate::error::CliError;
 use crate::terminal::emit;
 
@@ -19,6 +20,9 @@ pub struct Schema {
     /// Include the plugins that this profile names (only for `parameters`)
     #[arg(long)]
     profile: Option<PathBuf>,
+    /// Which plugins are loaded
+    #[command(flatten)]
+    plugins: PluginOptions,
 }
 
 /// What has a schema.
@@ -40,7 +44,7 @@ enum SchemaOf {
 pub fn run(options: &Schema) -> Result<ExitCode, CliError> {
     let schema = match options.of {
         SchemaOf::Profile => {
-            emit(&calib_profile::json_schema());
+            emit(&calib_profile::json_schema())?;
             return Ok(ExitCode::Accepted);
         }
         SchemaOf::Report => calib_report::report_schema(),
@@ -48,7 +52,7 @@ pub fn run(options: &Schema) -> Result<ExitCode, CliError> {
         SchemaOf::Model => calib_report::model_schema(),
         SchemaOf::Parameters => estimators(options)?.parameter_schemas(),
     };
-    emit(&(calib_report::json::pretty(&schema) + "\n"));
+    emit(&(calib_report::json::pretty(&schema) + "\n"))?;
     Ok(ExitCode::Accepted)
 }
 
@@ -58,5 +62,9 @@ fn estimators(options: &Schema) -> Result<Estimators, CliError> {
         return Ok(Estimators::built_in()?);
     };
     let robot = load_robot(profile)?;
-    Ok(Estimators::of_profile(&robot.profile, &robot.folder, true)?)
+    Ok(Estimators::of_profile(
+        &robot.profile,
+        &robot.folder,
+        options.plugins.plugins(),
+    )?)
 }

@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use calib_files::{OutputFile, write_results};
+use calib_files::{OutputFile, ResultsFolder};
 use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::load::{RobotProfile, load_robot};
 use calib_recording::WriteOptions;
 use clap::Args;
 
+use super::plugin_options::PluginOptions;
 use crate::error::CliError;
 use crate::terminal::{Console, emit_paths};
 
@@ -22,13 +23,17 @@ pub struct Simulate {
     /// Folder to write to
     #[arg(short, long)]
     out: PathBuf,
+    /// Which plugins are loaded: a simulation needs none
+    #[command(flatten)]
+    _plugins: PluginOptions,
 }
 
 /// Simulates, and prints the names of the files.
 pub fn run(console: &Console, options: &Simulate) -> Result<ExitCode, CliError> {
     let robot = load_robot(&options.profile)?;
+    let folder = ResultsFolder::open(&options.out)?;
     let files = simulate(&robot, options.seed)?;
-    emit_paths(console.json, &write_results(&options.out, &files)?);
+    emit_paths(console.json, &folder.write(&files)?)?;
     Ok(ExitCode::Accepted)
 }
 

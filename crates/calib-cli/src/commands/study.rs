@@ -7,8 +7,9 @@ use calib_pipeline::ExitCode;
 use calib_study::{Study, StudyOptions, cases, faults};
 use clap::{Args, ValueEnum};
 
+use super::plugin_options::PluginOptions;
 use crate::error::CliError;
-use crate::terminal::{count_bar, emit};
+use crate::terminal::{count_bar, emit, say};
 
 /// Arguments of `calib study`.
 #[derive(Debug, Args)]
@@ -34,6 +35,9 @@ pub struct StudyRun {
     /// Start over instead of continuing
     #[arg(long)]
     restart: bool,
+    /// Which plugins are loaded
+    #[command(flatten)]
+    plugins: PluginOptions,
     /// Print JSON instead of Markdown
     #[arg(long)]
     json: bool,
@@ -86,10 +90,10 @@ fn estimators(quiet: bool, study: &StudyRun, which: Study) -> Result<ExitCode, C
         calib_study::json(&result)
     } else {
         calib_study::markdown(&result)
-    });
+    })?;
     if let Some(out) = &study.out {
         for path in calib_study::write(&result, out)? {
-            eprintln!("wrote {}", path.display());
+            say(&format!("wrote {}", path.display()));
         }
     }
     Ok(ExitCode::Accepted)
@@ -106,6 +110,7 @@ fn robots(quiet: bool, study: &StudyRun, name: &str) -> Result<ExitCode, CliErro
         threads: study.threads,
         out: study.out.clone(),
         resume: !study.restart,
+        plugins: study.plugins.plugins(),
     };
     let bar = count_bar(quiet, "robots");
     let result = cases::run_cases(&options, &|done, total| {
@@ -119,7 +124,7 @@ fn robots(quiet: bool, study: &StudyRun, name: &str) -> Result<ExitCode, CliErro
         remedy: "leave out --json",
     })?;
     let text = cases::markdown(&result);
-    emit(if study.json { &json } else { &text });
+    emit(if study.json { &json } else { &text })?;
     if let Some(out) = &study.out {
         let files = [
             OutputFile::text(format!("{name}.csv"), cases::csv(&result)),
@@ -128,7 +133,7 @@ fn robots(quiet: bool, study: &StudyRun, name: &str) -> Result<ExitCode, CliErro
             OutputFile::text(format!("{name}.svg"), cases::svg(&result)),
         ];
         for path in write_results(out, &files)? {
-            eprintln!("wrote {}", path.display());
+            say(&format!("wrote {}", path.display()));
         }
     }
     Ok(ExitCode::Accepted)
@@ -153,7 +158,7 @@ fn of_faults(quiet: bool, study: &StudyRun) -> Result<ExitCode, CliError> {
     bar.finish_and_clear();
     let json = faults::json(&result)?;
     let text = faults::markdown(&result);
-    emit(if study.json { &json } else { &text });
+    emit(if study.json { &json } else { &text })?;
     if let Some(out) = &study.out {
         let files = [
             OutputFile::text("faults.csv", faults::csv(&result)),
@@ -161,7 +166,7 @@ fn of_faults(quiet: bool, study: &StudyRun) -> Result<ExitCode, CliError> {
             OutputFile::text("faults.md", text),
         ];
         for path in write_results(out, &files)? {
-            eprintln!("wrote {}", path.display());
+            say(&format!("wrote {}", path.display()));
         }
     }
     Ok(ExitCode::Accepted)

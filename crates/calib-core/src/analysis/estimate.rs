@@ -215,6 +215,10 @@ struct Outcome {
     chi2_stated: f64,
 }
 
+/// All rounds of a fit together take no more linearizations: ordinary fits take 20 to 80, and one that has not ended by
+/// then has no minimum nearby.
+const MOST_ITERATIONS: usize = 500;
+
 struct Fit<'a> {
     model: &'a Model,
     settings: &'a Settings,
@@ -223,6 +227,12 @@ struct Fit<'a> {
 }
 
 impl Fit<'_> {
+    /// Linearizations that are left for all further rounds.
+    fn left(&self) -> usize {
+        // The last round counts its start and its last step.
+        MOST_ITERATIONS.saturating_sub(self.iterations + 2)
+    }
+
     /// What the result needs beside the minimum.
     fn outcome(&self, found: &Found, mask: &[f64], work: &mut Workspace) -> Outcome {
         let Found {
@@ -269,7 +279,8 @@ impl Fit<'_> {
         }
         for _ in 0..GATE_ROUNDS {
             minimum = self.with_noise(&minimum.values, &weights, theta, work);
-            if !robust.enabled || minimum.status == SolveStatus::NotEvaluable {
+            let ended = minimum.status == SolveStatus::NotEvaluable || self.left() == 0;
+            if !robust.enabled || ended {
                 break;
             }
             match gate(model, &minimum.values, theta, mask, robust, work) {
@@ -288,9 +299,11 @@ impl Fit<'_> {
         work: &mut Workspace,
         decrement: f64,
     ) -> Minimum {
+        let own = self.settings.minimize;
         let settings = MinimizeSettings {
             decrement,
-            ..self.settings.minimize
+            max_iterations: own.max_iterations.min(self.left()),
+            ..own
         };
         let objective = Objective {
             model: self.model,
@@ -322,7 +335,7 @@ impl Fit<'_> {
         }
         let mut minimum = self.minimize(start, weights, theta, work, BETWEEN_ROUNDS);
         for _ in 0..self.settings.noise_rounds {
-            if minimum.status == SolveStatus::NotEvaluable {
+            if minimum.status == SolveStatus::NotEvaluable || self.left() == 0 {
                 break;
             }
             let objective = Objective {

@@ -92,6 +92,13 @@ const NOTHING: f64 = 1e-4;
 const SLIDE: f64 = 1e-6;
 /// …and moves the predictions by less than this, squared: 1e-4 σ.
 const UNSEEN: f64 = 1e-8;
+/// A direction that a wide prior alone holds, far below the data's rounding (the height of a planar robot against its
+/// tracker): the ridge lets Gauss–Newton creep along it, with a decrement that falls by no more than this factor per step.
+const CREEPING: f64 = 0.8;
+/// All that creeping on could gain (in σ²): a tenth of a σ of that prior…
+const LITTLE: f64 = 1e-2;
+/// …while no prediction moves by more than this, squared: 1e-3 σ.
+const UNSEEN_IN_ALL: f64 = 1e-6;
 /// A prior wider than this many typical deviations does not say how far a linearization holds.
 const WIDEST_SCALE: f64 = 30.0;
 
@@ -321,6 +328,14 @@ impl<'a> Descent<'a> {
         sum
     }
 
+    /// Whether steps that shrink slowly, each by the factor √rate, lead nowhere that matters. The sum of all that follow is
+    /// δ/(1 − √rate); what they gain is half the decrement over the same.
+    fn creeps_for_little(&self, rate: f64) -> bool {
+        let shrinks = 1.0 - rate.sqrt();
+        let gain = self.decrement / (2.0 * shrinks);
+        gain <= LITTLE && self.seen_by_data() <= UNSEEN_IN_ALL * shrinks * shrinks
+    }
+
     /// What becomes of the proposed step; `None` when it does not lower the cost. `before`: decrement of the step
     /// before.
     fn judge(&mut self, before: f64, work: &mut Workspace) -> Option<Step> {
@@ -341,8 +356,9 @@ impl<'a> Descent<'a> {
             let little = self.system.prior <= NOTHING && self.decrement <= SLIDE;
             little && rate > SLOW && self.seen_by_data() <= UNSEEN
         };
+        let creeps = || rate > CREEPING && self.creeps_for_little(rate);
         let soon = self.constant_noise && expected <= enough;
-        if self.decrement <= enough || soon || slides() {
+        if self.decrement <= enough || soon || slides() || creeps() {
             let fallen = self.decrement <= enough || cost(objective, &self.trial, work) <= limit;
             fallen.then_some(Step::Last)
         } else if self.constant_noise {

@@ -1,6 +1,15 @@
 //! Joint columns and the number of rows.
 
 super::topic! {
+    /// Something of a joint in the URDF is wrong and bears on no number of the calibration.
+    URDF_INCONSISTENT = "urdf-inconsistent" {
+        "mimic_of_fixed": Warning,
+            "In the URDF the joint mimics the fixed joint `{source}`: it is taken to stand still.",
+            "Mimic a joint that moves, or make this joint fixed.";
+        "limits_reversed": Warning,
+            "In the URDF the limits of the joint are in the wrong order, {lower} and {upper}: it is taken to have none.",
+            "Exchange the two numbers.";
+    }
     /// Fewer rows than the fit needs.
     TOO_FEW_POSES = "too-few-poses" {
         "": Error,

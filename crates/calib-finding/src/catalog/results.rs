@@ -81,6 +81,9 @@ super::topic! {
         "scheme": Info,
             "{missing} of {total:shape} of the links are missing in the 3-D view: only `file://`, `package://` and `model://` are read: {shapes:code}[[ and {more} more]].",
             "Name the files by a path to see them. No number depends on it.";
+        "outside": Info,
+            "{missing} of {total:shape} of the links are missing in the 3-D view: the files lie outside of the URDF's folder, of its package and of `robot.packages`: {shapes:code}[[ and {more} more]].",
+            "Name the folder of the meshes under `robot.packages`, and the files by `package://`, to see them. No number depends on it.";
         "unreadable": Info,
             "{missing} of {total:shape} of the links are missing in the 3-D view: the files cannot be read: {shapes:code}[[ and {more} more]].",
             "Correct the paths to see them. No number depends on it.";

@@ -3,8 +3,10 @@
 //! A picture decides nothing: what cannot be drawn is left out and named, in one finding per cause.
 
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use calib_files::input;
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_report::view3d::Outline;
 use calib_urdf::sha256_hex;
@@ -24,6 +26,7 @@ enum NotDrawn {
     NoPackage,
     Scheme,
     NotStl,
+    Outside,
     Unreadable,
     TooLarge,
     Damaged,
@@ -36,6 +39,7 @@ impl NotDrawn {
             Self::NoPackage => "no_package",
             Self::Scheme => "scheme",
             Self::NotStl => "not_stl",
+            Self::Outside => "outside",
             Self::Unreadable => "unreadable",
             Self::TooLarge => "too_large",
             Self::Damaged => "damaged",
@@ -125,11 +129,44 @@ fn mesh(robot: &RobotProfile, filename: &str) -> Result<Vec<u8>, NotDrawn> {
     if !is_stl {
         return Err(NotDrawn::NotStl);
     }
-    let file = std::fs::metadata(&path).map_err(|_| NotDrawn::Unreadable)?;
-    if file.len() > MAX_BYTES {
-        return Err(NotDrawn::TooLarge);
+    // Behind all links: a URDF from elsewhere names no other files of this computer.
+    let path = path.canonicalize().map_err(|_| NotDrawn::Unreadable)?;
+    if !roots(robot).iter().any(|root| path.starts_with(root)) {
+        return Err(NotDrawn::Outside);
     }
-    std::fs::read(&path).map_err(|_| NotDrawn::Unreadable)
+    input::read(&path, MAX_BYTES).map_err(|error| match error.kind() {
+        ErrorKind::FileTooLarge => NotDrawn::TooLarge,
+        _ => NotDrawn::Unreadable,
+    })
+}
+
+/// The folders whose files a URDF may name: its own, the packages around it, and those that the profile gives.
+fn roots(robot: &RobotProfile) -> Vec<PathBuf> {
+    let urdf = robot.folder.join(&robot.profile.urdf);
+    let given = robot.profile.packages.values();
+    let mut roots: Vec<PathBuf> = given
+        .filter_map(|folder| robot.folder.join(folder).canonicalize().ok())
+        .collect();
+    if let Some(beside) = urdf.canonicalize().ok().as_deref().and_then(Path::parent) {
+        roots.push(beside.to_owned());
+        let package = beside.ancestors().find(|folder| is_package(folder));
+        if let Some(package) = package {
+            roots.push(package.to_owned());
+            // Packages lie beside each other in a workspace.
+            let siblings = package.parent().and_then(|p| std::fs::read_dir(p).ok());
+            let siblings = siblings.into_iter().flatten().flatten();
+            roots.extend(
+                siblings
+                    .map(|e| e.path())
+                    .filter(|folder| is_package(folder)),
+            );
+        }
+    }
+    roots
+}
+
+fn is_package(folder: &Path) -> bool {
+    folder.join("package.xml").is_file()
 }
 
 /// The file that a URDF names: relative to the URDF, or in a package.

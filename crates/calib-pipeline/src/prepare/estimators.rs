@@ -15,6 +15,7 @@ use calib_profile::Profile;
 use nalgebra::{Matrix3, Point3, SMatrix, Vector3};
 
 use crate::error::PipelineError;
+use crate::options::Plugins;
 use crate::prepare::readers;
 
 /// A center that was estimated.
@@ -78,10 +79,15 @@ impl Estimators {
     pub fn of_profile(
         profile: &Profile,
         folder: &std::path::Path,
-        plugins: bool,
+        plugins: Plugins,
     ) -> Result<Self, PipelineError> {
         let mut estimators = Self::built_in()?;
-        let host = Host::new(SearchPath::from_environment(Some(folder)), plugins);
+        let refused = std::env::var_os("CALIB_NO_PLUGINS").is_some_and(|set| !set.is_empty());
+        let enabled = plugins != Plugins::Refused && !refused;
+        let mut host = Host::new(SearchPath::from_environment(Some(folder)), enabled);
+        if plugins != Plugins::Allowed {
+            host = host.without_foreign();
+        }
         for (name, spec) in &profile.plugins {
             // Relative paths start from the profile: the search path knows its folder.
             let place = spec.path.clone().unwrap_or_else(|| name.clone());

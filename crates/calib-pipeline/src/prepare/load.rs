@@ -3,15 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use calib_files::input;
 use calib_plugin::{Control, Source};
 use calib_profile::{Profile, RecordingSpec, RobotLog};
 use calib_recording::{ColumnMap, Filled, Meta, Poses, ReadOptions, Recording};
 use calib_urdf::sha256_hex;
 
 use crate::error::{DataProblem, NamedBy, PipelineError, WhyUnread};
+use crate::options::Plugins;
 use crate::prepare::align::align;
 use crate::prepare::estimators::{Estimators, values};
 use crate::prepare::readers;
+use crate::prepare::robot::urdf_warnings;
 use crate::prepare::rows::prepare;
 use crate::prepare::timelines::with_robot_log;
 
@@ -23,15 +26,15 @@ pub use crate::prepare::robot::load_robot;
 ///
 /// # Errors
 /// [`PipelineError`] with file, place and remedy.
-pub fn load_recordings(robot: RobotProfile, plugins: bool) -> Result<Inputs, PipelineError> {
+pub fn load_recordings(robot: RobotProfile, plugins: Plugins) -> Result<Inputs, PipelineError> {
     let estimators = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
     let mut recordings = BTreeMap::new();
-    let mut findings = Vec::new();
+    let mut findings = urdf_warnings(&robot);
     let mut digests = robot.digests.clone();
     let mut excluded = Vec::new();
     for (name, spec) in &robot.profile.recordings {
         let path = robot.folder.join(&spec.file);
-        let bytes = std::fs::read(&path).map_err(|e| {
+        let bytes = input::read(&path, largest()).map_err(|e| {
             PipelineError::read(&path, NamedBy::Recording(name.clone()), WhyUnread::Io(e))
         })?;
         digests.push(Digest {
@@ -81,6 +84,11 @@ pub fn load_recordings(robot: RobotProfile, plugins: bool) -> Result<Inputs, Pip
     Ok(inputs)
 }
 
+/// The most bytes that a recording may have.
+fn largest() -> u64 {
+    ReadOptions::default().max_bytes
+}
+
 /// Reads the robot's own log of a recording.
 fn read_robot_log(
     robot: &RobotProfile,
@@ -92,7 +100,7 @@ fn read_robot_log(
 ) -> Result<Recording, PipelineError> {
     let path = robot.folder.join(&log.file);
     let shown = path.display().to_string();
-    let bytes = std::fs::read(&path).map_err(|e| {
+    let bytes = input::read(&path, largest()).map_err(|e| {
         PipelineError::read(&path, NamedBy::RobotLog(name.to_owned()), WhyUnread::Io(e))
     })?;
     digests.push(Digest {
@@ -146,8 +154,9 @@ fn check_joint_names(
 pub fn of_tables(
     robot: RobotProfile,
     mut tables: BTreeMap<String, Poses>,
+    plugins: Plugins,
 ) -> Result<Inputs, PipelineError> {
-    let estimators = Estimators::of_profile(&robot.profile, &robot.folder, true)?;
+    let estimators = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
     let mut recordings = BTreeMap::new();
     let mut findings = Vec::new();
     for (name, spec) in &robot.profile.recordings {

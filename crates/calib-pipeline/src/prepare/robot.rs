@@ -1,9 +1,12 @@
 //! Reads and checks a profile and its URDF.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use calib_files::input;
+use calib_finding::{About, Fact, Finding, catalog};
 use calib_profile::{Profile, ProfileError};
-use calib_urdf::{RobotModel, sha256_hex};
+use calib_urdf::{Problem, ReadError, ReadProblem, RobotModel, sha256_hex};
 
 use crate::error::{NamedBy, PipelineError, WhyUnread};
 use crate::prepare::inputs::{Digest, RobotProfile};
@@ -31,6 +34,7 @@ pub fn load_robot(profile_path: &Path) -> Result<RobotProfile, PipelineError> {
     let model = RobotModel::from_urdf_text(&urdf_text, &urdf_path.display().to_string())?;
     let profile = calib_profile::check(&raw, &text, &shown, &model)?;
     known_estimators(&profile, &text, &shown)?;
+    limits_of_moved_joints(&profile, &model, &urdf_path)?;
     let file = profile_path
         .file_name()
         .map_or_else(String::new, |f| f.to_string_lossy().into_owned());
@@ -53,6 +57,58 @@ pub fn load_robot(profile_path: &Path) -> Result<RobotProfile, PipelineError> {
         urdf_text,
         digests,
     })
+}
+
+/// Limits in the wrong order are a warning, but not for a joint that the profile moves.
+fn limits_of_moved_joints(
+    profile: &Profile,
+    model: &RobotModel,
+    urdf: &Path,
+) -> Result<(), PipelineError> {
+    let moved = |joint: &str| {
+        let id = model.joint_id(joint);
+        let recordings = profile.recordings.values();
+        id.is_ok_and(|id| recordings.flat_map(|r| r.ranges.keys()).any(|j| *j == id))
+    };
+    let wrong = |found: &&ReadProblem| match &found.problem {
+        Problem::LimitsReversed { joint, .. } => moved(joint),
+        _ => false,
+    };
+    let problems: Vec<ReadProblem> = model.warnings().iter().filter(wrong).cloned().collect();
+    match problems.is_empty() {
+        true => Ok(()),
+        false => Err(ReadError::new(&urdf.display().to_string(), problems).into()),
+    }
+}
+
+/// What is wrong in the URDF and no reason to refuse it.
+pub(crate) fn urdf_warnings(robot: &RobotProfile) -> Vec<Finding> {
+    let finding = |found: &ReadProblem| {
+        Some(match &found.problem {
+            Problem::MimicOfFixed {
+                joint,
+                source_joint,
+            } => Finding::of_kind(
+                catalog::URDF_INCONSISTENT,
+                "mimic_of_fixed",
+                About::Joint(joint.clone()),
+            )
+            .with("source", Fact::name(source_joint.clone())),
+            Problem::LimitsReversed {
+                joint,
+                lower,
+                upper,
+            } => Finding::of_kind(
+                catalog::URDF_INCONSISTENT,
+                "limits_reversed",
+                About::Joint(joint.clone()),
+            )
+            .with("lower", Fact::name(lower.clone()))
+            .with("upper", Fact::name(upper.clone())),
+            _ => return None,
+        })
+    };
+    robot.model.warnings().iter().filter_map(finding).collect()
 }
 
 /// A profile does not know the estimators; their names are checked here, at their place in the profile.
@@ -90,14 +146,13 @@ fn known_estimators(profile: &Profile, text: &str, shown: &str) -> Result<(), Pi
 
 fn read_text(path: &Path, named_by: &NamedBy) -> Result<String, PipelineError> {
     let unread = |why: WhyUnread| PipelineError::read(path, named_by.clone(), why);
-    let size = std::fs::metadata(path).map_err(|e| unread(WhyUnread::Io(e)))?;
-    if size.is_dir() {
-        return Err(unread(WhyUnread::Folder));
-    }
-    if size.len() > LARGEST_TEXT {
-        return Err(unread(WhyUnread::TooLarge(size.len())));
-    }
-    let bytes = std::fs::read(path).map_err(|e| unread(WhyUnread::Io(e)))?;
+    let bytes = input::read(path, LARGEST_TEXT).map_err(|e| {
+        let size = std::fs::metadata(path).map_or(0, |m| m.len());
+        unread(match e.kind() {
+            ErrorKind::FileTooLarge => WhyUnread::TooLarge(size),
+            _ => WhyUnread::Io(e),
+        })
+    })?;
     String::from_utf8(bytes).map_err(|e| PipelineError::NotText {
         path: path.display().to_string(),
         offset: e.utf8_error().valid_up_to(),

@@ -6,7 +6,9 @@ use crate::{answer::Failure, offer::Kind, parameters::ParameterError};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PluginError {
     /// Plugins are switched off.
-    #[error("plugin `{name}` is needed, but plugins are switched off (--no-plugins)")]
+    #[error(
+        "plugin `{name}` is needed, but plugins are switched off (--no-plugins or CALIB_NO_PLUGINS)"
+    )]
     Disabled {
         /// The plugin.
         name: String,
@@ -24,6 +26,16 @@ pub enum PluginError {
         looked: Vec<String>,
         /// Plugins that are there.
         known: Vec<String>,
+    },
+    /// The profile names a file elsewhere, and no hash.
+    #[error(
+        "plugin `{name}` lies neither beside the profile nor in a plugin folder ({path}), and the profile does not pin it; add its `sha256`, or allow it with --allow-plugins"
+    )]
+    Foreign {
+        /// As it was asked for.
+        name: String,
+        /// The file.
+        path: String,
     },
     /// A pin that is no SHA-256.
     #[error("plugin `{name}`: `{pin}` is not a SHA-256 (64 hexadecimal digits)")]

@@ -28,6 +28,8 @@ use crate::{
 pub struct Host {
     search: SearchPath,
     enabled: bool,
+    /// Whether a file is loaded that lies elsewhere than on the search path and has no pin.
+    foreign: bool,
 }
 
 /// A plugin whose offers can be called. It stays in memory until the process ends.
@@ -49,7 +51,18 @@ impl Host {
     /// `enabled`: false for `--no-plugins`; then every [`Host::load`] is an error.
     #[must_use]
     pub fn new(search: SearchPath, enabled: bool) -> Self {
-        Self { search, enabled }
+        Self {
+            search,
+            enabled,
+            foreign: true,
+        }
+    }
+
+    /// Refuses a plugin that lies neither beside the profile nor in a plugin folder and that no hash pins.
+    #[must_use]
+    pub fn without_foreign(mut self) -> Self {
+        self.foreign = false;
+        self
     }
 
     /// Library files in the plugin folders; none is opened.
@@ -73,8 +86,15 @@ impl Host {
             });
         }
         let path = self.search.find(name_or_path)?;
-        if let Some(pin) = sha256 {
-            pin::check(name_or_path, &path, pin)?;
+        match sha256 {
+            Some(pin) => pin::check(name_or_path, &path, pin)?,
+            None if self.foreign || self.search.holds(&path) => {}
+            None => {
+                return Err(PluginError::Foreign {
+                    name: name_or_path.to_string(),
+                    path: path.display().to_string(),
+                });
+            }
         }
         open(&path)
     }

@@ -6,6 +6,9 @@ use sha2::{Digest, Sha256};
 
 use super::PluginError;
 
+/// Libraries with debug information have some hundred megabytes.
+const LARGEST: u64 = 1 << 30;
+
 /// Compares the file with the pin, before any of its code can run.
 ///
 /// # Errors
@@ -22,10 +25,11 @@ pub(super) fn check(name: &str, path: &Path, pin: &str) -> Result<(), PluginErro
         });
     }
     let shown = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|error| PluginError::Unreadable {
-        path: shown.clone(),
-        reason: error.to_string(),
-    })?;
+    let bytes =
+        calib_files::input::read(path, LARGEST).map_err(|error| PluginError::Unreadable {
+            path: shown.clone(),
+            reason: error.to_string(),
+        })?;
     let found: String = Sha256::digest(&bytes)
         .iter()
         .map(|byte| format!("{byte:02x}"))

@@ -69,6 +69,23 @@ impl SearchPath {
             .collect()
     }
 
+    /// Whether a file lies below the profile's folder or a plugin folder, with all links followed.
+    #[must_use]
+    pub fn holds(&self, path: &Path) -> bool {
+        let Ok(path) = path.canonicalize() else {
+            return false;
+        };
+        let current = PathBuf::from(".");
+        let beside = self.profile.iter().map(|folder| {
+            let is_current = folder.as_os_str().is_empty();
+            if is_current { &current } else { folder }
+        });
+        let folders = beside.chain(&self.environment).chain(&self.installation);
+        folders
+            .filter_map(|folder| folder.canonicalize().ok())
+            .any(|folder| path.starts_with(folder))
+    }
+
     /// The file of a plugin: a path (it has a separator or the ending of a library) or a name.
     ///
     /// # Errors

@@ -148,7 +148,7 @@ fn bad_names_and_folders_in_use_leave_nothing_behind() {
     new_project("twice", Language::C, folder.path()).unwrap();
     let error = new_project("twice", Language::Rust, folder.path()).unwrap_err();
     assert!(
-        error.to_string().ends_with("twice exists already"),
+        error.to_string().contains("twice exists already\n  help: "),
         "{error}"
     );
     let missing = new_project(

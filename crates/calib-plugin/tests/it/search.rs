@@ -91,7 +91,7 @@ fn nothing_is_loaded_when_plugins_are_off() {
         .unwrap_err();
     assert_eq!(
         error.to_string(),
-        "plugin `x` is needed, but plugins are switched off (--no-plugins)"
+        "plugin `x` is needed, but plugins are switched off (--no-plugins or CALIB_NO_PLUGINS)"
     );
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use calib_files::{NameFault, check_name};
 use calib_urdf::{JointId, JointKind, LinkId, RobotModel};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, Vector3};
 
@@ -224,14 +225,24 @@ impl<'a> Checker<'a> {
             add_points: raw.add_points.clone(),
             reports: raw.reports.clone(),
         };
-        for (key, file) in [("urdf", &outputs.urdf), ("scene", &outputs.scene)] {
-            if file.contains(['/', '\\']) {
-                self.problem(
-                    &["outputs", key],
-                    format!("`{file}` is a path"),
-                    "give a file name; `--out` chooses the folder",
-                );
-            }
+        let own = [("urdf", &raw.urdf), ("scene", &raw.scene)];
+        for (key, name) in own {
+            let (path, name) = match name {
+                Some(name) => (["outputs", key], name),
+                None => (["robot", "name"], &self.raw.robot.name),
+            };
+            let Err(fault) = check_name(name) else {
+                continue;
+            };
+            let found = match fault {
+                NameFault::Separator if path[0] == "outputs" => format!("`{name}` is a path"),
+                fault => format!("no file can be named {name:?}: {fault}"),
+            };
+            let remedy = match path[0] {
+                "outputs" => "give a file name; `--out` chooses the folder",
+                _ => "rename the robot, or name the files under `outputs`",
+            };
+            self.problem(&path, found, remedy);
         }
         outputs
     }

@@ -128,7 +128,7 @@ pub fn read_path_with(
     let name = path.display().to_string();
     let open = || -> Placed<(std::fs::File, u64)> {
         let io = |source| (At::File, Problem::Io(source));
-        let file = std::fs::File::open(path).map_err(io)?;
+        let file = calib_files::input::open(path).map_err(io)?;
         let bytes = file.metadata().map_err(io)?.len();
         Ok((file, bytes))
     };

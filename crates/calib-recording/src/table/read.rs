@@ -5,7 +5,7 @@ use super::rows::Rows;
 use crate::column_map::{ColumnMap, Delimiter};
 use crate::error::{At, Placed, Problem};
 use crate::model::Recording;
-use crate::text::{Lines, Separator, cells};
+use crate::text::{Lines, Separator, cells, unquoted};
 use calib_finding::{Finding, Subject, catalog};
 use std::io::BufRead;
 
@@ -91,7 +91,7 @@ fn read_header<R: BufRead>(
             comments.push(comment.trim().to_string());
         } else if !line.trim().is_empty() {
             let separator = given.unwrap_or_else(|| Separator::guess(line));
-            let names = cells(line, separator).map(str::to_string).collect();
+            let names = cells(line, separator).map(unquoted).collect();
             return Ok(Some((Layout::new(number, names, map)?, separator)));
         }
     }

@@ -4,6 +4,7 @@ use super::header::Layout;
 use crate::column_map::ColumnMap;
 use crate::model::{self, JointUnit, MarkerSample, Recording, Timeline};
 use crate::poses::{NotOneTable, Poses};
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
@@ -50,7 +51,7 @@ impl WriteOptions {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NotWritten {
     /// A name or text would break the table.
-    #[error("`{text}` contains a comma, quote or line break and cannot stand in a table")]
+    #[error("`{text}` contains a comma or line break and cannot stand in a table")]
     Text {
         /// The text.
         text: String,
@@ -161,7 +162,7 @@ fn write(poses: &Poses, filled: &Filled, options: &WriteOptions) -> Result<Strin
         .copied()
         .chain(poses.labels.values().flatten().map(String::as_str))
     {
-        if text.contains([',', ';', '\t', '"', '\n', '\r'])
+        if text.contains([',', ';', '\t', '\n', '\r'])
             || text.starts_with('#')
             || text.trim() != text
         {
@@ -173,6 +174,7 @@ fn write(poses: &Poses, filled: &Filled, options: &WriteOptions) -> Result<Strin
     if let Some(name) = misread(poses, &header) {
         return Err(NotWritten::Misread { name });
     }
+    let header: Vec<Cow<'_, str>> = header.into_iter().map(cell).collect();
     let _ = writeln!(out, "{}", header.join(","));
     for row in 0..poses.len() {
         let mut first = true;
@@ -187,7 +189,7 @@ fn write(poses: &Poses, filled: &Filled, options: &WriteOptions) -> Result<Strin
         }
         for texts in poses.labels.values() {
             separate(&mut out);
-            out.push_str(&texts[row]);
+            out.push_str(&cell(&texts[row]));
         }
         for column in &columns {
             separate(&mut out);
@@ -333,6 +335,15 @@ fn misread(poses: &Poses, header: &[&str]) -> Option<String> {
         .iter()
         .find_map(|(wanted, read)| wanted.iter().find(|name| !read.contains(**name)));
     lost.map(|name| String::clone(name))
+}
+
+/// A name as a cell: no formula, and in quotes where it has one itself.
+fn cell(name: &str) -> Cow<'_, str> {
+    let cell = calib_finding::cell(name);
+    match cell.contains('"') {
+        true => Cow::Owned(format!("\"{}\"", cell.replace('"', "\"\""))),
+        false => cell,
+    }
 }
 
 /// Shortest exact text, or fixed decimals without trailing zeros; never `-0`.

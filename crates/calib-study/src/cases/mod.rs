@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use calib_pipeline::prepare::load::{RobotProfile, load_robot, of_tables};
-use calib_pipeline::run::{RunOptions, run_on};
+use calib_pipeline::run::{Plugins, RunOptions, run_on};
 use calib_profile::Method;
 use calib_report::{LoopClosure, Report, Stats};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
@@ -45,6 +45,8 @@ pub struct CaseOptions {
     pub out: Option<PathBuf>,
     /// Keep the finished robots of an earlier run with the same settings.
     pub resume: bool,
+    /// Which plugins of the profile are loaded.
+    pub plugins: Plugins,
 }
 
 /// Error of one found transform against the truth.
@@ -116,7 +118,7 @@ pub fn run_cases(
                 let both = match known {
                     Some(both) => both,
                     None => {
-                        let both = one_robot(&robot, seed)?;
+                        let both = one_robot(&robot, seed, options.plugins)?;
                         lock().append(&both)?;
                         both
                     }
@@ -135,7 +137,11 @@ pub fn run_cases(
 }
 
 /// Draws a robot and calibrates it by both methods.
-fn one_robot(robot: &RobotProfile, seed: u64) -> Result<Vec<RobotResult>, CaseError> {
+fn one_robot(
+    robot: &RobotProfile,
+    seed: u64,
+    plugins: Plugins,
+) -> Result<Vec<RobotResult>, CaseError> {
     let simulated =
         calib_sim::simulate(&robot.profile, &robot.model, Some(seed)).map_err(|source| {
             CaseError::Simulation {
@@ -150,9 +156,9 @@ fn one_robot(robot: &RobotProfile, seed: u64) -> Result<Vec<RobotResult>, CaseEr
             force: true,
             strict: false,
             select: false,
-            no_plugins: false,
+            plugins,
         };
-        let ran = of_tables(robot.clone(), simulated.recordings.clone())
+        let ran = of_tables(robot.clone(), simulated.recordings.clone(), plugins)
             .and_then(|inputs| run_on(inputs, &options, &mut |_| {}));
         out.push(match ran {
             Ok(output) => RobotResult {

@@ -6,7 +6,7 @@ use calib_finding::{Fact, Finding, Severity, catalog};
 use calib_pipeline::error::DataProblem;
 use calib_pipeline::prepare::load::{RobotProfile, of_tables};
 use calib_pipeline::prepare::loads::Masses;
-use calib_pipeline::run::{RunOptions, RunOutput, run_on};
+use calib_pipeline::run::{Plugins, RunOptions, RunOutput, run_on};
 use calib_pipeline::{ExitCode, PipelineError};
 use calib_report::Verdict;
 use calib_report::verdict::{Effect, ReasonId};
@@ -245,7 +245,7 @@ fn run(cell: Cell, number: u64, seed: u64) -> (Case, Result<RunOutput, PipelineE
     let case = Case::draw(cell, number, &mut noise);
     let tables = case.tables(&mut noise);
     let ran = robot_profile(&case.profile(), &case.robot.urdf())
-        .and_then(|robot| of_tables(robot, tables))
+        .and_then(|robot| of_tables(robot, tables, Plugins::Refused))
         .and_then(|inputs| run_on(inputs, &RunOptions::default(), &mut |_| {}));
     (case, ran)
 }

@@ -7,7 +7,7 @@ pub(crate) mod text;
 
 use std::path::{Path, PathBuf};
 
-use calib_files::{FileError, replace};
+use calib_files::{make_folder, replace};
 
 use crate::{run::StudyResult, settings::StudyError};
 
@@ -29,10 +29,7 @@ pub fn json(result: &StudyResult) -> String {
 /// # Errors
 /// [`StudyError::File`] where the folder or a file cannot be written.
 pub fn write(result: &StudyResult, folder: &Path) -> Result<Vec<PathBuf>, StudyError> {
-    std::fs::create_dir_all(folder).map_err(|source| FileError::Write {
-        path: folder.to_path_buf(),
-        source,
-    })?;
+    make_folder(folder)?;
     let word = result.study.word();
     let mut files = vec![
         (format!("{word}.csv"), csv(result)),

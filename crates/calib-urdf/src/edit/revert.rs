@@ -90,7 +90,7 @@ impl Patched {
                 let start = r.at.saturating_add_signed(-grown);
                 grown += r.new.len() as isize - r.old.len() as isize;
                 Splice {
-                    range: start..start + r.old.len(),
+                    range: start..start.saturating_add(r.old.len()),
                     new: r.new.clone(),
                 }
             })

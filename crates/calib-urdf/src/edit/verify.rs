@@ -9,6 +9,7 @@ use crate::edit::decimal::same_number;
 use crate::edit::error::{EditError, Rounded};
 use crate::kinematics::rpy::{angle_between, matrix_from_rpy};
 use crate::model::{Joint, JointId, JointKind, JointLimits, Link, LinkId, MimicLaw, RobotModel};
+use crate::read::source::OwnAttributes as _;
 use crate::read::source::{has_quaternions, parse};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
@@ -197,12 +198,13 @@ fn trial_positions(model: &RobotModel) -> Vec<Vec<f64>> {
 /// The model as urdf-rs reads it: origins, axes and mimics of its own, the tree of ours.
 fn second_reading(text: &str, name: &str, ours: &RobotModel) -> Result<RobotModel, String> {
     let document = parse(text, name).map_err(|error| error.to_string())?;
-    if has_quaternions(&document)
-        && document
-            .descendants()
-            .any(|node| node.has_attribute("quat_xyzw"))
-    {
+    if has_quaternions(&document) && document.descendants().any(|node| node.has_own("quat_xyzw")) {
         return Err("it rounds `quat_xyzw` near pitch ±π/2".to_owned());
+    }
+    let prefixed =
+        |node: roxmltree::Node<'_, '_>| node.attributes().any(|a| a.namespace().is_some());
+    if document.descendants().any(prefixed) {
+        return Err("it takes attributes of other namespaces for the URDF's".to_owned());
     }
     let robot = urdf_rs::read_from_string(text.trim_start_matches('\u{feff}'))
         .map_err(|error| error.to_string())?;

@@ -5,6 +5,7 @@ use crate::error::{Hint, Problem};
 use crate::kinematics::rpy::rotation_from_rpy;
 use crate::model::{Inertial, JointKind, JointLimits};
 use crate::read::numbers::parse_numbers;
+use crate::read::source::OwnAttributes as _;
 use crate::read::source::{is_element, value_start};
 use calib_finding::nearest_word;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
@@ -28,7 +29,7 @@ impl Reader<'_> {
     }
 
     fn required<'a>(&mut self, node: Node<'a, '_>, attribute: &'static str) -> Option<&'a str> {
-        let value = node.attribute(attribute);
+        let value = node.own(attribute);
         if value.is_none() {
             let near = nearest_word(attribute, node.attributes().map(|a| a.name()));
             let problem = Problem::MissingAttribute {
@@ -70,7 +71,7 @@ impl Reader<'_> {
         let mass_node = self.only(inertial, "mass", &owner)?;
         let mass = self.number(mass_node, "value", &owner)?;
         if mass < 0.0 {
-            let found = mass_node.attribute("value").unwrap_or("").to_owned();
+            let found = mass_node.own("value").unwrap_or("").to_owned();
             self.report(
                 mass_node.range().start,
                 Problem::NegativeMass {
@@ -129,7 +130,7 @@ impl Reader<'_> {
     fn kind(&mut self, node: Node<'_, '_>, name: &str, owner: &str) -> Option<JointKind> {
         let written = self.required(node, "type")?;
         let at = node
-            .attribute_node("type")
+            .own_attribute("type")
             .map_or(node.range().start, |a| value_start(&a));
         if UNSUPPORTED_TYPES.contains(&written) {
             self.report(
@@ -172,7 +173,7 @@ impl Reader<'_> {
         self.unknown_attribute(node, "axis", owner, &["xyz"], "xyz");
         let Some(xyz) = self.triple(node, "xyz", owner) else {
             // Readers take a missing xyz as the default.
-            return (!node.has_attribute("xyz")).then(Vector3::x_axis);
+            return (!node.has_own("xyz")).then(Vector3::x_axis);
         };
         // Scaled first: 1e-200 is a direction, although its square is 0.
         let scale = xyz.amax();
@@ -203,8 +204,8 @@ impl Reader<'_> {
         let translation = self
             .triple(node, "xyz", owner)
             .unwrap_or_else(Vector3::zeros);
-        let rotation = if self.quaternions && node.has_attribute("quat_xyzw") {
-            if let Some(rpy) = node.attribute_node("rpy") {
+        let rotation = if self.quaternions && node.has_own("quat_xyzw") {
+            if let Some(rpy) = node.own_attribute("rpy") {
                 self.report(
                     value_start(&rpy),
                     Problem::TwoRotations {
@@ -255,11 +256,10 @@ impl Reader<'_> {
                 continue;
             }
             let meant = nearest_word(attribute.name(), known.iter().copied())
-                .filter(|name| !node.has_attribute(*name));
+                .filter(|name| !node.has_own(name));
             // A typo keeps the letters; other names are extensions.
             let typo = meant.is_some_and(|name| same_letters(name, attribute.name()))
-                || (known.iter().all(|name| !node.has_attribute(*name))
-                    && node.attributes().len() > 0);
+                || (known.iter().all(|name| !node.has_own(name)) && node.attributes().len() > 0);
             if typo {
                 let problem = Problem::UnknownAttribute {
                     owner: owner.to_owned(),
@@ -304,7 +304,10 @@ impl Reader<'_> {
                         lower: lower.to_string(),
                         upper: upper.to_string(),
                     };
-                    self.report(node.range().start, problem);
+                    // Many joints of a robot take no part in a calibration.
+                    self.warn(node.range().start, problem);
+                    limits.lower = None;
+                    limits.upper = None;
                 }
             }
         }
@@ -331,13 +334,13 @@ impl Reader<'_> {
     }
 
     fn optional_number(&mut self, node: Node<'_, '_>, attribute: &str, owner: &str) -> Option<f64> {
-        node.has_attribute(attribute)
+        node.has_own(attribute)
             .then(|| self.numbers::<1>(node, attribute, owner))?
             .map(|[value]| value)
     }
 
     fn triple(&mut self, node: Node<'_, '_>, attribute: &str, owner: &str) -> Option<Vector3<f64>> {
-        node.has_attribute(attribute)
+        node.has_own(attribute)
             .then(|| self.numbers::<3>(node, attribute, owner))?
             .map(Vector3::from)
     }
@@ -349,7 +352,7 @@ impl Reader<'_> {
         attribute: &str,
         owner: &str,
     ) -> Option<[f64; N]> {
-        let written = node.attribute_node(attribute)?;
+        let written = node.own_attribute(attribute)?;
         match parse_numbers(written.value()) {
             Ok(numbers) => Some(numbers),
             Err(fault) => {

@@ -9,6 +9,7 @@
 //! see [`crate::visual`].
 
 mod elements;
+mod nesting;
 pub(crate) mod numbers;
 pub mod source;
 mod tree;
@@ -18,6 +19,7 @@ use crate::error::{Hint, Place, Problem, ReadError, ReadProblem};
 use crate::model::{
     Joint, JointId, JointKind, JointLimits, Link, LinkId, Mimic, MimicLaw, RobotModel,
 };
+use crate::read::source::OwnAttributes as _;
 use crate::read::source::{
     decode, has_quaternions, parse, read_text, top_level, value_start, xacro_evidence,
 };
@@ -49,10 +51,14 @@ impl RobotModel {
             text,
             quaternions: has_quaternions(&document),
             found: Vec::new(),
+            warnings: Vec::new(),
         };
         let model = reader.robot(&document);
         match model {
-            Some(model) if reader.found.is_empty() => Ok(model),
+            Some(mut model) if reader.found.is_empty() => {
+                model.warnings = reader.warnings;
+                Ok(model)
+            }
             _ => {
                 let mut problems = reader.found;
                 problems.sort_by_key(|found| found.place);
@@ -113,6 +119,7 @@ struct Reader<'t> {
     text: &'t str,
     quaternions: bool,
     found: Vec<ReadProblem>,
+    warnings: Vec<ReadProblem>,
 }
 
 impl Reader<'_> {
@@ -121,6 +128,14 @@ impl Reader<'_> {
             return;
         }
         self.found.push(ReadProblem::at(self.text, offset, problem));
+    }
+
+    /// What is wrong, and no reason to refuse the robot.
+    fn warn(&mut self, offset: usize, problem: Problem) {
+        if self.warnings.len() < MAX_FINDINGS {
+            self.warnings
+                .push(ReadProblem::at(self.text, offset, problem));
+        }
     }
 
     /// More than a screen shows: the rest is not even looked up, since each place costs a walk through the text.
@@ -151,11 +166,7 @@ impl Reader<'_> {
         self.clean()?;
         let root = root?;
         let from_root = tree::breadth_first(root, &links.all, &joints);
-        let name = document
-            .root_element()
-            .attribute("name")
-            .unwrap_or("")
-            .to_owned();
+        let name = document.root_element().own("name").unwrap_or("").to_owned();
         Some(RobotModel {
             name,
             links: links.all,
@@ -164,6 +175,7 @@ impl Reader<'_> {
             from_root,
             link_ids: links.ids,
             joint_ids: raw.ids,
+            warnings: Vec::new(),
         })
     }
 
@@ -323,7 +335,7 @@ impl Reader<'_> {
         role: &'static str,
         link_ids: &BTreeMap<String, LinkId>,
     ) -> Option<LinkId> {
-        let attribute = node.attribute_node("link")?;
+        let attribute = node.own_attribute("link")?;
         let id = link_ids.get(attribute.value()).copied();
         if id.is_none() && !self.full() {
             let near = nearest_word(attribute.value(), link_ids.keys().map(String::as_str));
@@ -344,7 +356,7 @@ impl Reader<'_> {
         node: Node<'_, '_>,
         joints: &RawJoints<'_, '_>,
     ) -> Option<JointId> {
-        let attribute = node.attribute_node("joint")?;
+        let attribute = node.own_attribute("joint")?;
         let Some(id) = joints.ids.get(attribute.value()).copied() else {
             let others = joints
                 .ids
@@ -364,8 +376,8 @@ impl Reader<'_> {
                 joint: joint.name.to_owned(),
                 source_joint: attribute.value().to_owned(),
             };
-            self.report(value_start(&attribute), problem);
-            return None;
+            // Such a joint stands still, which is what simulators make of it.
+            self.warn(value_start(&attribute), problem);
         }
         Some(id)
     }

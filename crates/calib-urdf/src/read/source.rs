@@ -1,6 +1,8 @@
 //! From bytes to a parsed XML document, and the few questions that reading and patching both ask of it.
 
 use crate::error::{Problem, ReadError, ReadProblem};
+use crate::read::nesting;
+use calib_files::input;
 use roxmltree::{Attribute, Document, Node, ParsingOptions};
 use std::path::Path;
 
@@ -56,21 +58,24 @@ pub fn read_text(path: &Path, name_for_errors: &str) -> Result<String, ReadError
             reason: error.to_string(),
         })
     };
-    let size = std::fs::metadata(path).map_err(unreadable)?.len();
-    if size > MAX_BYTES {
-        return Err(whole_file(Problem::TooLarge {
+    let bytes = input::read(path, MAX_BYTES).map_err(|error| {
+        if error.kind() != std::io::ErrorKind::FileTooLarge {
+            return unreadable(error);
+        }
+        let size = std::fs::metadata(path).map_or(MAX_BYTES + 1, |m| m.len());
+        whole_file(Problem::TooLarge {
             bytes: size,
             limit: MAX_BYTES,
-        }));
-    }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
+        })
+    })?;
     decode(&bytes, name_for_errors).map(str::to_owned)
 }
 
 /// The XML document of a URDF or xacro text, whose root is `<robot>`.
 ///
 /// # Errors
-/// [`Problem::Empty`], [`Problem::TooLarge`], [`Problem::Xml`], [`Problem::NotARobot`].
+/// [`Problem::Empty`], [`Problem::TooLarge`], [`Problem::TooDeep`], [`Problem::Dtd`], [`Problem::Xml`],
+/// [`Problem::NotARobot`].
 pub fn parse<'a>(text: &'a str, name_for_errors: &str) -> Result<Document<'a>, ReadError> {
     let whole_file = |problem| ReadError::one(name_for_errors, ReadProblem::of_file(problem));
     if text.len() as u64 > MAX_BYTES {
@@ -82,9 +87,14 @@ pub fn parse<'a>(text: &'a str, name_for_errors: &str) -> Result<Document<'a>, R
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
         return Err(whole_file(Problem::Empty));
     }
-    // A DTD may define entities; roxmltree bounds their expansion and opens no other file.
+    // Before any parser: none of those that read the text later bounds its depth or its entities.
+    if let Err((offset, problem)) = nesting::check(text) {
+        return Err(ReadError::one(
+            name_for_errors,
+            ReadProblem::at(text, offset, problem),
+        ));
+    }
     let options = ParsingOptions {
-        allow_dtd: true,
         nodes_limit: 10_000_000,
         ..ParsingOptions::default()
     };
@@ -140,6 +150,29 @@ fn xml_reason(error: &roxmltree::Error) -> String {
     }
 }
 
+/// The attributes of an element without a prefix: those with one belong to somebody else, whatever they are called.
+pub(crate) trait OwnAttributes<'a, 'b: 'a> {
+    /// The attribute of that name.
+    fn own_attribute(&self, name: &str) -> Option<Attribute<'a, 'b>>;
+
+    /// Its value.
+    fn own(&self, name: &str) -> Option<&'a str> {
+        self.own_attribute(name).map(|attribute| attribute.value())
+    }
+
+    /// Whether it is there.
+    fn has_own(&self, name: &str) -> bool {
+        self.own_attribute(name).is_some()
+    }
+}
+
+impl<'a, 'b: 'a> OwnAttributes<'a, 'b> for Node<'a, 'b> {
+    fn own_attribute(&self, name: &str) -> Option<Attribute<'a, 'b>> {
+        let own = |a: &Attribute<'_, '_>| a.namespace().is_none() && a.name() == name;
+        self.attributes().find(own)
+    }
+}
+
 /// Is this an element of the URDF itself (and not of a foreign namespace) with that name?
 pub(crate) fn is_element(node: Node<'_, '_>, name: &str) -> bool {
     node.is_element()
@@ -172,7 +205,7 @@ pub(crate) fn value_start(attribute: &Attribute<'_, '_>) -> usize {
 pub(crate) fn has_quaternions(document: &Document<'_>) -> bool {
     let version = document
         .root_element()
-        .attribute("version")
+        .own("version")
         .unwrap_or("1.0")
         .trim();
     let mut parts = version.split('.').map(str::parse::<u32>);

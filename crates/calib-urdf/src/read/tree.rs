@@ -2,7 +2,7 @@
 
 use super::{RawJoint, Reader};
 use crate::error::Problem;
-use crate::model::{Joint, JointId, Link, LinkId, MimicLaw};
+use crate::model::{Joint, JointId, JointKind, Link, LinkId, MimicLaw};
 
 impl Reader<'_> {
     /// Every link has at most one parent here, so a walk upwards ends at a root or goes round.
@@ -69,6 +69,9 @@ impl Reader<'_> {
                     break;
                 }
                 path.push(next);
+            }
+            if joints[law.source.index()].kind == JointKind::Fixed {
+                law.multiplier = 0.0;
             }
             joints[start].law = law;
         }

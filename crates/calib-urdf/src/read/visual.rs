@@ -6,6 +6,7 @@
 use crate::error::{Place, ReadError};
 use crate::kinematics::rpy::rotation_from_rpy;
 use crate::read::numbers::parse_numbers;
+use crate::read::source::OwnAttributes as _;
 use crate::read::source::{parse, top_level};
 use nalgebra::{Isometry3, Translation3, Vector3};
 use roxmltree::Node;
@@ -85,7 +86,7 @@ pub fn visuals(
     let document = parse(text, name_for_errors)?;
     let (mut shapes, mut faults) = (Vec::new(), Vec::new());
     for link in top_level(&document, "link") {
-        let name = link.attribute("name").unwrap_or("");
+        let name = link.own("name").unwrap_or("");
         for visual in link.children().filter(|node| node.has_tag_name("visual")) {
             match shape(visual) {
                 Ok((link_from_visual, geometry)) => shapes.push(Visual {
@@ -138,7 +139,7 @@ fn shape(visual: Node<'_, '_>) -> Result<(Isometry3<f64>, Geometry), String> {
         },
         "mesh" => Geometry::Mesh {
             filename: solid
-                .attribute("filename")
+                .own("filename")
                 .map(str::trim)
                 .filter(|name| !name.is_empty())
                 .ok_or("a mesh has a `filename`")?
@@ -159,7 +160,7 @@ fn numbers<const N: usize>(
     name: &str,
     absent: Option<[f64; N]>,
 ) -> Result<[f64; N], String> {
-    match (node.attribute(name), absent) {
+    match (node.own(name), absent) {
         (Some(value), _) => {
             parse_numbers(value).map_err(|fault| format!("`{name}`: {}", fault.reason))
         }

@@ -4,6 +4,7 @@
 //! [`crate::patch_with`] gets their texts.
 
 use crate::error::{Place, ReadError};
+use crate::read::source::OwnAttributes as _;
 use crate::read::source::parse;
 use crate::xacro::expression::{Access, Root};
 use crate::xacro::is_xacro;
@@ -71,7 +72,7 @@ pub fn references(text: &str, name_for_errors: &str) -> Result<Vec<Reference>, R
         }
     };
     for node in document.descendants().filter(Node::is_element) {
-        if let (true, Some(filename)) = (is_xacro(node, "include"), node.attribute("filename")) {
+        if let (true, Some(filename)) = (is_xacro(node, "include"), node.own("filename")) {
             push(
                 Reads::Include,
                 plain_text(&document, filename),
@@ -134,8 +135,8 @@ fn first_known(document: &Document<'_>, text: &str) -> Option<(std::ops::Range<u
             let name = rest[..length].trim();
             let value = document
                 .descendants()
-                .find(|node| is_xacro(*node, element) && node.attribute("name") == Some(name))
-                .and_then(|node| node.attribute(attribute));
+                .find(|node| is_xacro(*node, element) && node.own("name") == Some(name))
+                .and_then(|node| node.own(attribute));
             if let Some(value) = value {
                 return Some((
                     start..start + open.len() + length + close.len_utf8(),
@@ -154,7 +155,7 @@ pub(crate) fn unseen(document: &Document<'_>, companions: &Companions) -> bool {
             .descendants()
             .filter(|node| is_xacro(*node, "include"))
             .any(|node| {
-                let argument = plain_text(document, node.attribute("filename").unwrap_or(""));
+                let argument = plain_text(document, node.own("filename").unwrap_or(""));
                 !companions
                     .included
                     .iter()

@@ -12,6 +12,7 @@ pub(crate) mod value;
 use crate::edit::error::EditError;
 use crate::error::Place;
 use crate::model::UnknownName;
+use crate::read::source::OwnAttributes as _;
 use crate::read::source::is_element;
 use roxmltree::{Document, Node};
 
@@ -38,13 +39,13 @@ pub(crate) fn joint<'a, 'b>(
     let named: Vec<Node<'_, '_>> = joints
         .iter()
         .copied()
-        .filter(|node| node.attribute("name") == Some(name))
+        .filter(|node| node.own("name") == Some(name))
         .collect();
     let templates: Vec<Node<'_, '_>> = joints
         .iter()
         .copied()
         .filter(|node| {
-            node.attribute("name")
+            node.own("name")
                 .is_some_and(|pattern| matches(pattern, name))
         })
         .collect();
@@ -63,10 +64,10 @@ pub(crate) fn joint<'a, 'b>(
             None => EditError::UnknownName {
                 file: file.to_owned(),
                 source: UnknownName::among(
-                    document.root_element().attribute("name").unwrap_or(""),
+                    document.root_element().own("name").unwrap_or(""),
                     "joint",
                     name,
-                    joints.iter().filter_map(|node| node.attribute("name")),
+                    joints.iter().filter_map(|node| node.own("name")),
                 ),
             },
         }),
@@ -101,7 +102,7 @@ fn used_once(
         file: file.to_owned(),
         place: Place::of_byte(text, node.range().start),
         joint: joint.to_owned(),
-        macro_name: definition.attribute("name").unwrap_or("").to_owned(),
+        macro_name: definition.own("name").unwrap_or("").to_owned(),
         lines,
     })
 }
@@ -111,13 +112,13 @@ fn template(file: &str, place: Place, joint: &str, node: Node<'_, '_>) -> EditEr
         file: file.to_owned(),
         place,
         joint: joint.to_owned(),
-        template: node.attribute("name").unwrap_or("").to_owned(),
+        template: node.own("name").unwrap_or("").to_owned(),
     }
 }
 
 /// Does the joint's name say more than `${…}`? A name that is computed as a whole fits every joint.
 fn has_fixed_part(node: Node<'_, '_>) -> bool {
-    let name = node.attribute("name").unwrap_or("");
+    let name = node.own("name").unwrap_or("");
     !(name.starts_with('$') && name.ends_with(['}', ')']) && name.matches('$').count() == 1)
 }
 
@@ -131,9 +132,7 @@ pub(crate) fn is_joint(node: Node<'_, '_>) -> bool {
                 .namespace()
                 .is_some_and(|uri| uri.contains("xacro"))
     };
-    is_element(node, "joint")
-        && node.has_attribute("name")
-        && !node.ancestors().skip(1).any(foreign)
+    is_element(node, "joint") && node.has_own("name") && !node.ancestors().skip(1).any(foreign)
 }
 
 /// Is this xacro's own element of that name?
@@ -161,7 +160,7 @@ fn use_lines(document: &Document<'_>, definition: Node<'_, '_>, text: &str) -> V
         depth: usize,
         lines: &mut Vec<usize>,
     ) {
-        let Some(name) = definition.attribute("name") else {
+        let Some(name) = definition.own("name") else {
             return;
         };
         for call in document.descendants().filter(|node| is_xacro(*node, name)) {

@@ -4,6 +4,7 @@ use crate::edit::error::EditError;
 use crate::error::ReadError;
 use crate::kinematics::rpy::rotation_from_rpy;
 use crate::read::numbers::parse_numbers;
+use crate::read::source::OwnAttributes as _;
 use crate::read::source::{child, parse, value_range, xacro_evidence};
 use crate::xacro::companions::Companions;
 use crate::xacro::value::{Context, cells};
@@ -46,13 +47,13 @@ pub fn xacro_origins(
     };
     let (mut found, mut computed) = (Vec::new(), Vec::new());
     for joint in document.descendants().filter(|node| is_joint(*node)) {
-        let name = joint.attribute("name").unwrap_or("").to_owned();
+        let name = joint.own("name").unwrap_or("").to_owned();
         let origin = child(joint, "origin");
         let numbers = |attribute: &str| match origin {
             None => Some([0.0; 3]),
             Some(origin) => read(&context, origin, attribute),
         };
-        let quaternion = origin.is_some_and(|o| o.has_attribute("quat_xyzw"));
+        let quaternion = origin.is_some_and(|o| o.has_own("quat_xyzw"));
         match (numbers("xyz"), numbers("rpy")) {
             (Some(xyz), Some(rpy)) if !quaternion => found.push((
                 name,
@@ -68,7 +69,7 @@ pub fn xacro_origins(
 }
 
 fn read(context: &Context<'_, '_>, origin: Node<'_, '_>, name: &str) -> Option<[f64; 3]> {
-    let Some(attribute) = origin.attribute_node(name) else {
+    let Some(attribute) = origin.own_attribute(name) else {
         return Some([0.0; 3]);
     };
     if !is_expression(attribute.value()) {

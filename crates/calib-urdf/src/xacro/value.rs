@@ -12,6 +12,7 @@
 use crate::edit::error::EditError;
 use crate::error::Place;
 use crate::read::numbers::parse_numbers;
+use crate::read::source::OwnAttributes as _;
 use crate::read::source::value_range;
 use crate::xacro::companions::{Companions, loaded, unseen};
 use crate::xacro::expression::{
@@ -140,7 +141,7 @@ fn follow_to_numbers(
 ) -> Result<Vec<Cell>, Unwritable> {
     // A parameter of the macro hides the property of that name.
     if let (Root::Name(name), Some(definition)) = (&access.root, enclosing_macro(joint)) {
-        let parameters = definition.attribute("params").unwrap_or("");
+        let parameters = definition.own("params").unwrap_or("");
         if words(parameters).any(|word| word == name) {
             return Err(Unwritable::Computed);
         }
@@ -154,7 +155,7 @@ fn follow_to_numbers(
                 .filter(|_| leaf.keys.is_empty())
                 .ok_or(Unwritable::Computed)?;
             let attribute = definition
-                .attribute_node("value")
+                .own_attribute("value")
                 .ok_or(Unwritable::Computed)?;
             (None, value_range(context.text, &attribute))
         }
@@ -220,7 +221,7 @@ fn yaml_value(
 fn definition<'a, 'b>(document: &'a Document<'b>, name: &str) -> Option<Node<'a, 'b>> {
     let mut definitions = document
         .descendants()
-        .filter(|node| is_xacro(*node, "property") && node.attribute("name") == Some(name));
+        .filter(|node| is_xacro(*node, "property") && node.own("name") == Some(name));
     let (definition, none) = (definitions.next()?, definitions.next());
     (none.is_none() && definition.parent() == Some(document.root_element())).then_some(definition)
 }
@@ -249,7 +250,7 @@ fn follow(context: &Context<'_, '_>, access: &Access) -> Leaf {
             Root::Name(name) => name.clone(),
         };
         let inner = definition(context.document, &name)
-            .and_then(|node| node.attribute("value"))
+            .and_then(|node| node.own("value"))
             .and_then(whole)
             .filter(|inner| constant(inner).is_none())
             .and_then(Access::parse);
@@ -295,7 +296,7 @@ pub(crate) fn readers(context: &Context<'_, '_>, leaf: &Leaf) -> Readers {
                 && attribute.name() == "value"
                 && whole(attribute.value()).is_some_and(|e| Access::parse(e).is_some())
                 && node
-                    .attribute("name")
+                    .own("name")
                     .is_some_and(|name| definition(context.document, name) == Some(node));
             if alias {
                 // Its own readers are counted where they are.

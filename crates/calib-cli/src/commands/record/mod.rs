@@ -18,7 +18,9 @@ use calib_pipeline::prepare::load::{RobotProfile, load_robot};
 use calib_profile::RecordingSpec;
 use clap::Args;
 
+use super::plugin_options::PluginOptions;
 use crate::error::CliError;
+use crate::terminal::emit;
 use error::RecordError;
 use plan::{guide_ranges, plan};
 
@@ -66,6 +68,9 @@ pub struct Record {
     /// Stop after this long, s
     #[arg(long)]
     pub(super) seconds: Option<f64>,
+    /// Which plugins are loaded: a recording needs none
+    #[command(flatten)]
+    _plugins: PluginOptions,
 }
 
 /// Records.
@@ -140,7 +145,7 @@ fn record(
     let ended = session.record(&mut source, &mut listener, &keys, &clock, screen)?;
     screen.line(&format!("ended: {ended}"));
     session.report(screen);
-    println!("{}", path.display());
+    emit(&format!("{}\n", path.display()))?;
     Ok(if ended.is_good() {
         ExitCode::Accepted
     } else {

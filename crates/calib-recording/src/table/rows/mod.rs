@@ -13,7 +13,7 @@ use crate::column_map::ColumnMap;
 use crate::error::{At, Placed, Problem, excerpt};
 use crate::growth::push;
 use crate::model::{MarkerSample, Timeline};
-use crate::text::{Number, Separator, cells, number};
+use crate::text::{Number, Separator, cells, number, unquoted};
 use nalgebra::Isometry3;
 use std::collections::BTreeMap;
 
@@ -143,7 +143,7 @@ impl<'a> Rows<'a> {
                         kind => self.unusual(line, i, slot, cell, kind)? / scale,
                     };
                 }
-                Column::Label(label) => cell.clone_into(&mut self.texts[label]),
+                Column::Label(label) => self.texts[label] = unquoted(cell),
                 Column::Entity => cell.clone_into(&mut self.entity),
                 Column::Pose => cell.clone_into(&mut self.poses.name),
                 Column::State(marker) => {

@@ -7,6 +7,7 @@ use crate::edit::error::EditError;
 use crate::edit::insert;
 use crate::error::{Problem, ReadError, ReadProblem};
 use crate::read::numbers::parse_numbers;
+use crate::read::source::OwnAttributes as _;
 use crate::read::source::value_range;
 use crate::xacro;
 use roxmltree::Node;
@@ -38,7 +39,7 @@ impl Patcher<'_, '_> {
             joint,
             name,
         } = *site;
-        let Some(attribute) = element.attribute_node(name) else {
+        let Some(attribute) = element.own_attribute(name) else {
             let new = new(default);
             if !default
                 .iter()

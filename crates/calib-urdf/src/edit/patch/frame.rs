@@ -5,6 +5,7 @@ use crate::edit::change::UrdfEdit;
 use crate::edit::error::EditError;
 use crate::edit::insert::{self, FixedFrame};
 use crate::model::UnknownName;
+use crate::read::source::OwnAttributes as _;
 use crate::read::source::{child, top_level};
 use roxmltree::Node;
 
@@ -18,8 +19,7 @@ impl Patcher<'_, '_> {
         insert::check_name("link", frame.link)?;
         insert::check_name("joint", frame.joint)?;
         let named = |kind, name| {
-            top_level(self.context.document, kind)
-                .find(move |node| node.attribute("name") == Some(name))
+            top_level(self.context.document, kind).find(move |node| node.own("name") == Some(name))
         };
         match (named("link", frame.link), named("joint", frame.joint)) {
             (None, None) => {}
@@ -54,14 +54,14 @@ impl Patcher<'_, '_> {
             _ => None,
         });
         let known: Vec<&str> = top_level(document, "link")
-            .filter_map(|node| node.attribute("name"))
+            .filter_map(|node| node.own("name"))
             .chain(added)
             .collect();
         // A xacro may get its links from elsewhere.
         if self.is_xacro || known.contains(&parent_link) {
             return Ok(());
         }
-        let robot = document.root_element().attribute("name").unwrap_or("");
+        let robot = document.root_element().own("name").unwrap_or("");
         let source = UnknownName::among(robot, "link", parent_link, known);
         Err(EditError::UnknownName {
             file: self.file.to_owned(),
@@ -88,8 +88,8 @@ impl Patcher<'_, '_> {
 
 /// Is this the fixed joint of the frame, as an earlier patch wrote it?
 fn is_frame(joint: Node<'_, '_>, frame: &FixedFrame<'_>) -> bool {
-    let end = |element| child(joint, element).and_then(|end| end.attribute("link"));
-    joint.attribute("type") == Some("fixed")
+    let end = |element| child(joint, element).and_then(|end| end.own("link"));
+    joint.own("type") == Some("fixed")
         && end("parent") == Some(frame.parent_link)
         && end("child") == Some(frame.link)
 }

@@ -7,6 +7,7 @@ use crate::edit::error::EditError;
 use crate::edit::insert;
 use crate::edit::rotation::{is_zero, quaternion_near, rpy_for};
 use crate::kinematics::rpy::{angle_between, rotation_from_rpy, rpy_from_rotation};
+use crate::read::source::OwnAttributes as _;
 use crate::read::source::child;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3, Vector4};
 
@@ -45,7 +46,7 @@ impl Patcher<'_, '_> {
             before.translation.vector = old.into();
             xyz.into()
         })?;
-        if self.quaternions && origin.has_attribute("quat_xyzw") {
+        if self.quaternions && origin.has_own("quat_xyzw") {
             self.set_numbers::<4>(&site("quat_xyzw"), [0.0, 0.0, 0.0, 1.0], |old| {
                 before.rotation =
                     UnitQuaternion::new_normalize(Quaternion::from(Vector4::from(old)));
@@ -63,7 +64,7 @@ impl Patcher<'_, '_> {
 
     pub(super) fn set_axis(&mut self, joint: &str, wanted: &Vector3<f64>) -> Result<(), EditError> {
         let node = self.joint(joint)?;
-        if node.attribute("type") == Some("fixed") {
+        if node.own("type") == Some("fixed") {
             let place = self.place(node.range().start);
             return Err(EditError::NoAxis {
                 file: self.file.to_owned(),
@@ -106,7 +107,7 @@ impl Patcher<'_, '_> {
         upper: f64,
     ) -> Result<(), EditError> {
         let node = self.joint(joint)?;
-        if let Some(kind @ ("fixed" | "continuous")) = node.attribute("type") {
+        if let Some(kind @ ("fixed" | "continuous")) = node.own("type") {
             return Err(EditError::NoPositionLimits {
                 file: self.file.to_owned(),
                 place: self.place(node.range().start),

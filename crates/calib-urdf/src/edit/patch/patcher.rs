@@ -5,6 +5,7 @@ use crate::edit::decimal::Splice;
 use crate::edit::error::EditError;
 use crate::error::Place;
 use crate::model::UnknownName;
+use crate::read::source::OwnAttributes as _;
 use crate::read::source::top_level;
 use crate::xacro;
 use crate::xacro::value::Context;
@@ -39,14 +40,14 @@ impl<'t, 'd> Patcher<'t, 'd> {
             return xacro::joint(document, text, name, self.file);
         }
         top_level(document, "joint")
-            .find(|node| node.attribute("name") == Some(name))
+            .find(|node| node.own("name") == Some(name))
             .ok_or_else(|| EditError::UnknownName {
                 file: self.file.to_owned(),
                 source: UnknownName::among(
-                    document.root_element().attribute("name").unwrap_or(""),
+                    document.root_element().own("name").unwrap_or(""),
                     "joint",
                     name,
-                    top_level(document, "joint").filter_map(|node| node.attribute("name")),
+                    top_level(document, "joint").filter_map(|node| node.own("name")),
                 ),
             })
     }

@@ -1,0 +1,175 @@
+//! Which error it is, and where, for programs.
+
+use std::path::Path;
+
+use calib_apply::ApplyError;
+use calib_drift::DriftError;
+use calib_files::FileError;
+use calib_pipeline::PipelineError;
+use calib_recording::At;
+use serde::Serialize;
+
+use super::CliError;
+
+/// Where an error is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Place {
+    /// The file or folder.
+    pub file: String,
+    /// Line, from 1.
+    pub line: Option<u64>,
+    /// Column, from 1: a character of a text.
+    pub column: Option<u64>,
+}
+
+impl Place {
+    fn of(file: impl Into<String>) -> Self {
+        Self {
+            file: file.into(),
+            line: None,
+            column: None,
+        }
+    }
+
+    fn path(path: &Path) -> Self {
+        Self::of(path.display().to_string())
+    }
+
+    fn at(file: &str, (line, column): (usize, usize)) -> Self {
+        Self {
+            file: file.to_owned(),
+            line: Some(line as u64),
+            column: Some(column as u64),
+        }
+    }
+}
+
+impl CliError {
+    /// Which error it is; the words stay for later versions.
+    #[must_use]
+    pub fn id(&self) -> &'static str {
+        match self {
+            Self::Pipeline(error) => of_pipeline(error),
+            Self::Apply(error) => of_apply(error),
+            Self::Drift(_) => "drift",
+            Self::Fit(_) => "fit",
+            Self::File(error) => of_file(error),
+            Self::Recording(_) => "recording",
+            Self::Table { .. } => "table-not-written",
+            Self::Simulation { .. } => "simulation",
+            Self::Json { .. } | Self::Report(_) => "report-not-written",
+            Self::Study(_) | Self::Cases(_) => "study",
+            Self::Record(_) => "record",
+            Self::Capture(_) => "capture",
+            Self::NewPlugin(_) => "new-plugin",
+            Self::Stdout(_) => "output-lost",
+        }
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn place(&self) -> Option<Place> {
+        Some(match self {
+            Self::Pipeline(error) => return place_of_pipeline(error),
+            Self::Apply(ApplyError::Read(error)) => place_of_urdf(error)?,
+            Self::Apply(ApplyError::File(error)) | Self::File(error) => place_of_file(error)?,
+            Self::Drift(DriftError::Report(error)) => Place::path(error.path()),
+            Self::Apply(ApplyError::Report(error)) => Place::path(error.path()),
+            Self::Recording(error) => place_of_recording(error),
+            Self::Table { file, .. } | Self::Simulation { file, .. } => Place::of(file.clone()),
+            _ => return None,
+        })
+    }
+
+    /// What to do: the text's own help, or [`CliError::remedy`].
+    #[must_use]
+    pub fn remedy_of(&self, said: &str) -> Option<String> {
+        let own = said.lines().find_map(|line| line.strip_prefix("  help: "));
+        own.or(self.remedy()).map(str::to_owned)
+    }
+}
+
+fn of_pipeline(error: &PipelineError) -> &'static str {
+    match error {
+        PipelineError::Read { .. } => "file-not-read",
+        PipelineError::NotText { .. } => "not-text",
+        PipelineError::Profile(_) => "profile",
+        PipelineError::Urdf(_) => "urdf",
+        PipelineError::Recording(_) => "recording",
+        PipelineError::Data { .. } => "recording-not-usable",
+        PipelineError::NotSimulated { .. } => "not-simulated",
+        PipelineError::Origin { .. } => "origin",
+        PipelineError::Solve(_) => "not-solved",
+        PipelineError::Patch { .. } | PipelineError::Edit(_) => "urdf-not-patched",
+        PipelineError::Plugin(_) => "plugin",
+        PipelineError::Report(_) => "report-not-written",
+    }
+}
+
+fn of_apply(error: &ApplyError) -> &'static str {
+    match error {
+        ApplyError::Read(_) => "urdf",
+        ApplyError::Edit(_) => "urdf-not-patched",
+        ApplyError::File(error) => of_file(error),
+        ApplyError::NotAccepted { .. } => "not-accepted",
+        ApplyError::ChangedAlready { .. } => "changed-already",
+        ApplyError::OtherOrigins { .. } => "other-origins",
+        ApplyError::PartlyApplied { .. } => "partly-applied",
+        ApplyError::NoRecord { .. } | ApplyError::NotARecord { .. } => "no-record",
+        ApplyError::Revert { .. } => "not-reverted",
+        _ => "apply",
+    }
+}
+
+fn of_file(error: &FileError) -> &'static str {
+    match error {
+        FileError::Busy { .. } => "folder-busy",
+        FileError::Name { .. } | FileError::SameName { .. } => "file-name",
+        FileError::Exists { .. } | FileError::Foreign { .. } => "file-exists",
+        FileError::OtherState { .. } => "other-state",
+        _ => "file-not-written",
+    }
+}
+
+fn place_of_pipeline(error: &PipelineError) -> Option<Place> {
+    Some(match error {
+        PipelineError::Read { file } => Place::of(file.path.clone()),
+        PipelineError::NotText { path, .. } => Place::of(path.clone()),
+        PipelineError::Profile(error) => {
+            let first = error.problems.first().and_then(|p| p.place);
+            first.map_or_else(
+                || Place::of(error.file()),
+                |p| Place::at(error.file(), (p.line, p.column)),
+            )
+        }
+        PipelineError::Urdf(error) => place_of_urdf(error)?,
+        PipelineError::Recording(error) => place_of_recording(error),
+        PipelineError::Data { file, .. } | PipelineError::Patch { file, .. } => {
+            Place::of(file.clone())
+        }
+        _ => return None,
+    })
+}
+
+fn place_of_urdf(error: &calib_urdf::ReadError) -> Option<Place> {
+    let first = error.problems.first().and_then(|p| p.place);
+    Some(first.map_or_else(
+        || Place::of(error.file.clone()),
+        |p| Place::at(&error.file, (p.line, p.column)),
+    ))
+}
+
+fn place_of_recording(error: &calib_recording::Error) -> Place {
+    let line = match &error.at {
+        At::Line(line) | At::Cell { line, .. } => Some(*line),
+        At::File | At::Byte(_) => None,
+    };
+    Place {
+        line,
+        ..Place::of(error.file.clone())
+    }
+}
+
+fn place_of_file(error: &FileError) -> Option<Place> {
+    error.path().map(Place::path)
+}

@@ -1,0 +1,166 @@
+//! A folder of results as a transaction.
+//!
+//! ```text
+//! lock · stage every file · list old and new names as "unfinished" · rename · list · unlock
+//! ```
+//!
+//! A program that is stopped anywhere leaves whole files, old or new. The list names every file before it is in its place, so
+//! that the next run may replace it; while the list says "unfinished", [`is_unfinished`] tells readers of the folder.
+
+use std::fs::{File, TryLockError};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use crate::disk::{self, is_there};
+use crate::error::FileError;
+use crate::file::{OutputFile, check_names};
+use crate::folder::make_folders;
+use crate::input;
+use crate::name::{MANIFEST, check_name};
+use crate::staged::{Staged, clean};
+
+/// First line of the list while its files are replaced.
+const UNFINISHED: &str = "# unfinished: run it again";
+
+/// A list of more bytes is not ours: names of some dozen files take a few kilobytes.
+const LARGEST_MANIFEST: u64 = 1 << 20;
+
+/// A folder that results will be written to, locked against other runs until they are written.
+///
+/// Dropped before, it leaves nothing behind: folders that it made are removed if they are empty.
+#[derive(Debug)]
+pub struct ResultsFolder {
+    folder: PathBuf,
+    /// The folders that were made, outermost first.
+    made: Vec<PathBuf>,
+    lock: Option<File>,
+}
+
+impl ResultsFolder {
+    /// Makes the folder where needed, locks it, and removes what a killed run left.
+    ///
+    /// # Errors
+    /// [`FileError::Busy`] while another run writes there; [`FileError::Write`].
+    pub fn open(folder: &Path) -> Result<Self, FileError> {
+        let mut made = Vec::new();
+        let done = make_folders(folder, &mut made);
+        let mut results = Self {
+            folder: folder.to_path_buf(),
+            made,
+            lock: None,
+        };
+        done?;
+        results.lock = lock(folder)?;
+        clean(folder);
+        Ok(results)
+    }
+
+    /// Writes all files, or none; returns their paths.
+    ///
+    /// Files of an earlier run, listed in the folder's [`MANIFEST`], are replaced. Any other file of the same name is kept,
+    /// and the call fails before a byte is written.
+    ///
+    /// # Errors
+    /// [`FileError::Name`], [`FileError::SameName`], [`FileError::Foreign`] or [`FileError::Write`].
+    pub fn write(mut self, files: &[OutputFile]) -> Result<Vec<PathBuf>, FileError> {
+        check_names(files)?;
+        let folder = self.folder.clone();
+        let ours = manifest(&folder);
+        for file in files {
+            let path = folder.join(&file.name);
+            if is_there(&path) && !ours.contains(&file.name) {
+                return Err(FileError::Foreign { path });
+            }
+        }
+        let names = listed(&folder, &ours, files);
+        let unfinished = format!("{UNFINISHED}\n{names}");
+        let list = folder.join(MANIFEST);
+        let stage = |path: &Path, bytes: &[u8]| {
+            Staged::file(&folder, bytes).map_err(FileError::write(path))
+        };
+        let mut staged = Vec::new();
+        for file in files {
+            let path = folder.join(&file.name);
+            staged.push((stage(&path, &file.bytes)?, path));
+        }
+        let first = stage(&list, unfinished.as_bytes())?;
+        staged.push((stage(&list, names.as_bytes())?, list.clone()));
+        let place = |staged: Staged, path: &Path| {
+            let placed = staged.place(path).map_err(FileError::write(path));
+            placed.map(drop)
+        };
+        let durable = || disk::sync_folder(&folder).map_err(FileError::write(&folder));
+        place(first, &list)?;
+        self.made.clear();
+        durable()?;
+        let mut written = Vec::new();
+        for (staged, path) in staged {
+            if path == list {
+                durable()?;
+            }
+            place(staged, &path)?;
+            written.push(path);
+        }
+        durable()?;
+        Ok(written)
+    }
+}
+
+impl Drop for ResultsFolder {
+    fn drop(&mut self) {
+        for folder in self.made.iter().rev() {
+            let _ = disk::remove_folder(folder);
+        }
+    }
+}
+
+/// Writes a folder of results: [`ResultsFolder::open`], [`ResultsFolder::write`].
+///
+/// # Errors
+/// As those.
+pub fn write_results(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>, FileError> {
+    check_names(files)?;
+    ResultsFolder::open(folder)?.write(files)
+}
+
+/// Whether a run was stopped while it replaced the files of this folder: each is whole, but they may be of two runs.
+#[must_use]
+pub fn is_unfinished(folder: &Path) -> bool {
+    let list = input::read_text(&folder.join(MANIFEST), LARGEST_MANIFEST);
+    list.is_ok_and(|text| text.lines().next() == Some(UNFINISHED))
+}
+
+fn manifest(folder: &Path) -> Vec<String> {
+    let list = input::read_text(&folder.join(MANIFEST), LARGEST_MANIFEST);
+    let lines = |text: String| text.lines().map(str::to_owned).collect();
+    list.map(lines).unwrap_or_default()
+}
+
+/// The names of these files, and those of earlier files that are still there.
+fn listed(folder: &Path, ours: &[String], files: &[OutputFile]) -> String {
+    let mut names: Vec<&str> = files.iter().map(|f| f.name.as_str()).collect();
+    names.extend(
+        ours.iter()
+            .map(String::as_str)
+            .filter(|n| check_name(n).is_ok() && is_there(&folder.join(n))),
+    );
+    names.sort_unstable();
+    names.dedup();
+    names.join("\n") + "\n"
+}
+
+/// The folder itself is locked: no file is left over, and the lock ends with the process. Where the system cannot lock a
+/// folder (Windows, some network disks) there is none.
+fn lock(folder: &Path) -> Result<Option<File>, FileError> {
+    let Ok(file) = File::open(folder) else {
+        return Ok(None);
+    };
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => Err(FileError::Busy {
+            path: folder.to_path_buf(),
+        }),
+        Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Interrupted => lock(folder),
+        Err(TryLockError::Error(_)) => Ok(None),
+    }
+}
