@@ -71,6 +71,37 @@ fn the_model_that_37_postures_choose_beats_the_field_on_another_day() {
     );
 }
 
+/// Nothing stated but bodies and recordings: no worse than the same with equal weights for everything.
+#[test]
+fn a_default_run_of_a_real_robot_predicts_no_worse_than_plain_least_squares() {
+    let Some(data) = data() else { return };
+    let read = |path: &str| std::fs::read(data.join(path)).expect("part of the data");
+    let (bare, _) = PROFILE.split_once("solve:").expect("a block");
+    let dir = Scratch::new()
+        .file("default.yaml", bare)
+        .file(
+            "plain.yaml",
+            format!("{bare}solve: {{robust: false, noise: {{joint_deg: 0}}}}\n"),
+        )
+        .file("tiago.urdf", read("tiago_qualisys/tiago_48_schunk.urdf"))
+        .file("train.csv", read("tiago_frozen/train.csv"))
+        .file("validation.csv", read("tiago_frozen/validation.csv"));
+    let [default, plain] = ["default", "plain"].map(|name| {
+        dir.calib(["run", &format!("{name}.yaml"), "--out", name]);
+        dir.json(&format!("{name}/report.json"))["verification"]["held_out"].clone()
+    });
+    let rms = |held_out: &serde_json::Value, robot: &str| {
+        held_out[robot]["rms_m"].as_f64().expect("62 postures")
+    };
+    let (found, by_plain) = (rms(&default, "calibrated"), rms(&plain, "calibrated"));
+    println!(
+        "TIAGo, another day: {:.2} mm rms, plain {:.2} mm",
+        found * 1e3,
+        by_plain * 1e3
+    );
+    assert!(found <= 1.03 * by_plain && found <= 1.03 * rms(&default, "registration_only"));
+}
+
 /// The same arm recorded badly: rows were read while it moved, and the fourth marker repeats the third.
 const SPOILED: &str = "calib: 1
 robot: {name: tiago, urdf: tiago.urdf}

@@ -223,7 +223,10 @@ const REPORT_PARTS: &[(&str, &[&str])] = &[
         "unobservable",
         &["not_observable", "workspace", "accuracy_limits"],
     ),
-    ("checks", &["loops", "estimators", "noise", "clocks"]),
+    (
+        "checks",
+        &["loops", "estimators", "noise", "tested_effects", "clocks"],
+    ),
     ("verification", &["verification"]),
     ("residuals", &["residuals"]),
     (

@@ -8,6 +8,7 @@ mod changes;
 mod clocks;
 mod contacts;
 mod data_faults;
+mod default_run;
 mod drift;
 mod effects;
 mod facts;

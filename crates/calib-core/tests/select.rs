@@ -5,8 +5,8 @@ mod common;
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_core::{
-    Axis, Chart, Configuration, EdgeKind, EffectKind, FrameId, ParameterId, Part, Problem,
-    Selection, SelectionRule, Settings, StepOutcome, select, solve,
+    Axis, Chart, Configuration, EdgeKind, EffectKind, FrameId, NestedError, ParameterId, Part,
+    Problem, Selection, SelectionRule, Settings, StepOutcome, select, solve,
 };
 use common::{Chain, Free, Handles, normal, rng, six_r};
 use nalgebra::Point3;
@@ -385,11 +385,14 @@ impl Robot {
     }
 
     /// Part of the coordinates of the point at the new poses that lie within their 95 % intervals: of what the parameters leave
-    /// uncertain, without noise. `None` where a joint has two couplings, which a configuration cannot tell apart.
-    fn coverage(&self, parts: &BTreeSet<usize>) -> Option<f64> {
+    /// uncertain, without noise; widened by what the choice cost. `None` where a joint has two couplings, which a configuration cannot
+    /// tell apart.
+    fn coverage(&self, parts: &BTreeSet<usize>, nested: Option<&NestedError>) -> Option<f64> {
         /// Two-sided 95 %.
         const Z95: f64 = 1.96;
-        let solution = solve(&self.with(parts), &Settings::default()).unwrap();
+        let given = solve(&self.with(parts), &Settings::default()).unwrap();
+        let widened = nested.and_then(|nested| given.widened_by_choice(nested));
+        let solution = widened.map_or(given, |(solution, _)| solution);
         let first = self.problem.samples() - self.places.len();
         let free: BTreeSet<ParameterId> = parts
             .iter()
@@ -439,6 +442,25 @@ struct Judged {
     lacked: usize,
     found: Selection,
     robot: Robot,
+}
+
+impl Judged {
+    fn has_added(&self) -> bool {
+        let mut steps = self.found.steps.iter();
+        steps.any(|s| s.outcome == StepOutcome::Added)
+    }
+
+    /// Of a choice that added something.
+    fn nested(&self) -> Option<&NestedError> {
+        let nested = self.found.nested.as_ref();
+        nested.filter(|_| self.found.parts != self.robot.first)
+    }
+}
+
+/// Mean over robots, %.
+fn mean_coverage(robots: &[Judged], of: impl Fn(&Judged) -> Option<f64>) -> f64 {
+    let each: Vec<f64> = robots.iter().filter_map(of).collect();
+    100.0 * each.iter().sum::<f64>() / each.len().max(1) as f64
 }
 
 fn judged(seed: u64, design: Design, effects: &[Truth]) -> Judged {
@@ -525,6 +547,23 @@ fn a_held_part_keeps_its_nominal_value() {
     }
 }
 
+/// What the choice leaves uncertain is in the intervals, too: as if the model had been given, they hold 91 % here.
+#[test]
+fn intervals_of_chosen_models_cover() {
+    let design = Design {
+        poses: 25,
+        ..Design::default()
+    };
+    let each: Vec<Judged> = (0..12)
+        .map(|seed| judged(1000 + seed, design, &draw(seed, 1 + seed as usize % 4, 0.0)))
+        .collect();
+    let widened = mean_coverage(&each, |j| j.robot.coverage(&j.found.parts, j.nested()));
+    let given = mean_coverage(&each, |j| j.robot.coverage(&j.found.parts, None));
+    println!("{widened:.1} %, as if given {given:.1} %");
+    // 12 robots of 300 coordinates that share a fit: ± 2 %
+    assert!(widened > 92.0 && widened >= given, "{widened} {given}");
+}
+
 /// Rates over many robots: `ROBOTS=200 cargo test --release -p calib-core --test select -- --ignored --nocapture`.
 #[test]
 #[ignore = "a study: minutes"]
@@ -543,55 +582,54 @@ fn study() {
             ("1 to 4 effects, none to strong", 1, 0.0),
             ("1 to 4 effects, half to full strength", 1, 0.5),
         ] {
-            let each: Vec<(Judged, bool)> = (0..robots)
+            let each: Vec<Judged> = (0..robots)
                 .map(|seed| {
                     let effects = draw(seed, some * (1 + seed as usize % 4), least);
-                    let judged = judged(1000 + seed, design, &effects);
-                    let added = judged
-                        .found
-                        .steps
-                        .iter()
-                        .any(|s| s.outcome == StepOutcome::Added);
-                    (judged, added)
+                    judged(1000 + seed, design, &effects)
                 })
                 .collect();
-            let mut ratios: Vec<f64> = each.iter().map(|(j, _)| j.ratio).collect();
+            let mut ratios: Vec<f64> = each.iter().map(|j| j.ratio).collect();
             ratios.sort_by(f64::total_cmp);
             let n = ratios.len();
             let share = |count: usize| 100.0 * count as f64 / n as f64;
-            let covered = |of: fn(&Judged) -> &BTreeSet<usize>| {
-                let each = each.iter().filter_map(|(j, _)| j.robot.coverage(of(j)));
-                let each: Vec<f64> = each.collect();
-                100.0 * each.iter().sum::<f64>() / each.len().max(1) as f64
-            };
             println!(
-                "coverage of 95 % intervals: selected {:.1} %, true model {:.1} %",
-                covered(|j| &j.found.parts),
-                covered(|j| &j.robot.truth),
+                "coverage of 95 % intervals: selected {:.1} % (as if the model were given {:.1} %), true model {:.1} %",
+                mean_coverage(&each, |j| j.robot.coverage(&j.found.parts, j.nested())),
+                mean_coverage(&each, |j| j.robot.coverage(&j.found.parts, None)),
+                mean_coverage(&each, |j| j.robot.coverage(&j.robot.truth, None)),
             );
             let within = |limit: f64| share(ratios.iter().filter(|r| **r <= limit).count());
             let nested = each
                 .iter()
-                .filter_map(|(j, _)| Some(j.found.nested.as_ref()?.rms / j.found.rms.1));
+                .filter_map(|j| Some(j.found.nested.as_ref()?.rms / j.found.rms.1));
             let nested: Vec<f64> = nested.collect();
-            let known = each.iter().map(|(j, _)| &j.robot);
-            let known: Vec<f64> = known
-                .map(|r| r.error(&r.of_true_size()) / r.error(&r.truth))
+            // The slowest part: only where it is asked for.
+            let asked = std::env::var_os("OF_TRUE_SIZE").is_some();
+            let known: Vec<f64> = each
+                .iter()
+                .filter(|_| asked)
+                .map(|j| j.robot.error(&j.robot.of_true_size()) / j.robot.error(&j.robot.truth))
                 .collect();
             let known = |limit: f64| share(known.iter().filter(|r| **r <= limit).count());
+            let likeliest = match asked {
+                true => format!(
+                    "; likeliest of the true size: ≤ 1.05 in {:.0} %, ≤ 1.2 in {:.0} %",
+                    known(1.05),
+                    known(1.2)
+                ),
+                false => String::new(),
+            };
             println!(
                 "{poses} poses, {label}: {n} robots; something added {:.0} %, a part that the robot lacks {:.1} %; \
                  error / true model's: median {:.3}, ≤ 1.05 in {:.0} %, ≤ 1.2 in {:.0} %, largest {:.2}; \
-                 nested / left out {:.3}; likeliest of the true size: ≤ 1.05 in {:.0} %, ≤ 1.2 in {:.0} %",
-                share(each.iter().filter(|(_, added)| *added).count()),
-                share(each.iter().filter(|(j, _)| j.lacked > 0).count()),
+                 nested / left out {:.3}{likeliest}",
+                share(each.iter().filter(|j| j.has_added()).count()),
+                share(each.iter().filter(|j| j.lacked > 0).count()),
                 ratios[n / 2],
                 within(1.05),
                 within(1.2),
                 ratios[n - 1],
                 nested.iter().sum::<f64>() / nested.len().max(1) as f64,
-                known(1.05),
-                known(1.2),
             );
         }
     }

@@ -67,7 +67,7 @@ pub fn run_on(
     options: &RunOptions,
     progress: &mut dyn FnMut(&str),
 ) -> Result<RunOutput, PipelineError> {
-    let selection = match options.select {
+    let mut chosen = match options.select {
         true => Some(selected(&mut inputs, options.force, progress)?),
         false => None,
     };
@@ -91,7 +91,10 @@ pub fn run_on(
             checked.findings.push(paper_assumptions());
             paper_result(&inputs, &checked.tracks, &checked.start, &origins, &nominal)
         }
-        Method::Ml => likelihood(&mut inputs, &mut checked, progress)?,
+        Method::Ml => {
+            let nested = chosen.as_ref().and_then(|chosen| chosen.nested.as_ref());
+            likelihood(&mut inputs, &mut checked, nested, progress)?
+        }
     };
     progress("verify");
     let refitted = refitted(&inputs, &checked, &solved)?;
@@ -99,6 +102,9 @@ pub fn run_on(
     let verified = verified(&inputs, tracks, &nominal, &solved, refitted.as_ref());
     checked.findings.extend(verified.findings);
     let (robot, fit) = (&solved.robot, solved.fit.as_ref());
+    if let Some(chosen) = &mut chosen {
+        chosen.selection.sigma_factor = fit.and_then(|fit| fit.widened);
+    }
     progress("patch the URDF");
     let urdf = patch_urdf(&inputs, robot, &verified.known)?;
     let covariance = solved.root_covariance.as_ref();
@@ -134,7 +140,7 @@ pub fn run_on(
         urdf: &urdf,
         written: &written,
         residuals: &verified.residuals,
-        selection,
+        selection: chosen.map(|chosen| chosen.selection),
         arguments: options.arguments(),
     });
     let files = files(&inputs, &report, &scene, written, &view)?;

@@ -5,7 +5,7 @@ use std::path::Path;
 use calib_report::Selection;
 
 use crate::error::PipelineError;
-use crate::formulate::selection::choose;
+use crate::formulate::selection::{Chosen, choose};
 use crate::options::Plugins;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
@@ -33,8 +33,8 @@ pub(crate) fn selected(
     inputs: &mut Inputs,
     force: bool,
     progress: &mut dyn FnMut(&str),
-) -> Result<Selection, PipelineError> {
+) -> Result<Chosen, PipelineError> {
     let chosen = choose(inputs.clone(), force, progress)?;
-    inputs.robot.profile.solve = chosen.solve;
-    Ok(chosen.selection)
+    inputs.robot.profile.solve = chosen.solve.clone();
+    Ok(chosen)
 }

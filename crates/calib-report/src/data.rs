@@ -196,6 +196,36 @@ pub struct NoiseCandidate {
     pub joint_sigma_rad: Option<f64>,
 }
 
+/// An effect that the model lacks at some joints, tested there without a fit: the most significant of its tests.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TestedEffect {
+    /// The effect, as in the table of effects; null for a drift of tracker or base.
+    pub effect: Option<String>,
+    /// Coefficients that were tested.
+    pub tested: usize,
+    /// The most significant one, for instance `elbow.compliance`.
+    pub parameter: String,
+    /// Share of χ² that it would remove.
+    pub explains: f64,
+    /// Probability of so much by chance, corrected for all tests.
+    pub p_value: f64,
+    /// What the data say.
+    pub answer: TestAnswer,
+}
+
+/// What a test of an effect says.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TestAnswer {
+    /// It is there, and matters: the finding `missing-physics`.
+    AskedFor,
+    /// It is there, and explains little.
+    Small,
+    /// It is not distinguishable from noise.
+    #[default]
+    NotSeen,
+}
+
 /// The offset between two clocks.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Clock {

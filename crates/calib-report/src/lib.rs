@@ -59,8 +59,8 @@ pub use calib_finding::{Finding, Severity, Unit};
 pub use check::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck, DataChecks};
 pub use data::{
     AccuracyLimit, Clock, Fates, FitSummary, Input, JointCoverage, Lost, Noise, NoiseCandidate,
-    NoiseChoice, Output, RecordingSummary, RecordingUse, Rejected, RejectedFor, Workspace,
-    WorkspacePoint,
+    NoiseChoice, Output, RecordingSummary, RecordingUse, Rejected, RejectedFor, TestAnswer,
+    TestedEffect, Workspace, WorkspacePoint,
 };
 pub use diagnosis::Diagnosis;
 pub use error::ReportError;

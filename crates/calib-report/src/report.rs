@@ -2,8 +2,8 @@ use crate::verdict::{Effect, Judgment, Reason, ReasonId};
 use crate::{
     AccuracyLimit, Change, Clock, DataInformation, Diagnosis, EstimatorResult, Finding, FitSummary,
     Identification, Input, JointCoverage, LoopClosure, Noise, NoiseChoice, NotObservable, Output,
-    Parameter, RecordingSummary, Rejected, Residuals, RobotChange, Selection, Transform, Unit,
-    Verification, WeakDirections, Workspace,
+    Parameter, RecordingSummary, Rejected, Residuals, RobotChange, Selection, TestedEffect,
+    Transform, Unit, Verification, WeakDirections, Workspace,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -83,6 +83,9 @@ pub struct Report {
     /// What is random from pose to pose, by evidence. Null where the profile states it, and with too few poses.
     #[serde(default)]
     pub noise_choice: Option<NoiseChoice>,
+    /// Effects that the model lacks, tested on what is left: which of them the data ask for, most significant first. Empty without a fit of all loops.
+    #[serde(default)]
+    pub tested_effects: Vec<TestedEffect>,
     /// Offsets between the clocks of the recordings.
     #[serde(default)]
     pub clocks: Vec<Clock>,

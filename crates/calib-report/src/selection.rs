@@ -115,6 +115,8 @@ pub struct Selection {
     pub chosen_rms_m: f64,
     /// The error to be stated for a chosen model; null where there are too few poses.
     pub nested: Option<NestedSelection>,
+    /// Standard deviations of the result over those of the same model without a choice; null where the choice cost nothing.
+    pub sigma_factor: Option<f64>,
     /// `free` and `joints` of the profile's `solve:` for the chosen model, YAML.
     pub solve: String,
 }

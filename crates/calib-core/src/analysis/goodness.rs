@@ -62,6 +62,14 @@ pub struct ScoreTest {
     pub explains: f64,
 }
 
+impl ScoreTest {
+    /// Chance would show one as large in less than 1 of 1000 analyses.
+    #[must_use]
+    pub fn is_significant(&self) -> bool {
+        self.p_corrected < SIGNIFICANT
+    }
+}
+
 /// Result of the goodness-of-fit analysis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -115,7 +123,7 @@ impl Solution {
             .map(|d| d.sf(self.chi2_stated));
         let missing = tests
             .iter()
-            .filter(|t| t.p_corrected < SIGNIFICANT && t.explains > RELEVANT)
+            .filter(|t| t.is_significant() && t.explains > RELEVANT)
             .cloned()
             .collect();
         Some(GoodnessOfFit {

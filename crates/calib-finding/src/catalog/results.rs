@@ -31,6 +31,12 @@ super::topic! {
             "The unconstrained estimate lies outside ±{limit}; the bound is active.",
             "Widen `within_mm` or `within_deg` if the limit is not physical; otherwise look for an effect that is not enabled.";
     }
+    /// A number far off where its prior expected it.
+    BEYOND_ITS_PRIOR = "beyond-its-prior" {
+        "": Info,
+            "The value lies {sigmas} standard deviations of its prior from the nominal one[[; {more:other} of its kind likewise]]. All of this kind together speak for a prior {factor} times as wide.",
+            "Check that the URDF is this robot's; if it is, state a wider prior under `solve.prior`.";
+    }
     /// A coefficient that physics allows on one side of 0 only, and that the data put on the other.
     WRONG_SIGN = "wrong-sign" {
         "": Warning,

@@ -1,6 +1,6 @@
 //! The result of the fit of all loops.
 
-use calib_core::{ParameterEstimate, ParameterKind, Settings};
+use calib_core::{NestedError, ParameterEstimate, ParameterKind, Settings};
 use calib_finding::{About, Fact, Finding, Severity, Unit, catalog};
 use calib_report::{Status, Unobservable};
 
@@ -12,7 +12,7 @@ use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
-use crate::formulate::{bad_rows, clock, noise};
+use crate::formulate::{bad_rows, clock, noise, priors};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
 use crate::prepare::tracks::body_tracks;
@@ -22,13 +22,15 @@ const ALIGNMENTS: usize = 3;
 /// Times that change by less, s, are right: at 1 m/s it is a hundredth of a millimeter.
 const ALIGNED: f64 = 1e-5;
 
-/// Fits all loops at once; rows of a motion are taken at the times that the fit gives, rows that had not settled are excluded and the fit is repeated.
+/// Fits all loops at once; rows of a motion are taken at the times that the fit gives, rows that had not settled are excluded
+/// and the fit is repeated. What the choice of the model cost in folds, where it was `chosen`, is in the covariance.
 ///
 /// # Errors
 /// [`PipelineError::Solve`], and those of the body tracks.
 pub fn likelihood(
     inputs: &mut Inputs,
     checked: &mut Checked,
+    chosen: Option<&NestedError>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Solved, PipelineError> {
     only_a_cross_check(&mut checked.findings);
@@ -58,7 +60,12 @@ pub fn likelihood(
         .extend(noise::by_evidence(&mut fit, inputs, &settings));
     checked.findings.extend(on_their_limit(&fit));
     checked.findings.extend(of_the_wrong_sign(&fit));
+    checked.findings.extend(priors::contradicted(&fit));
     checked.findings.extend(with_memory(&mut fit));
+    if let Some((wider, by)) = chosen.and_then(|nested| fit.solution.widened_by_choice(nested)) {
+        fit.solution = wider;
+        fit.widened = Some(by);
+    }
     clock::noticed(&mut checked.findings, inputs, &fit);
     *inputs = clock::corrected(inputs, &fit);
     ml_result(inputs, fit, registered)

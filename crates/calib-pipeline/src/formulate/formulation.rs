@@ -105,6 +105,8 @@ impl Formulation {
 pub struct MlFit {
     /// What was tried of the noise from pose to pose; `None` where the profile states it.
     pub noise: Option<NoiseChoice>,
+    /// Standard deviations over those of a given model, where the model was chosen and its choice cost something.
+    pub widened: Option<f64>,
     /// The problem's names.
     pub formulation: Formulation,
     /// What was found.

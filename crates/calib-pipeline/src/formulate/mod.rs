@@ -14,6 +14,7 @@ pub mod ml;
 pub mod model_checks;
 pub(crate) mod noise;
 pub mod parts;
+pub(crate) mod priors;
 pub mod realign;
 pub mod row_checks;
 pub mod selection;

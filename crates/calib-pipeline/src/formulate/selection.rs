@@ -4,7 +4,7 @@
 
 use std::collections::BTreeSet;
 
-use calib_core::{SelectionRule, Settings, StepOutcome};
+use calib_core::{NestedError, SelectionRule, Settings, StepOutcome};
 use calib_profile::Solve;
 use calib_report::{
     ModelPart, NestedSelection, PartKind, Selection, SelectionOutcome, SelectionStep,
@@ -25,6 +25,8 @@ pub struct Chosen {
     pub solve: Solve,
     /// How it was found.
     pub selection: Selection,
+    /// What it costs in folds; `None` where nothing was added or there are too few poses.
+    pub nested: Option<NestedError>,
 }
 
 /// Chooses what to free; `inputs` are as they were read.
@@ -38,11 +40,12 @@ pub fn choose(
 ) -> Result<Chosen, PipelineError> {
     let profile = inputs.robot.profile.clone();
     let mut checked = check_data(&mut inputs, Vec::new(), force)?;
-    let solved = likelihood(&mut inputs, &mut checked, progress)?;
+    let solved = likelihood(&mut inputs, &mut checked, None, progress)?;
     let Some(base) = solved.fit else {
         return Ok(Chosen {
             solve: profile.solve,
             selection: Selection::default(),
+            nested: None,
         });
     };
     progress("choose effects");
@@ -80,6 +83,7 @@ pub fn choose(
     };
     Ok(Chosen {
         selection: facts.selection(yaml(&solve, &inputs.robot.model)),
+        nested: found.nested.clone().filter(|_| !added.is_empty()),
         solve,
     })
 }
@@ -170,6 +174,7 @@ impl Facts<'_> {
                 first_rms_m: n.rms_first,
                 chosen_rms_m: n.rms_chosen,
             }),
+            sigma_factor: None,
             solve,
         }
     }

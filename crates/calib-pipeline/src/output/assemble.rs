@@ -12,7 +12,8 @@ use crate::output::evidence::Evidence;
 use crate::output::facts::facts;
 use crate::output::of_data::{coverage, estimators, findings, recordings, rejected};
 use crate::output::of_fit::{
-    fit_summary, missing_physics, noise, noise_choice, not_observable, parameters, transform,
+    fit_summary, missing_physics, noise, noise_choice, not_observable, parameters, tested_effects,
+    transform,
 };
 use crate::output::verdict::{limits, next_steps, scope};
 use crate::output::weak::{self, weak_directions};
@@ -83,6 +84,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         residuals: Residuals::from_rows(e.residuals),
         noise: e.fit.map_or_else(Vec::new, |fit| noise(e, fit)),
         noise_choice: e.fit.and_then(noise_choice),
+        tested_effects: goodness.as_ref().map_or_else(Vec::new, tested_effects),
         clocks: crate::formulate::clock::clocks(e.inputs, e.fit),
         recordings: recordings(e.inputs, &tracks),
         coverage: coverage(e.inputs),

@@ -2,10 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use calib_core::{Gauge, NoiseKind};
+use calib_core::{Gauge, GoodnessOfFit, NoiseKind};
 use calib_geometry::statistics::median;
 use calib_profile::Profile;
-use calib_report::{Cause, FitSummary, NotObservable, Parameter, Term, Transform, Unit};
+use calib_report::{
+    Cause, FitSummary, NotObservable, Parameter, Term, TestAnswer, TestedEffect, Transform, Unit,
+};
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::found::Found;
@@ -236,6 +238,43 @@ fn noise_model(model: calib_core::NoiseModel) -> calib_report::NoiseModel {
         calib_core::NoiseModel::JointEach => calib_report::NoiseModel::JointEach,
         _ => calib_report::NoiseModel::White,
     }
+}
+
+/// The tests effect by effect, the most significant of each first.
+pub(crate) fn tested_effects(goodness: &GoodnessOfFit) -> Vec<TestedEffect> {
+    let mut out: Vec<TestedEffect> = Vec::new();
+    for test in &goodness.tests {
+        let effect = match test.physics {
+            calib_core::Physics::Effect(kind) => Some(kind.effect().id.to_owned()),
+            _ => None,
+        };
+        let answer = if goodness.missing.iter().any(|m| m.name == test.name) {
+            TestAnswer::AskedFor
+        } else if test.is_significant() {
+            TestAnswer::Small
+        } else {
+            TestAnswer::NotSeen
+        };
+        let place = out.iter().position(|t| t.effect == effect);
+        let place = place.unwrap_or_else(|| {
+            out.push(TestedEffect::default());
+            out.len() - 1
+        });
+        let known = &mut out[place];
+        let matters = answer == TestAnswer::AskedFor && known.answer != TestAnswer::AskedFor;
+        if known.tested == 0 || matters {
+            *known = TestedEffect {
+                effect,
+                tested: known.tested,
+                parameter: test.name.clone(),
+                explains: test.explains,
+                p_value: test.p_corrected,
+                answer,
+            };
+        }
+        known.tested += 1;
+    }
+    out
 }
 
 /// A significant score test as the report tells it.

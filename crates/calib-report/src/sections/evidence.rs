@@ -3,7 +3,7 @@
 use super::{Page, code, mm};
 use crate::table::Table;
 use crate::words;
-use crate::{NoiseChoice, Report, Unit, number};
+use crate::{NoiseChoice, Report, TestedEffect, Unit, number};
 
 /// Row numbers shown in a table cell; the rest is counted.
 const ROWS: usize = 8;
@@ -14,6 +14,7 @@ pub(super) fn data(page: &mut Page, report: &Report) {
     conversions(page, report);
     joint_ranges(page, report);
     noise(page, report);
+    tested_effects(page, &report.tested_effects);
     page.text(format!(
         "Were the clocks synchronized? {}",
         words::clock::clocks(report, "below").join(" ")
@@ -116,6 +117,29 @@ fn noise(page: &mut Page, report: &Report) {
     if let Some(choice) = &report.noise_choice {
         noise_choice(page, choice);
     }
+}
+
+/// Which effects the data ask for, and which not.
+fn tested_effects(page: &mut Page, tested: &[TestedEffect]) {
+    let mut table = Table::new(&[
+        "<effect",
+        ">tests",
+        "<most significant",
+        ">explains of χ²",
+        ">p, of all tests",
+        "<the data",
+    ]);
+    for test in tested {
+        table.row([
+            test.words(),
+            test.tested.to_string(),
+            code(&test.parameter),
+            number::percent(test.explains),
+            words::selection::p_value(test.p_value),
+            test.answer.words().to_owned(),
+        ]);
+    }
+    page.table(words::physics::TESTED, table);
 }
 
 fn noise_choice(page: &mut Page, choice: &NoiseChoice) {

@@ -17,7 +17,7 @@ mod limit;
 mod next_steps;
 pub(crate) mod noise;
 pub(crate) mod observability;
-mod physics;
+pub(crate) mod physics;
 pub(crate) mod prose;
 mod rejected_for;
 pub(crate) mod rejection;

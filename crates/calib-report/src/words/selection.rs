@@ -17,9 +17,7 @@ impl ModelPart {
             (PartKind::Origin, _) => "origin".to_owned(),
             (PartKind::Coupling, _) => "coupling".to_owned(),
             (PartKind::Masses, _) => "masses".to_owned(),
-            (PartKind::Effect, "offset") => "zero offset".to_owned(),
-            (PartKind::Effect, "eccentricity_2") => "second harmonic".to_owned(),
-            (PartKind::Effect, id) => id.replace('_', " "),
+            (PartKind::Effect, id) => self::effect(id),
         };
         let joint = match &self.joint {
             Some(joint) => code(joint),
@@ -29,6 +27,15 @@ impl ModelPart {
             Some(other) => format!("{noun} of {joint} to {}", code(other)),
             None => format!("{noun} of {joint}"),
         }
+    }
+}
+
+/// An effect of the table of effects as a noun.
+pub(crate) fn effect(id: &str) -> String {
+    match id {
+        "offset" => "zero offset".to_owned(),
+        "eccentricity_2" => "second harmonic".to_owned(),
+        id => id.replace('_', " "),
     }
 }
 
@@ -106,6 +113,12 @@ pub(crate) fn summary(selection: &Selection) -> Vec<String> {
             nested.folds,
             length(nested.rms_m),
             length(nested.first_rms_m)
+        ));
+    }
+    if let Some(factor) = selection.sigma_factor {
+        lines.push(format!(
+            "All standard deviations are {} times those of the same model without a choice: the folds show what is uncertain because the model was chosen.",
+            number::fixed(factor, 2)
         ));
     }
     if !selection.unsupported.is_empty() {

@@ -32,6 +32,7 @@ mod nested;
 mod path;
 mod step;
 mod task;
+mod widen;
 
 /// Something that a model can have: parameters that are free together.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -126,6 +127,8 @@ pub struct NestedError {
     pub rms_first: f64,
     /// The same of the model that all samples chose, fitted without each fold.
     pub rms_chosen: f64,
+    /// Standard error of `rms² − rms_chosen²` over the folds, m².
+    pub lost_error: f64,
     /// In how many folds each part was added.
     pub added: Vec<usize>,
 }

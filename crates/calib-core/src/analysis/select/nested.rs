@@ -75,8 +75,22 @@ pub(super) fn nested(
         rms: rms(|fold| fold.nested),
         rms_first: rms(|fold| fold.first),
         rms_chosen: rms(|fold| fold.chosen),
+        lost_error: lost_error(&found),
         added,
     })
+}
+
+/// Standard error, over the folds, of what the mean square grows by when the choice is repeated without the fold, m².
+fn lost_error(folds: &[Fold]) -> f64 {
+    let mean = |(sum, count): Squares| sum / count.max(1) as f64;
+    let lost: Vec<f64> = folds
+        .iter()
+        .map(|fold| mean(fold.nested) - mean(fold.chosen))
+        .collect();
+    let n = lost.len() as f64;
+    let middle = lost.iter().sum::<f64>() / n;
+    let squares: f64 = lost.iter().map(|l| (l - middle).powi(2)).sum();
+    (squares / (n - 1.0) / n).sqrt()
 }
 
 /// The choice on some samples.

@@ -131,6 +131,7 @@ pub fn fit(
     let calibration = calibration(&formulation, &solution, inputs);
     Ok(MlFit {
         noise: None,
+        widened: None,
         formulation,
         solution,
         calibration,
