@@ -280,3 +280,34 @@ fn noise_groups_keep_their_kind() {
     let r = rig(8, Physics::None, true);
     assert_eq!(fit(&r).noise[0].kind, NoiseKind::Position);
 }
+
+/// Mean, standard deviation and share beyond ± 2 of the standardized residuals.
+fn spread(residuals: &[f64]) -> (f64, f64, f64) {
+    let n = residuals.len() as f64;
+    let mean = residuals.iter().sum::<f64>() / n;
+    let variance = residuals.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / n;
+    let beyond = residuals.iter().filter(|r| r.abs() > 2.0).count() as f64;
+    (mean, variance.sqrt(), beyond / n)
+}
+
+#[test]
+fn standardized_residuals_are_standard_normal_where_the_noise_is_right() {
+    for seed in 0..4 {
+        let s = fit(&rig(300 + seed, Physics::None, true));
+        let residuals = s.standardized_residuals().unwrap();
+        assert!(residuals.len() as f64 > s.degrees_of_freedom);
+        let (mean, std, beyond) = spread(&residuals);
+        assert!(
+            mean.abs() < 0.15 && (std - 1.0).abs() < 0.12,
+            "{mean} {std}"
+        );
+        // 4.6 % of a standard normal distribution.
+        assert!((0.02..0.08).contains(&beyond), "{beyond}");
+    }
+    // Half of the noise stated: everything is twice as large.
+    let mut wrong = rig(300, Physics::None, true);
+    let markers = wrong.h.markers;
+    wrong.h.problem.group_mut(markers).sigma *= 0.5;
+    let (_, std, _) = spread(&fit(&wrong).standardized_residuals().unwrap());
+    assert!((std - 2.0).abs() < 0.3, "{std}");
+}

@@ -154,6 +154,9 @@ pub struct Noise {
     pub unit: Unit,
     /// Standard deviation per component estimated from the data; null when it is not observable.
     pub sigma: Option<f64>,
+    /// Standard error of `sigma` divided by `sigma`; null where the data did not decide it.
+    #[serde(default)]
+    pub relative_error: Option<f64>,
     /// Stated by the profile.
     pub stated: Option<f64>,
     /// Number of observations.

@@ -21,6 +21,7 @@
 //! What this crate does **not** protect against: a report that was filled with wrong data. It reads no clock and takes no
 //! absolute path: the caller passes paths relative to the profile. The same report gives the same bytes.
 
+mod budget;
 mod check;
 pub mod csv;
 mod data;
@@ -46,6 +47,7 @@ pub mod scene;
 mod schema;
 mod sections;
 mod selection;
+mod standardized;
 mod svg;
 mod table;
 pub mod terminal;
@@ -84,6 +86,7 @@ pub use schema::{model_schema, report_schema, scene_schema};
 pub use selection::{
     ModelPart, NestedSelection, PartKind, Selection, SelectionOutcome, SelectionStep,
 };
+pub use standardized::Standardized;
 pub use verdict::{
     Agreement, Compared, Effect, Goodness, ImplausibleChange, Improvement, Judgment, Orientation,
     Part, Predicted, Prediction, Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver,

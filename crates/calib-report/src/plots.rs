@@ -1,6 +1,10 @@
 //! The plots of `report.html` as data: every plotted number, in the unit of its axis.
 
-use crate::{JointResiduals, Report, ResidualGroup, RobotChange, Unit, number};
+mod correlation;
+mod distribution;
+mod residuals;
+
+use crate::{Report, RobotChange, Unit, number};
 use serde::Serialize;
 
 /// A plot.
@@ -37,13 +41,37 @@ pub enum PlotKind {
         y: String,
         /// Whether the vertical axis is logarithmic.
         log_y: bool,
+        /// Drawn behind the series.
+        band: Option<Band>,
         /// In the order of the legend; at most four.
         series: Vec<Series>,
     },
     /// Counts per bin, one strip per joint, each over its own range.
     Strips {
+        /// Label of the axis that all strips share in kind.
+        axis: String,
         /// Top to bottom.
         rows: Vec<Strip>,
+    },
+    /// Bars side by side over a variable, and a curve to compare them with.
+    Bars {
+        /// Label of the horizontal axis.
+        x: String,
+        /// Label of the vertical axis.
+        y: String,
+        /// From, to, height.
+        bars: Vec<[f64; 3]>,
+        /// The curve.
+        curve: Series,
+    },
+    /// Numbers from −1 to 1 for pairs.
+    Matrix {
+        /// Label of the values.
+        value: String,
+        /// Of the rows and columns.
+        names: Vec<String>,
+        /// The lower triangle without its diagonal: row i has i values.
+        rows: Vec<Vec<f64>>,
     },
     /// Values at places, seen along an axis.
     Map {
@@ -86,6 +114,15 @@ pub struct Series {
     pub points: Vec<[f64; 2]>,
 }
 
+/// A band of [`PlotKind::Xy`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Band {
+    /// In the legend.
+    pub name: String,
+    /// x, lower end, upper end.
+    pub points: Vec<[f64; 3]>,
+}
+
 /// A row of [`PlotKind::Strips`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Strip {
@@ -121,9 +158,11 @@ pub fn plots(report: &Report) -> Vec<Plot> {
     changes(&mut plots, report);
     loops(&mut plots, report);
     coverage(&mut plots, report);
-    residuals(&mut plots, report);
+    residuals::residuals(&mut plots, report);
+    distribution::distribution(&mut plots, report);
     workspace(&mut plots, report);
     accuracy(&mut plots, report);
+    correlation::correlation(&mut plots, report);
     plots
 }
 
@@ -193,9 +232,10 @@ fn held_out(plots: &mut Vec<Plot>, report: &Report) {
             description: "Error of every held-out pose in the order of the recording; logarithmic."
                 .into(),
             kind: PlotKind::Xy {
-                x: "pose".into(),
+                x: "pose, in the order of the recording [1]".into(),
                 y: "error [mm]".into(),
                 log_y: true,
+                band: None,
                 series,
             },
         });
@@ -230,7 +270,7 @@ fn changes(plots: &mut Vec<Plot>, report: &Report) {
             description: "Bar: change divided by its σ; beyond ± 2.6 it is significant (99 %)."
                 .into(),
             kind: PlotKind::Rows {
-                axis: "change / σ".into(),
+                axis: "change [σ]".into(),
                 rows,
             },
         });
@@ -284,97 +324,11 @@ fn coverage(plots: &mut Vec<Plot>, report: &Report) {
             description:
                 "Samples of each joint over its range. Darker: more samples; empty: no samples."
                     .into(),
-            kind: PlotKind::Strips { rows },
+            kind: PlotKind::Strips {
+                axis: "joint position, each over its own range [deg or mm]".into(),
+                rows,
+            },
         });
-    }
-}
-
-fn residuals(plots: &mut Vec<Plot>, report: &Report) {
-    let row = |group: &ResidualGroup| PlotRow {
-        label: group.name.clone(),
-        bar: Some(mm(group.rms_m)),
-        whisker: Some([mm(group.rms_m), mm(group.p95_m)]),
-        tick: Some(mm(group.max_m)),
-        text: number::plain(group.rms_m, Unit::Meter),
-        ..PlotRow::default()
-    };
-    for (id, title, groups) in [
-        (
-            "plot-residuals-marker",
-            "Residuals per marker",
-            &report.residuals.by_marker,
-        ),
-        (
-            "plot-residuals-direction",
-            "Residuals along the axes of the tracker",
-            &report.residuals.by_direction,
-        ),
-    ] {
-        if !groups.is_empty() {
-            plots.push(Plot {
-                id: id.into(),
-                section: "residuals",
-                title: title.into(),
-                description: "Bar: rms; line: up to the 95 % quantile; tick: maximum.".into(),
-                kind: PlotKind::Rows {
-                    axis: "residual [mm]".into(),
-                    rows: groups.iter().map(row).take(ROWS).collect(),
-                },
-            });
-        }
-    }
-    for (i, joint) in report.residuals.by_joint.iter().enumerate() {
-        plots.push(over_bins(
-            format!("plot-residuals-joint-{}", i + 1),
-            format!("Residuals over {}", joint.name),
-            joint,
-        ));
-    }
-    for (i, recording) in report.residuals.over_time.iter().enumerate() {
-        plots.push(over_bins(
-            format!("plot-residuals-time-{}", i + 1),
-            format!("Residuals over {}", recording.name),
-            recording,
-        ));
-    }
-}
-
-fn over_bins(id: String, title: String, residuals: &JointResiduals) -> Plot {
-    let (scale, x) = match residuals.unit {
-        Unit::Radian => (
-            180.0 / std::f64::consts::PI,
-            format!("{} [deg]", residuals.name),
-        ),
-        Unit::Meter => (1e3, format!("{} [mm]", residuals.name)),
-        Unit::Second => (1.0, "time [s]".to_owned()),
-        _ => (1.0, "row".to_owned()),
-    };
-    let component = |name: &str, i: usize| Series {
-        name: format!("mean {name}"),
-        style: i,
-        line: true,
-        points: residuals
-            .bins
-            .iter()
-            .map(|bin| [bin.center * scale, mm(bin.mean_m[i])])
-            .collect(),
-    };
-    let rms = Series {
-        name: "rms".into(),
-        style: 3,
-        line: false,
-        points: residuals
-            .bins
-            .iter()
-            .map(|bin| [bin.center * scale, mm(bin.rms_m)])
-            .collect(),
-    };
-    Plot {
-        id,
-        section: "residuals",
-        title,
-        description: "Lines: mean residual along the x, y, z axes of the tracker; a systematic pattern indicates an effect that is not modeled. Dots: rms length.".into(),
-        kind: PlotKind::Xy { x, y: "residual [mm]".into(), log_y: false, series: vec![component("x", 0), component("y", 1), component("z", 2), rms] },
     }
 }
 

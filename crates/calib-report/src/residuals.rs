@@ -1,4 +1,4 @@
-use crate::{JointValue, Stats, Unit};
+use crate::{JointValue, Standardized, Stats, Unit};
 use calib_geometry::statistics::quantile_type7;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -51,6 +51,9 @@ pub struct Residuals {
     pub by_joint: Vec<JointResiduals>,
     /// Over time, or over the row where there is no time; recording by recording.
     pub over_time: Vec<JointResiduals>,
+    /// Their distribution in units of their standard deviations; null without a noise model.
+    #[serde(default)]
+    pub standardized: Option<Standardized>,
 }
 
 /// Residual lengths of a group, m.
@@ -97,6 +100,10 @@ pub struct ResidualBin {
     pub max_m: f64,
     /// Mean residual vector in the tracker frame, m: a systematic pattern indicates an effect that is not modeled.
     pub mean_m: [f64; 3],
+    /// σ of a component of `mean_m` where nothing is systematic, from how the residuals of whole rows scatter, m; null for a
+    /// single row.
+    #[serde(default)]
+    pub mean_sigma_m: Option<f64>,
 }
 
 /// Bins over a variable: enough to resolve a systematic pattern of three periods, few enough to have samples in each.
@@ -179,6 +186,16 @@ impl Residuals {
                 })
                 .collect(),
             over_time: over_time.collect(),
+            standardized: None,
+        }
+    }
+
+    /// The same with their distribution in units of their standard deviations.
+    #[must_use]
+    pub fn with_standardized(self, standardized: Option<Standardized>) -> Self {
+        Self {
+            standardized,
+            ..self
         }
     }
 
@@ -225,6 +242,7 @@ fn bins(rows: Vec<At<'_>>) -> Vec<ResidualBin> {
     } else {
         0.0
     };
+    let variance = variance_of_means(rows.iter().map(|row| row.1));
     let mut parts: BTreeMap<usize, Vec<&ResidualRow>> = BTreeMap::new();
     for (at, row) in rows {
         let bin = if width > 0.0 {
@@ -247,9 +265,31 @@ fn bins(rows: Vec<At<'_>>) -> Vec<ResidualBin> {
             rms_m: stats.rms,
             max_m: stats.max,
             mean_m,
+            mean_sigma_m: variance.map(|v| (v / rows.len() as f64).sqrt()),
         })
     };
     parts.into_iter().filter_map(summary).collect()
+}
+
+/// n times the variance of a component of the mean of n residuals where nothing is systematic, m². `None` for a single row.
+///
+/// Measurements of one row share its posture's error, so rows count (S_c: the sum of the residuals of row c, k_c of them):
+///
+/// ```text
+/// v = Σ_c |S_c|² / (3 Σ_c k_c)
+/// ```
+fn variance_of_means<'a>(rows: impl Iterator<Item = &'a ResidualRow>) -> Option<f64> {
+    let mut sums: BTreeMap<(&str, u64), [f64; 3]> = BTreeMap::new();
+    let mut count = 0.0;
+    for row in rows {
+        let sum = sums.entry((&row.recording, row.row)).or_default();
+        for (sum, x) in sum.iter_mut().zip(row.residual_m) {
+            *sum += x;
+        }
+        count += 1.0;
+    }
+    let total: f64 = sums.values().flatten().map(|x| x * x).sum();
+    (sums.len() > 1).then(|| total / (3.0 * count))
 }
 
 #[cfg(test)]
@@ -354,5 +394,63 @@ mod tests {
             Residuals::from_rows(&[row("a", 0.5, [0.001; 3]), row("a", 0.5, [0.001; 3])]);
         assert_eq!(residuals.by_joint[0].bins.len(), 1);
         assert_eq!(residuals.by_joint[0].bins[0].center, 0.5);
+    }
+
+    #[test]
+    fn of_the_means_of_noise_one_in_twenty_leaves_two_sigma_also_where_markers_share_an_error() {
+        use rand::SeedableRng;
+        use rand_distr::{Distribution, StandardNormal};
+        for shared in [0.0, 1e-3] {
+            let rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+            let mut noise = StandardNormal.sample_iter(rng);
+            let mut normal = |sigma: f64| -> [f64; 3] {
+                std::array::from_fn(|_| sigma * noise.next().unwrap_or(0.0))
+            };
+            let mut rows = Vec::new();
+            for i in 0..4000 {
+                let common = normal(shared);
+                for marker in ["a", "b", "c", "d"] {
+                    let own = normal(5e-4);
+                    let residual = std::array::from_fn(|k| common[k] + own[k]);
+                    rows.push(ResidualRow {
+                        row: i,
+                        ..row(marker, (i as f64 * 0.618).fract(), residual)
+                    });
+                }
+            }
+            let bins = &Residuals::from_rows(&rows).by_joint[0].bins;
+            let out = bins.iter().flat_map(|bin| {
+                let sigma = bin.mean_sigma_m.expect("many rows");
+                bin.mean_m.map(|x| x.abs() > 2.0 * sigma)
+            });
+            let out = out.filter(|out| *out).count();
+            // 72 means: 3.3 expected, more than 9 with a probability of 0.2 %.
+            assert!((0..=9).contains(&out), "{shared}: {out} of 72");
+            let sigma = bins[0].mean_sigma_m.expect("many rows");
+            let one = (shared * shared + 5e-4 * 5e-4 / 4.0).sqrt();
+            let expected = one / (bins[0].samples as f64 / 4.0).sqrt();
+            assert!((sigma / expected - 1.0).abs() < 0.1, "{sigma} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_pattern_leaves_its_band() {
+        let wave = |i: u64| {
+            let at = i as f64 * 0.01;
+            let noise = if i % 2 == 0 { 1e-4 } else { -1e-4 };
+            ResidualRow {
+                row: i,
+                ..row("a", at, [2e-4 * at.sin() + noise, noise, noise])
+            }
+        };
+        let rows: Vec<ResidualRow> = (0..628).map(wave).collect();
+        let bins = &Residuals::from_rows(&rows).by_joint[0].bins;
+        let out = |k: usize| {
+            let beyond = |b: &&ResidualBin| b.mean_m[k].abs() > 2.0 * b.mean_sigma_m.unwrap_or(0.0);
+            bins.iter().filter(beyond).count()
+        };
+        assert!(out(0) > 12 && out(1) == 0, "{} {}", out(0), out(1));
+        let single = Residuals::from_rows(&[row("a", 0.1, [1e-3; 3])]);
+        assert_eq!(single.by_joint[0].bins[0].mean_sigma_m, None);
     }
 }

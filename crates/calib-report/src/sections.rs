@@ -2,6 +2,7 @@
 //!
 //! Text is plain, with one kind of markup: names, paths and keys are between backticks.
 
+mod budget;
 mod evidence;
 mod robot;
 mod selection;
@@ -50,6 +51,7 @@ pub(crate) fn sections(report: &Report) -> Vec<Section> {
     evidence::residuals(&mut page, report);
     weak::directions(&mut page, report);
     evidence::accuracy(&mut page, report);
+    budget::budget(&mut page, report);
     robot::urdf(&mut page, report);
     robot::parameters(&mut page, report);
     evidence::files(&mut page, report);

@@ -1,13 +1,17 @@
 //! Plots as SVG: plain paths, colors by CSS class, so that one drawing serves light, dark and print.
 
 mod kinds;
+mod map;
+mod matrix;
 mod scale;
 mod strip;
+mod xy;
 
 pub(crate) use strip::strip;
 
 use crate::plots::{Plot, PlotKind};
 use std::fmt::Write;
+use xy::Labels;
 
 /// Width of every plot in user units; text is 12 units high and stays readable at 400 px.
 const WIDTH: f64 = 440.0;
@@ -24,10 +28,17 @@ pub(crate) fn svg(plot: &Plot) -> String {
             x,
             y,
             log_y,
+            band,
             series,
-        } => kinds::draw_xy(&mut body, x, y, *log_y, series),
-        PlotKind::Strips { rows } => kinds::draw_strips(&mut body, rows),
-        PlotKind::Map { value, panels } => kinds::draw_map(&mut body, value, panels),
+        } => xy::draw_xy(&mut body, &Labels { x, y }, *log_y, band.as_ref(), series),
+        PlotKind::Bars { x, y, bars, curve } => {
+            xy::draw_bars(&mut body, &Labels { x, y }, bars, curve)
+        }
+        PlotKind::Matrix { value, names, rows } => {
+            matrix::draw_matrix(&mut body, value, names, rows)
+        }
+        PlotKind::Strips { axis, rows } => kinds::draw_strips(&mut body, axis, rows),
+        PlotKind::Map { value, panels } => map::draw_map(&mut body, value, panels),
     };
     format!(
         "<svg role=\"img\" viewBox=\"0 0 {WIDTH} {height}\" aria-labelledby=\"{id}-t {id}-d\"><title id=\"{id}-t\">{}</title><desc id=\"{id}-d\">{}</desc>{}</svg>",
@@ -87,6 +98,15 @@ impl Body {
         );
     }
 
+    /// Text that reads upwards, its middle at a place.
+    fn upright(&mut self, x: f64, y: f64, text: &str) {
+        let _ = write!(
+            self.0,
+            "<text class=\"label middle\" transform=\"translate({x:.1} {y:.1}) rotate(-90)\">{}</text>",
+            escape(text)
+        );
+    }
+
     /// A mark whose shape, not only its color, identifies the series.
     fn mark(&mut self, series: usize, [x, y]: [f64; 2]) {
         let class = format!("mark s{series}");
@@ -119,7 +139,7 @@ impl Body {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plots::{Panel, PlotRow, Series, Strip};
+    use crate::plots::{Band, Panel, PlotRow, Series, Strip};
 
     #[test]
     fn names_cannot_leave_the_picture() {
@@ -165,9 +185,25 @@ mod tests {
                 x: String::new(),
                 y: String::new(),
                 log_y: true,
-                series: vec![xy],
+                band: Some(Band {
+                    name: String::new(),
+                    points: vec![[f64::NAN, 0.0, 1.0], [0.0, 1.0, f64::INFINITY]],
+                }),
+                series: vec![xy.clone()],
+            },
+            PlotKind::Bars {
+                x: String::new(),
+                y: String::new(),
+                bars: vec![[f64::NAN, 0.0, 1.0], [0.0, 0.0, 0.0]],
+                curve: xy,
+            },
+            PlotKind::Matrix {
+                value: String::new(),
+                names: vec!["a".into(), "b".into()],
+                rows: vec![vec![], vec![f64::NAN]],
             },
             PlotKind::Strips {
+                axis: String::new(),
                 rows: vec![Strip {
                     label: String::new(),
                     from: String::new(),
@@ -195,5 +231,66 @@ mod tests {
             let text = svg(&plot);
             assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
         }
+    }
+
+    /// Texts of a class in a picture.
+    fn texts(svg: &str, class: &str) -> Vec<String> {
+        let document = roxmltree::Document::parse(svg).expect("well-formed");
+        let of_class = |n: &roxmltree::Node<'_, '_>| {
+            n.attribute("class")
+                .is_some_and(|c| c.split(' ').any(|c| c == class))
+        };
+        let found = document.descendants().filter(of_class);
+        found.filter_map(|n| n.text().map(str::to_owned)).collect()
+    }
+
+    #[test]
+    fn both_axes_have_a_title_and_at_least_two_labeled_ticks_at_any_size_of_the_data() {
+        for exponent in -9..6 {
+            for from in [0.0, 1.0, -3.3, 0.97] {
+                for width in [1e-6, 0.03, 1.0, 7.7] {
+                    let at = |t: f64| (from + width * t) * 10f64.powi(exponent);
+                    for log_y in [false, true] {
+                        let scale =
+                            scale::Scale::new([at(0.0), at(1.0)].into_iter(), 0.0, 100.0, log_y);
+                        for count in [3.0, 4.0, 5.0] {
+                            let ticks = scale.ticks(count);
+                            assert!(
+                                ticks.len() >= 2,
+                                "{from} {width} {exponent} {log_y}: {ticks:?}"
+                            );
+                            let mut labels: Vec<_> = ticks.iter().map(|t| &t.1).collect();
+                            labels.dedup();
+                            assert_eq!(labels.len(), ticks.len(), "{labels:?}");
+                        }
+                    }
+                }
+            }
+        }
+        let series = Series {
+            name: "a".into(),
+            style: 0,
+            line: true,
+            points: vec![[0.0, 1.0], [2.0, 3.0]],
+        };
+        let plot = Plot {
+            id: "p".into(),
+            section: "data",
+            title: String::new(),
+            description: String::new(),
+            kind: PlotKind::Xy {
+                x: "angle [deg]".into(),
+                y: "residual [mm]".into(),
+                log_y: false,
+                band: None,
+                series: vec![series],
+            },
+        };
+        let text = svg(&plot);
+        assert_eq!(texts(&text, "label"), ["angle [deg]", "residual [mm]"]);
+        assert!(
+            texts(&text, "tick").len() >= 5,
+            "two for each axis and the legend"
+        );
     }
 }

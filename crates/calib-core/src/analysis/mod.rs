@@ -19,6 +19,7 @@ pub(crate) mod scores;
 pub(crate) mod select;
 pub(crate) mod solution;
 pub(crate) mod spread;
+mod standardized;
 pub(crate) mod untested;
 pub(crate) mod validate;
 pub(crate) mod weigh;

@@ -3,7 +3,7 @@
 use calib_profile::Method;
 use calib_report::{
     HeldOut, Identification, Input, MissingPhysics, NextStep, Output, Report, Residuals, Scope,
-    Verdict, Verification, judge,
+    Standardized, Verdict, Verification, judge,
 };
 
 use crate::formulate::formulation::MlFit;
@@ -81,7 +81,11 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         estimators: estimators(e),
         fit: e.fit.map(|fit| fit_summary(profile, fit, &parameters)),
         parameters,
-        residuals: Residuals::from_rows(e.residuals),
+        residuals: Residuals::from_rows(e.residuals).with_standardized(
+            e.fit
+                .and_then(|fit| fit.solution.standardized_residuals())
+                .and_then(|residuals| Standardized::of(&residuals)),
+        ),
         noise: e.fit.map_or_else(Vec::new, |fit| noise(e, fit)),
         noise_choice: e.fit.and_then(noise_choice),
         tested_effects: goodness.as_ref().map_or_else(Vec::new, tested_effects),

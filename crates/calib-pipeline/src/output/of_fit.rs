@@ -197,6 +197,7 @@ pub(crate) fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
                 _ => Unit::Radian,
             },
             sigma: Some(n.sigma),
+            relative_error: n.relative_error,
             stated: stated_sigma(profile, &n.name),
             samples: n.samples,
             text: calib_report::Noise::method(n.estimated).to_owned(),

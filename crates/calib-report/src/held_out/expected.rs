@@ -36,6 +36,9 @@ pub struct ExpectedError {
     /// What the tracker's noise contributes to `rms_m`, m; null where it is not known.
     #[serde(default)]
     pub tracker_m: Option<f64>,
+    /// ν of the interval; null where all errors are zero.
+    #[serde(default)]
+    pub degrees_of_freedom: Option<f64>,
 }
 
 impl ExpectedError {
@@ -57,6 +60,7 @@ pub(crate) struct Interval {
     pub(crate) low: f64,
     pub(crate) high: f64,
     pub(crate) postures: usize,
+    pub(crate) freedom: f64,
 }
 
 /// The errors of one posture, by subject: vectors, or single magnitudes.
@@ -86,6 +90,7 @@ pub(crate) fn interval(postures: &[Posture<'_>], confidence: f64) -> Option<Inte
             low: rms,
             high: rms,
             postures: sums.len(),
+            freedom: f64::INFINITY,
         });
     }
     let scatter: f64 = sums.iter().map(|(t, k)| (t - rms * rms * k).powi(2)).sum();
@@ -99,6 +104,7 @@ pub(crate) fn interval(postures: &[Posture<'_>], confidence: f64) -> Option<Inte
         low: end(1.0 - tail),
         high: end(tail),
         postures: sums.len(),
+        freedom,
     })
 }
 

@@ -109,6 +109,7 @@ impl HeldOut {
                 confidence: CONFIDENCE,
                 postures: found.postures,
                 tracker_m: None,
+                degrees_of_freedom: Some(found.freedom).filter(|nu| nu.is_finite()),
             });
         Self {
             n: kept.len(),

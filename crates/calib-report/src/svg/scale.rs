@@ -52,28 +52,41 @@ impl Scale {
         self.at + share.clamp(0.0, 1.0) * self.length
     }
 
-    /// About `count` round numbers and their labels.
+    /// About `count` round numbers and their labels, at least two.
     pub(super) fn ticks(&self, count: f64) -> Vec<(f64, String)> {
-        if self.log {
-            let (low, high) = (
-                self.from.log10().floor() as i32,
-                self.to.log10().ceil() as i32,
-            );
-            let steps: &[f64] = if high - low > 3 {
-                &[1.0]
-            } else {
-                &[1.0, 2.0, 5.0]
-            };
-            let all = (low..=high).flat_map(|decade| {
-                steps
-                    .iter()
-                    .map(move |step| (step * 10f64.powi(decade), decade))
-            });
-            return all
-                .filter(|(x, _)| (self.from..=self.to).contains(x))
-                .map(|(x, decade)| (x, number::fixed(x, (-decade).max(0) as usize)))
-                .collect();
+        let by_decade = if self.log { self.decades() } else { Vec::new() };
+        if by_decade.len() >= 2 {
+            return by_decade;
         }
+        // Each try halves the step or more: the second already finds two round numbers almost always.
+        let tries = (0..4).map(|k| self.even(count * 2f64.powi(k)));
+        let mut found = tries.skip_while(|ticks| ticks.len() < 2);
+        found.next().unwrap_or_default()
+    }
+
+    /// 1, 2 and 5 of each decade; the decades alone where there are many.
+    fn decades(&self) -> Vec<(f64, String)> {
+        let (low, high) = (
+            self.from.log10().floor() as i32,
+            self.to.log10().ceil() as i32,
+        );
+        let steps: &[f64] = if high - low > 3 {
+            &[1.0]
+        } else {
+            &[1.0, 2.0, 5.0]
+        };
+        let all = (low..=high).flat_map(|decade| {
+            steps
+                .iter()
+                .map(move |step| (step * 10f64.powi(decade), decade))
+        });
+        all.filter(|(x, _)| (self.from..=self.to).contains(x))
+            .map(|(x, decade)| (x, number::fixed(x, (-decade).max(0) as usize)))
+            .collect()
+    }
+
+    /// Multiples of a round step.
+    fn even(&self, count: f64) -> Vec<(f64, String)> {
         let raw = (self.to - self.from) / count;
         let decade = 10f64.powf(raw.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0]
@@ -81,7 +94,7 @@ impl Scale {
             .map(|m| m * decade)
             .find(|step| *step >= raw * 0.999)
             .unwrap_or(raw);
-        let decimals = (-step.log10().floor()).max(0.0) as usize;
+        let decimals = (-(step * 1.001).log10().floor()).max(0.0) as usize;
         let first = (self.from / step).ceil() as i64;
         let last = (self.to / step).floor() as i64;
         (first..=last)
@@ -107,7 +120,7 @@ mod tests {
         ] {
             let scale = Scale::new([from, to].into_iter(), 0.0, 100.0, false);
             let ticks = scale.ticks(4.0);
-            assert!((1..=9).contains(&ticks.len()), "{from} {to}: {ticks:?}");
+            assert!((2..=9).contains(&ticks.len()), "{from} {to}: {ticks:?}");
             for (x, label) in ticks {
                 assert!((0.0..=100.0).contains(&scale.place(x)));
                 assert!(

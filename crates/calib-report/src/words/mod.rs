@@ -6,6 +6,7 @@
 
 pub(crate) mod accuracy;
 pub(crate) mod answers;
+pub(crate) mod budget;
 pub(crate) mod check;
 pub(crate) mod clock;
 pub(crate) mod diagnosis;

@@ -13,8 +13,8 @@ use calib_report::{
     FitEnd, FitSummary, HeldOut, Improvement, Input, JointCoverage, JointValue, Judgment, Limit,
     Limited, LoopClosure, LoopGroup, Lost, Method, Noise, NoiseKind, NotObservable, Orientation,
     Outcome, Output, Parameter, PoseError, RecordingSummary, RecordingUse, Rejected, RejectedFor,
-    Report, ResidualRow, Residuals, Scene, Solver, Stats, Status, Term, Transform, Unit,
-    Unobservable, Validation, Verdict, VerdictFacts, Verification, View3d, Workspace,
+    Report, ResidualRow, Residuals, Scene, Solver, Standardized, Stats, Status, Term, Transform,
+    Unit, Unobservable, Validation, Verdict, VerdictFacts, Verification, View3d, Workspace,
     WorkspacePoint, judge, scene::SceneFrame,
 };
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
@@ -127,6 +127,14 @@ pub fn residual_rows() -> Vec<ResidualRow> {
         }
     }
     rows
+}
+
+/// Every component in units of the noise that the example found.
+fn standardized() -> Option<Standardized> {
+    let rows = residual_rows();
+    let used = rows.iter().filter(|row| row.used);
+    let components = used.flat_map(|row| row.residual_m.map(|x| x / 0.000_17));
+    Standardized::of(&components.collect::<Vec<_>>())
 }
 
 fn covariance(sigma_rad: f64, sigma_m: f64) -> Matrix6<f64> {
@@ -406,10 +414,10 @@ pub fn accepted() -> Report {
             stated_noise: vec!["marker".into()],
             cluster_robust_ratio: Some(1.04),
         }),
-        residuals: Residuals::from_rows(&residual_rows()),
+        residuals: Residuals::from_rows(&residual_rows()).with_standardized(standardized()),
         noise: vec![
-            Noise { group: "marker".into(), kind: NoiseKind::Position, unit: Unit::Meter, sigma: Some(0.000_131), stated: Some(0.000_1), samples: 357, text: "variance components (REML)".into() },
-            Noise { group: "joint".into(), kind: NoiseKind::Joint, unit: Unit::Radian, sigma: Some(0.000_31), stated: None, samples: 200, text: "variance components (REML)".into() },
+            Noise { group: "marker".into(), kind: NoiseKind::Position, unit: Unit::Meter, sigma: Some(0.000_131), relative_error: Some(0.04), stated: Some(0.000_1), samples: 357, text: "variance components (REML)".into() },
+            Noise { group: "joint".into(), kind: NoiseKind::Joint, unit: Unit::Radian, sigma: Some(0.000_31), relative_error: Some(0.09), stated: None, samples: 200, text: "variance components (REML)".into() },
         ],
         clocks: vec![Clock {
             recording: "arm_sweep".into(),
@@ -586,6 +594,7 @@ pub fn rejected() -> Report {
             kind: NoiseKind::Orientation,
             unit: Unit::Radian,
             sigma: None,
+            relative_error: None,
             stated: Some(0.002),
             samples: 0,
             text: "the closed forms do not estimate it".into(),

@@ -30,9 +30,20 @@ fn the_plots_of_the_examples_as_data() {
                 plots::PlotKind::Map { panels, .. } => {
                     panels.iter_mut().for_each(|panel| panel.points.truncate(2))
                 }
-                plots::PlotKind::Xy { series, .. } => series
-                    .iter_mut()
-                    .for_each(|series| series.points.truncate(3)),
+                plots::PlotKind::Xy { series, band, .. } => {
+                    series
+                        .iter_mut()
+                        .for_each(|series| series.points.truncate(3));
+                    band.iter_mut().for_each(|band| band.points.truncate(3));
+                }
+                plots::PlotKind::Bars { bars, curve, .. } => {
+                    bars.truncate(3);
+                    curve.points.truncate(3);
+                }
+                plots::PlotKind::Matrix { names, rows, .. } => {
+                    names.truncate(3);
+                    rows.truncate(3);
+                }
                 plots::PlotKind::Rows { .. } | plots::PlotKind::Strips { .. } => {}
             }
         }
