@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    apply, check, completions, convert, diff, drift, fit, plugins, record, revert, run, schema,
-    simulate, study,
+    apply, check, completions, convert, diff, drift, fit, man, plugins, record, revert, run,
+    schema, simulate, study, view,
 };
 use crate::terminal::Console;
 
@@ -29,6 +29,8 @@ pub struct Arguments {
 pub enum Command {
     /// Calibrate: from recordings to a patched URDF, a scene and a report
     Run(run::Run),
+    /// Show the report of a folder of results
+    View(view::View),
     /// Check a profile and its recordings without solving
     Check(check::Check),
     /// Simulate recordings with known truth for a profile
@@ -55,4 +57,6 @@ pub enum Command {
     Schema(schema::Schema),
     /// Print completions for a shell
     Completions(completions::Completions),
+    /// Print the manual page, or write those of all commands
+    Man(man::ManPages),
 }

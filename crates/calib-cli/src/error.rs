@@ -13,6 +13,7 @@ use calib_study::StudyError;
 use calib_study::cases::CaseError;
 
 use crate::commands::record::error::RecordError;
+use crate::commands::view::ViewError;
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
@@ -80,6 +81,9 @@ pub enum CliError {
     /// A capture was stopped by its source or its file.
     #[error("{0}")]
     Capture(#[from] CaptureError),
+    /// Of `calib view`.
+    #[error(transparent)]
+    View(#[from] ViewError),
     /// A plugin project cannot be made.
     #[error("{0}\n  help: calib plugins new NAME --lang rust|c --out FOLDER")]
     NewPlugin(NewProjectError),
@@ -128,6 +132,7 @@ impl CliError {
             | Self::Study(_)
             | Self::Cases(_)
             | Self::Record(_)
+            | Self::View(_)
             | Self::NewPlugin(_) => ExitCode::Usage,
         }
     }

@@ -1,7 +1,8 @@
 //! What a command shows: results on standard output, progress on standard error.
 
 use std::io::{ErrorKind, IsTerminal as _, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use calib_finding::{printable, printable_in_color};
@@ -113,6 +114,53 @@ pub fn say(text: &str) {
 /// The name of a stage as a JSON line on standard error.
 pub fn say_stage(stage: &str) {
     say(&serde_json::json!({"progress": stage}).to_string());
+}
+
+/// A file that was written, on standard error, where results go to standard output.
+pub fn emit_written(console: &Console, path: &Path) {
+    if console.json {
+        say(&serde_json::json!({"written": [path.display().to_string()]}).to_string());
+    } else {
+        say(&format!("wrote {}", path.display()));
+    }
+}
+
+/// How far a long computation is: a bar on a terminal, JSON lines with `--json`, nothing elsewhere.
+#[derive(Debug)]
+pub struct Counted {
+    bar: ProgressBar,
+    what: &'static str,
+    /// Whole percents of which a line was written, where lines are.
+    lines: Option<AtomicU64>,
+}
+
+impl Counted {
+    /// Counts `what`.
+    pub fn new(console: &Console, what: &'static str) -> Self {
+        let lines = console.json && !console.quiet;
+        Self {
+            bar: count_bar(console.quiet || lines, what),
+            what,
+            lines: lines.then(|| AtomicU64::new(0)),
+        }
+    }
+
+    /// `done` of `total`; a JSON line for each percent at the most.
+    pub fn at(&self, done: u64, total: u64) {
+        self.bar.set_length(total);
+        self.bar.set_position(done);
+        let percent = 100 * done / total.max(1);
+        let news = |lines: &AtomicU64| lines.fetch_max(percent, Ordering::SeqCst) < percent;
+        if self.lines.as_ref().is_some_and(news) {
+            let line = serde_json::json!({"progress": self.what, "done": done, "of": total});
+            say(&line.to_string());
+        }
+    }
+
+    /// Clears the bar.
+    pub fn end(&self) {
+        self.bar.finish_and_clear();
+    }
 }
 
 /// Lists files that were written, one per line, or as JSON.

@@ -7,6 +7,7 @@ pub mod convert;
 pub mod diff;
 pub mod drift;
 pub mod fit;
+pub mod man;
 mod plugin_options;
 pub mod plugins;
 pub mod record;
@@ -15,6 +16,7 @@ pub mod run;
 pub mod schema;
 pub mod simulate;
 pub mod study;
+pub mod view;
 
 use calib_pipeline::ExitCode;
 use clap::CommandFactory as _;
@@ -34,11 +36,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
         Command::Diff(options) => diff::run(options),
         Command::Drift(options) => drift::run(options),
         Command::Revert(options) => revert::run(console, options),
-        Command::Study(options) => study::run(console.quiet, options),
-        Command::Record(options) => record::run(console.quiet, options),
+        Command::Study(options) => study::run(console, options),
+        Command::Record(options) => record::run(console, options),
         Command::Convert(options) => convert::run(console, options),
-        Command::Plugins(options) => plugins::run(options),
+        Command::Plugins(options) => plugins::run(console, options),
         Command::Schema(options) => schema::run(options),
-        Command::Completions(options) => completions::run(options, &mut Arguments::command()),
+        Command::Completions(options) => {
+            completions::run(console, options, &mut Arguments::command())
+        }
+        Command::Man(options) => man::run(console, options, Arguments::command()),
+        Command::View(options) => view::run(console, options),
     }
 }

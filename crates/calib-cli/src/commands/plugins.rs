@@ -5,13 +5,14 @@ use std::path::PathBuf;
 
 use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::estimators::Estimators;
-use calib_plugin::check::{Limits, check};
-use calib_plugin::{HEADER, Host, Kind, Language, SearchPath, new_project};
+use calib_plugin::check::{Limits, Row, check};
+use calib_plugin::{HEADER, Host, Kind, Language, Offer, SearchPath, new_project};
 
 use clap::{Args, Subcommand};
+use serde_json::json;
 
 use crate::error::CliError;
-use crate::terminal::{emit, emit_raw, say};
+use crate::terminal::{Console, emit, emit_paths, emit_raw, say};
 
 /// Arguments of `calib plugins`.
 #[derive(Debug, Args)]
@@ -45,81 +46,131 @@ enum Plugins {
 }
 
 /// Lists, checks or creates plugins.
-pub fn run(options: &PluginsCommand) -> Result<ExitCode, CliError> {
+pub fn run(console: &Console, options: &PluginsCommand) -> Result<ExitCode, CliError> {
+    let json = console.json;
     match &options.what {
         None => {
-            emit(&list()?)?;
+            let listed = Listed::new()?;
+            emit(&if json { listed.json() } else { listed.text() })?;
             Ok(ExitCode::Accepted)
         }
         Some(Plugins::Header) => {
-            emit_raw(HEADER)?;
+            if json {
+                emit(&format!("{}\n", json!({"header": HEADER})))?;
+            } else {
+                emit_raw(HEADER)?;
+            }
             Ok(ExitCode::Accepted)
         }
-        Some(Plugins::Check { plugin }) => {
-            let host = Host::new(SearchPath::from_environment(None), true);
-            let conformance = check(&host, plugin, &Limits::default());
-            emit(&format!("{}\n", conformance.to_string().trim_end()))?;
-            if !conformance.passed() {
-                say(
-                    "  help: give the library's file with its folder (`./libname.so`), or a name on CALIB_PLUGIN_PATH; the contract is `calib plugins header`",
-                );
-            }
-            Ok(if conformance.passed() {
-                ExitCode::Accepted
-            } else {
-                ExitCode::Plugin
-            })
-        }
+        Some(Plugins::Check { plugin }) => checked(json, plugin),
         Some(Plugins::New { name, lang, out }) => {
             let folder = new_project(name, Language::from_name(lang)?, out)?;
-            emit(&format!("{}\n", folder.display()))?;
+            emit_paths(json, &[folder])?;
             Ok(ExitCode::Accepted)
         }
     }
 }
 
-/// Built-in estimators and readers, and the library files on the search path (none is opened).
-fn list() -> Result<String, CliError> {
-    let estimators = Estimators::built_in()?;
-    let mut text = String::new();
-    let mut section = |kind: Kind, rows: Vec<(String, String)>| {
-        let _ = writeln!(text, "{}s ({})", kind.word(), kind.id());
-        for (name, what) in rows {
-            let _ = writeln!(text, "  {name:<16} {what}");
-        }
-    };
-    let cor = estimators
-        .tables
-        .cor
-        .iter()
-        .map(|e| (e.offer().name.clone(), e.offer().summary.clone()));
-    section(Kind::Cor, cor.collect());
-    let aor = estimators
-        .tables
-        .aor
-        .iter()
-        .map(|e| (e.offer().name.clone(), e.offer().summary.clone()));
-    section(Kind::Aor, aor.collect());
-    let readers = estimators
-        .tables
-        .reader
-        .iter()
-        .map(|e| (e.offer().name.clone(), e.offer().summary.clone()));
-    section(Kind::Reader, readers.collect());
-    let reports = estimators
-        .tables
-        .report
-        .iter()
-        .map(|e| (e.offer().name.clone(), e.offer().summary.clone()));
-    section(Kind::Report, reports.collect());
-    let found = Host::new(SearchPath::from_environment(None), true).discover();
-    let _ = writeln!(
-        text,
-        "plugins on the search path: {}",
-        if found.is_empty() { "none" } else { "" }
-    );
-    for plugin in found {
-        let _ = writeln!(text, "  {:<16} {}", plugin.name, plugin.path.display());
+/// Prints what the checks of a plugin found.
+fn checked(json: bool, plugin: &str) -> Result<ExitCode, CliError> {
+    let host = Host::new(SearchPath::from_environment(None), true);
+    let conformance = check(&host, plugin, &Limits::default());
+    if json {
+        let row = |row: &Row| {
+            json!({
+                "subject": row.subject,
+                "test": row.test,
+                "outcome": row.outcome.word(),
+                "detail": row.detail,
+            })
+        };
+        let rows: Vec<_> = conformance.rows.iter().map(row).collect();
+        let all = json!({
+            "plugin": conformance.plugin,
+            "passed": conformance.passed(),
+            "tests": rows,
+        });
+        emit(&format!("{all:#}\n"))?;
+    } else {
+        emit(&format!("{}\n", conformance.to_string().trim_end()))?;
     }
-    Ok(text)
+    if conformance.passed() {
+        return Ok(ExitCode::Accepted);
+    }
+    if !json {
+        say(
+            "  help: give the library's file with its folder (`./libname.so`), or a name on CALIB_PLUGIN_PATH; the contract is `calib plugins header`"
+        );
+    }
+    Ok(ExitCode::Plugin)
+}
+
+/// Built-in estimators and readers, and the library files on the search path (none is opened).
+struct Listed {
+    /// Names and summaries of each kind.
+    kinds: Vec<(Kind, Vec<[String; 2]>)>,
+    /// Names and paths.
+    found: Vec<[String; 2]>,
+}
+
+impl Listed {
+    fn new() -> Result<Self, CliError> {
+        let estimators = Estimators::built_in()?;
+        let tables = &estimators.tables;
+        let row = |offer: &Offer| [offer.name.clone(), offer.summary.clone()];
+        let kinds = vec![
+            (
+                Kind::Cor,
+                tables.cor.iter().map(|e| row(e.offer())).collect(),
+            ),
+            (
+                Kind::Aor,
+                tables.aor.iter().map(|e| row(e.offer())).collect(),
+            ),
+            (
+                Kind::Reader,
+                tables.reader.iter().map(|e| row(e.offer())).collect(),
+            ),
+            (
+                Kind::Report,
+                tables.report.iter().map(|e| row(e.offer())).collect(),
+            ),
+        ];
+        let found = Host::new(SearchPath::from_environment(None), true).discover();
+        let found = found.into_iter();
+        Ok(Self {
+            kinds,
+            found: found
+                .map(|plugin| [plugin.name, plugin.path.display().to_string()])
+                .collect(),
+        })
+    }
+
+    fn text(&self) -> String {
+        let mut text = String::new();
+        for (kind, rows) in &self.kinds {
+            let _ = writeln!(text, "{}s ({})", kind.word(), kind.id());
+            for [name, what] in rows {
+                let _ = writeln!(text, "  {name:<16} {what}");
+            }
+        }
+        let none = if self.found.is_empty() { "none" } else { "" };
+        let _ = writeln!(text, "plugins on the search path: {none}");
+        for [name, path] in &self.found {
+            let _ = writeln!(text, "  {name:<16} {path}");
+        }
+        text
+    }
+
+    fn json(&self) -> String {
+        let row = |key: &str, [name, what]: &[String; 2]| json!({"name": name, key: what});
+        let mut all = serde_json::Map::new();
+        for (kind, rows) in &self.kinds {
+            let rows = rows.iter().map(|r| row("summary", r)).collect();
+            all.insert(kind.id().to_owned(), serde_json::Value::Array(rows));
+        }
+        let found = self.found.iter().map(|r| row("path", r)).collect();
+        all.insert("plugins".to_owned(), serde_json::Value::Array(found));
+        format!("{:#}\n", serde_json::Value::Object(all))
+    }
 }

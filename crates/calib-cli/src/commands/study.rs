@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 
 use super::plugin_options::PluginOptions;
 use crate::error::CliError;
-use crate::terminal::{count_bar, emit, say};
+use crate::terminal::{Console, Counted, emit, emit_written};
 
 /// Arguments of `calib study`.
 #[derive(Debug, Args)]
@@ -59,18 +59,18 @@ enum StudyName {
 }
 
 /// Runs a study.
-pub fn run(quiet: bool, study: &StudyRun) -> Result<ExitCode, CliError> {
+pub fn run(console: &Console, study: &StudyRun) -> Result<ExitCode, CliError> {
     match study.study {
-        StudyName::Cor => estimators(quiet, study, Study::Cor),
-        StudyName::Aor => estimators(quiet, study, Study::Aor),
-        StudyName::Justin => robots(quiet, study, "justin"),
-        StudyName::Ripley => robots(quiet, study, "ripley"),
-        StudyName::Faults => of_faults(quiet, study),
+        StudyName::Cor => estimators(console, study, Study::Cor),
+        StudyName::Aor => estimators(console, study, Study::Aor),
+        StudyName::Justin => robots(console, study, "justin"),
+        StudyName::Ripley => robots(console, study, "ripley"),
+        StudyName::Faults => of_faults(console, study),
     }
 }
 
 /// A study of estimators.
-fn estimators(quiet: bool, study: &StudyRun, which: Study) -> Result<ExitCode, CliError> {
+fn estimators(console: &Console, study: &StudyRun, which: Study) -> Result<ExitCode, CliError> {
     let default = StudyOptions::default();
     let options = StudyOptions {
         trials: study.trials.unwrap_or(default.trials),
@@ -80,12 +80,9 @@ fn estimators(quiet: bool, study: &StudyRun, which: Study) -> Result<ExitCode, C
         resume: !study.restart,
         only: Vec::new(),
     };
-    let bar = count_bar(quiet, "trials");
-    let result = calib_study::run(which, &options, &|done, total| {
-        bar.set_length(total);
-        bar.set_position(done);
-    })?;
-    bar.finish_and_clear();
+    let bar = Counted::new(console, "trials");
+    let result = calib_study::run(which, &options, &|done, total| bar.at(done, total))?;
+    bar.end();
     emit(&if study.json {
         calib_study::json(&result)
     } else {
@@ -93,14 +90,14 @@ fn estimators(quiet: bool, study: &StudyRun, which: Study) -> Result<ExitCode, C
     })?;
     if let Some(out) = &study.out {
         for path in calib_study::write(&result, out)? {
-            say(&format!("wrote {}", path.display()));
+            emit_written(console, &path);
         }
     }
     Ok(ExitCode::Accepted)
 }
 
 /// A case study over many simulated robots.
-fn robots(quiet: bool, study: &StudyRun, name: &str) -> Result<ExitCode, CliError> {
+fn robots(console: &Console, study: &StudyRun, name: &str) -> Result<ExitCode, CliError> {
     let default_profile = || PathBuf::from(format!("robots/{name}.yaml"));
     let options = cases::CaseOptions {
         profile: study.profile.clone().unwrap_or_else(default_profile),
@@ -112,12 +109,9 @@ fn robots(quiet: bool, study: &StudyRun, name: &str) -> Result<ExitCode, CliErro
         resume: !study.restart,
         plugins: study.plugins.plugins(),
     };
-    let bar = count_bar(quiet, "robots");
-    let result = cases::run_cases(&options, &|done, total| {
-        bar.set_length(total);
-        bar.set_position(done);
-    })?;
-    bar.finish_and_clear();
+    let bar = Counted::new(console, "robots");
+    let result = cases::run_cases(&options, &|done, total| bar.at(done, total))?;
+    bar.end();
     let json = cases::json(&result).map_err(|source| CliError::Json {
         what: "the study",
         source,
@@ -133,14 +127,14 @@ fn robots(quiet: bool, study: &StudyRun, name: &str) -> Result<ExitCode, CliErro
             OutputFile::text(format!("{name}.svg"), cases::svg(&result)),
         ];
         for path in write_results(out, &files)? {
-            say(&format!("wrote {}", path.display()));
+            emit_written(console, &path);
         }
     }
     Ok(ExitCode::Accepted)
 }
 
 /// The matrix of faults.
-fn of_faults(quiet: bool, study: &StudyRun) -> Result<ExitCode, CliError> {
+fn of_faults(console: &Console, study: &StudyRun) -> Result<ExitCode, CliError> {
     let default = faults::FaultOptions::default();
     let options = faults::FaultOptions {
         cases: study.trials.unwrap_or(default.cases),
@@ -150,12 +144,9 @@ fn of_faults(quiet: bool, study: &StudyRun) -> Result<ExitCode, CliError> {
         resume: !study.restart,
         only: Vec::new(),
     };
-    let bar = count_bar(quiet, "cases");
-    let result = faults::run_faults(&options, &|done, total| {
-        bar.set_length(total);
-        bar.set_position(done);
-    })?;
-    bar.finish_and_clear();
+    let bar = Counted::new(console, "cases");
+    let result = faults::run_faults(&options, &|done, total| bar.at(done, total))?;
+    bar.end();
     let json = faults::json(&result)?;
     let text = faults::markdown(&result);
     emit(if study.json { &json } else { &text })?;
@@ -166,7 +157,7 @@ fn of_faults(quiet: bool, study: &StudyRun) -> Result<ExitCode, CliError> {
             OutputFile::text("faults.md", text),
         ];
         for path in write_results(out, &files)? {
-            say(&format!("wrote {}", path.display()));
+            emit_written(console, &path);
         }
     }
     Ok(ExitCode::Accepted)

@@ -20,7 +20,7 @@ use clap::Args;
 
 use super::plugin_options::PluginOptions;
 use crate::error::CliError;
-use crate::terminal::emit;
+use crate::terminal::{Console, emit_paths, say_stage};
 use error::RecordError;
 use plan::{guide_ranges, plan};
 
@@ -74,14 +74,31 @@ pub struct Record {
 }
 
 /// Records.
-pub fn run(quiet: bool, options: &Record) -> Result<ExitCode, CliError> {
+pub fn run(console: &Console, options: &Record) -> Result<ExitCode, CliError> {
     let robot = load_robot(&options.profile)?;
-    record(&robot, options, screen(quiet).as_mut())
+    let (ended, path) = record(&robot, options, screen(console).as_mut())?;
+    if let Some(path) = path {
+        emit_paths(console.json, &[path])?;
+    }
+    Ok(ended)
 }
 
-fn screen(quiet: bool) -> Box<dyn Screen> {
-    if quiet {
+/// What the operator reads as JSON lines.
+struct JsonLines;
+
+impl Screen for JsonLines {
+    fn line(&mut self, text: &str) {
+        say_stage(text);
+    }
+
+    fn status(&mut self, _text: &str, _now: f64) {}
+}
+
+fn screen(console: &Console) -> Box<dyn Screen> {
+    if console.quiet {
         Box::new(Lines::new(std::io::sink()))
+    } else if console.json {
+        Box::new(JsonLines)
     } else if std::io::stderr().is_terminal() {
         Box::new(Terminal::new(std::io::stderr()))
     } else {
@@ -89,11 +106,12 @@ fn screen(quiet: bool) -> Box<dyn Screen> {
     }
 }
 
+/// Records; how it ended, and the file.
 fn record(
     robot: &RobotProfile,
     options: &Record,
     screen: &mut dyn Screen,
-) -> Result<ExitCode, CliError> {
+) -> Result<(ExitCode, Option<PathBuf>), CliError> {
     let (name, spec) = choose(robot, options)?;
     let address: Address = options.source.parse().map_err(RecordError::Source)?;
     let joints: JointSource = options.joints.parse().map_err(RecordError::Joints)?;
@@ -127,7 +145,7 @@ fn record(
         Ok(heard) => heard,
         Err(ended) => {
             screen.line(&format!("ended: {ended}"));
-            return Ok(ExitCode::Data);
+            return Ok((ExitCode::Data, None));
         }
     };
     let plan = plan(robot, spec, options, (joints, &heard), screen)?;
@@ -145,12 +163,12 @@ fn record(
     let ended = session.record(&mut source, &mut listener, &keys, &clock, screen)?;
     screen.line(&format!("ended: {ended}"));
     session.report(screen);
-    emit(&format!("{}\n", path.display()))?;
-    Ok(if ended.is_good() {
+    let code = if ended.is_good() {
         ExitCode::Accepted
     } else {
         ExitCode::Data
-    })
+    };
+    Ok((code, Some(path)))
 }
 
 /// The recording that is made: the named one, or the only one.
