@@ -227,6 +227,7 @@ const REPORT_PARTS: &[(&str, &[&str])] = &[
         "checks",
         &["loops", "estimators", "noise", "tested_effects", "clocks"],
     ),
+    ("kinematics", &["dh_table"]),
     ("verification", &["verification"]),
     ("residuals", &["residuals"]),
     (

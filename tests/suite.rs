@@ -39,3 +39,4 @@ mod truth;
 mod tutorial;
 mod urdf_out;
 mod verdict;
+mod view;

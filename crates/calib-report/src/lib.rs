@@ -25,6 +25,7 @@ mod budget;
 mod check;
 pub mod csv;
 mod data;
+mod dh_table;
 mod diagnosis;
 mod error;
 mod facts;
@@ -64,6 +65,7 @@ pub use data::{
     NoiseChoice, Output, RecordingSummary, RecordingUse, Rejected, RejectedFor, TestAnswer,
     TestedEffect, Workspace, WorkspacePoint,
 };
+pub use dh_table::{DhTable, DhTableRow, DhValue};
 pub use diagnosis::Diagnosis;
 pub use error::ReportError;
 pub use facts::{

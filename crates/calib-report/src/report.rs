@@ -1,9 +1,9 @@
 use crate::verdict::{Effect, Judgment, Reason, ReasonId};
 use crate::{
-    AccuracyLimit, Change, Clock, DataInformation, Diagnosis, EstimatorResult, Finding, FitSummary,
-    Identification, Input, JointCoverage, LoopClosure, Noise, NoiseChoice, NotObservable, Output,
-    Parameter, RecordingSummary, Rejected, Residuals, RobotChange, Selection, TestedEffect,
-    Transform, Unit, Verification, WeakDirections, Workspace,
+    AccuracyLimit, Change, Clock, DataInformation, DhTable, Diagnosis, EstimatorResult, Finding,
+    FitSummary, Identification, Input, JointCoverage, LoopClosure, Noise, NoiseChoice,
+    NotObservable, Output, Parameter, RecordingSummary, Rejected, Residuals, RobotChange,
+    Selection, TestedEffect, Transform, Unit, Verification, WeakDirections, Workspace,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -56,6 +56,9 @@ pub struct Report {
     /// What changed of the robot itself, in numbers that no choice of frames changes; the most significant first.
     #[serde(default)]
     pub robot_changes: Vec<RobotChange>,
+    /// The chain to the tool as Denavit–Hartenberg and Hayati parameters; null with `method: paper`.
+    #[serde(default)]
+    pub dh_table: Option<DhTable>,
     /// The changed values of the URDF, one entry each.
     #[serde(default)]
     pub changes: Vec<Change>,

@@ -3,6 +3,7 @@
 //! Text is plain, with one kind of markup: names, paths and keys are between backticks.
 
 mod budget;
+mod dh;
 mod evidence;
 mod robot;
 mod selection;
@@ -52,6 +53,7 @@ pub(crate) fn sections(report: &Report) -> Vec<Section> {
     weak::directions(&mut page, report);
     evidence::accuracy(&mut page, report);
     budget::budget(&mut page, report);
+    dh::dh(&mut page, report);
     robot::urdf(&mut page, report);
     robot::parameters(&mut page, report);
     evidence::files(&mut page, report);

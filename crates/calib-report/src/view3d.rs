@@ -68,6 +68,15 @@ pub struct ViewMarker {
     pub predicted: [f64; 3],
 }
 
+impl ViewMarker {
+    /// predicted − observed, m; `None` when the tracker lost it.
+    #[must_use]
+    pub fn residual_m(&self) -> Option<[f64; 3]> {
+        let observed = self.observed?;
+        Some(std::array::from_fn(|i| self.predicted[i] - observed[i]))
+    }
+}
+
 /// Points of one marker or body over a sweep.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Cloud {
@@ -243,9 +252,16 @@ impl View3d {
     /// # Errors
     /// [`ReportError::Json`] when it has no JSON form.
     pub(crate) fn embedded(&self) -> Result<String, ReportError> {
-        Ok(rounded_to(to_value(self)?, DIGITS)
-            .to_string()
-            .replace('<', "\\u003c"))
+        let mut value = rounded_to(to_value(self)?, DIGITS);
+        for (i, pose) in self.poses.iter().enumerate() {
+            for (k, marker) in pose.markers.iter().enumerate() {
+                // In digits of its own: 10 µm are nothing in a place, and much in a residual.
+                let residual = marker.residual_m().map(|r| r.map(|x| x * 1e3));
+                let residual = rounded_to(to_value(&residual)?, DIGITS);
+                value["poses"][i]["markers"][k]["residual_mm"] = residual;
+            }
+        }
+        Ok(value.to_string().replace('<', "\\u003c"))
     }
 
     /// The first pose as an image that needs no script: parallel projection from the front right, slightly above.

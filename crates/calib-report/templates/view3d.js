@@ -10,6 +10,7 @@
   // The camera looks at `target`; angles in rad, z is up.
   const start = { turn: -0.9, tilt: 0.42, zoom: 1, target: [0, 0, 0] };
   const camera = {};
+  let labels = [], picked = -1;
   let size = 1, floor = 0, pose = 0, colors = {}, factor = view.magnification;
   const layers = [
     ["calibrated", "Calibrated", "s0", true], ["outlines", "Outlines", "soft", true], ["nominal", "Nominal", "s1", true], ["markers", "Markers", "s3", true],
@@ -75,7 +76,54 @@
   }
   function text(a, words, color) {
     const p = project(a);
-    if (p) { ink.fillStyle = color; ink.fillText(words, p[0] + 6, p[1] - 5); }
+    if (p) labels.push([p, words, color]);
+  }
+  // A label stands at the first of four places beside its point where no other stands; else it is left out.
+  function drawLabels() {
+    const taken = [], high = 13;
+    for (const [p, words, color] of labels) {
+      const wide = ink.measureText(words).width;
+      const free = [[6, -5], [6, 14], [-wide - 6, -5], [-wide - 6, 14]].map(function (d) { return [p[0] + d[0], p[1] + d[1] - high, wide, high]; }).find(function (r) {
+        return r[0] >= 0 && r[0] + wide <= canvas.clientWidth && !taken.some(function (t) { return r[0] < t[0] + t[2] && t[0] < r[0] + wide && r[1] < t[1] + high && t[1] < r[1] + high; });
+      });
+      if (!free) continue;
+      taken.push(free);
+      ink.fillStyle = color; ink.fillText(words, free[0], free[1] + high - 2);
+    }
+    canvas.dataset.labels = JSON.stringify(taken.map(function (r) { return r.map(Math.round); }));
+    labels = [];
+  }
+  // A bar of a round length at the depth that the camera looks at.
+  function drawScale() {
+    const p = project(camera.target);
+    if (!p) return;
+    const power = Math.pow(10, Math.floor(Math.log10(120 / p[2]))), digit = [5, 2, 1].find(function (d) { return d * power * p[2] <= 120; }) || 1;
+    const meters = digit * power, y = canvas.clientHeight - 14;
+    ink.setLineDash([]); ink.strokeStyle = colors.ink; ink.lineWidth = 2; ink.beginPath();
+    ink.moveTo(14, y - 4); ink.lineTo(14, y); ink.lineTo(14 + meters * p[2], y); ink.lineTo(14 + meters * p[2], y - 4); ink.stroke();
+    ink.fillStyle = colors.ink; ink.fillText(meters >= 1 ? meters + " m" : Math.round(meters * 1e6) / 1e3 + " mm", 14, y - 8);
+  }
+  // The residual of a marker in words, and a ring about it.
+  function pick(i) {
+    const markers = view.poses[pose] ? view.poses[pose].markers : [];
+    picked = markers[i] ? i : -1;
+    const m = markers[i];
+    if (m) {
+      const e = m.residual_mm;
+      const mm = function (x) { return x.toFixed(2).replace("-", "\u2212"); };
+      document.getElementById("view-status").textContent = m.name + ": " + (e ? "predicted minus measured " + mm(Math.hypot(e[0], e[1], e[2])) + " mm (x " + mm(e[0]) + ", y " + mm(e[1]) + ", z " + mm(e[2]) + " mm)" : "not seen by the tracker");
+    }
+    draw();
+  }
+  function nearest(x, y) {
+    let best = -1, distance = 16;
+    (view.poses[pose] ? view.poses[pose].markers : []).forEach(function (m, i) {
+      for (const place of [m.observed, m.predicted]) {
+        const p = place && project(place), d = p ? Math.hypot(p[0] - x, p[1] - y) : Infinity;
+        if (d < distance) { distance = d; best = i; }
+      }
+    });
+    return best;
   }
   function across(n) {
     const helper = Math.abs(n[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0];
@@ -169,12 +217,17 @@
     }
     if (shown.joints) drawJoints();
     const now = view.poses[pose];
-    if (!now) return;
+    if (now) drawNow(now);
+    drawScale();
+    drawLabels();
+  }
+  function drawNow(now) {
     if (shown.outlines) drawOutlines(now.calibrated);
     if (shown.calibrated) { drawRobot(now.calibrated, colors.s0, 4); drawAxes(now.calibrated); for (const row of now.calibrated) dot(row, colors.s0, 3.5); }
     if (shown.nominal && now.nominal.length) drawRobot(now.nominal, colors.s1, 2, [6, 5]);
     for (const m of now.markers) {
       if (shown.markers) { if (m.observed) dot(m.observed, colors.s3, 4); dot(m.predicted, colors.s3, 5.5, true); }
+      if (m === now.markers[picked]) { dot(m.observed || m.predicted, colors.ink, 9, true); text(m.observed || m.predicted, m.name, colors.ink); }
       if (shown.residuals && m.observed) arrow(m.observed, add(m.observed, [0, 1, 2].map(function (i) { return m.predicted[i] - m.observed[i]; }), factor), colors.bad);
     }
     if (shown.names && shown.calibrated) view.frames.forEach(function (frame, i) { text(now.calibrated[i], frame.name, colors.ink); });
@@ -187,6 +240,7 @@
   }
   function setPose(i) {
     pose = Math.max(0, Math.min(view.poses.length - 1, i));
+    picked = -1;
     const now = view.poses[pose], slider = document.getElementById("pose");
     if (slider) slider.value = pose;
     const words = now ? "Pose " + (pose + 1) + " of " + view.poses.length + ": " + now.name + (now.text ? ", " + now.text : "") : "";
@@ -224,8 +278,15 @@
   document.getElementById("reset").addEventListener("click", reset);
 
   const touches = new Map();
-  canvas.addEventListener("pointerdown", function (e) { touches.set(e.pointerId, [e.clientX, e.clientY]); canvas.setPointerCapture(e.pointerId); });
+  let pressed = null;
+  canvas.addEventListener("pointerdown", function (e) { pressed = [e.clientX, e.clientY]; touches.set(e.pointerId, [e.clientX, e.clientY]); canvas.setPointerCapture(e.pointerId); });
   for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, function (e) { touches.delete(e.pointerId); });
+  canvas.addEventListener("pointerup", function (e) {
+    const box = canvas.getBoundingClientRect();
+    if (!pressed || Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) > 4) return;
+    const i = nearest(e.clientX - box.left, e.clientY - box.top);
+    if (i >= 0) pick(i);
+  });
   canvas.addEventListener("pointermove", function (e) {
     const before = touches.get(e.pointerId);
     if (!before) return;
@@ -246,6 +307,7 @@
     else if (e.key === "+" || e.key === "=") zoom(1.15);
     else if (e.key === "-") zoom(1 / 1.15);
     else if (e.key === "0") reset();
+    else if (e.key === "m" || e.key === "M") { const n = view.poses[pose] ? view.poses[pose].markers.length : 0; if (n) pick((picked + (e.key === "m" ? 1 : n - 1) + n) % n); }
     else if (e.key === "PageUp") setPose(pose - 1);
     else if (e.key === "PageDown") setPose(pose + 1);
     else return;

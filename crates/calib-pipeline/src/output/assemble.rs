@@ -18,6 +18,7 @@ use crate::output::of_fit::{
 use crate::output::verdict::{limits, next_steps, scope};
 use crate::output::weak::{self, weak_directions};
 use crate::verify::accuracy::{accuracy_limits, tracker_sigma, workspace};
+use crate::verify::dh_table::dh_table;
 use crate::verify::information::data_information;
 use crate::verify::motions::motions;
 use crate::verify::robot_changes::robot_changes;
@@ -73,6 +74,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             .fit
             .zip(information.as_ref())
             .map_or_else(Vec::new, |(fit, of)| robot_changes(e.inputs, fit, of)),
+        dh_table: e.fit.and_then(|fit| dh_table(e.inputs, fit)),
         changes: e.urdf.changes.clone(),
         urdf_diff: e.urdf.diff.clone(),
         not_observable: e.fit.map_or_else(Vec::new, not_observable),

@@ -45,7 +45,7 @@ pub(crate) fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configur
 }
 
 /// The link that the longest chain of joints carries a body on.
-fn tool_link(inputs: &Inputs) -> Option<LinkId> {
+pub(crate) fn tool_link(inputs: &Inputs) -> Option<LinkId> {
     let model = &inputs.robot.model;
     inputs
         .robot

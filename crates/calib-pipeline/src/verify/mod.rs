@@ -4,6 +4,8 @@ pub(crate) mod accuracy;
 pub mod changes;
 pub mod closure;
 pub mod deviations;
+pub(crate) mod dh_table;
+pub mod hayati;
 pub mod held_out;
 pub mod information;
 pub mod invariants;

@@ -62,7 +62,7 @@ fn gradient(fit: &MlFit, quantity: &Quantity) -> DVector<f64> {
 }
 
 /// Whether the data alone determine a number: its gradient has no part along what they do not see.
-fn measured(fit: &MlFit, gradient: &DVector<f64>) -> bool {
+pub(crate) fn measured(fit: &MlFit, gradient: &DVector<f64>) -> bool {
     /// A share of the null space below this is rounding; as in `calib-core`.
     const INDETERMINATE: f64 = 1e-5;
     let information = &fit.solution.information;

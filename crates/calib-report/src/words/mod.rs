@@ -9,6 +9,7 @@ pub(crate) mod answers;
 pub(crate) mod budget;
 pub(crate) mod check;
 pub(crate) mod clock;
+pub(crate) mod dh;
 pub(crate) mod diagnosis;
 pub(crate) mod files;
 pub(crate) mod fit;

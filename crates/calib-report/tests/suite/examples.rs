@@ -9,13 +9,13 @@ use calib_report::view3d::{
     Axis, Circle, Cloud, Outline, Sphere, ViewFrame, ViewMarker, ViewPose, pose_row,
 };
 use calib_report::{
-    AccuracyLimit, Change, Class, Clock, ClockCheck, ErrorSource, ErrorStats, EstimatorResult,
-    FitEnd, FitSummary, HeldOut, Improvement, Input, JointCoverage, JointValue, Judgment, Limit,
-    Limited, LoopClosure, LoopGroup, Lost, Method, Noise, NoiseKind, NotObservable, Orientation,
-    Outcome, Output, Parameter, PoseError, RecordingSummary, RecordingUse, Rejected, RejectedFor,
-    Report, ResidualRow, Residuals, Scene, Solver, Standardized, Stats, Status, Term, Transform,
-    Unit, Unobservable, Validation, Verdict, VerdictFacts, Verification, View3d, Workspace,
-    WorkspacePoint, judge, scene::SceneFrame,
+    AccuracyLimit, Change, Class, Clock, ClockCheck, DhTable, DhTableRow, DhValue, ErrorSource,
+    ErrorStats, EstimatorResult, FitEnd, FitSummary, HeldOut, Improvement, Input, JointCoverage,
+    JointValue, Judgment, Limit, Limited, LoopClosure, LoopGroup, Lost, Method, Noise, NoiseKind,
+    NotObservable, Orientation, Outcome, Output, Parameter, PoseError, RecordingSummary,
+    RecordingUse, Rejected, RejectedFor, Report, ResidualRow, Residuals, Scene, Solver,
+    Standardized, Stats, Status, Term, Transform, Unit, Unobservable, Validation, Verdict,
+    VerdictFacts, Verification, View3d, Workspace, WorkspacePoint, judge, scene::SceneFrame,
 };
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use rand::SeedableRng;
@@ -127,6 +127,34 @@ pub fn residual_rows() -> Vec<ResidualRow> {
         }
     }
     rows
+}
+
+/// One row of a chain of two joints.
+fn dh_table() -> DhTable {
+    let value = |parameter: &str, unit, nominal, value, sigma, measured| DhValue {
+        parameter: parameter.into(),
+        unit,
+        nominal,
+        value,
+        sigma: Some(sigma),
+        measured,
+    };
+    DhTable {
+        root: "base".into(),
+        link: "gripper".into(),
+        last_joint: "elbow".into(),
+        rows: vec![DhTableRow {
+            joint: "shoulder".into(),
+            values: vec![
+                value("theta", Unit::Radian, 0.0, -0.0123, 0.000_31, false),
+                value("a", Unit::Meter, 0.27, 0.270_07, 0.000_04, true),
+                value("alpha", Unit::Radian, 0.0, 0.000_5, 0.000_2, true),
+                value("beta", Unit::Radian, 0.0, -0.001_2, 0.000_2, true),
+            ],
+        }],
+        root_from_first: [[0.0, 0.0, 0.4, 0.0, 0.0, 0.0]; 2],
+        last_from_link: [[0.3, 0.0, 0.0, 0.0, 1.5707, 0.0]; 2],
+    }
 }
 
 /// Every component in units of the noise that the example found.
@@ -414,6 +442,7 @@ pub fn accepted() -> Report {
             stated_noise: vec!["marker".into()],
             cluster_robust_ratio: Some(1.04),
         }),
+        dh_table: Some(dh_table()),
         residuals: Residuals::from_rows(&residual_rows()).with_standardized(standardized()),
         noise: vec![
             Noise { group: "marker".into(), kind: NoiseKind::Position, unit: Unit::Meter, sigma: Some(0.000_131), relative_error: Some(0.04), stated: Some(0.000_1), samples: 357, text: "variance components (REML)".into() },

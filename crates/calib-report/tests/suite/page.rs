@@ -141,6 +141,63 @@ fn a_report_without_a_view_has_no_script() {
 }
 
 #[test]
+fn markers_tell_their_residual_and_labels_do_not_collide() {
+    let page = html(&examples::accepted(), Some(&examples::view())).expect("a page");
+    let script = "<script>
+        const canvas = document.getElementById('canvas'), box = canvas.getBoundingClientRect();
+        const said = () => document.getElementById('view-status').textContent;
+        const press = key => canvas.dispatchEvent(new KeyboardEvent('keydown', { key, cancelable: true }));
+        canvas.setPointerCapture = () => {};
+        const at = (kind, x, y) => canvas.dispatchEvent(new PointerEvent(kind, { clientX: box.left + x, clientY: box.top + y, pointerId: 1 }));
+        const heard = [];
+        press('m'); heard.push(said()); press('m'); heard.push(said()); press('M'); heard.push(said());
+        press('PageDown');
+        let clicked = 0;
+        for (let x = 5; x < box.width && !clicked; x += 10) for (let y = 5; y < box.height; y += 10) {
+            at('pointerdown', x, y); at('pointerup', x, y);
+            if (said().includes('predicted minus measured')) { clicked = 1; break; }
+        }
+        heard.push(said());
+        const names = [...document.querySelectorAll('#layers label')].find(l => l.textContent === 'Names').firstChild;
+        names.checked = true; names.dispatchEvent(new Event('change'));
+        const labels = JSON.parse(canvas.dataset.labels);
+        const apart = labels.every((a, i) => labels.every((b, j) => i === j || a[0] >= b[0] + b[2] - 1 || b[0] >= a[0] + a[2] - 1 || a[1] >= b[1] + b[3] || b[1] >= a[1] + a[3]));
+        heard.push(String(labels.length > 2 && apart));
+        document.body.dataset.heard = heard.join(' | ');
+    </script></body>";
+    let Some((dom, log)) = in_browser("residuals", &page.replace("</body>", script)) else {
+        skipped_tests::skip(skipped_tests::NO_BROWSER);
+        return;
+    };
+    assert!(!log.contains("CONSOLE"), "{log}");
+    let heard = dom.split("data-heard=\"").nth(1);
+    let heard = heard
+        .and_then(|rest| rest.split('"').next())
+        .expect("the script ran");
+    let told: Vec<&str> = heard.split(" | ").collect();
+    let held_out = examples::accepted().verification.held_out;
+    let worst = held_out
+        .and_then(|held_out| held_out.worst)
+        .expect("a worst pose");
+    let view = examples::view().beginning_with(&worst.pose);
+    let marker = &view.poses[0].markers[0];
+    let residual = marker.residual_m().expect("seen");
+    let length = residual.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let length = format!("predicted minus measured {:.2} mm", length * 1e3);
+    assert!(
+        told[0].starts_with(&marker.name) && told[0].contains(&length),
+        "{heard}"
+    );
+    assert!(
+        told[1].starts_with(&view.poses[0].markers[1].name),
+        "{heard}"
+    );
+    assert_eq!(told[2], told[0]);
+    assert!(told[3].contains("predicted minus measured"), "{heard}");
+    assert_eq!(told[4], "true", "{heard}");
+}
+
+#[test]
 fn the_view_is_moved_by_keys_and_slider() {
     let page = html(&examples::accepted(), Some(&examples::view())).expect("a page");
     let script = "<script>

@@ -53,7 +53,7 @@ const PAGE: &str = "report.html";
 pub fn run(console: &Console, options: &View) -> Result<ExitCode, CliError> {
     let page = page(&options.folder)?;
     if !options.serve && can_show() && open(&page) {
-        tell(console, "opened", &page.display().to_string());
+        tell(console, "opened", &page.display().to_string())?;
         return Ok(ExitCode::Accepted);
     }
     let port = options.port;
@@ -63,16 +63,16 @@ pub fn run(console: &Console, options: &View) -> Result<ExitCode, CliError> {
     let port = listener.local_addr().map_err(failed)?.port();
     let name = page.file_name().unwrap_or_default().to_string_lossy();
     let folder = page.parent().unwrap_or(Path::new("/")).to_owned();
-    tell(console, "url", &format!("http://127.0.0.1:{port}/{name}"));
+    tell(console, "url", &format!("http://127.0.0.1:{port}/{name}"))?;
     serve::serve(&listener, &folder, port);
     Ok(ExitCode::Accepted)
 }
 
-fn tell(console: &Console, what: &str, where_: &str) {
+fn tell(console: &Console, what: &str, where_: &str) -> Result<(), CliError> {
     if console.json {
-        emit(&format!("{}\n", serde_json::json!({what: where_})));
+        emit(&format!("{}\n", serde_json::json!({what: where_})))
     } else {
-        emit(&format!("{where_}\n"));
+        emit(&format!("{where_}\n"))
     }
 }
 
