@@ -151,10 +151,12 @@ fn programs_read_json_from_every_command() {
     let read = |arguments: &[&str]| dir.calib_with(arguments).expect(0).json();
     let listed = read(&["plugins", "--json"]);
     assert!(
-        listed["cor"].as_array().is_some_and(|rows| rows.len() > 5),
+        listed["calib.cor/1"]
+            .as_array()
+            .is_some_and(|rows| rows.len() > 5),
         "{listed}"
     );
-    assert!(listed["plugins"].is_array() && listed["cor"][0]["summary"].is_string());
+    assert!(listed["plugins"].is_array() && listed["calib.cor/1"][0]["summary"].is_string());
     let header = read(&["plugins", "header", "--json"]);
     assert!(
         header["header"]

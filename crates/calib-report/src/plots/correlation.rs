@@ -12,10 +12,10 @@ const MOST: usize = 28;
 /// parameters of the picture take no part.
 const OPEN: f64 = 1e-10;
 
-/// Pairs that the description names.
+/// Pairs that the caption names.
 const NAMED: usize = 3;
 
-/// A pair correlated by more than this is named: one of both could hardly be told from the other.
+/// A pair correlated by more than this is named: the data hardly distinguish the two.
 const STRONG: f64 = 0.9;
 
 pub(super) fn correlation(plots: &mut Vec<Plot>, report: &Report) {

@@ -19,7 +19,7 @@ pub(crate) const ENDS: &str =
 /// What the offsets mean.
 pub(crate) fn offsets(table: &DhTable) -> String {
     format!(
-        "Controller offsets: calibrated minus nominal θ, to be added to the position that the joint indicates. The zero of {} cannot be told from the rotation of what it carries, and those marked with * not from the frame of the base or from their priors.",
+        "Controller offsets: calibrated minus nominal θ, to be added to the position that the joint indicates. The zero of {} is not distinguishable from the rotation of what it carries; those marked with * are not distinguishable from the placement of the base, or come from their priors.",
         code(&table.last_joint)
     )
 }
