@@ -208,5 +208,6 @@ fn the_progress_of_a_study_is_json_lines() {
         .iter()
         .filter(|line| line["written"].is_array())
         .count();
-    assert_eq!(written, 4, "{lines:?}");
+    // The table, the data, the page, the figure, and the list of them.
+    assert_eq!(written, 5, "{lines:?}");
 }

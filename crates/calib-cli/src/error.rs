@@ -13,7 +13,7 @@ use calib_study::StudyError;
 use calib_study::cases::CaseError;
 
 use crate::commands::record::error::RecordError;
-use crate::commands::view::ViewError;
+use crate::commands::view::error::ViewError;
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]

@@ -6,7 +6,7 @@ use crate::DhTable;
 /// What the numbers mean.
 pub(crate) fn table(table: &DhTable) -> String {
     format!(
-        "From {} to {}: each joint turns about the z axis of its frame, or slides along it; behind it come Rz(θ) Tz(d) Tx(a) Rx(α) (Denavit and Hartenberg), or between parallel axes Rz(θ) Tx(a) Rx(α) Ry(β) (Hayati). θ adds to the indicated position of the joint. Values marked with * are conventions or come from their priors: the data do not determine them.",
+        "From {} to {}: each joint turns about the z axis of its frame, or slides along it; behind it come Rz(θ) Tz(d) Tx(a) Rx(α) (Denavit and Hartenberg), or between parallel axes Rz(θ) Tx(a) Rx(α) Ry(β) (Hayati). θ adds to the indicated position of the joint. Values marked with * are conventions, were held, or come from their priors: the data do not determine them.",
         code(&table.root),
         code(&table.link)
     )

@@ -1,5 +1,6 @@
 //! `calib view`.
 
+pub mod error;
 mod serve;
 
 use std::net::{Ipv4Addr, TcpListener};
@@ -11,6 +12,7 @@ use clap::Args;
 
 use crate::error::CliError;
 use crate::terminal::{Console, emit};
+use error::ViewError;
 
 /// Arguments of `calib view`.
 #[derive(Debug, Args)]
@@ -23,27 +25,6 @@ pub struct View {
     /// Port to serve on [default: a free one]
     #[arg(long, default_value_t = 0, hide_default_value = true)]
     port: u16,
-}
-
-/// Why a page is not shown.
-#[derive(Debug, thiserror::Error)]
-pub enum ViewError {
-    /// There is no report.
-    #[error("{}: no report to show\n  help: name a folder that `calib run` wrote, or a page in it", path.display())]
-    NoReport {
-        /// What was looked for.
-        path: PathBuf,
-    },
-    /// The port is taken, or not allowed.
-    #[error(
-        "port {port} of 127.0.0.1 cannot be served: {source}\n  help: name another one with --port, or none"
-    )]
-    Port {
-        /// The port.
-        port: u16,
-        /// Why.
-        source: std::io::Error,
-    },
 }
 
 /// The page of a folder of results.
