@@ -437,7 +437,7 @@ mod tests {
     fn a_pattern_leaves_its_band() {
         let wave = |i: u64| {
             let at = i as f64 * 0.01;
-            let noise = if i % 2 == 0 { 1e-4 } else { -1e-4 };
+            let noise = if i.is_multiple_of(2) { 1e-4 } else { -1e-4 };
             ResidualRow {
                 row: i,
                 ..row("a", at, [2e-4 * at.sin() + noise, noise, noise])

@@ -47,7 +47,8 @@ pub(crate) fn dh_table(inputs: &Inputs, fit: &MlFit) -> Option<DhTable> {
     Some(table(inputs, (&nominal, &found), link, |i| {
         let gradient = &gradients[i];
         let variance = (&fit.solution.information.covariance * gradient).dot(gradient);
-        let sigma = Some(variance.max(0.0).sqrt()).filter(|sigma| sigma.is_finite());
+        // What no free parameter moves was held: nothing is known of its error.
+        let sigma = Some(variance.max(0.0).sqrt()).filter(|s| s.is_finite() && *s > 0.0);
         (sigma, measured(fit, gradient))
     }))
 }
