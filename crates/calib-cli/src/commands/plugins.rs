@@ -99,7 +99,7 @@ fn checked(json: bool, plugin: &str) -> Result<ExitCode, CliError> {
     }
     if !json {
         say(
-            "  help: give the library's file with its folder (`./libname.so`), or a name on CALIB_PLUGIN_PATH; the contract is `calib plugins header`"
+            "  help: give the library's file with its folder (`./libname.so`), or a name on CALIB_PLUGIN_PATH; the contract is `calib plugins header`",
         );
     }
     Ok(ExitCode::Plugin)
