@@ -223,10 +223,8 @@ const REPORT_PARTS: &[(&str, &[&str])] = &[
         "unobservable",
         &["not_observable", "workspace", "accuracy_limits"],
     ),
-    (
-        "checks",
-        &["loops", "estimators", "noise", "tested_effects", "clocks"],
-    ),
+    ("checks", &["loops", "estimators", "noise", "clocks"]),
+    ("effects", &["tested_effects"]),
     ("kinematics", &["dh_table"]),
     ("verification", &["verification"]),
     ("residuals", &["residuals"]),

@@ -114,7 +114,7 @@ fn what_is_no_report_is_not_shown() {
         assert!(ran.stderr.contains("help: name a folder"), "{}", ran.stderr);
     }
     let ran = dir.calib(["view", "empty", "--json"]).expect(2);
-    let line: Value = serde_json::from_str(ran.stderr.trim()).expect("a JSON line");
+    let line: Value = serde_json::from_str(ran.stdout.trim()).expect("a JSON line");
     assert_eq!(line["exit_code"], 2);
 }
 
@@ -183,9 +183,9 @@ fn programs_read_json_from_every_command() {
 
     let refused = dir.calib(["record", "absent.yaml", "--source", "dtrack:1", "--json"]);
     assert_eq!(refused.code, 2);
-    let line: Value = serde_json::from_str(refused.stderr.trim()).expect("a JSON line");
+    let line: Value = serde_json::from_str(refused.stdout.trim()).expect("a JSON line");
     assert!(
-        line["error"].is_string() && line["help"].is_string(),
+        line["error"].is_string() && line["remedy"].is_string(),
         "{line}"
     );
 }

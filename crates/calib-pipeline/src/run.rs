@@ -67,10 +67,7 @@ pub fn run_on(
     options: &RunOptions,
     progress: &mut dyn FnMut(&str),
 ) -> Result<RunOutput, PipelineError> {
-    let mut chosen = match options.select {
-        true => Some(selected(&mut inputs, options.force, progress)?),
-        false => None,
-    };
+    let chosen = selected(&mut inputs, options, progress)?;
     progress("check data");
     let mut of_shapes = Vec::new();
     let (outlines, meshes) = shapes::outlines(&inputs.robot, &mut of_shapes);
@@ -102,9 +99,6 @@ pub fn run_on(
     let verified = verified(&inputs, tracks, &nominal, &solved, refitted.as_ref());
     checked.findings.extend(verified.findings);
     let (robot, fit) = (&solved.robot, solved.fit.as_ref());
-    if let Some(chosen) = &mut chosen {
-        chosen.selection.sigma_factor = fit.and_then(|fit| fit.widened);
-    }
     progress("patch the URDF");
     let urdf = patch_urdf(&inputs, robot, &verified.known)?;
     let covariance = solved.root_covariance.as_ref();
@@ -140,7 +134,7 @@ pub fn run_on(
         urdf: &urdf,
         written: &written,
         residuals: &verified.residuals,
-        selection: chosen.map(|chosen| chosen.selection),
+        selection: chosen.map(|chosen| chosen.fitted(fit)),
         arguments: options.arguments(),
     });
     let files = files(&inputs, &report, &scene, written, &view)?;

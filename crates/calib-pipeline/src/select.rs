@@ -6,7 +6,7 @@ use calib_report::Selection;
 
 use crate::error::PipelineError;
 use crate::formulate::selection::{Chosen, choose};
-use crate::options::Plugins;
+use crate::options::{Plugins, RunOptions};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
 use crate::prepare::robot::load_robot;
@@ -28,13 +28,16 @@ pub fn select(
     Ok(choose(inputs, force, progress)?.selection)
 }
 
-/// Chooses the effects and puts what was chosen into the profile's `solve:`.
+/// Chooses the effects where the options ask for it, and puts what was chosen into the profile's `solve:`.
 pub(crate) fn selected(
     inputs: &mut Inputs,
-    force: bool,
+    options: &RunOptions,
     progress: &mut dyn FnMut(&str),
-) -> Result<Chosen, PipelineError> {
-    let chosen = choose(inputs.clone(), force, progress)?;
+) -> Result<Option<Chosen>, PipelineError> {
+    if !options.select {
+        return Ok(None);
+    }
+    let chosen = choose(inputs.clone(), options.force, progress)?;
     inputs.robot.profile.solve = chosen.solve.clone();
-    Ok(chosen)
+    Ok(Some(chosen))
 }

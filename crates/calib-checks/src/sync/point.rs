@@ -301,7 +301,7 @@ impl Common {
         solve(&normal, &right)
     }
 
-    /// Variances of offset and drift by the answers without one block of time each, A being found anew.
+    /// Variances of offset and drift by the answers without one block of time each, A being found again.
     fn spread(&self) -> Option<Vector2<f64>> {
         let n = self.y.len();
         let edge = |k: usize| k * n / BLOCKS;

@@ -60,6 +60,7 @@ impl CliError {
             Self::Json { .. } | Self::Report(_) => "report-not-written",
             Self::Study(_) | Self::Cases(_) => "study",
             Self::Record(_) => "record",
+            Self::View(_) => "view",
             Self::Capture(_) => "capture",
             Self::NewPlugin(_) => "new-plugin",
             Self::Stdout(_) => "output-lost",

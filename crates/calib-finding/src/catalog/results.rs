@@ -54,7 +54,7 @@ super::topic! {
     }
     /// The residuals show an effect that is not in the model.
     MISSING_PHYSICS = "missing-physics" {
-        "": Warning,
+        "effect": Warning,
             "{physics} (`{parameter}`): explains {explains:percent} of χ², p = {p_value}.",
             "Enable the effect under `solve.free` or `solve.joints`, and compare the held-out errors.";
         "clock": Warning,

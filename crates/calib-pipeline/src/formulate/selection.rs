@@ -29,6 +29,17 @@ pub struct Chosen {
     pub nested: Option<NestedError>,
 }
 
+impl Chosen {
+    /// The choice with the factor that it widens the standard deviations of the fit by.
+    #[must_use]
+    pub fn fitted(self, fit: Option<&MlFit>) -> Selection {
+        Selection {
+            sigma_factor: fit.and_then(|fit| fit.widened),
+            ..self.selection
+        }
+    }
+}
+
 /// Chooses what to free; `inputs` are as they were read.
 ///
 /// # Errors

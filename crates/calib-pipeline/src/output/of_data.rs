@@ -199,7 +199,7 @@ pub(crate) fn missing_finding(e: &Evidence<'_>, missing: &MissingPhysics) -> Fin
     let finding = match clock {
         Some(recording) => Finding::of_kind(catalog::MISSING_PHYSICS, "clock", About::Fit)
             .with("recording", Fact::name(recording)),
-        None => Finding::new(catalog::MISSING_PHYSICS, About::Fit),
+        None => Finding::of_kind(catalog::MISSING_PHYSICS, "effect", About::Fit),
     };
     finding
         .with("physics", Fact::choice(missing.physics.words()))

@@ -3,7 +3,6 @@
 //! Only GET and HEAD, only regular files that lie in the folder itself, only requests that name this computer as their host (a
 //! page of another site cannot read the answers), one request for each connection.
 
-use std::fs;
 use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
@@ -12,8 +11,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Duration;
 
+use calib_files::input;
+
 /// A request's head is shorter; what is longer is refused.
 const HEAD: usize = 8192;
+
+/// The largest file that is served, bytes: a page with its meshes has less.
+const LARGEST: u64 = 1 << 28;
 
 /// A browser sends its request at once.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -53,7 +57,7 @@ fn answer(mut stream: TcpStream, folder: &Path, port: u16) -> std::io::Result<()
         Err(status) => (status, "text/plain", status.as_bytes().to_vec(), false),
         Ok(asked) => match asked
             .file(folder)
-            .and_then(|f| Some((kind(&f), fs::read(f).ok()?)))
+            .and_then(|f| Some((kind(&f), input::read(&f, LARGEST).ok()?)))
         {
             Some((kind, body)) => ("200 OK", kind, body, asked.head_only),
             None => (
@@ -160,6 +164,7 @@ fn kind(path: &Path) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use calib_files::{make_folder, replace};
 
     fn asked(line: &str, host: &str) -> Result<Asked, &'static str> {
         request(
@@ -189,14 +194,14 @@ mod tests {
         let parent = tempfile::tempdir().expect("a folder");
         let parent = parent.path().canonicalize().expect("a folder");
         let folder = parent.join("results");
-        fs::create_dir_all(folder.join("below")).expect("a folder");
         for (path, text) in [
             (folder.join("report.html"), "page"),
             (folder.join("below/secret"), "no"),
             (folder.join(".hidden"), "no"),
             (parent.join("secret"), "no"),
         ] {
-            fs::write(path, text).expect("a file");
+            make_folder(path.parent().expect("a folder")).expect("a folder");
+            replace(&path, text.as_bytes()).expect("a file");
         }
         #[cfg(unix)]
         std::os::unix::fs::symlink(parent.join("secret"), folder.join("link")).expect("a link");
