@@ -11,7 +11,7 @@ use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
 use crate::prepare::robot::load_robot;
 
-/// What `select` of [`RunOptions`](crate::options::RunOptions) would choose, and why. Writes nothing.
+/// What `select` of [`RunOptions`] would choose, and why. Writes nothing.
 ///
 /// # Errors
 /// As [`run`](crate::run::run).
