@@ -4,7 +4,8 @@
 use crate::scratch;
 
 use std::process::{Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::sync::mpsc;
+use std::time::Duration;
 
 use scratch::Scratch;
 
@@ -14,7 +15,7 @@ fn shell(dir: &Scratch, line: &str) -> Output {
         "calib() {{ '{}' \"$@\"; }}\n{line}",
         env!("CARGO_BIN_EXE_calib")
     );
-    let mut child = Command::new("sh")
+    let child = Command::new("sh")
         .args(["-c", &line])
         .current_dir(dir.path(""))
         .stdin(Stdio::null())
@@ -22,15 +23,12 @@ fn shell(dir: &Scratch, line: &str) -> Output {
         .stderr(Stdio::piped())
         .spawn()
         .expect("a shell");
-    let began = Instant::now();
-    while child.try_wait().expect("a child").is_none() {
-        if began.elapsed() > Duration::from_secs(30) {
-            child.kill().expect("killed");
-            panic!("it hangs: {line}");
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    child.wait_with_output().expect("ended")
+    let (send, ended) = mpsc::channel();
+    std::thread::spawn(move || send.send(child.wait_with_output()));
+    ended
+        .recv_timeout(Duration::from_secs(30))
+        .unwrap_or_else(|_| panic!("it hangs: {line}"))
+        .expect("ended")
 }
 
 fn code(dir: &Scratch, line: &str) -> i32 {

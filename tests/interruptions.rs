@@ -3,15 +3,14 @@
 //!
 //! A sample of the calls is tried; `CALIB_ALL_STOPS=1` tries all (`cargo test -p calib-cli --test suite interruptions::`).
 
+use crate::record::{free_port, still_body};
 use crate::scratch;
 
 use std::collections::BTreeMap;
-use std::net::UdpSocket;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 use scratch::{Files, Scratch, files_below, finished};
 
@@ -272,9 +271,7 @@ fn apply_in_place_and_elsewhere() {
         }
         assert_eq!(dir.files("mine")["r17.urdf"], before[TARGET]);
         assert!(!dir.path(RECORD).exists());
-        let copied = stopped
-            .into_iter()
-            .fold(Scratch::new(), |d, (name, bytes)| d.file(&name, bytes));
+        let copied = Scratch::holding(stopped);
         again(APPLY, 0)(&copied, before, after);
     };
     walk(&Trial {
@@ -310,9 +307,7 @@ fn apply_to_a_xacro_and_the_yaml_that_it_loads() {
             }
             assert_eq!(files(dir)[target], before[target]);
         }
-        let copied = stopped
-            .into_iter()
-            .fold(Scratch::new(), |d, (name, bytes)| d.file(&name, bytes));
+        let copied = Scratch::holding(stopped);
         again(apply, 0)(&copied, before, after);
     };
     walk(&Trial {
@@ -364,26 +359,9 @@ fn revert_in_place_and_elsewhere() {
 
 #[test]
 fn record() {
-    let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
-    let port = socket.local_addr().expect("bound").port();
-    drop(socket);
+    let port = free_port();
     let stop = Arc::new(AtomicBool::new(false));
-    let stopped = stop.clone();
-    let sender = std::thread::spawn(move || {
-        let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
-        for frame in 0.. {
-            if stopped.load(Ordering::Relaxed) {
-                return;
-            }
-            let body = "[0 1.000][500 600 700 0 0 0][1 0 0 0 1 0 0 0 1]";
-            let text = format!(
-                "fr {frame}\r\nts {}\r\n6d 1 {body} \r\n\0",
-                f64::from(frame) * 0.01
-            );
-            let _ = socket.send_to(text.as_bytes(), ("127.0.0.1", port));
-            std::thread::sleep(Duration::from_millis(10));
-        }
-    });
+    let sender = still_body(port, 0, stop.clone());
     let source = format!("dtrack:{port}");
     let profile = "robots/justin.yaml";
     let record = [

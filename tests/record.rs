@@ -15,7 +15,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use scratch::Scratch;
 
 /// A UDP port that nobody has just now.
-fn free_port() -> u16 {
+pub(crate) fn free_port() -> u16 {
     let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
     socket.local_addr().expect("bound").port()
 }
@@ -60,7 +60,11 @@ fn wait_for(what: &str, mut done: impl FnMut() -> bool) {
 }
 
 /// Sends a body that stands still, a hundred times a second, until told to stop.
-fn still_body(port: u16, first: u64, stop: Arc<AtomicBool>) -> std::thread::JoinHandle<u64> {
+pub(crate) fn still_body(
+    port: u16,
+    first: u64,
+    stop: Arc<AtomicBool>,
+) -> std::thread::JoinHandle<u64> {
     std::thread::spawn(move || {
         let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
         let mut number = first;

@@ -41,6 +41,13 @@ impl Scratch {
         Self(tempfile::tempdir().expect("a temporary folder"))
     }
 
+    /// A folder with these files.
+    pub fn holding(files: Files) -> Self {
+        files
+            .into_iter()
+            .fold(Self::new(), |dir, (name, bytes)| dir.file(&name, bytes))
+    }
+
     /// Copies a shipped robot: `robots/<name>.yaml` and `robots/<name>/`.
     pub fn robot(self, name: &str) -> Self {
         let robots = root().join("robots");

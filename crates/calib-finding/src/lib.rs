@@ -20,13 +20,14 @@
 //! Programs compare ids, subjects and facts, never texts. In JSON a finding has the keys `id`, `severity`, `subject`,
 //! `rows`, `text`, `remedy`, `facts` and `about` (the typed subject).
 //!
-//! The crate also has the one [`Unit`] of numbers whose kind is only known at run time, and [`nearest_word`] for
+//! The crate also has the one [`Unit`] of numbers whose kind is only known at run time, [`number`] for their digits, [`nearest_word`] for
 //! remedies of the form *did you mean*, and [`printable`] for what goes to a terminal.
 
 pub mod catalog;
 mod fact;
 mod finding;
 mod nearest;
+pub mod number;
 mod printable;
 mod subject;
 mod template;

@@ -1,10 +1,10 @@
 //! Sentences with places for values.
 //!
 //! `{key}` stands for a value: a number in the unit that people read, with three significant digits; `{key:um}` for a
-//! number in that unit; `{key:row}` for a count with its noun (`1 row`, `2 rows`). `[[ … ]]` is left out unless every
+//! number in that unit; `{key} ± {sigma}` for a value with the digits that its standard deviation leaves; `{key:row}` for a count with its noun (`1 row`, `2 rows`). `[[ … ]]` is left out unless every
 //! value in it is known.
 
-use crate::{Fact, Facts, Unit};
+use crate::{Fact, Facts, Unit, number};
 
 /// What stands where a value is not known.
 const UNKNOWN: &str = "—";
@@ -50,6 +50,11 @@ fn filled(template: &str, facts: &Facts) -> (String, bool) {
             rest = place;
             continue;
         };
+        if let Some((text, after)) = with_sigma(inside, after, facts) {
+            out += &text;
+            rest = after;
+            continue;
+        }
         let (key, form) = inside.split_once(':').unwrap_or((inside, ""));
         match facts.get(key) {
             Some(fact) => out += &shown(fact, form),
@@ -76,7 +81,7 @@ fn is_place(inside: &str) -> bool {
 
 fn shown(fact: &Fact, form: &str) -> String {
     match fact {
-        Fact::Number { value, unit } => number(*value, *unit, form),
+        Fact::Number { value, unit } => lone(*value, *unit, form),
         Fact::Count(count) if form.is_empty() => count.to_string(),
         Fact::Count(count) => format!("{count} {form}{}", if *count == 1 { "" } else { "s" }),
         Fact::Name(name) => name.to_string(),
@@ -91,9 +96,36 @@ fn shown(fact: &Fact, form: &str) -> String {
     }
 }
 
-/// A number in the unit that `form` names, else in the unit that people read.
-fn number(value: f64, unit: Unit, form: &str) -> String {
-    let (factor, suffix) = match form {
+/// A value whose standard deviation follows, `{value} ± {sigma}` or `{value} (± {sigma})`, with the digits that σ leaves, and the
+/// template behind the two.
+fn with_sigma<'a>(inside: &str, after: &'a str, facts: &Facts) -> Option<(String, &'a str)> {
+    let (bracket, after) = match after.strip_prefix(" (± {") {
+        Some(after) => (true, after),
+        None => (false, after.strip_prefix(" ± {")?),
+    };
+    let (sigma, after) = after.split_once('}')?;
+    let (key, form) = inside.split_once(':').unwrap_or((inside, ""));
+    let (sigma, _) = sigma.split_once(':').unwrap_or((sigma, ""));
+    let (Fact::Number { value, unit }, Fact::Number { value: sigma, .. }) =
+        (facts.get(key)?, facts.get(sigma)?)
+    else {
+        return None;
+    };
+    let (factor, suffix) = scale(*unit, form);
+    let (value, sigma) = number::rounded_pair(value * factor, sigma * factor)?;
+    let text = if bracket {
+        format!("{value}{suffix} (± {sigma}{suffix}")
+    } else if suffix.starts_with(' ') {
+        format!("{value} ± {sigma}{suffix}")
+    } else {
+        format!("{value}{suffix} ± {sigma}{suffix}")
+    };
+    Some((text, after))
+}
+
+/// The factor to the unit that `form` names, else to the unit that people read, and its suffix.
+fn scale(unit: Unit, form: &str) -> (f64, &'static str) {
+    match form {
         "m" => (1.0, " m"),
         "um" => (1e6, " µm"),
         "s" => (1.0, " s"),
@@ -102,7 +134,12 @@ fn number(value: f64, unit: Unit, form: &str) -> String {
         "percent" => (100.0, " %"),
         "ppm" => (1e6, " ppm"),
         _ => unit.display(),
-    };
+    }
+}
+
+/// A number in the unit that `form` names, else in the unit that people read.
+fn lone(value: f64, unit: Unit, form: &str) -> String {
+    let (factor, suffix) = scale(unit, form);
     format!("{}{suffix}", significant(value * factor))
 }
 
@@ -159,6 +196,25 @@ mod tests {
             "a ↔ b; `a`, `b`"
         );
         assert_eq!(said("{nan}{missing}"), "——");
+    }
+
+    #[test]
+    fn sigma_sets_the_digits_of_its_value() {
+        let mut facts = Facts::new();
+        facts.insert("offset", Fact::seconds(-2.7503));
+        facts.insert("sigma", Fact::seconds(0.000_165));
+        facts.insert("angle", Fact::radians(0.02));
+        facts.insert("sigma_angle", Fact::radians(0.000_3));
+        facts.insert("factor", Fact::ratio(0.123_456));
+        facts.insert("spread", Fact::ratio(0.001_2));
+        let said = |template| fill(template, &facts);
+        assert_eq!(said("{offset} ± {sigma} ahead"), "−2750.30 ± 0.17 ms ahead");
+        assert_eq!(said("{angle} ± {sigma_angle}."), "1.146° ± 0.017°.");
+        assert_eq!(
+            said("{factor:percent} (± {spread:percent})"),
+            "12.35 % (± 0.12 %)"
+        );
+        assert_eq!(said("{offset} ± {unknown}"), "−2750 ms ± —");
     }
 
     #[test]

@@ -45,12 +45,22 @@ pub(crate) fn freedom(degrees_of_freedom: Option<f64>) -> String {
     }
 }
 
+/// How often chance alone does this, as people say it.
+fn by_chance(chance: f64) -> String {
+    match 1.0 / chance {
+        times if times > 1e6 => "by chance less than once in 1 000 000".to_owned(),
+        times if times > 2.0 => format!("by chance once in {times:.0}"),
+        _ => format!("by chance in {:.0} %", chance * 100.0),
+    }
+}
+
 /// A stated noise that the residuals exceed.
 pub(crate) fn contradicted(found: Option<&Contradiction>) -> String {
     found.map_or_else(String::new, |c| {
         format!(
-            "  noise: the residuals show {:.2} times what was stated (chance {:.1e}); sigma follows the residuals\n",
-            c.ratio, c.chance
+            "  noise: the residuals show {:.2} times what was stated ({}); sigma follows the residuals\n",
+            c.ratio,
+            by_chance(c.chance)
         )
     })
 }

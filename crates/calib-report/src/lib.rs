@@ -10,7 +10,7 @@
 //! ```
 //!
 //! [`Report`] holds them as a plain struct (SI: m, rad, s); [`markdown`], [`terminal`], [`json`], [`csv`] and [`html`] turn the
-//! struct into text: they change units and round ([`number`]), and compute nothing else. What has to be
+//! struct into text: they change units and round ([`mod@number`]), and compute nothing else. What has to be
 //! *summarized* (quantiles, bins, a verdict from limits) is a constructor of the data, next to its type: [`Stats::of`],
 //! [`ErrorStats::of`], [`HeldOut::from_poses`], [`Residuals::from_rows`], [`JointCoverage::of`], [`judge`], which
 //! maps the facts of a result to its verdict.
@@ -35,7 +35,6 @@ pub mod html;
 mod identification;
 pub mod json;
 pub mod markdown;
-pub mod number;
 pub mod plots;
 mod quantity;
 mod read;
@@ -58,7 +57,7 @@ pub mod view3d;
 mod weak;
 mod words;
 
-pub use calib_finding::{Finding, Severity, Unit};
+pub use calib_finding::{Finding, Severity, Unit, number};
 pub use check::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck, DataChecks};
 pub use data::{
     AccuracyLimit, Clock, Fates, FitSummary, Input, JointCoverage, Lost, Noise, NoiseCandidate,

@@ -1,7 +1,7 @@
 //! Joint columns and the number of rows.
 
 super::topic! {
-    /// Something of a joint in the URDF is wrong and bears on no number of the calibration.
+    /// A joint of the URDF contradicts itself; no calibrated number depends on it.
     URDF_INCONSISTENT = "urdf-inconsistent" {
         "mimic_of_fixed": Warning,
             "In the URDF the joint mimics the fixed joint `{source}`: it is taken to stand still.",

@@ -13,7 +13,7 @@ use calib_checks::sync::ClockMap;
 use calib_core::{EffectKind, Parameter, ParameterId, ParameterKind, Problem, Unit};
 use calib_finding::{About, Fact, Finding, Subject, catalog};
 use calib_profile::Usage;
-use calib_report::{Clock, ClockCheck};
+use calib_report::{Clock, ClockCheck, number};
 
 use crate::formulate::formulation::{ClockParameters, Formulation, FreeSet, MlFit};
 use crate::prepare::aligned::{Alignment, ClockState, ClockUnknowns, SAME_TIME};
@@ -301,12 +301,12 @@ fn estimated(r: &Loaded, clock: &ClockEstimate) -> String {
         None => "estimated from all loops",
     };
     let drift = clock.drift_sigma.map_or_else(String::new, |sigma| {
-        format!(", {:+.0} ± {:.0} ppm", clock.drift * 1e6, sigma * 1e6)
+        let drift = number::fixed(clock.drift * 1e6, 0);
+        format!(", {drift} ± {:.0} ppm", sigma * 1e6)
     });
     format!(
-        "; {from}: {:+.5} s ± {:.3} ms at mid-recording{drift}, and corrected",
-        clock.offset,
-        clock.sigma.unwrap_or_default() * 1e3,
+        "; {from}: {} at mid-recording{drift}, and corrected",
+        number::with_sigma(clock.offset, clock.sigma, calib_report::Unit::Second),
     )
 }
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use calib_checks::sync::ClockMap;
 use calib_finding::Finding;
 use calib_recording::Poses;
+use calib_report::{Unit, number};
 use nalgebra::Matrix3;
 
 use crate::prepare::excluded::Excluded;
@@ -110,10 +111,9 @@ impl Alignment {
             }
             ClockState::Declared => "clocks stated to be the same".to_owned(),
             ClockState::Found { body, map } => format!(
-                "the tracker clock is offset by {:+.4} s ± {:.2} ms from the robot clock and runs {:+.0} ± {:.0} ppm fast (motion of `{body}`: correlation {:.3}, second peak {:.2})",
-                map.offset,
-                map.offset_sigma * 1e3,
-                map.drift * 1e6,
+                "the tracker clock is offset by {} from the robot clock and runs {} ± {:.0} ppm fast (motion of `{body}`: correlation {:.3}, second peak {:.2})",
+                number::with_sigma(map.offset, Some(map.offset_sigma), Unit::Second),
+                number::fixed(map.drift * 1e6, 0),
                 map.drift_sigma * 1e6,
                 map.correlation,
                 map.second

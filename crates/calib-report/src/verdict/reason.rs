@@ -132,7 +132,7 @@ pub enum Effect {
     Supports,
     /// The result is accepted with warnings.
     Warns,
-    /// The result is not evaluated.
+    /// The result is not decided.
     LeavesOpen,
     /// The result is rejected.
     Rejects,

@@ -73,6 +73,17 @@ fn with(change: impl FnOnce(&mut VerdictFacts)) -> VerdictFacts {
     facts
 }
 
+/// Fitted to and checked with motions of single joints, with a warning.
+fn single_joint_and(warning: &str) -> VerdictFacts {
+    with(|f| {
+        f.single_joint = SingleJoint {
+            fitted: true,
+            held_out: true,
+        };
+        f.warnings = vec![warning.into()];
+    })
+}
+
 fn change(sigmas: Option<f64>) -> ImplausibleChange {
     ImplausibleChange {
         name: "elbow.origin.x".into(),
@@ -459,24 +470,12 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
         (
             ReasonId::SingleJointData,
             LeavesOpen,
-            with(|f| {
-                f.single_joint = SingleJoint {
-                    fitted: true,
-                    held_out: true,
-                };
-                f.warnings = vec!["missing-physics".into()];
-            }),
+            single_joint_and("missing-physics"),
         ),
         (
             ReasonId::SingleJointData,
             LeavesOpen,
-            with(|f| {
-                f.single_joint = SingleJoint {
-                    fitted: true,
-                    held_out: true,
-                };
-                f.warnings = vec!["changed-while-recording".into()];
-            }),
+            single_joint_and("changed-while-recording"),
         ),
         (
             ReasonId::RejectedShare,
@@ -648,7 +647,7 @@ fn the_book_lists_every_rule() {
     let word = |effect: &Effect| match effect {
         Effect::Supports => "noted",
         Effect::Warns => "warning",
-        Effect::LeavesOpen => "not evaluated",
+        Effect::LeavesOpen => "not decided",
         Effect::Rejects => "rejected",
     };
     let expected: Vec<(String, String)> = ReasonId::ALL

@@ -51,6 +51,22 @@ impl Count {
     }
 }
 
+/// Of so many cases with true uncertainties, one has an error that is not covered.
+const BY_CHANCE: f64 = 1000.0;
+
+/// What is said of a case.
+const CASES: &str = "- *named*: not accepted without reserve, and a finding names the cause, or what the data cannot distinguish from it;
+- *stopped*: not accepted, and no finding names the cause;
+- *harmless*: accepted, with or without warnings; the rms error at 24 new poses is within the limit, and the stated uncertainty covers it;
+- *wrong*: accepted, and the error is above the limit or not covered.
+
+The stated uncertainty is that of the fit, widened to the error that `prediction-expected` states, with Student's allowance where the noise is known from few data.";
+
+/// The designs and the bodies of the tables below.
+const DESIGNS: &str = "The recordings to be fitted are of six designs. *random*: 40 random poses. *few*: 10 random poses. *six*: 6 random poses. *sweeps*: one joint at a time from one posture, seven poses each. \
+*both*: 20 random poses, and sweeps in a second recording. *stream*: a slow motion of all joints, 150 samples. The tracker sees *one*, *two*, *three* or *four* markers on the last link, or a body with position and \
+orientation (*pose*).";
+
 /// The tables of the book's page.
 #[must_use]
 pub fn markdown(result: &FaultResult) -> String {
@@ -66,14 +82,21 @@ pub fn markdown(result: &FaultResult) -> String {
     // Writing into a string cannot fail.
     let _ = writeln!(
         text,
-        "# Faults: what `calib run` says of them\n\n{n} cases with a fault, {} without; seed {}. A case is *named* where it is not accepted without reserve and a \
-         finding names the cause or what the data cannot distinguish from it; *stopped* where it is not accepted; *harmless* where it is accepted (with or without \
-         warnings), its rms error at 24 new poses is within the limit, and its uncertainty (that of the fit, widened \
-         to the error that `prediction-expected` states, with Student's allowance for noise known from few data) covers the error; *wrong* where it is accepted and one of the two fails.\n",
+        "# Faults: what `calib run` says of them\n\n{n} cases with a fault, {} without; seed {}. A case is:\n\n{CASES}\n\n{DESIGNS}\n",
         clean.len(),
         result.seed
     );
-    let _ = writeln!(text, "Wrong: {wrong} of {n}{}.\n", upper(wrong, n));
+    let accepted = all
+        .iter()
+        .filter(|r| matches!(r.outcome, Outcome::Harmless | Outcome::Wrong))
+        .count();
+    let _ = writeln!(
+        text,
+        "Wrong: {wrong} of {n}{}. The uncertainty is held to what chance exceeds in one of {BY_CHANCE} cases, so of the {accepted} accepted cases about {:.1} \
+         would be wrong if every model and every σ were true.\n",
+        upper(wrong, n),
+        accepted as f64 / BY_CHANCE
+    );
     let silent = all.iter().filter(|r| r.confidently_wrong()).count();
     let refused = clean.iter().filter(|r| r.false_refusal()).count();
     let undecided = clean.iter().filter(|r| r.truly_undecided()).count();

@@ -138,7 +138,9 @@ fn record(
         &mut listener,
         &clock,
         SURVEY,
-        options.patience,
+        options
+            .seconds
+            .map_or(options.patience, |s| s.min(options.patience)),
         screen,
     )?;
     let heard = match heard {

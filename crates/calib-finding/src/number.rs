@@ -23,7 +23,7 @@ const PLAIN_DECIMALS: i32 = 3;
 /// `1.234 ± 0.041 mm` from SI numbers. Without a finite σ the value stands alone.
 ///
 /// ```
-/// use calib_report::{number, Unit};
+/// use calib_finding::{number, Unit};
 /// assert_eq!(number::with_sigma(0.00123456, Some(0.0000412), Unit::Meter), "1.235 ± 0.041 mm");
 /// assert_eq!(number::with_sigma(-1e-9, Some(0.002), Unit::Meter), "0.0 ± 2.0 mm");
 /// ```
@@ -210,6 +210,11 @@ fn significant(value: f64, max_decimals: i32) -> String {
         (2 - exponent(value, 3)).clamp(0, max_decimals)
     };
     fixed(value, decimals as usize)
+}
+
+/// Value and σ of any unit, both already in it, as [`with_sigma`] rounds them; `None` where one is not finite.
+pub(crate) fn rounded_pair(value: f64, sigma: f64) -> Option<(String, String)> {
+    (value.is_finite() && sigma.is_finite()).then(|| digits_from_sigma(value, sigma.abs()))
 }
 
 /// Value and σ > 0 as text with the decimals that two significant digits of σ leave.
