@@ -70,6 +70,7 @@ fn check(dir: &Scratch, robot: &str) {
         ("urdf", format!("{robot}.calibrated.urdf")),
         ("sdf", format!("{robot}.scene.sdf")),
         ("gltf", format!("{robot}.scene.glb")),
+        ("mcap", format!("{robot}.scene.mcap")),
         ("html", "report.html".to_owned()),
         ("axe", "report.html".to_owned()),
     ] {
@@ -109,11 +110,13 @@ fn what_is_wrong_is_found() {
         .file("bad.urdf", "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/></robot>")
         .file("bad.sdf", "<sdf version=\"1.9\"><world name=\"w\"><frame name=\"a\" attached_to=\"b\"/></world></sdf>")
         .file("bad.glb", "glTF")
+        .file("bad.mcap", "MCAP")
         .file("bad.html", "<!DOCTYPE html><html lang=\"en\"><head><title>t</title></head><body><img src=\"a\"></body></html>");
     let bad = [
         ("urdf", "bad.urdf"),
         ("sdf", "bad.sdf"),
         ("gltf", "bad.glb"),
+        ("mcap", "bad.mcap"),
         ("html", "bad.html"),
         ("axe", "bad.html"),
     ];

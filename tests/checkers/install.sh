@@ -30,14 +30,16 @@ program() {
   chmod +x "$folder/$1"
 }
 if command -v npm >/dev/null && (cd "$folder" && npm install --no-audit --no-fund --silent \
-  gltf-validator@2.0.0-dev.3.10 html-validate@10.17.0 axe-core@4.14.1 >>install.log 2>&1); then
-  cp "$here/gltf.js" "$here/axe.js" "$folder"
+  gltf-validator@2.0.0-dev.3.10 html-validate@10.17.0 axe-core@4.14.1 \
+  @mcap/core@2.2.2 @foxglove/schemas@2.1.0 ajv@8.17.1 >>install.log 2>&1); then
+  cp "$here/gltf.js" "$here/axe.js" "$here/mcap.js" "$folder"
   program gltf "node \"$folder/gltf.js\""
+  program mcap "node \"$folder/mcap.js\""
   program html "\"$folder/node_modules/.bin/html-validate\""
   browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome) \
     && program axe "node \"$folder/axe.js\" \"$browser\""
 fi
 
-for checker in urdf sdf gltf html axe; do
+for checker in urdf sdf gltf mcap html axe; do
   [ -x "$folder/$checker" ] && echo "$checker" || echo "no checker of $checker here"
 done

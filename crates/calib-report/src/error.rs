@@ -12,6 +12,9 @@ pub enum ReportError {
     /// The CSV writer failed.
     #[error("residuals as CSV: {0}")]
     Csv(String),
+    /// The MCAP writer failed.
+    #[error("view as MCAP: {0}")]
+    Mcap(String),
     /// The HTML template failed.
     #[error("report as HTML: {0}")]
     Html(String),

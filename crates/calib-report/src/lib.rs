@@ -35,6 +35,7 @@ pub mod html;
 mod identification;
 pub mod json;
 pub mod markdown;
+pub mod mcap;
 pub mod plots;
 mod quantity;
 mod read;

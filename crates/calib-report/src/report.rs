@@ -154,11 +154,17 @@ impl Report {
         }
     }
 
-    /// How many reasons warn.
+    /// How many warnings a reader is shown: a reason that stands for several findings counts each of them.
     #[must_use]
     pub fn warnings(&self) -> usize {
         let warns = |reason: &&Reason| reason.effect == Effect::Warns;
-        self.reason_facts.iter().filter(warns).count()
+        let times = |reason: &Reason| match reason.values.get("times") {
+            Some(calib_finding::Fact::Count(times)) => {
+                usize::try_from(*times).unwrap_or(usize::MAX)
+            }
+            _ => 1,
+        };
+        self.reason_facts.iter().filter(warns).map(times).sum()
     }
 
     /// Sentences of the reasons that speak against the result; all of them where a report states no effects.

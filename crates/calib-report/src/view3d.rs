@@ -55,6 +55,9 @@ pub struct ViewPose {
     pub calibrated: Vec<[f64; 7]>,
     /// Observed markers or bodies.
     pub markers: Vec<ViewMarker>,
+    /// Joint values by name, rad or m; the page does not show them.
+    #[serde(skip)]
+    pub joints: Vec<(String, f64)>,
 }
 
 /// A marker in one pose.
@@ -356,7 +359,7 @@ impl View3d {
             let Some(row) = pose.calibrated.get(outline.frame) else {
                 continue;
             };
-            let world_from_frame = isometry(row);
+            let world_from_frame = pose_of(row);
             let end =
                 |x: f64, y: f64, z: f64| place(&(world_from_frame * Point3::new(x, y, z)).into());
             for [ax, ay, az, bx, by, bz] in outline.lines.iter().take(STILL_LINES) {
@@ -392,7 +395,7 @@ fn round_length(m: f64) -> f64 {
     digit.unwrap_or(1.0) * power
 }
 
-fn isometry(row: &[f64; 7]) -> Isometry3<f64> {
+pub(crate) fn pose_of(row: &[f64; 7]) -> Isometry3<f64> {
     let rotation =
         UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(row[6], row[3], row[4], row[5]));
     Isometry3::from_parts(Translation3::new(row[0], row[1], row[2]), rotation)

@@ -78,7 +78,7 @@ pub struct FitTable {
     /// Joint column whose angles are taken as exact (axes); rows without an angle are excluded
     #[arg(long)]
     pub joint: Option<String>,
-    /// Center that the axis passes through, m (axes: `planar_radial`)
+    /// Center that the axis passes through, m (axes, for estimators that take one: see `--list`)
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     pub center_m: Option<[f64; 3]>,
     /// Direction that fixes the sign of the axis if there are no joint angles (axes)

@@ -12,8 +12,9 @@
 //!
 //! (1) decides which weights may be used. Equal weights trust no model of the robot, and neither does the pose of each body;
 //! the joints' noise trusts the robot's Jacobian. Where it predicts worse than the better of the other two, or is larger than
-//! joints scatter, it has swallowed physics, however likely it is. Among those that may be used, the smallest within two
-//! standard errors of the least (2) is taken.
+//! joints scatter, it has swallowed physics, however likely it is. Among those that may be used and lie within two
+//! standard errors of the least (2), one level for all joints is taken, else the smallest: equal weights where the poses do not show
+//! how the joints scatter stated intervals that held in 92.8 % instead of 95 %.
 //!
 //! The gate of the robust fit is tried in the same way ([`admit`](crate::analysis::admit)): a model that physics is missing
 //! from finds its hardest poses unlikely.
@@ -450,7 +451,11 @@ fn choose(trials: &[Trial]) -> Option<NoiseChoice> {
         let (more, error) = paired(&scores.surprises[*i], &scores.surprises[best]);
         candidates[*i].admitted && more <= SHOWN * error
     };
-    let chosen = (0..trials.len()).find(within)?;
+    // All joints scatter, however little, and a level that the poses cannot tell from none costs nothing but wider intervals.
+    let joints = (0..trials.len()).find(|i| trials[*i].noise == NoiseModel::Joint);
+    let chosen = joints
+        .filter(within)
+        .or_else(|| (0..trials.len()).find(within))?;
     let (less, error) = paired(&scores.surprises[best], &scores.surprises[likeliest]);
     let swallowed = !candidates[likeliest].admitted && less > SHOWN * error;
     Some(NoiseChoice {

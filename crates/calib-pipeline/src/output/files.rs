@@ -97,6 +97,13 @@ pub(crate) fn written(
         },
         "robot, markers, errors as glTF for viewers".to_owned(),
     ));
+    files.push((
+        OutputFile {
+            name: format!("{stem}.mcap"),
+            bytes: calib_report::mcap::mcap(scene, view)?,
+        },
+        "the poses as a recording for players (MCAP)".to_owned(),
+    ));
     Ok(files)
 }
 

@@ -16,6 +16,7 @@ use crate::formulate::kinematics::Calibration;
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::accuracy::configuration;
+use crate::verify::deviations::joint_values;
 
 /// Half length of a drawn axis of a sweep, m.
 const AXIS_HALF_LENGTH: f64 = 0.3;
@@ -63,12 +64,9 @@ pub fn view(
             parent,
         });
     }
-    let validation = inputs
-        .recordings
-        .values()
-        .filter(|r| r.spec.usage == Usage::Validation);
-    let poses = validation
-        .flat_map(|r| poses(inputs, tracks, nominal, robot, r))
+    let poses = shown_rows(inputs, held_out)
+        .into_iter()
+        .flat_map(|(r, rows)| poses(inputs, tracks, (nominal, robot), r, &rows))
         .map(|pose| ViewPose {
             text: held_out.map_or_else(String::new, |h| h.errors_of(&pose.name)),
             ..pose
@@ -200,16 +198,51 @@ fn joint_axes(inputs: &Inputs, fit: &MlFit) -> Vec<Axis> {
     axes
 }
 
+/// Postures that are shown where none was recorded to be held out.
+const LEFT_OUT: usize = 24;
+
+/// What a pose of a recording is called.
+fn pose_name(r: &Loaded, row: usize) -> String {
+    format!("{}:{}", r.name, r.poses.rows[row])
+}
+
+/// Rows to show: the held-out ones; where there are none, the worst of those that were left out in turn, and others evenly.
+fn shown_rows<'a>(inputs: &'a Inputs, held_out: Option<&HeldOut>) -> Vec<(&'a Loaded, Vec<usize>)> {
+    let known = |r: &Loaded| {
+        (0..r.q.len())
+            .filter(|row| r.q[*row].is_some())
+            .collect::<Vec<_>>()
+    };
+    let (validation, fitted): (Vec<_>, Vec<_>) = inputs
+        .recordings
+        .values()
+        .map(|r| (r, known(r)))
+        .partition(|(r, _)| r.spec.usage == Usage::Validation);
+    if !validation.is_empty() {
+        return validation;
+    }
+    let count: usize = fitted.iter().map(|(_, rows)| rows.len()).sum();
+    let every = count.div_ceil(LEFT_OUT).max(1);
+    let worst = held_out.and_then(|h| h.worst.as_ref());
+    let thinned = |(r, rows): (&'a Loaded, Vec<usize>)| {
+        let is_worst = |row: usize| worst.is_some_and(|w| w.pose == pose_name(r, row));
+        let rows = rows.into_iter().enumerate();
+        let rows = rows.filter(|(i, row)| i % every == 0 || is_worst(*row));
+        (r, rows.map(|(_, row)| row).collect())
+    };
+    fitted.into_iter().map(thinned).collect()
+}
+
 fn poses(
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
-    nominal: &Calibration,
-    robot: &Calibration,
+    (nominal, robot): (&Calibration, &Calibration),
     r: &Loaded,
+    rows: &[usize],
 ) -> Vec<ViewPose> {
     let mut poses = Vec::new();
-    for (row, q) in r.q.iter().enumerate() {
-        let Some(q) = q else { continue };
+    for &row in rows {
+        let Some(q) = &r.q[row] else { continue };
         let placed = |c: &Calibration| -> Vec<Isometry3<f64>> {
             c.root_from_link(q)
                 .iter()
@@ -252,11 +285,15 @@ fn poses(
             }
         }
         poses.push(ViewPose {
-            name: format!("{}:{}", r.name, r.poses.rows[row]),
+            name: pose_name(r, row),
             text: String::new(),
             nominal: placed(nominal).iter().map(pose_row).collect(),
             calibrated: calibrated.iter().map(pose_row).collect(),
             markers,
+            joints: joint_values(inputs, &r.name, row)
+                .into_iter()
+                .map(|value| (value.joint, value.value))
+                .collect(),
         });
     }
     poses

@@ -15,14 +15,14 @@
 
 mod file;
 
-use crate::view3d::{Axis, Circle, Sphere, View3d, ViewPose};
+use crate::view3d::{Axis, Circle, Sphere, View3d, ViewPose, pose_of};
 use crate::{ReportError, Scene};
 use file::{Color, File, named, narrow};
 use gltf_json::Index;
 use gltf_json::animation::Property;
 use gltf_json::mesh::{Mesh, Mode};
 use gltf_json::scene::{Node, UnitQuaternion as Turn};
-use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde_json::json;
 
 /// Half of √2: the rotation about x by −90° that makes z up into y up.
@@ -165,8 +165,8 @@ impl File {
         for (i, frame) in view.frames.iter().enumerate() {
             let relative = |k: usize, parent: Option<usize>| -> Vec<Isometry3<f64>> {
                 let of = |rows: &&Vec<[f64; 7]>| match parent {
-                    Some(parent) => isometry(&rows[parent]).inverse() * isometry(&rows[k]),
-                    None => isometry(&rows[k]),
+                    Some(parent) => pose_of(&rows[parent]).inverse() * pose_of(&rows[k]),
+                    None => pose_of(&rows[k]),
                 };
                 shown.iter().map(of).collect()
             };
@@ -369,11 +369,6 @@ impl File {
             .chain(fixed.map(axis));
         self.still("joints", (Mode::Lines, Color::Joint), parts.collect())
     }
-}
-
-fn isometry(row: &[f64; 7]) -> Isometry3<f64> {
-    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(row[6], row[3], row[4], row[5]));
-    Isometry3::from_parts(Translation3::new(row[0], row[1], row[2]), rotation)
 }
 
 fn xyzw(q: &UnitQuaternion<f64>) -> [f64; 4] {

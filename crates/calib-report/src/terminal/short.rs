@@ -63,7 +63,11 @@ fn head(report: &Report, look: Look) -> Vec<String> {
         out.extend(lines(&all.join(" → "), look, "  ", "    "));
     }
     if !number.parts.is_empty() {
-        let parts = format!("of this: {}", number.parts.join(", "));
+        let parts = format!(
+            "{}: {}",
+            number.made_of.to_lowercase(),
+            number.parts.join(", ")
+        );
         let robot = match number.robot.as_str() {
             "" => parts,
             robot => format!("{parts}; {robot}"),

@@ -14,6 +14,8 @@ pub(crate) struct Headline {
     pub(crate) interval: String,
     /// `limit 1.50 mm`; empty where the profile sets none.
     pub(crate) limit: String,
+    /// What the parts are: of the number, or of a larger one.
+    pub(crate) made_of: &'static str,
     /// `tracker 0.52 mm`, largest first.
     pub(crate) parts: Vec<String>,
     /// `the robot itself: about 0.316 mm`; empty where the tracker's noise is not known.
@@ -69,6 +71,7 @@ pub(crate) fn headline(report: &Report) -> Headline {
         },
         value: format!("{} rms", length(rms)),
         interval,
+        made_of: made_of(report, rms),
         parts: parts(report),
         robot: robot.map_or_else(String::new, |m| {
             format!("the robot itself: about {}", length(m))
@@ -90,11 +93,28 @@ impl ErrorSource {
     }
 }
 
-fn parts(report: &Report) -> Vec<String> {
+/// The known parts of the error, m.
+fn known(report: &Report) -> impl Iterator<Item = (ErrorSource, f64)> {
     let of = report.accuracy_limits.iter();
-    let of = of.filter_map(|part| Some((part.kind, part.sigma_m.filter(|m| *m > 0.0)?)));
-    of.map(|(kind, m)| format!("{} {}", kind.short(), length(m)))
+    of.filter_map(|part| Some((part.kind, part.sigma_m.filter(|m| *m > 0.0)?)))
+}
+
+fn parts(report: &Report) -> Vec<String> {
+    known(report)
+        .map(|(kind, m)| format!("{} {}", kind.short(), length(m)))
         .collect()
+}
+
+/// The parts are stated by the fit. Where they exceed the measured error, they are not parts of it.
+fn made_of(report: &Report, rms: f64) -> &'static str {
+    /// Standard deviations and errors of few poses differ by this much.
+    const MORE: f64 = 1.2;
+    let all: f64 = known(report).map(|(_, m)| m * m).sum();
+    if all.sqrt() > MORE * rms {
+        "The fit expects more"
+    } else {
+        "Of this"
+    }
 }
 
 /// `checks:12 linkM_3`, and its error.

@@ -3,6 +3,7 @@
 mod browser;
 mod examples;
 mod glb;
+mod mcap;
 mod page;
 mod parts;
 mod renderers;

@@ -377,3 +377,18 @@ fn every_layer_draws_something_and_errors_grow_with_their_slider() {
     assert_eq!(seen.told["grows"], true);
     assert_eq!(seen.told["hidden"], true, "the still picture gives way");
 }
+
+#[test]
+fn what_exceeds_the_error_is_not_called_a_part_of_it() {
+    let mut report = examples::accepted();
+    let said = |report: &Report| {
+        let page = html(report, None).expect("a page");
+        [
+            page.contains("Of this: "),
+            page.contains("The fit expects more: "),
+        ]
+    };
+    assert_eq!(said(&report), [true, false]);
+    report.accuracy_limits[0].sigma_m = Some(0.05);
+    assert_eq!(said(&report), [false, true]);
+}

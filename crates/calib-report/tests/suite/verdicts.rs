@@ -659,3 +659,15 @@ fn the_book_lists_every_rule() {
         .collect();
     assert_eq!(rows, expected);
 }
+
+#[test]
+fn the_first_line_counts_every_warning_that_is_shown() {
+    let facts = with(|f| {
+        f.warnings = ["missing-physics", "row-outlier", "missing-physics"]
+            .map(String::from)
+            .to_vec();
+    });
+    let report = calib_report::Report::default().judged(judge(&facts));
+    assert_eq!(report.verdict, Verdict::AcceptedWithWarnings);
+    assert_eq!(report.warnings(), 3);
+}

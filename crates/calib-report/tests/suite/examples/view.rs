@@ -40,6 +40,7 @@ pub fn view() -> View3d {
                         predicted: marker(&model, place).into(),
                     })
                     .collect(),
+                ..ViewPose::default()
             }
         })
         .collect();
