@@ -5,7 +5,7 @@ const { McapIndexedReader, TempBuffer } = require('@mcap/core');
 const published = require('@foxglove/schemas/jsonschema');
 const Ajv = require('ajv');
 
-const ajv = new Ajv({ strict: false });
+const ajv = new Ajv({ strict: false, validateFormats: false });
 
 async function check(file) {
   const bytes = readFileSync(file);

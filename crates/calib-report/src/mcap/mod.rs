@@ -17,7 +17,7 @@ use std::io::Cursor;
 use ::mcap::records::{MessageHeader, Metadata};
 use ::mcap::{McapError, WriteOptions, Writer};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use schemars::JsonSchema;
+use schemars::{JsonSchema, generate::SchemaSettings};
 use serde::Serialize;
 
 use crate::view3d::{View3d, ViewMarker, ViewPose, pose_of};
@@ -110,7 +110,10 @@ impl Channel {
         topic: &str,
         name: &str,
     ) -> Result<Self, McapError> {
-        let schema = schemars::schema_for!(T);
+        // Whole and of the draft that players read.
+        let mut settings = SchemaSettings::draft07();
+        settings.inline_subschemas = true;
+        let schema = settings.into_generator().into_root_schema_for::<T>();
         let schema = writer.add_schema(
             &format!("foxglove.{name}"),
             "jsonschema",
