@@ -176,19 +176,14 @@ impl Solution {
     /// everything derived from them. `None` when the model cannot be evaluated.
     #[must_use]
     pub fn under(&self, dependence: &Dependence, borders: &[usize]) -> Option<Self> {
-        let samples = self.scaled_samples(dependence.of, borders, usize::MAX);
-        let before = memory(
-            &samples,
-            dependence.share,
-            dependence.decay,
-            self.model.free(),
-        );
         // Σ_s N_sᵀ k_s, earlier and later samples alike
         let n = self.model.free();
+        let mut memory = Memory::new(dependence.share, dependence.decay, n);
         let mut added = DMatrix::zeros(n, n);
-        for (sample, n_s) in samples.iter().zip(&before) {
-            added.gemm_tr(1.0, n_s, &sample.k, 1.0);
-        }
+        self.each_scaled(dependence.of, borders, |sample| {
+            added.gemm_tr(1.0, &memory.of(&sample), &sample.k, 1.0);
+            true
+        });
         let added = &added + added.transpose();
         let mut out = self.clone();
         let c = &self.information.covariance;
@@ -203,25 +198,33 @@ impl Solution {
         Some(out)
     }
 
+    /// The first samples, at most so many.
     fn scaled_samples(&self, of: MemoryOf, borders: &[usize], most: usize) -> Vec<Scaled> {
+        let mut out = Vec::new();
+        self.each_scaled(of, borders, |sample| {
+            out.push(sample);
+            out.len() < most
+        });
+        out
+    }
+
+    /// Calls `see` with one sample after the other until it gives `false`.
+    fn each_scaled(&self, of: MemoryOf, borders: &[usize], mut see: impl FnMut(Scaled) -> bool) {
         let mut work = Workspace::new(&self.model);
         work.cache.update(&self.model.problem, &self.values);
         let mut keys = Keys::default();
-        let mut out = Vec::new();
         let mut recording = None;
         for sample in 0..self.model.problem.samples {
-            if out.len() >= most {
-                break;
-            }
             let Some(rows) = whitened(self.objective(), &self.values, sample, &mut work) else {
                 continue;
             };
             let own = borders.partition_point(|b| *b <= sample);
             let starts = recording != Some(own);
             recording = Some(own);
-            out.push(self.scaled_sample(&rows, of, starts, &mut keys));
+            if !see(self.scaled_sample(&rows, of, starts, &mut keys)) {
+                break;
+            }
         }
-        out
     }
 
     /// W = σ V⁻¹ σ,   k = σ V⁻¹ J,   y = σ V⁻¹ e
@@ -352,49 +355,54 @@ fn shared<'a>(a: &'a Scaled, b: &'a Scaled) -> impl Iterator<Item = (usize, usiz
         .filter_map(move |(i, key)| Some((i, place((*key)?)?)))
 }
 
-/// Σ_{u<s} c ρ^(s−u) k_u for every sample, by recursion.
-fn memory(samples: &[Scaled], share: f64, decay: f64, n: usize) -> Vec<DMatrix<f64>> {
-    let reset = |s: usize| samples[s].starts;
-    recursion(samples.len(), |s| &samples[s], reset, share, decay, n)
-}
-
-fn recursion<'a>(
-    count: usize,
-    at: impl Fn(usize) -> &'a Scaled,
-    reset: impl Fn(usize) -> bool,
+/// Σ_{u<s} c ρ^(s−u) k_u, from sample to sample.
+struct Memory {
     share: f64,
     decay: f64,
-    n: usize,
-) -> Vec<DMatrix<f64>> {
-    let width = (0..count)
-        .flat_map(|s| &at(s).keys)
-        .flatten()
-        .max()
-        .map_or(0, |k| k + 1);
-    let mut held = DMatrix::<f64>::zeros(width, n);
-    let mut out = Vec::with_capacity(count);
-    for s in 0..count {
-        if reset(s) {
-            held.fill(0.0);
-        } else {
-            held *= decay;
+    /// By key.
+    held: DMatrix<f64>,
+}
+
+impl Memory {
+    fn new(share: f64, decay: f64, n: usize) -> Self {
+        Self {
+            share,
+            decay,
+            held: DMatrix::zeros(0, n),
         }
-        let sample = at(s);
-        let mut own = DMatrix::zeros(sample.keys.len(), n);
+    }
+
+    /// N of the next sample.
+    fn of(&mut self, sample: &Scaled) -> DMatrix<f64> {
+        self.next(sample, sample.starts)
+    }
+
+    /// The same where it is said whether nothing is remembered.
+    fn next(&mut self, sample: &Scaled, starts: bool) -> DMatrix<f64> {
+        if starts {
+            self.held.fill(0.0);
+        } else {
+            self.held *= self.decay;
+        }
         let asked = || {
             let keys = sample.keys.iter().enumerate();
             keys.filter_map(|(i, key)| Some((i, (*key)?)))
         };
+        let width = asked().map(|(_, key)| key + 1).max().unwrap_or(0);
+        if width > self.held.nrows() {
+            let held = std::mem::replace(&mut self.held, DMatrix::zeros(0, 0));
+            self.held = held.resize_vertically(width, 0.0);
+        }
+        let mut own = DMatrix::zeros(sample.keys.len(), self.held.ncols());
         for (i, key) in asked() {
-            own.row_mut(i).copy_from(&held.row(key));
+            own.row_mut(i).copy_from(&self.held.row(key));
         }
         for (i, key) in asked() {
-            let mut row = held.row_mut(key);
-            row += sample.k.row(i) * share;
+            let mut row = self.held.row_mut(key);
+            row += sample.k.row(i) * self.share;
         }
-        out.push(own);
+        own
     }
-    out
 }
 
 /// The last three terms of (3), by lag.
@@ -404,10 +412,14 @@ fn bias(samples: &[Scaled], c: &DMatrix<f64>, share: f64, decay: f64) -> [f64; L
     if share == 0.0 {
         return bias_of_none(samples, c);
     }
-    let before = memory(samples, share, decay, n);
+    let mut memory = Memory::new(share, decay, n);
+    let before: Vec<DMatrix<f64>> = samples.iter().map(|s| memory.of(s)).collect();
     // The same from the end: a recording then begins with its last sample.
     let ends = |s: usize| s == 0 || samples[count - s].starts;
-    let after = recursion(count, |s| &samples[count - 1 - s], ends, share, decay, n);
+    let mut memory = Memory::new(share, decay, n);
+    let after: Vec<DMatrix<f64>> = (0..count)
+        .map(|s| memory.next(&samples[count - 1 - s], ends(s)))
+        .collect();
     let mut added = DMatrix::zeros(n, n);
     let around: Vec<DMatrix<f64>> = (0..count)
         .map(|s| &before[s] + &after[count - 1 - s])
