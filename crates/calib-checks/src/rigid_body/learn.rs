@@ -16,8 +16,12 @@ const MIN_EXTENT: f64 = 1e-3;
 /// Rounds of registering and averaging; each divides the error by the number of rows or so, ten are usual.
 const MAX_ROUNDS: usize = 200;
 
-/// Change of the template, relative to its size, at which learning has converged.
+/// Change of the template, relative to its size, at which learning has converged…
 const CONVERGED: f64 = 1e-13;
+/// …or below which rounding is all that is left, where it no longer shrinks to…
+const ROUNDING: f64 = 1e-9;
+/// …this part of the change before: with many rows the mean is rounded by more than [`CONVERGED`].
+const SHRINKS: f64 = 0.5;
 
 /// Rows that the place of a marker is learned from at most, evenly over all of them: noise of 0.3 mm leaves 5 µm.
 const ENOUGH_ROWS: usize = 4000;
@@ -253,12 +257,19 @@ fn start(
     Ok(tracks.iter().map(|track| track[row]).collect())
 }
 
-/// Of every marker evenly spaced rows that show it.
+/// Evenly spaced rows, and those of a marker that is seldom seen.
 fn enough_rows(tracks: &[&[Option<Point3<f64>>]]) -> Vec<usize> {
-    let mut rows = BTreeSet::new();
+    let every = |rows: Vec<usize>| {
+        let stride = rows.len().div_ceil(ENOUGH_ROWS).max(1);
+        rows.into_iter().step_by(stride)
+    };
+    let count = tracks.first().map_or(0, |track| track.len());
+    let mut rows: BTreeSet<usize> = every((0..count).collect()).collect();
     for track in tracks {
-        let seen: Vec<usize> = (0..track.len()).filter(|i| track[*i].is_some()).collect();
-        rows.extend(seen.iter().step_by(seen.len().div_ceil(ENOUGH_ROWS).max(1)));
+        let shown = rows.iter().filter(|i| track[**i].is_some()).count();
+        if 2 * shown < ENOUGH_ROWS {
+            rows.extend(every((0..count).filter(|i| track[*i].is_some()).collect()));
+        }
     }
     rows.into_iter().collect()
 }
@@ -269,6 +280,7 @@ fn converged(
     tracks: &[&[Option<Point3<f64>>]],
     rows: &[usize],
 ) -> Vec<Option<Point3<f64>>> {
+    let mut before = f64::INFINITY;
     for _ in 0..MAX_ROUNDS {
         let next = average(&places, tracks, rows);
         let known_before = places.iter().flatten().count();
@@ -280,9 +292,11 @@ fn converged(
         let size = extent(next.iter().flatten());
         let grown = next.iter().flatten().count() > known_before;
         places = next;
-        if !grown && change <= CONVERGED * size {
+        let rounding = change <= ROUNDING * size && change > SHRINKS * before;
+        if !grown && (change <= CONVERGED * size || rounding) {
             break;
         }
+        before = change;
     }
     places
 }

@@ -5,6 +5,7 @@ use crate::statistics::median;
 use calib_finding::nearest_word;
 use calib_recording::Poses;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3};
+use rayon::prelude::*;
 use std::ops::AddAssign;
 
 /// One row's pose.
@@ -97,7 +98,6 @@ pub fn body_poses(
             expected: n,
         });
     }
-    let mut rows = Vec::with_capacity(n);
     let mut squares = vec![0.0; tracks.len()];
     let mut seen_rows = vec![0usize; tracks.len()];
     let mut worst = vec![(0.0, 0usize); tracks.len()];
@@ -106,39 +106,28 @@ pub fn body_poses(
     } else {
         0.0
     };
-    for row in 0..n {
-        let seen: Vec<usize> = (0..tracks.len())
-            .filter(|&k| tracks[k][row].is_some())
-            .collect();
-        let from: Vec<Point3<f64>> = seen.iter().map(|&k| template.points[k]).collect();
-        let to: Vec<Point3<f64>> = seen.iter().filter_map(|&k| tracks[k][row]).collect();
-        let Some(tracker_from_body) = register(&from, &to) else {
-            let count = seen.len();
-            rows.push(Err(if count < 3 {
-                WithoutPose::TooFewSeen { seen: count }
-            } else {
-                WithoutPose::OnALine { seen: count }
-            }));
-            continue;
+    let mut rows = Vec::with_capacity(n);
+    let registered = (0..n).into_par_iter().with_min_len(AT_ONCE);
+    let registered: Vec<_> = registered
+        .map(|row| registered_row(&template, tracks, row))
+        .collect();
+    for (row, registered) in registered.into_iter().enumerate() {
+        let (pose, distances) = match registered {
+            Ok(registered) => registered,
+            Err(why) => {
+                rows.push(Err(why));
+                continue;
+            }
         };
-        let mut sum = 0.0;
-        for ((&k, m), p) in seen.iter().zip(&from).zip(&to) {
-            let distance = (tracker_from_body * m - p).norm();
-            sum += distance * distance;
+        for &(k, distance) in &distances {
             squares[k] += distance * distance;
             seen_rows[k] += 1;
             if distance > worst[k].0 {
                 worst[k] = (distance, row);
             }
         }
-        freedom += 3.0 * seen.len() as f64 - 6.0;
-        let information = information(&from);
-        rows.push(Ok(RowPose {
-            tracker_from_body,
-            markers: seen.len(),
-            rms: (sum / seen.len() as f64).sqrt(),
-            covariance: information.try_inverse(),
-        }));
+        freedom += 3.0 * distances.len() as f64 - 6.0;
+        rows.push(Ok(pose));
     }
     let total: f64 = squares.iter().sum();
     let sigma = sigma.or_else(|| (freedom > 0.0).then(|| (total / freedom).sqrt()));
@@ -165,6 +154,41 @@ pub fn body_poses(
         sigma,
         fits,
     })
+}
+
+/// Rows that a thread registers at once: half a millisecond.
+const AT_ONCE: usize = 256;
+
+/// The pose of one row, its covariance for σ = 1, and the distance of every marker that was seen, m, by its place.
+fn registered_row(
+    template: &Template,
+    tracks: &[&[Option<Point3<f64>>]],
+    row: usize,
+) -> Result<(RowPose, Vec<(usize, f64)>), WithoutPose> {
+    let seen: Vec<usize> = (0..tracks.len())
+        .filter(|&k| tracks[k][row].is_some())
+        .collect();
+    let from: Vec<Point3<f64>> = seen.iter().map(|&k| template.points[k]).collect();
+    let to: Vec<Point3<f64>> = seen.iter().filter_map(|&k| tracks[k][row]).collect();
+    let Some(tracker_from_body) = register(&from, &to) else {
+        let count = seen.len();
+        return Err(if count < 3 {
+            WithoutPose::TooFewSeen { seen: count }
+        } else {
+            WithoutPose::OnALine { seen: count }
+        });
+    };
+    let pairs = from.iter().zip(&to);
+    let distances = pairs.map(|(m, p)| (tracker_from_body * m - p).norm());
+    let distances: Vec<(usize, f64)> = seen.iter().copied().zip(distances).collect();
+    let sum: f64 = distances.iter().map(|(_, d)| d * d).sum();
+    let pose = RowPose {
+        tracker_from_body,
+        markers: seen.len(),
+        rms: (sum / seen.len() as f64).sqrt(),
+        covariance: information(&from).try_inverse(),
+    };
+    Ok((pose, distances))
 }
 
 /// [`body_poses`] of markers of a table, by name; their order defines the body's frame.

@@ -11,6 +11,8 @@ use calib_checks::model::{Spoiled, SpoiledRow, spoiled_rows};
 use calib_checks::structural::{Chain, Deviation, deviations};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::Usage;
+use calib_urdf::LinkId;
+use rayon::prelude::*;
 
 use crate::formulate::structural::{Coupling, Layout, Structural, coupled};
 use crate::prepare::inputs::{Inputs, Loaded};
@@ -64,8 +66,8 @@ struct Rows<'a> {
 
 /// Rows that deviate while no structural hypothesis stands out.
 #[must_use]
-pub fn rows(
-    inputs: &Inputs,
+pub fn rows<'a>(
+    inputs: &'a Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
     structural: &Structural,
 ) -> Vec<Finding> {
@@ -74,37 +76,39 @@ pub fn rows(
         let mut all = structural.findings.iter();
         all.any(|f| f.severity == calib_finding::Severity::Error && f.subject.is_in(name))
     };
-    let mut all: Vec<Spoilt<'_>> = Vec::new();
-    for (body, spec) in &inputs.robot.profile.bodies {
-        for loaded in inputs.recordings.values().filter(|r| !explained(&r.name)) {
-            let seen = tracks[body].in_recording(&loaded.name);
-            if seen.is_empty() || loaded.q.iter().any(Option::is_none) {
-                continue;
-            }
-            let q: Vec<&Vec<f64>> = loaded.q.iter().flatten().collect();
-            let at = |q: &[f64]| {
-                let q = with_couplings(q, &structural.couplings);
-                inputs.robot.model.root_from_link(&q, spec.link)
-            };
-            let poses: Vec<_> = q.iter().map(|q| at(q)).collect();
-            let spoiled = spoiled_rows(seen, &poses);
-            if spoiled.rows.is_empty() {
-                continue;
-            }
-            let on_the_way = |row: &&SpoiledRow| {
-                on_the_way(&q, row, |there| {
-                    spoiled.disagreement_at(row.row, &at(there), seen, &poses)
-                })
-            };
-            let moving = spoiled.rows.iter().filter(on_the_way).map(|row| row.row);
-            all.push(Spoilt {
-                body,
-                loaded,
-                moving: moving.collect(),
-                spoiled,
-            });
+    let bodies = inputs.robot.profile.bodies.iter();
+    let tables = bodies.flat_map(|(body, spec)| {
+        let recordings = inputs.recordings.values();
+        recordings.map(move |loaded| (body.as_str(), spec.link, loaded))
+    });
+    let tables: Vec<_> = tables.filter(|(_, _, r)| !explained(&r.name)).collect();
+    let spoilt = |&(body, link, loaded): &(&'a str, LinkId, &'a Loaded)| {
+        let seen = tracks[body].in_recording(&loaded.name);
+        if seen.is_empty() || loaded.q.iter().any(Option::is_none) {
+            return None;
         }
-    }
+        let q: Vec<&Vec<f64>> = loaded.q.iter().flatten().collect();
+        let at = |q: &[f64]| {
+            let q = with_couplings(q, &structural.couplings);
+            inputs.robot.model.root_from_link(&q, link)
+        };
+        let poses: Vec<_> = q.iter().map(|q| at(q)).collect();
+        let spoiled = spoiled_rows(seen, &poses);
+        let on_the_way = |row: &&SpoiledRow| {
+            on_the_way(&q, row, |there| {
+                spoiled.disagreement_at(row.row, &at(there), seen, &poses)
+            })
+        };
+        let moving = spoiled.rows.iter().filter(on_the_way).map(|row| row.row);
+        let moving: BTreeSet<usize> = moving.collect();
+        (!spoiled.rows.is_empty()).then_some(Spoilt {
+            body,
+            loaded,
+            moving,
+            spoiled,
+        })
+    };
+    let all: Vec<Spoilt<'a>> = tables.par_iter().filter_map(spoilt).collect();
     if all.is_empty() {
         return Vec::new();
     }

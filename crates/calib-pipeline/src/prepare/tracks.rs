@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use calib_checks::rigid_body::{Distances, NotABody, Template, body_poses};
+use calib_checks::rigid_body::{BodyPoses, Distances, NotABody, RowPose, Template, body_poses};
 use calib_finding::nearest_word;
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::{Body, BodyKind, Usage};
 use nalgebra::{Isometry3, Point3};
+use rayon::prelude::*;
 
 use crate::error::{DataProblem, PipelineError};
 use crate::prepare::inputs::{Inputs, Loaded};
@@ -51,9 +52,18 @@ pub fn body_tracks(
     inputs: &Inputs,
     findings: &mut Vec<Finding>,
 ) -> Result<BTreeMap<String, BodyTrack>, PipelineError> {
+    let bodies: Vec<(&String, &Body)> = inputs.robot.profile.bodies.iter().collect();
+    let of = |(name, body): &(&String, &Body)| {
+        let mut findings = Vec::new();
+        let track = body_track(inputs, name, body, &mut findings);
+        (track, findings)
+    };
+    let of_bodies: Vec<_> = bodies.par_iter().map(of).collect();
     let mut tracks = BTreeMap::new();
-    for (name, body) in &inputs.robot.profile.bodies {
-        tracks.insert(name.clone(), body_track(inputs, name, body, findings)?);
+    for (track, of_body) in of_bodies {
+        findings.extend(of_body);
+        let track = track?;
+        tracks.insert(track.name.clone(), track);
     }
     Ok(tracks)
 }
@@ -93,6 +103,34 @@ fn recorded_as(inputs: &Inputs, name: &str, body: &Body) -> Option<String> {
         }),
     };
     near.map(str::to_owned)
+}
+
+/// A marker that wanders on its body: it is loose or mislabeled.
+fn loose_marker(body: &str, all: &BodyPoses, stated: Option<f64>) -> Option<Finding> {
+    let limit = (8.0 * stated.unwrap_or(0.0005)).max(0.003);
+    let (fit, wander) = all.moving_marker(limit)?;
+    Some(
+        Finding::new(catalog::BODY_NOT_RIGID, Subject::body(body))
+            .with("marker", Fact::name(&fit.name))
+            .with("distance", Fact::meters(wander))
+            .with("limit", Fact::meters(limit)),
+    )
+}
+
+/// The poses of a fitted recording, where the same samples of it were registered with all others.
+fn registered_already(
+    tracks: &[Vec<Option<Point3<f64>>>],
+    loaded: &Loaded,
+    fitted: &[&Loaded],
+    (good, all): (&[Vec<Option<Point3<f64>>>], &BodyPoses),
+) -> Option<Vec<Option<Isometry3<f64>>>> {
+    let place = fitted.iter().position(|r| r.name == loaded.name)?;
+    let first: usize = fitted[..place].iter().map(|r| r.poses.len()).sum();
+    let rows = first..first + loaded.poses.len();
+    let mut pairs = tracks.iter().zip(good);
+    let same = pairs.all(|(own, good)| good.get(rows.clone()) == Some(own.as_slice()));
+    let pose = |row: &Result<RowPose, _>| row.as_ref().ok().map(|pose| pose.tracker_from_body);
+    same.then(|| all.rows[rows].iter().map(pose).collect())
 }
 
 fn body_track(
@@ -170,22 +208,17 @@ fn body_track(
     // A sample that is off its body would turn the body's frame in all rows.
     let good = distances.without_gross(&slices(&gathered));
     let all = body_poses(names, &slices(&good), given.clone(), None).map_err(fail)?;
-    // A marker that wanders on its body by more than this is loose or mislabeled.
-    let limit = (8.0 * stated.unwrap_or(0.0005)).max(0.003);
-    if let Some((fit, wander)) = all.moving_marker(limit) {
-        findings.push(
-            Finding::new(catalog::BODY_NOT_RIGID, Subject::body(name))
-                .with("marker", Fact::name(&fit.name))
-                .with("distance", Fact::meters(wander))
-                .with("limit", Fact::meters(limit)),
-        );
-    }
+    findings.extend(loose_marker(name, &all, stated));
     for (recording, loaded) in &inputs.recordings {
         if names.iter().any(|m| loaded.poses.markers.contains_key(m)) {
             let tracks = distances.without_gross(&slices(&gather(names, &[loaded])));
-            let poses = body_poses(names, &slices(&tracks), Some(all.template.clone()), stated)
-                .map_err(fail)?;
-            track.poses.insert(recording.clone(), poses.track());
+            let poses = match registered_already(&tracks, loaded, &fitted, (&good, &all)) {
+                Some(poses) => poses,
+                None => body_poses(names, &slices(&tracks), Some(all.template.clone()), stated)
+                    .map_err(fail)?
+                    .track(),
+            };
+            track.poses.insert(recording.clone(), poses);
         }
     }
     track.learned = given.is_none();
