@@ -1,8 +1,9 @@
 //! Residuals as CSV: one row per observation, lengths in m, angles in rad, empty = unknown.
 
-use crate::{ReportError, ResidualRow, Unit, number};
+use crate::{JointValue, ReportError, ResidualRow, Unit, number};
 use calib_finding::cell as safe;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// `recording,row,t_s,subject,x_m,y_m,z_m,norm_m,rotation_rad,normalised,used,<joint>_rad|_m…`; predicted − observed in the tracker frame.
 ///
@@ -12,7 +13,7 @@ pub fn residuals_csv(rows: &[ResidualRow]) -> Result<String, ReportError> {
     let failed = |source: ::csv::Error| ReportError::Csv(source.to_string());
     // Every joint of any row has a column, in order of its name.
     let mut columns: BTreeMap<&str, &str> = BTreeMap::new();
-    for joint in rows.iter().flat_map(|row| &row.joints) {
+    for joint in rows.iter().flat_map(|row| row.joints.iter()) {
         columns.insert(
             &joint.joint,
             if joint.unit == Unit::Meter {
@@ -44,7 +45,16 @@ pub fn residuals_csv(rows: &[ResidualRow]) -> Result<String, ReportError> {
             .map(|(joint, unit)| safe(&format!("{joint}_{unit}")).into_owned()),
     );
     writer.write_record(header).map_err(failed)?;
+    // All markers of a row share its joint values.
+    let mut of_joints: Vec<String> = Vec::new();
+    let mut joints: Option<&Arc<[JointValue]>> = None;
     for row in rows {
+        if joints.is_none_or(|joints| !Arc::ptr_eq(joints, &row.joints)) {
+            joints = Some(&row.joints);
+            let of = |joint: &&str| row.joints.iter().find(|value| value.joint == *joint);
+            let text = |joint| of(joint).map_or_else(String::new, |value| cell(value.value));
+            of_joints = columns.keys().map(text).collect();
+        }
         let [x, y, z] = row.residual_m;
         let mut cells = vec![
             safe(&row.recording).into_owned(),
@@ -59,10 +69,7 @@ pub fn residuals_csv(rows: &[ResidualRow]) -> Result<String, ReportError> {
             row.normalized.map_or_else(String::new, cell),
             row.used.to_string(),
         ];
-        for joint in columns.keys() {
-            let value = row.joints.iter().find(|value| value.joint == *joint);
-            cells.push(value.map_or_else(String::new, |value| cell(value.value)));
-        }
+        cells.extend_from_slice(&of_joints);
         writer.write_record(&cells).map_err(failed)?;
     }
     let bytes = writer
@@ -82,7 +89,6 @@ fn cell(x: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::JointValue;
 
     #[test]
     fn unknown_is_empty_and_names_are_quoted() {
@@ -93,14 +99,14 @@ mod tests {
                 subject: "m1".into(),
                 residual_m: [0.1 + 0.2, -0.0, 0.0],
                 used: true,
-                joints: vec![JointValue::radians("q", 0.5)],
+                joints: [JointValue::radians("q", 0.5)].into(),
                 ..ResidualRow::default()
             },
             ResidualRow {
                 row: 4,
                 time_s: Some(0.25),
                 residual_m: [f64::NAN, 0.0, 0.0],
-                joints: vec![JointValue::meters("slide", 0.1)],
+                joints: [JointValue::meters("slide", 0.1)].into(),
                 ..ResidualRow::default()
             },
         ];

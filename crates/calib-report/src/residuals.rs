@@ -3,6 +3,7 @@ use calib_geometry::statistics::quantile_type7;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// One observation compared with the model: predicted − observed. The rows of `residuals.csv`; not part of `report.json`.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -23,8 +24,8 @@ pub struct ResidualRow {
     pub normalized: Option<f64>,
     /// Whether it took part in the fit.
     pub used: bool,
-    /// Where the joints were.
-    pub joints: Vec<JointValue>,
+    /// Where the joints were: one list for all markers and bodies of a row.
+    pub joints: Arc<[JointValue]>,
 }
 
 impl ResidualRow {
@@ -130,7 +131,7 @@ impl Residuals {
                 .or_default()
                 .push(row.length_m());
             over_time.entry(&row.recording).or_default().push(row);
-            for joint in &row.joints {
+            for joint in row.joints.iter() {
                 by_joint
                     .entry(&joint.joint)
                     .or_insert((joint.unit, Vec::new()))
@@ -297,7 +298,7 @@ mod tests {
     use super::*;
 
     fn row(subject: &str, at: f64, residual_m: [f64; 3]) -> ResidualRow {
-        let joints = vec![JointValue::radians("elbow", at)];
+        let joints = [JointValue::radians("elbow", at)].into();
         ResidualRow {
             recording: "r".into(),
             row: 1,

@@ -1,6 +1,7 @@
 //! Residuals of the fit, one row per marker or body and pose, for the report and `residuals.csv`.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use calib_core::{MeasurementId, MeasurementKind};
 use calib_geometry::so3;
@@ -78,7 +79,7 @@ pub fn residual_rows(
                     .map(|link| robot.tracker_from_root * link)
                     .collect(),
             };
-            let joints = joint_values(inputs, name, row);
+            let joints: Arc<[_]> = joint_values(inputs, name, row).into();
             let differences = sample.contacts(&root_from_link).into_iter();
             let differences = differences.chain(sample.bodies());
             rows.extend(differences.map(|d| ResidualRow {

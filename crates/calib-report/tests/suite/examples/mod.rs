@@ -121,7 +121,7 @@ pub fn residual_rows() -> Vec<ResidualRow> {
                 residual_m: residual.into(),
                 normalized: Some(residual.norm() / 0.000_2),
                 used: !(marker == 0 && pose == 17),
-                joints: joint_values(&q),
+                joints: joint_values(&q).into(),
                 ..ResidualRow::default()
             });
         }
