@@ -9,6 +9,8 @@
 //! R comes from QR block by block over the samples: JᵀWJ would lose every direction below 1e-8 of the
 //! strongest, and those are the ones that matter here.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 
 use calib_geometry::decompose;
@@ -17,7 +19,9 @@ use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
-use crate::solve::equations::{NormalEquations, Workspace};
+use crate::solve::chunks::{chunked, is_one_chunk};
+use crate::solve::equations::{NormalEquations, Objective, Workspace};
+use crate::solve::rows::SampleRows;
 
 /// A direction whose singular value is below this fraction of the largest is a gauge: rounding
 /// leaves about 1e-14, the weakest physical effect seen on real robots about 1e-6.
@@ -127,6 +131,40 @@ pub struct Information {
     pub(crate) r: DMatrix<f64>,
 }
 
+/// The triangular factor of some samples, columns in units of `scale`.
+fn factor_of(
+    objective: Objective,
+    at: State,
+    samples: Range<usize>,
+    scale: &DVector<f64>,
+    rows: &mut SampleRows,
+) -> Option<StreamedQr> {
+    let Objective {
+        model,
+        weights,
+        theta,
+    } = objective;
+    let n = model.free();
+    let mut qr = StreamedQr::new(n);
+    let mut scaled = vec![0.0; n];
+    for sample in samples {
+        if model.of_sample[sample].is_empty() {
+            continue;
+        }
+        rows.fill(model, at, weights, sample, Derivatives::All);
+        rows.covariance(model, weights, theta);
+        rows.factor()?;
+        rows.whiten(true);
+        for i in 0..rows.m {
+            for c in 0..n {
+                scaled[c] = rows.j[i * n + c] * scale[c];
+            }
+            qr.append(&scaled);
+        }
+    }
+    Some(qr)
+}
+
 impl Information {
     /// Equations (1) and (2) at `values`; `None` when the model cannot be evaluated there.
     #[must_use]
@@ -134,7 +172,6 @@ impl Information {
         let n = model.free();
         let mut work = Workspace::new(model);
         work.cache.update(&model.problem, values);
-        let mut qr = StreamedQr::new(n);
         let scale = DVector::from_iterator(
             n,
             model
@@ -142,24 +179,28 @@ impl Information {
                 .iter()
                 .map(|&p| model.problem.parameters[p].scale()),
         );
-        let rows = &mut work.rows;
-        let mut scaled = vec![0.0; n];
-        for sample in 0..model.problem.samples {
-            if model.of_sample[sample].is_empty() {
-                continue;
-            }
-            let at = State::new(&model.problem, &work.cache, values);
-            rows.fill(model, at, weights, sample, Derivatives::All);
-            rows.covariance(model, weights, theta);
-            rows.factor()?;
-            rows.whiten(true);
-            for i in 0..rows.m {
-                for c in 0..n {
-                    scaled[c] = rows.j[i * n + c] * scale[c];
-                }
-                qr.append(&scaled);
-            }
-        }
+        let objective = Objective {
+            model,
+            weights,
+            theta,
+        };
+        let at = State::new(&model.problem, &work.cache, values);
+        let of = |samples: Range<usize>| {
+            let mut rows = SampleRows::new(model);
+            factor_of(objective, at, samples, &scale, &mut rows)
+        };
+        let count = model.problem.samples;
+        let qr = if is_one_chunk(count) {
+            of(0..count)?
+        } else {
+            let mut qr = StreamedQr::new(n);
+            chunked(count, of, |part| {
+                part.finish()
+                    .row_iter()
+                    .for_each(|row| qr.append(row.transpose().as_slice()));
+            })?;
+            qr
+        };
         let r = qr.finish();
         if !r.iter().all(|x| x.is_finite()) {
             return None;

@@ -1,11 +1,14 @@
 //! Sums over the samples for the noise levels: equations (2) and (3) of [`noise`](crate::solve::noise).
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
+use crate::solve::chunks::{chunked, is_one_chunk};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::add_prior;
 use crate::solve::panel::Local;
@@ -25,6 +28,29 @@ pub(crate) struct Sums {
 }
 
 impl Sums {
+    /// Nothing summed yet, for so many groups.
+    fn zeros(model: &Model, count: usize) -> Self {
+        let most = model.max_rows.max(model.slots.len());
+        Self {
+            squares: DVector::zeros(count),
+            traces: DVector::zeros(count),
+            products: DMatrix::zeros(count, count),
+            moments: (0..=count)
+                .map(|_| Local::new(model.free(), most))
+                .collect(),
+        }
+    }
+
+    /// Adds the sums over further samples.
+    fn add(&mut self, more: &Self) {
+        self.squares += &more.squares;
+        self.traces += &more.traces;
+        self.products += &more.products;
+        for (moment, more) in self.moments.iter_mut().zip(&more.moments) {
+            moment.h += &more.h;
+        }
+    }
+
     /// H of the sums and the prior; without gradient and cost.
     pub(crate) fn normal_equations(&self, model: &Model, values: &Values) -> NormalEquations {
         let n = model.free();
@@ -211,22 +237,8 @@ pub(crate) fn sums(
     groups: &[usize],
     work: &mut Workspace,
 ) -> Option<Sums> {
-    let Objective {
-        model,
-        weights,
-        theta,
-    } = objective;
-    let count = groups.len();
-    let most = model.max_rows.max(model.slots.len());
-    let mut sums = Sums {
-        squares: DVector::zeros(count),
-        traces: DVector::zeros(count),
-        products: DMatrix::zeros(count, count),
-        moments: (0..=count)
-            .map(|_| Local::new(model.free(), most))
-            .collect(),
-    };
-    let layout = Layout::new(model, groups);
+    let model = objective.model;
+    let count = model.problem.samples;
     work.cache.update(&model.problem, values);
     let Workspace {
         cache,
@@ -234,23 +246,57 @@ pub(crate) fn sums(
         random,
         ..
     } = work;
-    for sample in 0..model.problem.samples {
-        rows.fill(
-            model,
-            State::new(&model.problem, cache, values),
-            weights,
-            sample,
-            Derivatives::All,
-        );
-        if rows.m == 0 {
-            continue;
-        }
-        rows.whiten_blocks(model, weights, theta, true)?;
-        rows.random_part(random)?;
-        let weighed = Weighed::new(model, &layout, rows, random);
-        weighed.add_rows(&mut sums);
-        weighed.add_effects(&layout, &mut sums);
+    let pass = Pass {
+        objective,
+        layout: &Layout::new(model, groups),
+        at: State::new(&model.problem, cache, values),
+    };
+    if is_one_chunk(count) {
+        return pass.sums(0..count, groups.len(), rows, random);
     }
-    sums.moments.iter_mut().for_each(Local::multiply);
-    Some(sums)
+    let mut all = Sums::zeros(model, groups.len());
+    let of = |samples: Range<usize>| {
+        let (mut rows, mut random) = (SampleRows::new(model), RandomPart::default());
+        pass.sums(samples, groups.len(), &mut rows, &mut random)
+    };
+    chunked(count, of, |sums| all.add(&sums))?;
+    Some(all)
+}
+
+/// Where the sums are wanted.
+struct Pass<'a> {
+    objective: Objective<'a>,
+    layout: &'a Layout,
+    at: State<'a>,
+}
+
+impl Pass<'_> {
+    /// Over some samples, for `count` groups.
+    fn sums(
+        &self,
+        samples: Range<usize>,
+        count: usize,
+        rows: &mut SampleRows,
+        random: &mut RandomPart,
+    ) -> Option<Sums> {
+        let Objective {
+            model,
+            weights,
+            theta,
+        } = self.objective;
+        let mut sums = Sums::zeros(model, count);
+        for sample in samples {
+            rows.fill(model, self.at, weights, sample, Derivatives::All);
+            if rows.m == 0 {
+                continue;
+            }
+            rows.whiten_blocks(model, weights, theta, true)?;
+            rows.random_part(random)?;
+            let weighed = Weighed::new(model, self.layout, rows, random);
+            weighed.add_rows(&mut sums);
+            weighed.add_effects(self.layout, &mut sums);
+        }
+        sums.moments.iter_mut().for_each(Local::multiply);
+        Some(sums)
+    }
 }

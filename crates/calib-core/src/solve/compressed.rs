@@ -10,16 +10,20 @@
 //! A marker of unknown position adds its own 3 columns: `JᵀG_mᵀ w`, `w I`, `w e`. The result equals the
 //! general way to rounding (a test holds both to it).
 
-use nalgebra::{Matrix6, Vector3, Vector6};
+use std::ops::Range;
+
+use nalgebra::{Vector3, Vector6};
 
 use crate::graph::measurement::{Markers, MeasurementKind, Rows};
 use crate::model::cache::{EdgeCache, State};
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
+use crate::solve::chunks::{chunked, is_one_chunk};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::panel::Local;
 use crate::solve::rows::{add_block, cholesky6, dot, point_columns, residual};
+use crate::solve::six_rows::{Upper, upper_product};
 
 /// Where the equations are wanted: the objective, the values, and the edges' poses at them.
 struct Pass<'a> {
@@ -41,42 +45,79 @@ pub(crate) fn accumulate_compressed(
         values,
         cache: &work.cache,
     };
-    for (measurement, stated) in model.problem.measurements.iter().enumerate() {
+    for (measurement, seen) in model.of_measurement.iter().enumerate() {
         let columns = &model.paths[measurement].columns;
-        let k = columns.len();
-        let mut local = Local::new(k, 6);
-        match &stated.kind {
-            MeasurementKind::Markers(seen)
-                if seen.observations.iter().all(|o| o.shape.is_none()) =>
-            {
-                pass.markers(measurement, seen, &mut local, out);
+        if is_one_chunk(seen.len()) {
+            let mut local = Local::new(columns.len(), 6);
+            if !pass.add(measurement, seen, &mut local, out) {
+                return false;
             }
-            _ => {
-                if !pass.general(measurement, &mut local, out) {
-                    return false;
-                }
-            }
+            add_local(columns, &local, out);
+            continue;
         }
-        local.multiply();
-        let n = out.n;
-        for a in 0..k {
-            out.g[columns[a]] += local.g[a];
-            for b in a..k {
-                let (i, j) = (columns[a].min(columns[b]), columns[a].max(columns[b]));
-                out.h[i * n + j] += local.h[(a, b)];
-            }
+        let of = |range: Range<usize>| {
+            let mut local = Local::new(columns.len(), 6);
+            let mut own = NormalEquations::new(model.free());
+            let fine = pass.add(measurement, &seen[range], &mut local, &mut own);
+            add_local(columns, &local, &mut own);
+            fine.then_some(own)
+        };
+        let fine = chunked(seen.len(), of, |own| {
+            out.h.iter_mut().zip(&own.h).for_each(|(sum, h)| *sum += h);
+            out.g.iter_mut().zip(&own.g).for_each(|(sum, g)| *sum += g);
+            out.data += own.data;
+        });
+        if fine.is_none() {
+            return false;
         }
-        out.data += local.cost;
     }
     out.data.is_finite()
 }
 
+/// Adds the sums over the columns of a path.
+fn add_local(columns: &[usize], local: &Local, out: &mut NormalEquations) {
+    let n = out.n;
+    for a in 0..local.k {
+        out.g[columns[a]] += local.g[a];
+        for b in a..local.k {
+            let (i, j) = (columns[a].min(columns[b]), columns[a].max(columns[b]));
+            out.h[i * n + j] += local.h[(a, b)];
+        }
+    }
+    out.data += local.cost;
+}
+
+/// Samples that a measurement saw, with their observations.
+type Seen = [(usize, Range<usize>)];
+
 impl Pass<'_> {
+    /// Adds some samples of a measurement: what concerns its path to `local`, the rest to `out`.
+    fn add(
+        &self,
+        measurement: usize,
+        seen: &Seen,
+        local: &mut Local,
+        out: &mut NormalEquations,
+    ) -> bool {
+        let stated = &self.objective.model.problem.measurements[measurement];
+        let fine = match &stated.kind {
+            MeasurementKind::Markers(markers)
+                if markers.observations.iter().all(|o| o.shape.is_none()) =>
+            {
+                self.markers((measurement, markers), seen, local, out);
+                true
+            }
+            _ => self.general(measurement, seen, local, out),
+        };
+        local.multiply();
+        fine
+    }
+
     /// Markers of isotropic noise: equations (1) and (2).
     fn markers(
         &self,
-        measurement: usize,
-        kind: &Markers,
+        (measurement, kind): (usize, &Markers),
+        seen: &Seen,
         local: &mut Local,
         out: &mut NormalEquations,
     ) {
@@ -89,7 +130,7 @@ impl Pass<'_> {
         let mut buffer = path.buffer();
         let mut upper = Upper::default();
         let mut now: Vec<(usize, f64)> = Vec::new();
-        for (sample, range) in &model.of_measurement[measurement] {
+        for (sample, range) in seen {
             let pose = path.evaluate(at, *sample, Derivatives::All, &mut buffer);
             now.clear();
             let mut moment = Vector3::zeros();
@@ -182,64 +223,54 @@ impl PointSums {
     }
 }
 
-/// U with UᵀU = W. W depends only on which markers were seen and their weights: U is kept while those stay.
-#[derive(Default)]
-struct Upper {
-    seen: Vec<(usize, f64)>,
-    factor: [[f64; 6]; 6],
-}
-
-impl Upper {
-    #[inline]
-    fn of(&mut self, now: &[(usize, f64)], positions: &[Vector3<f64>]) -> &[[f64; 6]; 6] {
-        if now != self.seen {
-            let u = upper_factor(&compressed_weight(now, positions));
-            self.factor = std::array::from_fn(|r| std::array::from_fn(|c| u[(r, c)]));
-            self.seen.clear();
-            self.seen.extend_from_slice(now);
-        }
-        &self.factor
-    }
-}
-
-/// Rows of U J, each k long, one after the other.
-#[inline]
-fn upper_product(factor: &[[f64; 6]; 6], twists: &[Vector6<f64>], rows: &mut [f64]) {
-    let k = twists.len();
-    let [u0, u1, u2, u3, u4, u5] = factor;
-    for (c, j) in twists.iter().enumerate() {
-        rows[c] =
-            u0[0] * j[0] + u0[1] * j[1] + u0[2] * j[2] + u0[3] * j[3] + u0[4] * j[4] + u0[5] * j[5];
-        rows[k + c] = u1[1] * j[1] + u1[2] * j[2] + u1[3] * j[3] + u1[4] * j[4] + u1[5] * j[5];
-        rows[2 * k + c] = u2[2] * j[2] + u2[3] * j[3] + u2[4] * j[4] + u2[5] * j[5];
-        rows[3 * k + c] = u3[3] * j[3] + u3[4] * j[4] + u3[5] * j[5];
-        rows[4 * k + c] = u4[4] * j[4] + u4[5] * j[5];
-        rows[5 * k + c] = u5[5] * j[5];
-    }
-}
-
 /// eᵀV⁻¹e without derivatives; infinite where it cannot be computed.
 pub(crate) fn cost_compressed(objective: Objective, values: &Values, work: &mut Workspace) -> f64 {
-    let Objective {
-        model,
-        weights,
-        theta,
-    } = objective;
+    let model = objective.model;
     let pass = Pass {
         objective,
         values,
         cache: &work.cache,
     };
     let positions = positions(model, values);
-    let at = State::new(&model.problem, pass.cache, values);
     let mut sum = 0.0;
-    for (measurement, path) in model.paths.iter().enumerate() {
+    for (measurement, seen) in model.of_measurement.iter().enumerate() {
+        let fine = if is_one_chunk(seen.len()) {
+            let more = pass.data_cost(measurement, seen, &positions, sum);
+            more.map(|more| sum = more)
+        } else {
+            let of =
+                |range: Range<usize>| pass.data_cost(measurement, &seen[range], &positions, 0.0);
+            chunked(seen.len(), of, |part| sum += part)
+        };
+        if fine.is_none() {
+            return f64::INFINITY;
+        }
+    }
+    sum
+}
+
+impl Pass<'_> {
+    /// `sum` and eᵀV⁻¹e of some samples of a measurement; `None` where it cannot be computed.
+    fn data_cost(
+        &self,
+        measurement: usize,
+        seen: &Seen,
+        positions: &[Vector3<f64>],
+        mut sum: f64,
+    ) -> Option<f64> {
+        let Objective {
+            model,
+            weights,
+            theta,
+        } = self.objective;
+        let at = State::new(&model.problem, self.cache, self.values);
+        let path = &model.paths[measurement];
         let markers = match &model.problem.measurements[measurement].kind {
             MeasurementKind::Markers(markers) => Some(markers),
             _ => None,
         };
         let mut buffer = path.buffer();
-        for (sample, range) in &model.of_measurement[measurement] {
+        for (sample, range) in seen {
             let pose = path.evaluate(at, *sample, Derivatives::None, &mut buffer);
             for o in range.clone() {
                 if weights[o] <= 0.0 {
@@ -256,53 +287,12 @@ pub(crate) fn cost_compressed(objective: Objective, values: &Values, work: &mut 
                     sum += weights[o] / theta[markers.noise.index()] * e.norm_squared();
                     continue;
                 }
-                let e = residual(model, values, measurement, item, &pose).e;
-                let Some(cost) = pass.cost(o, e) else {
-                    return f64::INFINITY;
-                };
-                sum += cost;
+                let e = residual(model, self.values, measurement, item, &pose).e;
+                sum += self.cost(o, e)?;
             }
         }
+        Some(sum)
     }
-    sum
-}
-
-/// W of equation (1).
-fn compressed_weight(seen: &[(usize, f64)], positions: &[Vector3<f64>]) -> Matrix6<f64> {
-    let mut weight = Matrix6::zeros();
-    // W = Σ w [ |p|²I − ppᵀ, [p]ₓ ; −[p]ₓ, I ]
-    for &(point, w) in seen {
-        let p = positions[point];
-        let pp = p.norm_squared();
-        for i in 0..3 {
-            for j in 0..3 {
-                weight[(i, j)] += w * (if i == j { pp } else { 0.0 } - p[i] * p[j]);
-            }
-            weight[(3 + i, 3 + i)] += w;
-        }
-        let skew = p.cross_matrix() * w;
-        for i in 0..3 {
-            for j in 0..3 {
-                weight[(i, 3 + j)] += skew[(i, j)];
-                weight[(3 + j, i)] += skew[(i, j)];
-            }
-        }
-    }
-    weight
-}
-
-/// U with UᵀU = W for a positive semidefinite W (fewer than three markers leave it singular).
-fn upper_factor(w: &Matrix6<f64>) -> Matrix6<f64> {
-    if let Some(c) = nalgebra::Cholesky::new(*w) {
-        return c.l().transpose();
-    }
-    let eigen = calib_geometry::decompose::symmetric_eigen_small(w);
-    let mut u = eigen.vectors.transpose();
-    for i in 0..6 {
-        u.row_mut(i).scale_mut(eigen.values[i].max(0.0).sqrt());
-    }
-    // Upper triangular form: the caller only reads r ≤ l.
-    u.qr().r()
 }
 
 /// Coupling of pose and points, and the points' own blocks.
@@ -362,12 +352,18 @@ impl Pass<'_> {
     }
 
     /// Any measurement without compression: whitened rows of each observation, over local columns.
-    fn general(&self, measurement: usize, local: &mut Local, out: &mut NormalEquations) -> bool {
+    fn general(
+        &self,
+        measurement: usize,
+        seen: &Seen,
+        local: &mut Local,
+        out: &mut NormalEquations,
+    ) -> bool {
         let model = self.objective.model;
         let path = &model.paths[measurement];
         let at = State::new(&model.problem, self.cache, self.values);
         let mut buffer = path.buffer();
-        for (sample, range) in &model.of_measurement[measurement] {
+        for (sample, range) in seen {
             let pose = path.evaluate(at, *sample, Derivatives::All, &mut buffer);
             for o in range.clone() {
                 if self.objective.weights[o] <= 0.0 {

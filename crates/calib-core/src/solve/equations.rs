@@ -48,16 +48,21 @@ pub(crate) struct Workspace {
     pub cache: EdgeCache,
     pub rows: SampleRows,
     pub random: RandomPart,
-    /// The random part of every V_s at the last linearization, where random effects make V_s depend
+    /// The random part of every V_s at the last linearization, by chunks of samples, where random effects make V_s depend
     /// on the values: a step is judged by the same V_s that proposed it. (With V_s moving along, the
     /// cost would reward values that only make the noise look larger.)
-    pub factors: Vec<f64>,
+    pub factors: Vec<Vec<f64>>,
 }
 
 impl Workspace {
     pub(crate) fn new(model: &Model) -> Self {
+        Self::with(model, EdgeCache::new(&model.problem, model.trig.clone()))
+    }
+
+    /// With the edges' poses that are known already.
+    pub(crate) fn with(model: &Model, cache: EdgeCache) -> Self {
         Self {
-            cache: EdgeCache::new(&model.problem, model.trig.clone()),
+            cache,
             rows: SampleRows::new(model),
             random: RandomPart::default(),
             factors: Vec::new(),

@@ -1,6 +1,7 @@
 //! The minimum of the stated problem: rows, normal equations, steps, noise, robust weights.
 
 pub(crate) mod bounded;
+pub(crate) mod chunks;
 pub(crate) mod components;
 pub(crate) mod compressed;
 pub(crate) mod curvature;
@@ -13,5 +14,6 @@ pub(crate) mod panel;
 pub(crate) mod relabel;
 pub(crate) mod robust;
 pub(crate) mod rows;
+pub(crate) mod six_rows;
 pub(crate) mod structured;
 pub(crate) mod whitened;

@@ -5,13 +5,18 @@
 //! F = ½ Σ_s e_sᵀ V_s⁻¹ e_s + ½ (x − x₀)ᵀ Λ (x − x₀)                                          (2)
 //! ```
 
-use crate::model::cache::State;
+use std::ops::Range;
+
+use crate::model::cache::{EdgeCache, State};
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
+use crate::solve::chunks::{chunk_of, chunked, is_one_chunk};
 use crate::solve::compressed::{accumulate_compressed, cost_compressed};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::panel::Local;
+use crate::solve::rows::SampleRows;
+use crate::solve::structured::RandomPart;
 
 /// Equation (1). `false` when some V_s is not positive definite or a number is not finite.
 pub(crate) fn accumulate(
@@ -25,7 +30,6 @@ pub(crate) fn accumulate(
     out.g.fill(0.0);
     out.data = 0.0;
     work.cache.update(&model.problem, values);
-    work.factors.clear();
     let fine = if model.slots.is_empty() {
         accumulate_compressed(objective, values, work, out)
     } else {
@@ -42,54 +46,131 @@ pub(crate) fn accumulate_rows(
     work: &mut Workspace,
     out: &mut NormalEquations,
 ) -> bool {
-    let Objective {
-        model,
-        weights,
-        theta,
-    } = objective;
-    let n = out.n;
-    let mut sum = Local::new(n, model.max_rows);
+    let model = objective.model;
+    let count = model.problem.samples;
     let Workspace {
         cache,
         rows,
         random,
         factors,
     } = work;
-    for sample in 0..model.problem.samples {
-        if model.of_sample[sample].is_empty() {
-            continue;
-        }
-        rows.fill(
-            model,
-            State::new(&model.problem, cache, values),
-            weights,
-            sample,
-            Derivatives::All,
-        );
-        if rows
-            .whiten_blocks(model, weights, theta, true)
-            .and_then(|()| rows.random_part(random))
-            .is_none()
-        {
-            return false;
-        }
-        random.store(factors);
-        let m = rows.m;
-        random.whiten(&mut rows.r[..m], 1);
-        random.whiten(&mut rows.j[..m * n], n);
-        out.data += rows.squared_norm();
-        for (row, r) in rows.j[..m * n].chunks_exact(n.max(1)).zip(&rows.r) {
-            out.g.iter_mut().zip(row).for_each(|(g, j)| *g += j * r);
-        }
-        sum.rows(m).copy_from_slice(&rows.j[..m * n]);
+    let pass = Pass {
+        objective,
+        values,
+        cache,
+    };
+    let mut reused = factors.pop().unwrap_or_default();
+    reused.clear();
+    factors.clear();
+    let mut add = |(sum, random): (Local, Vec<f64>)| {
+        add_sum(&sum, out);
+        factors.push(random);
+    };
+    if is_one_chunk(count) {
+        let sum = pass.sum(0..count, rows, random, reused);
+        let fine = sum.is_some();
+        sum.into_iter().for_each(add);
+        return fine;
     }
-    sum.multiply();
+    let sum = |samples: Range<usize>| {
+        let mut rows = SampleRows::new(model);
+        pass.sum(samples, &mut rows, &mut RandomPart::default(), Vec::new())
+    };
+    chunked(count, sum, &mut add).is_some()
+}
+
+fn add_sum(sum: &Local, out: &mut NormalEquations) {
+    let n = out.n;
+    out.data += sum.cost;
     for a in 0..n {
+        out.g[a] += sum.g[a];
         for b in a..n {
             out.h[a * n + b] += sum.h[(a, b)];
         }
     }
-    true
+}
+
+/// Where the equations are wanted: the objective, the values, and the edges' poses at them.
+struct Pass<'a> {
+    objective: Objective<'a>,
+    values: &'a Values,
+    cache: &'a EdgeCache,
+}
+
+impl Pass<'_> {
+    /// H, g and cost of some samples, and the random part of each V_s, appended to `factors`.
+    fn sum(
+        &self,
+        samples: Range<usize>,
+        rows: &mut SampleRows,
+        random: &mut RandomPart,
+        mut factors: Vec<f64>,
+    ) -> Option<(Local, Vec<f64>)> {
+        let Objective {
+            model,
+            weights,
+            theta,
+        } = self.objective;
+        let n = model.free();
+        let at = State::new(&model.problem, self.cache, self.values);
+        let mut sum = Local::new(n, model.max_rows);
+        for sample in samples {
+            if model.of_sample[sample].is_empty() {
+                continue;
+            }
+            rows.fill(model, at, weights, sample, Derivatives::All);
+            rows.whiten_blocks(model, weights, theta, true)?;
+            rows.random_part(random)?;
+            random.store(&mut factors);
+            let m = rows.m;
+            random.whiten(&mut rows.r[..m], 1);
+            random.whiten(&mut rows.j[..m * n], n);
+            sum.cost += rows.squared_norm();
+            for (row, r) in rows.j[..m * n].chunks_exact(n.max(1)).zip(&rows.r) {
+                sum.g.iter_mut().zip(row).for_each(|(g, j)| *g += j * r);
+            }
+            sum.rows(m).copy_from_slice(&rows.j[..m * n]);
+        }
+        sum.multiply();
+        Some((sum, factors))
+    }
+
+    /// eᵀV⁻¹e of some samples, with the random parts of V_s that are given; `None` where it cannot be computed.
+    fn cost(
+        &self,
+        samples: Range<usize>,
+        rows: &mut SampleRows,
+        random: &mut RandomPart,
+        stored: Option<&[f64]>,
+    ) -> Option<f64> {
+        let Objective {
+            model,
+            weights,
+            theta,
+        } = self.objective;
+        let at = State::new(&model.problem, self.cache, self.values);
+        let wanted = match stored {
+            Some(_) => Derivatives::None,
+            None => Derivatives::Random,
+        };
+        let mut sum = 0.0;
+        let mut next = 0;
+        for sample in samples {
+            if model.of_sample[sample].is_empty() {
+                continue;
+            }
+            rows.fill(model, at, weights, sample, wanted);
+            rows.whiten_blocks(model, weights, theta, false)?;
+            let m = rows.m;
+            match stored {
+                Some(factors) => next += random.load(&factors[next..], m, rows.k),
+                None => rows.random_part(random)?,
+            }
+            random.whiten(&mut rows.r[..m], 1);
+            sum += rows.squared_norm();
+        }
+        Some(sum)
+    }
 }
 
 pub(crate) fn add_prior(model: &Model, values: &Values, out: &mut NormalEquations) {
@@ -128,11 +209,8 @@ pub(crate) fn data_cost(objective: Objective, values: &Values, work: &mut Worksp
 }
 
 fn evaluate_cost(objective: Objective, values: &Values, work: &mut Workspace, stored: bool) -> f64 {
-    let Objective {
-        model,
-        weights,
-        theta,
-    } = objective;
+    let model = objective.model;
+    let count = model.problem.samples;
     work.cache.update(&model.problem, values);
     if model.slots.is_empty() {
         return cost_compressed(objective, values, work);
@@ -143,37 +221,26 @@ fn evaluate_cost(objective: Objective, values: &Values, work: &mut Workspace, st
         random,
         factors,
     } = work;
-    let wanted = if stored {
-        Derivatives::None
-    } else {
-        Derivatives::Random
+    let pass = Pass {
+        objective,
+        values,
+        cache,
     };
-    let mut sum = 0.0;
-    let mut at = 0;
-    for sample in 0..model.problem.samples {
-        if model.of_sample[sample].is_empty() {
-            continue;
-        }
-        rows.fill(
-            model,
-            State::new(&model.problem, cache, values),
-            weights,
-            sample,
-            wanted,
-        );
-        if rows.whiten_blocks(model, weights, theta, false).is_none() {
-            return f64::INFINITY;
-        }
-        let m = rows.m;
-        if stored {
-            at += random.load(&factors[at..], m, rows.k);
-        } else if rows.random_part(random).is_none() {
-            return f64::INFINITY;
-        }
-        random.whiten(&mut rows.r[..m], 1);
-        sum += rows.squared_norm();
+    let of_chunk = |chunk: usize| stored.then(|| factors.get(chunk).map_or(&[][..], Vec::as_slice));
+    if is_one_chunk(count) {
+        let sum = pass.cost(0..count, rows, random, of_chunk(0));
+        return sum.unwrap_or(f64::INFINITY);
     }
-    sum
+    let mut sum = 0.0;
+    let cost = |samples: Range<usize>| {
+        let stored = of_chunk(chunk_of(samples.start));
+        let mut rows = SampleRows::new(model);
+        pass.cost(samples, &mut rows, &mut RandomPart::default(), stored)
+    };
+    match chunked(count, cost, |part| sum += part) {
+        Some(()) => sum,
+        None => f64::INFINITY,
+    }
 }
 
 #[cfg(test)]

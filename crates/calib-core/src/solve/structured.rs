@@ -104,27 +104,27 @@ impl SampleRows {
         out.q.clear();
         out.q.extend_from_slice(&self.g[..m * k]);
         let mut r = vec![0.0; k * k];
+        let before: Vec<f64> = (0..k).map(|c| norm(&out.q, m, k, c)).collect();
         for c in 0..k {
-            let before = norm(&out.q, m, k, c);
-            for _ in 0..2 {
-                for p in 0..c {
-                    let mut along = 0.0;
-                    for i in 0..m {
-                        along += out.q[i * k + p] * out.q[i * k + c];
-                    }
-                    r[p * k + c] += along;
-                    for i in 0..m {
-                        out.q[i * k + c] -= along * out.q[i * k + p];
-                    }
+            // Its first projection was taken when each of the earlier columns was finished.
+            for p in 0..c {
+                let mut along = 0.0;
+                for i in 0..m {
+                    along += out.q[i * k + p] * out.q[i * k + c];
+                }
+                r[p * k + c] += along;
+                for i in 0..m {
+                    out.q[i * k + c] -= along * out.q[i * k + p];
                 }
             }
             let size = norm(&out.q, m, k, c);
-            let new = size > DEPENDENT * before;
+            let new = size > DEPENDENT * before[c];
             r[c * k + c] = if new { size } else { 0.0 };
             let factor = if new { 1.0 / size } else { 0.0 };
             for i in 0..m {
                 out.q[i * k + c] *= factor;
             }
+            project_later(&mut out.q, k, c, &mut r[c * k..(c + 1) * k]);
         }
         // L of I + R Rᵀ
         let mut l = vec![0.0; k * k];
@@ -206,38 +206,71 @@ impl RandomPart {
         if k == 0 {
             return;
         }
+        let (q, width) = (&self.q[..m * k], columns.max(1));
+        let mut terms = Vec::with_capacity(m.max(k));
         let mut z = vec![0.0; k * columns];
-        for i in 0..m {
-            let row = &x[i * columns..(i + 1) * columns];
-            for c in 0..k {
-                let q = self.q[i * k + c];
-                if q != 0.0 {
-                    let z = &mut z[c * columns..(c + 1) * columns];
-                    z.iter_mut().zip(row).for_each(|(z, x)| *z += q * x);
-                }
-            }
+        for (c, z) in z.chunks_exact_mut(width).enumerate() {
+            nonzero(&mut terms, m, |i| q[i * k + c]);
+            add_rows(z, &terms, x);
         }
         let mut mixed = vec![0.0; k * columns];
-        for i in 0..k {
-            for j in 0..k {
-                let factor = matrix[i * k + j];
-                if factor != 0.0 {
-                    let from = &z[j * columns..(j + 1) * columns];
-                    let to = &mut mixed[i * columns..(i + 1) * columns];
-                    to.iter_mut().zip(from).for_each(|(t, f)| *t += factor * f);
-                }
-            }
+        for (i, mixed) in mixed.chunks_exact_mut(width).enumerate() {
+            nonzero(&mut terms, k, |j| matrix[i * k + j]);
+            add_rows(mixed, &terms, &z);
         }
-        for i in 0..m {
-            let row = &mut x[i * columns..(i + 1) * columns];
-            for c in 0..k {
-                let q = self.q[i * k + c];
-                if q != 0.0 {
-                    let from = &mixed[c * columns..(c + 1) * columns];
-                    row.iter_mut().zip(from).for_each(|(x, f)| *x -= q * f);
-                }
-            }
+        for (i, x) in x.chunks_exact_mut(width).enumerate() {
+            nonzero(&mut terms, k, |c| -q[i * k + c]);
+            add_rows(x, &terms, &mixed);
         }
+    }
+}
+
+/// Factors that are not zero, with their places.
+#[inline]
+fn nonzero(terms: &mut Vec<(f64, usize)>, count: usize, factor: impl Fn(usize) -> f64) {
+    terms.clear();
+    terms.extend(
+        (0..count)
+            .map(|at| (factor(at), at))
+            .filter(|(f, _)| *f != 0.0),
+    );
+}
+
+/// Takes column `c` out of all later ones of a matrix with `k` columns, and notes how much in `r`.
+fn project_later(q: &mut [f64], k: usize, c: usize, r: &mut [f64]) {
+    let later = &mut r[c + 1..];
+    for row in q.chunks_exact(k) {
+        let own = row[c];
+        for (along, x) in later.iter_mut().zip(&row[c + 1..]) {
+            *along += own * x;
+        }
+    }
+    for row in q.chunks_exact_mut(k) {
+        let own = row[c];
+        for (along, x) in later.iter().zip(&mut row[c + 1..]) {
+            *x -= along * own;
+        }
+    }
+}
+
+/// x += Σ factor · row over the rows of a matrix as wide as x, four at a time: each sum is in their order.
+#[inline]
+fn add_rows(x: &mut [f64], terms: &[(f64, usize)], rows: &[f64]) {
+    let n = x.len();
+    let row = |at: usize| &rows[at * n..at * n + n];
+    let mut fours = terms.chunks_exact(4);
+    for four in &mut fours {
+        let [a, b, c, d] = [four[0].0, four[1].0, four[2].0, four[3].0];
+        let [p, q] = [row(four[0].1), row(four[1].1)];
+        let [r, s] = [row(four[2].1), row(four[3].1)];
+        for i in 0..n {
+            x[i] = x[i] + a * p[i] + b * q[i] + c * r[i] + d * s[i];
+        }
+    }
+    for &(factor, at) in fours.remainder() {
+        x.iter_mut()
+            .zip(row(at))
+            .for_each(|(x, y)| *x += factor * y);
     }
 }
 
