@@ -7,6 +7,7 @@
 use std::collections::BTreeSet;
 
 use crate::analysis::information::Information;
+use crate::analysis::looked_at::fewer;
 use crate::analysis::observability::observe;
 use crate::analysis::solution::{NoiseEstimate, Solution, describe_parameters};
 use crate::graph::error::Error;
@@ -18,7 +19,9 @@ use crate::solve::equations::{Objective, Workspace};
 use crate::solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize_in};
 use crate::solve::noise::{Scoring, score};
 use crate::solve::normal::data_cost;
-use crate::solve::robust::{RejectReason, Rejection, RobustSettings, clean, explain, gate};
+use crate::solve::robust::{
+    RejectReason, Rejection, RobustSettings, clean, clean_near, explain, gate,
+};
 use crate::solve::rows::add_block;
 
 /// How to solve.
@@ -257,9 +260,39 @@ impl Fit<'_> {
         }
     }
 
-    /// Start, Huber and GNC, then values, noise levels and gate in turn until the gate keeps the same set.
+    /// The fit of what `mask` leaves. The way from the start, Huber's weights and most of the rounds take many linearizations: of
+    /// long recordings some thousand samples go it, and all only the end.
     fn robustly(
         &mut self,
+        mask: &[f64],
+        theta: &mut Vec<f64>,
+        work: &mut Workspace,
+    ) -> (Minimum, Vec<f64>) {
+        let (model, robust) = (self.model, &self.settings.robust);
+        let start = model.start();
+        let Some(fewer) = fewer(model, mask) else {
+            return self.from(&start, mask, theta, work);
+        };
+        let stated = theta.clone();
+        let (near, _) = self.from(&start, &fewer, theta, work);
+        if near.status == SolveStatus::NotEvaluable {
+            *theta = stated;
+            return self.from(&start, mask, theta, work);
+        }
+        let robustly = || clean_near(model, &near.values, mask, theta, robust, work);
+        match robust.enabled.then(robustly).flatten() {
+            Some((values, kept, iterations)) => {
+                self.iterations += iterations;
+                self.settled(values, kept, mask, theta, work)
+            }
+            None => self.settled(near.values, mask.to_vec(), mask, theta, work),
+        }
+    }
+
+    /// Start, Huber and GNC, then what follows.
+    fn from(
+        &mut self,
+        start: &Values,
         mask: &[f64],
         theta: &mut Vec<f64>,
         work: &mut Workspace,
@@ -267,7 +300,7 @@ impl Fit<'_> {
         let model = self.model;
         let robust = &self.settings.robust;
         let mut weights = mask.to_vec();
-        let mut minimum = self.minimize(&model.start(), &weights, theta, work, BETWEEN_ROUNDS);
+        let mut minimum = self.minimize(start, &weights, theta, work, BETWEEN_ROUNDS);
         if robust.enabled
             && minimum.status != SolveStatus::NotEvaluable
             && let Some((values, kept, iterations)) =
@@ -277,8 +310,24 @@ impl Fit<'_> {
             minimum.values = values;
             weights = kept;
         }
-        for _ in 0..GATE_ROUNDS {
-            minimum = self.with_noise(&minimum.values, &weights, theta, work);
+        self.settled(minimum.values, weights, mask, theta, work)
+    }
+
+    /// Values, noise levels and gate in turn until the gate keeps the same set.
+    fn settled(
+        &mut self,
+        start: Values,
+        mut weights: Vec<f64>,
+        mask: &[f64],
+        theta: &mut Vec<f64>,
+        work: &mut Workspace,
+    ) -> (Minimum, Vec<f64>) {
+        let (model, robust) = (self.model, &self.settings.robust);
+        let mut minimum = self.with_noise(&start, &weights, theta, work);
+        for round in 0..GATE_ROUNDS {
+            if round > 0 {
+                minimum = self.with_noise(&minimum.values, &weights, theta, work);
+            }
             let ended = minimum.status == SolveStatus::NotEvaluable || self.left() == 0;
             if !robust.enabled || ended {
                 break;

@@ -19,13 +19,15 @@ use nalgebra::{DMatrix, DVector, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::analysis::looked_at::LookedAt;
 use crate::analysis::score::Scored;
 use crate::analysis::solution::Solution;
 use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{EFFECTS, EffectKind, Source};
 use crate::model::cache::State;
 use crate::model::layout::Model;
-use crate::solve::equations::Workspace;
+use crate::solve::equations::{NormalEquations, Workspace};
+use crate::solve::normal::add_prior;
 use crate::solve::rows::{dot, residual};
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
@@ -107,12 +109,12 @@ struct Candidate {
 
 impl Solution {
     /// Score tests of every effect that the problem declares ([`Problem::candidate`](crate::Problem::candidate)) and of those that
-    /// follow from the readings alone (gain, eccentricity), plus drift where times are given. `None`
-    /// when the model cannot be evaluated.
+    /// follow from the readings alone (gain, eccentricity), plus drift where times are given. Of long recordings
+    /// they look at some thousand samples. `None` when the model cannot be evaluated.
     #[must_use]
     pub fn goodness_of_fit(&self) -> Option<GoodnessOfFit> {
         let candidates = candidates(&self.model);
-        let mut tests = self.score_tests(&candidates)?;
+        let mut tests = self.score_tests(&candidates, &self.looked_at())?;
         self.with_profiles(&candidates, &mut tests);
         tests.sort_by(|a, b| b.z2.total_cmp(&a.z2).then_with(|| a.name.cmp(&b.name)));
         let chi2_per_dof = self.chi2_stated / self.degrees_of_freedom.max(1.0);
@@ -154,23 +156,41 @@ impl Solution {
         }
     }
 
-    fn score_tests(&self, candidates: &[Candidate]) -> Option<Vec<ScoreTest>> {
+    fn score_tests(
+        &self,
+        candidates: &[Candidate],
+        looked_at: &LookedAt,
+    ) -> Option<Vec<ScoreTest>> {
         let model = &self.model;
         let mut work = Workspace::new(model);
         work.cache.update(&model.problem, &self.values);
-        let c = covariance_of(&self.information.curvature(model))?;
-        let count = candidates.len();
-        let mut u = vec![0.0; count];
+        let (n, count) = (model.free(), candidates.len());
+        let mut u = DVector::zeros(count);
         let mut raw = vec![0.0; count];
-        let mut b = DMatrix::zeros(model.free(), count);
-        self.each_sample(candidates, &mut work, |s, alpha| {
+        let mut b = DMatrix::zeros(n, count);
+        let (mut h, mut g) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let samples = &looked_at.samples;
+        self.each_sample(candidates, samples, &mut work, |s, alpha| {
             for (k, own) in alpha.column_iter().enumerate() {
                 u[k] += own.dot(&s.w);
                 raw[k] += own.norm_squared();
             }
             // The product of a transpose has no fast kernel.
-            b.gemm(1.0, &s.a.transpose(), alpha, 1.0);
+            let transposed = s.a.transpose();
+            b.gemm(1.0, &transposed, alpha, 1.0);
+            if !looked_at.all {
+                h.gemm(1.0, &transposed, &s.a, 1.0);
+                g.gemv(1.0, &transposed, &s.w, 1.0);
+            }
         });
+        // From the minimum of all samples to that of those looked at, U ← U + bᵀδ.
+        let (c, step) = if looked_at.all {
+            (covariance_of(&self.information.curvature(model))?, None)
+        } else {
+            let (c, step) = self.to_own_minimum(&h, &g)?;
+            u.gemv_tr(1.0, &b, &step, 1.0);
+            (c, Some(step))
+        };
         let taken = &c * &b;
         let information: Vec<f64> = (0..count)
             .map(|k| raw[k] - b.column(k).dot(&taken.column(k)))
@@ -178,13 +198,18 @@ impl Solution {
         // Second pass: each sample's share of U once the effect has been taken out, so that a strong
         // effect does not count as its own noise.
         let mut clusters = vec![0.0; count];
-        self.each_sample(candidates, &mut work, |s, alpha| {
+        let mut chi2 = 0.0;
+        self.each_sample(candidates, samples, &mut work, |s, alpha| {
             let left = alpha - &s.a * &taken;
+            let moved = step.as_ref().map(|step| &s.w + &s.a * step);
+            let w = moved.as_ref().unwrap_or(&s.w);
+            chi2 += w.norm_squared();
             for (k, own) in left.column_iter().enumerate() {
-                let share = own.dot(&s.w) - u[k] / information[k] * own.norm_squared();
+                let share = own.dot(w) - u[k] / information[k] * own.norm_squared();
                 clusters[k] += share * share;
             }
         });
+        let chi2 = if looked_at.all { self.chi2 } else { chi2 };
         let excess = (self.chi2 / self.degrees_of_freedom.max(1.0)).max(1.0);
         let mut out = Vec::new();
         for (k, candidate) in candidates.iter().enumerate() {
@@ -195,7 +220,11 @@ impl Solution {
                 raw: &raw[k..=k],
                 clusters: Some(&one(clusters[k])),
                 excess,
-                samples: model.problem.samples,
+                samples: if looked_at.all {
+                    model.problem.samples
+                } else {
+                    samples.len()
+                },
             };
             // An effect that the parameters already imitate cannot be tested.
             let Some(tested) = scored.test() else {
@@ -210,20 +239,41 @@ impl Solution {
                 z2: tested.z2,
                 p_value: tested.p_value,
                 p_corrected: (tested.p_value * count as f64).min(1.0),
-                explains: (u[k] * u[k] / information / self.chi2.max(1e-300)).min(1.0),
+                explains: (u[k] * u[k] / information / chi2.max(1e-300)).min(1.0),
             });
         }
         Some(out)
     }
 
-    /// Calls `see` with every sample's whitened rows and the candidates' whitened columns L⁻¹a, side by side.
+    /// C of some samples with the prior, and δ = −C g to their own minimum, from their H and g without it.
+    fn to_own_minimum(
+        &self,
+        h: &DMatrix<f64>,
+        g: &DVector<f64>,
+    ) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let n = g.len();
+        let mut system = NormalEquations::new(n);
+        for i in 0..n {
+            for j in i..n {
+                system.h[i * n + j] = h[(i, j)];
+            }
+            system.g[i] = g[i];
+        }
+        add_prior(&self.model, &self.values, &mut system);
+        let c = covariance_of(&system)?;
+        let step = -(&c * DVector::from_row_slice(&system.g));
+        Some((c, step))
+    }
+
+    /// Calls `see` with the whitened rows of each of `samples` and the candidates' whitened columns L⁻¹a, side by side.
     fn each_sample(
         &self,
         candidates: &[Candidate],
+        samples: &[usize],
         work: &mut Workspace,
         mut see: impl FnMut(&Whitened, &DMatrix<f64>),
     ) {
-        for sample in 0..self.model.problem.samples {
+        for &sample in samples {
             let Some(s) = whitened(self.objective(), &self.values, sample, work) else {
                 continue;
             };

@@ -12,6 +12,7 @@ pub(crate) mod gauge;
 pub(crate) mod goodness;
 pub(crate) mod information;
 mod less_noise;
+mod looked_at;
 pub(crate) mod observability;
 pub(crate) mod sandwich;
 pub(crate) mod score;

@@ -11,11 +11,14 @@
 //! C = HHᵀ,   Hᵀ(Σ … + Λ)H = U diag(λ) Uᵀ,   C ← H U diag(max(1, λ)) Uᵀ Hᵀ                    (2)
 //! ```
 
-use nalgebra::DMatrix;
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
 
 use crate::analysis::solution::{Solution, describe_parameters};
 use crate::model::layout::Model;
 use crate::model::values::Values;
+use crate::solve::chunks::{chunked, is_one_chunk};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::accumulate;
 use crate::solve::whitened::{covariance_of, whitened};
@@ -25,11 +28,13 @@ const LEVERAGE_LEFT: f64 = 1e-10;
 
 impl Solution {
     /// Standard deviation of every parameter by equation (1), in the order of the parameters; `None` for one that is
-    /// held. It does not trust the noise model, and varies more by chance than the stated one: a cross-check.
+    /// held. It does not trust the noise model, and varies more by chance than the stated one: a cross-check. Of long recordings
+    /// it looks at some thousand samples that stand for all.
     #[must_use]
     pub fn cluster_robust_sigmas(&self) -> Option<Vec<Option<f64>>> {
         let c = covariance_of(&self.information.curvature(&self.model))?;
-        let covariance = around(self.objective(), &self.values, &c);
+        let samples: Vec<(usize, f64)> = self.looked_at().weighed().collect();
+        let covariance = &c * middle(self.objective(), &self.values, &c, &samples) * &c;
         let sigma = |column: usize| covariance[(column, column)].max(0.0).sqrt();
         let columns = self.model.column_of.iter();
         Some(columns.map(|column| column.map(sigma)).collect())
@@ -41,7 +46,7 @@ impl Solution {
     #[must_use]
     pub fn with_cluster_covariance(&self) -> Option<Self> {
         let c = covariance_of(&self.information.curvature(&self.model))?;
-        let middle = middle(self.objective(), &self.values, &c);
+        let middle = middle(self.objective(), &self.values, &c, &every(&self.model));
         let half = self.half_covariance();
         let inside = half.tr_mul(&(middle * &half));
         let eigen = calib_geometry::decompose::symmetric_eigen(&inside);
@@ -79,16 +84,22 @@ pub fn sandwich(
     if !accumulate(objective, values, &mut work, &mut system) {
         return None;
     }
-    Some(around(objective, values, &covariance_of(&system)?))
+    let c = covariance_of(&system)?;
+    Some(&c * middle(objective, values, &c, &every(model)) * &c)
 }
 
-/// Equation (1) where C is known.
-fn around(objective: Objective, values: &Values, c: &DMatrix<f64>) -> DMatrix<f64> {
-    c * middle(objective, values, c) * c
+/// Every sample, standing for itself.
+fn every(model: &Model) -> Vec<(usize, f64)> {
+    (0..model.problem.samples).map(|s| (s, 1.0)).collect()
 }
 
-/// What stands between the two C of equation (1).
-fn middle(objective: Objective, values: &Values, c: &DMatrix<f64>) -> DMatrix<f64> {
+/// What stands between the two C of equation (1), from samples that stand for so many each.
+fn middle(
+    objective: Objective,
+    values: &Values,
+    c: &DMatrix<f64>,
+    samples: &[(usize, f64)],
+) -> DMatrix<f64> {
     let model = objective.model;
     let n = model.free();
     let mut work = Workspace::new(model);
@@ -100,27 +111,51 @@ fn middle(objective: Objective, values: &Values, c: &DMatrix<f64>) -> DMatrix<f6
             middle[(i, i)] = 1.0 / (sigma * sigma);
         }
     }
-    for sample in 0..model.problem.samples {
-        let Some(s) = whitened(objective, values, sample, &mut work) else {
-            continue;
-        };
-        let m = s.w.len();
-        // I − Q = U diag(λ) Uᵀ
-        let ac = &s.a * c;
-        let eigen = (DMatrix::identity(m, m) - ac * s.a.transpose()).symmetric_eigen();
-        // (I − Q)^(-½) w = U diag(λ^(-½)) Uᵀ w
-        let mut coefficients = eigen.eigenvectors.tr_mul(&s.w);
-        for k in 0..m {
-            let left = eigen.eigenvalues[k];
-            coefficients[k] = if left > LEVERAGE_LEFT {
-                coefficients[k] / left.sqrt()
-            } else {
-                0.0
-            };
+    let cache = &work.cache;
+    let add = |some: Range<usize>, sum: &mut DMatrix<f64>| {
+        let mut work = Workspace::with(model, cache.clone());
+        for &(sample, factor) in &samples[some] {
+            if let Some(score) = adjusted_score(objective, values, sample, c, &mut work) {
+                sum.ger(factor, &score, &score, 1.0);
+            }
         }
-        let adjusted = &eigen.eigenvectors * coefficients;
-        let score = s.a.tr_mul(&adjusted);
-        middle.ger(1.0, &score, &score, 1.0);
+    };
+    if is_one_chunk(samples.len()) {
+        add(0..samples.len(), &mut middle);
+        return middle;
     }
+    let of = |some: Range<usize>| {
+        let mut sum = DMatrix::zeros(n, n);
+        add(some, &mut sum);
+        Some(sum)
+    };
+    chunked(samples.len(), of, |sum| middle += sum);
     middle
+}
+
+/// Aᵀ(I − Q)^(-½) w of a sample; `None` where it has no rows.
+fn adjusted_score(
+    objective: Objective,
+    values: &Values,
+    sample: usize,
+    c: &DMatrix<f64>,
+    work: &mut Workspace,
+) -> Option<DVector<f64>> {
+    let s = whitened(objective, values, sample, work)?;
+    let m = s.w.len();
+    // I − Q = U diag(λ) Uᵀ
+    let ac = &s.a * c;
+    let eigen = (DMatrix::identity(m, m) - ac * s.a.transpose()).symmetric_eigen();
+    // (I − Q)^(-½) w = U diag(λ^(-½)) Uᵀ w
+    let mut coefficients = eigen.eigenvectors.tr_mul(&s.w);
+    for k in 0..m {
+        let left = eigen.eigenvalues[k];
+        coefficients[k] = if left > LEVERAGE_LEFT {
+            coefficients[k] / left.sqrt()
+        } else {
+            0.0
+        };
+    }
+    let adjusted = &eigen.eigenvectors * coefficients;
+    Some(s.a.tr_mul(&adjusted))
 }

@@ -15,14 +15,15 @@ use crate::solve::whitened::{covariance_of, whitened};
 const LEVERAGE: f64 = 1.0 - 1e-6;
 
 impl Solution {
-    /// Equation (1) for every row that took part in the fit, by sample. `None` when the model cannot be evaluated.
+    /// Equation (1) for every row that took part in the fit, by sample; of long recordings for those of some thousand
+    /// samples. `None` when the model cannot be evaluated.
     #[must_use]
     pub fn standardized_residuals(&self) -> Option<Vec<f64>> {
         let c = covariance_of(&self.information.curvature(&self.model))?;
         let mut work = Workspace::new(&self.model);
         work.cache.update(&self.model.problem, &self.values);
         let mut out = Vec::new();
-        for sample in 0..self.model.problem.samples {
+        for sample in self.looked_at().samples {
             let Some(s) = whitened(self.objective(), &self.values, sample, &mut work) else {
                 continue;
             };

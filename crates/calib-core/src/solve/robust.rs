@@ -184,6 +184,46 @@ fn inflation(model: &Model, d2: &[f64], mask: &[f64], limits: &Limits) -> f64 {
     upper_median(&mut ratio).unwrap_or(1.0).max(1.0)
 }
 
+/// Linearizations between two reweightings.
+const INNER: MinimizeSettings = MinimizeSettings {
+    max_iterations: 4,
+    decrement: 1e-3,
+    damping: 1e-6,
+    active_sets: false,
+};
+
+/// As [`clean`], from values that are nearly right: the last round of GNC alone.
+pub(crate) fn clean_near(
+    model: &Model,
+    near: &Values,
+    mask: &[f64],
+    theta: &[f64],
+    settings: &RobustSettings,
+    work: &mut Workspace,
+) -> Option<(Values, Vec<f64>, usize)> {
+    let limits = Limits::new(settings);
+    let d2 = distances(model, near, theta, mask, work)?;
+    let scale = inflation(model, &d2, mask, &limits);
+    let weight = |o: usize| {
+        let c2 = limits.gate[model.observations[o].rows] * scale;
+        (c2 / (d2[o] + c2)).powi(2).max(LEAST_WEIGHT)
+    };
+    let weights: Vec<f64> = (0..mask.len())
+        .map(|o| if mask[o] > 0.0 { weight(o) } else { mask[o] })
+        .collect();
+    let objective = Objective {
+        model,
+        weights: &weights,
+        theta,
+    };
+    let fit = minimize_in(objective, near, &INNER, work);
+    let kept = gate(model, &fit.values, theta, mask, settings, work)?;
+    Some((fit.values, kept, fit.iterations))
+}
+
+/// Weights under this make V badly scaled and change nothing.
+const LEAST_WEIGHT: f64 = 1e-6;
+
 /// Huber and GNC from a start; returns values and the set that passed the gate (0/1 weights).
 pub(crate) fn clean(
     model: &Model,
@@ -195,13 +235,6 @@ pub(crate) fn clean(
 ) -> Option<(Values, Vec<f64>, usize)> {
     /// Reweighting rounds of (2): the weights settle to 1 % in fewer than ten.
     const HUBER_ROUNDS: usize = 12;
-    /// Linearizations between two reweightings.
-    const INNER: MinimizeSettings = MinimizeSettings {
-        max_iterations: 4,
-        decrement: 1e-3,
-        damping: 1e-6,
-        active_sets: false,
-    };
     let limits = Limits::new(settings);
     let rows = |o: usize| model.observations[o].rows;
     let mut values = start.values.clone();
@@ -247,8 +280,7 @@ pub(crate) fn clean(
             for o in 0..weights.len() {
                 if mask[o] > 0.0 {
                     let c2 = mu * limits.gate[rows(o)] * scale;
-                    // Weights under 1e-6 make V badly scaled and change nothing.
-                    weights[o] = (c2 / (d2[o] + c2)).powi(2).max(1e-6);
+                    weights[o] = (c2 / (d2[o] + c2)).powi(2).max(LEAST_WEIGHT);
                 }
             }
             let fit = {

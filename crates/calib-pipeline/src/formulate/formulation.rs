@@ -94,9 +94,7 @@ impl Formulation {
     /// First sample of every recording but the first.
     #[must_use]
     pub fn borders(&self) -> Vec<usize> {
-        let samples = &self.samples;
-        let starts = (1..samples.len()).filter(|s| samples[*s].0 != samples[s - 1].0);
-        starts.collect()
+        self.problem.borders.clone()
     }
 }
 

@@ -102,15 +102,6 @@ impl Candidates {
         first
     }
 
-    /// Samples with an observation that the fit used.
-    pub(super) fn samples(&self, solution: &Solution) -> Vec<usize> {
-        let used = |s: &usize| {
-            let mut observations = solution.model.of_sample[*s].clone();
-            observations.any(|o| solution.weights[o] > 0.0)
-        };
-        (0..solution.model.problem.samples).filter(used).collect()
-    }
-
     fn find_middles(&mut self, solution: &Solution) {
         let model = &solution.model;
         let mut work = Workspace::new(model);

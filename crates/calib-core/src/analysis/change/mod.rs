@@ -197,12 +197,12 @@ impl Solution {
 
     fn scan(&self, settings: &ChangeSettings) -> Option<ChangeScan> {
         let candidates = Candidates::new(self);
-        let used = candidates.samples(self);
+        let borders = &settings.borders;
+        let used = self.looked_at().samples;
         if used.len() < 2 * LEAST || candidates.list.is_empty() {
             return None;
         }
         let thin = every(&used, used.len().div_ceil(SIMULATED));
-        let borders = &settings.borders;
         let stride = used.len().div_ceil(EDGES);
         let levels = Levels::new(self, &candidates, &used, &every(&used, stride), borders)?;
         let design = &levels.designs[0];
@@ -231,8 +231,12 @@ impl Solution {
             && candidates.list[*k].pattern == Pattern::Step
             && let Some(coarse) = &found[*k]
         {
-            let edges = design.finer(&coarse.found.after, &used);
-            let fine = Design::new(self, &candidates, &used, &edges, borders)?;
+            let edges = design.finer(&coarse.found.after, &self.used_samples());
+            // The samples between two that were looked at say where it is.
+            let mut near = [&used[..], &edges[..]].concat();
+            near.sort_unstable();
+            near.dedup();
+            let fine = Design::new(self, &candidates, &near, &edges, borders)?;
             if let Some(found) = fine.best_near(*k, design, &coarse.found.after) {
                 let score = fine.score(found.gain);
                 let found = Best {

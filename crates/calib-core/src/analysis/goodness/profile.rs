@@ -37,21 +37,15 @@ pub(super) struct Profiled {
 impl Solution {
     /// Every candidate, in their order; `None` where the noise is known well enough.
     pub(super) fn profiled_tests(&self, candidates: &[Candidate]) -> Option<Vec<Profiled>> {
-        let used: std::collections::BTreeSet<usize> = self
-            .model
-            .observations
-            .iter()
-            .zip(&self.weights)
-            .filter(|(_, w)| **w > 0.0)
-            .map(|(o, _)| o.sample)
-            .collect();
+        let used = self.used_samples();
         let lower = self.with_less_noise(used.len());
         if lower.is_empty() {
             return None;
         }
         let all = std::iter::once(self).chain(&lower);
-        let levels: Vec<(Level, f64, Vec<Taken>)> =
-            all.map(|s| s.level(candidates)).collect::<Option<_>>()?;
+        let levels: Vec<(Level, f64, Vec<Taken>)> = all
+            .map(|s| s.level(candidates, &used))
+            .collect::<Option<_>>()?;
         let freedom = levels[0].1;
         let f = FisherSnedecor::new(1.0, freedom).ok()?;
         let of: Vec<Level> = levels.iter().map(|l| l.0).collect();
@@ -72,7 +66,7 @@ impl Solution {
     }
 
     /// Level, ν, and what every candidate takes.
-    fn level(&self, candidates: &[Candidate]) -> Option<(Level, f64, Vec<Taken>)> {
+    fn level(&self, candidates: &[Candidate], used: &[usize]) -> Option<(Level, f64, Vec<Taken>)> {
         let model = &self.model;
         let (n, count) = (model.free(), candidates.len());
         let mut work = Workspace::new(model);
@@ -82,7 +76,7 @@ impl Solution {
         let mut b = DMatrix::zeros(n, count);
         let (mut u, mut raw) = (vec![0.0; count], vec![0.0; count]);
         let (mut cost, mut rows, mut log_det) = (0.0, 0.0, 0.0);
-        self.each_sample(candidates, &mut work, |s, alpha| {
+        self.each_sample(candidates, used, &mut work, |s, alpha| {
             let transposed = s.a.transpose();
             h.gemm(1.0, &transposed, &s.a, 1.0);
             g.gemv(1.0, &transposed, &s.w, 1.0);

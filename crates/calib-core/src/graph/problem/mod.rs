@@ -74,6 +74,8 @@ pub struct Problem {
     pub times: Option<Vec<f64>>,
     /// Samples that are predicted but not fitted to.
     pub held_out: std::collections::BTreeSet<usize>,
+    /// First sample of every recording but the first (optional): where only some samples are looked at, they are of every recording.
+    pub borders: Vec<usize>,
 }
 
 impl Problem {

@@ -58,6 +58,8 @@ pub fn state(
             problem.held_out.insert(i);
         }
     }
+    let starts = (1..samples.len()).filter(|s| samples[*s].0 != samples[s - 1].0);
+    problem.borders = starts.collect();
     let tracker = problem.frame(&profile.tracker.frame);
     let root_frame = problem.frame(&model.link(model.root()).name);
     let tracker_free = !profile.bodies.is_empty()
