@@ -5,7 +5,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use calib_core::{MinimizeSettings, Model, Settings, minimize, solve};
+use calib_core::{ChangeSettings, MinimizeSettings, Model, NoiseKind, Settings, minimize, solve};
 use common::{Chain, Free, rng, six_r};
 
 /// Best of many runs: what the code costs on a machine that others use too.
@@ -89,9 +89,40 @@ fn six_r_with_1000_poses(c: &mut Criterion) {
     });
 }
 
+/// What grows with the length of a recording: the lines that begin with `long`.
+fn long_recordings(_: &mut Criterion) {
+    for poses in [1_000, 4_000, 40_000] {
+        let mut r = rng(1);
+        let free = Free::frames_and_offsets(6);
+        let chain = Chain::nominal(six_r())
+            .posed(&mut r, poses, 1.4)
+            .deviate(&mut r, &free, 0.01, 0.005);
+        let mut h = chain.problem(&free, 1e-4);
+        h.problem.group_mut(h.markers).estimate = true;
+        let noise = h
+            .problem
+            .noise_group("joints", NoiseKind::Joint, 1e-4, true);
+        for joint in h.joints.clone() {
+            h.problem.joint_noise(joint, noise);
+        }
+        chain.observe(&mut r, &mut h, 1e-4, 1e-4);
+        let settings = Settings::default();
+        let solution = solve(&h.problem, &settings).unwrap();
+        best_of(&format!("long: robust fit of {poses} poses"), 2, || {
+            std::hint::black_box(solve(&h.problem, &settings).unwrap());
+        });
+        best_of(&format!("long: tests after it, {poses} poses"), 2, || {
+            std::hint::black_box(solution.goodness_of_fit());
+            std::hint::black_box(solution.changes(&ChangeSettings::default()));
+            std::hint::black_box(solution.cluster_robust_sigmas());
+            std::hint::black_box(solution.standardized_residuals());
+        });
+    }
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(20);
-    targets = six_r_with_1000_poses
+    targets = six_r_with_1000_poses, long_recordings
 }
 criterion_main!(benches);
