@@ -33,6 +33,7 @@ mod sizes;
 mod streams;
 mod structural;
 mod studies;
+mod sweeps;
 mod third_robot;
 mod tolerance;
 mod truth;

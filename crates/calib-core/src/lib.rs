@@ -136,6 +136,7 @@ pub use nalgebra;
 
 pub use analysis::admit::Admission;
 pub use analysis::bounds::Unbounded;
+pub use analysis::change::contest::{Contest, Suspect};
 pub use analysis::change::{Change, ChangeScan, ChangeSettings, Moved};
 pub use analysis::closure::{ClosureStatistics, Spread};
 pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};
@@ -152,6 +153,7 @@ pub use analysis::select::{
 };
 pub use analysis::solution::{NoiseEstimate, ParameterClass, ParameterEstimate, Solution};
 pub use analysis::spread::{LinearPoint, Placement, PostureSpread, SizeSpread, SpreadDirection};
+pub use analysis::starts::StartDirection;
 pub use analysis::untested::{MovedPoint, Moves, OpenError, OpenErrors, UntestedEffect};
 pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
 pub use analysis::weigh::{NoiseCandidate, NoiseChoice, NoiseLevel, Weighed};
@@ -167,7 +169,9 @@ pub use graph::measurement::{
     PoseObservation,
 };
 pub use graph::parameter::{Parameter, ParameterKind};
-pub use graph::problem::{NoiseGroup, NoiseKind, NoiseModel, Point, Problem};
+pub use graph::problem::{
+    NoiseGroup, NoiseKind, NoiseModel, OpenStart, Point, Problem, StartChange,
+};
 pub use graph::unit::{DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA, Unit};
 pub use model::derived::{Configuration, DerivedPoint, DerivedPose, Target};
 pub use model::joint::JointMotion;

@@ -95,9 +95,13 @@ pub fn run_on(
     };
     progress("verify");
     let refitted = refitted(&inputs, &checked, &solved)?;
-    let tracks = &checked.tracks;
-    let verified = verified(&inputs, tracks, &nominal, &solved, refitted.as_ref());
+    let verified = verified(&inputs, &checked, &nominal, &solved, refitted.as_ref());
+    let explained = &verified.causes.explained;
+    checked
+        .findings
+        .retain(|finding| !explained.contains(finding));
     checked.findings.extend(verified.findings);
+    let tracks = &checked.tracks;
     let (robot, fit) = (&solved.robot, solved.fit.as_ref());
     progress("patch the URDF");
     let urdf = patch_urdf(&inputs, robot, &verified.known)?;
@@ -128,6 +132,7 @@ pub fn run_on(
         origins: &origins,
         found: &solved.found,
         fit,
+        causes: &verified.causes,
         robot,
         loops: verified.loops,
         held_out: verified.held_out,

@@ -26,7 +26,7 @@ use super::data::Data;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{RecordingIndex, SampleIndex};
 use super::linear::{Map, Model, Sums, Test, moving_joints, projected, solve};
-use super::screen::screen;
+use super::screen::{Screened, screen};
 use super::thinning::thinned;
 
 /// Joint noise against marker noise, (rad/m)²: none, and 0.003° … 0.1° for a marker of 0.3 mm.
@@ -77,11 +77,39 @@ impl Test {
 
 /// The most significant continuous fault, if any is significant and large enough to matter, also without the outliers that only
 /// the fitted geometry shows: beside nominal errors of 10 mm, one of 20 mm is none.
+///
+/// The samples that were `screened` under hypotheses without such a fault may be those that show it best: in a sweep of one joint,
+/// the ends of the range. It is asked for with all samples, too; what leaves the smaller scale is taken.
 pub(crate) fn continuous(
     data: &Data,
     screened: &[SampleIndex],
     options: &Options,
 ) -> Option<Continuous> {
+    let beside = confirmed(data, screened, options);
+    let all = (!screened.is_empty()).then(|| confirmed(data, &[], options));
+    let scale = |found: &Continuous| {
+        let left = left_with(data, screened, Some(&found.hypothesis), options);
+        left.map_or(f64::INFINITY, |left| left.scale)
+    };
+    match (beside, all.flatten()) {
+        (Some(a), Some(b)) if same(&a.hypothesis, &b.hypothesis) => Some(a),
+        (Some(a), Some(b)) => Some(if scale(&b) < scale(&a) { b } else { a }),
+        (a, b) => a.or(b),
+    }
+}
+
+/// Whether two are the same fault, of whatever size.
+fn same(a: &Hypothesis, b: &Hypothesis) -> bool {
+    let of = |h: &Hypothesis| match *h {
+        Hypothesis::Gain { joint, .. } => Some((joint.0, joint.0)),
+        Hypothesis::Coupling { joint, source, .. } => Some((joint.0, source.0)),
+        _ => None,
+    };
+    of(a) == of(b)
+}
+
+/// The fault that is demanded without these samples, and without those that are outliers beside it.
+fn confirmed(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<Continuous> {
     let found = demanded(data, screened, options)?;
     let known: BTreeSet<SampleIndex> = screened.iter().copied().collect();
     let outliers = outliers(data, screened, &found.hypothesis, options);
@@ -101,24 +129,33 @@ fn outliers(
     fault: &Hypothesis,
     options: &Options,
 ) -> Vec<SampleIndex> {
-    let fitted = |data: &Data| {
-        let (part, part_screened) = fewer(data, screened);
-        let (part, ..) = relinearized(part, &part_screened, options)?;
-        let at_map = Data {
-            chain: part.chain,
-            ..data.clone()
-        };
-        Some(screen(&at_map, &[]))
-    };
-    let with = Scoped {
-        hypothesis: *fault,
-        scope: Scope::All,
-    };
-    let with = fitted(&apply_all(&[with], data));
-    let without = fitted(data);
+    let with = left_with(data, screened, Some(fault), options);
+    let without = left_with(data, screened, None, options);
     let least = [without, with].into_iter().flatten();
     let least = least.min_by(|a, b| a.scale.total_cmp(&b.scale));
     least.map(|found| found.samples).unwrap_or_default()
+}
+
+/// Scale and outliers at the geometry that is fitted without the screened samples.
+fn left_with(
+    data: &Data,
+    screened: &[SampleIndex],
+    fault: Option<&Hypothesis>,
+    options: &Options,
+) -> Option<Screened> {
+    let corrections = fault.map(|hypothesis| Scoped {
+        hypothesis: *hypothesis,
+        scope: Scope::All,
+    });
+    let corrections: Vec<Scoped> = corrections.into_iter().collect();
+    let corrected = apply_all(&corrections, data);
+    let (part, part_screened) = fewer(&corrected, screened);
+    let (part, ..) = relinearized(part, &part_screened, options)?;
+    let at_map = Data {
+        chain: part.chain,
+        ..corrected
+    };
+    Some(screen(&at_map, &[]))
 }
 
 fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<Continuous> {

@@ -11,6 +11,7 @@
 //! variance that samples as clusters show: correlated residuals inside a sample cannot fake significance. If the
 //! stated noise is too small, z² is divided by χ²/dof.
 
+mod directions;
 mod profile;
 
 use std::collections::BTreeMap;
@@ -24,6 +25,7 @@ use crate::analysis::score::Scored;
 use crate::analysis::solution::Solution;
 use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{EFFECTS, EffectKind, Source};
+use crate::graph::ids::EdgeId;
 use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::solve::equations::{NormalEquations, Workspace};
@@ -70,6 +72,13 @@ impl ScoreTest {
     pub fn is_significant(&self) -> bool {
         self.p_corrected < SIGNIFICANT
     }
+
+    /// Physics allows a coefficient of this sign.
+    #[must_use]
+    pub fn is_possible(&self) -> bool {
+        let one_sided = matches!(self.physics, Physics::Effect(kind) if kind.effect().nonnegative);
+        !one_sided || self.estimate >= 0.0
+    }
 }
 
 /// Result of the goodness-of-fit analysis.
@@ -93,6 +102,7 @@ const SIGNIFICANT: f64 = 1e-3;
 const RELEVANT: f64 = 0.02;
 
 /// What is regressed on.
+#[derive(Clone)]
 enum Effect {
     /// (edge, lateral axis, regressor) of each joint that takes part.
     Joints(Vec<(usize, Option<usize>, Vec<f64>)>),
@@ -100,11 +110,45 @@ enum Effect {
     Drift(usize, Vec<f64>),
 }
 
-struct Candidate {
+#[derive(Clone)]
+pub(crate) struct Candidate {
     name: String,
     joint: Option<String>,
     physics: Physics,
     effect: Effect,
+    /// Regressors among which this one was chosen by the residuals.
+    tries: f64,
+}
+
+impl Candidate {
+    /// An effect of one joint by its regressor per sample.
+    pub(crate) fn of_joint(joint: EdgeId, kind: EffectKind, values: Vec<f64>) -> Self {
+        Self {
+            name: String::new(),
+            joint: None,
+            physics: Physics::Effect(kind),
+            effect: Effect::Joints(vec![(joint.index(), kind.lateral(), values)]),
+            tries: 1.0,
+        }
+    }
+
+    /// Whether it is the test of that name.
+    pub(crate) fn is_called(&self, name: &str) -> bool {
+        self.name == name
+    }
+
+    /// The regressor of an effect of one joint; of others, nothing.
+    pub(crate) fn values(&self) -> &[f64] {
+        match &self.effect {
+            Effect::Joints(parts) if parts.len() == 1 => &parts[0].2,
+            _ => &[],
+        }
+    }
+}
+
+/// Regressors that were tried.
+fn tries(candidates: &[Candidate]) -> f64 {
+    candidates.iter().map(|c| c.tries).sum()
 }
 
 impl Solution {
@@ -113,7 +157,7 @@ impl Solution {
     /// they look at some thousand samples. `None` when the model cannot be evaluated.
     #[must_use]
     pub fn goodness_of_fit(&self) -> Option<GoodnessOfFit> {
-        let candidates = candidates(&self.model);
+        let candidates = self.candidates();
         let mut tests = self.score_tests(&candidates, &self.looked_at())?;
         self.with_profiles(&candidates, &mut tests);
         tests.sort_by(|a, b| b.z2.total_cmp(&a.z2).then_with(|| a.name.cmp(&b.name)));
@@ -125,7 +169,7 @@ impl Solution {
             .map(|d| d.sf(self.chi2_stated));
         let missing = tests
             .iter()
-            .filter(|t| t.is_significant() && t.explains > RELEVANT)
+            .filter(|t| t.is_significant() && t.explains > RELEVANT && t.is_possible())
             .cloned()
             .collect();
         Some(GoodnessOfFit {
@@ -150,10 +194,17 @@ impl Solution {
                 test.estimate = profile.estimate;
                 test.z2 = profile.t2;
                 test.p_value = p_value;
-                test.p_corrected = (p_value * candidates.len() as f64).min(1.0);
+                test.p_corrected = (p_value * tries(candidates)).min(1.0);
                 test.explains = profile.explains;
             }
         }
+    }
+
+    /// Every effect that is tested, where a direction of approach is open with the one that suits it best.
+    pub(crate) fn candidates(&self) -> Vec<Candidate> {
+        let mut candidates = candidates(&self.model);
+        self.choose_directions(&mut candidates);
+        candidates
     }
 
     fn score_tests(
@@ -211,6 +262,7 @@ impl Solution {
         });
         let chi2 = if looked_at.all { self.chi2 } else { chi2 };
         let excess = (self.chi2 / self.degrees_of_freedom.max(1.0)).max(1.0);
+        let tried = tries(candidates);
         let mut out = Vec::new();
         for (k, candidate) in candidates.iter().enumerate() {
             let one = |value: f64| DMatrix::from_element(1, 1, value);
@@ -238,7 +290,7 @@ impl Solution {
                 estimate: -u[k] / information,
                 z2: tested.z2,
                 p_value: tested.p_value,
-                p_corrected: (tested.p_value * count as f64).min(1.0),
+                p_corrected: (tested.p_value * tried).min(1.0),
                 explains: (u[k] * u[k] / information / chi2.max(1e-300)).min(1.0),
             });
         }
@@ -266,24 +318,35 @@ impl Solution {
     }
 
     /// Calls `see` with the whitened rows of each of `samples` and the candidates' whitened columns L⁻¹a, side by side.
-    fn each_sample(
+    pub(crate) fn each_sample(
         &self,
         candidates: &[Candidate],
         samples: &[usize],
         work: &mut Workspace,
         mut see: impl FnMut(&Whitened, &DMatrix<f64>),
     ) {
+        self.each_numbered_sample(candidates, samples, work, |_, s, columns| see(s, columns));
+    }
+
+    /// The same with the number of the sample.
+    pub(crate) fn each_numbered_sample(
+        &self,
+        candidates: &[Candidate],
+        samples: &[usize],
+        work: &mut Workspace,
+        mut see: impl FnMut(usize, &Whitened, &DMatrix<f64>),
+    ) {
         for &sample in samples {
             let Some(s) = whitened(self.objective(), &self.values, sample, work) else {
                 continue;
             };
             let columns = self.effect_rows(candidates, sample, &s.blocks, s.w.len(), work);
-            see(&s, &(&s.l_inverse * columns));
+            see(sample, &s, &(&s.l_inverse * columns));
         }
     }
 
     /// a of equation (1) for every candidate at one sample.
-    fn effect_rows(
+    pub(crate) fn effect_rows(
         &self,
         candidates: &[Candidate],
         sample: usize,
@@ -355,6 +418,7 @@ fn candidates(model: &Model) -> Vec<Candidate> {
                 joint: Some(name.clone()),
                 physics: Physics::Effect(kind),
                 effect: Effect::Joints(vec![(e, kind.lateral(), values)]),
+                tries: 1.0,
             });
         };
         let modeled = |kind: EffectKind| joint.effects.iter().any(|f| f.kind == kind);
@@ -384,6 +448,7 @@ fn candidates(model: &Model) -> Vec<Candidate> {
         joint: None,
         physics: Physics::Effect(EffectKind::ClockOffset),
         effect: Effect::Joints(parts),
+        tries: 1.0,
     }));
     if let Some(times) = &model.problem.times {
         let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
@@ -394,6 +459,7 @@ fn candidates(model: &Model) -> Vec<Candidate> {
                 joint: None,
                 physics: Physics::Drift,
                 effect: Effect::Drift(axis, centered.clone()),
+                tries: 1.0,
             });
         }
     }

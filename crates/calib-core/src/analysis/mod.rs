@@ -21,6 +21,7 @@ pub(crate) mod select;
 pub(crate) mod solution;
 pub(crate) mod spread;
 mod standardized;
+pub(crate) mod starts;
 pub(crate) mod untested;
 pub(crate) mod validate;
 pub(crate) mod weigh;

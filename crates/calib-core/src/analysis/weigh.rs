@@ -22,6 +22,7 @@
 use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::analysis::admit::{Admission, eligible, left_out_squares, many_rejected, wider};
 use crate::analysis::estimate::{Settings, Start, refit};
@@ -107,6 +108,8 @@ const SAME: f64 = 1.005;
 /// A larger statement must be likelier by this many standard errors. With one, every second robot whose joints are alike is
 /// given a level for each of them; with two, one in thirty.
 const SHOWN: f64 = 2.0;
+/// Chance that clean poses are said to hide physics in their noise.
+const CHANCE: f64 = 1e-3;
 /// Levels of a candidate have settled when log σ² changes by less: 2.5 % in σ.
 const SETTLED: f64 = 0.05;
 /// Statements that trust no model of the robot.
@@ -457,7 +460,12 @@ fn choose(trials: &[Trial]) -> Option<NoiseChoice> {
         .filter(within)
         .or_else(|| (0..trials.len()).find(within))?;
     let (less, error) = paired(&scores.surprises[best], &scores.surprises[likeliest]);
-    let swallowed = !candidates[likeliest].admitted && less > SHOWN * error;
+    // The levels themselves were found from all poses: as many more of them as chance makes likelier are no evidence.
+    let more = candidates[likeliest].levels.len() as f64 - candidates[best].levels.len() as f64;
+    let by_chance =
+        ChiSquared::new(more.max(1.0)).map_or(f64::INFINITY, |c| c.inverse_cdf(1.0 - CHANCE));
+    let shown = less > SHOWN * error && 2.0 * less * poses as f64 > by_chance;
+    let swallowed = !candidates[likeliest].admitted && shown;
     Some(NoiseChoice {
         chosen: trials[chosen].noise,
         swallowed: swallowed.then_some(trials[likeliest].noise),

@@ -16,16 +16,16 @@ super::topic! {
     /// Something moved while the data were recorded.
     CHANGED_WHILE_RECORDING = "changed-while-recording" {
         "body": Warning,
-            "Body `{body}` moved on its link by {distance} ± {sigma} and {angle} between row {before}[[ of `{before_in}`]] and row {row}, or another change affected this part of the data.[[ Nearly as likely: {rivals:code} moved.]][[ Missing physics explains as much: `{physics}`.]]",
+            "Body `{body}` moved on its link by {distance} ± {sigma} and {angle} between row {before}[[ of `{before_in}`]] and row {row}, or another change affected this part of the data.[[ Nearly as likely: {rivals:code} moved.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
             "Fasten the body and record again, or estimate one mount for each part: add `split: {recording: {recording}, at_row: {row}[[, before: {earlier:list}]]}` to the body in the profile, and list held-out recordings that were made before the change under `before` as well.";
         "tracker": Warning,
-            "The tracker, or the whole robot, moved by {distance} ± {sigma} and {angle} between row {before}[[ of `{before_in}`]] and row {row}.[[ Nearly as likely: {rivals:code} moved.]][[ Missing physics explains as much: `{physics}`.]]",
+            "The tracker, or the whole robot, moved by {distance} ± {sigma} and {angle} between row {before}[[ of `{before_in}`]] and row {row}.[[ Nearly as likely: {rivals:code} moved.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
             "Secure the tracker and the robot's stand, and record again; until then keep only the rows of one side.";
         "joint": Warning,
-            "The zero of this joint changed by {angle} ± {sigma_angle} between row {before}[[ of `{before_in}`]] and row {row}.[[ Nearly as likely: {rivals:code} moved.]][[ Missing physics explains as much: `{physics}`.]]",
+            "The zero of this joint changed by {angle} ± {sigma_angle} between row {before}[[ of `{before_in}`]] and row {row}.[[ Nearly as likely: {rivals:code} moved.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
             "Check the joint's encoder and its coupling, home the robot, and record again.";
         "axis": Warning,
-            "The zero of this joint changed by {distance} ± {sigma} between row {before}[[ of `{before_in}`]] and row {row}.[[ Nearly as likely: {rivals:code} moved.]][[ Missing physics explains as much: `{physics}`.]]",
+            "The zero of this joint changed by {distance} ± {sigma} between row {before}[[ of `{before_in}`]] and row {row}.[[ Nearly as likely: {rivals:code} moved.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
             "Check the joint's encoder and its coupling, home the robot, and record again.";
         "drift": Warning,
             "The tracker's frame drifted by {distance} ± {sigma} and {angle} from the first row to the last.[[ Missing physics explains as much: `{physics}`.]]",

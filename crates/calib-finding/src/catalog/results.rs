@@ -55,26 +55,32 @@ super::topic! {
     /// The residuals show an effect that is not in the model.
     MISSING_PHYSICS = "missing-physics" {
         "effect": Warning,
-            "{physics} (`{parameter}`): explains {explains:percent} of χ², p = {p_value}.",
+            "{physics} (`{parameter}`): explains {explains:percent} of χ², p = {p_value}.[[ Nearly as good: {alternatives:code}.]]",
             "Enable the effect under `solve.free` or `solve.joints`, and compare the held-out errors.";
         "clock": Warning,
-            "{physics} (`{parameter}`): explains {explains:percent} of χ², p = {p_value}.",
+            "{physics} (`{parameter}`): explains {explains:percent} of χ², p = {p_value}.[[ Nearly as good: {alternatives:code}.]]",
             "Let the fit estimate it: `timing: {poses: continuous, clock: estimate}` in {recording:code} and in the recordings made in the same way. Or record in holds.";
+    }
+    /// From which side a joint came is not recorded before its first motion.
+    SIDE_BY_RESIDUALS = "side-by-residuals" {
+        "": Info,
+            "The rows of `{recording}` before a joint's first motion do not show from which side the joint came. The residuals do, and the fit takes it from them[[: from below for {below}]][[; from above for {above}]].",
+            "Begin each recording with a small motion of every joint, and end it from the side that the first rows are to have.";
     }
     /// What is random from pose to pose is no noise of a joint.
     NOISE_IS_PHYSICS = "noise-is-physics" {
         "swallowed": Info,
             "Joint noise of {sigma} maximizes the likelihood, but predicts left-out poses worse ({poses:pose} left out in turn): physics is missing from the model. The fit uses weights that do not depend on the robot model.",
-            "Enable the effects that `missing-physics` names, and compare the held-out errors.";
+            "If `missing-physics` names effects, enable them and compare the held-out errors; otherwise record more poses.";
         "no_encoder": Info,
             "Joint positions deviate from their readings by {sigma} (σ), differently in each pose. No encoder has that noise: physics is missing from the model (backlash, compliance, eccentricity), or the readings belong to other poses.",
-            "Enable the effects that `missing-physics` names, and compare the held-out errors.";
+            "If `missing-physics` names effects, enable them and compare the held-out errors; otherwise record more poses.";
     }
     /// Rejected vectors take part after all.
     REJECTED_TAKE_PART = "rejected-take-part" {
         "": Info,
             "{readmitted} of {rejected} rejected measurements were readmitted: left-out poses are predicted {better:percent} better with them. They are poses that the incomplete model fits worst, not errors.",
-            "Enable the effects that `missing-physics` names, and compare the held-out errors.";
+            "If `missing-physics` names effects, enable them and compare the held-out errors; otherwise record more poses.";
     }
     /// Shapes that the 3-D view lacks.
     SHAPE_NOT_DRAWN = "shape-not-drawn" {

@@ -12,13 +12,16 @@ use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
-use crate::formulate::{bad_rows, clock, noise, priors};
+use crate::formulate::{bad_rows, clock, noise, priors, starts};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
 use crate::prepare::tracks::body_tracks;
 
 /// Rows of a motion are taken again at better times at most this often; the first time leaves what is of second order.
 const ALIGNMENTS: usize = 3;
+/// Sides that joints came from are asked for at most this often: those of small effects show once the others are known, and those
+/// of held-out recordings last.
+const SIDES: usize = 3;
 /// Times that change by less, s, are right: at 1 m/s it is a hundredth of a millimeter.
 const ALIGNED: f64 = 1e-5;
 
@@ -41,7 +44,7 @@ pub fn likelihood(
     }
     let mut settings = Settings::default();
     settings.robust.enabled = inputs.robot.profile.solve.robust;
-    let (mut registered, mut fit, mut of_rows) = fits(inputs, checked, &settings, progress)?;
+    let (mut registered, mut fit, mut of_rows) = sided(inputs, checked, &settings, progress)?;
     for _ in 0..ALIGNMENTS {
         if !realign(inputs, &checked.tracks, &fit, ALIGNED) {
             break;
@@ -71,13 +74,46 @@ pub fn likelihood(
     ml_result(inputs, fit, registered)
 }
 
+/// [`fits`], again from the start where the residuals tell from which side joints came before their first motion.
+fn sided(
+    inputs: &mut Inputs,
+    checked: &mut Checked,
+    settings: &Settings,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Fits, PipelineError> {
+    // Rows are judged again with the sides known.
+    let first = starts::matter(inputs).then(|| (inputs.clone(), checked.tracks.clone()));
+    let mut found = fits(inputs, checked, settings, progress)?;
+    let Some((as_read, tracks)) = first else {
+        return Ok(found);
+    };
+    let mut sides = starts::Sides::new();
+    for _ in 0..SIDES {
+        let told = starts::fitted_first(inputs, starts::told(&found.1));
+        if told.is_empty() {
+            break;
+        }
+        sides.extend(told);
+        *inputs = as_read.clone();
+        checked.tracks = tracks.clone();
+        starts::take(inputs, &sides);
+        progress("fit again with the sides that joints came from");
+        found = fits(inputs, checked, settings, progress)?;
+    }
+    checked.findings.extend(starts::findings(inputs));
+    Ok(found)
+}
+
+/// Registration, fit, and what is wrong with rows.
+type Fits = (MlFit, MlFit, Vec<Finding>);
+
 /// The fit of mounts and place alone, that of everything, and what is wrong with the rows that it left out.
 fn fits(
     inputs: &mut Inputs,
     checked: &mut Checked,
     settings: &Settings,
     progress: &mut dyn FnMut(&str),
-) -> Result<(MlFit, MlFit, Vec<Finding>), PipelineError> {
+) -> Result<Fits, PipelineError> {
     progress("fit registration only");
     // The baseline is plain least squares: what is left then is the geometry's fault, not noise to be estimated.
     let baseline = ml::state(

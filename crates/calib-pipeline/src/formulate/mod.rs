@@ -19,5 +19,6 @@ pub mod realign;
 pub mod row_checks;
 pub mod selection;
 pub mod solved;
+pub(crate) mod starts;
 pub mod structural;
 pub mod without_effects;

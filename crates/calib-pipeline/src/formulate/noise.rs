@@ -1,6 +1,6 @@
 //! The noise from pose to pose by evidence, and what it says of the model.
 
-use calib_core::{NoiseKind, NoiseModel, Settings};
+use calib_core::{NoiseEstimate, NoiseKind, NoiseModel, Settings};
 use calib_finding::{About, Fact, Finding, catalog};
 
 use crate::formulate::formulation::MlFit;
@@ -9,6 +9,9 @@ use crate::prepare::inputs::Inputs;
 
 /// More than this is no encoder's noise, rad (0.06°): 1 mm at a meter.
 const ENCODER: f64 = 1e-3;
+
+/// Relative standard errors of a level within which it lies, 99.9 % on the side that counts.
+const CERTAIN: f64 = 3.0;
 
 /// Takes the noise that the recordings speak for, where the profile does not state it, with the findings that say what it
 /// means.
@@ -67,8 +70,13 @@ fn of_no_encoder(sigma: f64) -> Finding {
 fn no_encoder(fit: &MlFit) -> Option<Finding> {
     let noise = fit.solution.noise.iter();
     let of_joints = noise.filter(|n| n.kind == NoiseKind::Joint && n.samples > 0 && n.estimated);
-    let largest = of_joints.map(|n| n.sigma).fold(0.0, f64::max);
-    (largest > ENCODER).then(|| of_no_encoder(largest))
+    // What of the level is beyond doubt: that of a joint with few degrees of freedom is found within a factor of two.
+    let certain = |n: &&NoiseEstimate| {
+        let doubt = n.relative_error.map_or(0.0, |relative| CERTAIN * relative);
+        n.sigma > ENCODER * (1.0 + doubt)
+    };
+    let largest = of_joints.filter(certain).map(|n| n.sigma);
+    largest.max_by(f64::total_cmp).map(of_no_encoder)
 }
 
 /// Rejected vectors that take part after all.

@@ -28,15 +28,10 @@ use crate::verify::robot_changes::robot_changes;
 pub fn assemble(e: &Evidence<'_>) -> Report {
     let profile = &e.inputs.robot.profile;
     let file = &e.inputs.robot.file;
-    let (goodness, (workspace, weak)) = rayon::join(
-        || e.fit.and_then(|fit| fit.solution.goodness_of_fit()),
-        || {
-            let workspace = e.fit.and_then(|fit| workspace(e.inputs, fit));
-            (
-                workspace,
-                e.fit.and_then(|fit| weak_directions(e.inputs, fit)),
-            )
-        },
+    let goodness = e.causes.goodness.as_ref();
+    let (workspace, weak) = rayon::join(
+        || e.fit.and_then(|fit| workspace(e.inputs, fit)),
+        || e.fit.and_then(|fit| weak_directions(e.inputs, fit)),
     );
     let missing: Vec<MissingPhysics> = goodness
         .iter()
@@ -90,7 +85,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         ),
         noise: e.fit.map_or_else(Vec::new, |fit| noise(e, fit)),
         noise_choice: e.fit.and_then(noise_choice),
-        tested_effects: goodness.as_ref().map_or_else(Vec::new, tested_effects),
+        tested_effects: goodness.map_or_else(Vec::new, tested_effects),
         clocks: crate::formulate::clock::clocks(e.inputs, e.fit),
         recordings: recordings(e.inputs, &tracks),
         coverage: coverage(e.inputs),

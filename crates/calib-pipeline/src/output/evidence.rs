@@ -15,6 +15,7 @@ use crate::formulate::kinematics::Calibration;
 use crate::output::export::PatchedUrdf;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
+use crate::verify::causes::Causes;
 
 /// What the report is made of.
 #[derive(Debug)]
@@ -33,6 +34,8 @@ pub struct Evidence<'a> {
     pub found: &'a [Found],
     /// The fit, with `method: ml`.
     pub fit: Option<&'a MlFit>,
+    /// What made the residuals, each cause beside the others.
+    pub causes: &'a Causes,
     /// The calibrated robot.
     pub robot: &'a Calibration,
     /// Loop closures.

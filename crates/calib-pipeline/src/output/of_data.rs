@@ -201,7 +201,14 @@ pub(crate) fn missing_finding(e: &Evidence<'_>, missing: &MissingPhysics) -> Fin
             .with("recording", Fact::name(recording)),
         None => Finding::of_kind(catalog::MISSING_PHYSICS, "effect", About::Fit),
     };
+    let alike = e.causes.alike.iter();
+    let alike = alike.filter(|(name, _)| *name == missing.parameter);
+    let alike: Vec<String> = alike.flat_map(|(_, all)| all.clone()).collect();
     finding
+        .with_some(
+            "alternatives",
+            (!alike.is_empty()).then(|| Fact::names(alike)),
+        )
         .with("physics", Fact::choice(missing.physics.words()))
         .with("parameter", Fact::name(&missing.parameter))
         .with("explains", Fact::ratio(missing.explains))

@@ -12,7 +12,7 @@ pub(crate) const STILL: f64 = 1e-5;
 /// The circumstances of one row. The default knows nothing: every joint in the middle of its backlash, loads by gravity.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Conditions {
-    /// Direction in which each joint moved last, by joint index: +1, −1, or 0 where no row before tells.
+    /// Direction in which each joint moved last, by joint index: +1, −1, or 0 where nothing tells.
     pub approach: Vec<f64>,
     /// Measured torque that each joint holds about its axis, N m, by joint index; `None`: gravity loads it.
     pub torque: Option<Vec<f64>>,
@@ -53,7 +53,8 @@ pub fn missing_torques(inputs: &Inputs) -> Vec<Finding> {
 #[must_use]
 pub fn conditions(loaded: &Loaded, model: &RobotModel, load: Load) -> Vec<Conditions> {
     let n = model.joints().len();
-    let mut approach = vec![0.0; n];
+    let known = |joint| loaded.starts.get(&joint).copied().unwrap_or(0.0);
+    let mut approach: Vec<f64> = (0..n).map(known).collect();
     let mut before: Option<&Vec<f64>> = None;
     let mut out = Vec::with_capacity(loaded.q.len());
     for (row, q) in loaded.q.iter().enumerate() {

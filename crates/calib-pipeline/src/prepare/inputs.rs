@@ -60,6 +60,9 @@ pub struct Loaded {
     pub alignment: Option<Alignment>,
     /// Speed of each recorded joint per row of a motion, rad/s or m/s; empty for static poses.
     pub velocities: BTreeMap<String, Vec<Option<f64>>>,
+    /// From which side a joint came before its first motion in the recording, by joint index: +1 from below, −1 from above. What is
+    /// missing is not known.
+    pub starts: BTreeMap<usize, f64>,
     /// Shape of each marker's covariance per row, in units of the usual variance; empty where no scatter is known.
     pub shapes: BTreeMap<String, Vec<Option<Matrix3<f64>>>>,
 }

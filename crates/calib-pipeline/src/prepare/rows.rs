@@ -67,6 +67,7 @@ pub(crate) fn prepare(
         meta,
         alignment: None,
         velocities,
+        starts: BTreeMap::new(),
         shapes: BTreeMap::new(),
     })
 }

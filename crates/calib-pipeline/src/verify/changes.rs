@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use calib_core::{Change, ChangeSettings, EdgeId, FrameId, Moved, Physics, ScoreTest};
+use calib_core::{Change, ChangeScan, ChangeSettings, GoodnessOfFit, Moved};
+use calib_core::{EdgeId, FrameId};
 use calib_finding::{About, Fact, Finding, Severity, Subject, catalog};
 use calib_profile::Usage;
 use calib_urdf::Joint;
@@ -13,12 +14,38 @@ use crate::prepare::inputs::Inputs;
 /// Standard deviations within which the size of a change lies, 97.5 % on the side that counts.
 const CERTAIN: f64 = 2.0;
 
-/// At most one finding: the change that the data show best. Others appear once it has been dealt with.
+/// The scan of the fitted recordings.
 #[must_use]
-pub fn changes(inputs: &Inputs, fit: &MlFit) -> Option<Finding> {
+pub fn scan(fit: &MlFit) -> Option<ChangeScan> {
     let mut settings = ChangeSettings::default();
     settings.borders = fit.formulation.borders();
-    let scan = fit.solution.changes(&settings)?;
+    fit.solution.changes(&settings)
+}
+
+/// What a change is to be told beside.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Beside {
+    /// The missing effect that explains more than the change does.
+    pub physics: Option<String>,
+    /// Effects that explain the data as well in its place.
+    pub alike: Vec<String>,
+}
+
+impl Beside {
+    /// Where the change is the only suspect that was found.
+    #[must_use]
+    pub fn of_tests(goodness: Option<&GoodnessOfFit>) -> Self {
+        let missing = goodness.and_then(|g| g.missing.first());
+        Self {
+            physics: missing.map(|t| t.name.clone()),
+            alike: Vec::new(),
+        }
+    }
+}
+
+/// At most one finding: the change that the data show best. Others appear once it has been dealt with.
+#[must_use]
+pub fn finding(inputs: &Inputs, fit: &MlFit, scan: &ChangeScan, beside: Beside) -> Option<Finding> {
     let change = scan.significant()?;
     let names = Names { inputs, fit };
     let finding = names.described(change)?;
@@ -27,31 +54,26 @@ pub fn changes(inputs: &Inputs, fit: &MlFit) -> Option<Finding> {
         .iter()
         .filter_map(|c| names.of(c.moved))
         .collect();
-    let physics = physics(fit, change);
     // What of the size is beyond doubt.
     let of = |name| finding.facts.get(name).and_then(Fact::value);
     let size = of("distance").map(|size| size - CERTAIN * of("sigma").unwrap_or(0.0));
     let limits = &inputs.robot.profile.solve.limits;
+    // What an effect explains as well is no certain step.
+    let certain = beside.physics.is_none();
     let harmful = match (size, limits.held_out_max.or(limits.held_out_rms)) {
         (Some(size), Some(limit)) => size > limit,
         _ => false,
     };
+    let names = |all: Vec<String>| (!all.is_empty()).then(|| Fact::names(all));
     let finding = finding
-        .with_some("rivals", (!rivals.is_empty()).then(|| Fact::names(rivals)))
-        .with_some("physics", physics.map(Fact::name));
-    Some(if harmful {
+        .with_some("rivals", names(rivals))
+        .with_some("alternatives", names(beside.alike))
+        .with_some("physics", beside.physics.map(Fact::name));
+    Some(if harmful && certain {
         finding.with_severity(Severity::Error)
     } else {
         finding
     })
-}
-
-/// The missing effect that explains more than a change does, where there is one.
-fn physics(fit: &MlFit, change: &Change) -> Option<String> {
-    let goodness = fit.solution.goodness_of_fit()?;
-    // The drift of the tracker is tried by the scan itself.
-    let other = |t: &&ScoreTest| t.physics != Physics::Drift && t.explains > change.explains;
-    goodness.missing.iter().find(other).map(|t| t.name.clone())
 }
 
 /// What the parts of the problem are called.

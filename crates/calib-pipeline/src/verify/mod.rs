@@ -1,10 +1,13 @@
 //! What a solution is worth: held-out errors, loops, residuals, accuracy over the workspace.
 
 pub(crate) mod accuracy;
+mod applied;
+pub mod causes;
 pub mod changes;
 pub mod closure;
 pub mod deviations;
 pub(crate) mod dh_table;
+mod elimination;
 pub mod hayati;
 pub mod held_out;
 pub mod information;
@@ -21,11 +24,12 @@ use std::collections::BTreeMap;
 use calib_finding::{Fact, Finding};
 use calib_report::{HeldOut, LoopClosure, ResidualRow};
 
+use crate::formulate::checked::Checked;
 use crate::formulate::kinematics::Calibration;
 use crate::formulate::solved::Solved;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
-use crate::verify::changes::changes;
+use crate::verify::causes::{Causes, causes};
 use crate::verify::closure::close_loops;
 use crate::verify::known::{Known, Number, known_numbers};
 use crate::verify::moved::moved;
@@ -44,29 +48,43 @@ pub struct Verified {
     pub known: BTreeMap<Number, Known>,
     /// Every residual.
     pub residuals: Vec<ResidualRow>,
+    /// What made the residuals, each cause beside the others.
+    pub causes: Causes,
 }
 
 /// Verifies `solved`; the scan for changes takes as long as the rest together and runs beside it.
 #[must_use]
 pub fn verified(
     inputs: &Inputs,
-    tracks: &BTreeMap<String, BodyTrack>,
+    checked: &Checked,
     nominal: &Calibration,
     solved: &Solved,
     refitted: Option<&Calibration>,
 ) -> Verified {
     let fit = solved.fit.as_ref();
-    let (changed, mut verified) = rayon::join(
-        || fit.and_then(|fit| changes(inputs, fit)),
+    let tracks = &checked.tracks;
+    let (causes, mut verified) = rayon::join(
+        || {
+            fit.map_or_else(Causes::default, |fit| {
+                causes(inputs, fit, &checked.findings)
+            })
+        },
         || Verified {
             findings: moved(inputs, tracks, &solved.robot),
             loops: close_loops(inputs, tracks, &solved.body_from_origin(), &solved.fk),
             held_out: held_out(inputs, tracks, nominal, solved, refitted),
             known: fit.map_or_else(Default::default, |fit| known_numbers(inputs, fit)),
             residuals: residual_rows(inputs, tracks, &solved.robot, fit),
+            causes: Causes::default(),
         },
     );
-    if let Some(changed) = changed {
+    verified.causes = causes;
+    let missing = verified.causes.goodness.as_ref();
+    let missing = missing.is_some_and(|g| !g.missing.is_empty());
+    if missing && !verified.findings.is_empty() {
+        verified.findings = applied::still_moved(inputs, checked, &verified);
+    }
+    if let Some(changed) = verified.causes.change.clone() {
         verified.findings = one_cause(changed, verified.findings);
     }
     verified

@@ -23,6 +23,7 @@
 
 mod chance;
 mod columns;
+pub(crate) mod contest;
 mod levels;
 mod sums;
 
@@ -116,6 +117,8 @@ pub struct ChangeScan {
     pub threshold: f64,
     /// F / N of equation (2).
     pub cost_per_row: f64,
+    /// The rows that the fit rejected were scanned as well.
+    pub with_rejected: bool,
 }
 
 impl ChangeScan {
@@ -165,7 +168,10 @@ impl Solution {
             scan.cost_per_row * (1.0 - change.explains) < EXPLAINED * kept.cost_per_row
         };
         Some(if scan.significant().is_some_and(explained) {
-            scan
+            ChangeScan {
+                with_rejected: true,
+                ..scan
+            }
         } else {
             kept
         })
@@ -251,6 +257,7 @@ impl Solution {
             changes: changes.into_iter().map(|(_, c)| c).collect(),
             threshold: chance.threshold,
             cost_per_row: design.cost / design.rows,
+            with_rejected: false,
         })
     }
 }

@@ -14,8 +14,10 @@ mod joints;
 mod measurements;
 mod noise;
 mod paths;
+mod starts;
 
 pub use noise::NoiseModel;
+pub use starts::{OpenStart, StartChange};
 
 /// A point that is fixed in a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,6 +72,8 @@ pub struct Problem {
     pub(crate) measurements: Vec<Measurement>,
     /// Calls of the builder that could not be carried out.
     pub(crate) faults: Vec<Error>,
+    /// Samples before a joint's first motion.
+    pub(crate) starts: Vec<OpenStart>,
     /// Time of each sample, s (optional; the goodness-of-fit test looks for drift along it).
     pub times: Option<Vec<f64>>,
     /// Samples that are predicted but not fitted to.

@@ -5,8 +5,10 @@ use std::collections::BTreeMap;
 use bodies::add_bodies;
 use calib_core::{Chart, Problem, Role, Settings};
 use calib_profile::{Free, Usage};
+use couplings::coupling_candidates;
 use joints::{Row, add_joint, joint_noise_group};
 use masses::free_masses;
+use starts::open_starts;
 
 use crate::error::PipelineError;
 use crate::estimate::start::Start;
@@ -18,8 +20,10 @@ use crate::prepare::tracks::BodyTrack;
 
 mod bodies;
 mod calibration;
+mod couplings;
 mod joints;
 mod masses;
+mod starts;
 
 pub(crate) use calibration::{calibration, calibration_at};
 pub(crate) use joints::{moves, used_joints};
@@ -107,6 +111,10 @@ pub fn state(
             joint_noise,
             free_set,
         );
+    }
+    if free_set == FreeSet::Profile {
+        open_starts(&mut formulation, inputs, &rows);
+        coupling_candidates(&mut formulation, inputs, &rows);
     }
     if free_set == FreeSet::Profile && profile.solve.free.contains(&Free::Masses) {
         free_masses(&mut formulation, inputs, &rows);

@@ -1,0 +1,326 @@
+//! Causes of errors beside each other: what does one explain that others do not?
+//!
+//! Effects, and changes at the samples where they were found, as columns B of the linearized fit, all at once:
+//!
+//! ```text
+//! U = Σ_s B̃ᵀ w,   E = Σ_s Aᵀ B̃,   I = Σ_s B̃ᵀB̃ − Eᵀ C E + P,   B̃ = L⁻¹B                      (1)
+//! Δ(M) = U_Mᵀ I_MM⁺ U_M                                        what a set of causes explains together   (2)
+//! T(k | M) = N ln((F − Δ(M)) / (F − Δ(M ∪ k)))                 what k explains beside M                 (3)
+//! ```
+//!
+//! C, F, N and P as in the scan for changes. A step of a body, backlash in a sweep and an eccentric gear look alike alone; beside
+//! each other, those that are not there explain nothing.
+
+use std::ops::Range;
+
+use calib_geometry::decompose::symmetric_eigen;
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::columns::{Candidates, Pattern};
+use super::{Change, ChangeScan};
+use crate::analysis::goodness::Candidate;
+use crate::analysis::solution::Solution;
+use crate::graph::effect::EffectKind;
+use crate::graph::ids::EdgeId;
+use crate::solve::equations::{NormalEquations, Workspace};
+use crate::solve::normal::add_prior;
+use crate::solve::whitened::{Whitened, covariance_of};
+
+/// A direction with less than this share of its own information is one that the parameters, or other causes, imitate.
+const IMITATED: f64 = 1e-6;
+
+/// A cause that may explain errors.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Suspect<'a> {
+    /// An effect that [`Solution::goodness_of_fit`] tested, by its name.
+    Tested(&'a str),
+    /// An effect of a joint, with its regressor in every sample.
+    Effect {
+        /// The joint.
+        joint: EdgeId,
+        /// Which.
+        kind: EffectKind,
+        /// The regressor.
+        values: Vec<f64>,
+    },
+    /// A change that a scan found.
+    Change(&'a Change),
+}
+
+/// Suspects beside each other, by their numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contest {
+    columns: Vec<Range<usize>>,
+    u: DVector<f64>,
+    information: DMatrix<f64>,
+    /// Diagonal of Σ B̃ᵀB̃.
+    raw: Vec<f64>,
+    /// F and N.
+    cost: f64,
+    rows: f64,
+    /// Degrees of freedom beside the parameters of the fit.
+    freedom: f64,
+}
+
+impl Contest {
+    /// Equation (2) over F.
+    #[must_use]
+    pub fn explains(&self, together: &[usize]) -> f64 {
+        self.gain(together).0 / self.cost
+    }
+
+    /// Equation (3), and how many directions of `one` it tests; none where the parameters or the others imitate it.
+    #[must_use]
+    pub fn score(&self, one: usize, beside: &[usize]) -> (f64, usize) {
+        let (less, rank) = self.gain(beside);
+        let all: Vec<usize> = beside.iter().copied().chain([one]).collect();
+        let (more, full) = self.gain(&all);
+        let left = |gain: f64| (self.cost - gain).max(f64::MIN_POSITIVE);
+        let score = self.rows * (left(less) / left(more)).ln();
+        (score.max(0.0), full.saturating_sub(rank))
+    }
+
+    /// T of equation (3) that chance exceeds with this probability where a cause of `directions` columns is absent.
+    #[must_use]
+    pub fn threshold(&self, probability: f64, directions: usize) -> f64 {
+        let directions = directions.max(1) as f64;
+        let f = FisherSnedecor::new(directions, self.freedom);
+        let f = f.map_or(f64::INFINITY, |f| f.inverse_cdf(1.0 - probability));
+        self.rows * (directions * f / self.freedom).ln_1p()
+    }
+
+    /// Equation (2), and the rank of I.
+    fn gain(&self, of: &[usize]) -> (f64, usize) {
+        let own: Vec<usize> = of.iter().flat_map(|k| self.columns[*k].clone()).collect();
+        let scale: Vec<f64> = own
+            .iter()
+            .map(|&c| match self.raw[c] {
+                raw if raw > 0.0 => 1.0 / raw.sqrt(),
+                _ => 0.0,
+            })
+            .collect();
+        let k = own.len();
+        if k == 0 {
+            return (0.0, 0);
+        }
+        let scaled = DMatrix::from_fn(k, k, |i, j| {
+            self.information[(own[i], own[j])] * scale[i] * scale[j]
+        });
+        if scaled.iter().any(|x| !x.is_finite()) {
+            return (0.0, 0);
+        }
+        let u = DVector::from_fn(k, |i, _| self.u[own[i]] * scale[i]);
+        let eigen = symmetric_eigen(&scaled);
+        let mut gain = 0.0;
+        let mut rank = 0;
+        for i in (0..k).filter(|i| eigen.values[*i] > IMITATED) {
+            gain += eigen.vectors.column(i).dot(&u).powi(2) / eigen.values[i];
+            rank += 1;
+        }
+        (gain.min(self.cost), rank)
+    }
+}
+
+/// The columns of a suspect.
+enum Columns {
+    /// Its number among the effects.
+    Effect(usize),
+    /// Columns among those of all changes, by how much it holds in each sample.
+    Change(Range<usize>, Vec<f64>),
+}
+
+impl Solution {
+    /// Sets suspects beside each other, at the observations that `scan` looked at. `borders`: the first sample of every recording but
+    /// the first. `None` where the model cannot be evaluated or a suspect is not known.
+    #[must_use]
+    pub fn contest(
+        &self,
+        suspects: &[Suspect<'_>],
+        scan: Option<&ChangeScan>,
+        borders: &[usize],
+    ) -> Option<Contest> {
+        let all = scan
+            .filter(|scan| scan.with_rejected)
+            .map(|_| self.with_all());
+        let at = all.as_ref().unwrap_or(self);
+        let changes = Candidates::new(at);
+        let used = at.used_samples();
+        let tested = self.candidates();
+        let mut effects: Vec<Candidate> = Vec::new();
+        let mut columns = Vec::new();
+        for suspect in suspects {
+            columns.push(match suspect {
+                Suspect::Change(change) => {
+                    let own = changes.list.iter().position(|c| c.moved == change.moved)?;
+                    let own = &changes.list[own];
+                    let holds = holds(
+                        change,
+                        own.pattern,
+                        borders,
+                        &used,
+                        self.model.problem.samples,
+                    );
+                    Columns::Change(own.columns.clone(), holds)
+                }
+                Suspect::Tested(name) => {
+                    effects.push(tested.iter().find(|c| c.is_called(name))?.clone());
+                    Columns::Effect(effects.len() - 1)
+                }
+                Suspect::Effect {
+                    joint,
+                    kind,
+                    values,
+                } => {
+                    effects.push(Candidate::of_joint(*joint, *kind, values.clone()));
+                    Columns::Effect(effects.len() - 1)
+                }
+            });
+        }
+        at.summed(&changes, &effects, &columns)
+    }
+
+    /// The same solution with the observations that were rejected.
+    fn with_all(&self) -> Self {
+        let mut out = self.clone();
+        for (o, observation) in self.model.observations.iter().enumerate() {
+            if !self.model.is_held_out(observation.sample) {
+                out.weights[o] = 1.0;
+            }
+        }
+        out
+    }
+
+    /// Equation (1), at the minimum of the observations: one Gauss–Newton step from the fit.
+    fn summed(
+        &self,
+        changes: &Candidates,
+        effects: &[Candidate],
+        columns: &[Columns],
+    ) -> Option<Contest> {
+        let model = &self.model;
+        let n = model.free();
+        let mut ranges: Vec<Range<usize>> = Vec::new();
+        let mut width = 0;
+        for own in columns {
+            let count = match own {
+                Columns::Effect(_) => 1,
+                Columns::Change(of, _) => of.len(),
+            };
+            ranges.push(width..width + count);
+            width += count;
+        }
+        let (mut h, mut g) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let mut e = DMatrix::zeros(n, width);
+        let (mut own, mut u) = (DMatrix::zeros(width, width), DVector::zeros(width));
+        let (mut cost, mut rows) = (0.0, 0.0);
+        let mut work = Workspace::new(model);
+        work.cache.update(&model.problem, &self.values);
+        let inner = work.clone();
+        let samples = self.looked_at().samples;
+        self.each_numbered_sample(effects, &samples, &mut work, |number, s, alpha| {
+            let b = self.side_by_side(changes, columns, &ranges, (number, s, alpha), &inner);
+            let transposed = s.a.transpose();
+            h.gemm(1.0, &transposed, &s.a, 1.0);
+            g.gemv(1.0, &transposed, &s.w, 1.0);
+            e.gemm(1.0, &transposed, &b, 1.0);
+            own.gemm(1.0, &b.transpose(), &b, 1.0);
+            u += b.tr_mul(&s.w);
+            cost += s.w.norm_squared();
+            rows += s.w.len() as f64;
+        });
+        let mut system = NormalEquations::new(n);
+        for i in 0..n {
+            for j in i..n {
+                system.h[i * n + j] = h[(i, j)];
+            }
+            system.g[i] = g[i];
+        }
+        add_prior(model, &self.values, &mut system);
+        let parameters = model.columns.iter().map(|p| &model.problem.parameters[*p]);
+        let priors = parameters.filter(|p| p.prior_sigma.is_some()).count();
+        let c = covariance_of(&system)?;
+        let gradient = DVector::from_column_slice(&system.g);
+        let step = -(&c * &gradient);
+        cost += system.prior + gradient.dot(&step);
+        u += e.tr_mul(&step);
+        let raw: Vec<f64> = own.diagonal().iter().copied().collect();
+        let mut information = own - e.tr_mul(&(&c * &e));
+        for (range, of) in ranges.iter().zip(columns) {
+            if let Columns::Change(own, _) = of {
+                let place = changes.list.iter().position(|c| c.columns == *own)?;
+                for i in range.clone() {
+                    information[(i, i)] += changes.prior(place);
+                }
+            }
+        }
+        (cost.is_finite() && cost > 0.0 && rows > 0.0).then_some(Contest {
+            columns: ranges,
+            u,
+            information,
+            raw,
+            cost,
+            rows,
+            freedom: (rows + priors as f64 - n as f64).max(1.0),
+        })
+    }
+
+    /// B̃ of one sample.
+    fn side_by_side(
+        &self,
+        changes: &Candidates,
+        columns: &[Columns],
+        ranges: &[Range<usize>],
+        (sample, rows, effects): (usize, &Whitened, &DMatrix<f64>),
+        work: &Workspace,
+    ) -> DMatrix<f64> {
+        let width = ranges.last().map_or(0, |r| r.end);
+        let mut out = DMatrix::zeros(rows.w.len(), width);
+        let mut moved: Option<DMatrix<f64>> = None;
+        for (range, own) in ranges.iter().zip(columns) {
+            match own {
+                Columns::Effect(k) => out.column_mut(range.start).copy_from(&effects.column(*k)),
+                Columns::Change(of, holds) if holds[sample] != 0.0 => {
+                    let all =
+                        moved.get_or_insert_with(|| changes.whitened(self, sample, rows, work));
+                    let part = all.columns_range(of.clone()) * holds[sample];
+                    out.columns_range_mut(range.clone()).copy_from(&part);
+                }
+                Columns::Change(..) => {}
+            }
+        }
+        out
+    }
+}
+
+/// How much a change holds in each sample.
+fn holds(
+    change: &Change,
+    pattern: Pattern,
+    borders: &[usize],
+    used: &[usize],
+    samples: usize,
+) -> Vec<f64> {
+    let mut out = vec![0.0; samples];
+    match pattern {
+        Pattern::Constant => out.fill(1.0),
+        Pattern::Linear => {
+            let last = used.len().saturating_sub(1).max(1) as f64;
+            for (place, sample) in used.iter().enumerate() {
+                out[*sample] = place as f64 / last - 0.5;
+            }
+        }
+        Pattern::Step => {
+            let end_of = |first: usize| {
+                let next = borders.iter().filter(|b| **b > first).min();
+                next.copied().unwrap_or(samples).min(samples)
+            };
+            out[change.first..change.end.min(samples)].fill(1.0);
+            for &first in &change.also {
+                out[first..end_of(first)].fill(1.0);
+            }
+        }
+    }
+    out
+}

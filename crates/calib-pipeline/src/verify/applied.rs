@@ -1,0 +1,73 @@
+//! What of the held-out errors is left to explain once the effects that are missing are in the model.
+
+use calib_core::{Physics, Settings};
+use calib_finding::Finding;
+
+use crate::formulate::checked::Checked;
+use crate::formulate::formulation::{FreeSet, MlFit};
+use crate::formulate::ml;
+use crate::formulate::parts::{RobotPart, What, with_parts};
+use crate::formulate::starts;
+use crate::prepare::inputs::Inputs;
+use crate::verify::Verified;
+use crate::verify::moved::moved;
+
+/// The motions before held-out recordings that are found with the missing effects free as well; all of them where the effects cannot be freed.
+pub(super) fn still_moved(inputs: &Inputs, checked: &Checked, verified: &Verified) -> Vec<Finding> {
+    let all = || verified.findings.clone();
+    let Some((inputs, fit)) = with_missing(inputs, checked, verified) else {
+        return all();
+    };
+    let again = moved(&inputs, &checked.tracks, &fit.calibration);
+    let found = |finding: &Finding| {
+        let same = |other: &Finding| other.id == finding.id && other.subject == finding.subject;
+        again.iter().any(same)
+    };
+    all().into_iter().filter(found).collect()
+}
+
+/// The fit with the missing effects free.
+fn with_missing(
+    inputs: &Inputs,
+    checked: &Checked,
+    verified: &Verified,
+) -> Option<(Inputs, MlFit)> {
+    let model = &inputs.robot.model;
+    let missing = verified.causes.goodness.as_ref()?.missing.iter();
+    let parts: Vec<RobotPart> = missing
+        .filter_map(|test| {
+            let Physics::Effect(kind) = test.physics else {
+                return None;
+            };
+            let effect = kind.effect();
+            Some(RobotPart {
+                what: What::Effect(effect),
+                joint: Some(model.joint_id(test.joint.as_ref()?).ok()?),
+            })
+        })
+        .filter(|part| matches!(part.what, What::Effect(effect) if effect.profile.is_some()))
+        .collect();
+    if parts.is_empty() {
+        return None;
+    }
+    let mut inputs = inputs.clone();
+    inputs.robot.profile.solve = with_parts(&inputs, &parts);
+    let mut settings = Settings::default();
+    settings.robust.enabled = inputs.robot.profile.solve.robust;
+    let fit = |inputs: &Inputs| {
+        let stated = ml::state(inputs, &checked.tracks, &checked.start, FreeSet::Profile);
+        ml::fit(stated, inputs, &settings).ok()
+    };
+    let first = fit(&inputs)?;
+    let told = |inputs: &Inputs, fit: &MlFit| starts::fitted_first(inputs, starts::told(fit));
+    let sides = told(&inputs, &first);
+    if sides.is_empty() {
+        return Some((inputs, first));
+    }
+    starts::take(&mut inputs, &sides);
+    let second = fit(&inputs)?;
+    // Those of held-out recordings, which change no parameter.
+    let sides = told(&inputs, &second);
+    starts::take(&mut inputs, &sides);
+    Some((inputs, second))
+}

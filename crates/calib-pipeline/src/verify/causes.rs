@@ -1,0 +1,286 @@
+//! What made the residuals: missing effects, a change while recording, or what was suspected before the fit. Each is stated only
+//! where it explains something beside the others.
+
+use calib_core::{ChangeScan, Contest, EffectKind, GoodnessOfFit, ScoreTest, Suspect};
+use calib_finding::{Fact, Finding, catalog};
+
+use super::elimination::{Asked, Held, eliminated};
+use crate::formulate::formulation::MlFit;
+use crate::prepare::inputs::Inputs;
+use crate::verify::changes::{self, Beside};
+
+/// Chance of one false cause in so many analyses, as of the tests themselves.
+const SIGNIFICANT: f64 = 1e-3;
+/// Share of what the other causes leave of χ²: smaller effects are real but do not matter.
+const RELEVANT: f64 = 0.02;
+/// A cause that was found at a lower level of noise than that of the fit shows less here: it must keep this part of it beside others.
+const KEPT: f64 = 0.9;
+
+/// Part of the T of a cause from which another effect is as good: where something is missing, the noise is not what likelihoods take it for.
+const ALIKE: f64 = 0.75;
+/// The same of what was suspected before the fit, which may have rejected the rows that show it.
+const ALIKE_BEFORE: f64 = 0.5;
+
+/// The causes that hold.
+#[derive(Debug, Clone, Default)]
+pub struct Causes {
+    /// The tests, with the effects that are missing beside all other causes.
+    pub goodness: Option<GoodnessOfFit>,
+    /// What is as likely as a missing effect, by its name.
+    pub alike: Vec<(String, Vec<String>)>,
+    /// What changed while recording.
+    pub change: Option<Finding>,
+    /// Findings from before the fit that other causes explain.
+    pub explained: Vec<Finding>,
+}
+
+/// What may have made the residuals, in the order of the contest.
+#[derive(Debug, Clone)]
+enum Cause<'a> {
+    Missing(&'a ScoreTest),
+    Change,
+    Before(&'a Finding, String),
+}
+
+impl Cause<'_> {
+    /// What it is called where it is as good as another; a change is told by what moved.
+    fn code(&self) -> Option<String> {
+        match self {
+            Self::Missing(test) => Some(test.name.clone()),
+            Self::Change => None,
+            Self::Before(_, code) => Some(code.clone()),
+        }
+    }
+}
+
+/// The causes that the data show; `before`: findings from before the fit.
+#[must_use]
+pub fn causes(inputs: &Inputs, fit: &MlFit, before: &[Finding]) -> Causes {
+    let (scan, goodness) = rayon::join(|| changes::scan(fit), || fit.solution.goodness_of_fit());
+    let everything = || Causes {
+        change: scan.as_ref().and_then(|scan| {
+            changes::finding(inputs, fit, scan, Beside::of_tests(goodness.as_ref()))
+        }),
+        goodness: goodness.clone(),
+        ..Causes::default()
+    };
+    let (list, contest) = match suspected(inputs, fit, before, scan.as_ref(), goodness.as_ref()) {
+        Some(found) => found,
+        None => return everything(),
+    };
+    let tests = goodness.as_ref().map_or(1, |g| g.tests.len().max(1));
+    let asked: Vec<Asked> = list
+        .iter()
+        .enumerate()
+        .map(|(k, cause)| asked(&contest, (k, cause), scan.as_ref(), tests))
+        .collect();
+    let held = eliminated(&contest, &asked);
+    if held.causes.is_empty() {
+        return everything();
+    }
+    Outcome {
+        inputs,
+        fit,
+        list: &list,
+        contest: &contest,
+        held: &held,
+    }
+    .causes(scan.as_ref(), goodness.clone())
+}
+
+/// What one cause must show.
+fn asked(
+    contest: &Contest,
+    (number, cause): (usize, &Cause<'_>),
+    scan: Option<&ChangeScan>,
+    tests: usize,
+) -> Asked {
+    let (alone, directions) = contest.score(number, &[]);
+    match cause {
+        Cause::Change => {
+            let change = scan.and_then(ChangeScan::significant).zip(scan);
+            // T of the scan, whose level of noise may be another.
+            let part = change.map_or(1.0, |(change, scan)| {
+                (change.score - change.excess + scan.threshold) / change.score
+            });
+            Asked {
+                least: part * alone,
+                share: 0.0,
+                part: 1.0,
+            }
+        }
+        Cause::Missing(_) => Asked {
+            least: contest
+                .threshold(SIGNIFICANT / tests as f64, directions)
+                .min(KEPT * alone),
+            share: RELEVANT,
+            part: ALIKE,
+        },
+        Cause::Before(..) => Asked {
+            least: contest.threshold(SIGNIFICANT / tests as f64, directions),
+            share: 0.0,
+            part: ALIKE_BEFORE,
+        },
+    }
+}
+
+/// The causes that are asked, and the contest of them; `None` where there is nothing to choose.
+fn suspected<'a>(
+    inputs: &Inputs,
+    fit: &MlFit,
+    before: &'a [Finding],
+    scan: Option<&ChangeScan>,
+    goodness: Option<&'a GoodnessOfFit>,
+) -> Option<(Vec<Cause<'a>>, Contest)> {
+    let change = scan.and_then(ChangeScan::significant);
+    let missing = goodness.map_or(&[][..], |g| &g.missing);
+    let mut list: Vec<Cause<'_>> = missing.iter().map(Cause::Missing).collect();
+    let mut suspects: Vec<Suspect<'_>> = missing.iter().map(|t| Suspect::Tested(&t.name)).collect();
+    if let Some(change) = change {
+        list.push(Cause::Change);
+        suspects.push(Suspect::Change(change));
+    }
+    for finding in before {
+        let Some((code, suspect)) = suspected_before(inputs, fit, finding, goodness?) else {
+            continue;
+        };
+        // Named by the tests of the fit as well: one cause.
+        if missing.iter().any(|t| t.name == code) {
+            continue;
+        }
+        list.push(Cause::Before(finding, code));
+        suspects.push(suspect);
+    }
+    if list.len() < 2 {
+        return None;
+    }
+    let contest = fit
+        .solution
+        .contest(&suspects, scan, &fit.formulation.borders())?;
+    Some((list, contest))
+}
+
+/// A suspicion from before the fit as a cause: its name and its column.
+fn suspected_before<'a>(
+    inputs: &Inputs,
+    fit: &MlFit,
+    finding: &Finding,
+    goodness: &'a GoodnessOfFit,
+) -> Option<(String, Suspect<'a>)> {
+    // Of the tests: mistakes of a whole row or of a whole coupling have no size, and a clock that was corrected no effect.
+    finding.facts.get("effect")?;
+    let word = |key: &str| finding.facts.get(key).and_then(Fact::word);
+    let tested = |name: String| {
+        let test = goodness.tests.iter().find(|t| t.name == name)?;
+        Some((name, Suspect::Tested(&test.name)))
+    };
+    match finding.id {
+        id if id == catalog::JOINT_GAIN => tested(format!("{}.gain", word("joint")?)),
+        id if id == catalog::CLOCK_LAG => tested(format!("{}.clock_offset", word("recording")?)),
+        id if id == catalog::JOINT_COUPLING => {
+            let model = &inputs.robot.model;
+            let (joint, other) = (word("joint")?, word("other")?);
+            let code = format!("{joint}.coupling.{other}");
+            let (joint, other) = (model.joint_id(joint).ok()?, model.joint_id(other).ok()?);
+            let reading = |(recording, row): &(String, usize)| {
+                let q = inputs.recordings[recording].q[*row].as_ref();
+                q.map_or(0.0, |q| model.position(q, other))
+            };
+            let suspect = Suspect::Effect {
+                joint: fit.formulation.joints[joint.index()]?,
+                kind: EffectKind::Coupling,
+                values: fit.formulation.samples.iter().map(reading).collect(),
+            };
+            Some((code, suspect))
+        }
+        _ => None,
+    }
+}
+
+/// What holds, as findings.
+struct Outcome<'a> {
+    inputs: &'a Inputs,
+    fit: &'a MlFit,
+    list: &'a [Cause<'a>],
+    contest: &'a Contest,
+    held: &'a Held,
+}
+
+impl Outcome<'_> {
+    fn causes(&self, scan: Option<&ChangeScan>, goodness: Option<GoodnessOfFit>) -> Causes {
+        let is_held = |wanted: &dyn Fn(&Cause<'_>) -> bool| {
+            let mut held = self.held.causes.iter();
+            held.any(|k| wanted(&self.list[*k]))
+        };
+        let changed =
+            is_held(&|cause| matches!(cause, Cause::Change)) || self.beside_change().is_some();
+        let is_missing =
+            |test: &ScoreTest| is_held(&|c| matches!(c, Cause::Missing(t) if t.name == test.name));
+        let explained = self
+            .list
+            .iter()
+            .enumerate()
+            .filter_map(|(k, cause)| match cause {
+                Cause::Before(finding, _) if !self.held.causes.contains(&k) => {
+                    Some((*finding).clone())
+                }
+                _ => None,
+            });
+        let explained = explained.collect();
+        let alike = self
+            .held
+            .causes
+            .iter()
+            .zip(&self.held.alike)
+            .filter_map(|(k, alike)| {
+                let code = self.list[*k].code()?;
+                let alike: Vec<String> =
+                    alike.iter().filter_map(|a| self.list[*a].code()).collect();
+                (!alike.is_empty()).then_some((code, alike))
+            });
+        Causes {
+            alike: alike.collect(),
+            change: scan
+                .filter(|_| changed)
+                .and_then(|scan| changes::finding(self.inputs, self.fit, scan, self.beside())),
+            goodness: goodness.map(|mut goodness| {
+                goodness.missing.retain(is_missing);
+                goodness
+            }),
+            explained,
+        }
+    }
+
+    /// The effect that holds, and that a change explains as well as.
+    fn beside_change(&self) -> Option<usize> {
+        let is_change = |k: &usize| matches!(self.list[*k], Cause::Change);
+        let mut held = self.held.causes.iter().zip(&self.held.alike);
+        held.find(|(_, alike)| alike.iter().any(is_change))
+            .map(|(k, _)| *k)
+    }
+
+    /// What the change is to be told beside.
+    fn beside(&self) -> Beside {
+        let place = |k: &usize| matches!(self.list[*k], Cause::Change);
+        let Some(change) = self.held.causes.iter().position(place) else {
+            return Beside {
+                physics: self.beside_change().and_then(|k| self.list[k].code()),
+                alike: Vec::new(),
+            };
+        };
+        let own = self.held.causes[change];
+        let beside = |k: usize| -> Vec<usize> {
+            let all = self.held.causes.iter().copied();
+            all.filter(|c| *c != k).collect()
+        };
+        let score = |k: usize| self.contest.score(k, &beside(k)).0;
+        let stronger = self.held.causes.iter().copied().filter(|k| *k != own);
+        let stronger = stronger.filter(|k| score(*k) > score(own));
+        let stronger = stronger.max_by(|a, b| score(*a).total_cmp(&score(*b)));
+        let alike = self.held.alike[change].iter();
+        Beside {
+            physics: stronger.and_then(|k| self.list[k].code()),
+            alike: alike.filter_map(|k| self.list[*k].code()).collect(),
+        }
+    }
+}
