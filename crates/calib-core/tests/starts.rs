@@ -57,7 +57,7 @@ fn sweeps(seed: u64, wrong: Wrong, model: Model) -> Sweeps {
         }
     }
     let chain = chain.deviate(&mut r, &free, 0.01, 0.005);
-    let side = |bit: u64| if seed >> bit & 1 == 1 { -1.0 } else { 1.0 };
+    let side = |bit: u64| if (seed >> bit) & 1 == 1 { -1.0 } else { 1.0 };
     // From above, and then up through its sweep, a joint's backlash is the zero of the next one to a fit of these data.
     let sides = [[1.0, 1.0], [side(0), side(1)]];
     let n = chain.q.len();

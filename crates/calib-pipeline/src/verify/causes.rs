@@ -64,9 +64,9 @@ pub fn causes(inputs: &Inputs, fit: &MlFit, before: &[Finding]) -> Causes {
         goodness: goodness.clone(),
         ..Causes::default()
     };
-    let (list, contest) = match suspected(inputs, fit, before, scan.as_ref(), goodness.as_ref()) {
-        Some(found) => found,
-        None => return everything(),
+    let suspected = suspected(inputs, fit, before, scan.as_ref(), goodness.as_ref());
+    let Some((list, contest)) = suspected else {
+        return everything();
     };
     let tests = goodness.as_ref().map_or(1, |g| g.tests.len().max(1));
     let asked: Vec<Asked> = list

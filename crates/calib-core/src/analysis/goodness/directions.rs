@@ -59,7 +59,7 @@ impl Open {
 
 /// Direction of a start, of directions as bits.
 fn sign(signs: usize, start: usize) -> f64 {
-    if signs >> start & 1 == 1 { -1.0 } else { 1.0 }
+    if (signs >> start) & 1 == 1 { -1.0 } else { 1.0 }
 }
 
 impl Solution {
