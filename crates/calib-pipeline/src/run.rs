@@ -96,13 +96,9 @@ pub fn run_on(
     progress("verify");
     let refitted = refitted(&inputs, &checked, &solved)?;
     let verified = verified(&inputs, &checked, &nominal, &solved, refitted.as_ref());
-    let explained = &verified.causes.explained;
-    checked
-        .findings
-        .retain(|finding| !explained.contains(finding));
+    verified.causes.leave_unexplained(&mut checked.findings);
     checked.findings.extend(verified.findings);
-    let tracks = &checked.tracks;
-    let (robot, fit) = (&solved.robot, solved.fit.as_ref());
+    let (tracks, robot, fit) = (&checked.tracks, &solved.robot, solved.fit.as_ref());
     progress("patch the URDF");
     let urdf = patch_urdf(&inputs, robot, &verified.known)?;
     let covariance = solved.root_covariance.as_ref();

@@ -202,9 +202,12 @@ impl Solution {
                 continue;
             };
             let e = &s.l * &s.w;
-            let v = &s.l * s.l.transpose();
             for &(o, first, rows) in &s.blocks {
-                let of = vector_error(model, (o, first, rows), &e, [&v, &v]);
+                let l = s.l.rows(first, rows);
+                let own = l * l.transpose();
+                let variances = own.diagonal().iter().copied().collect();
+                let error = e.rows(first, rows).into_owned();
+                let of = vector_error(model, o, error, own, variances);
                 out.push((sample, of));
             }
         }
@@ -239,39 +242,25 @@ pub(crate) fn predictions(
         };
         let m = s.w.len();
         let q = &s.a * &c * s.a.transpose();
-        let with_all = &s.l * (DMatrix::identity(m, m) + &q) * s.l.transpose();
-        // Covariance of the whitened prediction error and the error itself.
-        let (error, covariance) = if left_out {
-            let eigen = calib_geometry::decompose::symmetric_eigen(&(DMatrix::identity(m, m) - q));
-            if eigen.values[0] < LEVERAGE_LEFT {
-                out.indispensable.push(sample);
-                continue;
-            }
-            let mut scaled = eigen.vectors.clone();
-            for k in 0..m {
-                scaled.column_mut(k).unscale_mut(eigen.values[k]);
-            }
-            let inverse = scaled * eigen.vectors.transpose();
-            (&inverse * &s.w, inverse)
-        } else {
-            (s.w.clone(), DMatrix::identity(m, m) + q)
-        };
-        let Some(cholesky) = nalgebra::Cholesky::new(covariance.clone()) else {
+        let with_all = &s.l * (DMatrix::identity(m, m) + &q);
+        let Some(predicted) = Predicted::new(q, &s.w, left_out) else {
             out.indispensable.push(sample);
             continue;
         };
-        let half = cholesky.l().solve_lower_triangular(&error)?;
-        let z2 = half.norm_squared();
-        let log_det = s.log_det + 2.0 * cholesky.l().diagonal().map(f64::ln).sum();
-        let e = &s.l * &error;
-        let full = &s.l * covariance * s.l.transpose();
+        let log_det = s.log_det + predicted.log_det;
+        let z2 = predicted.z2;
+        let e = &s.l * &predicted.error;
+        let own = &s.l * predicted.covariance;
+        let vector = |&(observation, first, rows): &(usize, usize, usize)| {
+            let l = s.l.rows(first, rows);
+            let covariance = own.rows(first, rows) * l.transpose();
+            let variances = (first..first + rows).map(|i| with_all.row(i).dot(&s.l.row(i)));
+            let error = e.rows(first, rows).into_owned();
+            vector_error(model, observation, error, covariance, variances.collect())
+        };
         out.samples.push(SamplePrediction {
             sample,
-            vectors: s
-                .blocks
-                .iter()
-                .map(|&block| vector_error(model, block, &e, [&full, &with_all]))
-                .collect(),
+            vectors: s.blocks.iter().map(vector).collect(),
             z2,
             rows: m,
             log_density: -0.5 * (z2 + log_det + m as f64 * (2.0 * std::f64::consts::PI).ln()),
@@ -280,30 +269,67 @@ pub(crate) fn predictions(
     Some(out)
 }
 
-/// One vector of a sample: its observation, first row and rows; with the covariance of the error, and that of one with all samples.
+/// The whitened prediction error of a sample: e, its covariance P, eᵀP⁻¹e and log det P.
+struct Predicted {
+    error: DVector<f64>,
+    covariance: DMatrix<f64>,
+    z2: f64,
+    log_det: f64,
+}
+
+impl Predicted {
+    /// Left out, e = (I − Q)⁻¹ w and P = (I − Q)⁻¹, so that eᵀP⁻¹e = wᵀe; held out, e = w and P = I + Q. `None` where the sample alone
+    /// determines something.
+    fn new(q: DMatrix<f64>, w: &DVector<f64>, left_out: bool) -> Option<Self> {
+        let m = w.len();
+        let identity = DMatrix::identity(m, m);
+        let factor = nalgebra::Cholesky::new(if left_out { identity - q } else { identity + q })?;
+        let log_det = 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
+        let inverse_error = factor.solve(w);
+        let z2 = w.dot(&inverse_error);
+        if !left_out {
+            let l = factor.l();
+            return Some(Self {
+                error: w.clone(),
+                covariance: &l * l.transpose(),
+                z2,
+                log_det,
+            });
+        }
+        let covariance = factor.inverse();
+        // The least eigenvalue of I − Q is at least 1/tr P, and at most m times that.
+        let left = 1.0 / covariance.trace();
+        (left >= LEVERAGE_LEFT).then_some(Self {
+            error: inverse_error,
+            covariance,
+            z2,
+            log_det: -log_det,
+        })
+    }
+}
+
+/// One vector of a sample: its observation and its error with the covariance of that, and the variances of an error with all samples.
 fn vector_error(
     model: &Model,
-    (observation, first, rows): (usize, usize, usize),
-    e: &DVector<f64>,
-    [covariance, with_all]: [&DMatrix<f64>; 2],
+    observation: usize,
+    error: DVector<f64>,
+    covariance: DMatrix<f64>,
+    with_all: Vec<f64>,
 ) -> VectorError {
     let o = model.observations[observation];
     let measurement = &model.problem.measurements[o.measurement];
-    let error = e.rows(first, rows).into_owned();
-    let block = covariance.view((first, first), (rows, rows)).into_owned();
-    let z = nalgebra::Cholesky::new(block)
+    let variances: Vec<f64> = covariance.diagonal().iter().copied().collect();
+    let z = nalgebra::Cholesky::new(covariance)
         .and_then(|c| c.l().solve_lower_triangular(&error))
         .map_or(f64::INFINITY, |y| y.norm());
     let deviation = measurement.kind.of().deviation(error.as_slice());
-    let expected = |covariance: &DMatrix<f64>| {
-        let sigma: Vec<f64> = (first..first + rows)
-            .map(|i| covariance[(i, i)].max(0.0).sqrt())
-            .collect();
+    let expected = |variances: &[f64]| {
+        let sigma: Vec<f64> = variances.iter().map(|v| v.max(0.0).sqrt()).collect();
         measurement.kind.of().deviation(&sigma).position
     };
     VectorError {
-        expected: expected(covariance),
-        expected_with_all: expected(with_all),
+        expected: expected(&variances),
+        expected_with_all: expected(&with_all),
         measurement: MeasurementId::of(o.measurement),
         item: o.item,
         position: deviation.position,

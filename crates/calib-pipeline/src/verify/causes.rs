@@ -34,6 +34,13 @@ pub struct Causes {
     pub explained: Vec<Finding>,
 }
 
+impl Causes {
+    /// Takes out what other causes explain.
+    pub fn leave_unexplained(&self, findings: &mut Vec<Finding>) {
+        findings.retain(|finding| !self.explained.contains(finding));
+    }
+}
+
 /// What may have made the residuals, in the order of the contest.
 #[derive(Debug, Clone)]
 enum Cause<'a> {
