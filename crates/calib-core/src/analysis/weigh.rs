@@ -21,6 +21,7 @@
 
 use std::collections::BTreeSet;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -187,7 +188,7 @@ impl Solution {
     ) -> Option<(Vec<Trial>, NoiseChoice)> {
         let thinned = self.thinned(weights);
         let mut trials: Vec<Trial> = models
-            .iter()
+            .par_iter()
             .filter_map(|&model| Trial::new(problem, model, self, &thinned))
             .collect();
         trials.sort_by_key(|t| t.noise);
