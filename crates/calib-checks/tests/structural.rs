@@ -429,6 +429,42 @@ fn contradictory_input_is_an_error() {
     ));
 }
 
+/// The parts of a body before and after it moved on its link: no row has both, so that nobody can have exchanged their names.
+#[test]
+fn parts_of_a_split_body_are_not_exchanged() {
+    let mut looked_at = options();
+    looked_at.list_invisible = true;
+    let exchanged = |s: &Scoped| matches!(s.hypothesis, Hypothesis::ExchangedBodies { .. });
+    for seed in 0..8 {
+        for kind in [BodyKind::Markers(3), BodyKind::Pose] {
+            let mut data = Setting::new(seed, Plan::Both, kind, BIG).data(true);
+            let mut before = data.bodies[0].clone();
+            for row in 0..data.recording.len() {
+                let lost = if row < 8 {
+                    &mut data.bodies[0]
+                } else {
+                    &mut before
+                };
+                match &mut lost.measured {
+                    Measured::Markers(rows) => rows[row].fill(None),
+                    Measured::Poses {
+                        tracker_from_body, ..
+                    } => tracker_from_body[row] = None,
+                }
+            }
+            data.bodies.push(before);
+            let outcome = explain(&data, &looked_at).unwrap();
+            assert!(!outcome.invisible.iter().any(exchanged), "seed {seed}");
+            let told = match &outcome.decision {
+                Decision::Named(named) => named.correction.iter().any(exchanged),
+                Decision::Undecided { leading, .. } => leading.is_some(),
+                _ => false,
+            };
+            assert!(!told, "seed {seed}, {kind:?}: {:?}", outcome.decision);
+        }
+    }
+}
+
 #[test]
 #[ignore = "study: minutes"]
 fn study_of_gains_and_pairs() {

@@ -1,7 +1,7 @@
 //! Which hypotheses are tried on given data, and in which scopes.
 
 use super::correct::same_shape;
-use super::data::{Data, Measured};
+use super::data::{Body, Data, Measured};
 use super::hypothesis::{Hypothesis, PoseMistake, QuarterTurns, Scope, UnitMistake};
 use super::ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex};
 
@@ -240,8 +240,22 @@ fn of_missing(data: &Data, list: &mut Vec<Candidate>) {
                     first: BodyIndex(a),
                     second: BodyIndex(b),
                 };
-                list.push((h, present.iter().map(|r| Scope::Recording(*r)).collect()));
+                let scopes = present
+                    .iter()
+                    .filter(|r| seen_together(data, **r, body, other));
+                let scopes: Vec<Scope> = scopes.map(|r| Scope::Recording(*r)).collect();
+                if !scopes.is_empty() {
+                    list.push((h, scopes));
+                }
             }
         }
     }
+}
+
+/// Whether a row of the recording has both bodies. Those that are never seen together, as a body before and after it
+/// moved on its link, cannot have been exchanged.
+fn seen_together(data: &Data, recording: RecordingIndex, a: &Body, b: &Body) -> bool {
+    let rows = data.recording.iter().enumerate();
+    let mut rows = rows.filter(|(_, r)| **r == recording);
+    rows.any(|(row, _)| a.measured.seen(row) && b.measured.seen(row))
 }

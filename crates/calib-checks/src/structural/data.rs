@@ -21,6 +21,18 @@ pub enum Measured {
     },
 }
 
+impl Measured {
+    /// Whether anything of the body was seen in a row.
+    pub(super) fn seen(&self, row: usize) -> bool {
+        match self {
+            Self::Markers(rows) => rows[row].iter().any(Option::is_some),
+            Self::Poses {
+                tracker_from_body, ..
+            } => tracker_from_body[row].is_some(),
+        }
+    }
+}
+
 /// A tracked body and the link that it is said to be mounted on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {

@@ -177,6 +177,9 @@ impl Names<'_> {
                 self.inputs.recordings[recording].poses.rows[*row],
             )
         };
+        // What holds from the first row of all on ends where the rest begins: said from there, everything before moved.
+        let turned = at == 0 && change.end < samples.len();
+        let at = if turned { change.end } else { at };
         let (recording, after) = row(at);
         let before = row(at.max(1) - 1);
         // Recordings that lie before the change, of those that were fitted.
@@ -188,7 +191,10 @@ impl Names<'_> {
             .filter(fitted)
             .filter(|name| *name != recording);
         let earlier: Vec<String> = others
-            .filter(|name| !changed.contains(name))
+            .filter(|name| match turned {
+                true => changed.contains(name) || *name == &samples[0].0,
+                false => !changed.contains(name),
+            })
             .cloned()
             .collect();
         let within = before.0 == recording;

@@ -66,7 +66,13 @@ impl Diagnosis {
                     "The residuals show an effect that the model lacks: {}.",
                     code(parameter)
                 ),
-                format!("Let `{again} --select` choose the effects to free."),
+                match report.selection {
+                    None => format!("Let `{again} --select` choose the effects to free."),
+                    // It would answer the same again.
+                    Some(_) => format!(
+                        "The selection did not take it: free it in the profile under `solve.joints`, run `{again}`, and compare the held-out errors."
+                    ),
+                },
             ],
             Self::TooFewPoses { postures, fitted } => [
                 "There are too few poses to decide whether the limit is met.".to_owned(),
@@ -86,11 +92,26 @@ impl Diagnosis {
                 "The profile sets no limits, so nothing could be accepted.".to_owned(),
                 format!("Set `solve.limits.held_out_rms_mm`, then run `{again}`."),
             ],
-            Self::Unexplained => [
-                "The error is larger than the limit, and no known effect explains it.".to_owned(),
-                format!("Let `{again} --select` try the effects that the model lacks."),
-            ],
+            Self::Unexplained => unexplained(report, again),
         }
+    }
+}
+
+/// A selection that was made would answer the same again.
+fn unexplained(report: &Report, again: &str) -> [String; 2] {
+    match report.selection {
+        None => [
+            "The error is larger than the limit, and no single known effect explains it."
+                .to_owned(),
+            format!("Let `{again} --select` try the effects that the model lacks."),
+        ],
+        Some(_) => [
+            "The error is larger than the limit, and no effect that was tried explains it."
+                .to_owned(),
+            format!(
+                "Look at the findings and at the poses with the largest errors in the report: two causes at once hide each other; then run `{again}`."
+            ),
+        ],
     }
 }
 
@@ -150,7 +171,7 @@ fn of_reason(report: &Report, id: &str, again: &str) -> Option<[String; 2]> {
         ReasonId::UncertaintyTooSmall
         | ReasonId::PredictionUndecided
         | ReasonId::EffectsNotExcluded => {
-            format!("Then run `{again}`.")
+            format!("Record more poses in which the joints move together, then run `{again}`.")
         }
         _ => format!("Correct it, then run `{again}`."),
     };
