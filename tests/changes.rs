@@ -172,6 +172,51 @@ fn a_tracker_that_is_bumped_is_named_with_its_row() {
     assert!(row.abs_diff(FROM + BEFORE + 1) <= 1, "{found:#}");
 }
 
+/// The tracker stood elsewhere while some recordings were made: the motion is between two of them, never at the first row of all.
+#[test]
+fn a_tracker_that_moved_between_recordings_is_said_with_both() {
+    const FIRST: &str = "robots/ripley/a_first.csv";
+    let whole = Scratch::new().robot("ripley").read(POSES);
+    let lines: Vec<&str> = whole.lines().collect();
+    let [first, rest] = [BEFORE..BEFORE + 12, BEFORE + 12..lines.len()]
+        .map(|part| [&lines[..BEFORE], &lines[part]].concat().join("\n") + "\n");
+    let header = lines.iter().find(|l| !l.starts_with('#')).expect("names");
+    let markers = header
+        .split(',')
+        .filter_map(|name| name.strip_suffix(".x_m"));
+    let markers: Vec<&str> = markers.collect();
+    let shifted = |dir: &Scratch, table: &str| {
+        rows(dir, table, |_, set, get| {
+            for marker in &markers {
+                if let Some(p) = get(marker) {
+                    set(marker, [p[0] + 2e-3, p[1], p[2]]);
+                }
+            }
+        })
+    };
+    // All poses, and the first twelve of them as a recording of their own.
+    let dir = Scratch::new().robot("ripley");
+    let text = shifted(&dir, POSES);
+    let long = dir.file(POSES, text);
+    let dir = Scratch::new().robot("ripley").file(POSES, rest);
+    let dir = dir.file(FIRST, first).edit(
+        PROFILE,
+        "  arm_poses: {",
+        "  a_first: {file: ripley/a_first.csv, use: static}\n  arm_poses: {",
+    );
+    let text = shifted(&dir, FIRST);
+    let short = dir.file(FIRST, text);
+    for (dir, moved) in [(long, "arm_poses"), (short, "a_first")] {
+        let (ran, report) = run(&dir);
+        let found = finding(&report, "changed-while-recording");
+        let found = found.unwrap_or_else(|| panic!("{}", ran.stdout));
+        let facts = &found["facts"];
+        assert_eq!(facts["before_in"], moved, "{found:#}");
+        assert_ne!(facts["recording"], moved, "{found:#}");
+        assert_eq!(facts["earlier"], serde_json::json!([moved]), "{found:#}");
+    }
+}
+
 /// The rows of `arm_poses`, each written `copies` times with another error of 0.3 mm in every coordinate.
 fn frames(copies: usize) -> Scratch {
     let dir = Scratch::new().robot("ripley");

@@ -303,14 +303,7 @@ impl Solution {
         h: &DMatrix<f64>,
         g: &DVector<f64>,
     ) -> Option<(DMatrix<f64>, DVector<f64>)> {
-        let n = g.len();
-        let mut system = NormalEquations::new(n);
-        for i in 0..n {
-            for j in i..n {
-                system.h[i * n + j] = h[(i, j)];
-            }
-            system.g[i] = g[i];
-        }
+        let mut system = NormalEquations::of(h, g);
         add_prior(&self.model, &self.values, &mut system);
         let c = covariance_of(&system)?;
         let step = -(&c * DVector::from_row_slice(&system.g));

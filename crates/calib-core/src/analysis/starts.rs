@@ -221,13 +221,7 @@ impl Free {
             dw += d.tr_mul(&s.w);
             squares += s.w.norm_squared();
         });
-        let mut system = NormalEquations::new(n);
-        for i in 0..n {
-            for j in i..n {
-                system.h[i * n + j] = h[(i, j)];
-            }
-            system.g[i] = g[i];
-        }
+        let mut system = NormalEquations::of(&h, &g);
         add_prior(model, &solution.values, &mut system);
         system.data = squares;
         let values = model.columns.iter().map(|p| solution.values.0[*p]);
@@ -316,13 +310,7 @@ impl Free {
             g[column] += weight * self.values[column];
             cost += weight * self.values[column].powi(2);
         }
-        let mut system = NormalEquations::new(n);
-        for i in 0..n {
-            for j in i..n {
-                system.h[i * n + j] = h[(i, j)];
-            }
-        }
-        let Some(c) = covariance_of(&system) else {
+        let Some(c) = covariance_of(&NormalEquations::of(&h, &g)) else {
             return (f64::INFINITY, None);
         };
         let step = -(c * &g);

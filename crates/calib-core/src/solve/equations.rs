@@ -1,6 +1,8 @@
 //! What the passes over the samples share: the function to be minimized, the sums of its linearization, and the
 //! memory that they reuse.
 
+use nalgebra::{DMatrix, DVector};
+
 use crate::model::cache::EdgeCache;
 use crate::model::layout::Model;
 use crate::solve::rows::SampleRows;
@@ -35,6 +37,19 @@ impl NormalEquations {
             data: 0.0,
             prior: 0.0,
         }
+    }
+
+    /// Those of a symmetric matrix and a gradient.
+    pub(crate) fn of(h: &DMatrix<f64>, g: &DVector<f64>) -> Self {
+        let n = g.len();
+        let mut out = Self::new(n);
+        for i in 0..n {
+            for j in i..n {
+                out.h[i * n + j] = h[(i, j)];
+            }
+            out.g[i] = g[i];
+        }
+        out
     }
 
     pub(crate) fn cost(&self) -> f64 {

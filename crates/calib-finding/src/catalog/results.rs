@@ -65,7 +65,7 @@ super::topic! {
     SIDE_BY_RESIDUALS = "side-by-residuals" {
         "": Info,
             "The rows of `{recording}` before a joint's first motion do not show from which side the joint came. The residuals do, and the fit takes it from them[[: from below for {below}]][[; from above for {above}]].",
-            "Begin each recording with a small motion of every joint, and end it from the side that the first rows are to have.";
+            "None is needed. To have the side recorded, begin each recording with a small motion of every joint.";
     }
     /// What is random from pose to pose is no noise of a joint.
     NOISE_IS_PHYSICS = "noise-is-physics" {

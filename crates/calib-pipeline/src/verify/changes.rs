@@ -177,27 +177,30 @@ impl Names<'_> {
                 self.inputs.recordings[recording].poses.rows[*row],
             )
         };
-        // What holds from the first row of all on ends where the rest begins: said from there, everything before moved.
-        let turned = at == 0 && change.end < samples.len();
-        let at = if turned { change.end } else { at };
+        let is_fitted =
+            |name: &String| self.inputs.recordings[name].spec.usage != Usage::Validation;
+        // A change that holds from the first sample on: the motion was at its end.
+        let rest = (change.end..samples.len()).find(|s| is_fitted(&samples[*s].0));
+        let turned = rest.filter(|_| at == 0);
+        let at = turned.unwrap_or(at);
         let (recording, after) = row(at);
-        let before = row(at.max(1) - 1);
         // Recordings that lie before the change, of those that were fitted.
         let changed: BTreeSet<&String> = change.also.iter().map(|s| &samples[*s].0).collect();
         let all: BTreeSet<&String> = samples.iter().map(|(name, _)| name).collect();
-        let fitted = |name: &&String| self.inputs.recordings[*name].spec.usage != Usage::Validation;
         let others = all
             .into_iter()
-            .filter(fitted)
-            .filter(|name| *name != recording);
+            .filter(|name| is_fitted(name) && *name != recording);
         let earlier: Vec<String> = others
             .filter(|name| match turned {
-                true => changed.contains(name) || *name == &samples[0].0,
-                false => !changed.contains(name),
+                Some(_) => changed.contains(name) || *name == &samples[0].0,
+                None => !changed.contains(name),
             })
             .cloned()
             .collect();
-        let within = before.0 == recording;
+        // Between recordings: from the last row of what lies before, which need not be the recording before in the order of the names.
+        let within = at > 0 && samples[at - 1].0 == *recording;
+        let last = samples.iter().rposition(|(name, _)| earlier.contains(name));
+        let before = row(last.filter(|_| !within).unwrap_or(at.max(1) - 1));
         finding
             .with("before", Fact::name(before.1.to_string()))
             .with_some("before_in", (!within).then(|| Fact::name(before.0.clone())))

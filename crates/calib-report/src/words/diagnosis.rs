@@ -70,7 +70,7 @@ impl Diagnosis {
                     None => format!("Let `{again} --select` choose the effects to free."),
                     // It would answer the same again.
                     Some(_) => format!(
-                        "The selection did not take it: free it in the profile under `solve.joints`, run `{again}`, and compare the held-out errors."
+                        "`--select` did not choose it: free it under `solve.joints`, run `{again}`, and compare the held-out errors."
                     ),
                 },
             ],
@@ -109,7 +109,7 @@ fn unexplained(report: &Report, again: &str) -> [String; 2] {
             "The error is larger than the limit, and no effect that was tried explains it."
                 .to_owned(),
             format!(
-                "Look at the findings and at the poses with the largest errors in the report: two causes at once hide each other; then run `{again}`."
+                "Look at the findings and at the poses with the largest errors in the report: two causes can hide each other. Correct one, then run `{again}`."
             ),
         ],
     }

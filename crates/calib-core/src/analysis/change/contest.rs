@@ -230,13 +230,7 @@ impl Solution {
             cost += s.w.norm_squared();
             rows += s.w.len() as f64;
         });
-        let mut system = NormalEquations::new(n);
-        for i in 0..n {
-            for j in i..n {
-                system.h[i * n + j] = h[(i, j)];
-            }
-            system.g[i] = g[i];
-        }
+        let mut system = NormalEquations::of(&h, &g);
         add_prior(model, &self.values, &mut system);
         let parameters = model.columns.iter().map(|p| &model.problem.parameters[*p]);
         let priors = parameters.filter(|p| p.prior_sigma.is_some()).count();

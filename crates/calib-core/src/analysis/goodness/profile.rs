@@ -89,13 +89,7 @@ impl Solution {
             rows += s.w.len() as f64;
             log_det += s.log_det;
         });
-        let mut system = NormalEquations::new(n);
-        for i in 0..n {
-            for j in i..n {
-                system.h[i * n + j] = h[(i, j)];
-            }
-            system.g[i] = g[i];
-        }
+        let mut system = NormalEquations::of(&h, &g);
         add_prior(model, &self.values, &mut system);
         let covariance = covariance_of(&system)?;
         let gradient = DVector::from_row_slice(&system.g);
