@@ -61,6 +61,9 @@ impl Observability {
 /// A direction with a singular value below this has a data-only σ larger than the prior's.
 const WEAK: f64 = 1.0;
 
+/// Shares of a direction are distinguished to one part in this many: far above rounding, far below anything that is printed.
+const ALIKE: f64 = 1e6;
+
 /// Null space (sparse where it can be) and weakly identifiable directions of a solved model.
 pub(crate) fn observe(model: &Model, values: &Values, information: &Information) -> Observability {
     let places = places(model);
@@ -142,7 +145,9 @@ fn terms(model: &Model, information: &Information, v: &DVector<f64>) -> (Vec<usi
     let mut columns: Vec<usize> = (0..v.len())
         .filter(|&c| v[c].abs() > TERM * largest)
         .collect();
-    columns.sort_by(|&a, &b| v[b].abs().total_cmp(&v[a].abs()).then(a.cmp(&b)));
+    // Shares that differ by rounding only are in the order of the columns, whatever the last bits of the data.
+    let share = |c: usize| (v[c].abs() / largest * ALIKE).round();
+    columns.sort_by(|&a, &b| share(b).total_cmp(&share(a)).then(a.cmp(&b)));
     let lead = columns.first().map_or(1.0, |&c| v[c]);
     // amount_c = s_c v_c / v_lead, s the scales of the parameters
     let terms = columns.iter().map(|&c| Term {

@@ -7,6 +7,7 @@ use nalgebra::Isometry3;
 use crate::graph::edge::EdgeKind;
 use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId, MeasurementId};
+use crate::graph::measurement::{Markers, Measurement, MeasurementKind};
 use crate::graph::problem::Problem;
 use crate::model::cache::{Trig, tabulate};
 use crate::model::path::CompiledPath;
@@ -29,6 +30,8 @@ pub struct Model {
     pub(crate) of_sample: Vec<Range<usize>>,
     /// The same, by measurement: (sample, observations).
     pub(crate) of_measurement: Vec<Vec<(usize, Range<usize>)>>,
+    /// Per measurement: whether it is of markers with the same noise in all directions.
+    alike: Vec<bool>,
     pub(crate) trig: Trig,
     /// Random effects of a sample.
     pub(crate) slots: Vec<Slot>,
@@ -112,6 +115,14 @@ fn of_measurement(
     ranges
 }
 
+/// Whether these are markers that were seen with the same noise in all directions.
+fn is_alike(measurement: &Measurement) -> bool {
+    match &measurement.kind {
+        MeasurementKind::Markers(markers) => markers.observations.iter().all(|o| o.shape.is_none()),
+        _ => false,
+    }
+}
+
 impl Model {
     /// Checks a problem and lays it out.
     ///
@@ -171,6 +182,7 @@ impl Model {
             observations,
             of_sample,
             of_measurement,
+            alike: problem.measurements.iter().map(is_alike).collect(),
             trig: tabulate(&problem),
             slots,
             rows,
@@ -185,6 +197,14 @@ impl Model {
     #[must_use]
     pub fn problem(&self) -> &Problem {
         &self.problem
+    }
+
+    /// The markers of a measurement, where their noise is the same in all directions.
+    pub(crate) fn alike_markers(&self, measurement: usize) -> Option<&Markers> {
+        match &self.problem.measurements[measurement].kind {
+            MeasurementKind::Markers(markers) if self.alike[measurement] => Some(markers),
+            _ => None,
+        }
     }
 
     /// Joints that never moved: contracted, not fitted.

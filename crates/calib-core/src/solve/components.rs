@@ -6,7 +6,6 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::model::cache::State;
 use crate::model::layout::Model;
-use crate::model::path::Derivatives;
 use crate::model::values::Values;
 use crate::solve::chunks::{chunked, is_one_chunk};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
@@ -14,6 +13,7 @@ use crate::solve::normal::add_prior;
 use crate::solve::panel::Local;
 use crate::solve::rows::{SampleRows, add_block};
 use crate::solve::structured::RandomPart;
+use crate::solve::turned::Rest;
 
 /// Sums of (2) and (3) over the samples, for the groups that are to be estimated.
 pub(crate) struct Sums {
@@ -38,6 +38,18 @@ impl Sums {
             moments: (0..=count)
                 .map(|_| Local::new(model.free(), most))
                 .collect(),
+        }
+    }
+
+    /// Rows without a twist: V⁻¹ is the unit matrix, V_g too.
+    fn add_rest(&mut self, layout: &Layout, rest: &Rest<'_>) {
+        let of_none = self.squares.len();
+        let place = layout.place[rest.group];
+        rest.add_gram(&mut self.moments[place.unwrap_or(of_none)].h);
+        if let Some(g) = place {
+            self.squares[g] += rest.cost;
+            self.traces[g] += rest.rows as f64;
+            self.products[(g, g)] += rest.rows as f64;
         }
     }
 
@@ -68,10 +80,13 @@ impl Sums {
 }
 
 /// Group of every row of a sample, in the order of its rows.
-fn row_groups(model: &Model, blocks: &[(usize, usize, usize)], out: &mut Vec<usize>) {
+fn row_groups(model: &Model, rows: &SampleRows, out: &mut Vec<usize>) {
     out.clear();
-    for &(o, first, count) in blocks {
-        out.resize(first + count, 0);
+    out.resize(rows.m, 0);
+    for block in &rows.turned {
+        out[block.first..block.first + 6].fill(block.group);
+    }
+    for &(o, first, _) in &rows.blocks {
         add_block(model, o, |i, j, group, _| {
             if i == j {
                 out[first + i] = group;
@@ -128,7 +143,7 @@ impl Weighed {
     fn new(model: &Model, layout: &Layout, rows: &SampleRows, random: &RandomPart) -> Self {
         let (m, n, k) = (rows.m, rows.n, rows.k);
         let mut groups = Vec::new();
-        row_groups(model, &rows.blocks, &mut groups);
+        row_groups(model, rows, &mut groups);
         let mut p = vec![0.0; m * m];
         for i in 0..m {
             p[i * m + i] = 1.0;
@@ -286,7 +301,9 @@ impl Pass<'_> {
         } = self.objective;
         let mut sums = Sums::zeros(model, count);
         for sample in samples {
-            rows.fill(model, self.at, weights, sample, Derivatives::All);
+            rows.fill_turned(model, self.at, (weights, theta), sample, |rest| {
+                sums.add_rest(self.layout, rest);
+            });
             if rows.m == 0 {
                 continue;
             }

@@ -99,15 +99,12 @@ impl Pass<'_> {
         local: &mut Local,
         out: &mut NormalEquations,
     ) -> bool {
-        let stated = &self.objective.model.problem.measurements[measurement];
-        let fine = match &stated.kind {
-            MeasurementKind::Markers(markers)
-                if markers.observations.iter().all(|o| o.shape.is_none()) =>
-            {
+        let fine = match self.objective.model.alike_markers(measurement) {
+            Some(markers) => {
                 self.markers((measurement, markers), seen, local, out);
                 true
             }
-            _ => self.general(measurement, seen, local, out),
+            None => self.general(measurement, seen, local, out),
         };
         local.multiply();
         fine

@@ -16,4 +16,5 @@ pub(crate) mod robust;
 pub(crate) mod rows;
 pub(crate) mod six_rows;
 pub(crate) mod structured;
+pub(crate) mod turned;
 pub(crate) mod whitened;

@@ -118,10 +118,16 @@ impl Pass<'_> {
             if model.of_sample[sample].is_empty() {
                 continue;
             }
-            rows.fill(model, at, weights, sample, Derivatives::All);
+            rows.fill_turned(model, at, (weights, theta), sample, |rest| {
+                sum.cost += rest.cost;
+                rest.add_gram(&mut sum.h);
+                for (own, g) in rest.own.iter().zip(rest.gradient) {
+                    sum.g[own.column] += g;
+                }
+            });
             rows.whiten_blocks(model, weights, theta, true)?;
             rows.random_part(random)?;
-            random.store(&mut factors);
+            random.store(rows, &mut factors);
             let m = rows.m;
             random.whiten(&mut rows.r[..m], 1);
             random.whiten(&mut rows.j[..m * n], n);

@@ -7,6 +7,8 @@
 //!
 //! u are the sample's random effects (joint noise, wobble), w the robust weight of each vector.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix6, Vector6};
 
 use crate::graph::measurement::{At, Rows};
@@ -15,6 +17,7 @@ use crate::model::layout::Model;
 use crate::model::path::{Derivatives, PathBuffer};
 use crate::model::pose::Pose;
 use crate::model::values::Values;
+use crate::solve::turned::{Rest, Turned, TurnedBlock};
 
 /// Scratch and result of [`SampleRows::fill`]; all matrices row-major.
 #[derive(Debug, Clone)]
@@ -30,8 +33,12 @@ pub(crate) struct SampleRows {
     pub g: Vec<f64>,
     /// m × m, lower triangle: V_s, then (after [`SampleRows::factor`]) its Cholesky factor.
     pub v: Vec<f64>,
-    /// (observation, first row, rows); observations of weight 0 are absent.
+    /// (observation, first row, rows); observations of weight 0 are absent, those of [`SampleRows::turned`] too.
     pub blocks: Vec<(usize, usize, usize)>,
+    /// Bodies whose markers are six whitened rows: none but after [`SampleRows::fill_turned`].
+    pub turned: Vec<TurnedBlock>,
+    /// What the turning of each measurement's markers needs.
+    turns: Vec<Turned>,
     buffers: Vec<PathBuffer>,
 }
 
@@ -50,6 +57,8 @@ impl SampleRows {
             g: vec![0.0; m * k],
             v: vec![0.0; m * m],
             blocks: Vec::with_capacity(m),
+            turned: Vec::new(),
+            turns: vec![Turned::default(); model.paths.len()],
             buffers: model
                 .paths
                 .iter()
@@ -67,22 +76,80 @@ impl SampleRows {
         sample: usize,
         wanted: Derivatives,
     ) {
+        self.clear();
+        for (measurement, seen) in seen_together(model, sample) {
+            self.add_measurement(model, at, weights, (measurement, seen), wanted);
+        }
+    }
+
+    /// As [`SampleRows::fill`] with all derivatives, but what the markers of a body say of its twist is six whitened rows
+    /// where they are alike and more than six. What the others say goes to `rest`. The blocks are still to be whitened.
+    pub(crate) fn fill_turned(
+        &mut self,
+        model: &Model,
+        at: State,
+        (weights, theta): (&[f64], &[f64]),
+        sample: usize,
+        mut rest: impl FnMut(&Rest<'_>),
+    ) {
+        self.clear();
+        for (measurement, seen) in seen_together(model, sample) {
+            let kept = seen.clone().filter(|&o| weights[o] > 0.0);
+            let alike = model.alike_markers(measurement);
+            let Some(markers) = alike.filter(|_| 3 * kept.clone().count() > 6) else {
+                self.add_measurement(model, at, weights, (measurement, seen), Derivatives::All);
+                continue;
+            };
+            let group = markers.noise.index();
+            let buffer = &mut self.buffers[measurement];
+            let path = &model.paths[measurement];
+            let pose = path.evaluate(at, sample, Derivatives::All, buffer);
+            let kept = kept.map(|o| (o, (weights[o] / theta[group]).sqrt()));
+            let turn = &mut self.turns[measurement];
+            turn.see(model, at.values, markers, &pose, kept);
+            let (first, n, k) = (self.m, self.n, self.k);
+            self.m += 6;
+            self.r[first..first + 6].copy_from_slice(&turn.residual);
+            let j = &mut self.j[first * n..(first + 6) * n];
+            turn.write_jacobian(j, n, &path.columns, &buffer.columns);
+            let g = &mut self.g[first * k..(first + 6) * k];
+            turn.write_twists(g, k, &path.slots, &buffer.slots);
+            self.turned.push(TurnedBlock {
+                measurement,
+                group,
+                first,
+                r: pose.r,
+            });
+            rest(&turn.rest(group));
+        }
+    }
+
+    fn clear(&mut self) {
         self.m = 0;
         self.blocks.clear();
-        let range = model.of_sample[sample].clone();
-        let mut measurement = usize::MAX;
-        let mut pose = Pose::identity();
-        for o in range {
+        self.turned.clear();
+    }
+
+    /// Rows of what a measurement saw at a sample.
+    fn add_measurement(
+        &mut self,
+        model: &Model,
+        at: State,
+        weights: &[f64],
+        (measurement, seen): (usize, Range<usize>),
+        wanted: Derivatives,
+    ) {
+        let mut pose = None;
+        for o in seen {
             if weights[o] <= 0.0 {
                 continue;
             }
             let observation = model.observations[o];
-            if observation.measurement != measurement {
-                measurement = observation.measurement;
+            let pose = pose.get_or_insert_with(|| {
                 let buffer = &mut self.buffers[measurement];
-                pose = model.paths[measurement].evaluate(at, sample, wanted, buffer);
-            }
-            let rows = residual(model, at.values, measurement, observation.item, &pose);
+                model.paths[measurement].evaluate(at, observation.sample, wanted, buffer)
+            });
+            let rows = residual(model, at.values, measurement, observation.item, pose);
             let first = self.m;
             self.blocks.push((o, first, observation.rows));
             self.m += observation.rows;
@@ -94,6 +161,21 @@ impl SampleRows {
             }
             if wanted != Derivatives::None && self.k > 0 {
                 self.fill_random(model, measurement, &rows, first);
+            }
+        }
+    }
+
+    /// Appends a matrix of `k` columns with the rows of this sample, as one with the rows that [`SampleRows::fill`] makes.
+    pub(crate) fn append_unturned(&self, matrix: &[f64], k: usize, out: &mut Vec<f64>) {
+        let mut row = 0;
+        while row < self.m {
+            if let Some(block) = self.turned.iter().find(|b| b.first == row) {
+                let six = &matrix[row * k..(row + 6) * k];
+                self.turns[block.measurement].append_unturned(&block.r, six, k, out);
+                row += 6;
+            } else {
+                out.extend_from_slice(&matrix[row * k..(row + 1) * k]);
+                row += 1;
             }
         }
     }
@@ -217,6 +299,18 @@ impl SampleRows {
     pub(crate) fn squared_norm(&self) -> f64 {
         self.r[..self.m].iter().map(|x| x * x).sum()
     }
+}
+
+/// What each measurement saw at a sample: its observations.
+fn seen_together(model: &Model, sample: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
+    let range = model.of_sample[sample].clone();
+    let first = range.start;
+    let runs = model.observations[range].chunk_by(|a, b| a.measurement == b.measurement);
+    runs.scan(first, |at, run| {
+        let start = *at;
+        *at += run.len();
+        Some((run[0].measurement, start..*at))
+    })
 }
 
 #[inline]

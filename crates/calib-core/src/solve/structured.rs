@@ -174,9 +174,9 @@ impl SampleRows {
 }
 
 impl RandomPart {
-    /// What a later [`RandomPart::load`] needs to whiten another residual with the same V.
-    pub(crate) fn store(&self, into: &mut Vec<f64>) {
-        into.extend_from_slice(&self.q);
+    /// What a later [`RandomPart::load`] needs to whiten another residual with the same V, in rows that are not turned.
+    pub(crate) fn store(&self, rows: &SampleRows, into: &mut Vec<f64>) {
+        rows.append_unturned(&self.q, self.k, into);
         into.extend_from_slice(&self.t);
     }
 

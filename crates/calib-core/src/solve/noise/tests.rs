@@ -10,8 +10,11 @@ use crate::solve::normal::accumulate;
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
 use crate::*;
 
+/// Markers on a body: two are rows of their own, more are turned into six; the first three lie on a line.
+const MARKERS: [usize; 4] = [2, 3, 4, 6];
+
 /// Markers and a body pose behind two noisy joints; everything that can be wrong in a sum is different here.
-fn problem() -> Problem {
+fn problem(markers: usize) -> Problem {
     let n = 14;
     let q = |a: f64| (0..n).map(|i| (f64::from(i) * a).sin()).collect::<Vec<_>>();
     let mut p = Problem::new(n as usize);
@@ -32,14 +35,23 @@ fn problem() -> Problem {
     let marker = p.noise_group("marker", NoiseKind::Position, 2e-3, true);
     let orientation = p.noise_group("orientation", NoiseKind::Orientation, 3e-3, true);
     let position = p.noise_group("position", NoiseKind::Position, 1e-3, false);
-    let points = [
-        p.known_point("k", d, Point3::new(0.3, 0.1, 0.0)),
-        p.unknown_point("u", d, Point3::new(0.1, -0.2, 0.3), None),
-    ];
-    let seen = (0..2 * n as usize)
+    let known = Point3::new(0.3, 0.1, 0.0);
+    let first = Point3::new(0.1, -0.2, 0.3);
+    let points: Vec<_> = (0..markers)
+        .map(|i| match i {
+            0 => p.known_point("k", d, known),
+            1 => p.unknown_point("u", d, first, None),
+            2 => p.known_point("between", d, nalgebra::center(&known, &first)),
+            _ => {
+                let at = Point3::new(0.1 * i as f64, 0.3, (i as f64).sin());
+                p.unknown_point(&format!("u{i}"), d, at, Some(0.1))
+            }
+        })
+        .collect();
+    let seen = (0..markers * n as usize)
         .map(|i| MarkerObservation {
-            sample: i / 2,
-            point: points[i % 2],
+            sample: i / markers,
+            point: points[i % markers],
             position: Point3::new((i as f64).sin(), (i as f64 * 1.7).cos(), 0.1),
             shape: None,
         })
@@ -66,8 +78,8 @@ struct Case {
 }
 
 impl Case {
-    fn new(weight: impl Fn(usize) -> f64) -> Self {
-        let model = Model::new(&problem()).unwrap();
+    fn new(markers: usize, weight: impl Fn(usize) -> f64) -> Self {
+        let model = Model::new(&problem(markers)).unwrap();
         let sigmas = model.problem.groups.iter().map(|g| g.sigma);
         Self {
             values: model.start(),
@@ -139,7 +151,7 @@ impl Case {
 const GROUPS: [usize; 3] = [0, 1, 2];
 
 fn unequal_weights(observation: usize) -> f64 {
-    [1.0, 0.3, 2.0][observation % 3]
+    [1.0, 0.3, 2.0, 0.0, 0.7][observation % 5]
 }
 
 fn sums_of(case: &mut Case) -> Sums {
@@ -153,7 +165,11 @@ fn sums_of(case: &mut Case) -> Sums {
 
 #[test]
 fn the_score_is_the_gradient_of_the_restricted_likelihood() {
-    let mut case = Case::new(unequal_weights);
+    MARKERS.into_iter().for_each(score_is_gradient);
+}
+
+fn score_is_gradient(markers: usize) {
+    let mut case = Case::new(markers, unequal_weights);
     let system = case.system();
     let c = covariance_of(&system).unwrap();
     let sums = sums_of(&mut case);
@@ -182,7 +198,11 @@ fn the_score_is_the_gradient_of_the_restricted_likelihood() {
 /// The sums of (3) against dense factors: tr(V_g V⁻¹) and tr(V_g V⁻¹ V_h V⁻¹), in log θ.
 #[test]
 fn the_expected_information_is_that_of_dense_factors() {
-    let mut case = Case::new(unequal_weights);
+    MARKERS.into_iter().for_each(information_is_dense);
+}
+
+fn information_is_dense(markers: usize) {
+    let mut case = Case::new(markers, unequal_weights);
     let sums = sums_of(&mut case);
     let at = case.dense(&case.theta.clone());
     // B_g = L⁻¹ (∂V/∂log θ_g) L⁻ᵀ; V is linear in θ, so the difference to twice θ_g is the derivative.
@@ -219,7 +239,11 @@ fn the_expected_information_is_that_of_dense_factors() {
 
 #[test]
 fn dense_and_structured_whitening_give_the_same_normal_equations() {
-    let mut case = Case::new(|_| 0.7);
+    MARKERS.into_iter().for_each(equations_are_dense);
+}
+
+fn equations_are_dense(markers: usize) {
+    let mut case = Case::new(markers, |_| 0.7);
     let system = case.system();
     let n = case.model.free();
     let (mut h, mut g, mut cost) = (DMatrix::zeros(n, n), DVector::zeros(n), 0.0);
@@ -245,4 +269,24 @@ fn dense_and_structured_whitening_give_the_same_normal_equations() {
     };
     let again = crate::solve::normal::cost(objective, &case.values, &mut case.work);
     assert!((again - system.cost()).abs() < 1e-11 * cost);
+    // So is one that goes somewhere else.
+    let mut moved = case.values.clone();
+    let columns = case.model.columns.iter();
+    columns.for_each(|p| moved.0[*p] += 0.01 * (*p as f64).cos());
+    let there = crate::solve::normal::cost(objective, &moved, &mut case.work);
+    let residuals = case.model.residuals(&moved);
+    let (mut expected, mut first) = (0.0, 0);
+    for s in case.dense(&case.theta.clone()) {
+        let m = s.w.len();
+        expected += (&s.l_inverse * residuals.rows(first, m)).norm_squared();
+        first += m;
+    }
+    for (c, p) in case.model.columns.iter().enumerate() {
+        let off = moved.0[*p] - case.model.problem.parameters[*p].nominal;
+        expected += case.prior(c) * off * off;
+    }
+    assert!(
+        (there - expected).abs() < 1e-10 * expected,
+        "{markers}: {there} {expected}"
+    );
 }
