@@ -150,6 +150,90 @@ fn a_kill_leaves_a_file_that_reads_and_goes_on() {
     assert_eq!(String::from_utf8_lossy(&output.stdout), "sweep.csv\n");
 }
 
+/// An interrupt of the terminal ends a recording as `q` does: what is in the file is whole, what is missing is said, and `--append` asks
+/// for it.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_with_whole_poses_and_says_how_to_go_on() {
+    let dir = Scratch::new().robot("justin");
+    let port = free_port();
+    let source = format!("dtrack:{port}");
+    let arguments = [
+        "record",
+        "robots/justin.yaml",
+        "--source",
+        &source,
+        "--recording",
+        "head_sweep",
+        "--map",
+        "heT=body_0",
+        "--out",
+        "sweep.csv",
+        "--poses",
+        "2",
+        "--hold",
+        "0.4",
+        "--append",
+    ];
+    let stop = Arc::new(AtomicBool::new(false));
+    let sender = still_body(port, 1000, stop.clone());
+    let interrupted = |after: usize| {
+        let mut child = start(&dir, &arguments);
+        let mut stdin = child.stdin.take().expect("piped");
+        wait_for("a file", || dir.path("sweep.csv").exists());
+        let before = rows(&dir.path("sweep.csv")).len();
+        // One pose is held, the next one begun.
+        stdin.write_all(b"\n").expect("heard");
+        wait_for("a pose", || {
+            rows(&dir.path("sweep.csv")).len() > before.max(after)
+        });
+        stdin.write_all(b"\n").expect("heard");
+        std::thread::sleep(Duration::from_millis(100));
+        let id = child.id().to_string();
+        let sent = Command::new("kill").args(["-INT", &id]).status();
+        assert!(sent.expect("kill").success());
+        let output = child.wait_with_output().expect("ended");
+        let said = String::from_utf8(output.stderr).expect("text");
+        (output.status.code(), said)
+    };
+    let (code, said) = interrupted(0);
+    assert_eq!(code, Some(3), "{said}");
+    for part in [
+        "taken as 0, because nobody sends them: torso_0",
+        "1 of 4 poses in the file, 1 of them from this",
+        "missing: pose 2..4.",
+        "`--append`",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let text = dir.read("sweep.csv");
+    assert!(text.contains("# joints taken as 0: torso_0, "), "{text}");
+    assert!(text.contains("# poses: 4 poses of head_pan"), "{text}");
+    let held = |text: &str| -> Vec<String> {
+        let rows = text.lines().filter(|l| !l.starts_with('#')).skip(1);
+        let mut holds: Vec<String> = rows
+            .filter_map(|row| row.split(',').nth(3).map(str::to_owned))
+            .collect();
+        holds.dedup();
+        holds
+    };
+    assert_eq!(held(&text), ["1"]);
+    let (_, said) = interrupted(rows(&dir.path("sweep.csv")).len());
+    assert!(
+        said.contains("2 of 4 poses in the file, 1 of them"),
+        "{said}"
+    );
+    assert_eq!(held(&dir.read("sweep.csv")), ["1", "2"]);
+    // Another grid is another recording: its poses would be taken for these.
+    let mut other = arguments.to_vec();
+    other[11] = "3";
+    let output = start(&dir, &other).wait_with_output().expect("ended");
+    let said = String::from_utf8(output.stderr).expect("text");
+    assert!(said.contains("its poses are `4 poses of"), "{said}");
+    stop.store(true, Ordering::Relaxed);
+    sender.join().expect("sent");
+}
+
 /// Rows of a shipped recording: joints in degrees, and the poses of the two bodies.
 struct Pose {
     joints: String,

@@ -35,6 +35,12 @@ impl Guide {
         texts.join(", ")
     }
 
+    /// `36 poses of head_pan -90.0..90.0°, head_tilt -20.0..40.0°`; `None` where no poses are requested.
+    pub fn poses(&self, columns: &[JointColumn]) -> Option<String> {
+        let count = self.steps.len();
+        (count > 0).then(|| format!("{count} poses of {}", self.shown_ranges(columns)))
+    }
+
     /// `waist -70.0..180.0°`.
     pub fn shown_ranges(&self, columns: &[JointColumn]) -> String {
         let texts: Vec<String> = self

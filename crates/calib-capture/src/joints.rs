@@ -190,6 +190,20 @@ impl JointListener {
         (now - at <= STALE).then_some(value)
     }
 
+    /// How old the joint's last value is, s; `None` where none was received.
+    pub fn age(&self, name: &str, now: f64) -> Option<f64> {
+        self.last.get(name).map(|(_, at)| now - at)
+    }
+
+    /// What the robot sends: names of joints, what is wrong with the last datagram, or nothing.
+    pub fn heard(&self) -> String {
+        match (&self.why, self.last.is_empty()) {
+            (_, false) => self.names().join(", "),
+            (Some(why), true) => why.clone(),
+            (None, true) => "nothing".to_owned(),
+        }
+    }
+
     /// Names that the robot sends.
     pub fn names(&self) -> Vec<&str> {
         self.last.keys().map(String::as_str).collect()

@@ -7,8 +7,8 @@
 //! ```
 //!
 //! A frame has two times: that of the device, and that of its arrival. Both are written (`t_s`,
-//! `host_s`). Late or duplicate frames are dropped and counted, never inserted: rows are written to disk every second
-//! and never changed, so that at most one second of data is lost if the program is killed.
+//! `host_s`). Late or duplicate frames are dropped and counted, never inserted. The rows of a hold are written when it is
+//! complete, those of a motion every second: if the program is killed, at most the hold in progress is lost.
 //!
 //! The pose that a row belongs to is decided by stillness: within a time window the tracked bodies must not move
 //! ([`Stillness`]). This crate estimates nothing.
@@ -43,8 +43,8 @@ pub use guide::{Guide, Step, grid};
 pub use joints::{JointColumn, JointListener, JointSource, Unit, parse_joints};
 pub use order::{Arrival, Order};
 pub use screen::{Lines, Screen, Terminal, WIDTH};
-pub use session::{CaptureError, Ended, Key, Plan, Session, Summary, Watched, WatchedKind};
+pub use session::{CaptureError, Ended, Key, Moved, Plan, Session, Summary, Watched, WatchedKind};
 pub use source::{Address, BadAddress, Input, Source, SourceError};
 pub use still::{StillSettings, Stillness};
 pub use survey::{Survey, map_names, survey};
-pub use table::{Table, TableError};
+pub use table::{Mark, POSES, Table, TableError};

@@ -81,6 +81,25 @@ impl Stillness {
         Some(t - since)
     }
 
+    /// What moved most within the window: its name, how far, m, and by what angle, rad; `None` where nothing is seen.
+    pub fn moving(&self) -> Option<(String, f64, f64)> {
+        let (_, last) = self.recent.back()?;
+        let of = |(name, pose): (&String, &Isometry3<f64>)| {
+            let earlier = self.recent.iter().filter_map(|(_, seen)| seen.get(name));
+            let (mut far, mut turned) = (0.0_f64, 0.0_f64);
+            for other in earlier {
+                far = far.max((pose.translation.vector - other.translation.vector).norm());
+                turned = turned.max(pose.rotation.angle_to(&other.rotation));
+            }
+            (name.clone(), far, turned)
+        };
+        let size = |(_, far, turned): &(String, f64, f64)| {
+            (far / self.settings.point_range).max(turned / self.settings.turn_range)
+        };
+        let each = last.iter().map(of);
+        each.max_by(|a, b| size(a).total_cmp(&size(b)))
+    }
+
     fn together(&self) -> bool {
         let Some((_, last)) = self.recent.back() else {
             return false;

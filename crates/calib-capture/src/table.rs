@@ -2,7 +2,7 @@
 
 use calib_recording::{ReadOptions, WRITTEN_LIVE, read_bytes};
 use std::fs::File;
-use std::io::Write;
+use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
 use calib_files::{FileError, input};
@@ -42,6 +42,16 @@ pub enum TableError {
     },
 }
 
+/// A place in the file that it can be cut back to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mark {
+    length: u64,
+    rows: u64,
+}
+
+/// What a comment of the file says before it lists the requested poses.
+pub const POSES: &str = "poses: ";
+
 /// A table being written.
 #[derive(Debug)]
 pub struct Table {
@@ -50,6 +60,8 @@ pub struct Table {
     pending: String,
     /// Time of the oldest row that waits, s.
     waiting_since: Option<f64>,
+    /// Bytes on the disk.
+    length: u64,
     /// Rows taken, on the disk or not.
     pub rows: u64,
     /// Device time of the last row of the file that is gone on with, s.
@@ -84,17 +96,18 @@ impl Table {
             path: shown,
             pending: String::new(),
             waiting_since: None,
+            length: text.len() as u64,
             rows: 0,
             last_time: None,
             held: Vec::new(),
         })
     }
 
-    /// Goes on with a file of the same header; a row that a kill cut off is taken away first.
+    /// Goes on with a file of the same header and the same requested poses; a row that a kill cut off is taken away first.
     ///
     /// # Errors
     /// [`TableError`].
-    pub fn append(path: &Path, header: &str) -> Result<Table, TableError> {
+    pub fn append(path: &Path, header: &str, poses: Option<&str>) -> Result<Table, TableError> {
         let shown = path.display().to_string();
         let io = |source| TableError::Io {
             path: shown.clone(),
@@ -124,6 +137,16 @@ impl Table {
         {
             return Err(other("it was not made by `calib record`".to_string()));
         }
+        let of_file = text
+            .lines()
+            .find_map(|l| l.strip_prefix("# ")?.strip_prefix(POSES));
+        if let (Some(of_file), Some(poses)) = (of_file, poses)
+            && of_file != poses
+        {
+            return Err(other(format!(
+                "its poses are `{of_file}`, this recording asks for `{poses}`"
+            )));
+        }
         let (mut rows, mut last_time, mut held) = (0, None, Vec::new());
         if lines.next().is_some() {
             let recording = read_bytes(&shown, text.as_bytes(), &ReadOptions::default())
@@ -142,6 +165,7 @@ impl Table {
             path: shown,
             pending: String::new(),
             waiting_since: None,
+            length: whole as u64,
             rows,
             last_time,
             held,
@@ -158,6 +182,41 @@ impl Table {
         self.rows += 1;
         self.waiting_since.get_or_insert(now);
         self.tick(now)
+    }
+
+    /// Where the file ends now; everything is written.
+    ///
+    /// # Errors
+    /// [`TableError::Io`].
+    pub fn mark(&mut self) -> Result<Mark, TableError> {
+        self.flush()?;
+        Ok(Mark {
+            length: self.length,
+            rows: self.rows,
+        })
+    }
+
+    /// Takes the rows after a mark out of the file.
+    ///
+    /// # Errors
+    /// [`TableError::Io`].
+    pub fn cut_back(&mut self, mark: Mark) -> Result<(), TableError> {
+        self.pending.clear();
+        self.waiting_since = None;
+        self.file
+            .set_len(mark.length)
+            .and_then(|()| self.file.seek(SeekFrom::End(0)))
+            .and_then(|_| self.file.sync_data())
+            .map_err(|source| self.refused(source))?;
+        (self.length, self.rows) = (mark.length, mark.rows);
+        Ok(())
+    }
+
+    fn refused(&self, source: std::io::Error) -> TableError {
+        TableError::Io {
+            path: self.path.clone(),
+            source,
+        }
     }
 
     /// Writes what has waited for a second.
@@ -184,10 +243,8 @@ impl Table {
         self.file
             .write_all(self.pending.as_bytes())
             .and_then(|()| self.file.sync_data())
-            .map_err(|source| TableError::Io {
-                path: self.path.clone(),
-                source,
-            })?;
+            .map_err(|source| self.refused(source))?;
+        self.length += self.pending.len() as u64;
         self.pending.clear();
         self.waiting_since = None;
         Ok(())

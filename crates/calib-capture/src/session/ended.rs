@@ -9,6 +9,14 @@ pub enum Key {
     There,
     /// Skip this pose.
     Skip,
+    /// Count this pose with what is seen of it.
+    Keep,
+    /// Record the last pose again.
+    Repeat,
+    /// The program was interrupted.
+    Interrupt,
+    /// No further input will come.
+    Closed,
     /// End the recording.
     Quit,
 }
@@ -20,6 +28,8 @@ pub enum Ended {
     Finished,
     /// The operator ended it.
     Quit,
+    /// The program was interrupted.
+    Interrupted,
     /// The time limit was reached.
     TimeIsOver,
     /// The tracker sent nothing for this long, s.
@@ -44,6 +54,7 @@ impl std::fmt::Display for Ended {
         match self {
             Ended::Finished => f.write_str("all poses recorded"),
             Ended::Quit => f.write_str("stopped by the operator"),
+            Ended::Interrupted => f.write_str("interrupted"),
             Ended::TimeIsOver => f.write_str("the time limit was reached"),
             Ended::Silent(s) => write!(
                 f,

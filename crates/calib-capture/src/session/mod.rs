@@ -1,19 +1,26 @@
 //! A recording being made: which pose is next, whether it is held, which rows are written.
 
 mod ended;
+mod hold;
 mod plan;
 mod record;
 mod rows;
 mod summary;
+mod waits;
 
 pub use ended::{CaptureError, Ended, Key};
-pub use plan::{Plan, Watched, WatchedKind};
+pub use plan::{Moved, Plan, Watched, WatchedKind};
 pub use summary::Summary;
 
+use std::collections::BTreeSet;
+
+use crate::table::Mark;
 use crate::{
     Arrival, Frame, JointListener, JointSource, Order, Screen, Step, StillSettings, Stillness,
     Table, TableError, Unit,
 };
+use hold::Hold;
+use waits::Waits;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
@@ -21,10 +28,12 @@ enum Phase {
     Going,
     /// It has arrived; wait until it is still.
     Settling,
-    /// Rows have been written since this time, s.
+    /// Rows have been taken since this time, s.
     Holding(f64),
     /// A free pose was held; wait until the robot moves.
     Leaving,
+    /// Nothing is held: every frame is a row.
+    Continuous,
 }
 
 /// Visibility of one body.
@@ -33,9 +42,14 @@ struct Sight {
     frames: u64,
     lost: u64,
     lost_since: Option<f64>,
-    /// In this pose.
-    pose_frames: u64,
-    pose_lost: u64,
+}
+
+/// The pose that was held last, and where the file ended before it.
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    step: usize,
+    hold: u64,
+    before: Mark,
 }
 
 /// A recording being made.
@@ -47,11 +61,18 @@ pub struct Session {
     still: Stillness,
     phase: Phase,
     step: usize,
-    next_hold: u64,
+    /// Requested poses that are in the file, counted from 0.
+    done: BTreeSet<usize>,
+    /// Poses of one's own choice in the file.
+    free: u64,
+    /// This pose counts with what is seen of it: the operator said so.
+    as_it_is: bool,
+    hold: Hold,
+    last: Option<Last>,
+    waits: Option<Waits>,
     sights: Vec<Sight>,
     covered: Vec<Option<(f64, f64)>>,
     held: usize,
-    rows_of_pose: u64,
     foreign: u64,
     unlabeled: bool,
     last_host: Option<f64>,
@@ -63,38 +84,73 @@ pub struct Session {
 impl Session {
     /// A session that writes to `table`; poses that the table already holds are not requested again.
     pub fn new(plan: Plan, table: Table) -> Self {
-        let done: Vec<u64> = table.held.iter().filter_map(|h| h.parse().ok()).collect();
-        let last = done.iter().copied().max().unwrap_or(0);
+        let numbers: BTreeSet<u64> = table.held.iter().filter_map(|h| h.parse().ok()).collect();
+        let place = |number: &u64| usize::try_from(number.checked_sub(1)?).ok();
         let sights = vec![Sight::default(); plan.watched.len()];
         let covered = vec![None; plan.columns.len()];
-        let step = if plan.guide.steps.is_empty() {
-            0
-        } else {
-            usize::try_from(last).unwrap_or(usize::MAX)
-        };
-        let phase = if plan.guide.steps.is_empty() {
-            Phase::Settling
-        } else {
-            Phase::Going
-        };
-        Session {
+        let mut session = Session {
+            done: numbers.iter().filter_map(place).collect(),
+            free: numbers.last().copied().unwrap_or(0),
+            phase: Phase::Settling,
             plan,
             table,
             order: Order::default(),
             still: Stillness::new(StillSettings::default()),
-            phase,
-            step,
-            next_hold: last + 1,
+            step: 0,
+            as_it_is: false,
+            hold: Hold::default(),
+            last: None,
+            waits: None,
             sights,
             covered,
             held: 0,
-            rows_of_pose: 0,
             foreign: 0,
             unlabeled: false,
             last_host: None,
             rate: None,
             restarted: false,
             too_old: 0,
+        };
+        session.step = session.next_missing(0);
+        session.phase = session.first_phase();
+        session
+    }
+
+    fn is_guided(&self) -> bool {
+        !self.plan.guide.steps.is_empty()
+    }
+
+    fn first_phase(&self) -> Phase {
+        match (self.plan.continuous, self.is_guided()) {
+            (true, _) => Phase::Continuous,
+            (false, true) => Phase::Going,
+            (false, false) => Phase::Settling,
+        }
+    }
+
+    /// The first requested pose from here on that the file does not have.
+    fn next_missing(&self, from: usize) -> usize {
+        let steps = self.plan.guide.steps.len();
+        (from..steps)
+            .find(|s| !self.done.contains(s))
+            .unwrap_or(steps)
+    }
+
+    /// Requested poses that the file does not have, counted from 1.
+    pub fn missing(&self) -> Vec<usize> {
+        let steps = 0..self.plan.guide.steps.len();
+        steps
+            .filter(|s| !self.done.contains(s))
+            .map(|s| s + 1)
+            .collect()
+    }
+
+    /// Number of the hold that comes next.
+    fn number(&self) -> u64 {
+        if self.is_guided() {
+            self.step as u64 + 1
+        } else {
+            self.free + 1
         }
     }
 
@@ -105,7 +161,7 @@ impl Session {
 
     /// Whether all poses were held.
     pub fn is_finished(&self) -> bool {
-        !self.plan.guide.steps.is_empty() && self.step >= self.plan.guide.steps.len()
+        self.is_guided() && self.step >= self.plan.guide.steps.len()
     }
 
     /// Announces the next pose.
@@ -122,6 +178,8 @@ impl Session {
                 guide.steps.len(),
                 guide.shown(step, &self.plan.columns)
             ));
+        } else if self.plan.continuous {
+            screen.line("Every frame is recorded: move the robot slowly through its range.");
         } else if guide.steps.is_empty() && self.held == 0 {
             screen.line(&format!(
                 "Free poses: hold each pose for {:.1} s.",
@@ -139,28 +197,68 @@ impl Session {
     }
 
     /// Handles the operator's input.
-    pub fn key(&mut self, key: Key, screen: &mut dyn Screen) {
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn key(&mut self, key: Key, screen: &mut dyn Screen) -> Result<(), TableError> {
         match (key, self.phase) {
             (Key::There, Phase::Going) => self.phase = Phase::Settling,
-            (Key::Skip, _) if !self.plan.guide.steps.is_empty() => {
+            (Key::Keep, Phase::Settling | Phase::Holding(_)) if self.is_guided() => {
+                self.as_it_is = true;
+                screen.line("  this pose counts with what is seen of it");
+            }
+            (Key::Repeat, _) => self.repeat(screen)?,
+            (Key::Skip, _) if self.is_guided() => {
                 screen.line("  skipped");
+                self.give_up_hold()?;
                 self.next(screen);
             }
             _ => {}
         }
+        Ok(())
+    }
+
+    /// Takes the pose that was held last out of the file, and asks for it again.
+    fn repeat(&mut self, screen: &mut dyn Screen) -> Result<(), TableError> {
+        let Some(last) = self.last.take() else {
+            screen.line("  No pose of this session can be repeated: only the last one, once.");
+            return Ok(());
+        };
+        self.hold = Hold::default();
+        self.table.cut_back(last.before)?;
+        screen.line(&format!(
+            "  Pose {} is out of the file and is recorded again.",
+            last.hold
+        ));
+        self.held -= 1;
+        self.done.remove(&last.step);
+        self.free = self.free.saturating_sub(1);
+        self.step = last.step;
+        self.as_it_is = false;
+        self.phase = self.first_phase();
+        self.announce(screen);
+        Ok(())
+    }
+
+    /// What was recorded of a hold that did not become one: nothing is written of it, but where all motion is.
+    fn give_up_hold(&mut self) -> Result<(), TableError> {
+        let hold = std::mem::take(&mut self.hold);
+        if self.plan.all {
+            let now = self.last_host.unwrap_or(0.0);
+            for row in hold.rows {
+                self.table.row(&row.text(None), now)?;
+            }
+        }
+        Ok(())
     }
 
     fn next(&mut self, screen: &mut dyn Screen) {
-        self.step += 1;
-        self.next_hold += 1;
-        self.rows_of_pose = 0;
-        for sight in &mut self.sights {
-            (sight.pose_frames, sight.pose_lost) = (0, 0);
-        }
-        self.phase = if self.plan.guide.steps.is_empty() {
-            Phase::Leaving
-        } else {
+        self.as_it_is = false;
+        self.phase = if self.is_guided() {
+            self.step = self.next_missing(self.step + 1);
             Phase::Going
+        } else {
+            Phase::Leaving
         };
         self.announce(screen);
     }
@@ -187,17 +285,21 @@ impl Session {
         let Some(step) = self.step() else {
             return self.plan.guide.steps.is_empty();
         };
-        let (angle, length) = self.plan.near;
         let guided = self.plan.guide.joints.iter().zip(&step.targets);
         matches!(self.plan.joints, JointSource::Udp(_))
             && guided.into_iter().all(|(&column, target)| {
-                let near = match self.plan.columns[column].unit {
-                    Unit::Angle => angle,
-                    Unit::Length => length,
-                };
                 self.joint(column, host, listener)
-                    .is_some_and(|q| (q - target).abs() <= near)
+                    .is_some_and(|q| (q - target).abs() <= self.near(column))
             })
+    }
+
+    /// How near the joint of a column must come to its target, rad or m.
+    fn near(&self, column: usize) -> f64 {
+        let (angle, length) = self.plan.near;
+        match self.plan.columns[column].unit {
+            Unit::Angle => angle,
+            Unit::Length => length,
+        }
     }
 
     /// Processes a frame that arrived at this time of this computer, s.
@@ -240,54 +342,97 @@ impl Session {
         self.see(frame, host);
         let names: Vec<&str> = self.plan.watched.iter().map(|w| w.from.as_str()).collect();
         let quiet = self.still.sees(t, frame, &names);
-        self.advance(quiet, host, listener, screen);
-        let holding = matches!(self.phase, Phase::Holding(_));
-        if holding || self.plan.all {
-            let row = self.row(frame, t, host, holding, listener);
-            self.table.row(&row, host)?;
-        }
-        if holding {
-            self.rows_of_pose += 1;
-        }
-        if let Phase::Holding(since) = self.phase
-            && host - since >= self.plan.hold
-        {
-            self.report_pose(host - since, screen);
-            self.held += 1;
-            self.next(screen);
+        self.advance(quiet, frame, (host, listener), screen)?;
+        match self.phase {
+            Phase::Holding(since) => {
+                let row = self.row(frame, t, host, listener);
+                self.hold.take(&self.plan, frame, row);
+                if host - since >= self.plan.hold {
+                    self.end_hold(host - since, host, screen)?;
+                }
+            }
+            Phase::Continuous => {
+                let row = self.row(frame, t, host, listener);
+                self.table.row(&row.text(None), host)?;
+            }
+            _ if self.plan.all => {
+                let row = self.row(frame, t, host, listener);
+                self.table.row(&row.text(None), host)?;
+            }
+            _ => {}
         }
         Ok(())
     }
 
+    /// A pose was held for as long as asked: it counts where the swept bodies were seen.
+    fn end_hold(
+        &mut self,
+        lasted: f64,
+        host: f64,
+        screen: &mut dyn Screen,
+    ) -> Result<(), TableError> {
+        let lost = self.hold.lost(&self.plan);
+        if !lost.is_empty() && !self.as_it_is {
+            let names: Vec<&str> = lost.iter().map(|moved| moved.name.as_str()).collect();
+            screen.line(&format!(
+                "  {} was lost: the hold is repeated when it is seen (k Enter = count the pose as it is, s Enter = skip it).",
+                names.join(", ")
+            ));
+            self.phase = Phase::Settling;
+            return self.give_up_hold();
+        }
+        self.report_pose(lasted, screen);
+        let number = self.number();
+        let before = self.table.mark()?;
+        for row in std::mem::take(&mut self.hold).rows {
+            self.table.row(&row.text(Some(number)), host)?;
+        }
+        self.table.flush()?;
+        self.last = Some(Last {
+            step: self.step,
+            hold: number,
+            before,
+        });
+        self.held += 1;
+        if self.is_guided() {
+            self.done.insert(self.step);
+        } else {
+            self.free = number;
+        }
+        self.next(screen);
+        Ok(())
+    }
+
     fn see(&mut self, frame: &Frame, host: f64) {
-        let holding = matches!(self.phase, Phase::Holding(_));
         for (watched, sight) in self.plan.watched.iter().zip(&mut self.sights) {
-            let seen = match watched.kind {
-                WatchedKind::Body => frame.bodies.contains_key(&watched.from),
-                WatchedKind::Marker => frame.point(&watched.from).is_some(),
-            };
+            let seen = watched.is_in(frame);
             sight.frames += 1;
             sight.lost += u64::from(!seen);
             sight.lost_since = match (seen, sight.lost_since) {
                 (true, _) => None,
                 (false, since) => since.or(Some(host)),
             };
-            if holding {
-                sight.pose_frames += 1;
-                sight.pose_lost += u64::from(!seen);
-            }
         }
+    }
+
+    /// Moved bodies that are hidden in this frame.
+    fn hidden(&self, frame: &Frame) -> Vec<String> {
+        let moved = self.plan.moved.iter();
+        moved
+            .filter(|moved| !moved.is_in(&self.plan, frame))
+            .map(|moved| moved.name.clone())
+            .collect()
     }
 
     fn advance(
         &mut self,
         quiet: Option<f64>,
-        host: f64,
-        listener: Option<&JointListener>,
+        frame: &Frame,
+        (host, listener): (f64, Option<&JointListener>),
         screen: &mut dyn Screen,
-    ) {
-        if self.is_finished() {
-            return;
+    ) -> Result<(), TableError> {
+        if self.is_finished() || self.phase == Phase::Continuous {
+            return Ok(());
         }
         match self.phase {
             Phase::Going if self.is_there(host, listener) => self.phase = Phase::Settling,
@@ -295,19 +440,26 @@ impl Session {
             _ => {}
         }
         let measured = matches!(self.plan.joints, JointSource::Udp(_));
+        let hidden = self.hidden(frame);
         match (self.phase, quiet) {
-            (Phase::Settling, Some(_)) => self.phase = Phase::Holding(host),
-            (Phase::Holding(_), None) => {
-                screen.line("  The robot moved: the hold starts over.");
-                self.phase = Phase::Settling;
-            }
             // The measured joints have left the target: the robot was only passing.
             (Phase::Holding(_) | Phase::Settling, _)
                 if measured && self.step().is_some() && !self.is_there(host, listener) =>
             {
+                self.give_up_hold()?;
                 self.phase = Phase::Going;
+            }
+            (Phase::Settling, Some(_)) if hidden.is_empty() || self.as_it_is => {
+                self.phase = Phase::Holding(host);
+            }
+            (Phase::Holding(_), None) => {
+                screen.line("  The robot moved: the hold starts over.");
+                self.give_up_hold()?;
+                self.phase = Phase::Settling;
             }
             _ => {}
         }
+        self.waits = self.waiting(quiet, hidden, host, listener);
+        Ok(())
     }
 }

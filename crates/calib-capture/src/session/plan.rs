@@ -1,6 +1,6 @@
 //! What is recorded, and how.
 
-use crate::{Guide, JointColumn, JointSource};
+use crate::{Frame, Guide, JointColumn, JointSource};
 use std::fmt::Write as _;
 
 /// Body or marker.
@@ -23,6 +23,37 @@ pub struct Watched {
     pub kind: WatchedKind,
 }
 
+impl Watched {
+    /// Whether the tracker saw it.
+    pub(super) fn is_in(&self, frame: &Frame) -> bool {
+        match self.kind {
+            WatchedKind::Body => frame.bodies.contains_key(&self.from),
+            WatchedKind::Marker => frame.point(&self.from).is_some(),
+        }
+    }
+}
+
+/// A body that the swept joints move: a pose in which it is hidden says nothing of them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moved {
+    /// Its name in the profile.
+    pub name: String,
+    /// What of [`Plan::watched`] belongs to it: itself, or its markers.
+    pub parts: Vec<usize>,
+}
+
+/// Markers that give the place of a rigid body.
+const RIGID: usize = 3;
+
+impl Moved {
+    /// Whether enough of it was seen: itself, or three of its markers (all, where it has fewer).
+    pub(super) fn is_in(&self, plan: &Plan, frame: &Frame) -> bool {
+        let parts = self.parts.iter().filter_map(|&part| plan.watched.get(part));
+        let seen = parts.filter(|watched| watched.is_in(frame)).count();
+        seen >= self.parts.len().min(RIGID)
+    }
+}
+
 /// What is recorded, and how.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -34,6 +65,10 @@ pub struct Plan {
     pub guide: Guide,
     /// Bodies and markers.
     pub watched: Vec<Watched>,
+    /// Bodies without which a requested pose does not count.
+    pub moved: Vec<Moved>,
+    /// A motion is recorded: every frame is a row, and nothing is held.
+    pub continuous: bool,
     /// How long a pose is recorded, s.
     pub hold: f64,
     /// Distance from the target within which a measured joint is at the pose, rad or m.

@@ -21,6 +21,7 @@ impl Session {
         screen: &mut dyn Screen,
     ) -> Result<Ended, CaptureError> {
         let ended = self.until_end(source, listener, keys, clock, screen);
+        self.give_up_hold()?;
         self.table.flush()?;
         ended
     }
@@ -58,7 +59,9 @@ impl Session {
             while keys_open {
                 match keys.try_recv() {
                     Ok(Key::Quit) => return Ok(Ended::Quit),
-                    Ok(key) => self.key(key, screen),
+                    Ok(Key::Interrupt) => return Ok(Ended::Interrupted),
+                    Ok(Key::Closed) => keys_open = false,
+                    Ok(key) => self.key(key, screen)?,
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => keys_open = false,
                 }

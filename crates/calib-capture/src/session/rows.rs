@@ -1,5 +1,6 @@
 //! One frame as a row of the recording.
 
+use super::hold::Row;
 use super::{Session, WatchedKind};
 use crate::{Frame, JointListener};
 use std::fmt::Write as _;
@@ -10,15 +11,11 @@ impl Session {
         frame: &Frame,
         t: f64,
         host: f64,
-        holding: bool,
         listener: Option<&JointListener>,
-    ) -> String {
-        let mut row = String::new();
+    ) -> Row {
         let number = frame.number.unwrap_or(self.order.taken);
-        let _ = write!(row, "{number},{t:.6},{host:.6},");
-        if holding {
-            let _ = write!(row, "{}", self.next_hold);
-        }
+        let before = format!("{number},{t:.6},{host:.6}");
+        let mut row = String::new();
         for column in 0..self.plan.columns.len() {
             row.push(',');
             if let Some(q) = self.joint(column, host, listener) {
@@ -50,6 +47,6 @@ impl Session {
                 },
             }
         }
-        row
+        Row { before, after: row }
     }
 }

@@ -11,8 +11,12 @@ use std::fmt::Write as _;
 pub struct Summary {
     /// Rows in the file.
     pub rows: u64,
-    /// Poses held.
+    /// Poses held in this session.
     pub poses: usize,
+    /// Poses in the file.
+    pub in_file: usize,
+    /// Requested poses that the file does not have, counted from 1.
+    pub missing: Vec<usize>,
     /// Frames recorded, missing, dropped because they were late.
     pub frames: (u64, u64, u64),
     /// Datagrams or reports that are not from the tracker or cannot be read.
@@ -25,16 +29,13 @@ pub struct Summary {
 
 impl Session {
     pub(super) fn report_pose(&self, held: f64, screen: &mut dyn Screen) {
-        let rows = self.rows_of_pose;
+        let rows = self.hold.rows.len();
         let mut text = format!(
             "  held {held:.1} s: {rows} row{}",
             if rows == 1 { "" } else { "s" }
         );
-        for (watched, sight) in self.plan.watched.iter().zip(&self.sights) {
-            if sight.pose_lost > 0 {
-                let share = 100.0 * sight.pose_lost as f64 / sight.pose_frames.max(1) as f64;
-                let _ = write!(text, "; {} lost in {share:.0} % of them", watched.name);
-            }
+        for (name, share) in self.hold.shares_lost(&self.plan) {
+            let _ = write!(text, "; {name} lost in {:.0} % of them", 100.0 * share);
         }
         screen.line(&text);
     }
@@ -42,14 +43,19 @@ impl Session {
     /// The current state in one line, at this time of this computer, s.
     pub fn status(&self, now: f64) -> String {
         let mut text = match self.plan.guide.steps.len() {
-            0 => format!("pose {}", self.held + 1),
+            _ if self.plan.continuous => format!("{} rows", self.table.rows),
+            0 => format!("pose {}", self.number()),
             n => format!("pose {}/{n}", (self.step + 1).min(n)),
         };
-        let doing = match self.phase {
-            Phase::Going => "moving".to_string(),
-            Phase::Settling => "settling".to_string(),
-            Phase::Holding(since) => format!("held {:.1}/{:.1} s", now - since, self.plan.hold),
-            Phase::Leaving => "move to the next pose".to_string(),
+        let doing = match (&self.waits, self.phase) {
+            (_, Phase::Holding(since)) => {
+                format!("held {:.1}/{:.1} s", now - since, self.plan.hold)
+            }
+            (Some(waits), _) => waits.to_string(),
+            (None, Phase::Going) => "moving".to_string(),
+            (None, Phase::Settling) => "settling".to_string(),
+            (None, Phase::Leaving) => "move to the next pose".to_string(),
+            (None, Phase::Continuous) => "recording".to_string(),
         };
         let _ = write!(text, " · {doing}");
         if let Some(rate) = self.rate {
@@ -85,6 +91,12 @@ impl Session {
         Summary {
             rows: self.table.rows,
             poses: self.held,
+            in_file: if self.is_guided() {
+                self.done.len()
+            } else {
+                self.free as usize
+            },
+            missing: self.missing(),
             frames: (self.order.taken, self.order.missing, self.order.late),
             foreign: self.foreign,
             lost: lost
@@ -99,14 +111,25 @@ impl Session {
     /// Shows what was recorded.
     pub fn report(&self, screen: &mut dyn Screen) {
         let summary = self.summary();
+        let rows = summary.rows;
         let of = match self.plan.guide.steps.len() {
             0 => String::new(),
             n => format!(" of {n}"),
         };
-        screen.line(&format!(
-            "{} rows in the file; {}{of} poses held in this session",
-            summary.rows, summary.poses
-        ));
+        if self.plan.continuous {
+            screen.line(&format!("{rows} rows in the file"));
+        } else {
+            screen.line(&format!(
+                "{rows} rows and {}{of} poses in the file, {} of them from this session",
+                summary.in_file, summary.poses
+            ));
+        }
+        if !summary.missing.is_empty() {
+            screen.line(&format!(
+                "missing: pose {}. Repeat the command with `--append` to record them.",
+                ranges(&summary.missing)
+            ));
+        }
         let (taken, missing, late) = summary.frames;
         screen.line(&format!(
             "frames: {taken} received, {missing} missing, {late} late or duplicate (dropped), {} not readable",
@@ -135,4 +158,18 @@ impl Session {
             ));
         }
     }
+}
+
+/// `2, 5..9`, of ascending numbers.
+fn ranges(numbers: &[usize]) -> String {
+    let runs = numbers.chunk_by(|a, b| a + 1 == *b);
+    let texts: Vec<String> = runs
+        .map(|run| match run {
+            [only] => only.to_string(),
+            [first, second] => format!("{first}, {second}"),
+            [first, .., last] => format!("{first}..{last}"),
+            [] => String::new(),
+        })
+        .collect();
+    texts.join(", ")
 }

@@ -58,6 +58,8 @@ fn plan(name: &str) -> Plan {
             from: name.into(),
             kind: WatchedKind::Body,
         }],
+        moved: Vec::new(),
+        continuous: false,
         hold: 1.0,
         near: (0.02, 0.002),
         all: true,

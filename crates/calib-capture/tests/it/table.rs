@@ -64,7 +64,7 @@ fn a_cut_file_is_read_up_to_its_last_whole_row_and_gone_on_with() {
             .iter()
             .any(|f| f.id == calib_finding::catalog::ROW_CUT_OFF);
         assert_eq!(cut, length > last, "{length}");
-        let mut table = Table::append(&path, HEADER).expect("gone on with");
+        let mut table = Table::append(&path, HEADER, None).expect("gone on with");
         assert_eq!((table.rows, table.last_time), (5, Some(4.25)));
         assert_eq!(table.held, ["1", "2"]);
         table.row(&row(7), 0.0).expect("written");
@@ -91,7 +91,7 @@ fn another_file_is_left_alone() {
         ("frame,t_s\n", "its columns are"),
     ] {
         std::fs::write(&path, text).expect("written");
-        let error = Table::append(&path, HEADER)
+        let error = Table::append(&path, HEADER, None)
             .expect_err("another")
             .to_string();
         assert!(error.contains(expected), "{error}");
@@ -99,11 +99,11 @@ fn another_file_is_left_alone() {
     }
     let own = format!("{HEADER}\n");
     std::fs::write(&path, &own).expect("written");
-    let error = Table::append(&path, HEADER)
+    let error = Table::append(&path, HEADER, None)
         .expect_err("by hand")
         .to_string();
     assert!(error.contains("not made by `calib record`"), "{error}");
-    assert!(Table::append(&folder.path().join("none.csv"), HEADER).is_err());
+    assert!(Table::append(&folder.path().join("none.csv"), HEADER, None).is_err());
 }
 
 #[test]

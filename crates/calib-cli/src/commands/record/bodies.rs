@@ -1,10 +1,11 @@
-//! Bodies and markers: the profile's names and the tracker's.
+//! Bodies and markers: the profile's names and the tracker's, and what the swept joints move.
 
 use std::collections::BTreeMap;
 
-use calib_capture::{Screen, Survey, Watched, WatchedKind, map_names};
+use calib_capture::{Moved, Screen, Survey, Watched, WatchedKind, map_names};
 use calib_pipeline::prepare::load::RobotProfile;
-use calib_profile::BodyKind;
+use calib_profile::{Body, BodyKind, RecordingSpec};
+use calib_urdf::{JointId, LinkId, RobotModel};
 
 use super::RecordError;
 
@@ -60,4 +61,53 @@ pub(super) fn watched(
         .collect();
     screen.line(&format!("recorded: {}", names.join(", ")));
     Ok(watched)
+}
+
+/// Recorded bodies that the swept joints move.
+pub(super) fn moved(robot: &RobotProfile, spec: &RecordingSpec, watched: &[Watched]) -> Vec<Moved> {
+    let of_body = |(name, body): (&String, &Body)| {
+        let mut joints = joints_to(&robot.model, body.link);
+        if !joints.any(|joint| spec.ranges.contains_key(&joint)) {
+            return None;
+        }
+        let parts = watched.iter().enumerate();
+        let parts = parts.filter(|(_, w)| match &body.kind {
+            BodyKind::Pose => w.name == *name,
+            BodyKind::Markers { names, .. } => names.contains(&w.name),
+        });
+        let parts: Vec<usize> = parts.map(|(part, _)| part).collect();
+        (!parts.is_empty()).then(|| Moved {
+            name: name.clone(),
+            parts,
+        })
+    };
+    robot.profile.bodies.iter().filter_map(of_body).collect()
+}
+
+/// Joints that move a recorded body, in the order of the file.
+pub(super) fn joints_of(robot: &RobotProfile, watched: &[Watched]) -> Vec<JointId> {
+    let recorded = |(name, body): &(&String, &Body)| match &body.kind {
+        BodyKind::Pose => watched.iter().any(|w| w.name == **name),
+        BodyKind::Markers { names, .. } => watched.iter().any(|w| names.contains(&w.name)),
+    };
+    let bodies: Vec<LinkId> = robot
+        .profile
+        .bodies
+        .iter()
+        .filter(recorded)
+        .map(|(_, body)| body.link)
+        .collect();
+    let moves = |joint: &JointId| {
+        let mut chains = bodies.iter().map(|link| joints_to(&robot.model, *link));
+        chains.any(|mut chain| chain.any(|other| other == *joint))
+    };
+    robot.model.independent_joints().filter(moves).collect()
+}
+
+/// Joints between a link and the root.
+fn joints_to(model: &RobotModel, link: LinkId) -> impl Iterator<Item = JointId> + '_ {
+    let joint_above = |link: LinkId| model.link(link).parent_joint;
+    std::iter::successors(joint_above(link), move |joint| {
+        joint_above(model.joint(*joint).parent)
+    })
 }

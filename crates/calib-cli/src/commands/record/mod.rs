@@ -10,8 +10,8 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Instant, SystemTime};
 
 use calib_capture::{
-    Address, CaptureError, JointListener, JointSource, Key, Lines, Plan, Screen, Session, Source,
-    SourceError, Table, TableError, Terminal, survey,
+    Address, CaptureError, JointListener, JointSource, Key, Lines, POSES, Plan, Screen, Session,
+    Source, SourceError, Table, TableError, Terminal, survey,
 };
 use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::load::{RobotProfile, load_robot};
@@ -22,7 +22,7 @@ use super::plugin_options::PluginOptions;
 use crate::error::CliError;
 use crate::terminal::{Console, emit_paths, say_stage};
 use error::RecordError;
-use plan::{guide_ranges, plan};
+use plan::{assumed_zero, guide_ranges, is_continuous, plan};
 
 /// How long the tracker is listened to before the columns are decided, s.
 const SURVEY: f64 = 1.0;
@@ -115,7 +115,10 @@ fn record(
     let (name, spec) = choose(robot, options)?;
     let address: Address = options.source.parse().map_err(RecordError::Source)?;
     let joints: JointSource = options.joints.parse().map_err(RecordError::Joints)?;
-    if guide_ranges(robot, spec).is_empty() && joints == JointSource::Targets {
+    // Joint values come from the poses that are asked for, from the robot, or from its own log.
+    let asks = !guide_ranges(robot, spec).is_empty() && !is_continuous(spec);
+    let logs = is_continuous(spec) && spec.robot_log.is_some();
+    if !asks && !logs && joints == JointSource::Targets {
         let recording = name.to_owned();
         return Err(RecordError::NoJoints { recording }.into());
     }
@@ -129,6 +132,7 @@ fn record(
     screen.line(&format!(
         "recording `{name}` from {address}; joint values: {}",
         match joints {
+            JointSource::Targets if logs => "in the robot's own log".to_string(),
             JointSource::Targets => "the requested poses (commanded, not measured)".to_string(),
             JointSource::Udp(port) => format!("from the robot, UDP port {port}"),
         }
@@ -154,9 +158,9 @@ fn record(
     let path = out_path(robot, spec, options);
     let header = plan.header();
     let table = if options.append && path.exists() {
-        Table::append(&path, &header)
+        Table::append(&path, &header, plan.guide.poses(&plan.columns).as_deref())
     } else {
-        let comments = comments(robot, name, &address, joints, &plan);
+        let comments = comments(robot, (name, spec), &address, joints, &plan);
         Table::create(&path, &comments, &header)
     };
     let table = table.map_err(CaptureError::from)?;
@@ -213,7 +217,7 @@ fn listener(joints: JointSource) -> Result<Option<JointListener>, CaptureError> 
 
 fn comments(
     robot: &RobotProfile,
-    name: &str,
+    (name, spec): (&str, &RecordingSpec),
     address: &Address,
     joints: JointSource,
     plan: &Plan,
@@ -230,7 +234,15 @@ fn comments(
         "t_s: the tracker's clock; host_s: this computer's clock when the frame arrived, s since 1970".to_string(),
         "hold: the pose, counted from 1".to_string(),
     ];
+    if let Some(poses) = plan.guide.poses(&plan.columns) {
+        comments.push(format!("{POSES}{poses}"));
+    }
+    let zero = assumed_zero(robot, spec, &plan.columns, &plan.watched);
+    if !zero.is_empty() {
+        comments.push(format!("joints taken as 0: {}", zero.join(", ")));
+    }
     comments.push(match joints {
+        JointSource::Targets if plan.continuous => "joints: in the robot's own log".to_string(),
         JointSource::Targets => "joints: the requested poses; commanded, not measured".to_string(),
         JointSource::Udp(_) => {
             "joints: as the robot sent them, the last value not older than 0.5 s".to_string()
@@ -254,15 +266,22 @@ fn clock() -> impl Fn() -> f64 {
     move || offset + began.elapsed().as_secs_f64()
 }
 
-/// Lines of standard input as keys; the channel closes when it ends.
+/// Lines of standard input as keys, and the interrupt of the terminal.
 fn keys() -> Receiver<Key> {
     let (send, receive) = channel();
+    let interrupts = send.clone();
+    // Where another part of the program listens already, an interrupt stops the program as it always did.
+    let _ = ctrlc::set_handler(move || {
+        let _ = interrupts.send(Key::Interrupt);
+    });
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines() {
-            let Ok(line) = line else { return };
+            let Ok(line) = line else { break };
             let key = match line.trim() {
                 "" => Key::There,
                 "s" => Key::Skip,
+                "r" => Key::Repeat,
+                "k" => Key::Keep,
                 "q" => Key::Quit,
                 _ => continue,
             };
@@ -270,6 +289,7 @@ fn keys() -> Receiver<Key> {
                 return;
             }
         }
+        let _ = send.send(Key::Closed);
     });
     receive
 }

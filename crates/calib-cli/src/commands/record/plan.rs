@@ -1,12 +1,12 @@
 //! What a capture session is asked for: columns, poses and bodies.
 
 use calib_capture::{
-    Guide, JointColumn, JointSource, Plan, Screen, Survey, Unit, grid, parse_joints,
+    Guide, JointColumn, JointSource, Plan, Screen, Survey, Unit, Watched, grid, parse_joints,
 };
 use calib_pipeline::prepare::load::RobotProfile;
-use calib_profile::RecordingSpec;
+use calib_profile::{RecordingSpec, TimedPoses};
 
-use super::bodies::watched;
+use super::bodies::{joints_of, moved, watched};
 use super::{Record, RecordError};
 
 /// How near a measured joint must come to its target: 1°, 2 mm.
@@ -25,9 +25,14 @@ pub(super) fn plan(
     let (swept, ranges): (Vec<JointColumn>, Vec<(f64, f64)>) =
         guide_ranges(robot, spec).into_iter().unzip();
     let poses = checked(options, swept.len())?;
+    let continuous = is_continuous(spec);
     let guide = Guide {
         joints: (0..swept.len()).collect(),
-        steps: grid(&ranges, poses),
+        steps: if continuous {
+            Vec::new()
+        } else {
+            grid(&ranges, poses)
+        },
         ranges,
     };
     let columns = columns(robot, spec, (swept, &options.at), heard, screen)?;
@@ -43,11 +48,16 @@ pub(super) fn plan(
         ));
     }
     let watched = watched(robot, &options.map, heard, screen)?;
-    if !guide.steps.is_empty() {
+    let moved = moved(robot, spec, &watched);
+    if moved.is_empty() && !spec.ranges.is_empty() {
+        screen.line(
+            "The swept joints move none of the recorded bodies. Map one that they move (`--map`).",
+        );
+    }
+    say_zero(&assumed_zero(robot, spec, &columns, &watched), screen);
+    if let Some(poses) = guide.poses(&columns) {
         screen.line(&format!(
-            "{} poses of {}. Keys: Enter = the robot is at the pose; s Enter = skip the pose; q Enter = stop.",
-            guide.steps.len(),
-            guide.shown_ranges(&columns)
+            "{poses}. Keys, each with Enter: none = the robot is at the pose; r = record the last pose again; s = skip the pose; k = count the pose though a body is hidden; q = stop."
         ));
     }
     Ok(Plan {
@@ -55,12 +65,48 @@ pub(super) fn plan(
         joints,
         guide,
         watched,
+        moved,
+        continuous,
         hold: options.hold,
         near: NEAR,
         all: options.all,
         patience: options.patience,
         longest: options.seconds,
     })
+}
+
+/// Whether a motion is recorded instead of poses.
+pub(super) fn is_continuous(spec: &RecordingSpec) -> bool {
+    spec.timing
+        .is_some_and(|timing| timing.poses == TimedPoses::Continuous)
+}
+
+/// Joints that move a recorded body, without a column and without a value in the profile: they are taken as 0.
+pub(super) fn assumed_zero(
+    robot: &RobotProfile,
+    spec: &RecordingSpec,
+    columns: &[JointColumn],
+    watched: &[Watched],
+) -> Vec<String> {
+    // Where the robot writes a log of its own, its joints are there.
+    if spec.robot_log.is_some() {
+        return Vec::new();
+    }
+    let joints = joints_of(robot, watched).into_iter();
+    let named = joints.filter(|id| !spec.hold.contains_key(id));
+    let names = named.map(|id| robot.model.joint(id).name.clone());
+    names
+        .filter(|name| !columns.iter().any(|c| c.name == *name))
+        .collect()
+}
+
+fn say_zero(joints: &[String], screen: &mut dyn Screen) {
+    if let Some(first) = joints.first() {
+        screen.line(&format!(
+            "taken as 0, because nobody sends them: {}. State those that stand elsewhere: --at {first}_deg=20",
+            joints.join(", ")
+        ));
+    }
 }
 
 /// Values of each joint and durations that make sense.

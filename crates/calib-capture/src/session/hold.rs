@@ -1,0 +1,67 @@
+//! The pose that is being held: its rows wait until the whole hold is good, so that no part of one is in the file.
+
+use super::plan::{Moved, Plan};
+use crate::Frame;
+
+/// A frame's row, but for the number of its hold.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Row {
+    /// Columns before the hold's.
+    pub before: String,
+    /// Columns after it.
+    pub after: String,
+}
+
+impl Row {
+    /// With the number of a hold, or without.
+    pub(super) fn text(&self, hold: Option<u64>) -> String {
+        let hold = hold.map_or_else(String::new, |number| number.to_string());
+        format!("{},{hold}{}", self.before, self.after)
+    }
+}
+
+/// The rows of a hold, and how often each thing was seen in it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Hold {
+    pub rows: Vec<Row>,
+    /// Frames in which each body or marker of the plan was seen.
+    seen: Vec<u64>,
+    /// Frames in which each moved body was seen.
+    moved: Vec<u64>,
+}
+
+/// A moved body must be seen in this share of a hold: its median is then of the pose, whatever the rest shows.
+const ENOUGH: f64 = 0.5;
+
+impl Hold {
+    /// Takes a frame.
+    pub(super) fn take(&mut self, plan: &Plan, frame: &Frame, row: Row) {
+        self.rows.push(row);
+        self.seen.resize(plan.watched.len(), 0);
+        self.moved.resize(plan.moved.len(), 0);
+        for (watched, seen) in plan.watched.iter().zip(&mut self.seen) {
+            *seen += u64::from(watched.is_in(frame));
+        }
+        for (moved, seen) in plan.moved.iter().zip(&mut self.moved) {
+            *seen += u64::from(moved.is_in(plan, frame));
+        }
+    }
+
+    /// Moved bodies that were not seen often enough.
+    pub(super) fn lost<'p>(&self, plan: &'p Plan) -> Vec<&'p Moved> {
+        let frames = self.rows.len() as f64;
+        let each = plan.moved.iter().zip(&self.moved);
+        each.filter(|(_, seen)| (**seen as f64) < ENOUGH * frames)
+            .map(|(moved, _)| moved)
+            .collect()
+    }
+
+    /// Share of the frames without each body or marker that was lost in some.
+    pub(super) fn shares_lost<'p>(&self, plan: &'p Plan) -> Vec<(&'p str, f64)> {
+        let frames = self.rows.len() as u64;
+        let each = plan.watched.iter().zip(&self.seen);
+        each.filter(|(_, seen)| **seen < frames)
+            .map(|(w, seen)| (w.name.as_str(), (frames - seen) as f64 / frames as f64))
+            .collect()
+    }
+}
