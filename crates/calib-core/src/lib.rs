@@ -154,7 +154,7 @@ pub use analysis::select::{
 pub use analysis::solution::{NoiseEstimate, ParameterClass, ParameterEstimate, Solution};
 pub use analysis::spread::{LinearPoint, Placement, PostureSpread, SizeSpread, SpreadDirection};
 pub use analysis::starts::StartDirection;
-pub use analysis::untested::{MovedPoint, Moves, OpenError, OpenErrors, UntestedEffect};
+pub use analysis::untested::{MovedPoint, Moves, OpenCause, OpenError, OpenErrors, UntestedEffect};
 pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
 pub use analysis::weigh::{NoiseCandidate, NoiseChoice, NoiseLevel, Weighed};
 pub use graph::axis::Axis;

@@ -6,8 +6,8 @@ mod common;
 use std::collections::BTreeSet;
 
 use calib_core::{
-    Configuration, MovedPoint, Moves, NoiseKind, OpenErrors, Settings, Solution, Target,
-    UntestedEffect, solve,
+    Change, ChangeSettings, Configuration, MovedPoint, Moves, NoiseKind, OpenCause, OpenErrors,
+    Settings, Solution, Target, UntestedEffect, solve,
 };
 use common::*;
 
@@ -34,11 +34,17 @@ fn rig(seed: u64, gain: f64) -> Rig {
 
 /// The same, with joints that the fit knows to be noisy.
 fn rig_with(seed: u64, gain: f64, joints: Option<f64>) -> Rig {
+    rig_of(seed, gain, joints, (FITTED, HELD_OUT))
+}
+
+/// The same with so many fitted and held-out poses.
+fn rig_of(seed: u64, gain: f64, joints: Option<f64>, count: (usize, usize)) -> Rig {
+    let (fitted, held_out) = count;
     let mut r = rng(seed);
     let mut free = Free::everything(6);
     free.prior = Some((0.005, 0.002));
     let chain = Chain::nominal(six_r()).deviate(&mut r, &free, 0.005, 0.002);
-    let chain = chain.posed(&mut r, FITTED + HELD_OUT, 1.2);
+    let chain = chain.posed(&mut r, fitted + held_out, 1.2);
     let gain = gain * normal(&mut r);
     let mut handles = chain.problem(&free, SIGMA);
     handles.problem.group_mut(handles.markers).estimate = false;
@@ -57,7 +63,7 @@ fn rig_with(seed: u64, gain: f64, joints: Option<f64>) -> Rig {
         (0..6).map(|j| moved(j) + noise[s][j]).collect()
     };
     chain.observe_moved(&mut r, &mut handles, SIGMA, extra);
-    handles.problem.held_out = (FITTED..FITTED + HELD_OUT).collect();
+    handles.problem.held_out = (fitted..fitted + held_out).collect();
     let solution = solve(&handles.problem, &Settings::plain()).expect("solved");
     Rig {
         chain,
@@ -75,6 +81,11 @@ fn postures() -> Vec<Vec<f64>> {
 }
 
 fn open(rig: &Rig, looked_at: &[usize]) -> OpenErrors {
+    open_with(rig, looked_at, 1, None)
+}
+
+/// With a change that was found as a second cause; the design from every `step`-th sample.
+fn open_with(rig: &Rig, looked_at: &[usize], step: usize, change: Option<&Change>) -> OpenErrors {
     let h = &rig.handles;
     let postures = postures();
     let point = |q: &Vec<f64>| {
@@ -92,9 +103,13 @@ fn open(rig: &Rig, looked_at: &[usize]) -> OpenErrors {
         at_samples: looked_at.iter().map(|s| rig.chain.q[*s][JOINT]).collect(),
         at_postures: postures.iter().map(|q| q[JOINT]).collect(),
     };
-    let found = rig
-        .solution
-        .open_errors(looked_at, 1.0, &[vec![effect]], &points);
+    let found = change.map(|change| OpenCause::Found {
+        change,
+        carries: true,
+    });
+    let gain = OpenCause::Effects(vec![effect]);
+    let causes: Vec<OpenCause<'_>> = std::iter::once(gain).chain(found).collect();
+    let found = rig.solution.open_errors(looked_at, step, &causes, &points);
     found.expect("postures")
 }
 
@@ -165,6 +180,101 @@ fn without_an_effect_the_parameters_alone_are_left() {
         assert!(sigma(&with_held_out) < GAIN);
     }
     assert!((0.7..1.4).contains(&(found / expected)));
+}
+
+/// Many rows of which a part stands for all: what that part happens to say must not be multiplied.
+#[test]
+fn a_part_of_many_rows_makes_no_error_larger() {
+    const ROWS: usize = 120;
+    let all: Vec<usize> = (0..ROWS).collect();
+    let (mut with, mut of_all, mut stated) = (0.0, 0.0, 0.0);
+    for seed in 500..508 {
+        let rig = rig_of(seed, 0.0, None, (ROWS, 0));
+        let part = open_with(&rig, &all, 4, None);
+        let exact = open_with(&rig, &all, 1, None);
+        assert!(
+            (part.alone.rms / part.stated - 1.0).abs() < 0.3,
+            "{:?} {}",
+            part.alone,
+            part.stated
+        );
+        with += part.with[0].rms.powi(2);
+        of_all += exact.with[0].rms.powi(2);
+        stated += part.stated.powi(2);
+    }
+    // One number more beside those of the fit.
+    assert!(with < 2.0 * stated, "{}", with / stated);
+    // Thirty samples of the design; multiplied residuals would make it 4.
+    assert!((0.6..1.8).contains(&(with / of_all)), "{}", with / of_all);
+}
+
+/// A body that slips, the last fifth of the rows after it, and a fit that does not know: the robot is used as it is after.
+fn slipped(seed: u64) -> (Rig, Change) {
+    const ROWS: usize = 40;
+    const FIRST: usize = 32;
+    const SLIP: f64 = 1e-3;
+    let mut r = rng(seed);
+    let mut free = Free::everything(6);
+    free.prior = Some((0.005, 0.002));
+    let chain = Chain::nominal(six_r()).deviate(&mut r, &free, 0.005, 0.002);
+    let mut chain = chain.posed(&mut r, ROWS, 1.2);
+    let mut handles = chain.problem(&free, SIGMA);
+    handles.problem.group_mut(handles.markers).estimate = true;
+    let direction = normal3(&mut r).normalize() * SLIP;
+    let mut seen = Vec::new();
+    for s in 0..ROWS {
+        if s == FIRST {
+            chain.true_mount *= nalgebra::Translation3::from(direction);
+        }
+        let x = chain.tracker_from_body(&chain.q[s], &[0.0; 6]);
+        for (m, p) in chain.markers.iter().enumerate() {
+            seen.push(calib_core::MarkerObservation {
+                sample: s,
+                point: handles.points[m],
+                position: x * p + normal3(&mut r) * SIGMA,
+                shape: None,
+            });
+        }
+    }
+    let (tracker, body, group) = (handles.tracker, handles.body, handles.markers);
+    handles.problem.markers("body", tracker, body, group, seen);
+    let mut settings = Settings::default();
+    settings.robust.enabled = false;
+    let solution = solve(&handles.problem, &settings).expect("solved");
+    let scan = solution
+        .changes(&ChangeSettings::default())
+        .expect("a scan");
+    let change = scan.significant().expect("a slip").clone();
+    let rig = Rig {
+        chain,
+        solution,
+        handles,
+        gain: 0.0,
+    };
+    (rig, change)
+}
+
+#[test]
+fn a_slip_that_was_found_is_in_the_expected_error() {
+    let all: Vec<usize> = (0..40).collect();
+    let (mut found, mut expected, mut alone, mut covered) = (0.0, 0.0, 0.0, 0);
+    const ROBOTS: usize = 8;
+    for seed in 0..ROBOTS as u64 {
+        let (rig, change) = slipped(600 + seed);
+        let (open, error) = (open_with(&rig, &all, 1, Some(&change)), truth(&rig));
+        found += error;
+        expected += open.with[1].rms.powi(2);
+        alone += open.alone.rms.powi(2);
+        covered += usize::from(error.sqrt() <= open.with[1].upper);
+    }
+    // The parameters alone do not know of it.
+    assert!(found > 3.0 * alone, "{}", found / alone);
+    assert!(
+        (0.7..1.4).contains(&(found / expected)),
+        "{}",
+        found / expected
+    );
+    assert!(covered >= ROBOTS - 1, "{covered}");
 }
 
 #[test]

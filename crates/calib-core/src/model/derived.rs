@@ -238,6 +238,7 @@ impl Solution {
         Ok(MovedPoint {
             by: by.collect(),
             turn: pose.r,
+            place: local.coords,
             point: LinearPoint {
                 position: Point3::from(pose.r * local.coords + pose.t),
                 jacobian,

@@ -8,6 +8,7 @@ use calib_core::{
 };
 
 use crate::formulate::kinematics::Calibration;
+use crate::prepare::inputs::Inputs;
 use crate::prepare::loads::FirstMoment;
 
 /// What to free in a solve: the profile's choice, or the bodies and the robot's place only.
@@ -95,6 +96,17 @@ impl Formulation {
     #[must_use]
     pub fn borders(&self) -> Vec<usize> {
         self.problem.borders.clone()
+    }
+
+    /// The body of a frame; markers without a frame of their own are points of their link.
+    pub(crate) fn body_of<'a>(&'a self, inputs: &'a Inputs, frame: FrameId) -> Option<&'a String> {
+        let own = self.bodies.iter().find(|(_, f)| **f == frame);
+        let on_link = || {
+            let mut bodies = inputs.robot.profile.bodies.iter();
+            bodies.find(|(_, b)| self.links[b.link.index()] == Some(frame))
+        };
+        own.map(|(name, _)| name)
+            .or_else(|| on_link().map(|(name, _)| name))
     }
 }
 

@@ -71,7 +71,7 @@ pub(crate) fn facts(
         goodness: e.fit.map(|fit| goodness(e, fit)),
         prediction: e
             .fit
-            .and_then(|fit| open::prediction(e.inputs, fit, held_out)),
+            .and_then(|fit| open::prediction(e.inputs, fit, held_out, e.causes.changed.as_ref())),
         agreement: e
             .fit
             .filter(|_| !left_out)

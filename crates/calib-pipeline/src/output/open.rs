@@ -12,11 +12,13 @@
 //! | zero of a joint, a step | 0.2° | a tooth of a belt, a slipped coupling |
 //! | drift of the tracker | 1 mm along each axis | a stand that warms or settles in an hour |
 //! | step of the tracker or of a body | 1 mm along each axis | a touch that nobody noticed |
+//! | a change that was found and not split | as found | it is in the data |
 
 use std::collections::BTreeSet;
 
 use calib_core::{
-    EffectKind, FrameId, JointState, MovedPoint, Moves, OpenError, Target, UntestedEffect,
+    Change, EffectKind, FrameId, JointState, Moved, MovedPoint, Moves, OpenCause, OpenError,
+    Target, UntestedEffect,
 };
 use calib_profile::Usage;
 use calib_report::{Agreement, HeldOut, Predicted, Prediction, Untested, UntestedKind};
@@ -29,9 +31,12 @@ use crate::prepare::conditions::Conditions;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::loads::Loads;
 use crate::verify::accuracy::configuration;
+use crate::verify::changes::name_of;
 
-/// Samples that are looked at, at most: more change nothing but the time.
-const SAMPLES: usize = 300;
+/// Samples that are looked at, at most: they tell effects of a fiftieth of the noise of one from nothing.
+const SAMPLES: usize = 4096;
+/// Samples that the design is taken from, at most: more change nothing but the time.
+const DESIGN: usize = 300;
 
 const GAIN: f64 = 0.005;
 const CROSSTALK: f64 = 0.01;
@@ -42,11 +47,13 @@ const YIELD: f64 = 0.2 * DEGREE;
 const STEP: f64 = 0.2 * DEGREE;
 const MOVED: f64 = 1e-3;
 
-/// Over the joint ranges of all recordings; `None` where no body was in the tracker's sight.
+/// Over the joint ranges of all recordings, with what `changed` while they were made; `None` where no body was in the tracker's
+/// sight.
 pub(crate) fn prediction(
     inputs: &Inputs,
     fit: &MlFit,
     held_out: Option<&HeldOut>,
+    changed: Option<&Change>,
 ) -> Option<Prediction> {
     // Where a robot stands that only touched something is a convention.
     if inputs.robot.profile.bodies.is_empty() {
@@ -66,12 +73,17 @@ pub(crate) fn prediction(
     let step = kept.len().div_ceil(SAMPLES).max(1);
     let looked_at: Vec<usize> = kept.into_iter().step_by(step).collect();
     let at = Places::new(inputs, fit, &looked_at, &box_of)?;
-    let mut effects = at.of_joints();
-    effects.extend(at.of_places(&name, target));
-    let (names, effects): (Vec<Untested>, Vec<Vec<UntestedEffect>>) = effects.into_iter().unzip();
+    let effects = at
+        .of_joints()
+        .into_iter()
+        .chain(at.of_places(&name, target));
+    let effects = effects.map(|(what, effects)| (what, OpenCause::Effects(effects)));
+    let found = changed.and_then(|change| of_change(inputs, fit, target, change));
+    let (names, causes): (Vec<Untested>, Vec<OpenCause<'_>>) = effects.chain(found).unzip();
+    let step = looked_at.len().div_ceil(DESIGN);
     let found = fit
         .solution
-        .open_errors(&looked_at, step as f64, &effects, &points)?;
+        .open_errors(&looked_at, step, &causes, &points)?;
     let worst = names
         .into_iter()
         .zip(&found.with)
@@ -82,6 +94,35 @@ pub(crate) fn prediction(
         alone: predicted(&found.alone),
         with: worst.map(|(name, with)| (name, predicted(with))),
     })
+}
+
+/// A change that the scan found, where a prediction can be wrong by it.
+fn of_change<'a>(
+    inputs: &Inputs,
+    fit: &MlFit,
+    target: Target,
+    change: &'a Change,
+) -> Option<(Untested, OpenCause<'a>)> {
+    let kind = match change.moved {
+        Moved::Body(_) => UntestedKind::Slip,
+        Moved::Reference(_) => UntestedKind::Bump,
+        Moved::Joint(_) => UntestedKind::Step,
+        Moved::Drift(_) => UntestedKind::Drift,
+        // What is predicted is seen by the same tracker.
+        _ => return None,
+    };
+    let name = name_of(inputs, fit, change.moved)?;
+    let carries = matches!(change.moved, Moved::Body(body) if frame_of(fit, target) == Some(body));
+    Some((untested(kind, &name), OpenCause::Found { change, carries }))
+}
+
+/// The frame that a target lies in.
+fn frame_of(fit: &MlFit, target: Target) -> Option<FrameId> {
+    match target {
+        Target::Frame(frame) => Some(frame),
+        Target::Point(point) => Some(fit.formulation.problem.points()[point.index()].frame),
+        _ => None,
+    }
 }
 
 fn predicted(error: &OpenError) -> Predicted {
@@ -241,11 +282,8 @@ impl<'a> Places<'a> {
     }
 
     fn of_places(&self, name: &str, target: Target) -> Vec<(Untested, Vec<UntestedEffect>)> {
-        let problem = &self.fit.formulation.problem;
-        let body: FrameId = match target {
-            Target::Frame(frame) => frame,
-            Target::Point(point) => problem.points()[point.index()].frame,
-            _ => return Vec::new(),
+        let Some(body) = frame_of(self.fit, target) else {
+            return Vec::new();
         };
         let tracker = self.fit.formulation.tracker;
         let frame = &self.inputs.robot.profile.tracker.frame;

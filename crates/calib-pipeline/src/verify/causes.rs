@@ -1,7 +1,7 @@
 //! What made the residuals: missing effects, a change while recording, or what was suspected before the fit. Each is stated only
 //! where it explains something beside the others.
 
-use calib_core::{ChangeScan, Contest, EffectKind, GoodnessOfFit, ScoreTest, Suspect};
+use calib_core::{Change, ChangeScan, Contest, EffectKind, GoodnessOfFit, ScoreTest, Suspect};
 use calib_finding::{Fact, Finding, catalog};
 
 use super::elimination::{Asked, Held, eliminated};
@@ -30,11 +30,20 @@ pub struct Causes {
     pub alike: Vec<(String, Vec<String>)>,
     /// What changed while recording.
     pub change: Option<Finding>,
+    /// The same, as the scan found it.
+    pub changed: Option<Change>,
     /// Findings from before the fit that other causes explain.
     pub explained: Vec<Finding>,
 }
 
 impl Causes {
+    /// The change that the finding tells, as it was found.
+    fn with_change_of(mut self, scan: Option<&ChangeScan>) -> Self {
+        let told = self.change.as_ref().and(scan);
+        self.changed = told.and_then(ChangeScan::significant).cloned();
+        self
+    }
+
     /// Takes out what other causes explain.
     pub fn leave_unexplained(&self, findings: &mut Vec<Finding>) {
         findings.retain(|finding| !self.explained.contains(finding));
@@ -64,12 +73,15 @@ impl Cause<'_> {
 #[must_use]
 pub fn causes(inputs: &Inputs, fit: &MlFit, before: &[Finding]) -> Causes {
     let (scan, goodness) = rayon::join(|| changes::scan(fit), || fit.solution.goodness_of_fit());
-    let everything = || Causes {
-        change: scan.as_ref().and_then(|scan| {
-            changes::finding(inputs, fit, scan, Beside::of_tests(goodness.as_ref()))
-        }),
-        goodness: goodness.clone(),
-        ..Causes::default()
+    let everything = || {
+        Causes {
+            change: scan.as_ref().and_then(|scan| {
+                changes::finding(inputs, fit, scan, Beside::of_tests(goodness.as_ref()))
+            }),
+            goodness: goodness.clone(),
+            ..Causes::default()
+        }
+        .with_change_of(scan.as_ref())
     };
     let suspected = suspected(inputs, fit, before, scan.as_ref(), goodness.as_ref());
     let Some((list, contest)) = suspected else {
@@ -255,7 +267,9 @@ impl Outcome<'_> {
                 goodness
             }),
             explained,
+            changed: None,
         }
+        .with_change_of(scan)
     }
 
     /// The effect that holds, and that a change explains as well as.

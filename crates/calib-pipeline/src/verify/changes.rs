@@ -76,6 +76,12 @@ pub fn finding(inputs: &Inputs, fit: &MlFit, scan: &ChangeScan, beside: Beside) 
     })
 }
 
+/// What moved, as the profile and the URDF call it.
+#[must_use]
+pub fn name_of(inputs: &Inputs, fit: &MlFit, moved: Moved) -> Option<String> {
+    Names { inputs, fit }.of(moved)
+}
+
 /// What the parts of the problem are called.
 struct Names<'a> {
     inputs: &'a Inputs,
@@ -83,18 +89,8 @@ struct Names<'a> {
 }
 
 impl Names<'_> {
-    /// The body of a frame; markers without a frame of their own are points of their link.
     fn body(&self, frame: FrameId) -> Option<&String> {
-        let formulation = &self.fit.formulation;
-        let own = formulation.bodies.iter().find(|(_, f)| **f == frame);
-        let on_link = || {
-            let bodies = &self.inputs.robot.profile.bodies;
-            let mut on = bodies
-                .iter()
-                .filter(|(_, b)| formulation.links[b.link.index()] == Some(frame));
-            on.next().map(|(name, _)| name)
-        };
-        own.map(|(name, _)| name).or_else(on_link)
+        self.fit.formulation.body_of(self.inputs, frame)
     }
 
     fn joint(&self, edge: EdgeId) -> Option<&Joint> {

@@ -15,7 +15,7 @@ use crate::solve::whitened::Whitened;
 
 /// How a candidate's columns enter over the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Pattern {
+pub(crate) enum Pattern {
     /// In a range of samples.
     Step,
     /// In proportion to the place of the sample, from −½ to ½.
@@ -24,7 +24,7 @@ pub(super) enum Pattern {
     Constant,
 }
 
-pub(super) struct Candidate {
+pub(crate) struct Candidate {
     pub moved: Moved,
     pub pattern: Pattern,
     /// Its columns among those of all candidates; candidates of one frame share them.
@@ -32,7 +32,7 @@ pub(super) struct Candidate {
 }
 
 /// What is tried, and the columns that it needs.
-pub(super) struct Candidates {
+pub(crate) struct Candidates {
     pub list: Vec<Candidate>,
     /// Count of columns.
     pub width: usize,
@@ -46,7 +46,7 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    pub(super) fn new(solution: &Solution) -> Self {
+    pub(crate) fn new(solution: &Solution) -> Self {
         let model = &solution.model;
         let mut out = Self {
             list: Vec::new(),
@@ -125,8 +125,14 @@ impl Candidates {
         }
     }
 
+    /// Middle of what a measuring frame sees, m: what its rotations are about.
+    pub(crate) fn middle(&self, frame: FrameId) -> Vector3<f64> {
+        let known = self.middles.iter().find(|(f, _)| *f == frame);
+        known.map_or_else(Vector3::zeros, |(_, middle)| *middle)
+    }
+
     /// B̃ = L⁻¹ B of one sample, all candidates side by side.
-    pub(super) fn whitened(
+    pub(crate) fn whitened(
         &self,
         solution: &Solution,
         sample: usize,
@@ -196,7 +202,7 @@ impl Candidates {
     }
 
     /// P of equation (1) for each column of a candidate, from how far things move at most.
-    pub(super) fn prior(&self, candidate: usize) -> f64 {
+    pub(crate) fn prior(&self, candidate: usize) -> f64 {
         /// 0.2 rad, 0.2 m: a body that moved farther is found before the fit.
         const WIDE: f64 = 0.2;
         /// 1 %: a tracker whose scale is worse is broken.

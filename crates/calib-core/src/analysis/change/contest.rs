@@ -289,7 +289,7 @@ impl Solution {
 }
 
 /// How much a change holds in each sample.
-fn holds(
+pub(crate) fn holds(
     change: &Change,
     pattern: Pattern,
     borders: &[usize],

@@ -22,7 +22,7 @@
 //! in sweeps of one joint after another; [`Solution::goodness_of_fit`] says whether it explains more.
 
 mod chance;
-mod columns;
+pub(crate) mod columns;
 pub(crate) mod contest;
 mod levels;
 mod sums;

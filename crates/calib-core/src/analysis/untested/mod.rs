@@ -17,20 +17,22 @@
 //! other could hide. What the joints do from pose to pose (5), θ as found, is added to every E: it is what a prediction meets, and
 //! what is not in the model and was taken for noise of the joints is in it.
 
+mod changed;
+mod sums;
+
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use crate::analysis::change::Change;
 use crate::analysis::solution::Solution;
 use crate::analysis::spread::LinearPoint;
 use crate::graph::edge::EdgeKind;
 use crate::graph::ids::{EdgeId, FrameId};
-use crate::model::cache::State;
-use crate::model::pose::Pose;
-use crate::solve::equations::{NormalEquations, Objective, Workspace};
-use crate::solve::normal::add_prior;
-use crate::solve::rows::{dot, residual};
-use crate::solve::whitened::{Whitened, covariance_of, whitened};
+use crate::solve::equations::Objective;
+use crate::solve::whitened::covariance_of;
+use changed::Changed;
+use sums::{Columns, Design, Seen};
 
 /// What an effect moves, per unit of its regressor and coefficient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +59,30 @@ pub struct UntestedEffect {
     pub at_postures: Vec<f64>,
 }
 
+/// Something that may make predictions wrong.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum OpenCause<'a> {
+    /// An effect that the model does not have, or several independent ones (the three coordinates of a slip).
+    Effects(Vec<UntestedEffect>),
+    /// A change while recording that a scan found and that the model does not have. The robot is used as it is after it.
+    Found {
+        /// The change.
+        change: &'a Change,
+        /// Whether what moved carries the point; a body elsewhere only misled the fit.
+        carries: bool,
+    },
+}
+
+impl OpenCause<'_> {
+    fn effects(&self) -> &[UntestedEffect] {
+        match self {
+            Self::Effects(effects) => effects,
+            Self::Found { .. } => &[],
+        }
+    }
+}
+
 /// A point at one posture: how it follows the parameters, and the motions of the joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MovedPoint {
@@ -66,6 +92,8 @@ pub struct MovedPoint {
     pub by: BTreeMap<EdgeId, Vector3<f64>>,
     /// Rotation from the point's frame to the axes that it is seen in.
     pub turn: Matrix3<f64>,
+    /// Where the point is in its frame, m.
+    pub place: Vector3<f64>,
 }
 
 impl MovedPoint {
@@ -91,7 +119,8 @@ pub struct OpenErrors {
     pub alone: OpenError,
     /// With each cause, in the order in which they were given.
     pub with: Vec<OpenError>,
-    /// ĉ and √v of equation (2) of each effect of each cause.
+    /// ĉ and √v of equation (2) of each effect of each cause; of a change 1 ± 0 for its jump, and 0 ± 1 for each
+    /// independent direction of its uncertainty.
     pub sizes: Vec<Vec<(f64, f64)>>,
 }
 
@@ -113,6 +142,8 @@ struct Common {
     shift: DVector<f64>,
     /// C = H⁻¹.
     covariance: DMatrix<f64>,
+    /// The same of the fitted samples alone.
+    fitted: DMatrix<f64>,
     /// [G_m]_m H^(-½)/√M.
     moved: DMatrix<f64>,
     /// Gram matrix of `moved`, and its trace.
@@ -127,7 +158,58 @@ struct Common {
     joints: (f64, f64),
 }
 
+/// One direction of a cause.
+struct Direction {
+    /// What it does to all u_m/√M, per unit.
+    displaced: DVector<f64>,
+    /// Mean and standard deviation.
+    size: (f64, f64),
+}
+
 impl Common {
+    /// d_m − G_m H⁻¹b of equation (3), of all postures.
+    fn displaced(&self, b: &DVector<f64>, at: impl Iterator<Item = Vector3<f64>>) -> DVector<f64> {
+        let mut d = -(&self.g * (&self.covariance * b));
+        let root = (d.len() as f64 / 3.0).sqrt();
+        for (m, moved) in at.enumerate() {
+            let mut place = d.rows_mut(3 * m, 3);
+            place += moved / root;
+        }
+        d
+    }
+
+    /// Equation (2).
+    fn of_effect(
+        &self,
+        (k, effect): (usize, &UntestedEffect),
+        design: &Design,
+        seen: &Seen,
+        postures: &[MovedPoint],
+    ) -> Direction {
+        let b: DVector<f64> = design.b.column(k).into();
+        let information = (design.own[k] - b.dot(&(&self.covariance * &b))).max(0.0);
+        let v = 1.0 / (information / self.level + effect.sigma.powi(-2));
+        let estimate = -v * (seen.score[k] + b.dot(&self.shift)) / self.level;
+        let at = postures.iter().zip(&effect.at_postures);
+        let at = at.map(|(posture, value)| posture.displacement(effect.moves) * *value);
+        Direction {
+            displaced: self.displaced(&b, at),
+            size: (estimate, v.sqrt()),
+        }
+    }
+
+    /// Equation (4) with a cause.
+    fn with(&self, mu: &DVector<f64>, cause: &[Direction]) -> OpenError {
+        let mut mu = mu.clone();
+        let mut more = Vec::new();
+        for direction in cause {
+            mu.axpy(direction.size.0, &direction.displaced, 1.0);
+            // `level` is in σ already.
+            more.push(&direction.displaced * (direction.size.1 / self.level.sqrt()));
+        }
+        self.open(&mu, &more)
+    }
+
     /// Equation (4) with mean `mu` and more directions, each per standard deviation.
     fn error(&self, mu: &DVector<f64>, more: &[DVector<f64>]) -> (f64, f64) {
         let mut trace = self.gram.trace();
@@ -165,88 +247,48 @@ impl Common {
 }
 
 impl Solution {
-    /// Equation (4) without an effect, then with each cause, which is one effect or several independent ones (the three coordinates of a
-    /// slip): over `postures`, from the samples `looked_at`, which stand for `factor` times as many. `None` without postures or free parameters, or where the model cannot be evaluated.
+    /// Equation (4) without an effect, then with each cause: over `postures`, from the samples `looked_at`. What grows with the square of the
+    /// parameters is summed over every `step`-th of them, which stands for the others; what the data say (g, and Σ aᵀV⁻¹e) over all: a part of
+    /// the samples, multiplied, would be as noisy as that part. `None` without postures or free parameters, or where the model cannot be evaluated.
     #[must_use]
     pub fn open_errors(
         &self,
         looked_at: &[usize],
-        factor: f64,
-        causes: &[Vec<UntestedEffect>],
+        step: usize,
+        causes: &[OpenCause<'_>],
         postures: &[MovedPoint],
     ) -> Option<OpenErrors> {
-        let effects: Vec<&UntestedEffect> = causes.iter().flatten().collect();
-        let effects = effects.as_slice();
-        let model = &self.model;
-        let n = model.free();
-        if n == 0 || postures.is_empty() {
+        if self.model.free() == 0 || postures.is_empty() {
             return None;
         }
-        let count = effects.len();
-        let mut fitted = NormalEquations::new(n);
-        let mut held_out = NormalEquations::new(n);
-        let mut b = DMatrix::zeros(n, count);
-        let mut own = vec![0.0; count];
-        let mut score = vec![0.0; count];
-        let mut work = Workspace::new(model);
-        work.cache.update(&model.problem, &self.values);
-        let weights: Vec<f64> = self
-            .model
-            .observations
+        let effects: Vec<&UntestedEffect> = causes.iter().flat_map(OpenCause::effects).collect();
+        let mut changes: Vec<Option<Changed<'_>>> = causes
             .iter()
-            .zip(&self.weights)
-            .map(|(o, w)| if model.is_held_out(o.sample) { 1.0 } else { *w })
+            .filter_map(|cause| match cause {
+                OpenCause::Found { change, carries } => Some(Changed::new(self, change, *carries)),
+                OpenCause::Effects(_) => None,
+            })
+            .collect();
+        let held_out = |sample: usize| self.model.is_held_out(sample);
+        let observations = self.model.observations.iter().zip(&self.weights);
+        let weights: Vec<f64> = observations
+            .map(|(o, w)| if held_out(o.sample) { 1.0 } else { *w })
             .collect();
         let objective = Objective {
             weights: &weights,
             ..self.objective()
         };
-        for (place, &sample) in looked_at.iter().enumerate() {
-            let Some(s) = whitened(objective, &self.values, sample, &mut work) else {
-                continue;
-            };
-            let system = if model.is_held_out(sample) {
-                &mut held_out
-            } else {
-                &mut fitted
-            };
-            // The product of a transpose has no fast kernel.
-            let transposed = s.a.transpose();
-            add(system, &s, &transposed, factor);
-            let columns = &s.l_inverse * self.columns(effects, place, sample, &s, &work);
-            b.gemm(factor, &transposed, &columns, 1.0);
-            for k in 0..count {
-                own[k] += factor * columns.column(k).norm_squared();
-                score[k] += factor * columns.column(k).dot(&s.w);
-            }
-        }
-        add_prior(model, &self.values, &mut fitted);
-        let mut all = NormalEquations::new(n);
-        for (sum, (a, b)) in all.h.iter_mut().zip(fitted.h.iter().zip(&held_out.h)) {
-            *sum = a + b;
-        }
-        for (sum, (a, b)) in all.g.iter_mut().zip(fitted.g.iter().zip(&held_out.g)) {
-            *sum = a + b;
-        }
-        let common = self.common(&all, &fitted, postures)?;
-        let root = (postures.len() as f64).sqrt();
+        let columns = Columns::new(self, &effects);
+        let design = Design::of(&columns, objective, looked_at, step, &mut changes);
+        let seen = Seen::of(&columns, objective, looked_at);
+        let common = self.common(&design, &seen, postures)?;
+        let of_effect = |effect| common.of_effect(effect, &design, &seen, postures);
+        let mut of_effects = effects.iter().copied().enumerate().map(of_effect);
+        let mut of_changes = changes.iter().map(|changed| match changed {
+            Some(changed) => changed.directions(&common, postures),
+            None => Vec::new(),
+        });
         let mu = &common.g * &common.shift;
-        let mut found = Vec::new();
-        for (k, effect) in effects.iter().enumerate() {
-            let taken = &common.covariance * b.column(k);
-            let information = (own[k] - b.column(k).dot(&taken)).max(0.0);
-            let v = 1.0 / (information / common.level + effect.sigma.powi(-2));
-            let estimate = -v * (score[k] + b.column(k).dot(&common.shift)) / common.level;
-            let mut d = -(&common.g * taken);
-            for (m, posture) in postures.iter().enumerate() {
-                let moved = posture.displacement(effect.moves) * effect.at_postures[m];
-                let mut place = d.rows_mut(3 * m, 3);
-                place += moved / root;
-            }
-            // `level` is in v already.
-            let share = &d * (v / common.level).sqrt();
-            found.push((d * estimate, share, (estimate, v.sqrt())));
-        }
         let mut out = OpenErrors {
             stated: common.stated,
             joints: common.joints.0.sqrt(),
@@ -254,36 +296,27 @@ impl Solution {
             with: Vec::new(),
             sizes: Vec::new(),
         };
-        let mut rest = found.into_iter();
         for cause in causes {
-            let own: Vec<_> = rest.by_ref().take(cause.len()).collect();
-            let mut mu = mu.clone();
-            for (shift, _, _) in &own {
-                mu += shift;
-            }
-            let more: Vec<DVector<f64>> = own.iter().map(|(_, share, _)| share.clone()).collect();
-            out.with.push(common.open(&mu, &more));
-            out.sizes
-                .push(own.iter().map(|(_, _, size)| *size).collect());
+            let own: Vec<Direction> = match cause {
+                OpenCause::Effects(effects) => of_effects.by_ref().take(effects.len()).collect(),
+                OpenCause::Found { .. } => of_changes.next().unwrap_or_default(),
+            };
+            out.with.push(common.with(&mu, &own));
+            out.sizes.push(own.iter().map(|d| d.size).collect());
         }
         Some(out)
     }
 
-    fn common(
-        &self,
-        all: &NormalEquations,
-        fitted: &NormalEquations,
-        postures: &[MovedPoint],
-    ) -> Option<Common> {
-        let n = all.n;
+    fn common(&self, design: &Design, seen: &Seen, postures: &[MovedPoint]) -> Option<Common> {
+        let n = self.model.free();
         let root = (postures.len() as f64).sqrt();
         let mut g = DMatrix::zeros(3 * postures.len(), n);
         for (m, posture) in postures.iter().enumerate() {
             let own = &posture.point.jacobian / root;
             g.view_mut((3 * m, 0), (3, n)).copy_from(&own);
         }
-        let covariance = covariance_of(all)?;
-        let before = covariance_of(fitted)?;
+        let covariance = covariance_of(&design.all(self))?;
+        let before = covariance_of(&design.fitted(self))?;
         // What the fit states against what independent noise gives: above 1 where the noise has a memory.
         let spread = |c: &DMatrix<f64>| (&g * c).dot(&g);
         let stated = spread(&self.information.covariance);
@@ -291,11 +324,12 @@ impl Solution {
         let half = covariance.clone().cholesky()?.l();
         let moved = &g * half;
         let gram = moved.tr_mul(&moved);
-        let shift = -(&covariance * DVector::from_column_slice(&all.g));
+        let shift = -(&covariance * seen.gradient(self));
         Some(Common {
             g,
             shift,
             covariance,
+            fitted: before,
             moved,
             gram,
             level: if level.is_finite() { level } else { 1.0 },
@@ -323,52 +357,6 @@ impl Solution {
             2.0 * squares / (count * count),
         )
     }
-
-    /// a of equation (1) for every effect at one sample, not whitened.
-    fn columns(
-        &self,
-        effects: &[&UntestedEffect],
-        place: usize,
-        sample: usize,
-        rows: &Whitened,
-        work: &Workspace,
-    ) -> DMatrix<f64> {
-        let model = &self.model;
-        let state = State::new(&model.problem, &work.cache, &self.values);
-        let mut out = DMatrix::zeros(rows.w.len(), effects.len());
-        let mut twists = Vec::new();
-        let mut measurement = usize::MAX;
-        let mut pose = Pose::identity();
-        for &(o, first, count) in &rows.blocks {
-            let observation = model.observations[o];
-            if observation.measurement != measurement {
-                measurement = observation.measurement;
-                pose = model.paths[measurement].effects(state, sample, &mut twists);
-            }
-            let jacobian = residual(model, &self.values, measurement, observation.item, &pose);
-            let kind = &model.problem.measurements[measurement];
-            for (k, effect) in effects.iter().enumerate() {
-                let twist = match effect.moves {
-                    Moves::Joint(joint) => twists
-                        .iter()
-                        .filter(|(edge, _)| *edge == joint.index())
-                        .map(|(_, twist)| twist[0])
-                        .sum(),
-                    Moves::Reference(frame, axis) if kind.from == frame => {
-                        let v: Vector3<f64> = pose.r.row(axis).transpose();
-                        Vector6::new(0.0, 0.0, 0.0, v.x, v.y, v.z)
-                    }
-                    Moves::Body(frame, axis) if kind.to == frame => Vector6::ith(3 + axis, 1.0),
-                    _ => continue,
-                };
-                let twist = twist * effect.at_samples[place];
-                for i in 0..count {
-                    out[(first + i, k)] += dot(&jacobian.m[i], &twist);
-                }
-            }
-        }
-        out
-    }
 }
 
 /// 99 % quantile of F(h, ν), by the cube root of χ²/dof, which is nearly normal (Wilson & Hilferty; Paulson 1942): within 8 % from
@@ -391,19 +379,6 @@ fn f_quantile(h: f64, freedom: f64) -> f64 {
     }
     let root = (a * one_b * one_b + b * one_a * one_a - Z * Z * a * b).max(0.0);
     ((one_a * one_b + Z * root.sqrt()) / square).powi(3)
-}
-
-/// Adds a sample to H (upper triangle) and g.
-fn add(out: &mut NormalEquations, s: &Whitened, transposed: &DMatrix<f64>, factor: f64) {
-    let n = out.n;
-    let h = transposed * &s.a;
-    let g = transposed * &s.w;
-    for i in 0..n {
-        for j in i..n {
-            out.h[i * n + j] += factor * h[(i, j)];
-        }
-        out.g[i] += factor * g[i];
-    }
 }
 
 #[cfg(test)]
