@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Cholesky, DVector};
 
-use crate::analysis::admit::eligible;
+use crate::analysis::admit::{eligible, many_rejected};
 use crate::analysis::compare::mean_and_error;
 use crate::analysis::estimate::solve;
 use crate::analysis::select::linear::{Linearization, measured_covariance};
@@ -170,8 +170,24 @@ impl Task<'_> {
 
     /// Linearized in everything that a part can free.
     pub(super) fn linearized(&self, at: &Fitted) -> Result<Linearization, Error> {
+        self.linearized_with(at, &at.solution.weights)
+    }
+
+    /// The same with the vectors that the gate rejected, where they are more than chance rejects: what a part explains cannot be seen in
+    /// the others once the gate took it for gross errors.
+    pub(super) fn linearized_with_rejected(
+        &self,
+        at: &Fitted,
+    ) -> Result<Option<Linearization>, Error> {
+        let everything = eligible(&at.solution);
+        let many = many_rejected(&at.solution.weights, &everything).is_some();
+        many.then(|| self.linearized_with(at, &everything))
+            .transpose()
+    }
+
+    fn linearized_with(&self, at: &Fitted, weights: &[f64]) -> Result<Linearization, Error> {
         let model = Model::new(&self.under(at.noise))?;
-        let linear = Linearization::at(&at.solution, model, &at.levels, self.step());
+        let linear = Linearization::at(&at.solution, weights, model, &at.levels, self.step());
         linear.ok_or(Error::NotEvaluable)
     }
 }

@@ -64,10 +64,10 @@ pub(super) struct Linearization {
 const CHUNK: usize = 32;
 
 impl Linearization {
-    /// At a solution, in the columns of `model`, which is the same problem with more of it free. `theta` are the levels of D; every
-    /// `step`-th sample is looked at by itself.
+    /// At a solution, with these weights; `model`: the same with more free; `theta`: levels of D; one by one every `step`-th sample.
     pub(super) fn at(
         solution: &Solution,
+        weights: &[f64],
         model: Model,
         theta: &[f64],
         step: usize,
@@ -75,7 +75,7 @@ impl Linearization {
         let n = model.free();
         let objective = Objective {
             model: &model,
-            weights: &solution.weights,
+            weights,
             theta: &solution.theta,
         };
         let mut work = Workspace::new(&model);

@@ -15,6 +15,10 @@
 //! shows alone: of its members, those stay that save half a standard error. In the end, parts are exchanged for others that
 //! explain more now that the rest is known, and those that later ones made needless are removed.
 //!
+//! A robust fit takes for gross errors what a missing part does to the rows that show it, and where it rejected them nothing asks for the part. Where
+//! no part makes the model better and more was rejected than chance explains, (3) is therefore asked once more with all rows; whether a part
+//! stays is decided by the fits in full and their predictions as before.
+//!
 //! The error to be stated for a model that was so chosen comes from folds: the whole choice is made again without each fold, which it then predicts.
 
 use std::collections::BTreeSet;

@@ -116,7 +116,17 @@ impl Course<'_> {
                 return Ok(Some(next));
             }
         }
-        self.one_more(linear, current)
+        let (next, found) = self.one_more(linear, current)?;
+        if next.is_some() {
+            return Ok(next);
+        }
+        if let Some(with_rejected) = self.task.linearized_with_rejected(current)?
+            && let (Some(next), _) = self.one_more(&with_rejected, current)?
+        {
+            return Ok(Some(next));
+        }
+        self.report_rest(&found, current.rms());
+        Ok(None)
     }
 
     fn take(&mut self, batch: Batch) {
@@ -170,12 +180,12 @@ impl Course<'_> {
         Ok(batch)
     }
 
-    /// The model with one part more, or the members of one group.
+    /// The model with one part more, or the members of one group; and all that was scored.
     fn one_more(
         &mut self,
         linear: &Linearization,
         current: &Fitted,
-    ) -> Result<Option<Fitted>, Error> {
+    ) -> Result<(Option<Fitted>, Vec<Candidate>), Error> {
         let task = self.task;
         let all = linear.all();
         let active = task.active(linear, &self.chosen);
@@ -215,14 +225,13 @@ impl Course<'_> {
                         chosen: with,
                         steps,
                     });
-                    return Ok(Some(next));
+                    return Ok((Some(next), found));
                 }
                 self.steps.push(step);
                 self.refused.insert(part.part);
             }
         }
-        self.report_rest(&found, current.rms());
-        Ok(None)
+        Ok((None, found))
     }
 
     /// What else was scored at the last step, the most significant first.
