@@ -6,6 +6,7 @@ use calib_report::{Status, Unobservable};
 
 use crate::error::PipelineError;
 use crate::formulate::checked::Checked;
+use crate::formulate::completed::bad_rows_beside;
 use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::found::Found;
 use crate::formulate::memory::with_memory;
@@ -128,7 +129,11 @@ fn fits(
     let mut fit = ml::fit(full, inputs, settings)?;
     let mut findings = Vec::new();
     if settings.robust.enabled {
-        let bad = bad_rows::bad_rows(inputs, &checked.tracks, &fit);
+        let mut bad = bad_rows::bad_rows(inputs, &checked.tracks, &fit);
+        if !bad.findings.is_empty() {
+            progress("judge rows beside what the model lacks");
+            bad = bad_rows_beside(inputs, checked, &fit, settings).unwrap_or(bad);
+        }
         findings = bad.findings;
         if !bad.unsettled.is_empty() {
             progress("fit again without the unsettled rows");

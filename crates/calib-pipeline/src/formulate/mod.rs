@@ -5,6 +5,7 @@ pub mod by_closed_forms;
 pub mod by_likelihood;
 pub mod checked;
 pub mod clock;
+pub(crate) mod completed;
 pub mod contacts;
 pub mod formulation;
 pub mod found;

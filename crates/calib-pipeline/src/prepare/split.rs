@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3};
 use crate::prepare::inputs::Inputs;
 
 /// Ending of the name of the body before the change, and of its markers.
-const BEFORE: &str = "_before";
+pub(crate) const BEFORE: &str = "_before";
 
 /// Carries out every `split` of the profile.
 pub fn split(inputs: &mut Inputs) {

@@ -1,12 +1,13 @@
 //! What of the held-out errors is left to explain once the effects that are missing are in the model.
 
-use calib_core::{Physics, Settings};
+use calib_core::Settings;
 use calib_finding::Finding;
 
 use crate::formulate::checked::Checked;
+use crate::formulate::completed::of_tests;
 use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::ml;
-use crate::formulate::parts::{RobotPart, What, with_parts};
+use crate::formulate::parts::with_parts;
 use crate::formulate::starts;
 use crate::prepare::inputs::Inputs;
 use crate::verify::Verified;
@@ -32,21 +33,8 @@ fn with_missing(
     checked: &Checked,
     verified: &Verified,
 ) -> Option<(Inputs, MlFit)> {
-    let model = &inputs.robot.model;
-    let missing = verified.causes.goodness.as_ref()?.missing.iter();
-    let parts: Vec<RobotPart> = missing
-        .filter_map(|test| {
-            let Physics::Effect(kind) = test.physics else {
-                return None;
-            };
-            let effect = kind.effect();
-            Some(RobotPart {
-                what: What::Effect(effect),
-                joint: Some(model.joint_id(test.joint.as_ref()?).ok()?),
-            })
-        })
-        .filter(|part| matches!(part.what, What::Effect(effect) if effect.profile.is_some()))
-        .collect();
+    let missing = &verified.causes.goodness.as_ref()?.missing;
+    let parts = of_tests(inputs, missing);
     if parts.is_empty() {
         return None;
     }
