@@ -84,7 +84,12 @@ pub fn causes(inputs: &Inputs, fit: &MlFit, before: &[Finding]) -> Causes {
         .with_change_of(scan.as_ref())
     };
     let suspected = suspected(inputs, fit, before, scan.as_ref(), goodness.as_ref());
-    let Some((list, contest)) = suspected else {
+    let Some(Suspected {
+        list,
+        contest,
+        tested,
+    }) = suspected
+    else {
         return everything();
     };
     let tests = goodness.as_ref().map_or(1, |g| g.tests.len().max(1));
@@ -101,6 +106,7 @@ pub fn causes(inputs: &Inputs, fit: &MlFit, before: &[Finding]) -> Causes {
         inputs,
         fit,
         list: &list,
+        tested: &tested,
         contest: &contest,
         held: &held,
     }
@@ -137,10 +143,19 @@ fn asked(
         },
         Cause::Before(..) => Asked {
             least: contest.threshold(SIGNIFICANT / tests as f64, directions),
-            share: 0.0,
+            share: RELEVANT,
             part: ALIKE_BEFORE,
         },
     }
+}
+
+/// What is set beside each other.
+struct Suspected<'a> {
+    /// The causes that are asked.
+    list: Vec<Cause<'a>>,
+    /// Findings from before the fit that its tests name as well, by the name of the test: no causes of their own.
+    tested: Vec<(&'a Finding, String)>,
+    contest: Contest,
 }
 
 /// The causes that are asked, and the contest of them; `None` where there is nothing to choose.
@@ -150,7 +165,7 @@ fn suspected<'a>(
     before: &'a [Finding],
     scan: Option<&ChangeScan>,
     goodness: Option<&'a GoodnessOfFit>,
-) -> Option<(Vec<Cause<'a>>, Contest)> {
+) -> Option<Suspected<'a>> {
     let change = scan.and_then(ChangeScan::significant);
     let missing = goodness.map_or(&[][..], |g| &g.missing);
     let mut list: Vec<Cause<'_>> = missing.iter().map(Cause::Missing).collect();
@@ -159,12 +174,14 @@ fn suspected<'a>(
         list.push(Cause::Change);
         suspects.push(Suspect::Change(change));
     }
+    let mut tested = Vec::new();
     for finding in before {
         let Some((code, suspect)) = suspected_before(inputs, fit, finding, goodness?) else {
             continue;
         };
         // Named by the tests of the fit as well: one cause.
         if missing.iter().any(|t| t.name == code) {
+            tested.push((finding, code));
             continue;
         }
         list.push(Cause::Before(finding, code));
@@ -176,7 +193,11 @@ fn suspected<'a>(
     let contest = fit
         .solution
         .contest(&suspects, scan, &fit.formulation.borders())?;
-    Some((list, contest))
+    Some(Suspected {
+        list,
+        tested,
+        contest,
+    })
 }
 
 /// A suspicion from before the fit as a cause: its name and its column.
@@ -221,6 +242,7 @@ struct Outcome<'a> {
     inputs: &'a Inputs,
     fit: &'a MlFit,
     list: &'a [Cause<'a>],
+    tested: &'a [(&'a Finding, String)],
     contest: &'a Contest,
     held: &'a Held,
 }
@@ -245,7 +267,13 @@ impl Outcome<'_> {
                 }
                 _ => None,
             });
-        let explained = explained.collect();
+        // Named by a test that another cause explains, and better: the finding is about that cause.
+        let tested = self
+            .tested
+            .iter()
+            .filter(|(_, code)| !self.is_as_good(code));
+        let tested = tested.map(|(finding, _)| (*finding).clone());
+        let explained = explained.chain(tested).collect();
         let alike = self
             .held
             .causes
@@ -270,6 +298,16 @@ impl Outcome<'_> {
             changed: None,
         }
         .with_change_of(scan)
+    }
+
+    /// Whether a test holds, or explains the data as well in the place of what does.
+    fn is_as_good(&self, code: &str) -> bool {
+        let own = |k: &usize| matches!(self.list[*k], Cause::Missing(test) if test.name == code);
+        let held = &self.held;
+        held.causes
+            .iter()
+            .chain(held.alike.iter().flatten())
+            .any(own)
     }
 
     /// The effect that holds, and that a change explains as well as.
