@@ -18,6 +18,8 @@ const FLIP_STEP_RATIO: f64 = 4.0;
 const JUMP_RATIO: f64 = 40.0;
 /// … and at least this, m, is a jump.
 const JUMP: f64 = 5e-3;
+/// Farthest place of a marker from an axis that moves it, m: no arm before one tracker reaches farther.
+const REACH: f64 = 3.0;
 /// Time step, in units of the median step, that is a gap.
 const GAP: f64 = 1.75;
 /// Part of the rows that a marker or body may be lost in.
@@ -106,6 +108,28 @@ fn joints_turned(poses: &Poses, before: usize, after: usize) -> f64 {
     turned.sum()
 }
 
+/// The largest second difference of a point that the joints' readings of three rows explain, m.
+///
+/// ```text
+/// |Δ²p| ≤ Σ_j r (|Δ²q_j|) + r (Σ_j |Δq_j|)²,   r: reach; 1 and 0 for joints that slide                        (1)
+/// ```
+fn joints_bend(poses: &Poses, row: usize) -> f64 {
+    let (mut bends, mut turns) = (0.0, 0.0);
+    for (name, q) in &poses.joints {
+        let (Some(a), Some(b), Some(c)) = (q[row - 1], q[row], q[row + 1]) else {
+            continue;
+        };
+        let bend = (a - 2.0 * b + c).abs();
+        if poses.joint_units.get(name) == Some(&JointUnit::Length) {
+            bends += bend;
+        } else {
+            bends += REACH * bend;
+            turns += (b - a).abs().max((c - b).abs());
+        }
+    }
+    bends + REACH * turns * turns
+}
+
 /// Steps in a track that should be smooth; only where rows have a time.
 pub(super) fn jumps(poses: &Poses) -> Vec<Finding> {
     if poses.t.is_none() {
@@ -140,13 +164,12 @@ pub(super) fn jumps(poses: &Poses) -> Vec<Finding> {
             continue;
         };
         let limit = (JUMP_RATIO * usual).max(JUMP);
-        let rows: Vec<u64> = bends
-            .iter()
-            .filter(|(_, bend)| *bend > limit)
-            .map(|(i, _)| poses.rows[*i])
-            .collect();
+        // A robot that starts or stops between two rows is no jump of the track.
+        let jump = |(i, bend): &&(usize, f64)| *bend > limit.max(JUMP + joints_bend(poses, *i));
+        let jumped: Vec<&(usize, f64)> = bends.iter().filter(jump).collect();
+        let rows: Vec<u64> = jumped.iter().map(|(i, _)| poses.rows[*i]).collect();
         if !rows.is_empty() {
-            let worst = bends.iter().map(|b| b.1).fold(0.0, f64::max);
+            let worst = jumped.iter().map(|b| b.1).fold(0.0, f64::max);
             findings.push(
                 Finding::new(catalog::JUMP, subject)
                     .with("worst", Fact::meters(worst))
