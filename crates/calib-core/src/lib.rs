@@ -45,6 +45,7 @@
 //! | has the noise a memory, and what does that cost | [`Solution::dependence`], [`Solution::under`] |
 //! | which model | [`compare()`]; which effects and axes it should have: [`select()`] |
 //! | what is random from pose to pose | [`Solution::weighed`] |
+//! | how wide the priors should be | [`Solution::widened`] |
 //! | can I trust the intervals if the noise model is wrong | [`sandwich`] |
 //! | how well does a loop close | [`ClosureStatistics`], [`Solution::pose_at_sample`] |
 //!
@@ -157,6 +158,7 @@ pub use analysis::starts::StartDirection;
 pub use analysis::untested::{MovedPoint, Moves, OpenCause, OpenError, OpenErrors, UntestedEffect};
 pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
 pub use analysis::weigh::{NoiseCandidate, NoiseChoice, NoiseLevel, Weighed};
+pub use analysis::widths::{Widened, WidthEstimate, WidthKind};
 pub use graph::axis::Axis;
 pub use graph::baseline::Baseline;
 pub use graph::chart::Chart;

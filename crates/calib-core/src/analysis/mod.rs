@@ -25,3 +25,4 @@ pub(crate) mod starts;
 pub(crate) mod untested;
 pub(crate) mod validate;
 pub(crate) mod weigh;
+pub(crate) mod widths;

@@ -1,7 +1,7 @@
 //! Prior standard deviations of effects, with their keys in profiles.
 
 /// A prior standard deviation that a profile can change.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 pub struct PriorKey {
     /// Key under `solve.prior`, unit included.
     pub key: &'static str,
@@ -52,6 +52,16 @@ impl PriorKey {
 }
 
 impl Prior {
+    /// The key at this kind of joint.
+    #[must_use]
+    pub fn key(&self, prismatic: bool) -> &'static PriorKey {
+        if prismatic {
+            self.prismatic
+        } else {
+            self.revolute
+        }
+    }
+
     /// The same key at revolute and prismatic joints.
     pub(crate) const fn of(key: &'static PriorKey) -> Self {
         Self {
