@@ -176,6 +176,12 @@ fn the_spoiled_table_is_named_line_by_line_and_still_fits() {
         rms * 1e3
     );
     assert!(rms <= BEST_KNOWN && used >= 3 * 26, "{rms} over {used}");
+    // Machined axes are better than their default widths say, and left-out postures are predicted better under narrower ones.
+    let widths = report["prior_widths"].as_array().expect("a list");
+    let of = |key: &str| widths.iter().find(|w| w["key"] == key).expect("in use");
+    let found = of("position_mm");
+    assert!(found["source"] == "found" && found["sigma"].as_f64() < found["declared"].as_f64());
+    assert_eq!(of("offset_deg")["source"], "default");
     let rejected = report["rejected"].as_array().expect("a list");
     let unsettled = rejected
         .iter()

@@ -224,7 +224,7 @@ const REPORT_PARTS: &[(&str, &[&str])] = &[
         &["not_observable", "workspace", "accuracy_limits"],
     ),
     ("checks", &["loops", "estimators", "noise", "clocks"]),
-    ("effects", &["tested_effects"]),
+    ("effects", &["tested_effects", "prior_widths"]),
     ("kinematics", &["dh_table"]),
     ("verification", &["verification"]),
     ("residuals", &["residuals"]),

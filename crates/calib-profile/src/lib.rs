@@ -34,9 +34,9 @@ pub use profile::{
     Body, BodyKind, ByRow, Clocks, Contact, ContactBase, Error3, Free, FreeEffect, FromRoot,
     JointException, JointFree, JointFreeSet, Limits, LinkTransform, Load, Loop, Method, Noise,
     Orientation, Origin, OriginFreeSet, Outputs, ParameterValue, Plugin, PointChoice, Prior,
-    Profile, Protocol, RecordingSpec, RobotLoad, RobotLog, SimErrors, SimMount, SimNoise,
-    Simulation, Solve, Split, Spots, Steps, SweptAxis, TimedPoses, Timing, Tip, Touched, Tracker,
-    UpAxis, Usage,
+    Profile, Protocol, RecordingSpec, RobotLoad, RobotLog, SharedWidth, SimErrors, SimMount,
+    SimNoise, Simulation, Solve, Split, Spots, Steps, SweptAxis, TimedPoses, Timing, Tip, Touched,
+    Tracker, UpAxis, Usage,
 };
 pub use schema::json_schema;
 

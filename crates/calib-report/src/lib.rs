@@ -37,6 +37,7 @@ pub mod json;
 pub mod markdown;
 pub mod mcap;
 pub mod plots;
+mod prior_width;
 mod quantity;
 mod read;
 mod report;
@@ -74,6 +75,7 @@ pub use facts::{
 };
 pub use held_out::{Distance, ExpectedError, HeldOut, OrientationErrors, PoseError, screen};
 pub use identification::Identification;
+pub use prior_width::{PriorWidth, WidthSource};
 pub use quantity::JointValue;
 pub use read::{NotAReport, REPORT, read_report, report_path};
 pub use report::{FormatVersion, Limit, Limited, Method, Outcome, Report, Verdict};

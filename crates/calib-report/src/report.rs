@@ -2,8 +2,8 @@ use crate::verdict::{Effect, Judgment, Reason, ReasonId};
 use crate::{
     AccuracyLimit, Change, Clock, DataInformation, DhTable, Diagnosis, EstimatorResult, Finding,
     FitSummary, Identification, Input, JointCoverage, LoopClosure, Noise, NoiseChoice,
-    NotObservable, Output, Parameter, RecordingSummary, Rejected, Residuals, RobotChange,
-    Selection, TestedEffect, Transform, Unit, Verification, WeakDirections, Workspace,
+    NotObservable, Output, Parameter, PriorWidth, RecordingSummary, Rejected, Residuals,
+    RobotChange, Selection, TestedEffect, Transform, Unit, Verification, WeakDirections, Workspace,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -86,6 +86,9 @@ pub struct Report {
     /// What is random from pose to pose, by evidence. Null where the profile states it, and with too few poses.
     #[serde(default)]
     pub noise_choice: Option<NoiseChoice>,
+    /// Prior widths that the numbers of a kind share. Empty without a fit of all loops.
+    #[serde(default)]
+    pub prior_widths: Vec<PriorWidth>,
     /// Effects that the model lacks, tested on what is left: which of them the data ask for, most significant first. Empty without a fit of all loops.
     #[serde(default)]
     pub tested_effects: Vec<TestedEffect>,

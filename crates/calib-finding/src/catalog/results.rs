@@ -36,6 +36,9 @@ super::topic! {
         "": Info,
             "The value lies {sigmas} standard deviations of its prior from the nominal one[[; {more:other} of its kind likewise]]. All of this kind together speak for a prior {factor} times as wide.",
             "Check that the URDF is this robot's; if it is, state a wider prior under `solve.prior`.";
+        "found": Info,
+            "The value lies {sigmas} standard deviations of the default prior from the nominal one[[; {more:other} of its kind likewise]]. All of this kind together speak for a prior {factor} times as wide, which was used.",
+            "Check that the URDF is this robot's; if it is, nothing is left to do.";
     }
     /// A coefficient that physics allows on one side of 0 only, and that the data put on the other.
     WRONG_SIGN = "wrong-sign" {

@@ -59,9 +59,12 @@ pub fn likelihood(
     }
     checked.findings.extend(of_rows);
     progress("choose the noise");
-    checked
-        .findings
-        .extend(noise::by_evidence(&mut fit, inputs, &settings));
+    // A prior that the robot contradicts looks like noise, and the noise decides what the data say of a prior.
+    priors::by_evidence(&mut fit, inputs, &settings);
+    if noise::by_evidence(&mut fit, inputs, &settings) {
+        priors::by_evidence(&mut fit, inputs, &settings);
+    }
+    checked.findings.extend(noise::meaning(&mut fit));
     checked.findings.extend(on_their_limit(&fit));
     checked.findings.extend(of_the_wrong_sign(&fit));
     checked.findings.extend(priors::contradicted(&fit));
@@ -219,9 +222,10 @@ fn ml_result(inputs: &Inputs, fit: MlFit, registered: MlFit) -> Result<Solved, P
     let profile = &inputs.robot.profile;
     let model = &inputs.robot.model;
     let at_zero = calib_core::Configuration::zero();
+    let judged = priors::judged(&fit);
     let mut found = Vec::new();
     let mut push = |frames: Found, from, to| -> Result<(), PipelineError> {
-        let derived = fit.solution.relative_pose(from, to, &at_zero)?;
+        let derived = judged.relative_pose(from, to, &at_zero)?;
         found.push(Found {
             pose: derived.pose,
             covariance: derived.covariance,
@@ -255,12 +259,13 @@ fn ml_result(inputs: &Inputs, fit: MlFit, registered: MlFit) -> Result<Solved, P
     let root = fit.formulation.links[model.root().index()];
     let root_covariance = match root {
         Some(root) => {
-            fit.solution
+            judged
                 .relative_pose(fit.formulation.tracker, root, &at_zero)?
                 .covariance
         }
         None => None,
     };
+    drop(judged);
     Ok(Solved {
         robot: fit.calibration.clone(),
         fk: fit.calibration.clone(),

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use calib_core::{
     EdgeId, FrameId, GroupId, NoiseChoice, NoiseKind, NoiseModel, ParameterId, PointId, Problem,
-    Solution,
+    Solution, WidthEstimate,
 };
+use calib_profile::SharedWidth;
 
 use crate::formulate::kinematics::Calibration;
 use crate::prepare::inputs::Inputs;
@@ -55,6 +56,8 @@ pub struct Formulation {
     pub clocks: BTreeMap<String, ClockParameters>,
     /// Noise levels that the problem has.
     pub noise: NoiseGroups,
+    /// Prior widths that several joints share.
+    pub widths: Vec<PriorKind>,
     /// Regressors are needed at predictions (compliance or coupling is free).
     pub loaded: bool,
 }
@@ -66,6 +69,15 @@ pub struct ClockParameters {
     pub offset: ParameterId,
     /// From there to its end, where the clocks are two.
     pub drift: Option<ParameterId>,
+}
+
+/// Parameters whose prior has the width of one key of `solve.prior`.
+#[derive(Debug, Clone)]
+pub struct PriorKind {
+    /// The key, and where its width is from.
+    pub width: SharedWidth,
+    /// The parameters of joints that move.
+    pub parameters: Vec<ParameterId>,
 }
 
 /// Noise levels of a problem.
@@ -115,6 +127,8 @@ impl Formulation {
 pub struct MlFit {
     /// What was tried of the noise from pose to pose; `None` where the profile states it.
     pub noise: Option<NoiseChoice>,
+    /// What was found of each of the formulation's widths; `None` for those that are as stated, or that the data cannot tell.
+    pub widths: Vec<Option<WidthEstimate>>,
     /// Standard deviations over those of a given model, where the model was chosen and its choice cost something.
     pub widened: Option<f64>,
     /// The problem's names.

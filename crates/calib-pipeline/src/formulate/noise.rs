@@ -13,9 +13,9 @@ const ENCODER: f64 = 1e-3;
 /// Relative standard errors of a level within which it lies, 99.9 % on the side that counts.
 const CERTAIN: f64 = 3.0;
 
-/// Takes the noise that the recordings speak for, where the profile does not state it, with the findings that say what it
-/// means.
-pub(crate) fn by_evidence(fit: &mut MlFit, inputs: &Inputs, settings: &Settings) -> Vec<Finding> {
+/// Takes the noise that the recordings speak for, where the profile does not state it; whether that changed the solution.
+pub(crate) fn by_evidence(fit: &mut MlFit, inputs: &Inputs, settings: &Settings) -> bool {
+    let mut changed = false;
     let stated = inputs.robot.profile.solve.noise;
     if stated.model.is_none()
         && !stated.known
@@ -26,9 +26,15 @@ pub(crate) fn by_evidence(fit: &mut MlFit, inputs: &Inputs, settings: &Settings)
             fit.formulation = fit.formulation.clone().with_noise(chosen);
             fit.calibration = calibration(&fit.formulation, &solution, inputs);
             fit.solution = solution;
+            changed = true;
         }
         fit.noise = Some(weighed.choice);
     }
+    changed
+}
+
+/// What the noise says of the model; where physics is missing, the uncertainty is that of the poses' own scatter.
+pub(crate) fn meaning(fit: &mut MlFit) -> Vec<Finding> {
     let mut findings = Vec::new();
     findings.extend(swallowed(fit).or_else(|| no_encoder(fit)));
     findings.extend(readmitted(fit));

@@ -12,6 +12,7 @@ use crate::formulate::checked::Checked;
 use crate::formulate::formulation::FreeSet;
 use crate::formulate::kinematics::Calibration;
 use crate::formulate::ml;
+use crate::formulate::priors;
 use crate::formulate::solved::Solved;
 use crate::prepare::inputs::Inputs;
 
@@ -31,7 +32,8 @@ pub fn refitted(
         return Ok(None);
     }
     let inputs = without_effects(inputs);
-    let formulation = ml::state(&inputs, &checked.tracks, &checked.start, FreeSet::Profile);
+    let mut formulation = ml::state(&inputs, &checked.tracks, &checked.start, FreeSet::Profile);
+    priors::take_over(fit, &formulation.widths, &mut formulation.problem);
     let solution = solve_kept(&formulation.problem, &fit.solution, &Settings::plain())?;
     let robot = ml::calibration_at(&formulation, &solution.model, &solution.values, &inputs);
     Ok(Some(Calibration {

@@ -17,6 +17,7 @@ use crate::output::of_fit::{
 };
 use crate::output::verdict::{limits, next_steps, scope};
 use crate::output::weak::{self, weak_directions};
+use crate::output::widths::prior_widths;
 use crate::verify::accuracy::{accuracy_limits, tracker_sigma, workspace};
 use crate::verify::dh_table::dh_table;
 use crate::verify::information::data_information;
@@ -85,6 +86,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         ),
         noise: e.fit.map_or_else(Vec::new, |fit| noise(e, fit)),
         noise_choice: e.fit.and_then(noise_choice),
+        prior_widths: e.fit.map_or_else(Vec::new, prior_widths),
         tested_effects: goodness.map_or_else(Vec::new, tested_effects),
         clocks: crate::formulate::clock::clocks(e.inputs, e.fit),
         recordings: recordings(e.inputs, &tracks),

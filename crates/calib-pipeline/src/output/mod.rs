@@ -16,3 +16,4 @@ pub mod shapes;
 mod verdict;
 pub mod view;
 pub mod weak;
+mod widths;

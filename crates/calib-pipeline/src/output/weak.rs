@@ -12,6 +12,7 @@ use calib_urdf::{JointId, LinkId};
 use nalgebra::{Point3, Vector3};
 
 use crate::formulate::formulation::MlFit;
+use crate::formulate::priors::judged;
 use crate::output::of_fit::unit;
 use crate::prepare::inputs::Inputs;
 use crate::verify::accuracy::configuration;
@@ -29,6 +30,7 @@ const LISTED: usize = 4;
 #[must_use]
 pub fn weak_directions(inputs: &Inputs, fit: &MlFit) -> Option<WeakDirections> {
     let (name, target) = tool(inputs, fit)?;
+    let solution = judged(fit);
     // Without a body in the tracker's sight, where the robot stands is a convention of what was touched.
     let placement = if inputs.robot.profile.bodies.is_empty() {
         Placement::Free
@@ -40,13 +42,11 @@ pub fn weak_directions(inputs: &Inputs, fit: &MlFit) -> Option<WeakDirections> {
     let at = |rows: &[Vec<f64>]| -> Option<(Vec<LinearPoint>, PostureSpread)> {
         let see = |q: &Vec<f64>| {
             let at = configuration(inputs, fit, q);
-            let seen = fit
-                .solution
-                .linear_point(fit.formulation.tracker, target, &at);
+            let seen = solution.linear_point(fit.formulation.tracker, target, &at);
             seen.ok()
         };
         let points: Vec<LinearPoint> = rows.iter().map(see).collect::<Option<_>>()?;
-        let spread = fit.solution.spread(&points, placement)?;
+        let spread = solution.spread(&points, placement)?;
         Some((points, spread))
     };
     let (points, spread) = at(&box_of)?;

@@ -37,7 +37,7 @@ pub fn data_information(inputs: &Inputs, fit: &MlFit) -> DataInformation {
             root.row_mut(r).neg_mut();
         }
     }
-    let of_problem = fit.formulation.problem.parameters();
+    let of_problem = solution.model.problem().parameters();
     DataInformation {
         parameters: free
             .iter()

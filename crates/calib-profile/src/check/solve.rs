@@ -104,6 +104,11 @@ impl Checker<'_> {
             mass: si(&MASS),
             mass_center: si(&MASS_CENTER),
             by_key: PRIOR_KEYS.iter().map(|key| (key.key, si(key))).collect(),
+            stated: PRIOR_KEYS
+                .iter()
+                .filter(|key| raw.states(key))
+                .map(|key| key.key)
+                .collect(),
         }
     }
 

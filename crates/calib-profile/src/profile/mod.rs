@@ -16,7 +16,8 @@ pub use origin::{LinkTransform, Loop, Orientation, Origin, PointChoice, SweptAxi
 pub use recording::{RecordingSpec, RobotLog, Timing};
 pub use simulate::{Error3, Protocol, SimErrors, SimMount, SimNoise, Simulation, Steps};
 pub use solve::{
-    FreeEffect, JointException, JointFreeSet, Limits, Noise, OriginFreeSet, Prior, Solve,
+    FreeEffect, JointException, JointFreeSet, Limits, Noise, OriginFreeSet, Prior, SharedWidth,
+    Solve,
 };
 
 pub use crate::raw::{

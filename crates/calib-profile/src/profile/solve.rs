@@ -1,9 +1,10 @@
 //! What is estimated, with priors, noise levels and limits of the verdict.
 
 use super::{Free, JointFree, Load, Method};
+use crate::raw::{ANGLE, POSITION};
 use calib_core::EFFECTS;
 use calib_core::NoiseModel;
-use calib_core::effect::Effect;
+use calib_core::effect::{Effect, PriorKey};
 use calib_urdf::JointId;
 use std::collections::BTreeMap;
 use std::collections::BTreeSet;
@@ -70,6 +71,10 @@ pub struct JointFreeSet {
     pub position_sigma: f64,
     /// Prior of orientation numbers, rad.
     pub angle_sigma: f64,
+    /// Where the prior of the position numbers is from; `None`: stated for this joint.
+    pub position_width: Option<SharedWidth>,
+    /// Where the prior of the orientation numbers is from; `None`: stated for this joint.
+    pub angle_width: Option<SharedWidth>,
     /// Limit of the position numbers, m.
     pub position_within: Option<f64>,
     /// Limit of the angle numbers, rad.
@@ -116,23 +121,40 @@ impl Solve {
             let possible = !(slides && effect.revolute_only);
             possible && has(JointFree::Effect(effect), Free::Effect(effect))
         });
-        let effects = effects.map(|effect| FreeEffect {
-            effect,
-            sigma: own_sigma
-                .filter(|_| effect.geometric)
-                .or_else(|| self.prior.of(effect, slides)),
-            within: own_within.filter(|_| effect.geometric),
+        let effects = effects.map(|effect| {
+            let own_sigma = own_sigma.filter(|_| effect.geometric);
+            let prior = effect.prior.as_ref().filter(|_| own_sigma.is_none());
+            FreeEffect {
+                effect,
+                sigma: own_sigma.or_else(|| self.prior.of(effect, slides)),
+                width: prior.map(|prior| self.prior.shared(prior.key(slides))),
+                within: own_within.filter(|_| effect.geometric),
+            }
         });
+        let width = |own: Option<f64>, key: &'static PriorKey| {
+            own.is_none().then(|| self.prior.shared(key))
+        };
         JointFreeSet {
             origin,
             effects: effects.collect(),
             coupled_to: exception.coupled_to,
             position_sigma: exception.sigma_m.unwrap_or(self.prior.position),
             angle_sigma: exception.sigma_rad.unwrap_or(self.prior.angle),
+            position_width: width(exception.sigma_m, &POSITION),
+            angle_width: width(exception.sigma_rad, &ANGLE),
             position_within: exception.within_m,
             angle_within: exception.within_rad,
         }
     }
+}
+
+/// A prior width that several joints share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SharedWidth {
+    /// Its key under `solve.prior`.
+    pub key: &'static PriorKey,
+    /// Whether the profile states it; else it is the default.
+    pub stated: bool,
 }
 
 /// A joint effect that is estimated.
@@ -142,6 +164,8 @@ pub struct FreeEffect {
     pub effect: &'static Effect,
     /// Prior σ of its coefficients, SI.
     pub sigma: Option<f64>,
+    /// Where that is from; `None`: stated for this joint, or there is none.
+    pub width: Option<SharedWidth>,
     /// Limit of its coefficients about 0, SI.
     pub within: Option<f64>,
 }
@@ -159,6 +183,8 @@ pub struct Prior {
     pub mass_center: f64,
     /// By key of `solve.prior`.
     pub(crate) by_key: BTreeMap<&'static str, f64>,
+    /// Keys that the profile states.
+    pub(crate) stated: BTreeSet<&'static str>,
 }
 
 impl Prior {
@@ -166,13 +192,16 @@ impl Prior {
     #[must_use]
     pub fn of(&self, effect: &Effect, prismatic: bool) -> Option<f64> {
         let prior = effect.prior.as_ref()?;
-        let key = if prismatic {
-            prior.prismatic
-        } else {
-            prior.revolute
-        };
+        let key = prior.key(prismatic);
         let sigma = self.by_key.get(key.key).copied();
         Some(sigma.unwrap_or(key.default * key.si).max(prior.least))
+    }
+
+    fn shared(&self, key: &'static PriorKey) -> SharedWidth {
+        SharedWidth {
+            key,
+            stated: self.stated.contains(key.key),
+        }
     }
 }
 

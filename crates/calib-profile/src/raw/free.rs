@@ -222,21 +222,21 @@ pub(crate) static PRIOR_KEYS: LazyLock<Vec<&'static PriorKey>> = LazyLock::new(|
 static PRIOR_WORDS: LazyLock<Vec<&'static str>> =
     LazyLock::new(|| PRIOR_KEYS.iter().map(|k| k.key).collect());
 
-/// Prior standard deviations of what is freed, in the units of their keys.
-#[derive(Debug, Clone, PartialEq)]
+/// Prior standard deviations of what is freed, in the units of their keys: those that the file states.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct RawPrior(BTreeMap<&'static str, f64>);
-
-impl Default for RawPrior {
-    fn default() -> Self {
-        Self(PRIOR_KEYS.iter().map(|k| (k.key, k.default)).collect())
-    }
-}
 
 impl RawPrior {
     /// Value of a key, in its unit.
     #[must_use]
     pub fn get(&self, key: &PriorKey) -> f64 {
         self.0.get(key.key).copied().unwrap_or(key.default)
+    }
+
+    /// Whether the file states this key.
+    #[must_use]
+    pub fn states(&self, key: &PriorKey) -> bool {
+        self.0.contains_key(key.key)
     }
 }
 
@@ -315,7 +315,7 @@ impl JsonSchema for RawPrior {
         };
         let properties: serde_json::Map<_, _> = PRIOR_KEYS.iter().map(property).collect();
         json_schema!({
-            "description": "Prior standard deviations of what is freed.",
+            "description": "Prior standard deviations of what is freed. One that is stated is used as it is; a default is multiplied by a factor from 0.1 to 10 where the data ask for it and predictions do not lose by it.",
             "type": "object",
             "properties": properties,
             "additionalProperties": false,

@@ -3,7 +3,7 @@
 use super::{Page, code, mm};
 use crate::table::Table;
 use crate::words;
-use crate::{NoiseChoice, Report, TestedEffect, Unit, number};
+use crate::{NoiseChoice, PriorWidth, Report, TestedEffect, Unit, number};
 
 /// Row numbers shown in a table cell; the rest is counted.
 const ROWS: usize = 8;
@@ -14,6 +14,7 @@ pub(super) fn data(page: &mut Page, report: &Report) {
     conversions(page, report);
     joint_ranges(page, report);
     noise(page, report);
+    prior_widths(page, &report.prior_widths);
     tested_effects(page, &report.tested_effects);
     page.text(format!(
         "Were the clocks synchronized? {}",
@@ -117,6 +118,30 @@ fn noise(page: &mut Page, report: &Report) {
     if let Some(choice) = &report.noise_choice {
         noise_choice(page, choice);
     }
+}
+
+/// How wide the priors are, and where that is from.
+fn prior_widths(page: &mut Page, widths: &[PriorWidth]) {
+    let mut table = Table::new(&[
+        "<prior standard deviation",
+        ">σ in use",
+        ">stated or default σ",
+        ">likeliest σ",
+        ">numbers",
+        "<source",
+    ]);
+    for width in widths {
+        let sigma = |sigma: f64| number::sigma(Some(sigma), width.unit);
+        table.row([
+            code(&width.key),
+            sigma(width.sigma),
+            sigma(width.declared),
+            width.likeliest.map_or_else(String::new, sigma),
+            width.numbers.to_string(),
+            width.source.words().to_owned(),
+        ]);
+    }
+    page.table("", table);
 }
 
 /// Which effects the data ask for, and which not.

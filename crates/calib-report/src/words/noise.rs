@@ -1,7 +1,7 @@
 //! The noise of the measurements.
 
 use super::prose::{capital, full_stop, or, short};
-use crate::{Noise, NoiseChoice, NoiseKind, NoiseModel, Report, number};
+use crate::{Noise, NoiseChoice, NoiseKind, NoiseModel, Report, WidthSource, number};
 
 impl Noise {
     /// How the level was determined.
@@ -42,6 +42,17 @@ pub(crate) fn noise(report: &Report, rest: &str) -> Vec<String> {
         .map(|noise| noise.sentence())
         .collect();
     or(short(&lines, rest), "Not estimated.")
+}
+
+impl WidthSource {
+    /// Where a prior width is from.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Self::Stated => "as stated",
+            Self::Default => "default",
+            Self::Found => "marginal likelihood",
+        }
+    }
 }
 
 impl NoiseModel {

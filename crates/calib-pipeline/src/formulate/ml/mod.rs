@@ -24,6 +24,7 @@ mod couplings;
 mod joints;
 mod masses;
 mod starts;
+mod widths;
 
 pub(crate) use calibration::{calibration, calibration_at};
 pub(crate) use joints::{moves, used_joints};
@@ -96,6 +97,7 @@ pub fn state(
         masses: Vec::new(),
         clocks: BTreeMap::new(),
         noise: NoiseGroups::default(),
+        widths: Vec::new(),
         loaded: false,
         samples,
     };
@@ -122,6 +124,9 @@ pub fn state(
     add_bodies(&mut formulation, inputs, tracks, start);
     add_contacts(&mut formulation, inputs);
     crate::formulate::clock::add_clocks(&mut formulation, inputs, free_set);
+    if free_set == FreeSet::Profile {
+        formulation.widths = widths::shared(&formulation, inputs);
+    }
     match profile.solve.noise.model {
         Some(model) if free_set == FreeSet::Profile => formulation.with_noise(model),
         _ => formulation,
@@ -141,6 +146,7 @@ pub fn fit(
     let calibration = calibration(&formulation, &solution, inputs);
     Ok(MlFit {
         noise: None,
+        widths: Vec::new(),
         widened: None,
         formulation,
         solution,
