@@ -58,3 +58,25 @@ fn wide_priors_end_at_the_optimum_of_the_data() {
         }
     }
 }
+
+/// What nothing determines is as small as it can be: along gauges the values end where they started, at the nominal robot, whether
+/// there is no prior or one that says nothing.
+#[test]
+fn gauges_end_at_minimum_norm() {
+    let without = solved(3, None, 2e-3, false);
+    let null = without.information.null_space();
+    assert!(null.ncols() >= 12, "{}", null.ncols());
+    for width in [None, Some(1e2), Some(1e6)] {
+        let s = solved(3, width, 2e-3, false);
+        let free = s.parameters.iter();
+        let free = free.filter(|p| s.column_of(p.id.index()).is_some());
+        let off: Vec<f64> = free.map(|p| p.value - p.nominal).collect();
+        let x = nalgebra::DVector::from_vec(off).component_div(&without.information.scale);
+        let along = null.tr_mul(&x).norm();
+        assert!(
+            along < 0.05 * x.norm(),
+            "{width:?}: {along} of {}",
+            x.norm()
+        );
+    }
+}

@@ -101,6 +101,8 @@ const LITTLE: f64 = 1e-2;
 const UNSEEN_IN_ALL: f64 = 1e-6;
 /// A prior wider than this many typical deviations does not say how far a linearization holds.
 const WIDEST_SCALE: f64 = 30.0;
+/// One wider than this many (300°, 3 m) says nothing: steps are as without it, and values stay where they start along gauges.
+const SAYS_NOTHING: f64 = 300.0;
 
 /// What became of a proposed step.
 enum Step {
@@ -203,7 +205,12 @@ impl<'a> Descent<'a> {
                 .clone()
                 .map(|&p| {
                     let typical = parameters[p].unit.typical_deviation();
-                    parameters[p].scale().min(WIDEST_SCALE * typical).powi(-2)
+                    let scale = parameters[p].scale();
+                    if scale > SAYS_NOTHING * typical {
+                        typical.powi(-2)
+                    } else {
+                        scale.min(WIDEST_SCALE * typical).powi(-2)
+                    }
                 })
                 .collect(),
             prior: columns
