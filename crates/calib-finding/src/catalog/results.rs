@@ -33,7 +33,7 @@ super::topic! {
     }
     /// A number far off where its prior expected it.
     BEYOND_ITS_PRIOR = "beyond-its-prior" {
-        "": Info,
+        "stated": Info,
             "The value lies {sigmas} standard deviations of its prior from the nominal one[[; {more:other} of its kind likewise]]. All of this kind together speak for a prior {factor} times as wide.",
             "Check that the URDF is this robot's; if it is, state a wider prior under `solve.prior`.";
         "found": Info,

@@ -147,7 +147,10 @@ impl Kind<'_> {
     fn finding(&self) -> Option<Finding> {
         let (z, largest) = self.largest.filter(|(z, _)| *z > BEYOND)?;
         let asked = (self.squares / self.shares.max(1.0)).sqrt().max(1.0);
-        let form = if self.found.is_some() { "found" } else { "" };
+        let form = match self.found {
+            Some(_) => "found",
+            None => "stated",
+        };
         let more = Some(self.beyond - 1).filter(|more| *more > 0);
         let about = About::Parameter(largest.name.clone());
         Some(
