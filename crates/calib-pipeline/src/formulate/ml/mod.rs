@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use bodies::add_bodies;
-use calib_core::{Chart, Problem, Role, Settings};
+use calib_core::{Chart, EdgeId, FrameId, Problem, Role, Settings};
 use calib_profile::{Free, Usage};
 use couplings::coupling_candidates;
 use joints::{Row, add_joint, joint_noise_group};
@@ -65,22 +65,7 @@ pub fn state(
     }
     let starts = (1..samples.len()).filter(|s| samples[*s].0 != samples[s - 1].0);
     problem.borders = starts.collect();
-    let tracker = problem.frame(&profile.tracker.frame);
-    let root_frame = problem.frame(&model.link(model.root()).name);
-    let tracker_free = !profile.bodies.is_empty()
-        && (profile.solve.free.contains(&Free::Tracker) || free_set == FreeSet::RegistrationOnly);
-    let chart = if tracker_free {
-        Chart::full()
-    } else {
-        Chart::none()
-    };
-    let measured = profile.tracker.from_root.as_ref();
-    let nominal = measured.map_or(start.tracker_from_root, |measured| measured.pose);
-    let root = problem.unknown("tracker_from_root", tracker, root_frame, nominal, chart);
-    problem.set_role(root, Role::World, None);
-    if let Some(measured) = measured {
-        problem.set_prior(root, Some(measured.sigma_rad), Some(measured.sigma));
-    }
+    let (tracker, root_frame, root) = add_root(&mut problem, inputs, start, free_set);
     let mut formulation = Formulation {
         problem,
         tracker,
@@ -131,6 +116,34 @@ pub fn state(
         Some(model) if free_set == FreeSet::Profile => formulation.with_noise(model),
         _ => formulation,
     }
+}
+
+/// The tracker's frame, that of the root link, and the edge between them: nominal, measured, or to be found.
+fn add_root(
+    problem: &mut Problem,
+    inputs: &Inputs,
+    start: &Start,
+    free_set: FreeSet,
+) -> (FrameId, FrameId, EdgeId) {
+    let profile = &inputs.robot.profile;
+    let model = &inputs.robot.model;
+    let tracker = problem.frame(&profile.tracker.frame);
+    let root_frame = problem.frame(&model.link(model.root()).name);
+    let tracker_free = !profile.bodies.is_empty()
+        && (profile.solve.free.contains(&Free::Tracker) || free_set == FreeSet::RegistrationOnly);
+    let chart = if tracker_free {
+        Chart::full()
+    } else {
+        Chart::none()
+    };
+    let measured = profile.tracker.from_root.as_ref();
+    let nominal = measured.map_or(start.tracker_from_root, |measured| measured.pose);
+    let root = problem.unknown("tracker_from_root", tracker, root_frame, nominal, chart);
+    problem.set_role(root, Role::World, None);
+    if let Some(measured) = measured {
+        problem.set_prior(root, Some(measured.sigma_rad), Some(measured.sigma));
+    }
+    (tracker, root_frame, root)
 }
 
 /// Solves a stated problem.
