@@ -33,8 +33,6 @@ use crate::prepare::loads::Loads;
 use crate::verify::accuracy::configuration;
 use crate::verify::changes::name_of;
 
-/// Samples that are looked at, at most: they tell effects of a fiftieth of the noise of one from nothing.
-const SAMPLES: usize = 4096;
 /// Samples that the design is taken from, at most: more change nothing but the time.
 const DESIGN: usize = 300;
 
@@ -69,9 +67,8 @@ pub(crate) fn prediction(
         fit.solution.moved_point(tracker, target, &at).ok()
     };
     let points: Vec<MovedPoint> = box_of.iter().map(see).collect::<Option<_>>()?;
-    let kept = kept(inputs, fit, held_out);
-    let step = kept.len().div_ceil(SAMPLES).max(1);
-    let looked_at: Vec<usize> = kept.into_iter().step_by(step).collect();
+    // All of them: at the minimum the residuals of all have no part along the parameters, those of a share have.
+    let looked_at = kept(inputs, fit, held_out);
     let at = Places::new(inputs, fit, &looked_at, &box_of)?;
     let effects = at
         .of_joints()

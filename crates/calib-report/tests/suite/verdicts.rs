@@ -671,3 +671,28 @@ fn the_first_line_counts_every_warning_that_is_shown() {
     assert_eq!(report.verdict, Verdict::AcceptedWithWarnings);
     assert_eq!(report.warnings(), 3);
 }
+
+/// The smallest limit here is 1.5 mm or more: what 1e5 poses leave open of an effect is far below it, whatever they state.
+#[test]
+fn an_open_error_far_below_the_limit_is_no_reason() {
+    let of = |open: f64| {
+        let facts = with(|f| {
+            let mut prediction = prediction(1.5e-6, 1.5 * open.hypot(3e-4), UntestedKind::Gain);
+            let stated = prediction.as_mut().expect("stated");
+            (stated.stated, stated.joints) = (4e-6, 3e-4);
+            f.prediction = prediction;
+        });
+        let limits = facts
+            .limits
+            .iter()
+            .filter(|l| l.name.starts_with("held_out"));
+        let limit = limits.map(|l| l.limit).fold(f64::INFINITY, f64::min);
+        let reasons = judge(&facts).reasons;
+        let small = |r: &Reason| r.id == ReasonId::UncertaintyTooSmall;
+        (limit, reasons.iter().any(small))
+    };
+    let (limit, _) = of(0.0);
+    assert!((1e-4..1.0).contains(&limit), "{limit}");
+    assert!(!of(0.015 * limit).1);
+    assert!(of(0.03 * limit).1);
+}

@@ -92,13 +92,19 @@ pub(super) fn agreement(facts: &Facts) -> Vec<Reason> {
 /// An error that the data do not exclude, in units of what the fit states of its predictions, up to which stating it instead is
 /// enough. Beyond it the effect is either seen, or so poorly that what is stated rests on how large such effects usually are.
 const TOO_SMALL: f64 = 2.5;
+/// An error of this share of the limit changes one at the limit by one part in five thousand: the fit of very many poses states
+/// less, and no untested effect is known so well.
+const NEGLIGIBLE: f64 = 0.02;
 
 pub(super) fn uncertainty(facts: &Facts) -> Vec<Reason> {
     let Some(prediction) = &facts.prediction else {
         return Vec::new();
     };
+    let least = position_limit(facts).map_or(0.0, |limit| NEGLIGIBLE * limit);
     // What the joints do from pose to pose is stated as their noise.
-    let of_fit = (TOO_SMALL * prediction.stated).hypot(prediction.joints);
+    let of_fit = (TOO_SMALL * prediction.stated)
+        .max(least)
+        .hypot(prediction.joints);
     let far = |with: &Predicted| with.rms > of_fit;
     let found = prediction.with.iter().filter(|(_, with)| far(with));
     let reason = |with: &Predicted| {
