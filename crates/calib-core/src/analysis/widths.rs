@@ -82,12 +82,12 @@ const SPREAD: f64 = 1.1;
 const FEWEST: usize = 6;
 /// A width is changed where it is off by more than this many standard errors of ln f.
 const SHOWN: f64 = 2.0;
-/// A width that is narrowed leaves no number farther out than this many of it: one part that was exchanged is not held back
-/// by the many that are as they should be.
+/// No width is made so narrow that a number deviates by more than this many of it: one exchanged part must not be forced to its
+/// nominal value by the many good ones.
 const WITHIN: f64 = 3.0;
 /// Widths that move the values by less than this squared distance, in σ of all data, change no prediction that anyone could tell.
 const UNSEEN: f64 = 1.0;
-/// Ratio of left-out errors that nobody can tell from 1.
+/// Ratio of left-out errors from which on one is smaller than the other.
 const SAME: f64 = 1.005;
 /// Poses that are left out in turn at most, evenly over all.
 const POSES: usize = 200;
