@@ -160,7 +160,8 @@ impl Pass<'_> {
                 *g += j.dot(&b);
             }
             let factor = upper.of(&now, &positions);
-            upper_product(factor, &buffer.columns, local.rows(6));
+            let twists = buffer.columns.iter().enumerate();
+            upper_product(factor, twists, buffer.columns.len(), local.rows(6));
         }
         point_blocks(model, measurement, &positions, &sums, out);
     }

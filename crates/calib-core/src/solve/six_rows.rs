@@ -30,12 +30,16 @@ impl Upper {
     }
 }
 
-/// Rows of U J, each k long, one after the other.
+/// U J into six rows, k long each, one after the other: every twist to its column, the others stay.
 #[inline]
-pub(crate) fn upper_product(factor: &[[f64; 6]; 6], twists: &[Vector6<f64>], rows: &mut [f64]) {
-    let k = twists.len();
+pub(crate) fn upper_product<'t>(
+    factor: &[[f64; 6]; 6],
+    twists: impl Iterator<Item = (usize, &'t Vector6<f64>)>,
+    k: usize,
+    rows: &mut [f64],
+) {
     let [u0, u1, u2, u3, u4, u5] = factor;
-    for (c, j) in twists.iter().enumerate() {
+    for (c, j) in twists {
         rows[c] =
             u0[0] * j[0] + u0[1] * j[1] + u0[2] * j[2] + u0[3] * j[3] + u0[4] * j[4] + u0[5] * j[5];
         rows[k + c] = u1[1] * j[1] + u1[2] * j[2] + u1[3] * j[3] + u1[4] * j[4] + u1[5] * j[5];

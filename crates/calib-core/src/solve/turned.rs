@@ -15,6 +15,7 @@ use crate::graph::measurement::Markers;
 use crate::model::layout::Model;
 use crate::model::pose::Pose;
 use crate::model::values::Values;
+use crate::solve::six_rows::upper_product;
 
 /// Six rows of a sample that stand for the markers of a body.
 #[derive(Debug, Clone)]
@@ -194,21 +195,9 @@ impl Turned {
         columns: &[usize],
         twists: &[Vector6<f64>],
     ) {
-        let [u0, u1, u2, u3, u4, u5] = &self.u;
         rows.fill(0.0);
-        for (&c, j) in columns.iter().zip(twists) {
-            rows[c] = u0[0] * j[0]
-                + u0[1] * j[1]
-                + u0[2] * j[2]
-                + u0[3] * j[3]
-                + u0[4] * j[4]
-                + u0[5] * j[5];
-            rows[n + c] = u1[1] * j[1] + u1[2] * j[2] + u1[3] * j[3] + u1[4] * j[4] + u1[5] * j[5];
-            rows[2 * n + c] = u2[2] * j[2] + u2[3] * j[3] + u2[4] * j[4] + u2[5] * j[5];
-            rows[3 * n + c] = u3[3] * j[3] + u3[4] * j[4] + u3[5] * j[5];
-            rows[4 * n + c] = u4[4] * j[4] + u4[5] * j[5];
-            rows[5 * n + c] = u5[5] * j[5];
-        }
+        let places = columns.iter().copied().zip(twists);
+        upper_product(&self.u, places, n, rows);
     }
 
     /// Equation (2) of the sample that was seen last.

@@ -77,10 +77,9 @@ pub(crate) fn prediction(
     let effects = effects.map(|(what, effects)| (what, OpenCause::Effects(effects)));
     let found = changed.and_then(|change| of_change(inputs, fit, target, change));
     let (names, causes): (Vec<Untested>, Vec<OpenCause<'_>>) = effects.chain(found).unzip();
-    let step = looked_at.len().div_ceil(DESIGN);
     let found = fit
         .solution
-        .open_errors(&looked_at, step, &causes, &points)?;
+        .open_errors(&looked_at, DESIGN, &causes, &points)?;
     let worst = names
         .into_iter()
         .zip(&found.with)
@@ -183,8 +182,9 @@ struct Places<'a> {
     postures: Rows<'a>,
     /// 0 at the first sample, 1 at the last.
     share: Vec<f64>,
-    /// 0 in the first half of the fitted samples, 1 after it.
-    late: Vec<f64>,
+    looked_at: Vec<usize>,
+    /// Which of them were fitted.
+    fitted: Vec<bool>,
 }
 
 impl<'a> Places<'a> {
@@ -198,9 +198,7 @@ impl<'a> Places<'a> {
         let all = &fit.formulation.samples;
         let row = |s: &usize| inputs.recordings[&all[*s].0].q[all[*s].1].as_ref();
         let rows: Vec<&Vec<f64>> = looked_at.iter().map(row).collect::<Option<_>>()?;
-        let usage = |s: &&usize| inputs.recordings[&all[**s].0].spec.usage;
-        let fitted = looked_at.iter().filter(|s| usage(s) != Usage::Validation);
-        let half = fitted.count() / 2;
+        let fitted = |s: &usize| inputs.recordings[&all[*s].0].spec.usage != Usage::Validation;
         let last = looked_at.len().max(2) - 1;
         Some(Self {
             inputs,
@@ -210,9 +208,8 @@ impl<'a> Places<'a> {
             share: (0..looked_at.len())
                 .map(|i| i as f64 / last as f64)
                 .collect(),
-            late: (0..looked_at.len())
-                .map(|i| if i < half { 0.0 } else { 1.0 })
-                .collect(),
+            looked_at: looked_at.to_vec(),
+            fitted: looked_at.iter().map(fitted).collect(),
         })
     }
 
@@ -262,7 +259,7 @@ impl<'a> Places<'a> {
                 add(of(UntestedKind::Eccentricity), harmonics.into());
                 let yields = effect(EffectKind::TorqueCompliance, YIELD, None);
                 add(of(UntestedKind::Compliance), vec![yields]);
-                let step = self.since(Moves::Joint(edge), STEP, &self.late);
+                let step = self.since(Moves::Joint(edge), STEP, &self.late(Moves::Joint(edge)));
                 add(of(UntestedKind::Step), vec![Some(step)]);
             }
             let alike = |o: &&JointId| **o != joint && model.joint(**o).kind.turns() == turns;
@@ -297,9 +294,27 @@ impl<'a> Places<'a> {
                 of(UntestedKind::Drift, frame),
                 along(&reference, &self.share),
             ),
-            (of(UntestedKind::Bump, frame), along(&reference, &self.late)),
-            (of(UntestedKind::Slip, name), along(&mount, &self.late)),
+            (
+                of(UntestedKind::Bump, frame),
+                along(&reference, &self.late(reference(0))),
+            ),
+            (
+                of(UntestedKind::Slip, name),
+                along(&mount, &self.late(mount(0))),
+            ),
         ]
+    }
+
+    /// 1 from the middle of the fitted samples that would show it on: what happens before or after all of them is in nothing that was
+    /// found.
+    fn late(&self, moves: Moves) -> Vec<f64> {
+        let seen = self.fit.solution.moved_in(moves, &self.looked_at);
+        let shows: Vec<usize> = (0..seen.len())
+            .filter(|&i| seen[i] && self.fitted[i])
+            .collect();
+        let middle = shows.get(shows.len() / 2).copied().unwrap_or(0);
+        let is_late = |i: usize| f64::from(u8::from(i >= middle));
+        (0..seen.len()).map(is_late).collect()
     }
 
     /// What is as at the end of the recordings when the robot is used.

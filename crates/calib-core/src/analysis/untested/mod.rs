@@ -29,6 +29,7 @@ use crate::analysis::solution::Solution;
 use crate::analysis::spread::LinearPoint;
 use crate::graph::edge::EdgeKind;
 use crate::graph::ids::{EdgeId, FrameId};
+use crate::model::path::Step;
 use crate::solve::equations::Objective;
 use crate::solve::whitened::covariance_of;
 use changed::Changed;
@@ -247,14 +248,15 @@ impl Common {
 }
 
 impl Solution {
-    /// Equation (4) without an effect, then with each cause: over `postures`, from the samples `looked_at`. What grows with the square of the
-    /// parameters is summed over every `step`-th of them, which stands for the others; what the data say (g, and Σ aᵀV⁻¹e) over all: a part of
-    /// the samples, multiplied, would be as noisy as that part. `None` without postures or free parameters, or where the model cannot be evaluated.
+    /// Equation (4) without an effect, then with each cause: over `postures`, from `samples`. What grows with the square of the
+    /// parameters is summed over about `most` of them, each of which stands for others of its recording; what the data say (g, and Σ aᵀV⁻¹e) over
+    /// all: a part of the samples, multiplied, would be as noisy as that part. `None` without postures or free parameters, or where the model
+    /// cannot be evaluated.
     #[must_use]
     pub fn open_errors(
         &self,
-        looked_at: &[usize],
-        step: usize,
+        samples: &[usize],
+        most: usize,
         causes: &[OpenCause<'_>],
         postures: &[MovedPoint],
     ) -> Option<OpenErrors> {
@@ -279,8 +281,8 @@ impl Solution {
             ..self.objective()
         };
         let columns = Columns::new(self, &effects);
-        let design = Design::of(&columns, objective, looked_at, step, &mut changes);
-        let seen = Seen::of(&columns, objective, looked_at);
+        let design = Design::of(&columns, objective, samples, most, &mut changes);
+        let seen = Seen::of(&columns, objective, samples);
         let common = self.common(&design, &seen, postures)?;
         let of_effect = |effect| common.of_effect(effect, &design, &seen, postures);
         let mut of_effects = effects.iter().copied().enumerate().map(of_effect);
@@ -305,6 +307,31 @@ impl Solution {
             out.sizes.push(own.iter().map(|d| d.size).collect());
         }
         Some(out)
+    }
+
+    /// In which of these samples something was measured that an effect would move; held-out ones count.
+    #[must_use]
+    pub fn moved_in(&self, moves: Moves, samples: &[usize]) -> Vec<bool> {
+        let model = &self.model;
+        let sees = |measurement: usize| {
+            let kind = &model.problem.measurements[measurement];
+            match moves {
+                Moves::Joint(joint) => {
+                    let mut steps = model.paths[measurement].steps.iter();
+                    steps.any(|s| matches!(s, Step::Joint { edge, .. } if *edge == joint.index()))
+                }
+                Moves::Reference(frame, _) => kind.from == frame,
+                Moves::Body(frame, _) => kind.to == frame,
+            }
+        };
+        let sees: Vec<bool> = (0..model.paths.len()).map(sees).collect();
+        let used = |o: usize| {
+            let observation = &model.observations[o];
+            let kept = self.weights[o] > 0.0 || model.is_held_out(observation.sample);
+            kept && sees[observation.measurement]
+        };
+        let of_sample = |s: &usize| model.of_sample[*s].clone().any(used);
+        samples.iter().map(of_sample).collect()
     }
 
     fn common(&self, design: &Design, seen: &Seen, postures: &[MovedPoint]) -> Option<Common> {

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::changed::Changed;
 use super::{Moves, UntestedEffect};
+use crate::analysis::looked_at::looked_at;
 use crate::analysis::solution::Solution;
 use crate::model::cache::State;
 use crate::model::pose::Pose;
@@ -102,12 +103,12 @@ pub(super) struct Design {
 }
 
 impl Design {
-    /// From every `step`-th sample that is looked at, which stands for the others.
+    /// From at most about `most` of the samples, each of which stands for others of its recording.
     pub(super) fn of(
         columns: &Columns<'_>,
         objective: Objective,
-        looked_at: &[usize],
-        step: usize,
+        samples: &[usize],
+        most: usize,
         changes: &mut [Option<Changed<'_>>],
     ) -> Self {
         let (solution, effects) = (columns.solution, columns.effects);
@@ -118,10 +119,13 @@ impl Design {
             b: DMatrix::zeros(n, effects.len()),
             own: vec![0.0; effects.len()],
         };
-        let step = step.max(1);
-        let factor = looked_at.len() as f64 / looked_at.len().div_ceil(step).max(1) as f64;
+        let mut places: Vec<(usize, usize)> = samples.iter().copied().zip(0..).collect();
+        places.sort_unstable();
+        let in_order: Vec<usize> = places.iter().map(|(sample, _)| *sample).collect();
+        let drawn = looked_at(&in_order, &solution.model.problem.borders, most);
         let mut work = columns.workspace();
-        for (place, &sample) in looked_at.iter().enumerate().step_by(step) {
+        for (sample, factor) in drawn.weighed() {
+            let place = places[in_order.partition_point(|s| *s < sample)].1;
             let Some(s) = whitened(objective, &solution.values, sample, &mut work) else {
                 continue;
             };
@@ -173,13 +177,13 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    pub(super) fn of(columns: &Columns<'_>, objective: Objective, looked_at: &[usize]) -> Self {
+    pub(super) fn of(columns: &Columns<'_>, objective: Objective, samples: &[usize]) -> Self {
         let solution = columns.solution;
         let none = || Self {
             g: DVector::zeros(solution.model.free()),
             score: vec![0.0; columns.effects.len()],
         };
-        let places: Vec<(usize, usize)> = looked_at.iter().copied().enumerate().collect();
+        let places: Vec<(usize, usize)> = samples.iter().copied().enumerate().collect();
         let at = columns.workspace();
         let of = |places: &[(usize, usize)]| {
             let (mut sum, mut work) = (none(), at.clone());
