@@ -378,7 +378,7 @@ fn record() {
         "--all",
         "--append",
         "--seconds",
-        "0.3",
+        "0.1",
     ];
     // No two recordings are the same: a file has its whole header, or is not there.
     let check = |now: &Files, before: &Files, _: &Files| {

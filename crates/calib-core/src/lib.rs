@@ -142,7 +142,7 @@ pub use analysis::change::{Change, ChangeScan, ChangeSettings, Moved};
 pub use analysis::closure::{ClosureStatistics, Spread};
 pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};
 pub use analysis::dependence::{Dependence, MemoryOf};
-pub use analysis::estimate::{Settings, solve, solve_kept};
+pub use analysis::estimate::{solve, solve_kept};
 pub use analysis::folds::{folds, k_fold};
 pub use analysis::gauge::Gauge;
 pub use analysis::goodness::{GoodnessOfFit, Physics, ScoreTest};
@@ -152,6 +152,7 @@ pub use analysis::sandwich::sandwich;
 pub use analysis::select::{
     NestedError, Part, Selection, SelectionRule, SelectionStep, StepOutcome, select,
 };
+pub use analysis::settings::Settings;
 pub use analysis::solution::{NoiseEstimate, ParameterClass, ParameterEstimate, Solution};
 pub use analysis::spread::{LinearPoint, Placement, PostureSpread, SizeSpread, SpreadDirection};
 pub use analysis::starts::StartDirection;

@@ -12,7 +12,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::analysis::estimate::{Settings, solve};
+use crate::analysis::estimate::solve;
+use crate::analysis::settings::Settings;
 use crate::analysis::solution::Solution;
 use crate::analysis::validate::{CrossValidation, SamplePrediction};
 use crate::graph::error::Error;

@@ -9,6 +9,7 @@ use std::collections::BTreeSet;
 use crate::analysis::information::Information;
 use crate::analysis::looked_at::fewer;
 use crate::analysis::observability::observe;
+use crate::analysis::settings::Settings;
 use crate::analysis::solution::{NoiseEstimate, Solution, describe_parameters};
 use crate::graph::error::Error;
 use crate::graph::ids::GroupId;
@@ -19,71 +20,15 @@ use crate::solve::equations::{Objective, Workspace};
 use crate::solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize_in};
 use crate::solve::noise::{Scoring, score};
 use crate::solve::normal::data_cost;
-use crate::solve::robust::{
-    RejectReason, Rejection, RobustSettings, clean, clean_near, explain, gate,
-};
+use crate::solve::robust::{RejectReason, Rejection, clean, clean_near, explain, gate};
 use crate::solve::rows::add_block;
-
-/// How to solve.
-///
-/// Non-exhaustive: start from [`Settings::default`] or [`Settings::plain`] and change what differs.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct Settings {
-    /// Limits of the minimization.
-    pub minimize: MinimizeSettings,
-    /// Treatment of outliers; on by default.
-    pub robust: RobustSettings,
-    /// Rounds of minimizing and re-estimating noise levels; they settle to 0.1 % in 5 to 15.
-    pub noise_rounds: usize,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            minimize: MinimizeSettings::default(),
-            robust: RobustSettings::default(),
-            noise_rounds: 60,
-        }
-    }
-}
-
-impl Settings {
-    /// Every observation counts fully, noise levels as stated: the plain least-squares fit.
-    #[must_use]
-    pub fn plain() -> Self {
-        let mut settings = Self::default();
-        settings.robust.enabled = false;
-        settings.noise_rounds = 0;
-        settings
-    }
-
-    /// The same with these limits of the minimization.
-    #[must_use]
-    pub fn with_minimize(mut self, minimize: MinimizeSettings) -> Self {
-        self.minimize = minimize;
-        self
-    }
-
-    /// The same with this treatment of outliers.
-    #[must_use]
-    pub fn with_robust(mut self, robust: RobustSettings) -> Self {
-        self.robust = robust;
-        self
-    }
-
-    /// The same with this number of rounds for the noise levels; 0 keeps them as stated.
-    #[must_use]
-    pub fn with_noise_rounds(mut self, rounds: usize) -> Self {
-        self.noise_rounds = rounds;
-        self
-    }
-}
 
 /// Noise levels have settled when log σ² changes by less than this: 0.05 % in σ.
 const NOISE_SETTLED: f64 = 1e-3;
-/// Values need not be better than 1e-3 σ while noise levels or outliers are still being decided.
+/// Values need not be better than 1e-3 σ while outliers are still being decided…
 const BETWEEN_ROUNDS: f64 = 1e-6;
+/// …and than 1e-2 σ from one round of the noise levels to the next: sums of squares do not change in the first order at the minimum.
+const BETWEEN_LEVELS: f64 = 1e-4;
 /// Gate and refit alternate; the set settles in two or three rounds unless an observation lies at the border.
 const GATE_ROUNDS: usize = 6;
 
@@ -405,7 +350,7 @@ impl Fit<'_> {
             if change < NOISE_SETTLED {
                 break;
             }
-            minimum = self.minimize(&minimum.values, weights, theta, work, BETWEEN_ROUNDS);
+            minimum = self.minimize(&minimum.values, weights, theta, work, BETWEEN_LEVELS);
         }
         self.minimize(
             &minimum.values,

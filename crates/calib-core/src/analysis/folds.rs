@@ -1,6 +1,7 @@
 //! k-fold cross-validation: refits on all but one fold, predictions on that fold.
 
-use crate::analysis::estimate::{Settings, solve};
+use crate::analysis::estimate::solve;
+use crate::analysis::settings::Settings;
 use crate::analysis::validate::CrossValidation;
 use crate::graph::error::Error;
 use crate::graph::problem::Problem;

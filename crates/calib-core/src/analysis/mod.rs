@@ -18,6 +18,7 @@ pub(crate) mod sandwich;
 pub(crate) mod score;
 pub(crate) mod scores;
 pub(crate) mod select;
+pub(crate) mod settings;
 pub(crate) mod solution;
 pub(crate) mod spread;
 mod standardized;

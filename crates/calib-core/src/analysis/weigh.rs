@@ -26,8 +26,9 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::analysis::admit::{Admission, eligible, left_out_squares, many_rejected, wider};
-use crate::analysis::estimate::{Settings, Start, refit};
+use crate::analysis::estimate::{Start, refit};
 use crate::analysis::scores::{Scores, mean, paired, tails};
+use crate::analysis::settings::Settings;
 use crate::analysis::solution::Solution;
 use crate::analysis::validate::{CrossValidation, predictions};
 use crate::graph::problem::{NoiseKind, NoiseModel, Problem};
@@ -392,7 +393,6 @@ fn values_at(
         max_iterations: 20,
         decrement: 1e-4,
         damping: 1e-6,
-        active_sets: false,
     };
     let objective = Objective {
         model,

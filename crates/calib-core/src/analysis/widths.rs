@@ -21,9 +21,10 @@ use serde::{Deserialize, Serialize};
 
 use calib_geometry::decompose::{solve_least_squares, symmetric_eigen};
 
-use crate::analysis::estimate::{Settings, Start, refit};
+use crate::analysis::estimate::{Start, refit};
 use crate::analysis::information::Information;
 use crate::analysis::scores::{Scores, mean, paired};
+use crate::analysis::settings::Settings;
 use crate::analysis::solution::{Solution, describe_parameters};
 use crate::graph::ids::ParameterId;
 use crate::solve::minimize::SolveStatus;

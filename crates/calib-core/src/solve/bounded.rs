@@ -4,9 +4,8 @@
 //! min ½ δᵀ(H + λ S⁻²)δ + gᵀδ      s.t.   lower ≤ x + δ ≤ upper                              (1)
 //! ```
 //!
-//! The walls that are active are found by Clarabel's interior-point method or, where many models are tried, by the primal-dual
-//! active-set method (Hintermüller, Ito & Kunisch 2002): a few Cholesky factors where it ends; it may cycle. Both solve (1), but where
-//! several minima explain the data alike, a rounding decides which one is found.
+//! The walls that are active are found by the primal-dual active-set method (Hintermüller, Ito & Kunisch 2002): a few Cholesky factors,
+//! and exact where it ends. It may cycle: then Clarabel's interior-point method finds them.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -23,8 +22,6 @@ pub(crate) struct Damped<'a> {
     pub natural: &'a [f64],
     /// λ
     pub damping: f64,
-    /// Active sets are tried before the interior point.
-    pub active_sets: bool,
 }
 
 /// Replaces `step` by the solution of (1) when it leaves the box; `false` when the program fails.
@@ -50,8 +47,7 @@ pub(crate) fn bounded_step(
         return true;
     }
     let program = Program::new(system, damped);
-    if damped.active_sets
-        && let Some(exact) = active_set(&program, &room)
+    if let Some(exact) = active_set(&program, &room)
         && exact.iter().all(|x| x.is_finite())
     {
         step.copy_from_slice(&exact);

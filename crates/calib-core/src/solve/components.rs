@@ -144,17 +144,14 @@ impl Weighed {
         let (m, n, k) = (rows.m, rows.n, rows.k);
         let mut groups = Vec::new();
         row_groups(model, rows, &mut groups);
-        let mut p = vec![0.0; m * m];
-        for i in 0..m {
-            p[i * m + i] = 1.0;
-        }
+        let p = random.weight();
         let mut e = rows.r[..m].to_vec();
-        let mut j = rows.j[..m * n].to_vec();
+        random.weigh(&mut e);
+        let mut j = vec![0.0; m * n];
+        random.weigh_rows(&rows.j[..m * n], n, &mut j);
         let u = rows.g[..m * k].to_vec();
-        let mut pu = u.clone();
-        for (x, columns) in [(&mut p, m), (&mut e, 1), (&mut j, n), (&mut pu, k)] {
-            random.weigh(x, columns);
-        }
+        let mut pu = vec![0.0; m * k];
+        random.weigh_rows(&u, k, &mut pu);
         let mut upu = vec![0.0; k * k];
         for i in 0..m {
             for a in 0..k {

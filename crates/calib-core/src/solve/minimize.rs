@@ -65,8 +65,6 @@ pub struct MinimizeSettings {
     pub decrement: f64,
     /// First damping λ: 1e-3 is a prior of 30 natural scales (30°, 30 cm) on the step.
     pub damping: f64,
-    /// Limits that are reached are found by active sets instead of an interior point: faster where many models are tried.
-    pub active_sets: bool,
 }
 
 impl Default for MinimizeSettings {
@@ -75,7 +73,6 @@ impl Default for MinimizeSettings {
             max_iterations: 100,
             decrement: 1e-12,
             damping: 1e-3,
-            active_sets: false,
         }
     }
 }
@@ -316,7 +313,6 @@ impl<'a> Descent<'a> {
                         curvature: curvature.known.then_some(curvature.s.as_slice()),
                         natural: &self.natural,
                         damping: self.damping,
-                        active_sets: self.settings.active_sets,
                     },
                     &mut self.step,
                 ))

@@ -129,13 +129,13 @@ impl Pass<'_> {
             rows.random_part(random)?;
             random.store(rows, &mut factors);
             let m = rows.m;
-            random.whiten(&mut rows.r[..m], 1);
-            random.whiten(&mut rows.j[..m * n], n);
+            random.whiten(&mut rows.r[..m]);
             sum.cost += rows.squared_norm();
-            for (row, r) in rows.j[..m * n].chunks_exact(n.max(1)).zip(&rows.r) {
-                sum.g.iter_mut().zip(row).for_each(|(g, j)| *g += j * r);
+            let (whitened, gradient) = sum.rows_and_gradient(m);
+            random.whiten_rows(&rows.j[..m * n], n, whitened);
+            for (row, r) in whitened.chunks_exact(n.max(1)).zip(&rows.r) {
+                gradient.iter_mut().zip(row).for_each(|(g, j)| *g += j * r);
             }
-            sum.rows(m).copy_from_slice(&rows.j[..m * n]);
         }
         sum.multiply();
         Some((sum, factors))
@@ -172,7 +172,7 @@ impl Pass<'_> {
                 Some(factors) => next += random.load(&factors[next..], m, rows.k),
                 None => rows.random_part(random)?,
             }
-            random.whiten(&mut rows.r[..m], 1);
+            random.whiten(&mut rows.r[..m]);
             sum += rows.squared_norm();
         }
         Some(sum)

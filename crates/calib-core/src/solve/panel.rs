@@ -33,12 +33,18 @@ impl Local {
 
     /// Space for `m` further rows, each k long, one after the other.
     pub(crate) fn rows(&mut self, m: usize) -> &mut [f64] {
+        self.rows_and_gradient(m).0
+    }
+
+    /// As [`Local::rows`], with the gradient that they are to be added to.
+    pub(crate) fn rows_and_gradient(&mut self, m: usize) -> (&mut [f64], &mut [f64]) {
         if self.filled + m > self.panel.ncols() {
             self.multiply();
         }
         let start = self.filled * self.k;
         self.filled += m;
-        &mut self.panel.as_mut_slice()[start..start + m * self.k]
+        let rows = &mut self.panel.as_mut_slice()[start..start + m * self.k];
+        (rows, &mut self.g)
     }
 
     /// H += Σ rowᵀ row
@@ -56,7 +62,21 @@ impl Local {
             Dyn(self.k),
             Dyn(1),
         );
-        self.h.gemm(1.0, &rows, &transposed, 1.0);
+        // H is symmetric: of four blocks, three are multiplied and one is copied.
+        let (k, half) = (self.k, self.k / 2);
+        let mut product = |from: usize, count: usize, to: usize, width: usize| {
+            let mut block = self.h.view_mut((from, to), (count, width));
+            let left = rows.rows(from, count);
+            block.gemm(1.0, &left, &transposed.columns(to, width), 1.0);
+        };
+        product(0, half, 0, half);
+        product(0, half, half, k - half);
+        product(half, k - half, half, k - half);
+        for b in 0..half {
+            for a in half..k {
+                self.h[(a, b)] = self.h[(b, a)];
+            }
+        }
         self.filled = 0;
     }
 }

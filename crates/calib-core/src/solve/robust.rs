@@ -189,7 +189,6 @@ const INNER: MinimizeSettings = MinimizeSettings {
     max_iterations: 4,
     decrement: 1e-3,
     damping: 1e-6,
-    active_sets: false,
 };
 
 /// As [`clean`], from values that are nearly right: the last round of GNC alone.

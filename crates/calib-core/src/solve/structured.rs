@@ -9,6 +9,8 @@
 //!
 //! Orthogonal Q instead of Woodbury's formula: nothing cancels, however large the random effects are.
 
+use nalgebra::{DMatrixView, DMatrixViewMut};
+
 use crate::model::layout::Model;
 use crate::solve::rows::{SampleRows, add_block};
 
@@ -104,18 +106,23 @@ impl SampleRows {
         out.q.clear();
         out.q.extend_from_slice(&self.g[..m * k]);
         let mut r = vec![0.0; k * k];
+        let mut again = vec![0.0; k];
         let before: Vec<f64> = (0..k).map(|c| norm(&out.q, m, k, c)).collect();
         for c in 0..k {
             // Its first projection was taken when each of the earlier columns was finished.
-            for p in 0..c {
-                let mut along = 0.0;
-                for i in 0..m {
-                    along += out.q[i * k + p] * out.q[i * k + c];
-                }
-                r[p * k + c] += along;
-                for i in 0..m {
-                    out.q[i * k + c] -= along * out.q[i * k + p];
-                }
+            again.fill(0.0);
+            for row in out.q.chunks_exact(k) {
+                let own = row[c];
+                again[..c]
+                    .iter_mut()
+                    .zip(row)
+                    .for_each(|(x, q)| *x += q * own);
+            }
+            for (p, x) in again[..c].iter().enumerate() {
+                r[p * k + c] += x;
+            }
+            for row in out.q.chunks_exact_mut(k) {
+                row[c] -= along(&row[..c], &again);
             }
             let size = norm(&out.q, m, k, c);
             let new = size > DEPENDENT * before[c];
@@ -191,49 +198,106 @@ impl RandomPart {
         m * k + k * k
     }
 
-    /// Equation (2) without L_D⁻¹: x ← (I − Q T Qᵀ) x, x being m rows of `columns`.
-    pub(crate) fn whiten(&self, x: &mut [f64], columns: usize) {
-        self.take_out(&self.t, x, columns);
+    /// Equation (2) without L_D⁻¹ of one column: x ← (I − Q T Qᵀ) x.
+    pub(crate) fn whiten(&self, x: &mut [f64]) {
+        self.take_out(&self.t, x);
     }
 
-    /// Equation (3) without the L_D: x ← (I − Q S Qᵀ) x.
-    pub(crate) fn weigh(&self, x: &mut [f64], columns: usize) {
-        self.take_out(&self.s, x, columns);
+    /// Equation (3) without the L_D of one column: x ← (I − Q S Qᵀ) x.
+    pub(crate) fn weigh(&self, x: &mut [f64]) {
+        self.take_out(&self.s, x);
     }
 
-    fn take_out(&self, matrix: &[f64], x: &mut [f64], columns: usize) {
-        let (m, k) = (self.m, self.k);
+    /// (I − Q T Qᵀ) x of m rows of `columns`, to `out`.
+    pub(crate) fn whiten_rows(&self, x: &[f64], columns: usize, out: &mut [f64]) {
+        self.take_out_of_rows(&self.t, x, columns, out);
+    }
+
+    /// (I − Q S Qᵀ) x of m rows of `columns`, to `out`.
+    pub(crate) fn weigh_rows(&self, x: &[f64], columns: usize, out: &mut [f64]) {
+        self.take_out_of_rows(&self.s, x, columns, out);
+    }
+
+    /// Equation (3) itself without the L_D: I − Q S Qᵀ, m × m.
+    pub(crate) fn weight(&self) -> Vec<f64> {
+        let m = self.m;
+        let mut out = vec![0.0; m * m];
+        self.without(&self.q_times(&self.s), &mut out);
+        out
+    }
+
+    fn take_out(&self, matrix: &[f64], x: &mut [f64]) {
+        let k = self.k;
         if k == 0 {
             return;
         }
-        let (q, width) = (&self.q[..m * k], columns.max(1));
-        let mut terms = Vec::with_capacity(m.max(k));
-        let mut z = vec![0.0; k * columns];
-        for (c, z) in z.chunks_exact_mut(width).enumerate() {
-            nonzero(&mut terms, m, |i| q[i * k + c]);
-            add_rows(z, &terms, x);
+        let mut z = vec![0.0; k];
+        for (row, x) in self.q.chunks_exact(k).zip(&*x) {
+            z.iter_mut().zip(row).for_each(|(z, q)| *z += q * x);
         }
-        let mut mixed = vec![0.0; k * columns];
-        for (i, mixed) in mixed.chunks_exact_mut(width).enumerate() {
-            nonzero(&mut terms, k, |j| matrix[i * k + j]);
-            add_rows(mixed, &terms, &z);
+        let rows = matrix.chunks_exact(k);
+        let mixed: Vec<f64> = rows.map(|row| along(row, &z)).collect();
+        for (row, x) in self.q.chunks_exact(k).zip(x) {
+            *x -= along(row, &mixed);
         }
-        for (i, x) in x.chunks_exact_mut(width).enumerate() {
-            nonzero(&mut terms, k, |c| -q[i * k + c]);
-            add_rows(x, &terms, &mixed);
+    }
+
+    /// (I − Q A Qᵀ) x. A matrix of m × m is the shorter way where random effects are no fewer than half of the rows.
+    fn take_out_of_rows(&self, matrix: &[f64], x: &[f64], columns: usize, out: &mut [f64]) {
+        let (m, k) = (self.m, self.k);
+        if k == 0 || columns == 0 || m == 0 {
+            out.copy_from_slice(x);
+            return;
+        }
+        let qa = self.q_times(matrix);
+        // Row after row is column after column of the transpose.
+        let x = DMatrixView::from_slice(x, columns, m);
+        let mut out = DMatrixViewMut::from_slice(out, columns, m);
+        if m <= 2 * k {
+            let mut whole = vec![0.0; m * m];
+            self.without(&qa, &mut whole);
+            out.gemm(1.0, &x, &DMatrixView::from_slice(&whole, m, m), 0.0);
+        } else {
+            let z = x * DMatrixView::from_slice(&self.q, k, m).transpose();
+            out.copy_from(&x);
+            out.gemm(-1.0, &z, &DMatrixView::from_slice(&qa, k, m), 1.0);
+        }
+    }
+
+    /// Q A of a k × k matrix, m × k.
+    fn q_times(&self, matrix: &[f64]) -> Vec<f64> {
+        let k = self.k;
+        let mut out = vec![0.0; self.m * k];
+        for (out, q) in out
+            .chunks_exact_mut(k.max(1))
+            .zip(self.q.chunks_exact(k.max(1)))
+        {
+            for (q, row) in q.iter().zip(matrix.chunks_exact(k)) {
+                out.iter_mut().zip(row).for_each(|(x, a)| *x += q * a);
+            }
+        }
+        out
+    }
+
+    /// I − (Q A) Qᵀ, m × m.
+    fn without(&self, qa: &[f64], out: &mut [f64]) {
+        let (m, k) = (self.m, self.k.max(1));
+        for i in 0..m {
+            for j in 0..m {
+                let unit = if i == j { 1.0 } else { 0.0 };
+                let taken = if self.k == 0 {
+                    0.0
+                } else {
+                    along(&qa[i * k..(i + 1) * k], &self.q[j * k..(j + 1) * k])
+                };
+                out[i * m + j] = unit - taken;
+            }
         }
     }
 }
 
-/// Factors that are not zero, with their places.
-#[inline]
-fn nonzero(terms: &mut Vec<(f64, usize)>, count: usize, factor: impl Fn(usize) -> f64) {
-    terms.clear();
-    terms.extend(
-        (0..count)
-            .map(|at| (factor(at), at))
-            .filter(|(f, _)| *f != 0.0),
-    );
+fn along(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Takes column `c` out of all later ones of a matrix with `k` columns, and notes how much in `r`.
@@ -253,27 +317,6 @@ fn project_later(q: &mut [f64], k: usize, c: usize, r: &mut [f64]) {
     }
 }
 
-/// x += Σ factor · row over the rows of a matrix as wide as x, four at a time: each sum is in their order.
-#[inline]
-fn add_rows(x: &mut [f64], terms: &[(f64, usize)], rows: &[f64]) {
-    let n = x.len();
-    let row = |at: usize| &rows[at * n..at * n + n];
-    let mut fours = terms.chunks_exact(4);
-    for four in &mut fours {
-        let [a, b, c, d] = [four[0].0, four[1].0, four[2].0, four[3].0];
-        let [p, q] = [row(four[0].1), row(four[1].1)];
-        let [r, s] = [row(four[2].1), row(four[3].1)];
-        for i in 0..n {
-            x[i] = x[i] + a * p[i] + b * q[i] + c * r[i] + d * s[i];
-        }
-    }
-    for &(factor, at) in fours.remainder() {
-        x.iter_mut()
-            .zip(row(at))
-            .for_each(|(x, y)| *x += factor * y);
-    }
-}
-
 /// Row `to` −= factor · row `from` of a matrix with `columns` columns; `from` < `to`.
 fn subtract(x: &mut [f64], columns: usize, to: usize, from: usize, factor: f64) {
     let (above, below) = x.split_at_mut(to * columns);
@@ -289,4 +332,50 @@ fn norm(q: &[f64], m: usize, k: usize, c: usize) -> f64 {
         .map(|i| q[i * k + c] * q[i * k + c])
         .sum::<f64>()
         .sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Few and many random effects beside the rows: column by column, all columns at once, and the matrix itself.
+    #[test]
+    fn all_ways_to_take_random_effects_out_agree() {
+        for (m, k, columns) in [
+            (6, 7, 20),
+            (12, 7, 61),
+            (12, 3, 5),
+            (36, 7, 61),
+            (9, 0, 4),
+            (6, 2, 0),
+        ] {
+            let numbers = |count: usize, seed: f64| -> Vec<f64> {
+                (0..count).map(|i| (seed + 1.7 * i as f64).sin()).collect()
+            };
+            let random = RandomPart {
+                m,
+                k,
+                q: numbers(m * k, 1.0),
+                t: numbers(k * k, 2.0),
+                s: numbers(k * k, 3.0),
+            };
+            let x = numbers(m * columns, 4.0);
+            let (mut whitened, mut weighed) = (x.clone(), x.clone());
+            random.whiten_rows(&x, columns, &mut whitened);
+            random.weigh_rows(&x, columns, &mut weighed);
+            let weight = random.weight();
+            for c in 0..columns {
+                let column: Vec<f64> = (0..m).map(|i| x[i * columns + c]).collect();
+                let (mut one, mut other) = (column.clone(), column.clone());
+                random.whiten(&mut one);
+                random.weigh(&mut other);
+                for i in 0..m {
+                    let dense = along(&weight[i * m..(i + 1) * m], &column);
+                    assert!((whitened[i * columns + c] - one[i]).abs() < 1e-12);
+                    assert!((weighed[i * columns + c] - other[i]).abs() < 1e-12);
+                    assert!((dense - other[i]).abs() < 1e-12);
+                }
+            }
+        }
+    }
 }

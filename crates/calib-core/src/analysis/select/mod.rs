@@ -25,7 +25,7 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use crate::analysis::estimate::Settings;
+use crate::analysis::settings::Settings;
 use crate::graph::error::Error;
 use crate::graph::ids::ParameterId;
 use crate::graph::problem::Problem;
@@ -172,15 +172,12 @@ pub fn select(
     rule: &SelectionRule,
     progress: &mut dyn FnMut(usize),
 ) -> Result<Selection, Error> {
-    // Trials are many, and decide by what they predict.
-    let mut settings = settings.clone();
-    settings.minimize.active_sets = true;
     path::select(
         &task::Task {
             problem,
             parts,
             first,
-            settings: &settings,
+            settings,
             rule,
         },
         progress,

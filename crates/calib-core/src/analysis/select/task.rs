@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use crate::analysis::estimate::Settings;
 use crate::analysis::select::linear::{Linear, Linearization};
 use crate::analysis::select::step::{
     Addition, Candidate, EQUAL, Stage, additions, candidates, without,
 };
 use crate::analysis::select::{Part, SelectionRule};
+use crate::analysis::settings::Settings;
 use crate::graph::problem::Problem;
 
 /// Parts that are exchanged at most.
