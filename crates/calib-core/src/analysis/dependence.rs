@@ -14,16 +14,22 @@
 //! factor κ for the level of the noise, which the fit makes look smaller. Residuals of missing physics that follow the order of the samples
 //! look the same, and are treated the same.
 //!
+//! The rows of a measured pose are turned into the axes of the frame that it was measured from: a tracker's memory stands still
+//! there, and turns with the body in the body's own axes.
+//!
 //! What this does not see: frames of one pose as separate samples, whose errors are shared but do not fade. Their
 //! joint values are equal; merge them before.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use crate::analysis::solution::{Solution, describe_parameters};
 use crate::graph::measurement::MeasurementKind;
 use crate::solve::equations::Workspace;
-use crate::solve::rows::add_block;
-use crate::solve::whitened::{Whitened, covariance_of, whitened};
+use crate::solve::whitened::{covariance_of, whitened};
+
+mod scaled;
+
+use scaled::{Keys, Scaled, scaled_sample};
 
 /// Which rows have the memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,38 +85,26 @@ const LARGEST_DECAY: f64 = 0.98;
 /// Rounds of substitution in (3): each leaves about a third of the error.
 const ROUNDS: usize = 8;
 
-/// One sample in units of each row's own σ.
-struct Scaled {
-    k: DMatrix<f64>,
-    w: DMatrix<f64>,
-    y: DVector<f64>,
-    /// Which row of which observation, the same in all samples; `None` for rows that are not asked.
-    keys: Vec<Option<usize>>,
-    /// First sample of a recording.
-    starts: bool,
-}
-
 impl Solution {
     /// Estimates the memory of the noise from successive samples; `borders` are the first samples of recordings, across which nothing is
     /// remembered. Where the residuals do not show one, decay and share are zero. `None` where fewer than eight samples or no pairs of rows exist.
     #[must_use]
     pub fn dependence(&self, borders: &[usize]) -> Option<Dependence> {
         let all = self.dependence_of(MemoryOf::All, borders)?;
-        let measurements = self.model.problem.measurements.iter();
-        let poses = measurements
-            .into_iter()
-            .any(|m| matches!(m.kind, MeasurementKind::Poses(_)));
-        if all.is_significant() || !poses {
+        let mut measurements = self.model.problem.measurements.iter();
+        let poses = measurements.any(|m| matches!(m.kind, MeasurementKind::Poses(_)));
+        if !poses {
             return Some(all);
         }
-        // Position and orientation of a body come from different parts of a tracker: one without memory hides the other's.
+        // Position and orientation of a body come from different parts of a tracker: one without memory hides the other's, and
+        // both together understate it.
         let parts = [MemoryOf::Positions, MemoryOf::Orientations];
-        let part = parts
+        let parts = parts
             .into_iter()
-            .filter_map(|of| self.dependence_of(of, borders))
-            .filter(Dependence::is_significant)
-            .max_by(|a, b| a.z.total_cmp(&b.z));
-        Some(part.unwrap_or(all))
+            .filter_map(|of| self.dependence_of(of, borders));
+        let found = parts.chain([all]).filter(Dependence::is_significant);
+        let clearest = found.max_by(|a, b| a.z.total_cmp(&b.z));
+        Some(clearest.unwrap_or(all))
     }
 
     fn dependence_of(&self, of: MemoryOf, borders: &[usize]) -> Option<Dependence> {
@@ -221,80 +215,10 @@ impl Solution {
             let own = borders.partition_point(|b| *b <= sample);
             let starts = recording != Some(own);
             recording = Some(own);
-            if !see(self.scaled_sample(&rows, of, starts, &mut keys)) {
+            if !see(scaled_sample(self, &rows, of, starts, &mut keys)) {
                 break;
             }
         }
-    }
-
-    /// W = σ V⁻¹ σ,   k = σ V⁻¹ J,   y = σ V⁻¹ e
-    fn scaled_sample(
-        &self,
-        rows: &Whitened,
-        of: MemoryOf,
-        starts: bool,
-        keys: &mut Keys,
-    ) -> Scaled {
-        let m = rows.w.len();
-        let mut sigma = vec![1.0; m];
-        let mut own = vec![None; m];
-        for &(o, first, count) in &rows.blocks {
-            add_block(&self.model, o, |i, j, group, shape| {
-                if i == j {
-                    sigma[first + i] = (self.theta[group] * shape).sqrt();
-                }
-            });
-            let observation = self.model.observations[o];
-            let kind = &self.model.problem.measurements[observation.measurement].kind;
-            let part = match kind {
-                MeasurementKind::Markers(markers) => {
-                    markers.observations[observation.item].point.index() + 1
-                }
-                _ => 0,
-            };
-            for i in 0..count {
-                if asked(of, kind, i) {
-                    own[first + i] = Some(keys.of(observation.measurement, part, i));
-                }
-            }
-        }
-        let mut scaled = rows.l_inverse.clone();
-        for (j, s) in sigma.iter().enumerate() {
-            scaled.column_mut(j).scale_mut(*s);
-        }
-        // The product of a transpose has no fast kernel.
-        let transposed = scaled.transpose();
-        Scaled {
-            k: &transposed * &rows.a,
-            y: &transposed * &rows.w,
-            w: &transposed * &scaled,
-            keys: own,
-            starts,
-        }
-    }
-}
-
-/// Whether a row of a measurement belongs to the rows that are asked.
-fn asked(of: MemoryOf, kind: &MeasurementKind, row: usize) -> bool {
-    let pose = matches!(kind, MeasurementKind::Poses(_));
-    match of {
-        MemoryOf::All => true,
-        MemoryOf::Positions => pose && row >= 3,
-        MemoryOf::Orientations => pose && row < 3,
-    }
-}
-
-/// Numbers of (measurement, point, row).
-#[derive(Default)]
-struct Keys(Vec<(usize, usize, usize)>);
-
-impl Keys {
-    fn of(&mut self, measurement: usize, part: usize, row: usize) -> usize {
-        let key = (measurement, part, row);
-        self.0.iter().position(|k| *k == key).unwrap_or_else(|| {
-            self.0.push(key);
-            self.0.len() - 1
-        })
     }
 }
 
