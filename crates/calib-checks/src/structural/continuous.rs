@@ -15,8 +15,6 @@
 
 use std::collections::BTreeSet;
 
-use calib_geometry::se3;
-use nalgebra::{DVector, Isometry3, Vector3};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::Options;
@@ -25,12 +23,10 @@ use super::candidates::span;
 use super::data::Data;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{RecordingIndex, SampleIndex};
-use super::linear::{Map, Model, Sums, Test, moving_joints, projected, solve};
+use super::linear::{Map, Model, Sums, Test, projected, solve};
+use super::nonlinear::{fewer, noise_ratio, relinearized};
 use super::screen::{Screened, screen};
-use super::thinning::thinned;
 
-/// Joint noise against marker noise, (rad/m)²: none, and 0.003° … 0.1° for a marker of 0.3 mm.
-const NOISE_RATIOS: [f64; 5] = [0.0, 0.03, 0.3, 3.0, 30.0];
 /// Relinearizations of the geometry before the tests.
 const RELINEARIZATIONS: usize = 3;
 /// With fewer degrees of freedom the priors, not the data, decide a test.
@@ -150,7 +146,7 @@ fn left_with(
     let corrections: Vec<Scoped> = corrections.into_iter().collect();
     let corrected = apply_all(&corrections, data);
     let (part, part_screened) = fewer(&corrected, screened);
-    let (part, ..) = relinearized(part, &part_screened, options)?;
+    let (part, ..) = relinearized(part, &part_screened, options, RELINEARIZATIONS)?;
     let at_map = Data {
         chain: part.chain,
         ..corrected
@@ -164,8 +160,9 @@ fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<
         return None;
     }
     let (part, part_screened) = fewer(data, screened);
-    let (part, deviation, sigma) = relinearized(part, &part_screened, options)?;
-    let (lambda, sigma) = noise_ratio(&part, &deviation, sigma, &part_screened, options)?;
+    let (part, deviation, sigma) = relinearized(part, &part_screened, options, RELINEARIZATIONS)?;
+    let noise = noise_ratio(&part, &deviation, sigma, &part_screened, options)?;
+    let (lambda, sigma) = (noise.lambda, noise.sigma);
     let at_map = Data {
         chain: part.chain,
         ..data.clone()
@@ -199,44 +196,6 @@ fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<
         effect,
         alternatives: alternatives.map(|s| tests[s.0].hypothesis(s.2)).collect(),
     })
-}
-
-/// Rows that give the point of linearization and the noise ratio: what they leave open is of second order, or a grid of
-/// factors of ten.
-const ROWS: usize = 120;
-
-/// Evenly spaced rows, and what is screened of them.
-fn fewer(data: &Data, screened: &[SampleIndex]) -> (Data, Vec<SampleIndex>) {
-    let rows = thinned(data, ROWS);
-    let place = |s: &SampleIndex| {
-        let row = rows.binary_search(&s.row).ok()?;
-        Some(SampleIndex { row, ..*s })
-    };
-    (
-        data.select(&rows),
-        screened.iter().filter_map(place).collect(),
-    )
-}
-
-/// The noise ratio λ of the largest restricted likelihood, and σ under it.
-fn noise_ratio(
-    data: &Data,
-    deviation: &DVector<f64>,
-    mut sigma: f64,
-    screened: &[SampleIndex],
-    options: &Options,
-) -> Option<(f64, f64)> {
-    let model = Model::new(data, &[], screened);
-    let mut best: Option<(f64, f64, f64)> = None;
-    for lambda in NOISE_RATIOS {
-        let sums = model.sums(lambda);
-        sigma = solve(&model, &sums, sigma, deviation, options)?.sigma;
-        let map = solve(&model, &sums, sigma, deviation, options)?;
-        if best.is_none_or(|b| map.log_likelihood > b.0) {
-            best = Some((map.log_likelihood, lambda, sigma));
-        }
-    }
-    best.map(|(_, lambda, sigma)| (lambda, sigma))
 }
 
 fn tests(data: &Data) -> Vec<Test> {
@@ -284,36 +243,4 @@ fn threshold(level: f64, freedom: f64) -> f64 {
     let f = FisherSnedecor::new(1.0, freedom).map_or(1e3, |d| d.inverse_cdf(1.0 - level));
     // g²/h = χ² F/(F + ν)
     freedom * (1.0 + f / freedom).ln()
-}
-
-/// The data with the chain at its MAP geometry, how far that is from nominal, and σ.
-fn relinearized(
-    mut data: Data,
-    screened: &[SampleIndex],
-    options: &Options,
-) -> Option<(Data, DVector<f64>, f64)> {
-    let nominal = data.chain.clone();
-    let moving = moving_joints(&data);
-    let mut deviation = DVector::zeros(6 * moving.len());
-    let mut sigma = options.sigma;
-    for _ in 0..RELINEARIZATIONS {
-        let x = {
-            let model = Model::new(&data, &[], screened);
-            let sums = model.sums(NOISE_RATIOS[2]);
-            let map = solve(&model, &sums, sigma, &deviation, options)?;
-            sigma = map.sigma;
-            map.x.rows(model.registration, deviation.len()).into_owned()
-        };
-        deviation += x;
-        for (g, &j) in moving.iter().enumerate() {
-            let xi = deviation.rows(6 * g, 6);
-            let twist = se3::Twist::new(
-                Vector3::new(xi[0], xi[1], xi[2]),
-                Vector3::new(xi[3], xi[4], xi[5]),
-            );
-            let step: Isometry3<f64> = se3::exp(&twist);
-            data.chain.joints[j].parent_from_joint = nominal.joints[j].parent_from_joint * step;
-        }
-    }
-    Some((data, deviation, sigma))
 }

@@ -22,6 +22,14 @@ pub enum Measured {
 }
 
 impl Measured {
+    /// Markers of the body; a pose counts as one.
+    pub(super) fn markers(&self) -> usize {
+        match self {
+            Self::Markers(rows) => rows.first().map_or(0, Vec::len),
+            Self::Poses { .. } => 1,
+        }
+    }
+
     /// Whether anything of the body was seen in a row.
     pub(super) fn seen(&self, row: usize) -> bool {
         match self {

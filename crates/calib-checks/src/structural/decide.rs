@@ -5,59 +5,25 @@ use super::candidates::{Candidate, candidates, span};
 use super::continuous;
 use super::data::{Data, DataError};
 use super::expected::expected;
+use super::few;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{JointIndex, SampleIndex};
+use super::likelihood::{Opinion, opinion};
+use super::naming::{Asked, EQUIVALENT_WITHIN, on_twin};
 use super::outcome::{Correction, Decision, Design, Evidence, Named, Options, Outcome};
+use super::ranking::{Ranking, distinct, few_samples, ratio};
 use super::scan::{Scan, Score, Scored};
-use super::score::score;
 use super::screen::screen;
 use super::thinning::thinned;
 use super::twin::twin;
 
-/// Degrees of freedom below which the residual of a registration says nothing. One marker in six poses has nine, and six where
-/// the rows are shifted by one: with a gross outlier among them that was named by chance.
-const LEAST_FREEDOM: f64 = 10.0;
+/// Degrees of freedom below which a gross outlier looks like a mistake. One marker in six poses has nine, and six where
+/// the rows are shifted by one.
+const FEW_FREEDOM: f64 = 10.0;
 /// Rounds of screening: the set settles in one or two.
 const SCREENINGS: usize = 3;
 /// Leaders under which outliers are looked for, beside the data as they are.
 const SCREENED_LEADERS: usize = 5;
-/// Only hypotheses with a residual up to this many times the winner's can be equivalent to it: equivalents differ by what
-/// the nominal errors do to them.
-const EQUIVALENT_WITHIN: f64 = 1.5;
-/// A hypothesis with a residual of this many times that of the data as they are explains nothing: a bound of it will do.
-const BEYOND: f64 = 2.0;
-/// The same in m, where the data are free of noise.
-const LEAST_BEYOND: f64 = 1e-4;
-/// Residuals that agree to this are those of one and the same correction.
-const SAME: f64 = 1e-6;
-
-/// Hypotheses ranked on the same samples.
-struct Ranking {
-    none: Score,
-    scored: Vec<Scored>,
-}
-
-impl Ranking {
-    fn of(data: &Data, candidates: &[Candidate], screened: &[SampleIndex]) -> Self {
-        let scan = Scan::new(data, screened);
-        let none = scan.none();
-        let enough = (BEYOND * none.rms).max(LEAST_BEYOND);
-        let mut scored = score(&scan, candidates, enough);
-        scored.retain(|s| s.score.score.is_finite());
-        scored.sort_by(|a, b| a.score.score.total_cmp(&b.score.score));
-        Self { none, scored }
-    }
-
-    fn ratio(&self, score: f64) -> f64 {
-        ratio(self.none.score, score)
-    }
-}
-
-/// `none / best`, finite: residuals under a micrometer, less than any tracker resolves, count as one.
-fn ratio(none: f64, best: f64) -> f64 {
-    const FLOOR: f64 = 1e-6;
-    none.max(FLOOR) / best.max(FLOOR)
-}
 
 /// Tries every structural hypothesis on the data.
 ///
@@ -84,10 +50,6 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
         design,
     };
     let (_, freedom) = Scan::new(work, &[]).freedom();
-    if freedom < LEAST_FREEDOM {
-        outcome.decision = Decision::TooFewData { freedom };
-        return Ok(outcome);
-    }
     let mut candidates = candidates(work);
     if rows.len() < data.readings.len() {
         // The neighbor of a row is not among the rows that are left.
@@ -99,13 +61,25 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
         candidates.iter_mut().for_each(|c| c.1.retain(about));
         candidates.retain(|c| !c.1.is_empty());
     }
+    if freedom < FEW_FREEDOM {
+        outcome.rms = Scan::new(work, &[]).none().rms;
+        outcome.decision = few::decide(work, candidates, freedom, options);
+        return Ok(outcome);
+    }
     let (ranking, screened) = screened_ranking(work, &candidates);
     outcome.rms = ranking.none.rms;
     outcome.expected = expected(work, &screened, options);
     if options.list_invisible {
         outcome.invisible = invisible(work, &ranking, &screened, options);
     }
-    outcome.decision = decide(work, &candidates, &ranking, &screened, &outcome, options);
+    let asked = Asked {
+        data: work,
+        candidates: &candidates,
+        ranking: &ranking,
+        screened: &screened,
+        options,
+    };
+    outcome.decision = decide(&asked, &outcome);
     let correction = match &outcome.decision {
         Decision::Named(named)
         | Decision::Undecided {
@@ -157,19 +131,6 @@ fn screened_ranking(data: &Data, candidates: &[Candidate]) -> (Ranking, Vec<Samp
     (ranking, screened)
 }
 
-/// The best hypotheses, one of each group with the same residual.
-fn distinct(scored: &[Scored], count: usize) -> impl Iterator<Item = &Scored> {
-    let mut last = f64::NEG_INFINITY;
-    scored
-        .iter()
-        .filter(move |s| {
-            let new = s.score.score > last * (1.0 + SAME) || last < 0.0;
-            last = s.score.score;
-            new
-        })
-        .take(count)
-}
-
 /// Hypotheses that fit the twin of correct data.
 fn invisible(
     data: &Data,
@@ -191,56 +152,45 @@ fn invisible(
     on_twin(&twin, &close, screened, options)
 }
 
-/// The hypotheses that fit a twin exactly.
-fn on_twin(
-    twin: &Data,
-    hypotheses: &[Scoped],
-    screened: &[SampleIndex],
-    options: &Options,
-) -> Vec<Scoped> {
-    let scan = Scan::new(twin, screened);
-    let list: Vec<Candidate> = hypotheses
-        .iter()
-        .map(|s| (s.hypothesis, vec![s.scope]))
-        .collect();
-    let fits = score(&scan, &list, f64::INFINITY)
-        .into_iter()
-        .filter(|s| s.score.score < options.twin_tolerance);
-    fits.map(|s| s.scoped).collect()
-}
-
-fn decide(
-    data: &Data,
-    candidates: &[Candidate],
-    ranking: &Ranking,
-    screened: &[SampleIndex],
-    outcome: &Outcome,
-    options: &Options,
-) -> Decision {
+fn decide(asked: &Asked<'_>, outcome: &Outcome) -> Decision {
+    let (ranking, options) = (asked.ranking, asked.options);
     let alarm = outcome.expected.is_some_and(|e| ranking.none.rms > e.limit);
     let best = ranking
         .scored
         .iter()
         .find(|s| !outcome.invisible.contains(&s.scoped));
     let best_ratio = best.map_or(1.0, |s| ranking.ratio(s.score.score));
-    let few = few_samples(data, screened);
+    let consistent = Decision::Consistent {
+        best: best.map(|s| s.scoped),
+        ratio: best_ratio,
+    };
+    let few = few_samples(asked.data, asked.screened);
     let single = best.filter(|_| best_ratio >= options.name_ratio * few);
-    let single = single.map(|best| name_single(data, candidates, ranking, best, screened, options));
-    let single = single.map(|named| with_expected(named, screened, data, options));
-    if let Some(named) = single.as_ref().filter(|named| settled(named, options)) {
-        // A cloud of points in a wrong unit of length looks like a body on a link that does not move.
-        if !maybe_unit(named, ranking) {
-            return Decision::Named(named.clone());
-        }
+    let single = single.map(|best| asked.with_expected(asked.name(best)));
+    // A cloud of points in a wrong unit of length looks like a body on a link that does not move.
+    let settled_by_residual = single
+        .as_ref()
+        .filter(|named| settled(named, options) && !maybe_unit(named, ranking));
+    if let Some(named) = settled_by_residual
+        && alarm
+        && named.within_expected != Some(false)
+    {
+        return Decision::Named(named.clone());
+    }
+    // Errors of the robot within the priors would explain the residual, or do not explain what is left: they are asked.
+    match opinion(asked, settled_by_residual, &outcome.invisible) {
+        Opinion::Likelier(named) => return Decision::Named(named),
+        Opinion::Against if !alarm => return consistent,
+        _ => {}
+    }
+    if let Some(named) = settled_by_residual {
+        return Decision::Named(named.clone());
     }
     if single.is_none() && !alarm {
-        return Decision::Consistent {
-            best: best.map(|s| s.scoped),
-            ratio: best_ratio,
-        };
+        return consistent;
     }
-    let pair = name_pair(data, candidates, ranking, screened, options);
-    let pair = pair.map(|pair| with_expected(pair, screened, data, options));
+    let pair = name_pair(asked);
+    let pair = pair.map(|pair| asked.with_expected(pair));
     let gain = |pair: &Named| {
         let single = single.as_ref().map_or(1.0, |s| s.evidence.ratio);
         pair.evidence.ratio / single
@@ -278,75 +228,8 @@ fn maybe_unit(named: &Named, ranking: &Ranking) -> bool {
     link && unit.is_some_and(|s| ranking.ratio(s.score.score) * NEARLY > named.evidence.ratio)
 }
 
-/// With few degrees of freedom ν the best of hundreds of hypotheses gains by chance: the ratios asked for grow by 1 + 4/ν.
-fn few_samples(data: &Data, screened: &[SampleIndex]) -> f64 {
-    const CHANCE: f64 = 4.0;
-    let (_, freedom) = Scan::new(data, screened).freedom();
-    1.0 + CHANCE / freedom.max(1.0)
-}
-
 fn undecided(leading: Option<Named>, ratio: f64) -> Decision {
     Decision::Undecided { leading, ratio }
-}
-
-/// Compares what is left with what nominal errors explain.
-fn with_expected(
-    mut named: Named,
-    screened: &[SampleIndex],
-    data: &Data,
-    options: &Options,
-) -> Named {
-    let corrected = apply_all(&named.correction, data);
-    named.within_expected =
-        expected(&corrected, screened, options).map(|e| named.evidence.best <= e.limit);
-    named
-}
-
-fn name_single(
-    data: &Data,
-    candidates: &[Candidate],
-    ranking: &Ranking,
-    best: &Scored,
-    screened: &[SampleIndex],
-    options: &Options,
-) -> Named {
-    let near = ranking.scored.iter().filter(|s| s.scoped != best.scoped);
-    let near = near.filter(|s| ratio(s.score.score, best.score.score) < EQUIVALENT_WITHIN);
-    let close: Vec<Scoped> = near.map(|s| s.scoped).collect();
-    let twin = twin(data, &[best.scoped], screened);
-    let equivalent = on_twin(&twin, &close, screened, options);
-    let others = || {
-        ranking
-            .scored
-            .iter()
-            .filter(|s| s.scoped != best.scoped && !equivalent.contains(&s.scoped))
-    };
-    let times = |s: &Scored| ratio(s.score.score, best.score.score);
-    let corrected = apply(&best.scoped, data);
-    Named {
-        correction: vec![best.scoped],
-        alternatives: others()
-            .map(|s| (vec![s.scoped], times(s)))
-            .take_while(|s| s.1 < options.runner_up_ratio)
-            .collect(),
-        evidence: Evidence {
-            none: ranking.none.rms,
-            best: best.score.rms,
-            next: others().next().map(|s| s.score.rms),
-            ratio: ranking.ratio(best.score.score),
-        },
-        left: left(&corrected, candidates, screened),
-        equivalent: equivalent.into_iter().map(|s| vec![s]).collect(),
-        within_expected: None,
-    }
-}
-
-/// By how much the best further hypothesis divides the residual of corrected data.
-fn left(corrected: &Data, candidates: &[Candidate], screened: &[SampleIndex]) -> f64 {
-    let next = Ranking::of(corrected, candidates, screened);
-    next.scored
-        .first()
-        .map_or(1.0, |s| next.ratio(s.score.score))
 }
 
 /// Two corrections, with the residual after both.
@@ -356,13 +239,14 @@ struct Pair {
 }
 
 /// The best pair: each of the leading hypotheses with every other.
-fn name_pair(
-    data: &Data,
-    candidates: &[Candidate],
-    ranking: &Ranking,
-    screened: &[SampleIndex],
-    options: &Options,
-) -> Option<Named> {
+fn name_pair(asked: &Asked<'_>) -> Option<Named> {
+    let Asked {
+        data,
+        candidates,
+        ranking,
+        screened,
+        options,
+    } = *asked;
     let mut pairs: Vec<Pair> = Vec::new();
     for leader in distinct(&ranking.scored, options.beam) {
         let first = apply(&leader.scoped, data);
@@ -410,7 +294,7 @@ fn name_pair(
         }
     }
     Some(Named {
-        left: left(&apply_all(&best.correction, data), candidates, screened),
+        left: asked.left(&apply_all(&best.correction, data)),
         evidence: Evidence {
             none: ranking.none.rms,
             best: best.score.rms,
@@ -421,6 +305,7 @@ fn name_pair(
         equivalent,
         alternatives,
         within_expected: None,
+        allowing: None,
     })
 }
 

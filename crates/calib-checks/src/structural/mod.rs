@@ -32,7 +32,8 @@
 //! `ln score = ln rms − share · ln s`.
 //!
 //! **Decision.** A hypothesis is named where it divides the score of the data as they are by 1.5 or more, and no further hypothesis
-//! does so after it was applied; else pairs are tried. What the design cannot tell apart from the winner is found on
+//! does so after it was applied; else the likeliest beside errors of the robot is asked for, and pairs are tried. Where few
+//! samples are left, a single bad row is the rival. What the design cannot tell apart from the winner is found on
 //! noise-free twins and named with it. Gross outliers are screened under the leading hypotheses, by the one with
 //! the smallest robust scale, never under one alone. Gains and fractional couplings are found by score tests.
 //!
@@ -56,12 +57,17 @@ mod correct;
 mod data;
 mod decide;
 mod expected;
+mod few;
 mod hypothesis;
 mod ids;
+mod likelihood;
 mod linear;
 mod moments;
 mod moved;
+mod naming;
+mod nonlinear;
 mod outcome;
+mod ranking;
 mod registration;
 mod rotation;
 mod rows;
@@ -81,7 +87,10 @@ pub use hypothesis::{
     Hypothesis, PoseMistake, QuarterTurns, Scope, Scoped, UnitMistake, axes_rotation,
 };
 pub use ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex, SampleIndex};
-pub use outcome::{Correction, Decision, Design, Evidence, Expected, Named, Options, Outcome};
+pub use likelihood::{KnownNoise, log_odds};
+pub use outcome::{
+    Allowing, Correction, Decision, Design, Evidence, Expected, Named, Options, Outcome,
+};
 pub use registration::{PointRows, Registered, registration};
 pub use rows::{Deviation, Deviations, deviations};
 pub use thinning::thin;

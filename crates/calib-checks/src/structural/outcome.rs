@@ -84,6 +84,15 @@ pub struct Evidence {
     pub ratio: f64,
 }
 
+/// Noise of a marker coordinate that is left where the robot may be off as far as the priors say, m.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Allowing {
+    /// Of the data as they are.
+    pub none: f64,
+    /// After the correction.
+    pub best: f64,
+}
+
 /// Corrections that belong together: one, or two.
 pub type Correction = Vec<Scoped>;
 
@@ -102,6 +111,8 @@ pub struct Named {
     pub left: f64,
     /// The residual that is left is within the limit of the expected one.
     pub within_expected: Option<bool>,
+    /// Where the residuals of registrations did not decide: what is left beside errors of the robot.
+    pub allowing: Option<Allowing>,
 }
 
 impl Named {

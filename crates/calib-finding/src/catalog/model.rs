@@ -4,25 +4,25 @@ super::topic! {
     /// A joint has the opposite sign.
     JOINT_SIGN = "joint-sign" {
         "": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with the opposite sign of joint `{joint}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with the opposite sign of joint `{joint}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Negate this joint's column, or reverse its axis in the URDF: `<axis xyz=\"{axis}\"/>`.";
     }
     /// Two joint columns are exchanged.
     JOINT_ORDER = "joint-order" {
         "": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with joints `{joint}` and `{other}` exchanged[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with joints `{joint}` and `{other}` exchanged[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Exchange the names of these columns in the header, or map them: `columns: {joints: {{joint}: <column of {other}>, {other}: <column of {joint}>}}`.";
     }
     /// The zero of a joint is off by a multiple of 90°.
     JOINT_OFFSET = "joint-offset" {
         "": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with {offset} added to joint `{joint}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with {offset} added to joint `{joint}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Correct the zero of this joint: add {offset} to its column, or rotate the joint's origin in the URDF by {offset} about its axis.";
     }
     /// A joint also moves with another joint.
     JOINT_COUPLING = "joint-coupling" {
         "whole": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}` also moves by {factor} times joint `{other}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}` also moves by {factor} times joint `{other}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Declare the coupling: `solve: {joints: {{joint}: {coupled_to: [{other}]}}}`. If the controller computes it already, record the joint's own position.";
         "fraction": Warning,
             "Joint `{joint}` seems to move by {factor:percent} (± {sigma:percent}) of joint `{other}` as well; this changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
@@ -40,28 +40,28 @@ super::topic! {
             "The recording has no values of joint `{joint}`, which moves {bodies:code}; it is taken to stand at 0.",
             "Record this joint, or state where it stood: `hold: {{joint}_{unit}: 0}` in the recording.";
         "moved": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}`, which has no column, moved[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}`, which has no column, moved[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Record this joint: export its column. If it stood still, state where: `hold: {{joint}_{unit}: 0}` in the recording.";
         "stood": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}`, which has no column, stood at {at} {unit}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}`, which has no column, stood at {at} {unit}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Record this joint, or state where it stood: `hold: {{joint}_{unit}: {at}}` in the recording.";
     }
     /// A body is on another link.
     WRONG_MOUNT = "wrong-mount" {
         "other_link": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with body `{body}` on link `{other}` instead of `{link}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with body `{body}` on link `{other}` instead of `{link}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Correct the body's link in the profile: `link: {other}`.";
         "exchanged": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with bodies `{body}` and `{other}` exchanged[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with bodies `{body}` and `{other}` exchanged[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Exchange the links of these bodies in the profile, or their names in the tracker's software.";
     }
     /// The tracker's frame is another one in some recordings.
     TRACKER_MOVED = "tracker-moved" {
         "moved": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} if the tracker was moved for {recordings:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} if the tracker was moved for {recordings:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Record these again without moving the tracker or the robot's base, or calibrate them in a profile of their own.";
         "axes": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with other tracker axes in {recordings:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with other tracker axes in {recordings:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Export these recordings with the axes of the others.";
         "held_out": Error,
             "The errors in {recordings:code} are {none} per coordinate, but only {best} if the tracker, or the whole robot, moved by {distance} ± {sigma} and {angle} before.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
@@ -70,7 +70,7 @@ super::topic! {
     /// A body has another mount in some recordings.
     BODY_REMOUNTED = "body-remounted" {
         "recordings": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} if body `{body}` was remounted for {recordings:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} if body `{body}` was remounted for {recordings:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Give the body another name in these recordings and in the profile, or record them again.";
         "held_out": Error,
             "The errors in {recordings:code} are {none} per coordinate, but only {best} if body `{body}` moved on its link by {distance} ± {sigma}[[ and {angle}]] before.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
@@ -79,10 +79,10 @@ super::topic! {
     /// Tracker and joints were read at different times.
     CLOCK_LAG = "clock-lag" {
         "rows_before": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with the joint values {rows:row} before[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with the joint values {rows:row} before[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Synchronize the two, or record in holds: the joint values are ahead of the tracker.";
         "rows_after": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with the joint values {rows:row} after[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with the joint values {rows:row} after[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Synchronize the two, or record in holds: the joint values lag behind the tracker.";
         "behind": Warning,
             "The joint values of {recording:code} lag {offset} ± {sigma} behind the tracker's data of their rows: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
@@ -118,19 +118,19 @@ super::topic! {
     /// Quaternions in another order.
     QUATERNION_ORDER = "quaternion-order" {
         "scalar_first": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with the quaternions of {bodies:code} read scalar first[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with the quaternions of {bodies:code} read scalar first[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Rename the columns, or list them under `quaternion_wxyz` in the column map: the file writes w, x, y, z.";
         "scalar_last": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with the quaternions of {bodies:code} read scalar last[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with the quaternions of {bodies:code} read scalar last[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Rename the columns: the file writes x, y, z, w.";
     }
     /// Poses in another convention.
     POSE_CONVENTION = "pose-convention" {
         "inverse": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with the poses of {bodies:code} inverted[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with the poses of {bodies:code} inverted[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Export the pose of the body in the tracker's frame: the file has that of the tracker in the body's frame.";
         "transposed": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with the rotations of {bodies:code} transposed[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with the rotations of {bodies:code} transposed[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Export the rotation from body to tracker coordinates: the file has its inverse.";
     }
     /// The recordings contradict the nominal robot, and nothing that is known explains it.

@@ -100,9 +100,12 @@ fn of_validation(all: &Layout<'_>, fitted: &Outcome, mut options: Options) -> Ve
         return Vec::new();
     }
     (options.list_invisible, options.score_tests) = (false, false);
-    let recordings = all.recordings.iter().enumerate();
-    let suspects = recordings.filter(|(_, r)| held_out(r));
-    options.suspects = suspects.map(|(r, _)| RecordingIndex(r)).collect();
+    // Fitted recordings that were too few to be judged are judged with the others.
+    if !matches!(fitted.decision, Decision::TooFewData { .. }) {
+        let recordings = all.recordings.iter().enumerate();
+        let suspects = recordings.filter(|(_, r)| held_out(r));
+        options.suspects = suspects.map(|(r, _)| RecordingIndex(r)).collect();
+    }
     let Ok(outcome) = explain(&all.data, &options) else {
         return Vec::new();
     };

@@ -52,6 +52,8 @@ pub(super) fn with_evidence(
         .with("none", Fact::meters(named.evidence.none))
         .with("best", Fact::meters(named.evidence.best))
         .with_some("next", named.evidence.next.map(Fact::meters))
+        .with_some("allowed_none", named.allowing.map(|a| Fact::meters(a.none)))
+        .with_some("allowed", named.allowing.map(|a| Fact::meters(a.best)))
         .with_some("limit", limit.map(Fact::meters))
         .with_some("equivalent", names(equivalent))
         .with_some(
