@@ -150,6 +150,18 @@ fn good_data_of_robots_that_are_far_off_are_given_no_name() {
     }
 }
 
+/// Six poses with two shifts of two rows, forth and back, are two poses: they fit anything.
+#[test]
+fn two_shifts_of_rows_explain_nothing() {
+    let setting = Setting::new(1_000_797, Plan::Poses(6), BodyKind::Pose, SMALL);
+    let mut options = Options::default();
+    options.list_invisible = false;
+    let data = with_outliers(setting.data(true), 0.1, 1_000_797);
+    let outcome = explain(&data, &options).unwrap();
+    let named = matches!(outcome.decision, Decision::Named(_));
+    assert!(!named, "{:?}", outcome.decision);
+}
+
 #[test]
 #[ignore = "study: minutes"]
 fn study_of_robots_that_are_far_off() {

@@ -178,12 +178,13 @@ fn decide(asked: &Asked<'_>, outcome: &Outcome) -> Decision {
         return Decision::Named(named.clone());
     }
     // Errors of the robot within the priors would explain the residual, or do not explain what is left: they are asked.
-    match opinion(asked, settled_by_residual, &outcome.invisible) {
+    let against = match opinion(asked, single.as_ref(), &outcome.invisible) {
         Opinion::Likelier(named) => return Decision::Named(named),
         Opinion::Against if !alarm => return consistent,
-        _ => {}
-    }
-    if let Some(named) = settled_by_residual {
+        Opinion::Against => true,
+        Opinion::Open => false,
+    };
+    if let Some(named) = settled_by_residual.filter(|_| !against) {
         return Decision::Named(named.clone());
     }
     if single.is_none() && !alarm {
@@ -202,7 +203,7 @@ fn decide(asked: &Asked<'_>, outcome: &Outcome) -> Decision {
         Some(pair) if gain(&pair) >= options.name_ratio => undecided(Some(pair), best_ratio),
         _ => match single {
             // No pair explains more: nominal errors beyond the priors are the likelier reason for what is left.
-            Some(named) if named.verified(options) => Decision::Named(named),
+            Some(named) if named.verified(options) && !against => Decision::Named(named),
             single => undecided(single, best_ratio),
         },
     }
@@ -313,9 +314,10 @@ fn name_pair(asked: &Asked<'_>) -> Option<Named> {
 fn undoes(first: &Scoped, second: &Scoped) -> bool {
     let same_kind =
         std::mem::discriminant(&first.hypothesis) == std::mem::discriminant(&second.hypothesis);
+    // Two shifts of rows leave fewer rows, and nothing else.
     let own = matches!(
         first.hypothesis,
-        Hypothesis::TrackerMoved | Hypothesis::Remounted { .. }
+        Hypothesis::TrackerMoved | Hypothesis::Remounted { .. } | Hypothesis::RowShift { .. }
     );
     first == second || (same_kind && own)
 }

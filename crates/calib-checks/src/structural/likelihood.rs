@@ -42,7 +42,7 @@ const ROUNDS: usize = 6;
 pub(super) enum Opinion {
     /// One is by far the likeliest: (2).
     Likelier(Named),
-    /// The one that was named is less likely than the data as they are.
+    /// The one that was named is less likely than the data as they are, or far less than another one.
     Against,
     /// Neither.
     Open,
@@ -65,8 +65,12 @@ pub(super) fn opinion(asked: &Asked<'_>, named: Option<&Named>, invisible: &[Sco
         let is = |j: &&Judged<'_>| named.correction == [j.scored.scoped];
         judged.iter().find(is)
     };
+    let first = judged
+        .first()
+        .filter(|first| !has_unknowns(&first.scored.scoped.hypothesis));
+    let first = first.map_or(0.0, |first| first.gain - DECISIVE);
     match named.as_ref().and_then(own) {
-        Some(own) if own.gain < 0.0 && !has_unknowns(&own.scored.scoped.hypothesis) => {
+        Some(own) if own.gain < first.max(0.0) && !has_unknowns(&own.scored.scoped.hypothesis) => {
             Opinion::Against
         }
         _ => Opinion::Open,
