@@ -3,7 +3,9 @@
 
 mod common;
 
-use calib_core::{ErrorSummary, NoiseKind, NoiseModel, Settings, Solution, Weighed, solve};
+use calib_core::{
+    Configuration, ErrorSummary, NoiseKind, NoiseModel, Settings, Solution, Weighed, solve,
+};
 use common::{Chain, Free, Handles, normal, rng, six_r};
 
 const MARKER: f64 = 2e-4;
@@ -27,6 +29,7 @@ enum Truth {
 
 /// Poses to fit, then 60 to predict.
 struct Case {
+    chain: Chain,
     handles: Handles,
 }
 
@@ -92,7 +95,7 @@ impl Case {
         };
         chain.observe_moved(&mut r, &mut h, MARKER, extra);
         h.problem.held_out = (fitted..fitted + 60).collect();
-        Self { handles: h }
+        Self { chain, handles: h }
     }
 
     fn solved(&self, noise: NoiseModel) -> Solution {
@@ -140,6 +143,45 @@ fn joint_noise_is_found_where_it_is() {
             "{truth:?}: {found:?}"
         );
     }
+}
+
+/// Part of the coordinates of the body's origin at the poses that were not fitted within their 95 % intervals.
+fn covered(case: &Case, s: &Solution) -> f64 {
+    let h = &case.handles;
+    let (mut inside, mut count) = (0.0, 0.0);
+    for &sample in &h.problem.held_out {
+        let q = &case.chain.q[sample];
+        let joints = h.joints.iter().zip(q);
+        let at = joints.fold(Configuration::zero(), |at, (joint, q)| at.with(*joint, *q));
+        let truth = case.chain.tracker_from_body(q, &[0.0; 6]);
+        let p = nalgebra::Point3::origin();
+        let found = s.predict_point(h.tracker, h.body, &p, &at).unwrap();
+        let covariance = found.covariance.unwrap();
+        for i in 0..3 {
+            let z = (found.position - truth.translation.vector)[i] / covariance[(i, i)].sqrt();
+            inside += f64::from(z.abs() < 1.96);
+            count += 1.0;
+        }
+    }
+    inside / count
+}
+
+/// Few poses, joints that scatter more than the tracker: where equal weights, or those of each body, predict as well, the joints do not stand still.
+#[test]
+fn weights_that_trust_no_joints_state_what_joints_do() {
+    let (mut inside, mut count) = (0.0, 0.0);
+    for seed in 700..780 {
+        let case = Case::new(seed, 12, Truth::Joint(7e-4));
+        let joint = case.solved(NoiseModel::Joint);
+        let weighed = weighed(&joint);
+        let safe = [NoiseModel::White, NoiseModel::BodyPose].contains(&weighed.choice.chosen);
+        if let Some(solution) = weighed.solution.filter(|_| safe) {
+            inside += covered(&case, &solution);
+            count += 1.0;
+        }
+    }
+    assert!(count >= 8.0, "{count}");
+    assert!(inside >= 0.9 * count, "{inside} of {count}");
 }
 
 /// The cells of the comparison with plain least squares, which keeps every row and weighs all markers alike.

@@ -10,6 +10,13 @@
 //! ```text
 //! C = HHᵀ,   Hᵀ(Σ … + Λ)H = U diag(λ) Uᵀ,   C ← H U diag(max(1, λ)) Uᵀ Hᵀ                    (2)
 //! ```
+//!
+//! Weights may trust less than is known of the noise: equal ones, where the joints scatter but their Jacobian shall not decide. The
+//! estimate stays, and its covariance is that under the noise V' that was found:
+//!
+//! ```text
+//! C (Σ_s Aᵀ L⁻¹ V' L⁻ᵀ A + Λ) C                                                                (3)
+//! ```
 
 use std::ops::Range;
 
@@ -47,6 +54,38 @@ impl Solution {
     pub fn with_cluster_covariance(&self) -> Option<Self> {
         let c = covariance_of(&self.information.curvature(&self.model))?;
         let middle = middle(self.objective(), &self.values, &c, &every(&self.model));
+        Some(self.at_least(middle))
+    }
+
+    /// The same solution with the covariance that this estimate has under another statement of the noise, in every direction in
+    /// which it is larger: equation (3). Of long recordings it looks at some thousand samples that stand for all. `None` when the model
+    /// cannot be evaluated.
+    pub(crate) fn with_noise_of(&self, other: &Model, theta: &[f64]) -> Option<Self> {
+        let (own, weights) = (self.objective(), &self.weights);
+        let other = Objective {
+            model: other,
+            weights,
+            theta,
+        };
+        let n = self.model.free();
+        let mut middle = DMatrix::zeros(n, n);
+        add_priors(&self.model, &mut middle);
+        let (mut work, mut of_other) = (Workspace::new(own.model), Workspace::new(other.model));
+        work.cache.update(&own.model.problem, &self.values);
+        of_other.cache.update(&other.model.problem, &self.values);
+        for (sample, factor) in self.looked_at().weighed() {
+            let Some(rows) = whitened(own, &self.values, sample, &mut work) else {
+                continue;
+            };
+            let noise = whitened(other, &self.values, sample, &mut of_other)?;
+            let scores = rows.a.tr_mul(&(rows.l_inverse * noise.l));
+            middle.gemm(factor, &scores, &scores.transpose(), 1.0);
+        }
+        Some(self.at_least(middle))
+    }
+
+    /// Equation (2), from what stands between the two C of (1) or (3).
+    fn at_least(&self, middle: DMatrix<f64>) -> Self {
         let half = self.half_covariance();
         let inside = half.tr_mul(&(middle * &half));
         let eigen = calib_geometry::decompose::symmetric_eigen(&inside);
@@ -60,7 +99,7 @@ impl Solution {
         for (parameter, described) in out.parameters.iter_mut().zip(described) {
             parameter.sigma = described.sigma;
         }
-        Some(out)
+        out
     }
 }
 
@@ -104,13 +143,8 @@ fn middle(
     let n = model.free();
     let mut work = Workspace::new(model);
     work.cache.update(&model.problem, values);
-    // Λ = diag(1/σ²)
     let mut middle = DMatrix::zeros(n, n);
-    for (i, &p) in model.columns.iter().enumerate() {
-        if let Some(sigma) = model.problem.parameters[p].prior_sigma {
-            middle[(i, i)] = 1.0 / (sigma * sigma);
-        }
-    }
+    add_priors(model, &mut middle);
     let cache = &work.cache;
     let add = |some: Range<usize>, sum: &mut DMatrix<f64>| {
         let mut work = Workspace::with(model, cache.clone());
@@ -131,6 +165,15 @@ fn middle(
     };
     chunked(samples.len(), of, |sum| middle += sum);
     middle
+}
+
+/// Λ = diag(1/σ²)
+fn add_priors(model: &Model, middle: &mut DMatrix<f64>) {
+    for (i, &p) in model.columns.iter().enumerate() {
+        if let Some(sigma) = model.problem.parameters[p].prior_sigma {
+            middle[(i, i)] += 1.0 / (sigma * sigma);
+        }
+    }
 }
 
 /// Aᵀ(I − Q)^(-½) w of a sample; `None` where it has no rows.
