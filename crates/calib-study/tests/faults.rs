@@ -2,8 +2,8 @@
 
 use calib_report::verdict::ReasonId;
 use calib_study::faults::{
-    CaseResult, Class, Design, Errors, Fault, FaultOptions, FaultResult, Outcome, csv, markdown,
-    run_faults,
+    Body, CaseResult, Class, Design, Errors, Fault, FaultOptions, FaultResult, Outcome, csv,
+    markdown, run_faults,
 };
 
 fn part(only: &[Fault], cases: u64) -> FaultResult {
@@ -158,6 +158,22 @@ fn mistakes_in_one_recording_are_named_on_a_robot_that_is_far_off() {
     assert!(far.len() >= 10, "{}", far.len());
     let unnamed: Vec<_> = far.iter().filter(|r| !r.named).collect();
     assert!(unnamed.len() <= 2, "{unnamed:#?}");
+}
+
+/// Six poses of one marker, and robots that are 3° and 20 mm off: what is not named is judged by its likelihood.
+#[test]
+fn mistakes_of_few_poses_and_of_robots_that_are_far_off_are_named() {
+    let result = part(&[Fault::Exchange, Fault::WrongLink], 2);
+    let seen = |r: &&CaseResult| r.moved_m.is_some_and(|moved| moved > 2e-5);
+    let asked = |r: &&CaseResult| {
+        let six_of_one = r.cell.design == Design::Six && r.cell.body == Body::One;
+        six_of_one || r.cell.errors == Errors::Huge
+    };
+    let asked: Vec<&CaseResult> = result.results.iter().filter(seen).filter(asked).collect();
+    let unnamed: Vec<_> = asked.iter().filter(|r| !r.named).collect();
+    assert!(asked.len() >= 30, "{}", asked.len());
+    assert!(10 * unnamed.len() <= asked.len(), "{unnamed:#?}");
+    assert!(unnamed.iter().all(|r| r.odds.is_some()), "{unnamed:#?}");
 }
 
 #[test]

@@ -18,17 +18,14 @@
 //! √Λ ≥ t + 2.6 √(1 + t²/2ν)                            missed 1 in 200 times (Johnson and Welch 1940)           (2)
 //! ```
 //!
-//! 10⁻⁶ for each of the thousand effects, places and rows that are tried is 1 in 1 000 recordings, the level of the program. What the fault moves at registration level is the residual of the registration of the nominal robot's own noise-free data (3).
+//! 10⁻⁶ for each of the thousand effects, places and rows that are tried is 1 in 1 000 recordings, the level of the program. What a discrete fault leaves is in [`odds`](super::odds).
 
-use calib_checks::structural::{
-    Body, Chain, Data, JointIndex, LinkIndex, Measured, RecordingIndex, registration_residual,
-};
-use calib_urdf::RobotModel;
 use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Vector3};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::case::{Case, LAST, SIGMA, SIGMA_JOINT, SIGMA_ORIENTATION, Seen};
+use super::case::{Case, SIGMA, SIGMA_JOINT, SIGMA_ORIENTATION, Seen};
 use super::fault::Class;
+use super::odds::moved;
 
 /// What the recordings of a case show of its fault.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -37,7 +34,7 @@ pub(crate) struct Shown {
     pub evidence: Option<f64>,
     /// What equation (2) asks of it.
     pub needed: Option<f64>,
-    /// Equation (3), rms, m.
+    /// What the fault moves the residual of a registration by, rms, m.
     pub moved_m: Option<f64>,
 }
 
@@ -54,54 +51,6 @@ pub(crate) fn shown(case: &Case) -> Shown {
         needed: found.map(|(_, needed)| needed),
         moved_m: moved(case, !in_fitted),
     }
-}
-
-/// Equation (3); with the held-out recording, where a fault may be in it alone.
-fn moved(case: &Case, held_out: bool) -> Option<f64> {
-    let model = RobotModel::from_urdf_text(&case.robot.urdf(), "arm.urdf").ok()?;
-    let chain = Chain::from_model(&model).ok()?;
-    let n = case.robot.joints.len();
-    let link = n - usize::from(case.wrong_link());
-    let link = LinkIndex::from(model.link_id(&format!("l{link}")).ok()?);
-    let mut data = Data {
-        chain,
-        readings: Vec::new(),
-        recording: Vec::new(),
-        rates: Vec::new(),
-        bodies: Vec::new(),
-    };
-    let (mut markers, mut poses) = (Vec::new(), Vec::new());
-    let tables = case.twin();
-    let recordings = case.readings.iter().map(|(name, _)| *name);
-    let counted = recordings.filter(|name| held_out || *name != LAST);
-    for (r, name) in counted.enumerate() {
-        let table = &tables[name];
-        for row in 0..table.rows.len() {
-            let mut q = vec![None; model.joints().len()];
-            for (joint, column) in &table.joints {
-                q[JointIndex::from(model.joint_id(joint).ok()?).0] = column[row];
-            }
-            data.readings.push(q);
-            data.recording.push(RecordingIndex(r));
-            markers.push(table.markers.values().map(|column| column[row]).collect());
-            poses.push(table.bodies.values().next().and_then(|column| column[row]));
-        }
-    }
-    let measured = if case.markers.is_empty() {
-        Measured::Poses {
-            tracker_from_body: poses,
-            sigma_position: SIGMA,
-            sigma_orientation: SIGMA_ORIENTATION,
-        }
-    } else {
-        Measured::Markers(markers)
-    };
-    data.bodies.push(Body {
-        link,
-        measured,
-        mounts: Vec::new(),
-    });
-    registration_residual(&data).ok()
 }
 
 /// Equations (1) and (2).

@@ -19,6 +19,7 @@ mod evidence;
 mod fault;
 mod goals;
 mod names;
+mod odds;
 mod outcome;
 mod profile;
 mod render;

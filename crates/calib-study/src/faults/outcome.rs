@@ -1,6 +1,6 @@
 //! What the program made of a case: its verdict and findings against the truth.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_finding::{Fact, Finding, Severity, catalog};
 use calib_pipeline::error::DataProblem;
@@ -8,6 +8,7 @@ use calib_pipeline::prepare::load::{RobotProfile, of_tables};
 use calib_pipeline::prepare::loads::Masses;
 use calib_pipeline::run::{Plugins, RunOptions, RunOutput, run_on};
 use calib_pipeline::{ExitCode, PipelineError};
+use calib_recording::Poses;
 use calib_report::Verdict;
 use calib_report::verdict::{Effect, ReasonId};
 use calib_urdf::RobotModel;
@@ -18,6 +19,7 @@ use super::design::{Design, Validation};
 use super::evidence::shown;
 use super::fault::{Class, Fault};
 use super::names::names_the_cause;
+use super::odds::odds;
 use super::true_error::{error, rms};
 use crate::noise::Noise;
 
@@ -71,6 +73,9 @@ pub struct CaseResult {
     /// What the fault moves the residual of a registration of the nominal robot by, rms, m.
     #[serde(default)]
     pub moved_m: Option<f64>,
+    /// ln of how many times likelier than everything else a discrete fault is that was not named, noise and priors known.
+    #[serde(default)]
+    pub odds: Option<f64>,
     /// Rows by which a named change lies off the true one.
     #[serde(default)]
     pub row_off: Option<i64>,
@@ -206,18 +211,23 @@ const TRUE_OF_FEW: [&str; 3] = ["held-by-priors", "size-not-seen", "not-checked"
 
 /// Draws a case and runs the program on it.
 pub(crate) fn run_case(cell: Cell, number: u64, seed: u64) -> CaseResult {
-    let (case, ran) = run(cell, number, seed);
+    let (case, tables, ran) = run(cell, number, seed);
     let result = match ran {
         Ok(output) => judged(&case, number, &output),
         Err(error) => stopped(&case, number, error),
     };
-    with_shown(&case, result)
+    with_shown(&case, &tables, result)
 }
 
+/// The recordings by name.
+type Tables = BTreeMap<String, Poses>;
+
 /// The result beside what the recordings show of the fault.
-fn with_shown(case: &Case, result: CaseResult) -> CaseResult {
+fn with_shown(case: &Case, tables: &Tables, result: CaseResult) -> CaseResult {
     let shown = shown(case);
+    let unnamed = case.cell.fault.class() == Class::Discrete && !result.named;
     CaseResult {
+        odds: unnamed.then(|| odds(case, tables)).flatten(),
         evidence: shown.evidence,
         needed: shown.needed,
         moved_m: shown.moved_m,
@@ -240,14 +250,14 @@ fn row_off(case: &Case, findings: &[Finding]) -> Option<i64> {
     Some(row - 2 - case.change(rows.len()) as i64)
 }
 
-fn run(cell: Cell, number: u64, seed: u64) -> (Case, Result<RunOutput, PipelineError>) {
+fn run(cell: Cell, number: u64, seed: u64) -> (Case, Tables, Result<RunOutput, PipelineError>) {
     let mut noise = Noise::of_trial(seed, &cell.id(), number);
     let case = Case::draw(cell, number, &mut noise);
     let tables = case.tables(&mut noise);
     let ran = robot_profile(&case.profile(), &case.robot.urdf())
-        .and_then(|robot| of_tables(robot, tables, Plugins::Refused))
+        .and_then(|robot| of_tables(robot, tables.clone(), Plugins::Refused))
         .and_then(|inputs| run_on(inputs, &RunOptions::default(), &mut |_| {}));
-    (case, ran)
+    (case, tables, ran)
 }
 
 /// A single case: what became of it, and the whole report.
@@ -259,16 +269,16 @@ pub fn report_of(
     number: u64,
     seed: u64,
 ) -> (CaseResult, Result<calib_report::Report, String>) {
-    let (case, ran) = run(cell, number, seed);
+    let (case, tables, ran) = run(cell, number, seed);
     match ran {
         Ok(output) => {
             let result = judged(&case, number, &output);
-            (with_shown(&case, result), Ok(output.report))
+            (with_shown(&case, &tables, result), Ok(output.report))
         }
         Err(error) => {
             let text = error.to_string();
             let result = stopped(&case, number, error);
-            (with_shown(&case, result), Err(text))
+            (with_shown(&case, &tables, result), Err(text))
         }
     }
 }
@@ -302,6 +312,7 @@ fn stopped(case: &Case, number: u64, error: PipelineError) -> CaseResult {
         evidence: None,
         needed: None,
         moved_m: None,
+        odds: None,
         row_off: None,
         covered: None,
     }
@@ -372,6 +383,7 @@ fn judged(case: &Case, number: u64, output: &RunOutput) -> CaseResult {
         evidence: None,
         needed: None,
         moved_m: None,
+        odds: None,
         row_off: row_off(case, findings),
         covered: error.covered,
     }
