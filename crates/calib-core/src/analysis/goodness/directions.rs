@@ -144,22 +144,36 @@ impl Solution {
         found
     }
 
-    /// U and I of columns side by side.
+    /// U and I of columns side by side, of the samples that the tests look at: what another side would change in the others is tested
+    /// nowhere.
     fn between(&self, columns: &[Candidate]) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let model = &self.model;
-        let count = columns.len();
+        let (n, count) = (model.free(), columns.len());
         let mut work = Workspace::new(model);
         work.cache.update(&model.problem, &self.values);
-        let c = covariance_of(&self.information.curvature(model))?;
         let mut u = DVector::zeros(count);
         let mut raw = DMatrix::zeros(count, count);
-        let mut b = DMatrix::zeros(model.free(), count);
-        self.each_sample(columns, &self.used_samples(), &mut work, |s, alpha| {
+        let mut b = DMatrix::zeros(n, count);
+        let (mut h, mut g) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let looked_at = self.looked_at();
+        self.each_sample(columns, &looked_at.samples, &mut work, |s, alpha| {
             let transposed = alpha.transpose();
             u += &transposed * &s.w;
             raw.gemm(1.0, &transposed, alpha, 1.0);
-            b.gemm(1.0, &s.a.transpose(), alpha, 1.0);
+            let transposed = s.a.transpose();
+            b.gemm(1.0, &transposed, alpha, 1.0);
+            if !looked_at.all {
+                h.gemm(1.0, &transposed, &s.a, 1.0);
+                g.gemv(1.0, &transposed, &s.w, 1.0);
+            }
         });
+        let c = if looked_at.all {
+            covariance_of(&self.information.curvature(model))?
+        } else {
+            let (c, step) = self.to_own_minimum(&h, &g)?;
+            u.gemv_tr(1.0, &b, &step, 1.0);
+            c
+        };
         let information = raw - b.tr_mul(&(&c * &b));
         Some((u, information))
     }
