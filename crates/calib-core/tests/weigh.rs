@@ -35,6 +35,11 @@ struct Case {
 
 impl Case {
     fn new(seed: u64, fitted: usize, truth: Truth) -> Self {
+        Self::with_second(seed, fitted, truth, None)
+    }
+
+    /// With a second body, whose markers have so many times the noise.
+    fn with_second(seed: u64, fitted: usize, truth: Truth, ratio: Option<f64>) -> Self {
         let mut r = rng(seed);
         let free = Free {
             prior: Some((0.0175, 0.01)),
@@ -93,7 +98,19 @@ impl Case {
                 })
                 .collect()
         };
-        chain.observe_moved(&mut r, &mut h, MARKER, extra);
+        chain.observe_moved(&mut r, &mut h, MARKER, &extra);
+        if let Some(ratio) = ratio {
+            let second = h.problem.frame("second");
+            let place = nalgebra::Isometry3::identity();
+            h.problem.known("between", h.body, second, place);
+            h.body = second;
+            let points = chain.markers.iter().enumerate();
+            h.points = points
+                .map(|(i, p)| h.problem.known_point(&format!("n{i}"), second, *p))
+                .collect();
+            chain.observe_moved(&mut r, &mut h, ratio * MARKER, &extra);
+            h.problem.measurements_mut()[1].name = "second".to_owned();
+        }
         h.problem.held_out = (fitted..fitted + 60).collect();
         Self { chain, handles: h }
     }
@@ -250,6 +267,38 @@ fn study_of_weights() {
             );
         }
     }
+}
+
+/// Two bodies on the last link, the second with `ratio` times the noise of the first.
+fn two_bodies(seed: u64, ratio: f64) -> Solution {
+    Case::with_second(seed, 40, Truth::Joint(3.5e-4), Some(ratio)).solved(NoiseModel::Joint)
+}
+
+#[test]
+fn a_body_that_is_seen_worse_has_its_own_noise() {
+    let settings = Settings::default();
+    let own = (0..4).filter(|seed| {
+        let found = two_bodies(400 + seed, 5.0).with_levels_by_body(&settings);
+        let Some(found) = found else { return false };
+        let of = |name: &str| found.noise.iter().find(|n| n.name == name).map(|n| n.sigma);
+        let (first, second) = (of("markers body").unwrap(), of("markers second").unwrap());
+        // 480 coordinates each: 3 %.
+        assert!((first / MARKER - 1.0).abs() < 0.15, "{first}");
+        assert!((second / MARKER / 5.0 - 1.0).abs() < 0.15, "{second}");
+        true
+    });
+    assert_eq!(own.count(), 4);
+}
+
+#[test]
+fn bodies_that_are_seen_alike_share_their_noise() {
+    let settings = Settings::default();
+    let alike = |seed: &u64| two_bodies(500 + seed, 1.0).with_levels_by_body(&settings);
+    let found = (0..4).filter_map(|seed| alike(&seed)).count();
+    // Chance takes one of forty.
+    assert!(found <= 1, "{found} of 4");
+    let one = Case::new(1, 40, Truth::White).solved(NoiseModel::Joint);
+    assert!(one.with_levels_by_body(&settings).is_none(), "one body");
 }
 
 #[test]

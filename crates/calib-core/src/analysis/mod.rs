@@ -14,6 +14,7 @@ pub(crate) mod information;
 mod less_noise;
 mod looked_at;
 pub(crate) mod observability;
+mod own_levels;
 pub(crate) mod sandwich;
 pub(crate) mod score;
 pub(crate) mod scores;

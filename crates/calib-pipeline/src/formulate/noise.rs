@@ -15,8 +15,8 @@ const CERTAIN: f64 = 3.0;
 
 /// Takes the noise that the recordings speak for, where the profile does not state it; whether that changed the solution.
 pub(crate) fn by_evidence(fit: &mut MlFit, inputs: &Inputs, settings: &Settings) -> bool {
-    let mut changed = false;
     let stated = inputs.robot.profile.solve.noise;
+    let mut changed = !stated.known && levels_by_body(fit, inputs, settings);
     if stated.model.is_none()
         && !stated.known
         && let Some(weighed) = fit.solution.weighed(&NoiseModel::ALL, settings)
@@ -31,6 +31,19 @@ pub(crate) fn by_evidence(fit: &mut MlFit, inputs: &Inputs, settings: &Settings)
         fit.noise = Some(weighed.choice);
     }
     changed
+}
+
+/// Takes a level for each body where left-out poses speak for it; whether they did.
+fn levels_by_body(fit: &mut MlFit, inputs: &Inputs, settings: &Settings) -> bool {
+    let problem = fit.formulation.problem.with_noise_by_body();
+    let solution = fit.solution.with_levels_by_body(settings);
+    let (Some(problem), Some(solution)) = (problem, solution) else {
+        return false;
+    };
+    fit.formulation.problem = problem;
+    fit.calibration = calibration(&fit.formulation, &solution, inputs);
+    fit.solution = solution;
+    true
 }
 
 /// What the noise says of the model; where physics is missing, the uncertainty is that of the poses' own scatter.

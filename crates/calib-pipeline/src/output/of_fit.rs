@@ -169,10 +169,16 @@ pub(crate) fn fit_summary(profile: &Profile, fit: &MlFit, parameters: &[Paramete
 
 /// The noise level that the profile states for a group of observations.
 pub(crate) fn stated_sigma(profile: &Profile, group: &str) -> Option<f64> {
+    // With a level for each body, its name follows.
+    let of = |of: &str| {
+        group
+            .strip_prefix(of)
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
+    };
     match group {
-        "marker" => profile.tracker.marker_sigma,
-        "body position" => profile.tracker.body_sigma,
-        "body orientation" => profile.tracker.body_sigma_rad,
+        _ if of("marker") => profile.tracker.marker_sigma,
+        _ if of("body position") => profile.tracker.body_sigma,
+        _ if of("body orientation") => profile.tracker.body_sigma_rad,
         joint if joint == "joint" || joint.starts_with("joint ") => profile.solve.noise.joint,
         _ => None,
     }
