@@ -1,16 +1,19 @@
 //! The result of the paper's method: the closed forms, each origin by itself.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_finding::{About, Finding, catalog};
+use calib_geometry::registration::rigid_registration;
+use calib_profile::Usage;
 use calib_urdf::JointId;
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 
 use crate::estimate::paper::OriginEstimate;
 use crate::estimate::start::{Start, mean_pose};
 use crate::formulate::found::Found;
 use crate::formulate::kinematics::Calibration;
 use crate::formulate::solved::Solved;
+use crate::prepare::conditions::conditions;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
 
@@ -32,7 +35,6 @@ pub(crate) fn paper_result(
     let zero = model.forward_kinematics(&model.zero_positions());
     let mut robot = nominal.clone();
     let mut found = Vec::new();
-    let mut places = Vec::new();
     for (name, estimate) in origins {
         let origin = &profile.origins[name];
         let Some(pose) = estimate.pose else { continue };
@@ -42,16 +44,6 @@ pub(crate) fn paper_result(
         robot
             .mounts
             .insert(origin.body.clone(), link_from_origin * pose.inverse());
-        let sweep = &inputs.recordings[&origin.sweep];
-        for (q, seen) in sweep
-            .q
-            .iter()
-            .zip(tracks[&origin.body].in_recording(&origin.sweep))
-        {
-            if let (Some(q), Some(seen)) = (q, seen) {
-                places.push(seen * pose * model.root_from_link(q, origin.link).inverse());
-            }
-        }
         found.push(Found {
             name: format!("{}_from_{name}", origin.body),
             origin: Some(name.clone()),
@@ -64,12 +56,14 @@ pub(crate) fn paper_result(
         });
     }
     let known_place = profile.bodies.values().any(|b| b.mount.is_some());
-    if let (false, Some(place)) = (known_place, mean_pose(&places)) {
+    let found_mounts: BTreeSet<&String> = found.iter().map(|f| &f.parent).collect();
+    let place = root_with_mounts_held(inputs, tracks, &robot, &found_mounts);
+    if let (false, Some(place)) = (known_place, place) {
         robot.tracker_from_root = place;
     }
     for (name, t) in &profile.transforms {
         if let Some((joint, found_transform)) =
-            paper_transform(inputs, tracks, start, origins, name, t)
+            paper_transform(inputs, tracks, (start, nominal), origins, name, t)
         {
             if let Some(joint) = joint {
                 let (id, origin) = joint;
@@ -92,13 +86,52 @@ pub(crate) fn paper_result(
     }
 }
 
+/// Where the root stands: the place that carries the bodies, on the mounts that were found, from where the robot's own kinematics has them
+/// onto where the tracker saw them, in all fitted recordings together.
+fn root_with_mounts_held(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    robot: &Calibration,
+    bodies: &BTreeSet<&String>,
+) -> Option<Isometry3<f64>> {
+    /// Points of a body beside its origin, m: they weigh an orientation as a body of this size does.
+    const SIZE: f64 = 0.1;
+    let of_body = [
+        Point3::origin(),
+        Point3::new(SIZE, 0.0, 0.0),
+        Point3::new(0.0, SIZE, 0.0),
+        Point3::new(0.0, 0.0, SIZE),
+    ];
+    let profile = &inputs.robot.profile;
+    let (mut at_root, mut seen_at) = (Vec::new(), Vec::new());
+    let recordings = inputs.recordings.iter();
+    for (name, loaded) in recordings.filter(|(_, r)| r.spec.usage != Usage::Validation) {
+        let under = conditions(loaded, &robot.model, profile.solve.load);
+        for (row, q) in loaded.q.iter().enumerate() {
+            let Some(q) = q else { continue };
+            let root_from_link = robot.root_from_link_under(q, &under[row]);
+            for &body in bodies {
+                let seen = tracks[body].in_recording(name).get(row).copied();
+                let (Some(Some(seen)), Some(mount)) = (seen, robot.mounts.get(body)) else {
+                    continue;
+                };
+                let root_from_body = root_from_link[profile.bodies[body].link.index()] * mount;
+                at_root.extend(of_body.map(|p| root_from_body * p));
+                seen_at.extend(of_body.map(|p| seen * p));
+            }
+        }
+    }
+    let found = rigid_registration(&at_root, &seen_at, None).ok()?;
+    Some(found.b_from_a)
+}
+
 type CorrectedJoint = Option<(JointId, Isometry3<f64>)>;
 
 /// A transform between links by the paper's method: from the sweep of the origin whose link is its child.
 fn paper_transform(
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
-    start: &Start,
+    (start, robot): (&Start, &Calibration),
     origins: &BTreeMap<String, OriginEstimate>,
     name: &str,
     t: &calib_profile::LinkTransform,
@@ -110,16 +143,19 @@ fn paper_transform(
     let pose = estimate.pose?;
     let zero = model.forward_kinematics(&model.zero_positions());
     let sweep = &inputs.recordings[&origin.sweep];
+    let under = conditions(sweep, model, profile.solve.load);
     let mut samples = Vec::new();
-    for (q, seen) in sweep
+    for ((q, under), seen) in sweep
         .q
         .iter()
+        .zip(&under)
         .zip(tracks[&origin.body].in_recording(&origin.sweep))
     {
         let (Some(q), Some(seen)) = (q, seen) else {
             continue;
         };
-        let root_from_link = model.forward_kinematics(q);
+        // A stiffness that is stated lets the joints yield to what was measured of their torques, or to gravity.
+        let root_from_link = robot.root_from_link_under(q, under);
         // The child as it would stand at zero: undo the swept joints in the robot's own frame.
         let child_from_child_at_zero =
             root_from_link[t.child.index()].inverse() * zero[t.child.index()];
