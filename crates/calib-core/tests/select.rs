@@ -1,5 +1,7 @@
 //! The choice of effects by prediction: none where there is none, the right ones where there are some, and the error that it states.
 
+#[path = "select/bound.rs"]
+mod bound;
 mod common;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -74,6 +76,11 @@ fn one_joint_at_a_time(each: usize) -> Vec<Vec<f64>> {
     };
     (0..6 * each).map(at).collect()
 }
+
+/// Prior σ of axes and offsets: rotation, rad, and translation, m.
+const PRIOR: (f64, f64) = (DEG, 0.01);
+/// How far they are off.
+const DEVIATION: (f64, f64) = (0.3 * DEG, 0.001);
 
 /// Samples without noise that no fit sees.
 const NEW: usize = 100;
@@ -158,7 +165,8 @@ fn draw(seed: u64, count: usize, least: f64) -> Vec<Truth> {
     out
 }
 
-fn robot(seed: u64, design: Design, effects: &[Truth]) -> Robot {
+/// An arm at its poses, what of it is free, and what its effects follow.
+fn scene(seed: u64, design: Design) -> (Chain, Free, Regressors) {
     let mut r = rng(seed);
     let free = Free {
         world: Chart::full(),
@@ -171,11 +179,11 @@ fn robot(seed: u64, design: Design, effects: &[Truth]) -> Robot {
         offsets: vec![true; 6],
         mount: Chart::full(),
         points: false,
-        prior: Some((DEG, 0.01)),
+        prior: Some(PRIOR),
     };
     let mut chain = Chain::nominal(six_r())
         .posed(&mut r, design.poses + NEW, 1.4)
-        .deviate(&mut r, &free, 0.3 * DEG, 0.001);
+        .deviate(&mut r, &free, DEVIATION.0, DEVIATION.1);
     chain.markers.truncate(design.markers);
     if let Some(each) = design.sweeps {
         let rows = one_joint_at_a_time(each);
@@ -195,6 +203,12 @@ fn robot(seed: u64, design: Design, effects: &[Truth]) -> Robot {
             .map(|v| v.into_iter().map(f64::signum).collect())
             .collect(),
     };
+    (chain, free, regressors)
+}
+
+fn robot(seed: u64, design: Design, effects: &[Truth]) -> Robot {
+    let (chain, free, regressors) = scene(seed, design);
+    let n = chain.q.len();
     let mut h = chain.problem(&free, design.sigma);
     h.problem.group_mut(h.markers).estimate = true;
     let noise = h
