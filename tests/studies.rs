@@ -53,7 +53,16 @@ fn the_books_pages_have_the_shape_of_the_studies() {
     for study in ["cor", "aor", "justin", "ripley"] {
         let dir = Scratch::new().robot("justin").robot("ripley");
         let printed = dir
-            .calib(["study", study, "--trials", "1", "--out", "out"])
+            .calib([
+                "study",
+                study,
+                "--trials",
+                "1",
+                "--recorded",
+                "1",
+                "--out",
+                "out",
+            ])
             .expect(0)
             .stdout;
         let book = |name: &str| {
@@ -87,9 +96,11 @@ fn a_case_study_continues_where_it_stopped() {
         words.extend_from_slice(more);
         dir.calib_with(&words).expect(0).json()
     };
-    let whole = run(&["--trials", "3", "--threads", "2"]);
-    run(&["--trials", "1", "--out", "kept"]);
-    let continued = run(&["--trials", "3", "--out", "kept", "--threads", "1"]);
+    let once = ["--recorded", "1"];
+    let whole = run(&[&["--trials", "3", "--threads", "2"], &once[..]].concat());
+    run(&[&["--trials", "1", "--out", "kept"], &once[..]].concat());
+    let more = ["--trials", "3", "--out", "kept", "--threads", "1"];
+    let continued = run(&[&more, &once[..]].concat());
     assert_eq!(whole, continued);
     for file in [
         "ripley.csv",
@@ -122,6 +133,22 @@ fn a_case_study_continues_where_it_stopped() {
         mean("ml"),
         mean("paper")
     );
+}
+
+/// Two recordings of one robot give results that differ by their noise, about as far as one is from the truth or less.
+#[test]
+fn the_same_robot_is_recorded_again() {
+    let dir = Scratch::new().robot("ripley");
+    let out = dir
+        .calib(["study", "ripley", "--trials", "1", "--json"])
+        .expect(0)
+        .json();
+    for result in out["results"].as_array().expect("results") {
+        let scatter = &result["scatter"]["gripM_from_endJ"]["translation_m"];
+        let scatter = scatter.as_f64().expect("a size");
+        // In fifty robots 0.02 to 0.5 mm.
+        assert!(scatter > 1e-5 && scatter < 1e-3, "{scatter}");
+    }
 }
 
 #[test]

@@ -193,7 +193,8 @@ fn programs_read_json_from_every_command() {
 #[test]
 fn the_progress_of_a_study_is_json_lines() {
     let dir = Scratch::new().robot("ripley");
-    let ran = dir.calib(["study", "ripley", "--trials", "2", "--out", "out", "--json"]);
+    let two = ["study", "ripley", "--trials", "2", "--recorded", "1"];
+    let ran = dir.calib_with(&[&two[..], &["--out", "out", "--json"]].concat());
     let ran = ran.expect(0);
     assert!(ran.json()["results"].is_array());
     let lines: Vec<Value> = (ran.stderr.lines())

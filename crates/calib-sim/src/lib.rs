@@ -93,6 +93,22 @@ pub fn simulate(
     model: &RobotModel,
     seed: Option<u64>,
 ) -> Result<Simulated, SimError> {
+    simulate_again(profile, model, seed, 0)
+}
+
+/// The robot of [`simulate`] recorded once more: the same robot, mounts and tracker, other random poses and other noise. Repetition 0 is
+/// [`simulate`].
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_again(
+    profile: &Profile,
+    model: &RobotModel,
+    seed: Option<u64>,
+    repetition: u64,
+) -> Result<Simulated, SimError> {
+    /// Streams of one repetition: more recordings than any profile has, and the streams of motions beside them.
+    const STREAMS: u64 = 1 << 20;
     let plan = profile.simulate.as_ref().ok_or(SimError::NoSection)?;
     let seed = seed.unwrap_or(plan.seed);
     let robot = TrueRobot::draw(profile, plan, model, seed);
@@ -104,7 +120,7 @@ pub fn simulate(
     let mut recordings = BTreeMap::new();
     for (index, (name, protocol)) in plan.recordings.iter().enumerate() {
         // A stream of its own per recording: adding one leaves the others as they were.
-        let mut rng = stream(seed, 1 + index as u64);
+        let mut rng = stream(seed, repetition * STREAMS + 1 + index as u64);
         let commanded = commanded_poses(protocol, model, &mut rng);
         let mut poses = measure(&tracker, model, &commanded, &protocol.bodies, &mut rng);
         if !commanded.groups.is_empty() {

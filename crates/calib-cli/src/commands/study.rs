@@ -20,6 +20,9 @@ pub struct StudyRun {
     /// Trials of an ordinary cell [cor, aor: 1500], robots drawn [justin, ripley: 100], or cases of each cell [faults: 4]
     #[arg(long)]
     trials: Option<u64>,
+    /// Recordings of each robot, whose results show the repeatability [justin, ripley]
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..))]
+    recorded: u64,
     /// Seed of the random numbers
     #[arg(long)]
     seed: Option<u64>,
@@ -103,6 +106,7 @@ fn robots(console: &Console, study: &StudyRun, name: &str) -> Result<ExitCode, C
         profile: study.profile.clone().unwrap_or_else(default_profile),
         name: name.to_owned(),
         robots: study.trials.unwrap_or(100),
+        recorded: study.recorded,
         seed: study.seed.unwrap_or(1),
         threads: study.threads,
         out: study.out.clone(),

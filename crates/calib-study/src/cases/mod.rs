@@ -6,6 +6,7 @@
 
 mod error;
 mod render;
+mod repeat;
 mod state;
 
 use std::collections::BTreeMap;
@@ -17,6 +18,7 @@ use calib_pipeline::prepare::load::{RobotProfile, load_robot, of_tables};
 use calib_pipeline::run::{Plugins, RunOptions, run_on};
 use calib_profile::Method;
 use calib_report::{LoopClosure, Report, Stats};
+use calib_sim::Simulated;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -37,6 +39,9 @@ pub struct CaseOptions {
     pub name: String,
     /// Robots drawn.
     pub robots: u64,
+    /// How often each robot is recorded and calibrated: how far its results scatter is their repeatability, which one recording does not
+    /// show.
+    pub recorded: u64,
     /// Seed of the first.
     pub seed: u64,
     /// Threads; `None`: as many as there are processors.
@@ -71,6 +76,9 @@ pub struct RobotResult {
     pub loops: Vec<LoopClosure>,
     /// Found transforms against the truth, by the report's names.
     pub off: BTreeMap<String, Off>,
+    /// How far the found transforms of this robot's recordings scatter: standard deviation of one; empty where it was recorded once.
+    #[serde(default)]
+    pub scatter: BTreeMap<String, Off>,
 }
 
 /// A finished case study.
@@ -80,6 +88,8 @@ pub struct CaseResult {
     pub study: String,
     /// Robots drawn.
     pub robots: u64,
+    /// Recordings of each.
+    pub recorded: u64,
     /// Seed of the first.
     pub seed: u64,
     /// Robot by robot, method by method.
@@ -118,7 +128,7 @@ pub fn run_cases(
                 let both = match known {
                     Some(both) => both,
                     None => {
-                        let both = one_robot(&robot, seed, options.plugins)?;
+                        let both = one_robot(&robot, seed, options)?;
                         lock().append(&both)?;
                         both
                     }
@@ -131,66 +141,88 @@ pub fn run_cases(
     Ok(CaseResult {
         study: options.name.clone(),
         robots: options.robots,
+        recorded: options.recorded,
         seed: options.seed,
         results: results.into_iter().flatten().collect(),
     })
 }
 
-/// Draws a robot and calibrates it by both methods.
+/// Draws a robot and calibrates it by both methods, from each of its recordings.
 fn one_robot(
     robot: &RobotProfile,
     seed: u64,
-    plugins: Plugins,
+    options: &CaseOptions,
 ) -> Result<Vec<RobotResult>, CaseError> {
-    let simulated =
-        calib_sim::simulate(&robot.profile, &robot.model, Some(seed)).map_err(|source| {
-            CaseError::Simulation {
-                file: robot.file.clone(),
-                source: Box::new(source),
-            }
-        })?;
+    let recorded = |repetition: u64| {
+        let simulated =
+            calib_sim::simulate_again(&robot.profile, &robot.model, Some(seed), repetition);
+        simulated.map_err(|source| CaseError::Simulation {
+            file: robot.file.clone(),
+            source: Box::new(source),
+        })
+    };
+    let simulated = recorded(0)?;
+    let again: Vec<Simulated> = (1..options.recorded)
+        .map(recorded)
+        .collect::<Result<_, _>>()?;
     let mut out = Vec::new();
     for (method, word) in METHODS {
-        let options = RunOptions {
+        let run = RunOptions {
             method: Some(method),
             force: true,
             strict: false,
             select: false,
-            plugins,
+            plugins: options.plugins,
         };
-        let ran = of_tables(robot.clone(), simulated.recordings.clone(), plugins)
-            .and_then(|inputs| run_on(inputs, &options, &mut |_| {}));
-        out.push(match ran {
-            Ok(output) => RobotResult {
-                seed,
-                method: word.to_owned(),
-                failure: None,
-                off: against(&output.report, &simulated.truth),
-                loops: output.report.loops,
-            },
-            Err(e) => RobotResult {
-                seed,
-                method: word.to_owned(),
-                failure: Some(e.to_string()),
-                loops: Vec::new(),
-                off: BTreeMap::new(),
-            },
-        });
+        let calibrated = |simulated: &Simulated| {
+            let tables = simulated.recordings.clone();
+            of_tables(robot.clone(), tables, options.plugins)
+                .and_then(|inputs| run_on(inputs, &run, &mut |_| {}))
+        };
+        let mut result = RobotResult {
+            seed,
+            method: word.to_owned(),
+            failure: None,
+            loops: Vec::new(),
+            off: BTreeMap::new(),
+            scatter: BTreeMap::new(),
+        };
+        match calibrated(&simulated) {
+            Ok(output) => {
+                let repeated = again.iter().filter_map(|s| calibrated(s).ok());
+                let all: Vec<Found> = std::iter::once(transforms(&output.report))
+                    .chain(repeated.map(|output| transforms(&output.report)))
+                    .collect();
+                result.off = against(&all[0], &simulated.truth);
+                result.scatter = repeat::scatter(&all);
+                result.loops = output.report.loops;
+            }
+            Err(e) => result.failure = Some(e.to_string()),
+        }
+        out.push(result);
     }
     Ok(out)
 }
 
-fn against(report: &Report, truth: &calib_sim::Truth) -> BTreeMap<String, Off> {
-    report
-        .transforms
+/// Transforms of one calibration, by the report's names.
+type Found = BTreeMap<String, Isometry3<f64>>;
+
+fn transforms(report: &Report) -> Found {
+    let of = |found: &calib_report::Transform| {
+        let [x, y, z, w] = found.rotation_xyzw;
+        let turn = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+        let [x, y, z] = found.translation_m;
+        let at = Isometry3::from_parts(Translation3::new(x, y, z), turn);
+        (found.name.clone(), at)
+    };
+    report.transforms.iter().map(of).collect()
+}
+
+fn against(found: &Found, truth: &calib_sim::Truth) -> BTreeMap<String, Off> {
+    found
         .iter()
-        .filter_map(|found| {
-            let name = &found.name;
+        .filter_map(|(name, at)| {
             let truth = truth.transforms.get(name)?.isometry();
-            let [x, y, z, w] = found.rotation_xyzw;
-            let turn = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
-            let [x, y, z] = found.translation_m;
-            let at = Isometry3::from_parts(Translation3::new(x, y, z), turn);
             let off = Off {
                 translation_m: (at.translation.vector - truth.translation.vector).norm(),
                 rotation_rad: at.rotation.angle_to(&truth.rotation),

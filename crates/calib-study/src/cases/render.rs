@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use calib_report::{LoopClosure, Stats};
 
-use super::{CaseResult, METHODS, Over, RobotResult};
+use super::{CaseResult, METHODS, Off, Over, RobotResult};
 
 /// What the paper printed: rows of Table 1 (torso 0, 90, 90, −90, 90°).
 const TABLE_1: [(&str, [f64; 5]); 6] = [
@@ -141,6 +141,7 @@ pub fn markdown(result: &CaseResult) -> String {
         }
     }
     truth(&mut out, result);
+    repeated(&mut out, result);
     out
 }
 
@@ -222,16 +223,37 @@ fn table_2(out: &mut String, result: &CaseResult, name: &str) {
 }
 
 fn truth(out: &mut String, result: &CaseResult) {
-    out.push_str(
-        "\n## Found transforms against the truth\n\n| transform | method | position, mm | orientation, ° |\n|---|---|---|---|\n",
+    out.push_str("\n## Found transforms against the truth\n\n");
+    of_transforms(out, result, |r| &r.off);
+}
+
+/// What several recordings of one robot differ by: of one recording, the table is empty.
+fn repeated(out: &mut String, result: &CaseResult) {
+    let _ = write!(
+        out,
+        "\n## Repeatability (paper, §7)\n\nEvery robot recorded and calibrated {}: standard deviation of one calibration over its recordings. What is \
+         wrong in every recording does not show in it.\n\n",
+        match result.recorded {
+            1 => "once (`--recorded 2` and more fill the table)".to_owned(),
+            n => format!("{n} times"),
+        }
     );
+    of_transforms(out, result, |r| &r.scatter);
+}
+
+fn of_transforms(
+    out: &mut String,
+    result: &CaseResult,
+    of: fn(&RobotResult) -> &BTreeMap<String, Off>,
+) {
+    out.push_str("| transform | method | position, mm | orientation, ° |\n|---|---|---|---|\n");
     let names: std::collections::BTreeSet<&String> =
         result.results.iter().flat_map(|r| r.off.keys()).collect();
     for name in names {
         for (_, method) in METHODS {
             let off: Vec<_> = of_method(result, method)
                 .iter()
-                .filter_map(|r| r.off.get(name).copied())
+                .filter_map(|r| of(r).get(name).copied())
                 .collect();
             let position: Vec<f64> = off.iter().map(|o| o.translation_m).collect();
             let turn: Vec<f64> = off.iter().map(|o| o.rotation_rad).collect();

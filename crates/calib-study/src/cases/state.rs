@@ -13,6 +13,7 @@ use super::{CaseError, CaseOptions, RobotResult};
 struct Settings {
     calib_case_study: u32,
     study: String,
+    recorded: u64,
     /// Digests of profile and URDF.
     inputs: Vec<String>,
     version: String,
@@ -32,8 +33,9 @@ impl State {
             });
         };
         let settings = serde_json::to_string(&Settings {
-            calib_case_study: 1,
+            calib_case_study: 2,
             study: options.name.clone(),
+            recorded: options.recorded,
             inputs: robot.digests.iter().map(|d| d.sha256.clone()).collect(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         })?;
