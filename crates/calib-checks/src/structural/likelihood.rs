@@ -50,7 +50,7 @@ pub(super) enum Opinion {
 
 /// Asks the leading hypotheses, and the one that the residual of a registration `named`.
 pub(super) fn opinion(asked: &Asked<'_>, named: Option<&Named>, invisible: &[Scoped]) -> Opinion {
-    let judged = judged(asked, invisible);
+    let judged = judged(asked, invisible, named.is_some());
     if let Some(best) = judged
         .first()
         .filter(|_| stands_out(&judged, asked.options))
@@ -77,8 +77,9 @@ pub(super) fn opinion(asked: &Asked<'_>, named: Option<&Named>, invisible: &[Sco
     }
 }
 
-/// The leaders with what they gain, the likeliest first.
-fn judged<'a>(asked: &Asked<'a>, invisible: &[Scoped]) -> Vec<Judged<'a>> {
+/// The leaders with what they gain, the likeliest first. None where errors of the robot leave no more than noise of the data as they are,
+/// and no mistake was named that might be worse.
+fn judged<'a>(asked: &Asked<'a>, invisible: &[Scoped], named: bool) -> Vec<Judged<'a>> {
     let ranking: &'a Ranking = asked.ranking;
     let most = WITHIN * ranking.none.score;
     let near = |s: &&Scored| s.score.score < most && !invisible.contains(&s.scoped);
@@ -96,6 +97,9 @@ fn judged<'a>(asked: &Asked<'a>, invisible: &[Scoped]) -> Vec<Judged<'a>> {
     let Some(without) = without.flatten() else {
         return Vec::new();
     };
+    if !named && without.sigma <= QUIETER * asked.options.sigma {
+        return Vec::new();
+    }
     let leaders = leaders.into_iter();
     let mut judged: Vec<Judged<'a>> = leaders
         .filter_map(|s| Judged::of(asked, s, without))

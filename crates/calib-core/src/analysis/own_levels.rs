@@ -4,8 +4,9 @@
 //! are used where left-out poses are likelier under them, by more than chance and what the choice allows, and where they predict no worse:
 //! physics that is missing behind one of the bodies also makes it look noisy.
 
-use crate::analysis::estimate::{Settings, Start, refit};
+use crate::analysis::estimate::{Start, refit};
 use crate::analysis::scores::{Scores, mean, paired};
+use crate::analysis::settings::Settings;
 use crate::analysis::solution::Solution;
 
 /// Poses that are left out in turn at most, evenly over all.
