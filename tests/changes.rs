@@ -74,7 +74,7 @@ fn changed_from(
                 }
             }
         });
-        dir = dir.file(*table, text);
+        dir = dir.file(table, text);
     }
     dir
 }

@@ -98,7 +98,7 @@ impl Case {
                 })
                 .collect()
         };
-        chain.observe_moved(&mut r, &mut h, MARKER, &extra);
+        chain.observe_moved(&mut r, &mut h, MARKER, extra);
         if let Some(ratio) = ratio {
             let second = h.problem.frame("second");
             let place = nalgebra::Isometry3::identity();
@@ -108,7 +108,7 @@ impl Case {
             h.points = points
                 .map(|(i, p)| h.problem.known_point(&format!("n{i}"), second, *p))
                 .collect();
-            chain.observe_moved(&mut r, &mut h, ratio * MARKER, &extra);
+            chain.observe_moved(&mut r, &mut h, ratio * MARKER, extra);
             h.problem.measurements_mut()[1].name = "second".to_owned();
         }
         h.problem.held_out = (fitted..fitted + 60).collect();
