@@ -2,7 +2,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/it/common/mod.rs"]
 mod common;
 
 use calib_core::{ChangeSettings, MinimizeSettings, Model, NoiseKind, Settings, minimize, solve};

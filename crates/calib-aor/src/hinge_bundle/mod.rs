@@ -9,7 +9,7 @@
 //! All seen samples count, frames may miss markers. The angles are eliminated frame by frame; with encoder
 //! angles ([`Options::angles`]) they are data instead. It reaches the bound where a circle for each marker does not:
 //! the body is rigid, and the angle of a frame is one number for all its markers. Where the noise of such an angle is a
-//! part of the arc itself (20° at 5 mm and 100 mm) nobody reaches it who treats all frames alike: see `tests/short_arcs.rs`.
+//! part of the arc itself (20° at 5 mm and 100 mm) nobody reaches it who treats all frames alike: see `tests/it/short_arcs.rs`.
 
 mod bundle;
 

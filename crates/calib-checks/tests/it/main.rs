@@ -2,6 +2,9 @@
 
 mod bodies;
 mod checks;
+mod likelihood;
 mod real_tables;
 mod recall;
+mod robots;
+mod structural;
 mod sync;

@@ -1,0 +1,180 @@
+//! Noise with a memory: noticed, measured, and the intervals cover again; noise without one is left alone.
+
+use crate::common::{Chain, Free, Handles, normal, normal3, rng, six_r};
+use calib_core::{
+    Configuration, Dependence, NoiseKind, PoseNoise, PoseObservation, Settings, Solution, solve,
+};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use rand::RngExt;
+
+/// Marker noise, m.
+const SIGMA: f64 = 3e-4;
+/// Orientation noise of a body that is measured as a pose, rad.
+const TURN: f64 = 1e-3;
+/// Joint noise, rad (0.01°).
+const JOINT: f64 = 1.7e-4;
+/// Two-sided 95 %.
+const Z95: f64 = 1.96;
+
+struct Case {
+    chain: Chain,
+    h: Handles,
+    solution: Solution,
+}
+
+/// What the tracker reports.
+#[derive(Clone, Copy, PartialEq)]
+enum Seen {
+    Markers,
+    Poses,
+}
+
+/// `poses` random poses; the noise of positions is an autoregression of first order by rows, along the axes of the tracker.
+fn case(seen: Seen, seed: u64, poses: usize, rho: f64) -> Case {
+    let mut r = rng(seed);
+    let free = Free::everything(6);
+    let chain = Chain::nominal(six_r())
+        .posed(&mut r, poses, 1.4)
+        .deviate(&mut r, &free, 0.005, 0.002);
+    let mut h = chain.problem(&free, SIGMA);
+    h.problem.group_mut(h.markers).estimate = true;
+    let noise = h
+        .problem
+        .noise_group("joints", NoiseKind::Joint, JOINT, true);
+    for joint in h.joints.clone() {
+        h.problem.joint_noise(joint, noise);
+    }
+    let mut state: Vec<Vector3<f64>> = chain.markers.iter().map(|_| normal3(&mut r)).collect();
+    let (mut markers, mut bodies) = (Vec::new(), Vec::new());
+    for (sample, q) in chain.q.iter().enumerate() {
+        let extra: Vec<f64> = q.iter().map(|_| normal(&mut r) * JOINT).collect();
+        let x = chain.tracker_from_body(q, &extra);
+        for state in &mut state {
+            *state = *state * rho + normal3(&mut r) * (1.0 - rho * rho).sqrt();
+        }
+        for (m, p) in chain.markers.iter().enumerate() {
+            markers.push(calib_core::MarkerObservation {
+                sample,
+                point: h.points[m],
+                position: x * p + state[m] * SIGMA,
+                shape: None,
+            });
+        }
+        let turned = UnitQuaternion::from_scaled_axis(normal3(&mut r) * TURN);
+        let at = Translation3::from(x.translation.vector + state[0] * SIGMA);
+        let pose = Isometry3::from_parts(at, x.rotation * turned);
+        bodies.push(PoseObservation { sample, pose });
+    }
+    let p = &mut h.problem;
+    match seen {
+        Seen::Markers => p.markers("body", h.tracker, h.body, h.markers, markers),
+        Seen::Poses => {
+            let orientation = p.noise_group("turn", NoiseKind::Orientation, TURN, true);
+            let noise = PoseNoise::Split {
+                orientation,
+                position: h.markers,
+            };
+            p.poses("body", h.tracker, h.body, noise, bodies);
+        }
+    }
+    let mut settings = Settings::default();
+    settings.robust.enabled = false;
+    let solution = solve(&h.problem, &settings).expect("solves");
+    Case { chain, h, solution }
+}
+
+/// Part of the coordinates of a marker at new poses within their 95 % intervals, and the mean square of their z.
+fn coverage(case: &Case, solution: &Solution, seed: u64) -> (f64, f64) {
+    let mut r = rng(1000 + seed);
+    let (mut inside, mut z2, mut count) = (0.0, 0.0, 0.0);
+    for _ in 0..30 {
+        let q: Vec<f64> = (0..6).map(|_| r.random_range(-1.4..1.4)).collect();
+        let mut at = Configuration::zero();
+        for (joint, q) in case.h.joints.iter().zip(&q) {
+            at = at.with(*joint, *q);
+        }
+        let p = Point3::origin();
+        let found = solution
+            .predict_point(case.h.tracker, case.h.body, &p, &at)
+            .expect("a path");
+        let truth = case.chain.tracker_from_body(&q, &[0.0; 6]) * p;
+        let covariance = found.covariance.expect("estimable");
+        for i in 0..3 {
+            let z = (found.position[i] - truth[i]) / covariance[(i, i)].sqrt();
+            inside += f64::from(z.abs() < Z95);
+            z2 += z * z;
+            count += 1.0;
+        }
+    }
+    (inside / count, z2 / count)
+}
+
+/// Mean coverage over robots: as the fit states it, and under the memory found; and how often one is significant.
+fn mean_coverage(
+    seen: Seen,
+    robots: u64,
+    poses: usize,
+    rho: f64,
+) -> ([f64; 2], [f64; 2], usize, f64) {
+    let (mut naive, mut under, mut significant, mut decay) = ([0.0; 2], [0.0; 2], 0, 0.0);
+    let part = 1.0 / robots as f64;
+    for seed in 0..robots {
+        let case = case(seen, seed, poses, rho);
+        let found: Dependence = case.solution.dependence(&[]).expect("enough samples");
+        significant += usize::from(found.is_significant());
+        decay += part * found.decay;
+        let mended = case.solution.under(&found, &[]).expect("evaluable");
+        for (sum, solution) in [(&mut naive, &case.solution), (&mut under, &mended)] {
+            let (inside, z2) = coverage(&case, solution, seed);
+            sum[0] += part * inside;
+            sum[1] += part * z2;
+        }
+    }
+    (naive, under, significant, decay)
+}
+
+#[test]
+fn noise_with_a_memory_is_measured_and_covered() {
+    for poses in [40, 100] {
+        let (naive, under, significant, decay) = mean_coverage(Seen::Markers, 16, poses, 0.9);
+        assert_eq!(significant, 16);
+        assert!((decay - 0.9).abs() < 0.05, "{decay}");
+        assert!(naive[0] < 0.88, "the fault is there: {naive:?}");
+        // 16 robots × 90 coordinates that share their fit: ± 1.5 %
+        assert!((0.93..0.985).contains(&under[0]), "{poses}: {under:?}");
+    }
+}
+
+/// The memory of positions stands still in the tracker's frame, and turns in the body's.
+#[test]
+fn positions_of_poses_with_a_memory_are_covered() {
+    for poses in [40, 100] {
+        let (naive, under, significant, decay) = mean_coverage(Seen::Poses, 16, poses, 0.9);
+        assert_eq!(significant, 16);
+        assert!((decay - 0.9).abs() < 0.05, "{decay}");
+        assert!(naive[0] < 0.85, "the fault is there: {naive:?}");
+        assert!((0.93..0.985).contains(&under[0]), "{poses}: {under:?}");
+    }
+}
+
+#[test]
+fn noise_without_a_memory_is_left_alone() {
+    left_alone(Seen::Markers);
+    left_alone(Seen::Poses);
+}
+
+fn left_alone(seen: Seen) {
+    let (naive, under, significant, _) = mean_coverage(seen, 30, 40, 0.0);
+    assert_eq!(significant, 0);
+    assert!((0.92..0.975).contains(&naive[0]), "{naive:?}");
+    // Even where it is not significant, what is found hardly changes the intervals.
+    assert!((naive[0] - under[0]).abs() < 0.02, "{naive:?} {under:?}");
+}
+
+/// A memory ends where a recording ends: pairs across a border are not counted.
+#[test]
+fn borders_cut_the_memory() {
+    let case = case(Seen::Markers, 1, 40, 0.9);
+    let every: Vec<usize> = (1..40).collect();
+    assert_eq!(case.solution.dependence(&every), None);
+}

@@ -1,0 +1,4 @@
+//! The hand-eye estimators.
+
+mod judged;
+mod solvers;

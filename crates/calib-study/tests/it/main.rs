@@ -1,0 +1,4 @@
+//! The studies.
+
+mod faults;
+mod study;
