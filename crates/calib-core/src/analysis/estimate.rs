@@ -341,6 +341,7 @@ impl Fit<'_> {
                 theta: next,
                 change,
                 relative_sigma,
+                ..
             }) = score(objective, &minimum.values, work)
             else {
                 break;

@@ -113,7 +113,7 @@ const SAME: f64 = 1.005;
 const SHOWN: f64 = 2.0;
 /// Chance that clean poses are said to hide physics in their noise.
 const CHANCE: f64 = 1e-3;
-/// Levels of a candidate have settled when log σ² changes by less: 2.5 % in σ.
+/// Levels of a candidate have settled when a further step would make the observations likelier by less, nats.
 const SETTLED: f64 = 0.05;
 /// Statements that trust no model of the robot.
 const SAFE: [NoiseModel; 2] = [NoiseModel::White, NoiseModel::BodyPose];
@@ -124,8 +124,6 @@ const SMALLER: [NoiseModel; 3] = [NoiseModel::White, NoiseModel::BodyPose, Noise
 const JOINT_NOISE: f64 = 1e-3;
 /// Steps of scoring of a candidate at most.
 const ROUNDS: usize = 12;
-/// Values and levels of a candidate are brought together this many times.
-const TURNS: usize = 2;
 
 impl Solution {
     /// The noise from pose to pose that the observations speak for, among `models`, and what of the rejected takes part
@@ -294,7 +292,15 @@ impl Trial {
         let model = Model::new(&problem.with_noise_model(noise)?).ok()?;
         let mut theta = start_levels(&model, reference);
         let mut work = Workspace::new(&model);
-        let values = settle(&model, &reference.values, weights, &mut theta, &mut work)?;
+        // The fit itself is one of the candidates.
+        let itself = noise == NoiseModel::Joint
+            && std::ptr::eq(problem, reference.model.problem())
+            && weights == reference.weights;
+        let values = if itself {
+            reference.values.clone()
+        } else {
+            settle(&model, &reference.values, weights, &mut theta, &mut work)?
+        };
         let objective = Objective {
             model: &model,
             weights,
@@ -355,11 +361,8 @@ fn settle(
     theta: &mut Vec<f64>,
     work: &mut Workspace,
 ) -> Option<Values> {
-    let mut values = start.clone();
-    for _ in 0..TURNS {
-        levels(model, &values, weights, theta, work);
-        values = values_at(model, &values, weights, theta, work)?;
-    }
+    levels(model, start, weights, theta, work);
+    let values = values_at(model, start, weights, theta, work)?;
     levels(model, &values, weights, theta, work);
     Some(values)
 }
@@ -382,7 +385,7 @@ fn levels(
             return;
         };
         *theta = next.theta;
-        if next.change < SETTLED {
+        if next.gain < SETTLED {
             return;
         }
     }

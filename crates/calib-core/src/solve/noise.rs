@@ -47,6 +47,8 @@ pub(crate) struct Scoring {
     pub theta: Vec<f64>,
     /// Largest |Δ log θ| among the groups that are still above their floor.
     pub change: f64,
+    /// By how much the step makes the observations likelier, nats, to second order.
+    pub gain: f64,
     /// Standard error of each group's σ relative to σ; `None` for stated ones.
     pub relative_sigma: Vec<Option<f64>>,
 }
@@ -64,6 +66,7 @@ pub(crate) fn score(
     let mut out = Scoring {
         theta: theta.to_vec(),
         change: 0.0,
+        gain: 0.0,
         relative_sigma: vec![None; theta.len()],
     };
     if groups.is_empty() {
@@ -86,6 +89,7 @@ pub(crate) fn score(
         } else {
             0.0
         };
+        out.gain += 0.5 * gradient[i] * step;
         // θ ← θ exp(Δ log θ)
         let floor = (model.problem.groups[g].sigma * FLOOR).powi(2);
         out.theta[g] = (theta[g] * step.exp()).max(floor);
