@@ -10,6 +10,10 @@
 //!
 //! A gross error cannot be predicted, and takes the predictions of others with it: with it they are worse. A pose that the
 //! model merely describes badly is predicted better where others like it take part.
+//!
+//! Gross errors that are alike predict each other: a body that was knocked before a recording gains by readmission there, far more
+//! than all other poses lose. What makes the poses worse that had lost nothing is therefore not readmitted, whatever the sum says, where these
+//! are the most.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -49,6 +53,12 @@ pub(crate) struct Wider {
 /// A distance beyond the gate by this factor belongs to no tail.
 const WIDE: f64 = 2.5;
 
+/// Poses that had lost nothing are not predicted worse than by this factor (rms) for the sake of others…
+const HARM: f64 = 1.5;
+/// …where those are no more than this share of all. Where they are more, as behind a step in the middle of the recordings, nothing tells
+/// which side is right, and what looks for changes has to see both.
+const FEW: f64 = 0.2;
+
 /// Every observation that may take part: not held out, and not where another marker should be.
 pub(crate) fn eligible(solution: &Solution) -> Vec<f64> {
     let model = &solution.model;
@@ -73,6 +83,27 @@ pub(crate) fn many_rejected(weights: &[f64], eligible: &[f64]) -> Option<usize> 
     let rejected = pairs().filter(|(w, _)| **w == 0.0).count();
     let chance = (1.0 - RobustSettings::default().gate) * pairs().count() as f64;
     (rejected as f64 > 2.0 + 3.0 * chance).then_some(rejected)
+}
+
+/// Samples with an eligible observation that takes no part.
+pub(crate) fn touched(model: &Model, weights: &[f64], eligible: &[f64]) -> BTreeSet<usize> {
+    let lost = weights.iter().zip(eligible).map(|(w, e)| w < e);
+    let observations = model.observations.iter().zip(lost);
+    observations
+        .filter(|(_, lost)| *lost)
+        .map(|(o, _)| o.sample)
+        .collect()
+}
+
+/// Whether the poses that had lost nothing are predicted worse by [`HARM`] for the sake of [`FEW`]; `both` has (1) squared by sample,
+/// with and without what was rejected.
+pub(crate) fn is_harmed(both: &BTreeMap<usize, (f64, f64)>, touched: &BTreeSet<usize>) -> bool {
+    let whole = both.iter().filter(|(sample, _)| !touched.contains(sample));
+    let sums = whole.fold((0, 0.0, 0.0), |sum, (_, square)| {
+        (sum.0 + 1, sum.1 + square.0, sum.2 + square.1)
+    });
+    let few = sums.0 as f64 >= (1.0 - FEW) * both.len() as f64;
+    few && sums.1 > HARM * HARM * sums.2
 }
 
 /// The wider gate, and none.

@@ -20,13 +20,15 @@
 //! The gate of the robust fit is tried in the same way ([`admit`](crate::analysis::admit)): a model that physics is missing
 //! from finds its hardest poses unlikely.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::analysis::admit::{Admission, eligible, left_out_squares, many_rejected, wider};
+use crate::analysis::admit::{
+    Admission, eligible, is_harmed, left_out_squares, many_rejected, touched, wider,
+};
 use crate::analysis::estimate::{Start, refit};
 use crate::analysis::scores::{Scores, mean, paired, tails};
 use crate::analysis::settings::Settings;
@@ -214,8 +216,8 @@ impl Solution {
         observations().map(|(o, w)| of(o.sample, *w)).collect()
     }
 
-    /// Whether the predictions of all poses gain by what the gate rejected, under noise that trusts no model of the robot;
-    /// the weights with it where they do.
+    /// Whether the predictions of all poses gain by what the gate rejected, under noise that trusts no model of the robot, and
+    /// those that had lost nothing are not the price; the weights with it where so.
     fn admitted(
         &self,
         safe: &Trial,
@@ -239,6 +241,7 @@ impl Solution {
             left_out_squares(objective, &values, &everything)
         };
         let before = squares(&self.weights)?;
+        let touched = touched(&safe.model, &self.weights, eligible);
         let objective = Objective {
             model: &safe.model,
             weights: &self.weights,
@@ -256,11 +259,14 @@ impl Solution {
             let Some(after) = squares(&wider.weights) else {
                 continue;
             };
-            let both: Vec<(f64, f64)> = before
+            let both: BTreeMap<usize, (f64, f64)> = before
                 .iter()
-                .filter_map(|(sample, b)| Some((*after.get(sample)?, *b)))
+                .filter_map(|(sample, b)| Some((*sample, (*after.get(sample)?, *b))))
                 .collect();
-            let (with, without): (Vec<f64>, Vec<f64>) = both.into_iter().unzip();
+            if is_harmed(&both, &touched) {
+                continue;
+            }
+            let (with, without): (Vec<f64>, Vec<f64>) = both.into_values().unzip();
             let (more, error) = paired(&with, &without);
             let ratio = (mean(&with) / mean(&without).max(f64::MIN_POSITIVE)).sqrt();
             if ratio < out.ratio / SAME && -more > error {
