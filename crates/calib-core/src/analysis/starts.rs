@@ -29,6 +29,8 @@ const CLEAR: f64 = 9.0;
 const CERTAIN: f64 = 4.0;
 /// c of equation (3): a sample of noise alone exceeds it once in 10⁵ or less.
 const GROSS: f64 = 9.0;
+/// A sample that lies farther off than twice what all sides together make of it is a gross error, whatever the sides were.
+const REACH: f64 = 2.0;
 /// Rounds of changing signs one at a time.
 const ROUNDS: usize = 4;
 
@@ -99,16 +101,33 @@ impl Solution {
             .is_some_and(|sigma| found.value.abs() > CERTAIN * sigma)
     }
 
-    /// The same solution with all observations of the fitted samples that the starts are about.
+    /// The same solution with all observations of the fitted samples that the starts are about and that sides can explain.
     fn with_rows_of(&self, pieces: &[Piece]) -> Self {
-        let mut out = self.clone();
-        for sample in pieces.iter().flat_map(Piece::samples) {
-            if !self.model.is_held_out(sample) {
-                for o in self.model.of_sample[sample].clone() {
-                    out.weights[o] = 1.0;
-                }
-            }
+        let mut all = self.clone();
+        let mut wanted: Vec<usize> = pieces.iter().flat_map(Piece::samples).collect();
+        wanted.retain(|sample| !self.model.is_held_out(*sample));
+        wanted.sort_unstable();
+        wanted.dedup();
+        for &sample in &wanted {
+            all.weights[self.model.of_sample[sample].clone()].fill(1.0);
         }
+        let candidates: Vec<Candidate> = pieces.iter().map(|p| p.candidate.clone()).collect();
+        let value = |p: &Piece| self.values.0[self.model.columns[p.column]];
+        let values: Vec<f64> = pieces.iter().map(value).collect();
+        let excess = (self.chi2 / self.degrees_of_freedom.max(1.0)).max(1.0);
+        let mut work = Workspace::new(&self.model);
+        work.cache.update(&self.model.problem, &self.values);
+        let mut out = all.clone();
+        all.each_numbered_sample(&candidates, &wanted, &mut work, |sample, s, d| {
+            let sides: f64 = (0..values.len())
+                .map(|k| d.column(k).norm() * values[k].abs())
+                .sum();
+            let noise = (GROSS * excess * s.w.len() as f64).sqrt();
+            if s.w.norm() > REACH * sides + noise {
+                let own = self.model.of_sample[sample].clone();
+                out.weights[own.clone()].copy_from_slice(&self.weights[own]);
+            }
+        });
         out
     }
 

@@ -21,6 +21,7 @@ use crate::error::PipelineError;
 use crate::estimate::start::start;
 use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::ml;
+use crate::formulate::starts::rows_of_no_side;
 use crate::prepare::conditions::{Conditions, conditions};
 use crate::prepare::excluded::Excluded;
 use crate::prepare::inputs::{Inputs, Loaded};
@@ -73,6 +74,7 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
     let conditions = recordings
         .map(|(name, r)| (name.as_str(), conditions(r, model, load)))
         .collect();
+    let of_no_side = rows_of_no_side(inputs);
     for name in inputs.robot.profile.bodies.keys() {
         let off = BodyError {
             inputs,
@@ -93,6 +95,10 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
             let (mut moving, mut others) = (Vec::new(), Vec::new());
             for row in 0..loaded.q.len() {
                 if !rejected.contains(&(recording.clone(), row, name.clone())) {
+                    continue;
+                }
+                let of_no_side = of_no_side.contains(&(recording.clone(), row));
+                if of_no_side && off.is_usual_on_a_side(loaded, row, usual) {
                     continue;
                 }
                 match off.between_rows(loaded, row, usual) {
@@ -219,6 +225,7 @@ struct FarOff {
 type Usual = (f64, f64);
 
 /// What one row says of a body and of the joints.
+#[derive(Clone, Copy)]
 struct SeenRow<'a> {
     seen: &'a Isometry3<f64>,
     q: &'a [f64],
@@ -338,11 +345,45 @@ impl<'a> BodyError<'a> {
         })
     }
 
+    /// Whether a row is as good as others if its joints came from sides that nothing tells.
+    fn is_usual_on_a_side(&self, loaded: &'a Loaded, row: usize, usual: Usual) -> bool {
+        let Some(seen) = self.seen(loaded, row) else {
+            return false;
+        };
+        let joints = 0..seen.under.approach.len();
+        let open: Vec<usize> = joints
+            .filter(|j| seen.under.approach_of(*j) == 0.0)
+            .collect();
+        // Joints without backlash, and those beyond the body, do nothing: the best side of one after the other.
+        let mut under = seen.under.clone();
+        let ratio = |under: &Conditions| {
+            let sided = SeenRow { under, ..seen };
+            self.ratio(&sided, usual).unwrap_or(f64::INFINITY)
+        };
+        for _ in 0..2 {
+            for &joint in &open {
+                let with = |side: f64| {
+                    let mut under = under.clone();
+                    under.approach[joint] = side;
+                    (ratio(&under), under)
+                };
+                let (below, above) = (with(1.0), with(-1.0));
+                under = if below.0 <= above.0 { below.1 } else { above.1 };
+            }
+        }
+        ratio(&under) < FAR_OFF
+    }
+
+    /// The error in units of what is usual.
+    fn ratio(&self, seen: &SeenRow<'_>, usual: Usual) -> Option<f64> {
+        // √χ²₆(½) is what is usual.
+        Some(self.weighted(seen, seen.q, usual)?.norm() / 2.313)
+    }
+
     fn far_off(&self, loaded: &'a Loaded, row: usize, usual: Usual) -> Option<FarOff> {
         let seen = self.seen(loaded, row)?;
         let e = self.at(&seen, seen.q)?;
-        // √χ²₆(½) is what is usual.
-        let ratio = self.weighted(&seen, seen.q, usual)?.norm() / 2.313;
+        let ratio = self.ratio(&seen, usual)?;
         if ratio < FAR_OFF {
             return None;
         }

@@ -1,24 +1,52 @@
 //! From which side a joint came before it first moved in a recording, where an effect depends on it and the residuals tell.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_core::effect::Source;
 use calib_finding::{Fact, Finding, Subject, catalog};
-use calib_profile::{Solve, Usage};
+use calib_profile::{Load, Solve, Usage};
+use calib_urdf::JointId;
 
 use crate::formulate::formulation::MlFit;
+use crate::prepare::conditions::conditions;
 use crate::prepare::inputs::Inputs;
 
 /// Whether the profile frees anything that depends on the side.
 pub(crate) fn matter(inputs: &Inputs) -> bool {
+    sided_joints(inputs).next().is_some()
+}
+
+/// Joints of which the profile frees anything that depends on the side.
+fn sided_joints(inputs: &Inputs) -> impl Iterator<Item = JointId> + '_ {
     let solve: &Solve = &inputs.robot.profile.solve;
     let model = &inputs.robot.model;
-    model.joint_ids().any(|joint| {
-        let free = solve.free_set(joint, true, !model.joint(joint).kind.turns());
+    model.joint_ids().filter(move |joint| {
+        let free = solve.free_set(*joint, true, !model.joint(*joint).kind.turns());
         let terms = free.effects.iter().flat_map(|free| free.effect.terms);
         let mut sources = terms.map(|term| term.source);
         sources.any(|source| matches!(source, Source::Approach | Source::Friction))
     })
+}
+
+/// With fewer rows before a joint's first motion, which side it came from is told by little more than the noise of one of them.
+pub(crate) const FEWEST: usize = 3;
+
+/// Rows (recording, row) that no side is asked for: too few of them stand before the first motion of some joint. Their errors are those of
+/// a joint in the middle of its backlash, which is where it never stands.
+pub(crate) fn rows_of_no_side(inputs: &Inputs) -> BTreeSet<(String, usize)> {
+    let joints: Vec<JointId> = sided_joints(inputs).collect();
+    let mut out = BTreeSet::new();
+    for (name, loaded) in inputs.recordings.iter().filter(|_| !joints.is_empty()) {
+        let under = conditions(loaded, &inputs.robot.model, Load::Gravity);
+        for joint in &joints {
+            let open = |row: &usize| under[*row].approach_of(joint.index()) == 0.0;
+            let rows: Vec<usize> = (0..under.len()).take_while(open).collect();
+            if rows.len() < FEWEST {
+                out.extend(rows.into_iter().map(|row| (name.clone(), row)));
+            }
+        }
+    }
+    out
 }
 
 /// Sides by recording and joint index.

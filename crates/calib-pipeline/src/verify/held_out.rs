@@ -11,6 +11,7 @@ use calib_report::{Distance, HeldOut, PoseError};
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::Calibration;
+use crate::formulate::starts::rows_of_no_side;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::deviations::{Deviation, Key, deviations, joint_values};
@@ -75,8 +76,28 @@ pub fn held_out(
         })
         .collect();
     calib_report::screen(&mut poses);
+    if fit.is_some() {
+        without_rows_of_no_side(inputs, &best, &mut poses);
+    }
     without_spoiled_orientations(inputs, &mut poses);
     Some(HeldOut::from_poses(quantity(inputs, validation), poses))
+}
+
+/// Of joints that came from a side which nothing tells, the fit predicts the middle, with an uncertainty that it does not state: these rows
+/// are screened, where they are not most of all.
+fn without_rows_of_no_side(inputs: &Inputs, found: &[Deviation], poses: &mut [PoseError]) {
+    let of_no_side = rows_of_no_side(inputs);
+    let of_none = |found: &Deviation| {
+        let (recording, row, _) = found.key();
+        of_no_side.contains(&(recording, row))
+    };
+    let flags: Vec<bool> = found.iter().map(of_none).collect();
+    if 2 * flags.iter().filter(|flag| **flag).count() > flags.len() {
+        return;
+    }
+    for (pose, flag) in poses.iter_mut().zip(flags) {
+        pose.screened |= flag;
+    }
 }
 
 /// A marker that was screened out spoils the orientation of its body in that posture: it is not counted either.

@@ -9,10 +9,8 @@ use calib_urdf::{JointId, RobotModel};
 use super::joints::Row;
 use crate::formulate::formulation::Formulation;
 use crate::formulate::kinematics::joint_state;
+use crate::formulate::starts::FEWEST;
 use crate::prepare::inputs::Inputs;
-
-/// With fewer rows, which side is told by little more than the noise of one of them, and matters as little.
-const FEWEST: usize = 3;
 
 /// Declares the open starts of all joints that are approached from a known side elsewhere.
 pub(super) fn open_starts(formulation: &mut Formulation, inputs: &Inputs, rows: &[Row<'_>]) {
