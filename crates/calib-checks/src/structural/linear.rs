@@ -87,10 +87,22 @@ impl<'a> Model<'a> {
 
     /// Sums over all rows with joint noise ratio λ.
     pub(crate) fn sums(&self, lambda: f64) -> Sums {
+        let [sums] = self.sums_of([lambda]);
+        sums
+    }
+
+    /// [`sums`](Self::sums) for several ratios: the rows are the same.
+    pub(crate) fn sums_of<const N: usize>(&self, lambdas: [f64; N]) -> [Sums; N] {
         let width = self.columns() + 1;
-        let mut gram = DMatrix::zeros(width, width);
-        let mut tall = Tall::new(width, width - 1 - self.tests.len());
-        let (mut log_det, mut observations) = (0.0, 0.0);
+        let mut out = lambdas.map(|lambda| Whitened {
+            lambda,
+            tall: Tall::new(width, width - 1 - self.tests.len()),
+            sums: Sums {
+                gram: DMatrix::zeros(width, width),
+                log_det: 0.0,
+                observations: 0.0,
+            },
+        });
         let links: Vec<LinkIndex> = self.scan.data.bodies.iter().map(|b| b.link).collect();
         let mut walk = Walk::new(&self.scan.data.chain, &links);
         for i in 0..self.scan.data.readings.len() {
@@ -108,35 +120,16 @@ impl<'a> Model<'a> {
                     .iter_mut()
                     .for_each(|d| d.1.rows_mut(3 * s, 3).scale_mut(self.share(k)));
             }
-            if lambda > 0.0 {
-                let v_rows = block.nrows();
-                let mut v = DMatrix::identity(v_rows, v_rows);
-                for (j, d) in &by_reading {
-                    v.ger(lambda * noise_weight(&self.scan.data.chain, *j), d, d, 1.0);
-                }
-                if let Some(cholesky) = Cholesky::new(v) {
-                    log_det += 2.0
-                        * cholesky
-                            .l_dirty()
-                            .diagonal()
-                            .iter()
-                            .map(|x| x.ln())
-                            .sum::<f64>();
-                    let mut inverse = DMatrix::identity(v_rows, v_rows);
-                    cholesky.l_dirty().solve_lower_triangular_mut(&mut inverse);
-                    // A product has a fast kernel, the solution of a triangular system has none.
-                    block = inverse * block;
-                }
+            let measured = 3.0 * seen.iter().map(|&k| self.share(k).powi(2)).sum::<f64>();
+            for whitened in &mut out {
+                whitened.add(&self.scan.data.chain, &block, &by_reading);
+                whitened.sums.observations += measured;
             }
-            observations += 3.0 * seen.iter().map(|&k| self.share(k).powi(2)).sum::<f64>();
-            tall.push(&block, &mut gram);
         }
-        tall.flush(&mut gram);
-        Sums {
-            gram,
-            log_det,
-            observations,
-        }
+        out.map(|mut whitened| {
+            whitened.tall.flush(&mut whitened.sums.gram);
+            whitened.sums
+        })
     }
 
     /// The rows of one instant: all columns and the residual; and ∂p/∂reading for each reading.
@@ -203,6 +196,36 @@ impl<'a> Model<'a> {
         }
         by_reading.retain(|(_, d)| d.amax() > 0.0);
         (block, by_reading)
+    }
+}
+
+/// Sums with one ratio of joint noise, as they grow.
+struct Whitened {
+    lambda: f64,
+    tall: Tall,
+    sums: Sums,
+}
+
+impl Whitened {
+    /// Adds the rows of one instant.
+    fn add(&mut self, chain: &Chain, block: &DMatrix<f64>, by_reading: &[(usize, DVector<f64>)]) {
+        let n = block.nrows();
+        let mut v = DMatrix::identity(n, n);
+        for (j, d) in by_reading {
+            v.ger(self.lambda * noise_weight(chain, *j), d, d, 1.0);
+        }
+        let cholesky = (self.lambda > 0.0).then(|| Cholesky::new(v)).flatten();
+        let Some(cholesky) = cholesky else {
+            self.tall.push(block, &mut self.sums.gram);
+            return;
+        };
+        let l = cholesky.l_dirty();
+        let logs = l.diagonal().iter().map(|x| x.ln()).sum::<f64>();
+        self.sums.log_det += 2.0 * logs;
+        let mut inverse = DMatrix::identity(n, n);
+        l.solve_lower_triangular_mut(&mut inverse);
+        // A product has a fast kernel, the solution of a triangular system has none.
+        self.tall.push(&(inverse * block), &mut self.sums.gram);
     }
 }
 

@@ -53,8 +53,7 @@ pub(super) fn noise_ratio(
 ) -> Option<Noise> {
     let model = Model::new(data, &[], screened);
     let mut best: Option<Noise> = None;
-    for lambda in NOISE_RATIOS {
-        let sums = model.sums(lambda);
+    for (lambda, sums) in NOISE_RATIOS.into_iter().zip(model.sums_of(NOISE_RATIOS)) {
         sigma = solve(&model, &sums, sigma, deviation, options)?.sigma;
         let map = solve(&model, &sums, sigma, deviation, options)?;
         if best.is_none_or(|b| map.log_likelihood > b.log_likelihood) {
