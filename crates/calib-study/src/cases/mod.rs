@@ -76,9 +76,13 @@ pub struct RobotResult {
     pub loops: Vec<LoopClosure>,
     /// Found transforms against the truth, by the report's names.
     pub off: BTreeMap<String, Off>,
-    /// How far the found transforms of this robot's recordings scatter: standard deviation of one; empty where it was recorded once.
+    /// How far the found transforms of this robot's recordings scatter: standard deviation of one; empty where it was recorded once, and
+    /// where a recording has no result: those that succeed are not like the others.
     #[serde(default)]
     pub scatter: BTreeMap<String, Off>,
+    /// Recordings after the first that have no result.
+    #[serde(default)]
+    pub failed_again: u64,
 }
 
 /// A finished case study.
@@ -186,15 +190,17 @@ fn one_robot(
             loops: Vec::new(),
             off: BTreeMap::new(),
             scatter: BTreeMap::new(),
+            failed_again: 0,
         };
         match calibrated(&simulated) {
             Ok(output) => {
-                let repeated = again.iter().filter_map(|s| calibrated(s).ok());
-                let all: Vec<Found> = std::iter::once(transforms(&output.report))
-                    .chain(repeated.map(|output| transforms(&output.report)))
-                    .collect();
-                result.off = against(&all[0], &simulated.truth);
-                result.scatter = repeat::scatter(&all);
+                let first = transforms(&output.report);
+                let found = |s: &Simulated| Some(transforms(&calibrated(s).ok()?.report));
+                let again: Vec<Option<Found>> = again.iter().map(found).collect();
+                result.off = against(&first, &simulated.truth);
+                result.failed_again = again.iter().filter(|a| a.is_none()).count() as u64;
+                let all: Option<Vec<Found>> = std::iter::once(Some(first)).chain(again).collect();
+                result.scatter = all.map(|all| repeat::scatter(&all)).unwrap_or_default();
                 result.loops = output.report.loops;
             }
             Err(e) => result.failure = Some(e.to_string()),

@@ -238,6 +238,19 @@ fn repeated(out: &mut String, result: &CaseResult) {
             n => format!("{n} times"),
         }
     );
+    for (_, method) in METHODS {
+        let left_out = of_method(result, method)
+            .iter()
+            .filter(|r| r.failure.is_some() || r.failed_again > 0)
+            .count();
+        if result.recorded > 1 && left_out > 0 {
+            let _ = write!(
+                out,
+                "`{method}`: {left_out} of {} robots are left out, for not every recording of theirs has a result.\n\n",
+                result.robots
+            );
+        }
+    }
     of_transforms(out, result, |r| &r.scatter);
 }
 
@@ -314,4 +327,47 @@ pub fn svg(result: &CaseResult) -> String {
     }
     out.push_str("</svg>\n");
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn robot(seed: u64, method: &str, scatter: Option<f64>) -> RobotResult {
+        let off = |translation_m| Off {
+            translation_m,
+            rotation_rad: 0.0,
+        };
+        let named = |size: f64| BTreeMap::from([("t".to_owned(), off(size))]);
+        RobotResult {
+            seed,
+            method: method.to_owned(),
+            failure: None,
+            loops: Vec::new(),
+            off: named(1e-3),
+            scatter: scatter.map(named).unwrap_or_default(),
+            failed_again: u64::from(scatter.is_none()),
+        }
+    }
+
+    #[test]
+    fn robots_without_all_their_calibrations_are_counted() {
+        let mut results = Vec::new();
+        for (seed, of_paper) in [(0, Some(2e-3)), (1, None), (2, Some(4e-3))] {
+            results.push(robot(seed, "paper", of_paper));
+            results.push(robot(seed, "ml", Some(1e-3)));
+        }
+        let page = markdown(&CaseResult {
+            study: "ripley".to_owned(),
+            robots: 3,
+            recorded: 4,
+            seed: 0,
+            results,
+        });
+        let (_, repeated) = page.split_once("## Repeatability").expect("a part");
+        assert!(repeated.contains("`paper`: 1 of 3 robots are left out"));
+        assert!(!repeated.contains("`ml`: "), "{repeated}");
+        let mean_of_two = "| `t` | paper | 3.00 ± 1.00";
+        assert!(repeated.contains(mean_of_two), "{repeated}");
+    }
 }

@@ -33,7 +33,7 @@ impl State {
             });
         };
         let settings = serde_json::to_string(&Settings {
-            calib_case_study: 2,
+            calib_case_study: 3,
             study: options.name.clone(),
             recorded: options.recorded,
             inputs: robot.digests.iter().map(|d| d.sha256.clone()).collect(),
