@@ -16,12 +16,13 @@
 //! ```text
 //! ν = observations − tr((Σ AᵀV⁻¹A + P)⁻¹ Σ AᵀV⁻¹A) − 1,   t = t_ν(1 − 5·10⁻⁷)
 //! √Λ ≥ t + 2.6 √(1 + t²/2ν)                            missed 1 in 200 times (Johnson and Welch 1940)           (2)
+//! Φ((√Λ − t)/√(1 + t²/2ν))                              how often it names the fault                             (3)
 //! ```
 //!
 //! 10⁻⁶ for each of the thousand effects, places and rows that are tried is 1 in 1 000 recordings, the level of the program. What a discrete fault leaves is in [`odds`](super::odds).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Vector3};
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use super::case::{Case, SIGMA, SIGMA_JOINT, SIGMA_ORIENTATION, Seen};
 use super::fault::Class;
@@ -34,6 +35,8 @@ pub(crate) struct Shown {
     pub evidence: Option<f64>,
     /// What equation (2) asks of it.
     pub needed: Option<f64>,
+    /// How often the best test names the fault, equation (3).
+    pub chance: Option<f64>,
     /// What the fault moves the residual of a registration by, rms, m.
     pub moved_m: Option<f64>,
 }
@@ -48,13 +51,14 @@ pub(crate) fn shown(case: &Case) -> Shown {
     let found = in_fitted.then(|| evidence(case)).flatten();
     Shown {
         evidence: found.map(|(evidence, _)| evidence),
-        needed: found.map(|(_, needed)| needed),
+        needed: found.map(|(_, best)| best.needed()),
+        chance: found.map(|(evidence, best)| best.chance(evidence)),
         moved_m: moved(case, !in_fitted),
     }
 }
 
-/// Equations (1) and (2).
-fn evidence(case: &Case) -> Option<(f64, f64)> {
+/// Equation (1), and the test that has it.
+fn evidence(case: &Case) -> Option<(f64, Best)> {
     let clean = case.without_fault();
     let body = match case.markers.len() {
         0 => 6,
@@ -83,23 +87,45 @@ fn evidence(case: &Case) -> Option<(f64, f64)> {
     // tr(N⁻¹ (N − P)) = n − tr(N⁻¹ P)
     let held = factor.inverse().diagonal().dot(&prior);
     let freedom = observations as f64 - (n as f64 - held) - 1.0;
-    Some((evidence, needed(freedom)))
+    Some((evidence, Best::of(freedom)))
 }
 
-/// Equation (2); without a degree of freedom nothing suffices.
-fn needed(freedom: f64) -> f64 {
-    /// Both sides together one in a million.
-    const LEVEL: f64 = 5e-7;
-    /// Normal quantile of 99.5 %.
-    const POWER: f64 = 2.6;
-    let Some(t) = StudentsT::new(0.0, 1.0, freedom)
-        .ok()
-        .filter(|_| freedom >= 1.0)
-    else {
-        return f64::MAX;
-    };
-    let t = t.inverse_cdf(1.0 - LEVEL);
-    t + POWER * (1.0 + t * t / (2.0 * freedom)).sqrt()
+/// The test that knows the fault and not the noise.
+#[derive(Debug, Clone, Copy)]
+struct Best {
+    /// Its threshold t; infinite without a degree of freedom.
+    threshold: f64,
+    /// √(1 + t²/2ν)
+    spread: f64,
+}
+
+impl Best {
+    fn of(freedom: f64) -> Self {
+        /// Both sides together one in a million.
+        const LEVEL: f64 = 5e-7;
+        let student = (freedom >= 1.0).then(|| StudentsT::new(0.0, 1.0, freedom).ok());
+        let Some(student) = student.flatten() else {
+            return Self {
+                threshold: f64::INFINITY,
+                spread: 1.0,
+            };
+        };
+        let threshold = student.inverse_cdf(1.0 - LEVEL);
+        let spread = (1.0 + threshold * threshold / (2.0 * freedom)).sqrt();
+        Self { threshold, spread }
+    }
+
+    /// Equation (2).
+    fn needed(self) -> f64 {
+        /// Normal quantile of 99.5 %.
+        const POWER: f64 = 2.6;
+        (self.threshold + POWER * self.spread).min(f64::MAX)
+    }
+
+    /// Equation (3).
+    fn chance(self, evidence: f64) -> f64 {
+        Normal::standard().cdf((evidence - self.threshold) / self.spread)
+    }
 }
 
 /// 1/σ² of the origins, as the profile says; nothing is known of tracker and body.
@@ -194,5 +220,40 @@ impl Row {
                     .copy_from(&(e / SIGMA_ORIENTATION));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{ChiSquared, Distribution, StandardNormal};
+
+    use super::*;
+
+    /// Equations (2) and (3) against draws of the test's own statistic: (√Λ + a normal number) over a noise that was found.
+    #[test]
+    fn the_best_test_names_as_often_as_draws_of_it() {
+        const DRAWS: usize = 20_000;
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        for freedom in [8.0, 20.0, 200.0] {
+            let best = Best::of(freedom);
+            let squares = ChiSquared::new(freedom).expect("positive");
+            for of_needed in [0.6, 0.8, 1.0] {
+                let evidence = of_needed * best.needed();
+                let named = (0..DRAWS).filter(|_| {
+                    let draw: f64 = StandardNormal.sample(&mut rng);
+                    let found: f64 = squares.sample(&mut rng);
+                    (evidence + draw) / (found / freedom).sqrt() > best.threshold
+                });
+                let share = named.count() as f64 / DRAWS as f64;
+                let said = best.chance(evidence);
+                assert!(
+                    (share - said).abs() < 0.03,
+                    "{freedom} {of_needed}: {share} {said}"
+                );
+            }
+        }
+        assert_eq!(Best::of(0.5).chance(1e9), 0.0);
     }
 }

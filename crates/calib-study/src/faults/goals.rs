@@ -27,6 +27,9 @@ const SMALL: f64 = 2e-4;
 /// ln of how many times likelier than everything else a discrete fault must be that a test can name.
 const MILLION: f64 = 13.8;
 
+/// What no test can exceed.
+const BEST: &str = "the same, by the best test that knows the fault, its place and its size: named (no program can be expected to name more)";
+
 /// The side of a goal.
 #[derive(Debug, Clone, Copy)]
 enum Side {
@@ -67,6 +70,18 @@ impl Row {
     /// Mean share of postures whose error lies within its interval.
     fn coverage(condition: &str, cases: &[&CaseResult], goal: Side) -> Self {
         let shares: Vec<f64> = cases.iter().filter_map(|r| r.covered).collect();
+        Self::mean(condition, &shares, Some(goal))
+    }
+
+    /// What a test names that knows the fault, its place and its size; a fault without evidence always.
+    fn best(condition: &str, cases: &[&CaseResult]) -> Self {
+        let chance = |r: &&CaseResult| r.chance.unwrap_or(1.0);
+        let chances: Vec<f64> = cases.iter().map(chance).collect();
+        Self::mean(condition, &chances, None)
+    }
+
+    /// Equation (2).
+    fn mean(condition: &str, shares: &[f64], goal: Option<Side>) -> Self {
         let n = shares.len() as f64;
         let mean = shares.iter().sum::<f64>() / n.max(1.0);
         let squares: f64 = shares.iter().map(|c| (c - mean).powi(2)).sum();
@@ -76,7 +91,7 @@ impl Row {
             cases: shares.len(),
             share: mean,
             interval: ((mean - half).max(0.0), (mean + half).min(1.0)),
-            goal: Some(goal),
+            goal,
         }
     }
 
@@ -205,6 +220,7 @@ fn effects(all: &[&CaseResult]) -> Vec<Row> {
             Some(Side::AtLeast(0.95)),
             &named,
         ),
+        Row::best(BEST, &large),
         Row::of(
             "the same, decidable: named",
             &large_decidable,
@@ -235,6 +251,7 @@ fn effects(all: &[&CaseResult]) -> Vec<Row> {
             Some(Side::AtLeast(0.99)),
             &named,
         ),
+        Row::best(BEST, &slips),
         Row::of(
             "the same, decidable: named",
             &shown,
@@ -375,7 +392,8 @@ pub(super) fn goals(results: &[CaseResult]) -> String {
     let mut text = String::from(
         "## Goals\n\nEach goal on the cases that it is about; what a fault moves the registration residual by is that of noise-free data of the nominal robot, and discrete faults that move it by \
          less than 0.02 mm are the same as none on their recordings. One that was not named counts as *decidable* where the recordings are a million times likelier under it than under any other hypothesis or none, \
-         the noise and the profile's priors known: with less, nobody can name it so that one clean recording in a thousand is given a name. Shares with their 95 % intervals; a goal is *met* where the whole interval is on its side, *not met* where none of it is.\n\n\
+         the noise and the profile's priors known: with less, nobody can name it so that one clean recording in a thousand is given a name. What the best test names of effects and changes is the mean of its chances, by the \
+         evidence below and at the same level of false names: where that is below a goal, the recordings are too short, too few or too noisy for it, whatever program reads them. Shares with their 95 % intervals; a goal is *met* where the whole interval is on its side, *not met* where none of it is.\n\n\
          | condition | cases | share | goal | |\n|---|---|---|---|---|\n",
     );
     let rows = [discrete(&all), effects(&all), clean(&all), coverage(&all)];

@@ -70,6 +70,9 @@ pub struct CaseResult {
     /// The evidence that a test needs which does not know the noise, σ.
     #[serde(default)]
     pub needed: Option<f64>,
+    /// How often the best test that knows the fault, and not the noise, names it.
+    #[serde(default)]
+    pub chance: Option<f64>,
     /// What the fault moves the residual of a registration of the nominal robot by, rms, m.
     #[serde(default)]
     pub moved_m: Option<f64>,
@@ -230,6 +233,7 @@ fn with_shown(case: &Case, tables: &Tables, result: CaseResult) -> CaseResult {
         odds: unnamed.then(|| odds(case, tables)).flatten(),
         evidence: shown.evidence,
         needed: shown.needed,
+        chance: shown.chance,
         moved_m: shown.moved_m,
         ..result
     }
@@ -311,6 +315,7 @@ fn stopped(case: &Case, number: u64, error: PipelineError) -> CaseResult {
         worst_z: None,
         evidence: None,
         needed: None,
+        chance: None,
         moved_m: None,
         odds: None,
         row_off: None,
@@ -382,6 +387,7 @@ fn judged(case: &Case, number: u64, output: &RunOutput) -> CaseResult {
         worst_z: error.worst_z,
         evidence: None,
         needed: None,
+        chance: None,
         moved_m: None,
         odds: None,
         row_off: row_off(case, findings),

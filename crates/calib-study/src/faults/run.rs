@@ -113,7 +113,7 @@ pub fn run_faults(
     })?;
     lock().close(&results)?;
     Ok(FaultResult {
-        calib_fault_study: 2,
+        calib_fault_study: 3,
         seed: options.seed,
         cases: options.cases,
         results,

@@ -32,7 +32,7 @@ impl State {
             });
         };
         let settings = serde_json::to_string(&Settings {
-            calib_fault_study: 2,
+            calib_fault_study: 3,
             seed: options.seed,
             version: env!("CARGO_PKG_VERSION").to_owned(),
         })?;
