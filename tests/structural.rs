@@ -18,17 +18,17 @@ const JOINTS: [(&str, f64, f64); 5] = [
 const HOME: [f64; 5] = [20.0, -35.0, 80.0, -30.0, 15.0];
 
 #[derive(Clone, Copy, PartialEq)]
-enum Design {
+pub enum Design {
     Random(usize),
     /// A recording of its own for each joint.
     Sweeps,
 }
 
 /// Markers of the hand, mm, in the frame of its mount.
-type Markers = &'static [[f64; 3]];
-const ONE: Markers = &[[20.0, 30.0, 10.0]];
+pub type Markers = &'static [[f64; 3]];
+pub const ONE: Markers = &[[20.0, 30.0, 10.0]];
 const TWO: Markers = &[[20.0, 30.0, 10.0], [70.0, -20.0, 15.0]];
-const FOUR: Markers = &[
+pub const FOUR: Markers = &[
     [0.0, 0.0, 0.0],
     [72.0, 0.0, 0.0],
     [25.0, 58.0, 0.0],
@@ -37,17 +37,17 @@ const FOUR: Markers = &[
 /// All within 15 mm of the wrist's axis once the mount is on it.
 const NEAR_THE_AXIS: Markers = &[[0.0, 0.0, 0.0], [60.0, 12.0, 0.0], [30.0, 0.0, 14.0]];
 
-struct Setting {
-    design: Design,
-    markers: Markers,
+pub struct Setting {
+    pub design: Design,
+    pub markers: Markers,
     /// mm, from the last link.
-    mount: [f64; 3],
-    validation: bool,
-    seed: u64,
+    pub mount: [f64; 3],
+    pub validation: bool,
+    pub seed: u64,
 }
 
 impl Setting {
-    fn new(design: Design, markers: Markers, seed: u64) -> Self {
+    pub fn new(design: Design, markers: Markers, seed: u64) -> Self {
         Self {
             design,
             markers,
@@ -57,7 +57,7 @@ impl Setting {
         }
     }
 
-    fn tables(&self) -> Vec<String> {
+    pub fn tables(&self) -> Vec<String> {
         let mut tables: Vec<String> = match self.design {
             Design::Random(_) => vec!["poses".to_owned()],
             Design::Sweeps => JOINTS.iter().map(|j| j.0.to_owned()).collect(),
@@ -93,7 +93,7 @@ impl Setting {
     }
 
     /// A folder with the profile and its simulated recordings.
-    fn folder(&self) -> Scratch {
+    pub fn folder(&self) -> Scratch {
         let names: Vec<String> = (1..=self.markers.len()).map(|k| format!("m{k}")).collect();
         let of_table = |table: &String, text: String| format!("  {table}: {text}\n");
         let recordings: String = self
@@ -189,7 +189,7 @@ fn rows(dir: Scratch, table: &str, change: impl Fn(usize, &[String], &mut Vec<St
 }
 
 /// `to` becomes `to + factor · from`.
-fn coupled(dir: Scratch, tables: &[String], to: &str, from: &str, factor: f64) -> Scratch {
+pub fn coupled(dir: Scratch, tables: &[String], to: &str, from: &str, factor: f64) -> Scratch {
     tables.iter().fold(dir, |dir, table| {
         rows(dir, table, |_, header, cells| {
             let at = |name: &str| header.iter().position(|h| h == name).expect("a column");

@@ -3,6 +3,7 @@
 
 mod apply;
 mod bad_input;
+mod blind;
 mod book;
 mod changes;
 mod clocks;
