@@ -145,8 +145,8 @@ fn pipes_and_devices_are_refused_and_never_waited_for() {
     let mesh = "<visual><geometry><mesh filename=\"../pipe.stl\"/></geometry></visual>";
     let dir = dir.edit(
         "robots/ripley/r17.urdf",
-        "<link name=\"gripper\"/>",
-        &format!("<link name=\"gripper\">{mesh}</link>"),
+        "<link name=\"gripper_tip\"/>",
+        &format!("<link name=\"gripper_tip\">{mesh}</link>"),
     );
     let made = Command::new("mkfifo")
         .arg(dir.path("robots/pipe.stl"))

@@ -81,10 +81,54 @@ fn check(dir: &Scratch, robot: &str) {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
+/// A report is sent by mail, bytes.
+const LARGEST_PAGE: u64 = 1_500_000;
+
+/// A4 pages of the printed report.
+const SHEETS: usize = 9;
+
+/// The pages that a browser prints; `None` where there is no browser here.
+fn sheets(dir: &Scratch, page: &Path) -> Option<usize> {
+    let pdf = dir.path("report.pdf");
+    let flags = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        "--no-pdf-header-footer",
+    ];
+    let known = ["chromium", "chromium-browser", "google-chrome"];
+    let printed = known.iter().find_map(|browser| {
+        let mut command = Command::new(browser);
+        command
+            .args(flags)
+            .arg(format!("--user-data-dir={}", dir.path("browser").display()))
+            .arg(format!("--print-to-pdf={}", pdf.display()))
+            .arg(format!("file://{}", page.display()));
+        command.output().ok()
+    })?;
+    assert!(printed.status.success(), "{printed:?}");
+    let bytes = std::fs::read(pdf).expect("a PDF file");
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    Some(text.matches("/Type /Page\n").count())
+}
+
 #[test]
 fn the_outputs_of_the_shipped_robots_pass() {
     for robot in ["ripley", "justin"] {
-        check(&Scratch::new().robot(robot), robot);
+        let dir = Scratch::new().robot(robot);
+        check(&dir, robot);
+        let page = dir.path("out/report.html");
+        let size = page.metadata().expect("a report").len();
+        assert!(size <= LARGEST_PAGE, "{robot}: {size} bytes");
+        if robot == "ripley" {
+            match sheets(&dir, &page) {
+                Some(count) => assert!((1..=SHEETS).contains(&count), "{count} pages"),
+                None => skipped_tests::skip(skipped_tests::NO_BROWSER),
+            }
+        }
     }
 }
 

@@ -429,6 +429,15 @@ fn box_stl() -> Vec<u8> {
     stl
 }
 
+const PLATE_OBJ: &str = "v 0 0 0\nv 100 0 0\nv 100 50 0\nv 0 50 0\nf 1 2 3 4\n";
+
+/// A square of 100 mm in meters.
+const SQUARE_DAE: &str = r##"<COLLADA><library_geometries><geometry id="g"><mesh>
+<source id="s"><float_array count="12">0 0 0 0.1 0 0 0.1 0.1 0 0 0.1 0</float_array></source>
+<vertices id="v"><input semantic="POSITION" source="#s"/></vertices>
+<polygons><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2 3</p></polygons>
+</mesh></geometry></library_geometries></COLLADA>"##;
+
 const TEXT_STL: &str = "solid one\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0.1 0 0\nvertex 0 0.1 0\nendloop\nendfacet\nendsolid\n";
 
 #[test]
@@ -451,6 +460,9 @@ fn shapes_of_the_urdf_are_drawn_and_missing_meshes_are_told() {
         mesh("gone.stl"),
         mesh("../../private.stl"),
         mesh("body.dae"),
+        mesh("plate.obj"),
+        mesh("square.dae"),
+        mesh("body.blend"),
         visual("<capsule radius=\"1\"/>"),
     ];
     let dir = Scratch::new()
@@ -462,6 +474,8 @@ fn shapes_of_the_urdf_are_drawn_and_missing_meshes_are_told() {
         .file("packages/elsewhere/box.stl", box_stl())
         .file("robots/ripley/broken.stl", &box_stl()[..500])
         .file("robots/ripley/body.dae", "<COLLADA/>")
+        .file("robots/ripley/plate.obj", PLATE_OBJ)
+        .file("robots/ripley/square.dae", SQUARE_DAE)
         .edit(
             "robots/ripley.yaml",
             "urdf: ripley/r17.urdf}",
@@ -469,31 +483,27 @@ fn shapes_of_the_urdf_are_drawn_and_missing_meshes_are_told() {
         )
         .edit(
             "robots/ripley/r17.urdf",
-            "<link name=\"gripper\"/>",
-            &format!("<link name=\"gripper\">{}</link>", shapes.concat()),
+            "<link name=\"gripper_tip\"/>",
+            &format!("<link name=\"gripper_tip\">{}</link>", shapes.concat()),
         );
     let ran = dir
         .calib(["run", "robots/ripley.yaml", "--out", "out"])
         .expect(0);
     assert_eq!(ran.stderr, "");
     let data = view_data(&dir.read("out/report.html"));
-    let lines: Vec<usize> = data["outlines"]
-        .as_array()
-        .expect("outlines")
-        .iter()
-        .map(|outline| outline["lines"].as_array().expect("lines").len())
-        .collect();
-    // Box; two rims and four sides; three circles; the box without its diagonals; a triangle; the box again.
-    assert_eq!(lines, [12, 36, 48, 12, 3, 12]);
-    let ends = |k: usize| -> Vec<f64> {
-        let lines = data["outlines"][3]["lines"].as_array().expect("lines");
-        lines
-            .iter()
-            .map(|line| line[k].as_f64().expect("a number"))
-            .collect()
-    };
+    let solids = data["solids"].as_array().expect("solids");
+    let of_tip = solids.last().expect("shapes")["frame"].clone();
+    let solids: Vec<&Value> = solids.iter().filter(|s| s["frame"] == of_tip).collect();
+    let faces = |solid: &&Value| solid["faces"].as_array().expect("faces").len();
+    let faces: Vec<usize> = solids.iter().map(faces).collect();
+    // Box; cylinder of 20 sides; ball of 8 rings; the box as triangles; a triangle; the box again; plate; square.
+    assert_eq!(faces, [6, 22, 162, 12, 1, 12, 2, 2]);
+    let points = solids[3]["points"].as_array().expect("points");
+    assert_eq!(points.len(), 8);
     assert!(
-        ends(0).iter().all(|x| (x.abs() - 0.1).abs() < 1e-9),
+        points
+            .iter()
+            .all(|p| (p[0].as_f64().expect("m").abs() - 0.1).abs() < 1e-9),
         "scaled to meters"
     );
     let report = dir.json("out/report.json");
@@ -509,14 +519,20 @@ fn shapes_of_the_urdf_are_drawn_and_missing_meshes_are_told() {
         .expect("inputs")
         .iter()
         .filter_map(|input| input["path"].as_str())
-        .filter(|path| path.to_lowercase().ends_with(".stl"))
+        .filter(|path| {
+            [".stl", ".obj", ".dae"]
+                .iter()
+                .any(|e| path.to_lowercase().ends_with(e))
+        })
         .collect();
     assert_eq!(
         read,
         [
             "../meshes/box.stl",
             "package://arm_description/one.STL",
-            "package://elsewhere/box.stl"
+            "package://elsewhere/box.stl",
+            "plate.obj",
+            "square.dae"
         ]
     );
     // The robot is the same with and without its looks.

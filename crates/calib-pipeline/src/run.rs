@@ -70,7 +70,7 @@ pub fn run_on(
     let chosen = selected(&mut inputs, options, progress)?;
     progress("check data");
     let mut of_shapes = Vec::new();
-    let (outlines, meshes) = shapes::outlines(&inputs.robot, &mut of_shapes);
+    let (solids, meshes) = shapes::solids(&inputs.robot, &mut of_shapes);
     inputs.digests.extend(meshes);
     let mut checked = check_data(&mut inputs, of_shapes, options.force)?;
     progress("estimate origins");
@@ -111,7 +111,7 @@ pub fn run_on(
         held_out: verified.held_out.as_ref(),
         fit,
     };
-    let view = view(&inputs, tracks, &shown, outlines);
+    let view = view(&inputs, tracks, &shown, solids);
     let alone = refitted.map(|robot| patch_urdf(&inputs, &robot, &BTreeMap::new()));
     let robots = Robots {
         urdf: &urdf,

@@ -18,9 +18,6 @@ pub enum ReportError {
     /// The HTML template failed.
     #[error("report as HTML: {0}")]
     Html(String),
-    /// A mesh cannot be read: found and expected.
-    #[error("mesh: {0}")]
-    Stl(String),
     /// Two frames of a scene have one name.
     #[error("the scene has two frames named `{0}`")]
     FrameTwice(String),

@@ -1,13 +1,13 @@
 //! The 3-D view of `report.html` as data: all coordinates in the tracker's (or world's) frame, m and rad.
 
-mod outline;
+mod solid;
+mod still;
 
-pub use outline::Outline;
+pub use solid::Solid;
 
+use crate::ReportError;
 use crate::json::{rounded_to, to_value};
-use crate::svg::Body;
-use crate::{ReportError, number};
-use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::Serialize;
 
 /// What the 3-D view shows.
@@ -19,8 +19,8 @@ pub struct View3d {
     pub magnification: f64,
     /// Frames of the robot; lines to the parents are the links.
     pub frames: Vec<ViewFrame>,
-    /// Outlines of the links; empty when only frames are drawn.
-    pub outlines: Vec<Outline>,
+    /// Shapes of the links; empty when only frames are drawn.
+    pub solids: Vec<Solid>,
     /// Poses to step through, the validation poses first.
     pub poses: Vec<ViewPose>,
     /// Points of the sweeps.
@@ -149,17 +149,14 @@ const DIGITS: usize = 5;
 /// Points of all clouds together in the page: 20 bytes each, a third of a megabyte.
 const CLOUD_POINTS: usize = 15_000;
 
-/// Lines of all outlines together in the page: 40 bytes each, two thirds of a megabyte.
-const OUTLINE_LINES: usize = 15_000;
+/// Faces of all links together in the page: 30 bytes each, a third of a megabyte.
+const FACES: usize = 12_000;
 
 /// Poses in the page.
 const POSES: usize = 200;
 
 /// Frames of all poses together in the page: 110 bytes each for both robots, a megabyte.
 const POSE_FRAMES: usize = 9_000;
-
-/// Lines of one outline in the static image.
-const STILL_LINES: usize = 300;
 
 /// The row of [`ViewPose::calibrated`] for a frame.
 #[must_use]
@@ -191,22 +188,13 @@ impl View3d {
         for frame in &mut view.frames {
             frame.parent = frame.parent.filter(|parent| *parent < frames);
         }
-        let total: usize = view
-            .outlines
-            .iter()
-            .map(|outline| outline.lines.len())
-            .sum();
-        let step = total.div_ceil(OUTLINE_LINES).max(1);
-        view.outlines.retain(|outline| outline.frame < frames);
-        for outline in &mut view.outlines {
-            outline.lines = outline
-                .lines
-                .iter()
-                .filter(|line| finite(line))
-                .step_by(step)
-                .copied()
-                .collect();
-        }
+        view.solids.retain(|solid| {
+            let corners = || solid.faces.iter().flatten();
+            solid.frame < frames
+                && solid.points.iter().all(finite)
+                && corners().all(|i| (*i as usize) < solid.points.len())
+        });
+        view.solids = fewer(&view.solids, FACES);
         let fits = |rows: &Vec<[f64; 7]>| rows.len() == frames && rows.iter().all(finite);
         let most = POSES.min(POSE_FRAMES / frames.max(1)).max(1);
         let step = view.poses.len().div_ceil(most).max(1);
@@ -266,133 +254,20 @@ impl View3d {
         }
         Ok(value.to_string().replace('<', "\\u003c"))
     }
-
-    /// The first pose as an image that needs no script: parallel projection from the front right, slightly above.
-    pub(crate) fn still(&self) -> String {
-        const SIZE: [f64; 2] = [640.0, 400.0];
-        let camera = Rotation3::from_axis_angle(&Vector3::x_axis(), -65f64.to_radians())
-            * Rotation3::from_axis_angle(&Vector3::z_axis(), 40f64.to_radians());
-        let flat = |p: &[f64; 3]| {
-            let p = camera * Point3::from(*p);
-            [p.x, -p.y]
-        };
-        let robot = self.poses.first().into_iter().flat_map(|pose| {
-            let seen = pose.markers.iter().filter_map(|marker| marker.observed);
-            pose.calibrated.iter().map(origin).chain(seen)
-        });
-        // Sweeps and centers would make the robot small.
-        let bare = self.poses.is_empty();
-        let clouds: &[Cloud] = if bare { &self.clouds } else { &[] };
-        let swept = clouds.iter().flat_map(|cloud| cloud.points.iter().copied());
-        let still = || self.axes.iter().filter(|axis| bare && axis.frame.is_none());
-        let axes = still().flat_map(|axis| [axis.end(-1.0), axis.end(1.0)]);
-        let everything = robot.chain(swept).chain(axes);
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for place in everything.map(|p| flat(&p)) {
-            for k in 0..2 {
-                low[k] = low[k].min(place[k]);
-                high[k] = high[k].max(place[k]);
-            }
-        }
-        if low[0] > high[0] {
-            (low, high) = ([-1.0; 2], [1.0; 2]);
-        }
-        let scale = (0..2)
-            .map(|k| 0.86 * SIZE[k] / (high[k] - low[k]).max(1e-6))
-            .fold(f64::INFINITY, f64::min);
-        let place = |p: &[f64; 3]| {
-            let at = flat(p);
-            [0, 1].map(|k| 0.5 * SIZE[k] + scale * (at[k] - 0.5 * (low[k] + high[k])))
-        };
-        let mut body = Body(String::new());
-        for cloud in clouds {
-            // The static image shows an impression of the sweep, not every point.
-            for point in cloud
-                .points
-                .iter()
-                .step_by(cloud.points.len().div_ceil(200).max(1))
-            {
-                body.circle("dot", place(point), 1.2);
-            }
-        }
-        for sphere in self.spheres.iter().filter(|_| bare) {
-            body.circle("thin", place(&sphere.center), sphere.radius * scale);
-        }
-        for circle in self.circles.iter().filter(|_| bare) {
-            let turn =
-                UnitQuaternion::rotation_between(&Vector3::z(), &Vector3::from(circle.normal))
-                    .unwrap_or_default();
-            let around = (0..=48).map(|i| {
-                let (sin, cos) = (f64::from(i) / 48.0 * std::f64::consts::TAU).sin_cos();
-                place(
-                    &(Point3::from(circle.center)
-                        + turn * Vector3::new(cos, sin, 0.0) * circle.radius)
-                        .into(),
-                )
-            });
-            body.path("thin", &around.collect::<Vec<_>>());
-        }
-        for axis in still() {
-            body.line("line s2", place(&axis.end(-1.0)), place(&axis.end(1.0)));
-        }
-        if let Some(pose) = self.poses.first() {
-            self.draw_pose(&mut body, pose, &place);
-        }
-        let [left, bottom] = [16.0, SIZE[1] - 16.0];
-        let bar = round_length(90.0 / scale);
-        body.line("axis", [left, bottom], [left + bar * scale, bottom]);
-        body.text(
-            "tick",
-            left,
-            bottom - 6.0,
-            &number::plain(bar, crate::Unit::Meter),
-        );
-        format!(
-            "<svg role=\"img\" viewBox=\"0 0 {} {}\" aria-label=\"The robot in the pose with the largest error: calibrated solid, nominal dashed, markers as dots, errors as magnified lines\">{}</svg>",
-            SIZE[0], SIZE[1], body.0
-        )
-    }
-
-    /// The robot in a pose: outlines, links as lines, markers with their errors.
-    fn draw_pose(&self, body: &mut Body, pose: &ViewPose, place: &dyn Fn(&[f64; 3]) -> [f64; 2]) {
-        for outline in &self.outlines {
-            let Some(row) = pose.calibrated.get(outline.frame) else {
-                continue;
-            };
-            let world_from_frame = pose_of(row);
-            let end =
-                |x: f64, y: f64, z: f64| place(&(world_from_frame * Point3::new(x, y, z)).into());
-            for [ax, ay, az, bx, by, bz] in outline.lines.iter().take(STILL_LINES) {
-                body.line("thin", end(*ax, *ay, *az), end(*bx, *by, *bz));
-            }
-        }
-        for (class, rows) in [
-            ("line thick s0", &pose.calibrated),
-            ("line dashed s1", &pose.nominal),
-        ] {
-            for (row, frame) in rows.iter().zip(&self.frames) {
-                if let Some(parent) = frame.parent.and_then(|parent| rows.get(parent)) {
-                    body.line(class, place(&origin(parent)), place(&origin(row)));
-                }
-            }
-        }
-        for marker in &pose.markers {
-            let Some(observed) = marker.observed else {
-                continue;
-            };
-            body.circle("mark s3", place(&observed), 3.0);
-            let k = self.magnification;
-            let end = [0, 1, 2].map(|i| observed[i] + k * (marker.predicted[i] - observed[i]));
-            body.line("line error", place(&observed), place(&end));
-        }
-    }
 }
 
-/// The largest of 1, 2, 5 × 10ⁿ m that is not above a length.
-fn round_length(m: f64) -> f64 {
-    let power = 10f64.powf(m.max(1e-6).log10().floor());
-    let digit = [5.0, 2.0].into_iter().find(|d| d * power <= m);
-    digit.unwrap_or(1.0) * power
+/// Shapes with at most about so many faces together, each its share.
+fn fewer(solids: &[Solid], most: usize) -> Vec<Solid> {
+    let total: usize = solids.iter().map(|solid| solid.faces.len()).sum();
+    let share = |solid: &Solid| {
+        let most = if total <= most {
+            total
+        } else {
+            solid.faces.len() * most / total
+        };
+        solid.thinned(most.max(20))
+    };
+    solids.iter().map(share).collect()
 }
 
 pub(crate) fn pose_of(row: &[f64; 7]) -> Isometry3<f64> {

@@ -9,35 +9,42 @@
 
   // The camera looks at `target`; angles in rad, z is up.
   const start = { turn: -0.9, tilt: 0.42, zoom: 1, target: [0, 0, 0] };
-  const camera = {};
+  const camera = Object.assign({}, start);
   let labels = [], picked = -1;
   let size = 1, floor = 0, pose = 0, colors = {}, factor = view.magnification;
   const layers = [
-    ["calibrated", "Calibrated", "s0", true], ["outlines", "Outlines", "soft", true], ["nominal", "Nominal", "s1", true], ["markers", "Markers", "s3", true],
-    ["residuals", "Errors", "bad", true], ["sweeps", "Sweeps", "soft", false], ["joints", "Spheres, circles, axes", "s2", true], ["names", "Names", "ink", false],
+    ["calibrated", "Calibrated", "s0", true], ["solids", "Shapes", "body", true], ["nominal", "Nominal", "s1", true], ["markers", "Markers", "s3", true],
+    ["residuals", "Errors", "bad", true], ["sweeps", "Sweeps", "soft", false], ["joints", "Spheres, circles, axes", "s2", !view.poses.length], ["names", "Names and axes", "ink", false],
   ];
   const shown = {};
 
-  function places() {
+  // What the picture has to hold in a pose: frames, markers and shapes; where there is none, the sweeps.
+  function places(p) {
     const all = [];
-    for (const p of view.poses) { for (const row of p.calibrated) all.push(row); for (const m of p.markers) all.push(m.observed || m.predicted); }
-    if (!all.length) for (const cloud of view.clouds) for (const point of cloud.points) all.push(point);
+    if (!p) for (const cloud of view.clouds) for (const point of cloud.points) all.push(point);
+    if (!p) return all;
+    for (const row of p.calibrated) all.push(row);
+    for (const m of p.markers) all.push(m.observed || m.predicted);
+    for (const solid of view.solids) { const row = p.calibrated[solid.frame], q = row.slice(3); for (const point of solid.points) all.push(add(row, rotate(q, point), 1)); }
     return all;
   }
-  function frameAll() {
+  function ends(all) {
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-    for (const p of places()) for (let i = 0; i < 3; i++) { low[i] = Math.min(low[i], p[i]); high[i] = Math.max(high[i], p[i]); }
-    if (!(low[0] <= high[0])) return;
-    for (let i = 0; i < 3; i++) start.target[i] = (low[i] + high[i]) / 2;
-    size = Math.max(1e-3, Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]));
-    floor = low[2];
+    for (const p of all) for (let i = 0; i < 3; i++) { low[i] = Math.min(low[i], p[i]); high[i] = Math.max(high[i], p[i]); }
+    return [low, high];
   }
-  // Look at everything, as large as it goes; perspective needs a second and third look.
+  // Look at the robot as it stands, as large as it goes; perspective needs a second and third look.
   function reset() {
+    const all = places(view.poses[pose]), [low, high] = ends(all);
+    if (low[0] <= high[0]) {
+      start.target = low.map(function (x, i) { return (x + high[i]) / 2; });
+      size = Math.max(1e-3, Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]));
+      floor = low[2];
+    }
     Object.assign(camera, start, { target: start.target.slice() });
     for (let i = 0; i < 3; i++) {
       let reach = 0;
-      for (const p of places()) {
+      for (const p of all) {
         const at = project(p);
         if (at) reach = Math.max(reach, Math.abs(at[0] / canvas.clientWidth - 0.5), Math.abs(at[1] / canvas.clientHeight - 0.5));
       }
@@ -103,6 +110,15 @@
     ink.moveTo(14, y - 4); ink.lineTo(14, y); ink.lineTo(14 + meters * p[2], y); ink.lineTo(14 + meters * p[2], y - 4); ink.stroke();
     ink.fillStyle = colors.ink; ink.fillText(meters >= 1 ? meters + " m" : Math.round(meters * 1e6) / 1e3 + " mm", 14, y - 8);
   }
+  // The directions of the frame that everything is in.
+  function drawTriad() {
+    const ct = Math.cos(camera.turn), st = Math.sin(camera.turn), ce = Math.cos(camera.tilt), se = Math.sin(camera.tilt);
+    const x = canvas.clientWidth - 44, y = canvas.clientHeight - 40;
+    [["x", ct, se * st], ["y", -st, se * ct], ["z", 0, ce]].forEach(function ([name, right, up]) {
+      ink.setLineDash([]); ink.strokeStyle = colors.ink; ink.lineWidth = 1.5; ink.beginPath(); ink.moveTo(x, y); ink.lineTo(x + 26 * right, y - 26 * up); ink.stroke();
+      ink.fillStyle = colors.ink; ink.fillText(name, x + 34 * right - 3, y - 34 * up + 4);
+    });
+  }
   // The residual of a marker in words, and a ring about it.
   function pick(i) {
     const markers = view.poses[pose] ? view.poses[pose].markers : [];
@@ -164,12 +180,59 @@
       if (frame.parent !== null) line(rows[frame.parent], rows[i], color, width, dash);
     });
   }
-  function drawOutlines(rows) {
-    for (const outline of view.outlines) {
-      const row = rows[outline.frame], q = row.slice(3);
-      for (const l of outline.lines) line(add(row, rotate(q, l.slice(0, 3)), 1), add(row, rotate(q, l.slice(3)), 1), colors.soft, 0.7);
+  // Filled faces, each pixel of the nearest one, at twice the pixels of the picture: the browser smooths the edges.
+  const fine = { canvas: document.createElement("canvas"), wide: 0, high: 0 };
+  function drawSolids(rows) {
+    const k = 2, wide = k * canvas.clientWidth, high = k * canvas.clientHeight;
+    if (!wide || !high) return;
+    const to = fine.canvas.getContext("2d");
+    if (fine.wide !== wide || fine.high !== high) {
+      Object.assign(fine, { wide, high });
+      Object.assign(fine.canvas, { width: wide, height: high });
+      fine.image = to.createImageData(wide, high);
+      fine.pixels = new Uint32Array(fine.image.data.buffer);
+      fine.near = new Float32Array(wide * high);
+    }
+    fine.pixels.fill(0); fine.near.fill(0);
+    const ct = Math.cos(camera.turn), st = Math.sin(camera.turn), ce = Math.cos(camera.tilt), se = Math.sin(camera.tilt);
+    const eye = [-ce * st, -ce * ct, se], light = [eye[0] + 0.5 * se * st - 0.4 * ct, eye[1] + 0.5 * se * ct + 0.4 * st, eye[2] + 0.5 * ce];
+    const base = [1, 3, 5].map(function (i) { return parseInt(colors.body.slice(i, i + 2), 16); });
+    for (const solid of view.solids) {
+      const row = rows[solid.frame], q = row.slice(3);
+      const places = solid.points.map(function (p) { return add(row, rotate(q, p), 1); }), seen = places.map(project);
+      for (const face of solid.faces) {
+        if (face.some(function (i) { return !seen[i]; })) continue;
+        const [a, b, c] = face.map(function (i) { return places[i]; });
+        const n = cross(add(b, a, -1), add(c, a, -1)), long = Math.hypot(n[0], n[1], n[2]);
+        if (!long) continue;
+        // Files do not agree which side of a face is outside: the side that is seen has the light.
+        const side = dot3(n, eye) < 0 ? -1 : 1, bright = Math.max(0, side * dot3(n, light) / long / Math.hypot(light[0], light[1], light[2]));
+        const rgb = base.map(function (x) { return Math.round(x * (0.4 + 0.6 * bright)); });
+        const color = (255 << 24 | rgb[2] << 16 | rgb[1] << 8 | rgb[0]) >>> 0;
+        for (let i = 1; i + 1 < face.length; i++) fill(seen[face[0]], seen[face[i]], seen[face[i + 1]], color, k);
+      }
+    }
+    to.putImageData(fine.image, 0, 0);
+    ink.drawImage(fine.canvas, 0, 0, wide / k, high / k);
+  }
+  // A triangle of [x, y, 1 / distance]; the last is linear in the picture.
+  function fill(a, b, c, color, k) {
+    const x0 = k * a[0], y0 = k * a[1], x1 = k * b[0] - x0, y1 = k * b[1] - y0, x2 = k * c[0] - x0, y2 = k * c[1] - y0;
+    const area = x1 * y2 - x2 * y1;
+    if (!area) return;
+    const top = Math.max(0, Math.ceil(y0 + Math.min(0, y1, y2) - 0.5)), low = Math.min(fine.high - 1, Math.floor(y0 + Math.max(0, y1, y2) - 0.5));
+    const left = Math.max(0, Math.ceil(x0 + Math.min(0, x1, x2) - 0.5)), right = Math.min(fine.wide - 1, Math.floor(x0 + Math.max(0, x1, x2) - 0.5));
+    for (let y = top; y <= low; y++) {
+      const dy = y + 0.5 - y0;
+      for (let x = left; x <= right; x++) {
+        const dx = x + 0.5 - x0, u = (dx * y2 - x2 * dy) / area, v = (x1 * dy - dx * y1) / area;
+        if (u < 0 || v < 0 || u + v > 1) continue;
+        const at = y * fine.wide + x, near = a[2] + u * (b[2] - a[2]) + v * (c[2] - a[2]);
+        if (near > fine.near[at]) { fine.near[at] = near; fine.pixels[at] = color; }
+      }
     }
   }
+  function dot3(a, b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
   function drawAxes(rows) {
     const long = size * 0.035, names = [colors.bad, colors.s2, colors.s0];
     rows.forEach(function (row) {
@@ -219,11 +282,13 @@
     const now = view.poses[pose];
     if (now) drawNow(now);
     drawScale();
+    drawTriad();
     drawLabels();
   }
   function drawNow(now) {
-    if (shown.outlines) drawOutlines(now.calibrated);
-    if (shown.calibrated) { drawRobot(now.calibrated, colors.s0, 4); drawAxes(now.calibrated); for (const row of now.calibrated) dot(row, colors.s0, 3.5); }
+    const filled = shown.solids && view.solids.length;
+    if (filled) drawSolids(now.calibrated);
+    if (shown.calibrated) { drawRobot(now.calibrated, colors.s0, filled ? 2 : 4); if (shown.names) drawAxes(now.calibrated); for (const row of now.calibrated) dot(row, colors.s0, 3.5); }
     if (shown.nominal && now.nominal.length) drawRobot(now.nominal, colors.s1, 2, [6, 5]);
     for (const m of now.markers) {
       if (shown.markers) { if (m.observed) dot(m.observed, colors.s3, 4); dot(m.predicted, colors.s3, 5.5, true); }
@@ -235,7 +300,7 @@
 
   function readColors() {
     const style = getComputedStyle(document.documentElement);
-    for (const name of ["paper", "ink", "soft", "line", "bad", "s0", "s1", "s2", "s3"]) colors[name] = style.getPropertyValue("--" + name).trim();
+    for (const name of ["paper", "ink", "soft", "line", "body", "bad", "s0", "s1", "s2", "s3"]) colors[name] = style.getPropertyValue("--" + name).trim();
     draw();
   }
   function setPose(i) {
@@ -258,7 +323,7 @@
   function zoom(by) { camera.zoom = Math.max(0.2, Math.min(60, camera.zoom * by)); draw(); }
 
   for (const [id, name, color, on] of layers) {
-    if (id === "outlines" && !view.outlines.length) continue;
+    if (id === "solids" && !view.solids.length) continue;
     shown[id] = on;
     const label = document.createElement("label"), box = document.createElement("input"), swatch = document.createElement("i");
     box.type = "checkbox"; box.checked = on; swatch.style.background = "var(--" + color + ")"; swatch.setAttribute("aria-hidden", "true");
@@ -314,9 +379,8 @@
     e.preventDefault();
   });
 
-  frameAll();
-  reset();
   readColors();
+  reset();
   setPose(0);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readColors);
   window.addEventListener("beforeprint", readColors);

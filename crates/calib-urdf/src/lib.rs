@@ -17,7 +17,7 @@
 //! [`patch()`] replaces attribute values by their byte range and leaves every other byte of the file (comments, quotes,
 //! order, line endings) as it is. [`revert()`] restores the original bytes.
 //!
-//! This crate does **not** open meshes (`package://` stays a text), expand xacro, or support closed kinematic loops.
+//! This crate does **not** open files (`package://` stays a text; [`mesh`] reads bytes), expand xacro, or support closed kinematic loops.
 //!
 //! ```
 //! use calib_urdf::nalgebra::Isometry3;
@@ -64,7 +64,7 @@ pub use model::{
     UnknownName,
 };
 pub use nalgebra;
-pub use read::{source, visual};
+pub use read::{mesh, source, visual};
 pub use xacro::companions::{Companion, Companions, Reads, Reference, references};
 pub use xacro::origins::{is_xacro, xacro_origins};
 pub use yaml::origins::{YamlOrigin, patch_yaml, ur_key, yaml_origins};

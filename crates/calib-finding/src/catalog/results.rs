@@ -87,9 +87,9 @@ super::topic! {
     }
     /// Shapes that the 3-D view lacks.
     SHAPE_NOT_DRAWN = "shape-not-drawn" {
-        "not_stl": Info,
-            "{missing} of {total:shape} of the links are missing in the 3-D view: not in STL format: {shapes:code}[[ and {more} more]].",
-            "Convert the meshes to STL to see them. No number depends on it.";
+        "format": Info,
+            "{missing} of {total:shape} of the links are missing in the 3-D view: neither STL nor OBJ nor Collada (DAE): {shapes:code}[[ and {more} more]].",
+            "Convert the meshes to STL, OBJ or DAE to see them. No number depends on it.";
         "no_package": Info,
             "{missing} of {total:shape} of the links are missing in the 3-D view: their package is neither around the URDF nor under `robot.packages`: {shapes:code}[[ and {more} more]].",
             "Name the package under `robot.packages` to see them. No number depends on it.";
@@ -106,7 +106,7 @@ super::topic! {
             "{missing} of {total:shape} of the links are missing in the 3-D view: the files have more than 128 MB: {shapes:code}[[ and {more} more]].",
             "Reduce the meshes to see them. No number depends on it.";
         "damaged": Info,
-            "{missing} of {total:shape} of the links are missing in the 3-D view: the files are not complete STL meshes: {shapes:code}[[ and {more} more]].",
+            "{missing} of {total:shape} of the links are missing in the 3-D view: the files are damaged meshes: {shapes:code}[[ and {more} more]].",
             "Export the meshes again to see them. No number depends on it.";
         "undefined": Info,
             "{missing} of {total:shape} of the links are missing in the 3-D view: the URDF format does not define the shape: {shapes:code}[[ and {more} more]].",

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 use calib_files::input;
 use calib_finding::{About, Fact, Finding, catalog};
-use calib_report::view3d::Outline;
+use calib_report::view3d::Solid;
+use calib_urdf::mesh::{MeshFormat, Triangle};
 use calib_urdf::sha256_hex;
 use calib_urdf::visual::{Geometry, Visual, visuals};
 
@@ -25,7 +26,7 @@ const NAMED: usize = 3;
 enum NotDrawn {
     NoPackage,
     Scheme,
-    NotStl,
+    Format,
     Outside,
     Unreadable,
     TooLarge,
@@ -38,7 +39,7 @@ impl NotDrawn {
         match self {
             Self::NoPackage => "no_package",
             Self::Scheme => "scheme",
-            Self::NotStl => "not_stl",
+            Self::Format => "format",
             Self::Outside => "outside",
             Self::Unreadable => "unreadable",
             Self::TooLarge => "too_large",
@@ -48,16 +49,16 @@ impl NotDrawn {
     }
 }
 
-/// The outlines of all links, and the mesh files that were read for them.
+/// The shapes of all links, and the mesh files that were read for them.
 ///
 /// Findings tell what was left out, and why.
 #[must_use]
-pub fn outlines(robot: &RobotProfile, findings: &mut Vec<Finding>) -> (Vec<Outline>, Vec<Digest>) {
-    let (mut outlines, mut read) = (Vec::new(), Vec::new());
+pub fn solids(robot: &RobotProfile, findings: &mut Vec<Finding>) -> (Vec<Solid>, Vec<Digest>) {
+    let (mut solids, mut read) = (Vec::new(), Vec::new());
     let file = &robot.profile.urdf;
     // The model was read from the same text: it is XML.
     let Ok((shapes, faults)) = visuals(&robot.urdf_text, file) else {
-        return (outlines, read);
+        return (solids, read);
     };
     let count = shapes.len() + faults.len();
     let mut left_out: BTreeMap<NotDrawn, Vec<String>> = BTreeMap::new();
@@ -69,9 +70,9 @@ pub fn outlines(robot: &RobotProfile, findings: &mut Vec<Finding>) -> (Vec<Outli
         let Ok(link) = robot.model.link_id(&shape.link) else {
             continue;
         };
-        match outline(robot, link.index(), shape) {
-            Ok((outline, digest)) => {
-                outlines.push(outline);
+        match solid(robot, link.index(), shape) {
+            Ok((solid, digest)) => {
+                solids.push(solid);
                 read.extend(digest.filter(|d| !read.contains(d)));
             }
             Err((mesh, why)) => left_out.entry(why).or_default().push(mesh),
@@ -90,54 +91,51 @@ pub fn outlines(robot: &RobotProfile, findings: &mut Vec<Finding>) -> (Vec<Outli
                 .with_some("more", more),
         );
     }
-    (outlines, read)
+    (solids, read)
 }
 
 /// One shape and the file that was read for it; else the file, and why it is not drawn.
-fn outline(
+fn solid(
     robot: &RobotProfile,
     frame: usize,
     shape: &Visual,
-) -> Result<(Outline, Option<Digest>), (String, NotDrawn)> {
+) -> Result<(Solid, Option<Digest>), (String, NotDrawn)> {
     let at = &shape.link_from_visual;
     Ok(match &shape.geometry {
-        Geometry::Box { size } => (Outline::cuboid(frame, at, *size), None),
+        Geometry::Box { size } => (Solid::cuboid(frame, at, *size), None),
         Geometry::Cylinder { radius, length } => {
-            (Outline::cylinder(frame, at, *radius, *length), None)
+            (Solid::cylinder(frame, at, *radius, *length), None)
         }
-        Geometry::Sphere { radius } => (Outline::ball(frame, at, *radius), None),
+        Geometry::Sphere { radius } => (Solid::ball(frame, at, *radius), None),
         Geometry::Mesh { filename, scale } => {
             let named = |why: NotDrawn| (filename.clone(), why);
-            let bytes = mesh(robot, filename).map_err(named)?;
-            let outline = Outline::from_stl(frame, at, *scale, &bytes)
-                .map_err(|_| named(NotDrawn::Damaged))?;
+            let (triangles, bytes) = mesh(robot, filename).map_err(named)?;
             let digest = Digest {
                 path: filename.clone(),
                 sha256: sha256_hex(&bytes),
             };
-            (outline, Some(digest))
+            (Solid::of_mesh(frame, at, *scale, &triangles), Some(digest))
         }
     })
 }
 
-/// The bytes of an STL file.
-fn mesh(robot: &RobotProfile, filename: &str) -> Result<Vec<u8>, NotDrawn> {
+/// The triangles of a mesh, and the bytes of its file.
+fn mesh(robot: &RobotProfile, filename: &str) -> Result<(Vec<Triangle>, Vec<u8>), NotDrawn> {
     let path = resolve(robot, filename)?;
-    let is_stl = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("stl"));
-    if !is_stl {
-        return Err(NotDrawn::NotStl);
-    }
+    let extension = path.extension().and_then(|e| e.to_str());
+    let format = extension.and_then(MeshFormat::of_extension);
+    let format = format.ok_or(NotDrawn::Format)?;
     // Behind all links: a URDF from elsewhere names no other files of this computer.
     let path = path.canonicalize().map_err(|_| NotDrawn::Unreadable)?;
     if !roots(robot).iter().any(|root| path.starts_with(root)) {
         return Err(NotDrawn::Outside);
     }
-    input::read(&path, MAX_BYTES).map_err(|error| match error.kind() {
+    let bytes = input::read(&path, MAX_BYTES).map_err(|error| match error.kind() {
         ErrorKind::FileTooLarge => NotDrawn::TooLarge,
         _ => NotDrawn::Unreadable,
-    })
+    })?;
+    let triangles = format.triangles(&bytes);
+    Ok((triangles.map_err(|_| NotDrawn::Damaged)?, bytes))
 }
 
 /// The folders whose files a URDF may name: its own, the packages around it, and those that the profile gives.

@@ -6,7 +6,7 @@ use calib_geometry::Line;
 use calib_profile::{BodyKind, Usage};
 use calib_report::HeldOut;
 use calib_report::view3d::{
-    Axis, Circle, Cloud, Outline, Sphere, View3d, ViewFrame, ViewMarker, ViewPose, pose_row,
+    Axis, Circle, Cloud, Solid, Sphere, View3d, ViewFrame, ViewMarker, ViewPose, pose_row,
 };
 use nalgebra::{Isometry3, Matrix3, Point3};
 
@@ -40,13 +40,13 @@ pub struct Shown<'a> {
     pub fit: Option<&'a MlFit>,
 }
 
-/// Everything that the view shows; the outlines of the links are those of [`crate::output::shapes`].
+/// Everything that the view shows; the shapes of the links are those of [`crate::output::shapes`].
 #[must_use]
 pub fn view(
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
     shown: &Shown<'_>,
-    outlines: Vec<Outline>,
+    solids: Vec<Solid>,
 ) -> View3d {
     let Shown {
         nominal,
@@ -121,7 +121,7 @@ pub fn view(
         spheres,
         circles,
         axes,
-        outlines,
+        solids,
     }
 }
 

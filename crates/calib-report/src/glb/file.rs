@@ -14,13 +14,14 @@ use json::{Asset, Index, Root};
 use crate::ReportError;
 
 /// Colors of [`Color`], linear RGB.
-const COLORS: [(&str, [f32; 3]); 6] = [
+const COLORS: [(&str, [f32; 3]); 7] = [
     ("calibrated", [0.0, 0.168, 0.445]),
     ("nominal", [0.565, 0.109, 0.0]),
     ("marker", [0.271, 0.040, 0.235]),
     ("error", [0.527, 0.0, 0.0]),
     ("joint", [0.0, 0.216, 0.107]),
     ("soft", [0.168, 0.168, 0.168]),
+    ("body", [0.584, 0.646, 0.701]),
 ];
 
 /// What a mesh is drawn in.
@@ -32,6 +33,8 @@ pub(super) enum Color {
     Error,
     Joint,
     Soft,
+    /// The only one that has light and shadow.
+    Body,
 }
 
 impl Color {
@@ -279,8 +282,9 @@ impl File {
     }
 }
 
-/// A color without light and shadow.
+/// A color, of lines and marks without light and shadow.
 fn material((name, [r, g, b]): &(&str, [f32; 3])) -> Material {
+    let is_body = *name == Color::Body.name();
     Material {
         name: Some((*name).to_owned()),
         pbr_metallic_roughness: PbrMetallicRoughness {
@@ -288,9 +292,11 @@ fn material((name, [r, g, b]): &(&str, [f32; 3])) -> Material {
             metallic_factor: StrengthFactor(0.0),
             ..PbrMetallicRoughness::default()
         },
-        extensions: Some(Extension {
+        extensions: (!is_body).then_some(Extension {
             unlit: Some(Unlit {}),
         }),
+        // Meshes from elsewhere do not always look outwards.
+        double_sided: is_body,
         ..Material::default()
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! tracker (turned: glTF has y up)
-//! ├── calibrated      links as nodes, each under its parent, with axes and outlines
+//! ├── calibrated      links as nodes, each under its parent, with axes and shapes
 //! ├── nominal         the same as it was described
 //! ├── seen            markers where the tracker saw them
 //! ├── errors ×k       an arrow per marker from where it was seen towards where it was predicted
@@ -174,8 +174,10 @@ impl File {
                 mesh: Some(triad),
                 ..Node::default()
             })];
-            let outline = format!("{} outline{suffix}", frame.name);
-            children.extend(self.outline(view, i, &outline, color));
+            // One robot has the shapes: two that differ by less than a millimeter would flicker.
+            if color == Color::Calibrated {
+                children.extend(self.shape(view, i, &format!("{} shape", frame.name)));
+            }
             for k in (0..links.len()).filter(|k| view.frames[*k].parent == Some(i)) {
                 children.push(links[k]);
                 let to_child = relative(k, Some(i));
@@ -200,20 +202,18 @@ impl File {
         (0..count).map(|_| self.node(Node::default())).collect()
     }
 
-    /// The outline of a link, where it has one.
-    fn outline(
-        &mut self,
-        view: &View3d,
-        link: usize,
-        name: &str,
-        color: Color,
-    ) -> Option<Index<Node>> {
-        let of_link = view.outlines.iter().filter(|outline| outline.frame == link);
-        let lines: Vec<[f64; 3]> = of_link
-            .flat_map(|outline| &outline.lines)
-            .flat_map(|[ax, ay, az, bx, by, bz]| [[*ax, *ay, *az], [*bx, *by, *bz]])
-            .collect();
-        let mesh = self.mesh(name, Mode::Lines, color, &lines)?;
+    /// The filled shape of a link, where it has one. Without normals, viewers shade each face as flat (§3.7.2.1).
+    fn shape(&mut self, view: &View3d, link: usize, name: &str) -> Option<Index<Node>> {
+        let of_link = view.solids.iter().filter(|solid| solid.frame == link);
+        let corners = of_link.flat_map(|solid| {
+            let point = |i: &u32| solid.points[*i as usize];
+            solid.faces.iter().flat_map(move |face| {
+                let pairs = face.get(1..).unwrap_or_default().windows(2);
+                pairs.flat_map(move |pair| [point(&face[0]), point(&pair[0]), point(&pair[1])])
+            })
+        });
+        let corners: Vec<[f64; 3]> = corners.collect();
+        let mesh = self.mesh(name, Mode::Triangles, Color::Body, &corners)?;
         Some(self.node(Node {
             mesh: Some(mesh),
             ..named(name)

@@ -147,6 +147,28 @@ fn positions_carry_their_true_bounds_and_no_name_of_a_link_is_lost() {
     );
 }
 
+/// The volume inside closed faces that look outwards, m³: a missing or turned face changes it.
+#[test]
+fn links_are_filled_and_have_light_and_shadow() {
+    let read = Read::of(&glb(&examples::scene(), &examples::view()).expect("a file"));
+    let mesh = read.node("shoulder shape").mesh().expect("a shape");
+    let primitive = mesh.primitives().next().expect("faces");
+    assert_eq!(primitive.mode(), gltf::mesh::Mode::Triangles);
+    let material = primitive.material();
+    assert!(!material.unlit() && material.double_sided());
+    let reader = primitive.reader(|_| Some(&read.blob));
+    let corners: Vec<Vector3<f64>> = (reader.read_positions().expect("positions"))
+        .map(|p| Vector3::from(p.map(f64::from)))
+        .collect();
+    let (faces, rest) = corners.as_chunks::<3>();
+    assert!(rest.is_empty());
+    let volume: f64 = faces.iter().map(|[a, b, c]| a.dot(&b.cross(c)) / 6.0).sum();
+    assert!((volume - 0.08 * 0.1 * 0.4).abs() < 1e-8, "{volume}");
+    let names: Vec<&str> = read.document.nodes().filter_map(|n| n.name()).collect();
+    let shapes = names.iter().filter(|name| name.ends_with(" shape"));
+    assert_eq!(shapes.count(), 3, "the calibrated robot's only: {names:?}");
+}
+
 #[test]
 fn empty_and_odd_views_are_files_too() {
     Read::of(&glb(&Scene::default(), &View3d::default()).expect("nothing to show"));

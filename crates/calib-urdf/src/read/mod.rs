@@ -6,9 +6,10 @@
 //! forward kinematics a patched file has to agree with (see [`crate::verify()`]), and not the first.
 //!
 //! What does not bear on kinematics (collisions, `<gazebo>`, `<ros2_control>`) is not looked at; visuals are read apart,
-//! see [`crate::visual`].
+//! see [`crate::visual`] and [`crate::mesh`].
 
 mod elements;
+pub mod mesh;
 mod nesting;
 pub(crate) mod numbers;
 pub mod source;

@@ -3,7 +3,7 @@
 use super::{Draw, MARKERS, frames, held_out_poses};
 use calib_report::View3d;
 use calib_report::view3d::{
-    Axis, Circle, Cloud, Outline, Sphere, ViewFrame, ViewMarker, ViewPose, pose_row,
+    Axis, Circle, Cloud, Solid, Sphere, ViewFrame, ViewMarker, ViewPose, pose_row,
 };
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -82,10 +82,10 @@ pub fn view() -> View3d {
                 parent: i.checked_sub(1),
             })
             .collect(),
-        outlines: vec![
-            Outline::cylinder(0, &Isometry3::translation(0.0, 0.0, 0.1), 0.09, 0.2),
-            Outline::cuboid(2, &Isometry3::translation(0.0, 0.0, 0.19), [0.08, 0.1, 0.4]),
-            Outline::cuboid(
+        solids: vec![
+            Solid::cylinder(0, &Isometry3::translation(0.0, 0.0, 0.1), 0.09, 0.2),
+            Solid::cuboid(2, &Isometry3::translation(0.0, 0.0, 0.19), [0.08, 0.1, 0.4]),
+            Solid::cuboid(
                 3,
                 &Isometry3::translation(0.0, 0.0, 0.19),
                 [0.06, 0.08, 0.4],
