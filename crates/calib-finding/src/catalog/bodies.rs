@@ -43,7 +43,7 @@ super::topic! {
             "The body fits the mirror image of its template to {mirrored}, the template only to {plain}.",
             "Check the axes of the export: the recording's frame is left-handed, or an axis has the wrong sign.";
         "tracker": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with one axis of the tracker reversed[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ With a robot that is off as far as the priors allow, the noise is {allowed_none} without it and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "The recordings fit the nominal robot to {none} rms, but to {best} with one axis of the tracker reversed[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Check the axes of the export: the tracker's frame is left-handed, or an axis has the wrong sign.";
     }
     /// A marker moves on its body over all recordings together.
