@@ -125,16 +125,21 @@ fn a_body_that_slips_is_named_with_its_row() {
     assert!((distance - 1.5e-3).abs() < 0.4e-3, "{found:#}");
 }
 
-#[test]
-fn a_split_gives_the_body_two_mounts() {
-    let dir = slipped().edit(
+/// The profile gives the body that slipped two mounts, the first also in the recordings `before`.
+fn split(dir: Scratch, before: &str) -> Scratch {
+    dir.edit(
         PROFILE,
         "gripM: {link: gripper, markers: [gripM_1, gripM_2, gripM_3, gripM_4]}",
         &format!(
-            "gripM: {{link: gripper, markers: [gripM_1, gripM_2, gripM_3, gripM_4], split: {{recording: arm_poses, at_row: {}, before: [base_sweep]}}}}",
+            "gripM: {{link: gripper, markers: [gripM_1, gripM_2, gripM_3, gripM_4], split: {{recording: arm_poses, at_row: {}, before: [{before}]}}}}",
             FROM + BEFORE + 1
         ),
-    );
+    )
+}
+
+#[test]
+fn a_split_gives_the_body_two_mounts() {
+    let dir = split(slipped(), "base_sweep");
     let (ran, report) = run(&dir);
     assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
     assert!(
@@ -157,14 +162,7 @@ fn a_split_gives_the_body_two_mounts() {
 /// The mount after the slip is in the last rows of one recording only: they are not held to hide another slip before them.
 #[test]
 fn a_mount_that_only_the_last_rows_see_is_judged_by_them() {
-    let dir = slipped_before(&[]).edit(
-        PROFILE,
-        "gripM: {link: gripper, markers: [gripM_1, gripM_2, gripM_3, gripM_4]}",
-        &format!(
-            "gripM: {{link: gripper, markers: [gripM_1, gripM_2, gripM_3, gripM_4], split: {{recording: arm_poses, at_row: {}, before: [base_sweep, wrist_sweep, checks]}}}}",
-            FROM + BEFORE + 1
-        ),
-    );
+    let dir = split(slipped_before(&[]), "base_sweep, wrist_sweep, checks");
     let (ran, _) = run(&dir);
     assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
 }
