@@ -155,7 +155,9 @@ pub use analysis::select::{
 pub use analysis::settings::Settings;
 pub use analysis::solution::{NoiseEstimate, ParameterClass, ParameterEstimate, Solution};
 pub use analysis::spread::{LinearPoint, Placement, PostureSpread, SizeSpread, SpreadDirection};
+pub use analysis::standardized::StandardizedResiduals;
 pub use analysis::starts::StartDirection;
+pub use analysis::tails::{ResidualVector, Tails};
 pub use analysis::untested::{MovedPoint, Moves, OpenCause, OpenError, OpenErrors, UntestedEffect};
 pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
 pub use analysis::weigh::{NoiseCandidate, NoiseChoice, NoiseLevel, Weighed};
@@ -173,7 +175,7 @@ pub use graph::measurement::{
 };
 pub use graph::parameter::{Parameter, ParameterKind};
 pub use graph::problem::{
-    NoiseGroup, NoiseKind, NoiseModel, OpenStart, Point, Problem, StartChange,
+    NoiseGroup, NoiseKind, NoiseModel, OpenStart, OwnNoise, Point, Problem, StartChange,
 };
 pub use graph::unit::{DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA, Unit};
 pub use model::derived::{Configuration, DerivedPoint, DerivedPose, Target};

@@ -174,8 +174,6 @@ pub struct NoiseChoice {
     pub candidates: Vec<NoiseCandidate>,
     /// Poses that were left out in turn.
     pub poses: usize,
-    /// Mean fourth power of the left-out errors over that of normal noise of their size: above 1 for heavy tails.
-    pub tails: f64,
     /// Measurements that the robust fit rejected, where they were more than chance rejects.
     pub rejected: usize,
     /// Those of them that take part after all.

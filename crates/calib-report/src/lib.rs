@@ -90,7 +90,7 @@ pub use schema::{model_schema, report_schema, scene_schema};
 pub use selection::{
     ModelPart, NestedSelection, PartKind, Selection, SelectionOutcome, SelectionStep,
 };
-pub use standardized::Standardized;
+pub use standardized::{Standardized, Tails};
 pub use verdict::{
     Agreement, Compared, Effect, Goodness, ImplausibleChange, Improvement, Judgment, Orientation,
     Part, Predicted, Prediction, Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver,

@@ -29,6 +29,22 @@ pub struct Standardized {
     pub counts: Vec<u64>,
     /// Quantiles of the standard normal distribution and of the residuals: all in the tails, a selection between them.
     pub quantiles: Vec<[f64; 2]>,
+    /// Their tails, where they are heavier than those of normal noise beyond doubt; null where they are not.
+    #[serde(default)]
+    pub tails: Option<Tails>,
+}
+
+/// Student's t that describes the residuals, rejected ones included; normal noise has infinitely many degrees of freedom.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Tails {
+    /// The likeliest degrees of freedom.
+    pub degrees_of_freedom: f64,
+    /// Least of the 95 % interval.
+    pub least: f64,
+    /// Largest of it.
+    pub most: f64,
+    /// Probability of so much evidence for heavy tails where the noise is normal.
+    pub p_value: f64,
 }
 
 impl Standardized {
@@ -63,7 +79,14 @@ impl Standardized {
             std: (squares / (n as f64 - 1.0)).sqrt(),
             counts,
             quantiles: quantiles.collect(),
+            tails: None,
         })
+    }
+
+    /// The same with what was found of heavy tails.
+    #[must_use]
+    pub fn with_tails(self, tails: Option<Tails>) -> Self {
+        Self { tails, ..self }
     }
 
     /// σ of the observed quantile where the normal one is `z`, for independent standard normal values.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::validate::{CrossValidation, VectorError};
+use crate::analysis::validate::CrossValidation;
 
 /// (1) and (2) of the choice of noise ([`weigh`](crate::analysis::weigh)) for every pose that all trials could predict.
 pub(crate) struct Scores {
@@ -58,19 +58,4 @@ pub(crate) fn paired(a: &[f64], b: &[f64]) -> (f64, f64) {
     let squares = differences.iter().map(|d| (d - middle).powi(2));
     let n = differences.len().max(2) as f64;
     (middle, (squares.sum::<f64>() / (n - 1.0) / n).sqrt())
-}
-
-/// Mean of z⁴ over d (d + 2)/d² times the squared mean of z²: 1 for normal noise of any size.
-pub(crate) fn tails(loo: &CrossValidation) -> f64 {
-    let all = || loo.samples.iter().flat_map(|s| &s.vectors);
-    let n = all().count().max(1) as f64;
-    let size = |v: &VectorError| v.z.powi(2) / v.error.len() as f64;
-    let second = all().map(size).sum::<f64>() / n;
-    let fourth: f64 = all()
-        .map(|v| {
-            let d = v.error.len() as f64;
-            size(v).powi(2) * d / (d + 2.0)
-        })
-        .sum();
-    fourth / n / second.powi(2).max(f64::MIN_POSITIVE)
 }

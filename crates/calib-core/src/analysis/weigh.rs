@@ -30,7 +30,7 @@ use crate::analysis::admit::{
     Admission, eligible, is_harmed, left_out_squares, many_rejected, touched, wider,
 };
 use crate::analysis::estimate::{Start, refit};
-use crate::analysis::scores::{Scores, mean, paired, tails};
+use crate::analysis::scores::{Scores, mean, paired};
 use crate::analysis::settings::Settings;
 use crate::analysis::solution::Solution;
 use crate::analysis::validate::{CrossValidation, predictions};
@@ -86,8 +86,6 @@ pub struct NoiseChoice {
     /// The likeliest of all, where it was not admitted and is likelier than all that were: residuals of a pose belong
     /// together, by more than joints scatter or with weights that predict worse.
     pub swallowed: Option<NoiseModel>,
-    /// Mean of z⁴ of the left-out errors over what normal noise of that size would give: 1, above it for heavy tails.
-    pub tails: f64,
     /// Left-out poses.
     pub poses: usize,
     /// What became of the vectors that the gate had rejected; `None` where they were no more than chance rejects.
@@ -488,7 +486,6 @@ fn choose(trials: &[Trial]) -> Option<NoiseChoice> {
         chosen: trials[chosen].noise,
         swallowed: swallowed.then_some(trials[likeliest].noise),
         candidates,
-        tails: tails(&trials[chosen].loo),
         poses,
         admission: None,
     })

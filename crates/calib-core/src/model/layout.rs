@@ -115,10 +115,12 @@ fn of_measurement(
     ranges
 }
 
-/// Whether these are markers that were seen with the same noise in all directions.
+/// Whether these are markers that were all seen with the same noise, in all directions.
 fn is_alike(measurement: &Measurement) -> bool {
     match &measurement.kind {
-        MeasurementKind::Markers(markers) => markers.observations.iter().all(|o| o.shape.is_none()),
+        MeasurementKind::Markers(markers) => {
+            markers.own.is_empty() && markers.observations.iter().all(|o| o.shape.is_none())
+        }
         _ => false,
     }
 }
@@ -199,7 +201,7 @@ impl Model {
         &self.problem
     }
 
-    /// The markers of a measurement, where their noise is the same in all directions.
+    /// The markers of a measurement, where the noise of all is the same, in all directions.
     pub(crate) fn alike_markers(&self, measurement: usize) -> Option<&Markers> {
         match &self.problem.measurements[measurement].kind {
             MeasurementKind::Markers(markers) if self.alike[measurement] => Some(markers),

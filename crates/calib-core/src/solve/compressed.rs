@@ -282,7 +282,8 @@ impl Pass<'_> {
                     let marker = &markers.observations[item];
                     let p = positions[marker.point.index()];
                     let e = pose.r * p + pose.t - marker.position.coords;
-                    sum += weights[o] / theta[markers.noise.index()] * e.norm_squared();
+                    let level = theta[markers.noise_of(marker.point).index()];
+                    sum += weights[o] / level * e.norm_squared();
                     continue;
                 }
                 let e = residual(model, self.values, measurement, item, &pose).e;

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::graph::ids::MeasurementId;
-use crate::graph::measurement::{Markers, MeasurementKind};
+use crate::graph::measurement::MeasurementKind;
 use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
@@ -400,20 +400,19 @@ fn swapped(
     limits: &Limits,
     work: &mut Workspace,
 ) -> bool {
-    let MeasurementKind::Markers(Markers {
-        noise,
-        observations,
-    }) = &model.problem.measurements[observation.measurement].kind
+    let MeasurementKind::Markers(markers) =
+        &model.problem.measurements[observation.measurement].kind
     else {
         return false;
     };
-    let seen = &observations[observation.item];
+    let seen = &markers.observations[observation.item];
     let path = &model.paths[observation.measurement];
     let mut buffer = path.buffer();
     let at = State::new(&model.problem, &work.cache, values);
     let pose = path.evaluate(at, observation.sample, Derivatives::None, &mut buffer);
     let frame = model.problem.measurements[observation.measurement].to;
     // Twice the gate: the joints' noise adds to the marker's.
+    let noise = markers.noise_of(seen.point);
     let limit = (4.0 * limits.gate[3] * theta[noise.index()]).sqrt();
     (0..model.problem.points.len()).any(|p| {
         if p == seen.point.index() || model.problem.points[p].frame != frame {

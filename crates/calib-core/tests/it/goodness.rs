@@ -292,7 +292,7 @@ fn spread(residuals: &[f64]) -> (f64, f64, f64) {
 fn standardized_residuals_are_standard_normal_where_the_noise_is_right() {
     for seed in 0..4 {
         let s = fit(&rig(300 + seed, Physics::None, true));
-        let residuals = s.standardized_residuals().unwrap();
+        let residuals = s.standardized_residuals().unwrap().rows;
         assert!(residuals.len() as f64 > s.degrees_of_freedom);
         let (mean, std, beyond) = spread(&residuals);
         assert!(
@@ -306,6 +306,6 @@ fn standardized_residuals_are_standard_normal_where_the_noise_is_right() {
     let mut wrong = rig(300, Physics::None, true);
     let markers = wrong.h.markers;
     wrong.h.problem.group_mut(markers).sigma *= 0.5;
-    let (_, std, _) = spread(&fit(&wrong).standardized_residuals().unwrap());
+    let (_, std, _) = spread(&fit(&wrong).standardized_residuals().unwrap().rows);
     assert!((std - 2.0).abs() < 0.3, "{std}");
 }

@@ -183,6 +183,7 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
     add(
         "markers",
         MeasurementKind::Markers(measurement::Markers {
+            own: std::collections::BTreeMap::new(),
             noise,
             observations: markers,
         }),

@@ -206,7 +206,7 @@ fn standard_deviations_of_clusters_and_residuals_are_those_of_all_samples() {
             assert!((0.7..1.4).contains(&ratio), "{}: {ratio}", parameter.name);
         }
     }
-    let residuals = solution.standardized_residuals().expect("evaluable");
+    let residuals = solution.standardized_residuals().expect("evaluable").rows;
     let squares: f64 = residuals.iter().map(|r| r * r).sum();
     let variance = squares / residuals.len() as f64;
     assert!((variance - 1.0).abs() < 0.02, "{variance}");

@@ -85,6 +85,12 @@ super::topic! {
             "{readmitted} of {rejected} rejected measurements were readmitted: left-out poses are predicted {better:percent} better with them. They are poses that the incomplete model fits worst, not errors.",
             "If `missing-physics` names effects, enable them and compare the held-out errors; otherwise record more poses.";
     }
+    /// A marker scatters unlike the others of its body.
+    MARKER_NOISE = "marker-noise" {
+        "": Info,
+            "Marker `{marker}` of body `{body}` scatters by {sigma} per coordinate, the other markers by {others}: left-out poses are predicted better with a noise level of its own.",
+            "Check the marker if it scatters more than the others: it may be loose, damaged, or partly hidden from the cameras.";
+    }
     /// Shapes that the 3-D view lacks.
     SHAPE_NOT_DRAWN = "shape-not-drawn" {
         "format": Info,

@@ -64,6 +64,7 @@ pub fn likelihood(
     if noise::by_evidence(&mut fit, inputs, &settings) {
         priors::by_evidence(&mut fit, inputs, &settings);
     }
+    checked.findings.extend(noise::of_markers(&fit));
     checked.findings.extend(noise::meaning(&mut fit));
     checked.findings.extend(on_their_limit(&fit));
     checked.findings.extend(of_the_wrong_sign(&fit));

@@ -278,6 +278,7 @@ fn touched(
             };
             MeasurementKind::Markers(measurement::Markers {
                 noise,
+                own: BTreeMap::new(),
                 observations: at.map(seen).collect(),
             })
         }

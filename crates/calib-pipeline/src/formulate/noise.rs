@@ -1,6 +1,10 @@
 //! The noise from pose to pose by evidence, and what it says of the model.
 
-use calib_core::{NoiseEstimate, NoiseKind, NoiseModel, Settings};
+use std::collections::BTreeMap;
+
+use calib_core::{
+    GroupId, MeasurementKind, NoiseEstimate, NoiseKind, NoiseModel, PointId, Settings,
+};
 use calib_finding::{About, Fact, Finding, catalog};
 
 use crate::formulate::formulation::MlFit;
@@ -16,7 +20,7 @@ const CERTAIN: f64 = 3.0;
 /// Takes the noise that the recordings speak for, where the profile does not state it; whether that changed the solution.
 pub(crate) fn by_evidence(fit: &mut MlFit, inputs: &Inputs, settings: &Settings) -> bool {
     let stated = inputs.robot.profile.solve.noise;
-    let mut changed = !stated.known && levels_by_body(fit, inputs, settings);
+    let mut changed = !stated.known && own_levels(fit, inputs, settings);
     if stated.model.is_none()
         && !stated.known
         && let Some(weighed) = fit.solution.weighed(&NoiseModel::ALL, settings)
@@ -33,17 +37,55 @@ pub(crate) fn by_evidence(fit: &mut MlFit, inputs: &Inputs, settings: &Settings)
     changed
 }
 
-/// Takes a level for each body where left-out poses speak for it; whether they did.
-fn levels_by_body(fit: &mut MlFit, inputs: &Inputs, settings: &Settings) -> bool {
-    let problem = fit.formulation.problem.with_noise_by_body();
-    let solution = fit.solution.with_levels_by_body(settings);
-    let (Some(problem), Some(solution)) = (problem, solution) else {
-        return false;
-    };
-    fit.formulation.problem = problem;
-    fit.calibration = calibration(&fit.formulation, &solution, inputs);
-    fit.solution = solution;
-    true
+/// Takes a level for each body, and for markers that scatter unlike the others, where left-out poses speak for it; whether they did.
+fn own_levels(fit: &mut MlFit, inputs: &Inputs, settings: &Settings) -> bool {
+    let mut changed = false;
+    let by_body = fit.formulation.problem.with_noise_by_body();
+    if let Some(own) = by_body
+        && let Some(solution) = fit.solution.with_levels_by_body(settings)
+    {
+        fit.formulation.problem = own.problem;
+        fit.solution = solution;
+        changed = true;
+    }
+    if let Some((solution, apart)) = fit.solution.with_levels_by_marker(settings)
+        && let Some(own) = fit.formulation.problem.with_noise_by_marker(&apart)
+    {
+        fit.formulation.problem = own.problem;
+        fit.solution = solution;
+        changed = true;
+    }
+    if changed {
+        fit.calibration = calibration(&fit.formulation, &fit.solution, inputs);
+    }
+    changed
+}
+
+/// Markers that have a noise level of their own.
+pub(crate) fn of_markers(fit: &MlFit) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let sigma = |group: GroupId| fit.solution.noise[group.index()].sigma;
+    for measurement in fit.formulation.problem.measurements() {
+        let MeasurementKind::Markers(markers) = &measurement.kind else {
+            continue;
+        };
+        for (point, level) in &markers.own {
+            let of = |(body, names): (&String, &BTreeMap<String, PointId>)| {
+                let marker = names.iter().find(|(_, p)| *p == point)?.0.clone();
+                Some((body.clone(), marker))
+            };
+            let Some((body, marker)) = fit.formulation.points.iter().find_map(of) else {
+                continue;
+            };
+            let finding = Finding::new(catalog::MARKER_NOISE, About::Fit)
+                .with("marker", Fact::name(marker))
+                .with("body", Fact::name(body))
+                .with("sigma", Fact::meters(sigma(*level)))
+                .with("others", Fact::meters(sigma(markers.noise)));
+            findings.push(finding);
+        }
+    }
+    findings
 }
 
 /// What the noise says of the model; where physics is missing, the uncertainty is that of the poses' own scatter.

@@ -3,7 +3,7 @@
 use calib_profile::Method;
 use calib_report::{
     HeldOut, Identification, Input, MissingPhysics, NextStep, Output, Report, Residuals, Scope,
-    Standardized, Verdict, Verification, judge,
+    Verdict, Verification, judge,
 };
 
 use crate::formulate::formulation::MlFit;
@@ -12,8 +12,8 @@ use crate::output::evidence::Evidence;
 use crate::output::facts::facts;
 use crate::output::of_data::{coverage, estimators, findings, recordings, rejected};
 use crate::output::of_fit::{
-    fit_summary, missing_physics, noise, noise_choice, not_observable, parameters, tested_effects,
-    transform,
+    fit_summary, missing_physics, noise, noise_choice, not_observable, parameters, standardized,
+    tested_effects, transform,
 };
 use crate::output::verdict::{limits, next_steps, scope};
 use crate::output::weak::{self, weak_directions};
@@ -82,7 +82,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         residuals: Residuals::from_rows(e.residuals).with_standardized(
             e.fit
                 .and_then(|fit| fit.solution.standardized_residuals())
-                .and_then(|residuals| Standardized::of(&residuals)),
+                .and_then(|found| standardized(&found)),
         ),
         noise: e.fit.map_or_else(Vec::new, |fit| noise(e, fit)),
         noise_choice: e.fit.and_then(noise_choice),

@@ -6,7 +6,8 @@ use calib_core::{Gauge, GoodnessOfFit, NoiseKind};
 use calib_geometry::statistics::median;
 use calib_profile::Profile;
 use calib_report::{
-    Cause, FitSummary, NotObservable, Parameter, Term, TestAnswer, TestedEffect, Transform, Unit,
+    Cause, FitSummary, NotObservable, Parameter, Standardized, Term, TestAnswer, TestedEffect,
+    Transform, Unit,
 };
 
 use crate::formulate::formulation::MlFit;
@@ -211,6 +212,22 @@ pub(crate) fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
         .collect()
 }
 
+/// How the residuals are distributed, with their tails where these are heavy.
+pub(crate) fn standardized(found: &calib_core::StandardizedResiduals) -> Option<Standardized> {
+    /// Chance of calling normal noise heavy-tailed.
+    const CHANCE: f64 = 1e-3;
+    let heavy = calib_core::Tails::of(&found.vectors).filter(|t| t.p_value < CHANCE);
+    let tails = heavy.and_then(|t| {
+        Some(calib_report::Tails {
+            degrees_of_freedom: t.degrees_of_freedom?,
+            least: t.least,
+            most: t.most?,
+            p_value: t.p_value,
+        })
+    });
+    Some(Standardized::of(&found.rows)?.with_tails(tails))
+}
+
 /// What was tried of the noise from pose to pose.
 pub(crate) fn noise_choice(fit: &MlFit) -> Option<calib_report::NoiseChoice> {
     let choice = fit.noise.as_ref()?;
@@ -222,7 +239,6 @@ pub(crate) fn noise_choice(fit: &MlFit) -> Option<calib_report::NoiseChoice> {
     Some(calib_report::NoiseChoice {
         chosen: noise_model(choice.chosen),
         poses: choice.poses,
-        tails: choice.tails,
         rejected: choice.admission.map_or(0, |a| a.rejected),
         readmitted: choice.admission.map_or(0, |a| a.readmitted),
         candidates: candidates

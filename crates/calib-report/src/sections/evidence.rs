@@ -118,6 +118,10 @@ fn noise(page: &mut Page, report: &Report) {
     if let Some(choice) = &report.noise_choice {
         noise_choice(page, choice);
     }
+    let standardized = report.residuals.standardized.as_ref();
+    if let Some(tails) = standardized.and_then(|s| s.tails.as_ref()) {
+        page.text(words::noise::tails(tails));
+    }
 }
 
 /// How wide the priors are, and where that is from.

@@ -1,7 +1,7 @@
 //! The noise of the measurements.
 
 use super::prose::{capital, full_stop, or, short};
-use crate::{Noise, NoiseChoice, NoiseKind, NoiseModel, Report, WidthSource, number};
+use crate::{Noise, NoiseChoice, NoiseKind, NoiseModel, Report, Tails, WidthSource, number};
 
 impl Noise {
     /// How the level was determined.
@@ -67,21 +67,13 @@ impl NoiseModel {
     }
 }
 
-/// What was taken, and what the tails and the rejected measurements say.
+/// What was taken, and what the rejected measurements say.
 pub(crate) fn choice(choice: &NoiseChoice) -> String {
-    /// Normal noise of 100 vectors exceeds this in one of 100 fits.
-    const HEAVY: f64 = 1.5;
     let mut text = format!(
         "Noise from pose to pose, beside that of each measurement: {}, selected by leave-one-out prediction over {} poses.",
         choice.chosen.words(),
         choice.poses
     );
-    if choice.tails > HEAVY {
-        text += &format!(
-            " The tails of the leave-one-out errors are {} times those of normal noise: keep `robust` on.",
-            number::fixed(choice.tails, 1)
-        );
-    }
     if choice.rejected > 0 {
         text += &format!(
             " {} of {} rejected measurements were readmitted, because they improve the predictions.",
@@ -89,4 +81,15 @@ pub(crate) fn choice(choice: &NoiseChoice) -> String {
         );
     }
     text
+}
+
+/// What heavy tails of the residuals mean.
+pub(crate) fn tails(tails: &Tails) -> String {
+    let of = |degrees: f64| number::fixed(degrees, usize::from(degrees < 10.0));
+    format!(
+        "The residuals have heavier tails than normal noise: Student's t with {} degrees of freedom (95 % interval: {} to {}). Large errors are common: keep `robust` on, and read the stated intervals as those of the bulk of the measurements.",
+        of(tails.degrees_of_freedom),
+        of(tails.least),
+        of(tails.most)
+    )
 }

@@ -1,5 +1,7 @@
 //! Marker points: `e = R p + t − y`, three rows in axes of `from`, m.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Point3};
 
 use super::{At, Input, Kind, Rows, isotropic};
@@ -11,6 +13,8 @@ use crate::graph::ids::{GroupId, PointId};
 pub struct Markers {
     /// σ per coordinate.
     pub noise: GroupId,
+    /// σ per coordinate of markers that have one of their own.
+    pub own: BTreeMap<PointId, GroupId>,
     /// What was seen.
     pub observations: Vec<MarkerObservation>,
 }
@@ -26,6 +30,14 @@ pub struct MarkerObservation {
     pub position: Point3<f64>,
     /// Shape of its covariance in `from`, in units of σ²; `None` isotropic.
     pub shape: Option<Matrix3<f64>>,
+}
+
+impl Markers {
+    /// The noise of a marker: its own, or that of all.
+    #[must_use]
+    pub fn noise_of(&self, point: PointId) -> GroupId {
+        self.own.get(&point).copied().unwrap_or(self.noise)
+    }
 }
 
 impl Kind for Markers {
@@ -57,12 +69,14 @@ impl Kind for Markers {
     }
 
     fn covariance(&self, item: usize, add: &mut dyn FnMut(usize, usize, GroupId, f64)) {
-        let Some(shape) = self.observations[item].shape else {
-            return isotropic(0..3, self.noise, add);
+        let o = &self.observations[item];
+        let noise = self.noise_of(o.point);
+        let Some(shape) = o.shape else {
+            return isotropic(0..3, noise, add);
         };
         for i in 0..3 {
             for j in 0..=i {
-                add(i, j, self.noise, shape[(i, j)]);
+                add(i, j, noise, shape[(i, j)]);
             }
         }
     }

@@ -1,5 +1,7 @@
 //! Points and measurements.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Point3;
 
 use crate::graph::ids::{EdgeId, FrameId, GroupId, PointId};
@@ -75,6 +77,7 @@ impl Problem {
             path: None,
             kind: MeasurementKind::Markers(Markers {
                 noise,
+                own: BTreeMap::new(),
                 observations,
             }),
         });

@@ -13,10 +13,12 @@ mod edges;
 mod joints;
 mod measurements;
 mod noise;
+mod own_noise;
 mod paths;
 mod starts;
 
 pub use noise::NoiseModel;
+pub use own_noise::OwnNoise;
 pub use starts::{OpenStart, StartChange};
 
 /// A point that is fixed in a frame.

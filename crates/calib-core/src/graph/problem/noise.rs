@@ -1,13 +1,13 @@
 //! Statements of what is random from pose to pose, for one and the same measurements.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
 use crate::graph::edge::EdgeKind;
 use crate::graph::ids::{EdgeId, FrameId, GroupId};
-use crate::graph::measurement::{MeasurementKind, PoseNoise};
+use crate::graph::measurement::MeasurementKind;
 use crate::graph::problem::{NoiseKind, Problem};
 
 /// What is random from pose to pose, beside the noise of each measurement. In order of growth.
@@ -82,47 +82,6 @@ impl Problem {
         Some(out)
     }
 
-    /// The same problem with noise levels of its own for each body, started from the common ones; `None` where no two bodies share a level
-    /// that is estimated. Frames, edges, parameters, measurements and groups keep their places; new groups follow them.
-    #[must_use]
-    pub fn with_noise_by_body(&self) -> Option<Self> {
-        let mut out = self.clone();
-        // Of each common level, the first body keeps the place.
-        let mut first: BTreeMap<GroupId, BodyLevel> = BTreeMap::new();
-        let mut own: BTreeMap<(GroupId, FrameId), GroupId> = BTreeMap::new();
-        for i in 0..self.measurements.len() {
-            let (body, name) = (self.measurements[i].to, self.measurements[i].name.clone());
-            let common: Vec<GroupId> = levels_of(&mut out.measurements[i].kind)
-                .into_iter()
-                .map(|level| *level)
-                .collect();
-            for common in common {
-                let stated = self.groups[common.index()].clone();
-                if !stated.estimate {
-                    continue;
-                }
-                let known = first.entry(common).or_insert_with(|| BodyLevel {
-                    body,
-                    name: name.clone(),
-                });
-                if known.body == body {
-                    continue;
-                }
-                out.groups[common.index()].name = format!("{} {}", stated.name, known.name);
-                let level = *own.entry((common, body)).or_insert_with(|| {
-                    let name = format!("{} {name}", stated.name);
-                    out.noise_group(&name, stated.kind, stated.sigma, true)
-                });
-                let levels = levels_of(&mut out.measurements[i].kind);
-                levels
-                    .into_iter()
-                    .filter(|l| **l == common)
-                    .for_each(|l| *l = level);
-            }
-        }
-        (!own.is_empty()).then_some(out)
-    }
-
     fn without_joint_noise(&mut self, noisy: &[(usize, GroupId)]) {
         for &(edge, group) in noisy {
             if let EdgeKind::Joint(joint) = &mut self.edges[edge].kind {
@@ -179,27 +138,6 @@ impl Problem {
         let shift = format!("{name} pose, position");
         let group = self.noise_group(&shift, NoiseKind::Position, sigma, true);
         self.random(&shift, shifted, *frame, [3, 4, 5].map(unit).to_vec(), group);
-    }
-}
-
-/// The body that a common level belongs to at first.
-struct BodyLevel {
-    body: FrameId,
-    name: String,
-}
-
-/// Noise levels of what is seen of a body.
-fn levels_of(kind: &mut MeasurementKind) -> Vec<&mut GroupId> {
-    match kind {
-        MeasurementKind::Markers(markers) => vec![&mut markers.noise],
-        MeasurementKind::Poses(poses) => match &mut poses.noise {
-            PoseNoise::Split {
-                orientation,
-                position,
-            } => vec![orientation, position],
-            PoseNoise::Full { scale, .. } => vec![scale],
-        },
-        _ => Vec::new(),
     }
 }
 
