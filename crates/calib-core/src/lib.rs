@@ -145,6 +145,7 @@ pub use analysis::dependence::{Dependence, MemoryOf};
 pub use analysis::estimate::{solve, solve_kept};
 pub use analysis::folds::{folds, k_fold};
 pub use analysis::gauge::Gauge;
+pub use analysis::gear_ratio::GearRatio;
 pub use analysis::goodness::{GoodnessOfFit, Physics, ScoreTest};
 pub use analysis::information::{Information, NULL_TOLERANCE};
 pub use analysis::observability::{Direction, Observability, Term};

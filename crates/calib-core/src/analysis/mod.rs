@@ -9,6 +9,7 @@ pub(crate) mod dependence;
 pub(crate) mod estimate;
 pub(crate) mod folds;
 pub(crate) mod gauge;
+pub(crate) mod gear_ratio;
 pub(crate) mod goodness;
 pub(crate) mod information;
 mod less_noise;

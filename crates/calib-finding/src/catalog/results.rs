@@ -85,6 +85,12 @@ super::topic! {
             "{readmitted} of {rejected} rejected measurements were readmitted: left-out poses are predicted {better:percent} better with them. They are poses that the incomplete model fits worst, not errors.",
             "If `missing-physics` names effects, enable them and compare the held-out errors; otherwise record more poses.";
     }
+    /// A joint errs once per turn of its motor, whose ratio nobody stated.
+    GEAR_RATIO_FOUND = "gear-ratio-found" {
+        "": Info,
+            "Joint `{joint}` errs by {amplitude}, {ratio} ± {sigma} times per turn, as a gear train out of center does once per turn of its motor (probability of chance over all joints and ratios: {chance}).",
+            "Compare the ratio with the gear's data sheet, then state it and estimate the error: `robot: {gear_ratio: {{joint}: {whole}}}` and `solve: {joints: {{joint}: {free: [offset, motor_eccentricity]}}}`.";
+    }
     /// A marker scatters unlike the others of its body.
     MARKER_NOISE = "marker-noise" {
         "": Info,

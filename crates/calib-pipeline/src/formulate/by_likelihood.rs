@@ -13,7 +13,7 @@ use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
-use crate::formulate::{bad_rows, clock, noise, priors, starts};
+use crate::formulate::{bad_rows, clock, gear_ratio, noise, priors, starts};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
 use crate::prepare::tracks::body_tracks;
@@ -73,6 +73,9 @@ pub fn likelihood(
     if let Some((wider, by)) = chosen.and_then(|nested| fit.solution.widened_by_choice(nested)) {
         fit.solution = wider;
         fit.widened = Some(by);
+    }
+    if chosen.is_some() {
+        checked.findings.extend(gear_ratio::searched(&fit));
     }
     clock::noticed(&mut checked.findings, inputs, &fit);
     *inputs = clock::corrected(inputs, &fit);

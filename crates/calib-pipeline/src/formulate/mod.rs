@@ -9,6 +9,7 @@ pub(crate) mod completed;
 pub mod contacts;
 pub mod formulation;
 pub mod found;
+pub(crate) mod gear_ratio;
 pub mod kinematics;
 pub(crate) mod memory;
 pub mod ml;
