@@ -43,7 +43,7 @@ const MARKERS: usize = 3;
 const MANY: f64 = 0.05;
 /// No marker scatters by less, m: a level to begin with.
 const LEAST: f64 = 1e-6;
-/// Levels below this part of the largest are not told apart.
+/// Levels below this part of the largest are not distinguished.
 const SMALLEST: f64 = 0.05;
 /// A marker is tried where its q differs from that of the others by so many standard errors over the poses: four good markers are tried for
 /// nothing in one of a hundred fits.
@@ -57,7 +57,7 @@ impl Solution {
     }
 
     /// The same observations with a level of their own for the markers that scatter unlike the others of their body, and which those are;
-    /// `None` where the common level stays. Where the gate rejected many of theirs for being unlike the others, the fit is made anew.
+    /// `None` where the common level stays. Where the gate rejected many of theirs for being unlike the others, the fit starts over.
     #[must_use]
     pub fn with_levels_by_marker(&self, settings: &Settings) -> Option<(Self, Vec<PointId>)> {
         let scatter = self.scatter_of_markers();
