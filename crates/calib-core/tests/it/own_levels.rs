@@ -1,9 +1,7 @@
 //! Noise levels of their own for markers, on arms with one marker that scatters unlike the others.
 
-mod common;
-
+use crate::common::{Chain, Free, normal3, rng, six_r};
 use calib_core::{MeasurementKind, NoiseKind, PointId, Settings, Solution, solve};
-use common::{Chain, Free, normal3, rng, six_r};
 
 const MARKER: f64 = 2e-4;
 /// Joint noise, rad.

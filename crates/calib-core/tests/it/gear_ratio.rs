@@ -1,9 +1,7 @@
 //! Gear ratios that nobody stated, found from the errors of joints on simulated arms.
 
-mod common;
-
+use crate::common::{Chain, Free, normal, rng, six_r};
 use calib_core::{GearRatio, NoiseKind, Settings, solve};
-use common::{Chain, Free, normal, rng, six_r};
 use rand::RngExt;
 
 const MARKER: f64 = 2e-4;
