@@ -367,7 +367,7 @@ mod tests {
         let (_, repeated) = page.split_once("## Repeatability").expect("a part");
         assert!(repeated.contains("`paper`: 1 of 3 robots are left out"));
         assert!(!repeated.contains("`ml`: "), "{repeated}");
-        let mean_of_two = "| `t` | paper | 3.00 ± 1.00";
+        let mean_of_two = "| `t` | paper | 3.00 ± 1.41";
         assert!(repeated.contains(mean_of_two), "{repeated}");
     }
 }
