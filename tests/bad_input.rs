@@ -428,7 +428,10 @@ fn robot_descriptions() {
     );
     said.run(
         "a comma as decimal sign",
-        &edited(r#"xyz="0.375 0 0""#, r#"xyz="0,375 0 0""#),
+        &edited(
+            r#"<origin xyz="0.375 0 0" rpy="0 0 0"/>"#,
+            r#"<origin xyz="0,375 0 0" rpy="0 0 0"/>"#,
+        ),
         2,
     );
     said.run("xacro", &edited("<robot name=\"ripley\">", "<robot name=\"ripley\" xmlns:xacro=\"http://www.ros.org/wiki/xacro\"><xacro:property name=\"l\" value=\"0.375\"/>"), 2);
@@ -441,8 +444,8 @@ fn mesh_paths_are_kept_and_not_opened() {
         r#"<visual><geometry><mesh filename="package://not_here/arm.dae"/></geometry></visual>"#;
     let dir = ripley().edit(
         URDF,
-        r#"<link name="forearm"/>"#,
-        &format!(r#"<link name="forearm">{mesh}</link>"#),
+        r#"<link name="forearm">"#,
+        &format!(r#"<link name="forearm">{mesh}"#),
     );
     dir.calib(["run", PROFILE, "--out", "out"]).expect(0);
     assert!(dir.read("out/ripley.calibrated.urdf").contains(mesh));

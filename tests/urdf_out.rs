@@ -274,9 +274,10 @@ fn the_difference_is_shown() {
             .robot("ripley")
             .read("robots/ripley/r17.urdf"),
     );
-    let moved = dir
-        .read("a.urdf")
-        .replace("xyz=\"0.375 0 0\"", "xyz=\"0.3751 0 -0.0002\"");
+    let moved = dir.read("a.urdf").replace(
+        "xyz=\"0.375 0 0\" rpy=\"0 0 0\"",
+        "xyz=\"0.3751 0 -0.0002\" rpy=\"0 0 0\"",
+    );
     let dir = dir.file("b.urdf", moved);
     for format in ["table", "json", "unified"] {
         let ran = dir

@@ -109,6 +109,34 @@ struct Sample {
     vectors: Vec<ResidualVector>,
     /// c of equation (1) by number of rows.
     censored: BTreeMap<usize, f64>,
+    /// The same vectors by number of rows.
+    sizes: BTreeMap<usize, Size>,
+}
+
+/// Vectors of one number of rows.
+struct Size {
+    /// Neighbors in order of x: their mean and number, of those that do not lie beyond c.
+    groups: Vec<(f64, f64)>,
+    /// Number of those.
+    within: f64,
+    /// Number of those that lie beyond c.
+    beyond: f64,
+}
+
+impl Size {
+    fn new(mut squares: Vec<f64>, censored: f64) -> Self {
+        /// Groups in which ℓ is summed: the mean of a hundredth of all is as good as its members.
+        const GROUPS: usize = 128;
+        squares.sort_by(f64::total_cmp);
+        let within = squares.partition_point(|x| *x <= censored);
+        let group = |of: &[f64]| (of.iter().sum::<f64>() / of.len() as f64, of.len() as f64);
+        let size = within.div_ceil(GROUPS).max(1);
+        Self {
+            groups: squares[..within].chunks(size).map(group).collect(),
+            within: within as f64,
+            beyond: (squares.len() - within) as f64,
+        }
+    }
 }
 
 impl Sample {
@@ -123,12 +151,21 @@ impl Sample {
         let mut levels: Vec<f64> = vectors.iter().map(|v| v.square / middle[&v.rows]).collect();
         levels.sort_by(f64::total_cmp);
         let level = levels[levels.len() / 2];
+        if level <= 0.0 {
+            return None;
+        }
         let scaled = vectors.iter().map(|v| ResidualVector {
             square: v.square / level,
             ..*v
         });
-        (level > 0.0).then(|| Self {
-            vectors: scaled.collect(),
+        let vectors: Vec<ResidualVector> = scaled.collect();
+        let size = |(d, c): (&usize, &f64)| {
+            let own = vectors.iter().filter(|v| v.rows == *d);
+            (*d, Size::new(own.map(|v| v.square).collect(), *c))
+        };
+        Some(Self {
+            sizes: censored.iter().map(size).collect(),
+            vectors,
             censored,
         })
     }
@@ -142,24 +179,25 @@ impl Sample {
 
     /// Equation (1) at 1/ν and s².
     fn log_likelihood(&self, lambda: f64, scale: f64) -> f64 {
-        let beyond = |d: usize| ln_beyond(d as f64, lambda, self.censored[&d] / scale);
-        let beyond: BTreeMap<usize, f64> = self.censored.keys().map(|d| (*d, beyond(*d))).collect();
-        let constant = |d: usize| ln_constant(d as f64, lambda) - 0.5 * d as f64 * scale.ln();
-        let constant: BTreeMap<usize, f64> =
-            self.censored.keys().map(|d| (*d, constant(*d))).collect();
-        let of = |v: &ResidualVector| {
-            if v.square > self.censored[&v.rows] {
-                return beyond[&v.rows];
-            }
-            let x = v.square / scale;
-            let kernel = if lambda > 0.0 {
-                0.5 * (1.0 / lambda + v.rows as f64) * (lambda * x).ln_1p()
-            } else {
-                0.5 * x
+        let of = |(d, size): (&usize, &Size)| {
+            let rows = *d as f64;
+            let kernel = |square: f64| {
+                let x = square / scale;
+                if lambda > 0.0 {
+                    0.5 * (1.0 / lambda + rows) * (lambda * x).ln_1p()
+                } else {
+                    0.5 * x
+                }
             };
-            constant[&v.rows] - kernel
+            let kernels: f64 = size.groups.iter().map(|(x, n)| n * kernel(*x)).sum();
+            let constant = ln_constant(rows, lambda) - 0.5 * rows * scale.ln();
+            let mut sum = size.within * constant - kernels;
+            if size.beyond > 0.0 {
+                sum += size.beyond * ln_beyond(rows, lambda, self.censored[d] / scale);
+            }
+            sum
         };
-        self.vectors.iter().map(of).sum()
+        self.sizes.iter().map(of).sum()
     }
 
     /// f of equation (2): of ψ = x²/d(d + 2) − 2x/d + 1, the slope of ℓ at λ = 0 of which nothing shows in s.
