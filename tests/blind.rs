@@ -181,6 +181,58 @@ fn bodies_of_different_noise_have_their_own() {
     assert_eq!(findings(&report, "changed-while-recording").count(), 0);
 }
 
+/// One marker is loose and scatters six times as far as the others: it is named, none of its rows is taken for a reflection,
+/// and what is left of the error is the tracker's.
+#[test]
+fn a_marker_that_scatters_unlike_the_others_is_named() {
+    let setting = Setting::new(Design::Random(60), FOUR, 50);
+    let dir = setting.folder().cells("poses.csv", |row, column, cell| {
+        match cell.parse::<f64>() {
+            Ok(value) if column.starts_with("m3.") => {
+                let place: usize = column.bytes().map(usize::from).sum();
+                format!("{:.6}", value + 1.8e-3 * normal(1_000 * row + place))
+            }
+            _ => cell.to_owned(),
+        }
+    });
+    let report = run(&dir, &[]);
+    let named: Vec<&Value> = findings(&report, "marker-noise").collect();
+    assert_eq!(named.len(), 1, "{:#}", report["findings"]);
+    assert_eq!(named[0]["facts"]["marker"], "m3");
+    let sigma = |of: &str| named[0]["facts"][of]["value"].as_f64().expect("m");
+    assert!((sigma("sigma") / 1.8e-3_f64.hypot(3e-4) - 1.0).abs() < 0.25);
+    assert!((sigma("others") / 3e-4 - 1.0).abs() < 0.25);
+    assert_eq!(findings(&report, "marker-outlier").count(), 0);
+    let sources = report["accuracy_limits"].as_array().expect("a list");
+    assert_eq!(sources[0]["kind"], "tracker_noise", "{sources:#?}");
+}
+
+/// Every coordinate errs as Student's t with three degrees of freedom: that is said, and normal noise is not called so.
+#[test]
+fn heavy_tails_are_stated() {
+    let setting = Setting::new(Design::Random(60), FOUR, 51);
+    let tails = |report: &Value| report["residuals"]["standardized"]["tails"].clone();
+    let dir = setting.folder();
+    assert_eq!(tails(&run(&dir, &[])), Value::Null);
+    let dir = dir.cells("poses.csv", |row, column, cell| match cell.parse::<f64>() {
+        Ok(value) if column.starts_with('m') => {
+            let of_name = |sum: usize, byte| 7 * sum + usize::from(byte);
+            let place = column.bytes().fold(0, of_name) % 1_000;
+            let at = |k: usize| normal(100_000 * k + 1_000 * row + place);
+            let chi = (at(1).powi(2) + at(2).powi(2) + at(3).powi(2)) / 3.0;
+            format!("{:.6}", value + 6e-4 * at(0) / chi.sqrt())
+        }
+        _ => cell.to_owned(),
+    });
+    let report = run(&dir, &[]);
+    let found = tails(&report);
+    let number = |key: &str| found[key].as_f64().unwrap_or_else(|| panic!("{found}"));
+    assert!(
+        number("least") < 5.0 && number("degrees_of_freedom") < 10.0 && number("p_value") < 1e-3
+    );
+    assert!(dir.read("out/report.md").contains("heavier tails"));
+}
+
 /// About normal with variance 1, the same for the same number: twelve of a scrambled sequence.
 fn normal(number: usize) -> f64 {
     let uniform = |k: usize| {

@@ -147,6 +147,20 @@ simulate:
     }
 }
 
+impl Setting {
+    /// The same, simulated from a profile with other words: each with what takes its place.
+    pub fn simulated_with(&self, words: &[(&str, &str)]) -> Scratch {
+        let of_tables = self.tables().into_iter().map(|table| format!("{table}.csv"));
+        let written = of_tables.chain(["truth.json".to_owned()]);
+        let dir = written.fold(self.folder(), |dir, file| dir.without(&file));
+        let dir = words
+            .iter()
+            .fold(dir, |dir, (from, to)| dir.edit("arm.yaml", from, to));
+        dir.calib(["simulate", "arm.yaml", "--out", "."]).expect(0);
+        dir
+    }
+}
+
 /// Changes the cells of one column in some tables.
 fn column(dir: Scratch, tables: &[String], name: &str, change: impl Fn(f64) -> f64) -> Scratch {
     tables.iter().fold(dir, |dir, table| {

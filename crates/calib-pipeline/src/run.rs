@@ -88,10 +88,7 @@ pub fn run_on(
             checked.findings.push(paper_assumptions());
             paper_result(&inputs, &checked.tracks, &checked.start, &origins, &nominal)
         }
-        Method::Ml => {
-            let nested = chosen.as_ref().and_then(|chosen| chosen.nested.as_ref());
-            likelihood(&mut inputs, &mut checked, nested, progress)?
-        }
+        Method::Ml => likelihood(&mut inputs, &mut checked, chosen.as_ref(), progress)?,
     };
     progress("verify");
     let refitted = refitted(&inputs, &checked, &solved)?;

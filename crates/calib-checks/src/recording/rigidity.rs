@@ -25,6 +25,8 @@ const ALL_PERMUTATIONS: usize = 5;
 const BENDING: f64 = 0.15;
 /// Gross outliers strike all markers alike: one marker in this part of the bad rows is its own fault.
 const ALWAYS_THE_SAME: f64 = 0.9;
+/// A marker out of place is farther off than this many σ of its own distances: one that always scatters is not.
+const OWN_SIGMAS: f64 = 5.0;
 /// The least of a few scatters, each from n rows, is below σ: by up to 1 + this over n.
 const FEW_ROWS: f64 = 24.0;
 
@@ -212,21 +214,8 @@ impl<'a> Body<'a> {
 
     /// A marker whose distances to the others are unsteady while those of the others are not.
     fn loose_marker(&self) -> Option<Finding> {
-        let unsteadiness = |k: usize| -> f64 {
-            let mut sigmas: Vec<f64> = self
-                .pairs
-                .iter()
-                .filter(|pair| pair.i == k || pair.j == k)
-                .map(|pair| pair.sigma)
-                .collect();
-            sigmas.sort_by(f64::total_cmp);
-            sigmas
-                .get(sigmas.len().saturating_sub(1) / 2)
-                .copied()
-                .unwrap_or(0.0)
-        };
         let (worst, sigma) = (0..self.markers.len())
-            .map(|k| (k, unsteadiness(k)))
+            .map(|k| (k, self.scatter(k)))
             .max_by(|a, b| a.1.total_cmp(&b.1))?;
         if sigma <= self.tolerance / 2.0 {
             return None;
@@ -236,6 +225,16 @@ impl<'a> Body<'a> {
                 .with("marker", Fact::name(self.markers[worst]))
                 .with("scatter", Fact::meters(sigma)),
         )
+    }
+
+    /// Robust σ of the distances of a marker from the others, m: the median over them.
+    fn scatter(&self, marker: usize) -> f64 {
+        let of_marker = |pair: &&Pair| pair.i == marker || pair.j == marker;
+        let of_marker = self.pairs.iter().filter(of_marker);
+        let mut sigmas: Vec<f64> = of_marker.map(|pair| pair.sigma).collect();
+        sigmas.sort_by(f64::total_cmp);
+        let middle = sigmas.len().saturating_sub(1) / 2;
+        sigmas.get(middle).copied().unwrap_or(0.0)
     }
 
     /// Scale and handedness against a template that is known beforehand.

@@ -29,7 +29,7 @@ pub struct StandardizedResiduals {
 }
 
 impl Solution {
-    /// Equation (1) of long recordings for some thousand samples. `None` when the model cannot be evaluated.
+    /// Equation (1); of long recordings for some thousand samples only. `None` when the model cannot be evaluated.
     #[must_use]
     pub fn standardized_residuals(&self) -> Option<StandardizedResiduals> {
         let model = &self.model;

@@ -1,6 +1,6 @@
 //! The result of the fit of all loops.
 
-use calib_core::{NestedError, ParameterEstimate, ParameterKind, Settings};
+use calib_core::{ParameterEstimate, ParameterKind, Settings};
 use calib_finding::{About, Fact, Finding, Severity, Unit, catalog};
 use calib_report::{Status, Unobservable};
 
@@ -12,6 +12,7 @@ use crate::formulate::found::Found;
 use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::realign::realign;
+use crate::formulate::selection::Chosen;
 use crate::formulate::solved::Solved;
 use crate::formulate::{bad_rows, clock, gear_ratio, noise, priors, starts};
 use crate::prepare::inputs::Inputs;
@@ -34,7 +35,7 @@ const ALIGNED: f64 = 1e-5;
 pub fn likelihood(
     inputs: &mut Inputs,
     checked: &mut Checked,
-    chosen: Option<&NestedError>,
+    chosen: Option<&Chosen>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Solved, PipelineError> {
     only_a_cross_check(&mut checked.findings);
@@ -70,7 +71,8 @@ pub fn likelihood(
     checked.findings.extend(of_the_wrong_sign(&fit));
     checked.findings.extend(priors::contradicted(&fit));
     checked.findings.extend(with_memory(&mut fit));
-    if let Some((wider, by)) = chosen.and_then(|nested| fit.solution.widened_by_choice(nested)) {
+    let nested = chosen.and_then(|chosen| chosen.nested.as_ref());
+    if let Some((wider, by)) = nested.and_then(|nested| fit.solution.widened_by_choice(nested)) {
         fit.solution = wider;
         fit.widened = Some(by);
     }

@@ -18,7 +18,8 @@ use crate::output::of_fit::{
 use crate::output::verdict::{limits, next_steps, scope};
 use crate::output::weak::{self, weak_directions};
 use crate::output::widths::prior_widths;
-use crate::verify::accuracy::{accuracy_limits, tracker_sigma, workspace};
+use crate::verify::accuracy::{accuracy_limits, workspace};
+use crate::verify::tracker_noise::TrackerNoise;
 use crate::verify::dh_table::dh_table;
 use crate::verify::information::data_information;
 use crate::verify::motions::motions;
@@ -142,8 +143,9 @@ fn verification(e: &Evidence<'_>, verdict: Verdict) -> Verification {
 /// The held-out errors with the share of the tracker's noise.
 fn held_out(e: &Evidence<'_>) -> Option<HeldOut> {
     let mut held_out = e.held_out.clone()?;
+    let tracker_m = e.fit.and_then(|fit| TrackerNoise::of(fit).over(&held_out));
     if let Some(expected) = &mut held_out.expected {
-        expected.tracker_m = e.fit.and_then(tracker_sigma);
+        expected.tracker_m = tracker_m;
     }
     Some(held_out)
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_core::effect::Source;
-use calib_core::{Configuration, EffectKind, GroupId, NoiseKind};
+use calib_core::{Configuration, EffectKind, NoiseKind};
 use calib_geometry::so3;
 use calib_profile::{Body, BodyKind, Usage};
 use calib_report::{AccuracyLimit, ErrorSource, HeldOut, PoseError, Workspace, WorkspacePoint};
@@ -15,6 +15,7 @@ use crate::formulate::kinematics::joint_state;
 use crate::prepare::conditions::Conditions;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
+use crate::verify::tracker_noise::TrackerNoise;
 
 /// Indicated joint positions of a sample as a prediction's configuration, loads included.
 pub(crate) fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configuration {
@@ -107,12 +108,6 @@ pub(crate) fn workspace(inputs: &Inputs, fit: &MlFit) -> Option<Workspace> {
         .map(|w| w.relative_to(&inputs.robot.profile.tracker.frame))
 }
 
-/// The noise level of a group that was found.
-fn noise_level(fit: &MlFit, group: Option<GroupId>) -> Option<f64> {
-    let level = fit.solution.noise.iter().find(|n| Some(n.id) == group)?;
-    Some(level.sigma)
-}
-
 /// What a held-out error is made of: rms over the bodies and postures that were held out, in meters.
 pub(crate) fn accuracy_limits(
     inputs: &Inputs,
@@ -124,7 +119,7 @@ pub(crate) fn accuracy_limits(
     };
     let of_errors = OfErrors::of(inputs, held_out, fit);
     let parameters = of_errors.parameters;
-    let tracker = tracker_sigma(fit).unwrap_or(0.0);
+    let tracker = TrackerNoise::of(fit).over(held_out).unwrap_or(0.0);
     let joints = fit.joint_sigma().unwrap_or(0.0) * of_errors.lever;
     let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
     let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
@@ -271,35 +266,26 @@ impl ToolBody<'_> {
         fit: Option<&MlFit>,
     ) -> Option<f64> {
         let fit = fit?;
-        let groups = fit.formulation.noise;
+        let noise = TrackerNoise::of(fit);
         let track = tracks.get(self.name)?;
         if *self.kind == BodyKind::Pose || track.is_computed() {
             let mut noise = fit.solution.noise.iter();
             let level = noise.find(|n| n.kind == NoiseKind::Orientation)?;
             return Some(level.sigma * 3.0_f64.sqrt());
         }
-        // Fit of a pose to n markers: information JᵀJ/σ² with J_i = [−[p_i]ₓ, 1], and the part of the rotation.
-        let points = &track.template.as_ref()?.points;
-        let information: Matrix6<f64> = points
-            .iter()
-            .map(|p| {
+        // Fit of a pose to n markers: information Σ J_iᵀJ_i/σ_i² with J_i = [−[p_i]ₓ, 1], and the part of the rotation.
+        let template = track.template.as_ref()?;
+        let seen = template.names.iter().zip(&template.points);
+        let information: Option<Matrix6<f64>> = seen
+            .map(|(name, p)| {
                 let mut j = nalgebra::Matrix3x6::zeros();
                 j.fixed_view_mut::<3, 3>(0, 0)
                     .copy_from(&-so3::skew(&p.coords));
                 j.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
-                j.transpose() * j
+                Some(j.transpose() * j / noise.variance(name)?)
             })
             .sum();
-        let covariance = nalgebra::Cholesky::new(information)?.inverse();
-        let rotation = covariance.fixed_view::<3, 3>(0, 0).trace().max(0.0).sqrt();
-        Some(noise_level(fit, groups.marker)? * rotation)
+        let covariance = nalgebra::Cholesky::new(information?)?.inverse();
+        Some(covariance.fixed_view::<3, 3>(0, 0).trace().max(0.0).sqrt())
     }
-}
-
-/// Noise of one measured position, rms of its length (m), as the held-out errors count it: by marker, else by body.
-pub(crate) fn tracker_sigma(fit: &MlFit) -> Option<f64> {
-    let groups = fit.formulation.noise;
-    let sigma =
-        noise_level(fit, groups.marker).or_else(|| noise_level(fit, groups.body_position))?;
-    Some(sigma * 3.0_f64.sqrt())
 }

@@ -18,6 +18,7 @@ pub(crate) mod motions;
 pub mod moved;
 pub mod residuals;
 pub mod robot_changes;
+pub(crate) mod tracker_noise;
 
 use std::collections::BTreeMap;
 

@@ -4,14 +4,26 @@ use calib_finding::{Fact, Finding, catalog};
 use calib_recording::Poses;
 use nalgebra::Point3;
 
-use super::{ALL_PERMUTATIONS, ALWAYS_THE_SAME, BENDING, Body, Pair, ROWS, distances};
+use super::{
+    ALL_PERMUTATIONS, ALWAYS_THE_SAME, BENDING, Body, OWN_SIGMAS, Pair, ROWS, distances,
+};
 use crate::statistics::{median, range};
+
+/// A row with one marker out of place.
+struct Outlier {
+    /// As the recording numbers it.
+    row: u64,
+    /// Index of the marker.
+    marker: usize,
+    /// By how much, m.
+    off: f64,
+}
 
 impl<'a> Body<'a> {
     /// Rows in which markers are exchanged, or one is out of place.
     pub(super) fn bad_rows(&self, poses: &Poses) -> Vec<Finding> {
         let mut swapped: Vec<(u64, Vec<&str>)> = Vec::new();
-        let mut outliers: Vec<(u64, String, f64)> = Vec::new();
+        let mut outliers: Vec<Outlier> = Vec::new();
         // Markers each of which alone explains a bad row.
         let mut alone: Vec<Vec<usize>> = Vec::new();
         // Rows that an exchange explains, and one marker out of place as well: always so with three markers, two of them exchanged.
@@ -42,7 +54,7 @@ impl<'a> Body<'a> {
                 .into_iter()
                 .map(|row| self.outlier(poses, row, &mut alone)),
         );
-        outliers.sort_by_key(|(row, _, _)| *row);
+        outliers.sort_by_key(|outlier| outlier.row);
         let mut findings = Vec::new();
         if let Some((_, which)) = swapped.first() {
             findings.push(
@@ -53,16 +65,17 @@ impl<'a> Body<'a> {
             );
         }
         if self.bends(&alone, poses.len()) {
-            findings.extend(self.bending(outliers.iter().map(|(row, _, _)| *row).collect()));
+            findings.extend(self.bending(outliers.iter().map(|outlier| outlier.row).collect()));
             return findings;
         }
-        if let Some((_, marker, off)) = outliers.iter().max_by(|a, b| a.2.total_cmp(&b.2)) {
+        outliers.retain(|outlier| outlier.off > OWN_SIGMAS * self.scatter(outlier.marker));
+        if let Some(worst) = outliers.iter().max_by(|a, b| a.off.total_cmp(&b.off)) {
             findings.push(
                 self.finding(catalog::MARKER_OUTLIER)
-                    .with("marker", Fact::name(marker))
-                    .with("off", Fact::meters(*off))
+                    .with("marker", Fact::name(self.markers[worst.marker]))
+                    .with("off", Fact::meters(worst.off))
                     .with("rows", Fact::count(outliers.len()))
-                    .at_rows(outliers.iter().map(|(row, _, _)| *row)),
+                    .at_rows(outliers.iter().map(|outlier| outlier.row)),
             );
         }
         findings
@@ -74,11 +87,15 @@ impl<'a> Body<'a> {
         poses: &Poses,
         row: usize,
         alone: &mut Vec<Vec<usize>>,
-    ) -> (u64, String, f64) {
+    ) -> Outlier {
         let points: Vec<Option<Point3<f64>>> = self.tracks.iter().map(|track| track[row]).collect();
         alone.push(self.explained_by_one(&points));
         let (marker, off) = self.out_of_place(&points);
-        (poses.rows[row], marker, off)
+        Outlier {
+            row: poses.rows[row],
+            marker,
+            off,
+        }
     }
 
     /// The markers without which the distances of a row are right.
@@ -164,7 +181,7 @@ impl<'a> Body<'a> {
     }
 
     /// The marker whose distances are most off, and by how much.
-    fn out_of_place(&self, points: &[Option<Point3<f64>>]) -> (String, f64) {
+    fn out_of_place(&self, points: &[Option<Point3<f64>>]) -> (usize, f64) {
         let off = |k: usize| {
             let departures: Vec<f64> = self
                 .pairs
@@ -179,9 +196,7 @@ impl<'a> Body<'a> {
         let worst = (0..self.markers.len())
             .map(|k| (k, off(k)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
-        worst.map_or((String::new(), 0.0), |(k, off)| {
-            (self.markers[k].to_string(), off)
-        })
+        worst.unwrap_or((0, 0.0))
     }
 }
 

@@ -1,0 +1,81 @@
+//! The noise of the tracker as the fit found it, by what was measured.
+
+use std::collections::BTreeMap;
+
+use calib_core::{FrameId, GroupId, MeasurementKind, PointId, PoseNoise};
+use calib_report::HeldOut;
+
+use crate::formulate::formulation::MlFit;
+
+/// Variances of one coordinate of a measured position, m².
+#[derive(Debug, Clone, Default)]
+pub(crate) struct TrackerNoise<'a> {
+    /// By marker, and by body where its poses were measured.
+    by_subject: BTreeMap<&'a str, f64>,
+    /// Of everything else that was measured: markers first.
+    common: Option<f64>,
+}
+
+impl<'a> TrackerNoise<'a> {
+    pub(crate) fn of(fit: &'a MlFit) -> Self {
+        let level = |group: GroupId| {
+            let found = fit.solution.noise.iter().find(|n| n.id == group)?;
+            Some(found.sigma * found.sigma)
+        };
+        let (markers, bodies) = (markers(fit), bodies(fit));
+        let mut by_subject = BTreeMap::new();
+        for measurement in fit.formulation.problem.measurements() {
+            match &measurement.kind {
+                MeasurementKind::Markers(seen) => {
+                    for observation in &seen.observations {
+                        let name = markers.get(&observation.point).copied();
+                        let variance = level(seen.noise_of(observation.point));
+                        by_subject.extend(name.zip(variance));
+                    }
+                }
+                MeasurementKind::Poses(seen) => {
+                    if let PoseNoise::Split { position, .. } = seen.noise {
+                        let name = bodies.get(&measurement.to).copied();
+                        by_subject.extend(name.zip(level(position)));
+                    }
+                }
+                _ => {}
+            }
+        }
+        let groups = fit.formulation.noise;
+        let of_markers = groups.marker.and_then(level);
+        Self {
+            by_subject,
+            common: of_markers.or_else(|| groups.body_position.and_then(level)),
+        }
+    }
+
+    /// Variance of one coordinate of a marker's or a body's position, m².
+    pub(crate) fn variance(&self, subject: &str) -> Option<f64> {
+        self.by_subject.get(subject).copied().or(self.common)
+    }
+
+    /// rms length of the noise in the positions that were held out, m.
+    pub(crate) fn over(&self, held_out: &HeldOut) -> Option<f64> {
+        let errors = held_out.poses.iter().filter(|p| !p.screened);
+        let (mut sum, mut n) = (0.0, 0.0);
+        for error in errors {
+            sum += 3.0 * self.variance(&error.subject)?;
+            n += 1.0;
+        }
+        (n > 0.0).then(|| f64::sqrt(sum / n))
+    }
+}
+
+/// Names of the markers.
+fn markers(fit: &MlFit) -> BTreeMap<PointId, &str> {
+    let bodies = fit.formulation.points.values();
+    let named = bodies.flat_map(|names| names.iter().map(|(name, point)| (*point, name.as_str())));
+    named.collect()
+}
+
+/// Names of the bodies.
+fn bodies(fit: &MlFit) -> BTreeMap<FrameId, &str> {
+    let named = fit.formulation.bodies.iter();
+    named.map(|(name, frame)| (*frame, name.as_str())).collect()
+}
