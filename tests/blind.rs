@@ -186,15 +186,15 @@ fn bodies_of_different_noise_have_their_own() {
 #[test]
 fn a_marker_that_scatters_unlike_the_others_is_named() {
     let setting = Setting::new(Design::Random(60), FOUR, 50);
-    let dir = setting.folder().cells("poses.csv", |row, column, cell| {
-        match cell.parse::<f64>() {
+    let dir = setting
+        .folder()
+        .cells("poses.csv", |row, column, cell| match cell.parse::<f64>() {
             Ok(value) if column.starts_with("m3.") => {
                 let place: usize = column.bytes().map(usize::from).sum();
                 format!("{:.6}", value + 1.8e-3 * normal(1_000 * row + place))
             }
             _ => cell.to_owned(),
-        }
-    });
+        });
     let report = run(&dir, &[]);
     let named: Vec<&Value> = findings(&report, "marker-noise").collect();
     assert_eq!(named.len(), 1, "{:#}", report["findings"]);
@@ -231,6 +231,57 @@ fn heavy_tails_are_stated() {
         number("least") < 5.0 && number("degrees_of_freedom") < 10.0 && number("p_value") < 1e-3
     );
     assert!(dir.read("out/report.md").contains("heavier tails"));
+}
+
+/// Rows that are wrong make the baseline no worse, and so the gain no larger: registration only leaves them out as the fit does.
+#[test]
+fn gross_rows_flatter_no_calibration() {
+    let setting = Setting {
+        validation: true,
+        ..Setting::new(Design::Random(40), FOUR, 52)
+    };
+    let registered = |dir: &Scratch| {
+        let held_out = &run(dir, &[])["verification"]["held_out"];
+        let rms = held_out["registration_only"]["rms_m"].as_f64();
+        rms.expect("validation poses")
+    };
+    let clean = registered(&setting.folder());
+    let spoiled = along(setting.folder(), "poses", "x", |row, x| {
+        x + if row % 13 == 5 { 0.08 } else { 0.0 }
+    });
+    let spoiled = registered(&spoiled);
+    assert!(
+        (spoiled / clean - 1.0).abs() < 0.1,
+        "{clean} m, with gross rows {spoiled} m"
+    );
+}
+
+/// A robot that is taken as its URDF has it: mount and tracker are the result, and are on the terminal.
+#[test]
+fn of_a_hand_eye_calibration_the_transforms_are_shown() {
+    let setting = Setting::new(Design::Random(20), FOUR, 53);
+    let dir = setting.simulated_with(&[
+        (
+            "[bodies, tracker, joint_offsets, joint_axes]",
+            "[bodies, tracker]",
+        ),
+        (
+            "{joint_offset_deg: 0.3, axis_mm: 0.8, axis_deg: 0.15}",
+            "{}",
+        ),
+    ]);
+    let ran = dir.calib(["run", "arm.yaml", "--out", "out"]);
+    assert!(
+        ran.stdout.contains("hand in gripper: x y z"),
+        "{}",
+        ran.stdout
+    );
+    assert!(ran.stdout.contains("world"), "{}", ran.stdout);
+    assert!(!ran.stdout.contains("calib apply"), "{}", ran.stdout);
+    let report = dir.json("out/report.json");
+    let mount = &report["transforms"][0];
+    assert_eq!(mount["name"], "gripper_from_hand");
+    assert_eq!(mount["observable"], true);
 }
 
 /// About normal with variance 1, the same for the same number: twelve of a scrambled sequence.

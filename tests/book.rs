@@ -253,7 +253,12 @@ struct Shelf {
 impl Shelf {
     fn new() -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        for part in ["robots", "book/src/tutorial", "book/src/run-time"] {
+        for part in [
+            "robots",
+            "book/src/tutorial",
+            "book/src/run-time",
+            "book/src/hand-eye",
+        ] {
             copy(&root().join(part), &folder.path().join(part));
         }
         Shelf { folder }

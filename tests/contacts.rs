@@ -254,11 +254,9 @@ fn an_arm_without_a_tracker_finds_its_offsets_by_touching() {
 
 #[test]
 fn places_and_points_are_found_with_the_offsets() {
-    let report = {
-        let dir = laboratory(PROFILE);
-        dir.calib(["run", "arm.yaml", "--out", "out"]).expect(0);
-        dir.json("out/report.json")
-    };
+    let dir = laboratory(PROFILE);
+    dir.calib(["run", "arm.yaml", "--out", "out"]).expect(0);
+    let report = dir.json("out/report.json");
     for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
         let name = format!("tip.{axis}");
         assert!(
@@ -273,6 +271,40 @@ fn places_and_points_are_found_with_the_offsets() {
     let height = normal.dot(&(Vector3::new(0.0, 0.0, 0.043) - table.translation.vector)) / normal.z;
     let z = z(&report, "table.place.z", height);
     assert!(z.abs() < 4.0, "{}", parameter(&report, "table.place.z"));
+    tells_what_was_touched(&dir.json("out/arm.scene.json"));
+}
+
+/// The scene has the tip with its σ and every touched thing with its frame; without a tracker nothing was measured.
+fn tells_what_was_touched(scene: &Value) {
+    let list = |key: &str| scene[key].as_array().expect("a list").clone();
+    let named = |all: &[Value], name: &str| {
+        let found = all.iter().find(|x| x["name"] == name);
+        found.unwrap_or_else(|| panic!("no `{name}`")).clone()
+    };
+    let (frames, things) = (list("frames"), list("touched"));
+    assert_eq!(frames[0]["status"], "assumed", "{}", frames[0]);
+    let tip = named(&list("tips"), "tip");
+    for (k, truth) in TRUE_TIP.iter().enumerate() {
+        let at = tip["xyz_m"][k].as_f64().expect("m");
+        let variance = tip["covariance"][k][k].as_f64().expect("m²");
+        assert!((at - truth).abs() < 4.0 * variance.sqrt(), "{tip}");
+    }
+    for (thing, shape) in [
+        ("bar", "sphere"),
+        ("edge", "line"),
+        ("socket", "point"),
+        ("table", "plane"),
+    ] {
+        let thing = named(&things, thing);
+        assert_eq!(thing["shape"], shape);
+        assert_eq!(thing["tip"], "tip");
+        let frame = named(&frames, thing["frame"].as_str().expect("a name"));
+        assert_eq!(frame["parent"], "l0");
+    }
+    let table = named(&frames, "table_place");
+    assert_eq!(table["status"], "calibrated");
+    assert!(!table["covariance"].is_null());
+    assert_eq!(scene["verdict"]["verdict"], "accepted_with_warnings");
 }
 
 #[test]

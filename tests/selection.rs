@@ -109,7 +109,10 @@ fn a_gear_ratio_that_nobody_stated_is_found_and_its_remedy_works() {
     let dir = setting.simulated_with(&[
         ("joint_offsets, joint_axes]", "joint_offsets]"),
         (", axis_mm: 0.8, axis_deg: 0.15", ""),
-        ("{marker_mm: 0.3, joint_deg: 0.02}", "{marker_mm: 0.1, joint_deg: 0.005}"),
+        (
+            "{marker_mm: 0.3, joint_deg: 0.02}",
+            "{marker_mm: 0.1, joint_deg: 0.005}",
+        ),
     ]);
     let clean = dir.calib(["run", "arm.yaml", "--select", "--out", "clean"]);
     assert!(clean.code < 2, "{}", clean.stderr);
@@ -133,8 +136,16 @@ fn a_gear_ratio_that_nobody_stated_is_found_and_its_remedy_works() {
     assert_eq!(facts["whole"], 121);
     // The remedy, as it is said.
     let dir = dir
-        .edit("arm.yaml", "r17.urdf}", "r17.urdf, gear_ratio: {elbow: 121}}")
-        .edit("arm.yaml", "joint_offsets]", "joint_offsets, motor_eccentricity]");
+        .edit(
+            "arm.yaml",
+            "r17.urdf}",
+            "r17.urdf, gear_ratio: {elbow: 121}}",
+        )
+        .edit(
+            "arm.yaml",
+            "joint_offsets]",
+            "joint_offsets, motor_eccentricity]",
+        );
     let applied = dir.calib(["run", "arm.yaml", "--out", "applied"]);
     assert!(applied.code < 2, "{}", applied.stderr);
     let report = dir.json("applied/report.json");

@@ -150,7 +150,10 @@ simulate:
 impl Setting {
     /// The same, simulated from a profile with other words: each with what takes its place.
     pub fn simulated_with(&self, words: &[(&str, &str)]) -> Scratch {
-        let of_tables = self.tables().into_iter().map(|table| format!("{table}.csv"));
+        let of_tables = self
+            .tables()
+            .into_iter()
+            .map(|table| format!("{table}.csv"));
         let written = of_tables.chain(["truth.json".to_owned()]);
         let dir = written.fold(self.folder(), |dir, file| dir.without(&file));
         let dir = words

@@ -132,6 +132,47 @@ fn hand_and_eye_are_judged() {
     }
 }
 
+/// A detector states the board in the camera: named without `--inverted`, right with it, and `--optical` turns the frame as REP 103 says.
+#[test]
+fn a_camera_s_own_direction_is_named_and_understood() {
+    let camera = |arguments: &[&str], code: i32| {
+        let dir = Scratch::new().file(
+            "camera.csv",
+            std::fs::read(crate::scratch::root().join("book/src/hand-eye/camera.csv"))
+                .expect("the book's example"),
+        );
+        let command = ["fit", "handeye", "camera.csv", "--measured", "board"];
+        dir.calib_with(&[&command[..], arguments].concat())
+            .expect(code)
+    };
+    let wrong = camera(&[], 4).stdout;
+    assert!(
+        wrong.contains("poses are inverted") && wrong.contains("run it again with --inverted"),
+        "{wrong}"
+    );
+    let found = camera(&["--inverted", "--optical", "--json"], 0).json();
+    // Where the example's camera is.
+    let truth = [0.042, -0.003, 0.081];
+    for (k, truth) in truth.iter().enumerate() {
+        let at = found["x"]["translation_m"][k].as_f64().expect("m");
+        let variance = found["covariance"][3 + k][3 + k].as_f64().expect("m²");
+        assert!((at - truth).abs() < 4.0 * variance.sqrt(), "{found}");
+        let linked = found["camera_link_urdf"]["xyz_m"][k].as_f64().expect("m");
+        assert!((at - linked).abs() < 1e-12, "{found}");
+    }
+    // The camera looks along its z axis: the x axis of its frame in a URDF.
+    let rotation = |of: &Value| {
+        let angle = |k: usize| of["rpy_rad"][k].as_f64().expect("rad");
+        nalgebra::Rotation3::from_euler_angles(angle(0), angle(1), angle(2))
+    };
+    let view = rotation(&found["x_urdf"]) * nalgebra::Vector3::z();
+    let forward = rotation(&found["camera_link_urdf"]) * nalgebra::Vector3::x();
+    assert!((view - forward).norm() < 1e-9, "{found}");
+    let down = rotation(&found["x_urdf"]) * nalgebra::Vector3::y();
+    let up = rotation(&found["camera_link_urdf"]) * nalgebra::Vector3::z();
+    assert!((down + up).norm() < 1e-9, "{found}");
+}
+
 #[test]
 fn rows_with_gross_errors_are_named_as_in_the_file() {
     let table = hand_eye(|p| p).read("pairs.csv");

@@ -1,13 +1,15 @@
 //! `calib fit handeye`.
 
+use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write as _;
 use std::path::Path;
 
 use calib_estimator::{Input, Kind, Options, Verdict};
-use calib_handeye::HandEye;
+use calib_handeye::{Correction, HandEye};
 use calib_recording::{BodyColumns, ColumnMap, ReadOptions};
-use nalgebra::Isometry3;
-use serde_json::json;
+use calib_urdf::rpy::{rotation_from_rpy, rpy_from_rotation};
+use nalgebra::{Isometry3, Translation3, Vector3};
+use serde_json::{Value, json};
 
 use crate::HandEyeRequest;
 use crate::answer::{Answer, answer, doubt, freedom, matrix, pose_text, pose_value};
@@ -31,7 +33,7 @@ fn command() -> Command<HandEye> {
     }
 }
 
-/// `calib fit handeye`: `robot_i · X = Z · measured_i`.
+/// `calib fit handeye`: `base_from_flange_i · X = Z · tracker_from_body_i`, X = `flange_from_body`, Z = `base_from_tracker`.
 ///
 /// # Errors
 /// As [`crate::cor`].
@@ -46,6 +48,10 @@ pub fn handeye(request: &HandEyeRequest) -> Result<Answer, FitError> {
         robot,
         measured,
     } = pose_pairs(file, &request.robot, &request.measured)?;
+    let measured: Vec<Isometry3<f64>> = match request.inverted {
+        true => measured.iter().map(Isometry3::inverse).collect(),
+        false => measured,
+    };
     let input = Input::PosePairs {
         robot: &robot,
         measured: &measured,
@@ -132,6 +138,7 @@ fn pose_pairs(file: &Path, robot: &str, measured: &str) -> Result<PosePairs, Fit
 
 fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rejected: &[u64]) -> Answer {
     let observable = e.verdict == Verdict::Ok;
+    let camera = request.optical.then(|| e.x * link_from_optical().inverse());
     let value = json!({
         "estimator": id,
         "observable": observable,
@@ -140,6 +147,8 @@ fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rejected: &[u
         "explanation": e.explanation,
         "x": pose_value(&e.x),
         "z": pose_value(&e.z),
+        "x_urdf": origin_value(&e.x),
+        "camera_link_urdf": camera.as_ref().map(origin_value),
         "covariance": e.covariance.as_ref().map(matrix),
         "degrees_of_freedom": e.noise.degrees_of_freedom,
         "sigma_m": e.noise.sigma_t,
@@ -156,8 +165,14 @@ fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rejected: &[u
         request.robot, request.measured, e.used
     );
     text += &doubt(e.reason.as_deref());
-    for (name, pose, at) in [("X", &e.x, 0), ("Z", &e.z, 6)] {
-        let _ = writeln!(text, "  {name} {}", pose_text(pose));
+    if let Some(remedy) = remedy(request, e) {
+        let _ = writeln!(text, "  {remedy}");
+    }
+    for (name, pose, at) in [
+        ("X, flange_from_body:", &e.x, 0),
+        ("Z, base_from_tracker:", &e.z, 6),
+    ] {
+        let _ = writeln!(text, "  {name}\n    {}", pose_text(pose));
         if let Some(s) = e.sigmas() {
             let _ = writeln!(
                 text,
@@ -170,6 +185,14 @@ fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rejected: &[u
                 s[at + 2].to_degrees()
             );
         }
+    }
+    let _ = writeln!(text, "  X in a URDF: {}", origin_text(&e.x));
+    if let Some(camera) = &camera {
+        let _ = writeln!(
+            text,
+            "  the camera's own frame (x along the view, z up) in a URDF: {}",
+            origin_text(camera)
+        );
     }
     text += &freedom(e.noise.degrees_of_freedom);
     let _ = writeln!(
@@ -188,4 +211,38 @@ fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rejected: &[u
         let _ = writeln!(text, "  gross errors in rows {rejected:?}");
     }
     answer(text, &value, observable)
+}
+
+/// What to do where the poses of one side are inverted.
+fn remedy(request: &HandEyeRequest, e: &HandEye) -> Option<&'static str> {
+    let candidates = &e.explanation.as_ref()?.candidates;
+    let inverted = |c: &Correction| matches!(c, Correction::InvertedPoses(_));
+    let found = candidates.iter().flatten().any(inverted);
+    found.then_some(match request.inverted {
+        true => "Run it again without --inverted, or give the flange in the robot's base.",
+        false => {
+            "If the measured poses are those of the target in the camera, run it again with --inverted; else give the flange in the robot's base."
+        }
+    })
+}
+
+/// How the optical frame of a camera (z along the view, x to the right, y down) stands in the camera's frame of a URDF (x along the view,
+/// y to the left, z up): REP 103 of ROS.
+fn link_from_optical() -> Isometry3<f64> {
+    let rotation = rotation_from_rpy(&Vector3::new(-FRAC_PI_2, 0.0, -FRAC_PI_2));
+    Isometry3::from_parts(Translation3::identity(), rotation)
+}
+
+fn origin_value(pose: &Isometry3<f64>) -> Value {
+    json!({ "xyz_m": pose.translation.vector.as_slice(), "rpy_rad": rpy_from_rotation(&pose.rotation).as_slice() })
+}
+
+/// A micrometer and a microradian: more is below any σ of a hand and an eye.
+fn origin_text(pose: &Isometry3<f64>) -> String {
+    let three = |v: [f64; 3]| v.map(|x| format!("{:.6}", x + 0.0)).join(" ");
+    format!(
+        "<origin xyz=\"{}\" rpy=\"{}\"/>",
+        three(pose.translation.vector.into()),
+        three(rpy_from_rotation(&pose.rotation).into())
+    )
 }

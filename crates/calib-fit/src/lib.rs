@@ -95,10 +95,14 @@ pub struct FrameRequest {
 pub struct HandEyeRequest {
     /// The table: two poses per row.
     pub file: Option<PathBuf>,
-    /// Prefix of the columns of the robot's pose, or the name of a body.
+    /// Prefix of the columns of the robot's pose `base_from_flange`, or the name of a body.
     pub robot: String,
-    /// Prefix of the columns of the measured pose, or the name of a body.
+    /// Prefix of the columns of the measured pose `tracker_from_body`, or the name of a body.
     pub measured: String,
+    /// The measured pose is `body_from_tracker`: a camera states where the target is in the camera.
+    pub inverted: bool,
+    /// The body is a camera's optical frame (z along the view, x to the right): its URDF frame (x along the view, z up) is asked for as well.
+    pub optical: bool,
     /// Estimator id; `handeye` when not given.
     pub estimator: Option<String>,
     /// All estimators.

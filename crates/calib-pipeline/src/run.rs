@@ -18,9 +18,10 @@ use crate::formulate::without_effects::refitted;
 use crate::output::assemble::assemble;
 use crate::output::evidence::Evidence;
 use crate::output::exit::exit_code;
-use crate::output::export::{patch_urdf, scene};
-use crate::output::files::{Robots, files, written};
+use crate::output::export::patch_urdf;
+use crate::output::files::{Robots, files, listed, written};
 use crate::output::model_file::model_file;
+use crate::output::scene::scene;
 use crate::output::shapes;
 use crate::output::view::{Shown, view};
 use crate::prepare::inputs::Inputs;
@@ -98,8 +99,6 @@ pub fn run_on(
     let (tracks, robot, fit) = (&checked.tracks, &solved.robot, solved.fit.as_ref());
     progress("patch the URDF");
     let urdf = patch_urdf(&inputs, robot, &verified.known)?;
-    let covariance = solved.root_covariance.as_ref();
-    let scene = scene(&inputs, tracks, robot, covariance, &solved.found);
     progress("write the report");
     let shown = Shown {
         nominal: &nominal,
@@ -116,8 +115,7 @@ pub fn run_on(
         model: &model_file(&inputs, &solved),
         robot,
     };
-    let written = written(&inputs, &verified.residuals, (&scene, &view), &robots)?;
-    let report = assemble(&Evidence {
+    let mut report = assemble(&Evidence {
         inputs: &inputs,
         tracks,
         method,
@@ -130,11 +128,13 @@ pub fn run_on(
         loops: verified.loops,
         held_out: verified.held_out,
         urdf: &urdf,
-        written: &written,
         residuals: &verified.residuals,
         selection: chosen.map(|chosen| chosen.fitted(fit)),
         arguments: options.arguments(),
     });
+    let scene = scene(&inputs, tracks, &solved, &report);
+    let written = written(&inputs, &verified.residuals, (&scene, &view), &robots)?;
+    report.outputs = listed(&inputs, &written);
     let files = files(&inputs, &report, &scene, written, &view)?;
     let exit = exit_code(&report, options.strict, fit, &origins);
     Ok(RunOutput {

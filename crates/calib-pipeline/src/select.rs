@@ -5,7 +5,8 @@ use std::path::Path;
 use calib_report::Selection;
 
 use crate::error::PipelineError;
-use crate::formulate::selection::{Chosen, choose};
+use crate::formulate::chosen::Chosen;
+use crate::formulate::selection::choose;
 use crate::options::{Plugins, RunOptions};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;

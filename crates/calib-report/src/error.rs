@@ -29,6 +29,14 @@ pub enum ReportError {
         /// The missing frame.
         parent: String,
     },
+    /// A frame comes before its parent.
+    #[error("the parent `{parent}` of frame `{child}` comes after it: parents come first")]
+    ParentLater {
+        /// The child.
+        child: String,
+        /// Its parent.
+        parent: String,
+    },
     /// The parents of a frame form a cycle.
     #[error("the parents of frame `{0}` form a cycle")]
     FrameCycle(String),

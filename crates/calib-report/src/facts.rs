@@ -77,6 +77,11 @@ pub enum NextStep {
         /// The file with the joint effects that a URDF cannot hold, where there are any.
         effects: Option<String>,
     },
+    /// Nothing of the URDF changed.
+    KeepUrdf {
+        /// The file with what was found: where bodies and tracker are.
+        scene: String,
+    },
     /// Fix the problems of a rejected result.
     FixProblems,
     /// Record validation poses and set limits.

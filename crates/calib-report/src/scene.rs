@@ -1,18 +1,22 @@
 //! The scene: the calibrated world for a situation model, as data.
 //!
 //! A tree of frames, each `parent_from_frame` with covariance where it is known and the status measured, calibrated or
-//! assumed; the markers of each body; simple objects; the robot's URDF and joint positions; where all of it comes from.
+//! assumed; joints, markers of each body, tips, what was touched, simple objects; the robot's URDF and joint positions; the verdict; where
+//! all of it comes from.
 //! JSON is the primary form and keeps every bit of every number. The ROS 2 launch file and the SDF world are derived from it
 //! and lossy: they know no covariance and no status.
 
+mod known;
 mod launch;
 mod sdf;
+
+pub use known::{SceneJoint, SceneTip, SceneTouched, SceneVerdict, TouchedShape};
 
 use crate::{Input, JointValue, ReportError, Status, json};
 use nalgebra::{Isometry3, Matrix6};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The calibrated world. SI; quaternions x, y, z, w.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -23,10 +27,22 @@ pub struct Scene {
     pub name: String,
     /// The robot.
     pub robot: SceneRobot,
-    /// Frames; parents before children is not required.
+    /// What the calibration was judged to be; null for a scene that no run wrote.
+    #[serde(default)]
+    pub verdict: Option<SceneVerdict>,
+    /// Frames, each after its parent.
     pub frames: Vec<SceneFrame>,
+    /// Joints of the robot, each after the joint that carries it.
+    #[serde(default)]
+    pub joints: Vec<SceneJoint>,
     /// Tracking bodies and their markers.
     pub bodies: Vec<SceneBody>,
+    /// Points of the robot that touch or are aimed: tips and tool center points.
+    #[serde(default)]
+    pub tips: Vec<SceneTip>,
+    /// What was touched.
+    #[serde(default)]
+    pub touched: Vec<SceneTouched>,
     /// Objects of simple shape: a table.
     #[serde(default)]
     pub objects: Vec<SceneObject>,
@@ -61,10 +77,18 @@ pub struct SceneFrame {
     pub xyz_m: [f64; 3],
     /// Orientation in the parent, unit quaternion x, y, z, w.
     pub quat_xyzw: [f64; 4],
-    /// 6×6 in [ω; v] of this frame (rad², rad·m, m²); null when it is unknown.
+    /// Of the pose in the parent, 6×6 in [ω; v] of this frame (rad², rad·m, m²); null when it is unknown.
     pub covariance: Option<[[f64; 6]; 6]>,
+    /// Of the pose in the root with all joints at 0, in the same axes: what is a convention between two joints does not show in it. Null when
+    /// it is unknown.
+    #[serde(default)]
+    pub covariance_in_root: Option<[[f64; 6]; 6]>,
     /// Where the numbers come from.
     pub status: Status,
+    /// Directions in which nothing that was recorded tells where it is, as unit twists [ω; v] of this frame: there the numbers are the
+    /// nominal ones. Empty where everything is known, or nothing was estimated.
+    #[serde(default)]
+    pub unobservable: Vec<[f64; 6]>,
     /// Whether it is a link of the robot's URDF: then `robot_state_publisher` publishes it, and the launch file does not.
     #[serde(default)]
     pub in_urdf: bool,
@@ -78,7 +102,9 @@ impl Default for SceneFrame {
             xyz_m: [0.0; 3],
             quat_xyzw: [0.0, 0.0, 0.0, 1.0],
             covariance: None,
+            covariance_in_root: None,
             status: Status::Assumed,
+            unobservable: Vec::new(),
             in_urdf: false,
         }
     }
@@ -111,11 +137,26 @@ impl SceneFrame {
             // x + 0 is x, except that −0 becomes 0.
             xyz_m: <[f64; 3]>::from(parent_from_frame.translation.vector).map(|x| x + 0.0),
             quat_xyzw: [q.x, q.y, q.z, q.w].map(|x| x + 0.0),
-            covariance: covariance
-                .map(|c| std::array::from_fn(|i| std::array::from_fn(|j| c[(i, j)]))),
+            covariance: covariance.map(rows),
+            covariance_in_root: None,
             status,
+            unobservable: Vec::new(),
             in_urdf: false,
         }
+    }
+
+    /// The same with what was found of it: its covariance in the parent and in the root, and the directions in which nothing is known.
+    #[must_use]
+    pub fn with_known(
+        mut self,
+        covariance: Option<&Matrix6<f64>>,
+        in_root: Option<&Matrix6<f64>>,
+        unobservable: Vec<[f64; 6]>,
+    ) -> Self {
+        self.covariance = covariance.map(rows);
+        self.covariance_in_root = in_root.map(rows);
+        self.unobservable = unobservable;
+        self
     }
 
     /// The same as a link of the robot's URDF.
@@ -241,10 +282,11 @@ impl Scene {
         Ok(sdf::sdf(self))
     }
 
-    /// Checks that names are unique, parents exist and form no cycle, and every pose is valid.
+    /// Checks that names are unique, parents exist, come first and form no cycle, and every pose is valid.
     ///
     /// # Errors
-    /// The first violation: [`ReportError::FrameTwice`], [`ReportError::UnknownParent`], [`ReportError::FrameCycle`], [`ReportError::NotAPose`].
+    /// The first violation: [`ReportError::FrameTwice`], [`ReportError::UnknownParent`], [`ReportError::FrameCycle`],
+    /// [`ReportError::ParentLater`], [`ReportError::NotAPose`].
     pub fn check(&self) -> Result<(), ReportError> {
         let mut parent_of: BTreeMap<&str, Option<&str>> = BTreeMap::new();
         for frame in &self.frames {
@@ -254,9 +296,9 @@ impl Scene {
             {
                 return Err(ReportError::FrameTwice(frame.name.clone()));
             }
-            let covariance_is_finite = frame
-                .covariance
+            let covariance_is_finite = [frame.covariance, frame.covariance_in_root]
                 .iter()
+                .flatten()
                 .flatten()
                 .flatten()
                 .all(|x| x.is_finite());
@@ -274,6 +316,7 @@ impl Scene {
                 .then_some(())
                 .ok_or_else(missing)
         };
+        let mut before: BTreeSet<&str> = BTreeSet::new();
         for frame in &self.frames {
             let mut at = frame.parent.as_deref();
             let mut steps = 0;
@@ -285,6 +328,25 @@ impl Scene {
                 }
                 at = parent_of.get(parent).copied().flatten();
             }
+            if let Some(parent) = frame.parent.as_deref()
+                && !before.contains(parent)
+            {
+                return Err(ReportError::ParentLater {
+                    child: frame.name.clone(),
+                    parent: parent.to_owned(),
+                });
+            }
+            before.insert(&frame.name);
+        }
+        for joint in &self.joints {
+            exists(&joint.name, &joint.parent)?;
+            exists(&joint.name, &joint.child)?;
+        }
+        for tip in &self.tips {
+            exists(&tip.name, &tip.link)?;
+        }
+        for thing in &self.touched {
+            exists(&thing.name, &thing.frame)?;
         }
         for body in &self.bodies {
             exists(&body.name, &body.name)?;
@@ -304,6 +366,10 @@ impl Scene {
         }
         Ok(())
     }
+}
+
+fn rows(c: &Matrix6<f64>) -> [[f64; 6]; 6] {
+    std::array::from_fn(|i| std::array::from_fn(|j| c[(i, j)]))
 }
 
 fn is_pose(xyz: [f64; 3], quat: [f64; 4]) -> bool {
@@ -352,6 +418,13 @@ mod tests {
                 ReportError::FrameCycle("a".into()),
             ),
             (vec![frame("a", "a")], ReportError::FrameCycle("a".into())),
+            (
+                vec![frame("a", "world"), root()],
+                ReportError::ParentLater {
+                    child: "a".into(),
+                    parent: "world".into(),
+                },
+            ),
             (
                 vec![SceneFrame {
                     xyz_m: [f64::NAN, 0.0, 0.0],

@@ -194,17 +194,12 @@ impl Screen<'_> {
             let cell = |i: usize| {
                 number::bare_with_sigma(transform.translation_m[i], sigma(i), Unit::Meter)
             };
-            let status = if transform.observable {
-                transform.status.word()
-            } else {
-                "partial"
-            };
             table.row([
                 transform.name.clone(),
                 cell(0),
                 cell(1),
                 cell(2),
-                status.to_owned(),
+                words::transforms::short_status(transform).to_owned(),
             ]);
         }
         self.text += &table.plain(self.look.columns);

@@ -26,7 +26,12 @@ pub enum Fit {
     Aor(FitTable),
     /// Frame of a joint with two axes, from body poses and two joint columns
     Frame(FitFrame),
-    /// Hand-eye: AX = ZB from two poses per row
+    /// Hand-eye: where a camera or a tracked body is on the flange, and the tracker in the robot's base
+    ///
+    /// Each row has the flange in the robot's base (base_from_flange) and the body in the tracker
+    /// (tracker_from_body). X = flange_from_body and Z = base_from_tracker follow from
+    /// base_from_flange * X = Z * tracker_from_body. Of a camera on the flange the body is the camera
+    /// and the tracker is the board or tag; a detector states the board in the camera: --inverted.
     Handeye(FitHandEye),
 }
 
@@ -145,12 +150,18 @@ pub struct FitHandEye {
     /// The table: poses of two bodies in each row
     #[arg(required_unless_present = "list")]
     pub file: Option<PathBuf>,
-    /// Prefix of the columns of the first pose (robot flange), e.g. `flange`
+    /// Prefix of the columns of the flange in the robot's base: `flange_x` … `flange_qw`
     #[arg(long, default_value = "flange")]
     pub robot: String,
-    /// Prefix of the columns of the second pose (measurement), e.g. `meas`
+    /// Prefix of the columns of the measured body in the tracker's frame: `meas_x` … `meas_qw`
     #[arg(long, default_value = "meas")]
     pub measured: String,
+    /// The measured poses are inverted: the board or tag in the camera, as its detector states it
+    #[arg(long)]
+    pub inverted: bool,
+    /// The body is the optical frame of a camera (z along the view): give its URDF frame too (x along the view)
+    #[arg(long)]
+    pub optical: bool,
     /// Estimator to use; `handeye` if none is named
     #[arg(long)]
     pub estimator: Option<String>,
@@ -215,6 +226,8 @@ impl FitHandEye {
             file: self.file.clone(),
             robot: self.robot.clone(),
             measured: self.measured.clone(),
+            inverted: self.inverted,
+            optical: self.optical,
             estimator: self.estimator.clone(),
             all: self.all,
             list: self.list,

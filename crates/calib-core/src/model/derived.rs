@@ -193,6 +193,26 @@ impl Solution {
         Ok(self.moved_point(from, target, at)?.point)
     }
 
+    /// A target as seen from `from` at a configuration, with covariance; of a point, its own coordinates are part of it.
+    ///
+    /// # Errors
+    /// As [`Solution::relative_pose`].
+    pub fn known_point(
+        &self,
+        from: FrameId,
+        target: Target,
+        at: &Configuration,
+    ) -> Result<DerivedPoint, Error> {
+        let LinearPoint { position, jacobian } = self.linear_point(from, target, at)?;
+        Ok(DerivedPoint {
+            position,
+            covariance: self
+                .inherit(&jacobian)
+                .map(|c| Matrix3::from_iterator(c.iter().copied())),
+            estimable: self.unseen(&jacobian).ncols() == 0,
+        })
+    }
+
     /// The same with the motions of the joints between.
     ///
     /// # Errors

@@ -6,15 +6,15 @@ use calib_report::{Status, Unobservable};
 
 use crate::error::PipelineError;
 use crate::formulate::checked::Checked;
+use crate::formulate::chosen::Chosen;
 use crate::formulate::completed::bad_rows_beside;
 use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::found::Found;
 use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::realign::realign;
-use crate::formulate::selection::Chosen;
 use crate::formulate::solved::Solved;
-use crate::formulate::{bad_rows, clock, gear_ratio, noise, priors, starts};
+use crate::formulate::{bad_rows, clock, gear_ratio, noise, priors, starts, wanted};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
 use crate::prepare::tracks::body_tracks;
@@ -124,15 +124,6 @@ fn fits(
     settings: &Settings,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Fits, PipelineError> {
-    progress("fit registration only");
-    // The baseline is plain least squares: what is left then is the geometry's fault, not noise to be estimated.
-    let baseline = ml::state(
-        inputs,
-        &checked.tracks,
-        &checked.start,
-        FreeSet::RegistrationOnly,
-    );
-    let registered = ml::fit(baseline, inputs, &Settings::plain())?;
     progress("fit all loops");
     let full = ml::state(inputs, &checked.tracks, &checked.start, FreeSet::Profile);
     let mut fit = ml::fit(full, inputs, settings)?;
@@ -152,7 +143,21 @@ fn fits(
             fit = ml::fit(full, inputs, settings)?;
         }
     }
+    progress("fit registration only");
+    let registered = registered(inputs, checked, &fit)?;
     Ok((registered, fit, findings))
+}
+
+/// The fit of mounts and place alone, from the observations that the fit of everything kept: rows that are wrong make no baseline
+/// worse. It is plain least squares: what is left is the geometry's fault, not noise to be estimated.
+fn registered(inputs: &Inputs, checked: &Checked, fit: &MlFit) -> Result<MlFit, PipelineError> {
+    let (tracks, start) = (&checked.tracks, &checked.start);
+    let baseline = ml::state(inputs, tracks, start, FreeSet::RegistrationOnly);
+    let settings = Settings::plain();
+    match ml::fit_kept(&baseline, inputs, &fit.solution, &settings) {
+        Some(registered) => Ok(registered),
+        None => ml::fit(baseline, inputs, &settings),
+    }
 }
 
 /// Numbers that a physical limit of the profile stopped.
@@ -225,12 +230,10 @@ fn only_a_cross_check(findings: &mut [Finding]) {
 }
 
 fn ml_result(inputs: &Inputs, fit: MlFit, registered: MlFit) -> Result<Solved, PipelineError> {
-    let profile = &inputs.robot.profile;
-    let model = &inputs.robot.model;
     let at_zero = calib_core::Configuration::zero();
     let judged = priors::judged(&fit);
     let mut found = Vec::new();
-    let mut push = |frames: Found, from, to| -> Result<(), PipelineError> {
+    for (frames, from, to) in wanted::transforms(inputs, &fit) {
         let derived = judged.relative_pose(from, to, &at_zero)?;
         found.push(Found {
             pose: derived.pose,
@@ -239,30 +242,8 @@ fn ml_result(inputs: &Inputs, fit: MlFit, registered: MlFit) -> Result<Solved, P
             status: Status::Calibrated,
             ..frames
         });
-        Ok(())
-    };
-    for (name, origin) in &profile.origins {
-        if let (Some(body), Some(link)) = (
-            fit.formulation.bodies.get(&origin.body),
-            fit.formulation.links[origin.link.index()],
-        ) {
-            let frames = Found {
-                origin: Some(name.clone()),
-                ..Found::between(format!("{}_from_{name}", origin.body), &origin.body, name)
-            };
-            push(frames, *body, link)?;
-        }
     }
-    for (name, t) in &profile.transforms {
-        if let (Some(parent), Some(child)) = (
-            fit.formulation.links[t.parent.index()],
-            fit.formulation.links[t.child.index()],
-        ) {
-            let [outer, inner] = [t.parent, t.child].map(|link| &model.link(link).name);
-            push(Found::between(name.clone(), outer, inner), parent, child)?;
-        }
-    }
-    let root = fit.formulation.links[model.root().index()];
+    let root = fit.formulation.links[inputs.robot.model.root().index()];
     let root_covariance = match root {
         Some(root) => {
             judged

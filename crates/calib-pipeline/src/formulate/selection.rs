@@ -4,8 +4,7 @@
 
 use std::collections::BTreeSet;
 
-use calib_core::{NestedError, SelectionRule, Settings, StepOutcome};
-use calib_profile::Solve;
+use calib_core::{SelectionRule, Settings, StepOutcome};
 use calib_report::{
     ModelPart, NestedSelection, PartKind, Selection, SelectionOutcome, SelectionStep,
 };
@@ -13,32 +12,11 @@ use calib_report::{
 use crate::error::PipelineError;
 use crate::formulate::by_likelihood::likelihood;
 use crate::formulate::checked::check_data;
+use crate::formulate::chosen::Chosen;
 use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::ml::state;
 use crate::formulate::parts::{Parts, RobotPart, What, everything, open_joints, with_parts, yaml};
 use crate::prepare::inputs::Inputs;
-
-/// What was chosen: what to solve for, and how it was found.
-#[derive(Debug, Clone)]
-pub struct Chosen {
-    /// The profile's choice with the parts that were added.
-    pub solve: Solve,
-    /// How it was found.
-    pub selection: Selection,
-    /// What it costs in folds; `None` where nothing was added or there are too few poses.
-    pub nested: Option<NestedError>,
-}
-
-impl Chosen {
-    /// The choice with the factor that it widens the standard deviations of the fit by.
-    #[must_use]
-    pub fn fitted(self, fit: Option<&MlFit>) -> Selection {
-        Selection {
-            sigma_factor: fit.and_then(|fit| fit.widened),
-            ..self.selection
-        }
-    }
-}
 
 /// Chooses what to free; `inputs` are as they were read.
 ///

@@ -2,8 +2,8 @@
 
 use calib_profile::Method;
 use calib_report::{
-    HeldOut, Identification, Input, MissingPhysics, NextStep, Output, Report, Residuals, Scope,
-    Verdict, Verification, judge,
+    HeldOut, Identification, Input, MissingPhysics, NextStep, Report, Residuals, Scope, Verdict,
+    Verification, judge,
 };
 
 use crate::formulate::formulation::MlFit;
@@ -19,11 +19,11 @@ use crate::output::verdict::{limits, next_steps, scope};
 use crate::output::weak::{self, weak_directions};
 use crate::output::widths::prior_widths;
 use crate::verify::accuracy::{accuracy_limits, workspace};
-use crate::verify::tracker_noise::TrackerNoise;
 use crate::verify::dh_table::dh_table;
 use crate::verify::information::data_information;
 use crate::verify::motions::motions;
 use crate::verify::robot_changes::robot_changes;
+use crate::verify::tracker_noise::TrackerNoise;
 
 /// The report of a run.
 #[must_use]
@@ -109,7 +109,6 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
                 sha256: d.sha256.clone(),
             })
             .collect(),
-        outputs: outputs(e),
         reproduce: vec![reproduce(e)],
         undo: vec![format!(
             "calib revert {} --out original.urdf",
@@ -172,27 +171,4 @@ fn identification(e: &Evidence<'_>) -> Identification {
         date: stated.date.clone(),
         tracker: stated.tracker.clone(),
     }
-}
-
-/// The files of a run: what they are, and their digests where they do not depend on the report itself.
-fn outputs(e: &Evidence<'_>) -> Vec<Output> {
-    let urdf = &e.inputs.robot.profile.urdf;
-    let written = e.written.iter().map(|(file, what)| Output {
-        path: file.name.clone(),
-        what: (*what).to_owned(),
-        sha256: Some(calib_urdf::sha256_hex(&file.bytes)),
-        changes: (file.name == e.inputs.robot.profile.outputs.urdf).then(|| urdf.clone()),
-    });
-    let own = [
-        ("report.md", "this report as Markdown"),
-        ("report.json", "this report as data"),
-        ("report.html", "this report as a page"),
-    ];
-    let own = own.map(|(path, what)| Output {
-        path: path.to_owned(),
-        what: what.to_owned(),
-        sha256: None,
-        changes: None,
-    });
-    written.chain(own).collect()
 }

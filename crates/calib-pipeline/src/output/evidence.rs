@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use calib_core::SolveStatus;
-use calib_files::OutputFile;
 use calib_finding::Finding;
 use calib_profile::Method;
 use calib_report::{FitEnd, HeldOut, LoopClosure, ResidualRow, Selection};
@@ -44,8 +43,6 @@ pub struct Evidence<'a> {
     pub held_out: Option<HeldOut>,
     /// The patched description.
     pub urdf: &'a PatchedUrdf,
-    /// Files that do not depend on the report, and what they are.
-    pub written: &'a [(OutputFile, String)],
     /// Residuals of the fit.
     pub residuals: &'a [ResidualRow],
     /// How the model was chosen, where it was.

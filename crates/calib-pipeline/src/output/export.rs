@@ -1,4 +1,4 @@
-//! The calibrated robot as a patched URDF, the effects that a URDF cannot hold, and the scene.
+//! The calibrated robot as a patched URDF, and the effects that a URDF cannot hold.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -6,18 +6,15 @@ use std::fmt::Write as _;
 use calib_core::effect::{Drives, Source};
 use calib_core::{EFFECTS, EffectKind};
 use calib_geometry::so3;
-use calib_report::scene::{Provenance, SceneBody, SceneFrame, SceneMarker, SceneRobot};
-use calib_report::{Change, Input, Scene, Status, Unit};
+use calib_report::{Change, Unit};
 use calib_urdf::rpy::rpy_from_rotation;
 use calib_urdf::{ChangeRecord, JointId, RobotModel, UrdfEdit, patch};
-use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use crate::error::PipelineError;
-use crate::formulate::found::Found;
 use crate::formulate::kinematics::{Calibration, JointEffects, motion_axis};
-use crate::output::points::{added_frames, body_frame, point_frames};
-use crate::prepare::inputs::{Digest, Inputs};
-use crate::prepare::tracks::BodyTrack;
+use crate::output::points::added_frames;
+use crate::prepare::inputs::Inputs;
 use crate::verify::known::{Known, Number};
 
 /// The patched URDF.
@@ -306,151 +303,4 @@ fn loads_yaml(inputs: &Inputs, robot: &Calibration) -> String {
         );
     }
     text
-}
-
-/// The calibrated world: tracker, robot root, bodies, origins and links at the zero position.
-#[must_use]
-pub fn scene(
-    inputs: &Inputs,
-    tracks: &BTreeMap<String, BodyTrack>,
-    robot: &Calibration,
-    root_covariance: Option<&Matrix6<f64>>,
-    found: &[Found],
-) -> Scene {
-    let profile = &inputs.robot.profile;
-    let model = robot.urdf_model();
-    let root = model.link(model.root()).name.clone();
-    let mut frames = vec![
-        SceneFrame::root(profile.tracker.frame.clone(), Status::Measured),
-        SceneFrame::new(
-            root.clone(),
-            profile.tracker.frame.clone(),
-            &robot.tracker_from_root,
-            root_covariance,
-            Status::Calibrated,
-        ),
-    ];
-    frames.extend(link_frames(inputs, &model));
-    frames.extend(body_frames(inputs, robot, &model));
-    frames.extend(point_frames(inputs, robot, &model));
-    frames.extend(origin_frames(inputs, robot, &model, found));
-    Scene {
-        name: inputs.robot.file.clone(),
-        robot: SceneRobot {
-            name: profile.robot.clone(),
-            urdf: profile.outputs.urdf.clone(),
-            base: root,
-            joints: Vec::new(),
-            has_masses: inputs.robot.model.every_link_has_mass(),
-        },
-        frames,
-        bodies: scene_bodies(inputs, tracks, robot, &model),
-        objects: Vec::new(),
-        provenance: provenance(inputs),
-        ..Scene::default()
-    }
-}
-
-/// The links; at zero a child link stands where its joint's origin is.
-fn link_frames(inputs: &Inputs, model: &RobotModel) -> Vec<SceneFrame> {
-    let nominal = &inputs.robot.model;
-    let frame = |id: JointId| {
-        let joint = model.joint(id);
-        let same = joint.parent_link_from_joint == nominal.joint(id).parent_link_from_joint;
-        let status = if same {
-            Status::Assumed
-        } else {
-            Status::Calibrated
-        };
-        let frame = SceneFrame::new(
-            model.link(joint.child).name.clone(),
-            model.link(joint.parent).name.clone(),
-            &joint.parent_link_from_joint,
-            None,
-            status,
-        );
-        frame.in_urdf()
-    };
-    model.joint_ids().map(frame).collect()
-}
-
-/// The bodies on their links.
-fn body_frames(inputs: &Inputs, robot: &Calibration, model: &RobotModel) -> Vec<SceneFrame> {
-    let frame = |(name, mount): (&String, &Isometry3<f64>)| {
-        let body = &inputs.robot.profile.bodies[name];
-        let status = if body.mount.is_some() {
-            Status::Assumed
-        } else {
-            Status::Calibrated
-        };
-        SceneFrame::new(
-            body_frame(model, name),
-            model.link(body.link).name.clone(),
-            mount,
-            None,
-            status,
-        )
-    };
-    robot.mounts.iter().map(frame).collect()
-}
-
-/// The origins that the profile asks for, in their bodies.
-fn origin_frames(
-    inputs: &Inputs,
-    robot: &Calibration,
-    model: &RobotModel,
-    found: &[Found],
-) -> Vec<SceneFrame> {
-    let origins = &inputs.robot.profile.origins;
-    let asked = |f: &&Found| origins.contains_key(&f.child) && robot.mounts.contains_key(&f.parent);
-    let frame = |f: &Found| {
-        SceneFrame::new(
-            format!("{}_origin", f.child),
-            body_frame(model, &f.parent),
-            &f.pose,
-            f.covariance.as_ref(),
-            f.status,
-        )
-    };
-    found.iter().filter(asked).map(frame).collect()
-}
-
-/// The bodies with their markers.
-fn scene_bodies(
-    inputs: &Inputs,
-    tracks: &BTreeMap<String, BodyTrack>,
-    robot: &Calibration,
-    model: &RobotModel,
-) -> Vec<SceneBody> {
-    let markers = |name: &String| {
-        let template = tracks[name].template.iter();
-        let named = template.flat_map(|t| t.names.iter().zip(&t.points));
-        let marker = |(name, point): (&String, &Point3<f64>)| SceneMarker {
-            name: name.clone(),
-            xyz_m: point.coords.into(),
-        };
-        named.map(marker).collect()
-    };
-    let body = |name: &String| SceneBody {
-        name: body_frame(model, name),
-        link: model
-            .link(inputs.robot.profile.bodies[name].link)
-            .name
-            .clone(),
-        markers: markers(name),
-    };
-    robot.mounts.keys().map(body).collect()
-}
-
-fn provenance(inputs: &Inputs) -> Provenance {
-    let input = |d: &Digest| Input {
-        path: d.path.clone(),
-        sha256: d.sha256.clone(),
-    };
-    Provenance {
-        tool: "calib".to_owned(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        profile: inputs.robot.file.clone(),
-        inputs: inputs.digests.iter().map(input).collect(),
-    }
 }

@@ -2,7 +2,7 @@
 
 use calib_files::OutputFile;
 use calib_report::robot_model::RobotModelFile;
-use calib_report::{Report, ResidualRow};
+use calib_report::{Output, Report, ResidualRow};
 
 use crate::error::PipelineError;
 use crate::formulate::kinematics::Calibration;
@@ -28,7 +28,7 @@ pub(crate) fn alone_name(urdf: &str) -> String {
     format!("{}.alone.urdf", urdf.trim_end_matches(".urdf"))
 }
 
-/// The files that do not depend on the report, and what they are in words.
+/// The files but for the report's own, and what they are in words.
 pub(crate) fn written(
     inputs: &Inputs,
     residuals: &[ResidualRow],
@@ -73,7 +73,7 @@ pub(crate) fn written(
     put(
         outputs.scene.clone(),
         scene.json()?,
-        "scene: frames with poses and uncertainty (JSON)",
+        "scene: frames, joints and touched things with uncertainty (JSON)",
     );
     put(
         format!("{stem}.launch.py"),
@@ -105,6 +105,29 @@ pub(crate) fn written(
         "the poses as a recording for players (MCAP)".to_owned(),
     ));
     Ok(files)
+}
+
+/// What is written, with its digest but for the report's own files.
+pub(crate) fn listed(inputs: &Inputs, written: &[(OutputFile, String)]) -> Vec<Output> {
+    let profile = &inputs.robot.profile;
+    let written = written.iter().map(|(file, what)| Output {
+        path: file.name.clone(),
+        what: (*what).to_owned(),
+        sha256: Some(calib_urdf::sha256_hex(&file.bytes)),
+        changes: (file.name == profile.outputs.urdf).then(|| profile.urdf.clone()),
+    });
+    let own = [
+        ("report.md", "this report as Markdown"),
+        ("report.json", "this report as data"),
+        ("report.html", "this report as a page"),
+    ];
+    let own = own.map(|(path, what)| Output {
+        path: path.to_owned(),
+        what: what.to_owned(),
+        sha256: None,
+        changes: None,
+    });
+    written.chain(own).collect()
 }
 
 pub(crate) fn files(

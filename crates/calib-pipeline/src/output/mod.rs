@@ -12,6 +12,7 @@ pub(crate) mod of_data;
 mod of_fit;
 mod open;
 mod points;
+pub mod scene;
 pub mod shapes;
 mod verdict;
 pub mod view;

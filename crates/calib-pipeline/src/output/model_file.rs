@@ -11,7 +11,7 @@ use calib_report::robot_model::{
     ModelBody, ModelEffect, ModelJoint, ModelLink, ModelMimic, ModelMotion, ModelNumber,
     ModelPoint, ModelPose, ModelUncertainty, RobotModelFile,
 };
-use calib_urdf::{JointId, JointKind};
+use calib_urdf::{Joint, JointId, JointKind, RobotModel};
 use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
 
 use crate::formulate::formulation::MlFit;
@@ -40,15 +40,13 @@ pub fn model_file(inputs: &Inputs, solved: &Solved) -> RobotModelFile {
         let link = name(tip.link);
         (point.clone(), ModelPoint { link, xyz_m })
     });
-    let mut joints: Vec<JointId> = model.joint_ids().collect();
-    joints.sort_by_key(|j| (model.chain_to_root(model.joint(*j).child).len(), j.index()));
     RobotModelFile {
         robot: profile.robot.clone(),
         root: name(model.root()),
         gravity_m_s2: robot.masses.gravity().into(),
         masses_assumed: robot.masses.assumed.is_some(),
         links: links(robot),
-        joints: joints
+        joints: outward(model)
             .into_iter()
             .map(|j| joint(inputs, robot, j))
             .collect(),
@@ -97,28 +95,44 @@ fn links(robot: &Calibration) -> Vec<ModelLink> {
 fn joint(inputs: &Inputs, robot: &Calibration, id: JointId) -> ModelJoint {
     let model = &robot.model;
     let j = model.joint(id);
-    let mimic = j.mimic.as_ref().map(|_| ModelMimic {
-        joint: model.joint(j.law.source).name.clone(),
-        multiplier: j.law.multiplier,
-        offset: j.law.offset,
-    });
     ModelJoint {
         name: j.name.clone(),
         parent: model.link(j.parent).name.clone(),
         child: model.link(j.child).name.clone(),
-        motion: match j.kind {
-            JointKind::Fixed => ModelMotion::Fixed,
-            JointKind::Prismatic { .. } => ModelMotion::Prismatic,
-            _ => ModelMotion::Revolute,
-        },
+        motion: motion(j),
         parent_from_joint: pose(&j.parent_link_from_joint),
         load_origin: pose(&robot.masses.loaded().joint(id).parent_link_from_joint),
         axis: j.kind.axis().map(|axis| axis.into_inner().into()),
         limits: j.limits.range().map(|(low, high)| [low, high]),
-        mimic,
+        mimic: mimic(model, j),
         fitted_range: fitted_range(inputs, id),
         effects: effects(robot, id),
     }
+}
+
+/// The joints, each after the one that carries it.
+pub(super) fn outward(model: &RobotModel) -> Vec<JointId> {
+    let mut joints: Vec<JointId> = model.joint_ids().collect();
+    joints.sort_by_key(|j| (model.chain_to_root(model.joint(*j).child).len(), j.index()));
+    joints
+}
+
+/// How a joint moves.
+pub(super) fn motion(joint: &Joint) -> ModelMotion {
+    match joint.kind {
+        JointKind::Fixed => ModelMotion::Fixed,
+        JointKind::Prismatic { .. } => ModelMotion::Prismatic,
+        _ => ModelMotion::Revolute,
+    }
+}
+
+/// The joint that it follows.
+pub(super) fn mimic(model: &RobotModel, joint: &Joint) -> Option<ModelMimic> {
+    joint.mimic.as_ref().map(|_| ModelMimic {
+        joint: model.joint(joint.law.source).name.clone(),
+        multiplier: joint.law.multiplier,
+        offset: joint.law.offset,
+    })
 }
 
 fn effects(robot: &Calibration, id: JointId) -> Vec<ModelEffect> {
@@ -153,7 +167,7 @@ fn effects(robot: &Calibration, id: JointId) -> Vec<ModelEffect> {
 }
 
 /// Smallest and largest reading of the fitted rows, where the joint moved.
-fn fitted_range(inputs: &Inputs, id: JointId) -> Option<[f64; 2]> {
+pub(super) fn fitted_range(inputs: &Inputs, id: JointId) -> Option<[f64; 2]> {
     let fitted = inputs.recordings.values();
     let fitted = fitted.filter(|r| r.spec.usage != Usage::Validation);
     let readings = fitted.flat_map(|r| r.q.iter().flatten());

@@ -124,7 +124,11 @@ pub(crate) fn next_steps(
 ) -> Vec<NextStep> {
     let has_limits = e.inputs.robot.profile.solve.limits != Limits::default();
     let has_validation = e.held_out.as_ref().is_some_and(|h| !h.left_out);
+    let unchanged = e.urdf.changes.is_empty() && effects_file(e).is_none();
     let mut steps = vec![match verdict {
+        Verdict::Accepted | Verdict::AcceptedWithWarnings if unchanged => NextStep::KeepUrdf {
+            scene: e.inputs.robot.profile.outputs.scene.clone(),
+        },
         Verdict::Accepted | Verdict::AcceptedWithWarnings => NextStep::Use {
             urdf: e.inputs.robot.profile.outputs.urdf.clone(),
             effects: effects_file(e),

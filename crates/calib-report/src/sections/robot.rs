@@ -141,15 +141,10 @@ pub(super) fn transforms(page: &mut Page, report: &Report) {
                     .join(", ")
             },
         );
-        let status = if transform.observable {
-            transform.status.word().to_owned()
-        } else {
-            format!("{}, partial", transform.status.word())
-        };
         table.row([
             code(&transform.name),
             format!("{} ← {}", transform.parent, transform.child),
-            status,
+            crate::words::transforms::status(transform),
             place(0),
             place(1),
             place(2),

@@ -81,6 +81,11 @@ fn head(report: &Report, look: Look) -> Vec<String> {
     if let Some(parameters) = words::robot::parameters(report) {
         out.extend(lines(&parameters, look, "", "  "));
     }
+    if words::transforms::is_the_result(report) {
+        for transform in &report.transforms {
+            out.extend(lines(&words::transforms::line(transform), look, "", "  "));
+        }
+    }
     out
 }
 
@@ -174,7 +179,11 @@ fn next(report: &Report, places: Places<'_>) -> Option<String> {
     let urdf = diagnosis::nominal_urdf(report);
     let command = urdf.and_then(|urdf| diagnosis::apply(report, places.folder, &places.of(urdf)));
     match (command, report.verdict) {
-        (Some(command), Verdict::Accepted | Verdict::AcceptedWithWarnings) => Some(command),
+        (Some(command), Verdict::Accepted | Verdict::AcceptedWithWarnings)
+            if !report.changes.is_empty() =>
+        {
+            Some(command)
+        }
         _ => report.next_steps.first().map(|step| sentence(step)),
     }
 }

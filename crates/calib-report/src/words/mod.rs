@@ -28,5 +28,6 @@ pub(crate) mod robot;
 pub(crate) mod scope;
 pub(crate) mod selection;
 mod terms;
+pub(crate) mod transforms;
 pub(crate) mod verdict;
 pub(crate) mod weak;

@@ -14,6 +14,9 @@ impl NextStep {
                     with.map_or_else(String::new, |file| format!(" with the effects in `{file}`"));
                 format!("Use `{urdf}`{with}, and keep this folder: `calib revert` needs it.")
             }
+            Self::KeepUrdf { scene } => format!(
+                "Keep the URDF: nothing of the robot itself was estimated. `{scene}` has where bodies and tracker are."
+            ),
             Self::FixProblems => {
                 "Do not use this result until the problems above are fixed.".to_owned()
             }

@@ -4,9 +4,7 @@ use calib_finding::{Fact, Finding, catalog};
 use calib_recording::Poses;
 use nalgebra::Point3;
 
-use super::{
-    ALL_PERMUTATIONS, ALWAYS_THE_SAME, BENDING, Body, OWN_SIGMAS, Pair, ROWS, distances,
-};
+use super::{ALL_PERMUTATIONS, ALWAYS_THE_SAME, BENDING, Body, OWN_SIGMAS, Pair, ROWS, distances};
 use crate::statistics::{median, range};
 
 /// A row with one marker out of place.
@@ -82,12 +80,7 @@ impl<'a> Body<'a> {
     }
 
     /// A row with its marker out of place, by how much, and in `alone` the markers each of which explains it alone.
-    fn outlier(
-        &self,
-        poses: &Poses,
-        row: usize,
-        alone: &mut Vec<Vec<usize>>,
-    ) -> Outlier {
+    fn outlier(&self, poses: &Poses, row: usize, alone: &mut Vec<Vec<usize>>) -> Outlier {
         let points: Vec<Option<Point3<f64>>> = self.tracks.iter().map(|track| track[row]).collect();
         alone.push(self.explained_by_one(&points));
         let (marker, off) = self.out_of_place(&points);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use bodies::add_bodies;
-use calib_core::{Chart, EdgeId, FrameId, Problem, Role, Settings};
+use calib_core::{Chart, EdgeId, FrameId, Problem, Role, Settings, Solution};
 use calib_profile::{Free, Usage};
 use couplings::coupling_candidates;
 use joints::{Row, add_joint, joint_noise_group};
@@ -156,15 +156,29 @@ pub fn fit(
     settings: &Settings,
 ) -> Result<MlFit, PipelineError> {
     let solution = calib_core::solve(&formulation.problem, settings)?;
-    let calibration = calibration(&formulation, &solution, inputs);
-    Ok(MlFit {
+    Ok(found(formulation, inputs, solution))
+}
+
+/// As [`fit`], from the observations only that another fit kept; `None` where the two do not have the same ones, or too few are left.
+pub fn fit_kept(
+    formulation: &Formulation,
+    inputs: &Inputs,
+    kept: &Solution,
+    settings: &Settings,
+) -> Option<MlFit> {
+    let solution = calib_core::solve_kept(&formulation.problem, kept, settings).ok()?;
+    Some(found(formulation.clone(), inputs, solution))
+}
+
+fn found(formulation: Formulation, inputs: &Inputs, solution: Solution) -> MlFit {
+    MlFit {
         noise: None,
         widths: Vec::new(),
         widened: None,
+        calibration: calibration(&formulation, &solution, inputs),
         formulation,
         solution,
-        calibration,
-    })
+    }
 }
 
 /// All rows with known joint positions, recording after recording.
