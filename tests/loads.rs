@@ -6,7 +6,7 @@ use scratch::Scratch;
 use serde_json::Value;
 
 /// Four joints; `inertial` of the three moving links that have one.
-fn urdf(inertial: [&str; 3]) -> String {
+pub fn urdf(inertial: [&str; 3]) -> String {
     let joint = |i: usize, xyz: &str, axis: &str, inertial: &str| {
         format!(
             "  <link name=\"l{i}\">{inertial}</link>\n  <joint name=\"j{i}\" type=\"revolute\"><parent link=\"l{}\"/><child link=\"l{i}\"/>\n    \
@@ -23,9 +23,9 @@ fn urdf(inertial: [&str; 3]) -> String {
     )
 }
 
-const MASSLESS: [&str; 3] = ["", "", ""];
+pub const MASSLESS: [&str; 3] = ["", "", ""];
 
-const PROFILE: &str = r#"calib: 1
+pub const PROFILE: &str = r#"calib: 1
 robot: {name: arm, urdf: arm.urdf}
 tracker: {frame: lab, body_sigma_mm: 0.1, body_sigma_deg: 0.02}
 bodies:
@@ -57,7 +57,7 @@ simulate:
 "#;
 
 /// Recordings of a robot (URDF and profile) simulated, beside the URDF and profile of the run.
-fn laboratory(truth: (&str, &str), run: (&str, &str)) -> Scratch {
+pub fn laboratory(truth: (&str, &str), run: (&str, &str)) -> Scratch {
     let real = Scratch::new()
         .file("arm.urdf", truth.0)
         .file("arm.yaml", truth.1);
@@ -223,7 +223,7 @@ fn the_urdf_fitted_without_effects_predicts_better_than_the_one_whose_effects_ar
 }
 
 /// Masses far from rods: a light upper arm, a heavy forearm, a hand with its center aside.
-const UNEVEN: [&str; 3] = [
+pub const UNEVEN: [&str; 3] = [
     "<inertial><origin xyz=\"0.03 0 0.1\"/><mass value=\"3\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>",
     "<inertial><origin xyz=\"0.2 0 0.08\"/><mass value=\"6\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>",
     "<inertial><origin xyz=\"0.1 0.12 0\"/><mass value=\"4\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>",

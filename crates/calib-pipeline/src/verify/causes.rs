@@ -1,7 +1,9 @@
 //! What made the residuals: missing effects, a change while recording, or what was suspected before the fit. Each is stated only
 //! where it explains something beside the others.
 
-use calib_core::{Change, ChangeScan, Contest, EffectKind, GoodnessOfFit, ScoreTest, Suspect};
+use calib_core::{
+    Change, ChangeScan, Contest, EffectKind, GoodnessOfFit, Moved, ScoreTest, Suspect,
+};
 use calib_finding::{Fact, Finding, catalog};
 
 use super::elimination::{Asked, Held, eliminated};
@@ -132,6 +134,7 @@ fn asked(
                 least: part * alone,
                 share: 0.0,
                 part: 1.0,
+                linearized: change.map_or(0.0, |(change, _)| turned(change).powi(2)),
             }
         }
         Cause::Missing(_) => Asked {
@@ -140,12 +143,22 @@ fn asked(
                 .min(KEPT * alone),
             share: RELEVANT,
             part: ALIKE,
+            linearized: 0.0,
         },
         Cause::Before(..) => Asked {
             least: contest.threshold(SIGNIFICANT / tests as f64, directions),
             share: RELEVANT,
             part: ALIKE_BEFORE,
+            linearized: 0.0,
         },
+    }
+}
+
+/// By how much a step of a joint turns what lies behind it, rad: a row that it moves by d is linearized to within d times this.
+fn turned(change: &Change) -> f64 {
+    match change.moved {
+        Moved::Joint(_) => change.jump[0],
+        _ => 0.0,
     }
 }
 

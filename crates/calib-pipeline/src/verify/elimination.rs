@@ -19,6 +19,8 @@ pub(super) struct Asked {
     pub share: f64,
     /// Part of a cause's T from which it is as good in its place.
     pub part: f64,
+    /// Share of the cost that it leaves by being linearized: what explains less beside it may be no more than that.
+    pub linearized: f64,
 }
 
 /// The causes that hold, with what is as good in the place of each.
@@ -47,7 +49,9 @@ pub(super) fn eliminated(contest: &Contest, asked: &[Asked]) -> Held {
         let with: Vec<usize> = beside.iter().copied().chain([one]).collect();
         let (before, after) = (contest.explains(beside), contest.explains(&with));
         let share = (after - before) / (1.0 - before).max(f64::MIN_POSITIVE);
-        match directions > 0 && share > asked[one].share {
+        let linearized = beside.iter().map(|k| asked[*k].linearized);
+        let is_real = linearized.fold(0.0, f64::max) < after - before;
+        match directions > 0 && share > asked[one].share && is_real {
             true => score - asked[one].least,
             false => f64::NEG_INFINITY,
         }
