@@ -8,11 +8,13 @@ use nalgebra::{DVector, Isometry3, Vector3};
 use super::Options;
 use super::data::Data;
 use super::ids::SampleIndex;
-use super::linear::{Model, moving_joints, solve};
+use super::linear::{Model, moving_joints, prior_precision, solve};
 use super::thinning::thinned;
 
 /// Joint noise against marker noise, (rad/m)²: none, and 0.003° … 0.1° for a marker of 0.3 mm.
 const NOISE_RATIOS: [f64; 5] = [0.0, 0.03, 0.3, 3.0, 30.0];
+/// A relinearization that moves nothing by more of its prior σ is the last: the next would move a millionth.
+const SETTLED: f64 = 1e-3;
 /// Rows that give the point of linearization and the noise ratio: what they leave open is of second order, or a grid of
 /// factors of ten.
 const ROWS: usize = 120;
@@ -80,12 +82,15 @@ pub(super) fn relinearized(
     let mut deviation = DVector::zeros(6 * moving.len());
     let mut sigma = options.sigma;
     for _ in 0..rounds {
-        let x = {
+        let (x, most) = {
             let model = Model::new(&data, &[], screened);
             let sums = model.sums(NOISE_RATIOS[2]);
             let map = solve(&model, &sums, sigma, &deviation, options)?;
             sigma = map.sigma;
-            map.x.rows(model.registration, deviation.len()).into_owned()
+            let x = map.x.rows(model.registration, deviation.len()).into_owned();
+            let precision = prior_precision(&model, options);
+            let of_prior = x.zip_map(&precision, |x, p| x * p.sqrt());
+            (x, of_prior.amax())
         };
         deviation += x;
         for (g, &j) in moving.iter().enumerate() {
@@ -96,6 +101,9 @@ pub(super) fn relinearized(
             );
             let step: Isometry3<f64> = se3::exp(&twist);
             data.chain.joints[j].parent_from_joint = nominal.joints[j].parent_from_joint * step;
+        }
+        if most < SETTLED {
+            break;
         }
     }
     Some((data, deviation, sigma))

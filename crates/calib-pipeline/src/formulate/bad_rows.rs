@@ -55,10 +55,18 @@ pub fn bad_rows_of_inputs(
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
 ) -> Result<BadRows, PipelineError> {
+    if !inputs.recordings.values().any(is_judged) {
+        return Ok(BadRows::default());
+    }
     let start = start(inputs, tracks);
     let stated = ml::state(inputs, tracks, &start, FreeSet::Profile);
     let fit = ml::fit(stated, inputs, &calib_core::Settings::default())?;
     Ok(bad_rows(inputs, tracks, &fit))
+}
+
+/// Whether single rows of a recording are judged. Where rows follow each other in time, a lag is the clock's, and every row has one.
+fn is_judged(loaded: &Loaded) -> bool {
+    loaded.spec.usage != Usage::Validation && loaded.alignment.is_none()
 }
 
 /// What is wrong with the rows that `fit` left out.
@@ -86,12 +94,7 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
         let Some(usual) = off.usual(&rejected) else {
             continue;
         };
-        for (recording, loaded) in inputs
-            .recordings
-            .iter()
-            // Where rows follow each other in time, a lag is the clock's, and every row has one.
-            .filter(|(_, r)| r.spec.usage != Usage::Validation && r.alignment.is_none())
-        {
+        for (recording, loaded) in inputs.recordings.iter().filter(|(_, r)| is_judged(r)) {
             let (mut moving, mut others) = (Vec::new(), Vec::new());
             for row in 0..loaded.q.len() {
                 if !rejected.contains(&(recording.clone(), row, name.clone())) {
