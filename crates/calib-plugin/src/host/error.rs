@@ -71,6 +71,14 @@ pub enum PluginError {
         /// The chain of causes.
         reason: String,
     },
+    /// This program is static: it has no loader of shared libraries.
+    #[error(
+        "plugin {path}: this program is static (musl) and cannot load plugins\n  help: use the release for `linux-gnu`, or build one: cargo install --path crates/calib-cli"
+    )]
+    StaticProgram {
+        /// The file.
+        path: String,
+    },
     /// It is a library, but no plugin.
     #[error("plugin {path}: found a shared library, needed one that exports `{symbol}`: {reason}")]
     NoEntry {

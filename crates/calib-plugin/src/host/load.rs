@@ -111,6 +111,10 @@ impl Host {
 
 fn open(path: &Path) -> Result<LoadedPlugin, PluginError> {
     let shown = path.display().to_string();
+    // The loader of a static program gives no reason that a person could use.
+    if cfg!(all(target_env = "musl", target_feature = "crt-static")) {
+        return Err(PluginError::StaticProgram { path: shown });
+    }
     // An absolute path, because the system's loader searches elsewhere for a bare file name.
     let file = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     // SAFETY: runs the library's initializers. It is code that the user named; what they do is in the trust model.
