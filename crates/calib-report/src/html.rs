@@ -37,7 +37,7 @@ struct HeadPart {
     strip: Option<Markup>,
     use_for: Vec<Markup>,
     not_for: Option<Markup>,
-    interval: Markup,
+    bounds: Vec<Markup>,
     diagnosis: Option<[Markup; 2]>,
     remarks: Vec<RemarkPart>,
     next: Option<Markup>,
@@ -46,6 +46,7 @@ struct HeadPart {
 
 struct RemarkPart {
     word: &'static str,
+    rejects: bool,
     text: Markup,
     remedy: Markup,
     place: &'static str,
@@ -191,9 +192,8 @@ fn head_part(report: &Report, sections: &[SectionPart]) -> HeadPart {
     let strip = (steps.len() > 1).then(|| Markup(strip(&steps, limit(report).map(|l| l.limit))));
     let number = headline(report);
     let [interval, limit] = [&number.interval, &number.limit];
-    let interval = [interval, limit].map(String::as_str);
-    let interval = interval.into_iter().filter(|text| !text.is_empty());
-    let interval = interval.collect::<Vec<_>>().join(" · ");
+    let bounds = [interval, limit].into_iter().filter(|t| !t.is_empty());
+    let bounds = bounds.map(|text| Markup::from_text(text)).collect();
     let has = |id: &str| sections.iter().any(|section| section.id == id);
     let remarks = remarks(report).into_iter();
     let texts = |words: [String; 2]| words.map(|words| Markup::from_text(&words));
@@ -212,10 +212,11 @@ fn head_part(report: &Report, sections: &[SectionPart]) -> HeadPart {
             .map(|s| Markup::from_text(s))
             .collect(),
         not_for: not_for(report).map(|excluded| Markup::from_text(&excluded)),
-        interval: Markup::from_text(&interval),
+        bounds,
         diagnosis: diagnosis(report).map(texts),
         remarks: remarks
             .map(|remark| RemarkPart {
+                rejects: remark.effect == Effect::Rejects,
                 word: match remark.effect {
                     Effect::Rejects => "Rejected",
                     Effect::LeavesOpen => "Open",

@@ -229,10 +229,9 @@ fn held_out(plots: &mut Vec<Plot>, report: &Report) {
             id: "plot-held-out-poses".into(),
             section: "held-out",
             title: "Pose by pose".into(),
-            description: "Error of every held-out pose in the order of the recording; logarithmic."
-                .into(),
+            description: "Every held-out error in the order of the recording; logarithmic.".into(),
             kind: PlotKind::Xy {
-                x: "pose, in the order of the recording [1]".into(),
+                x: "held-out error, in the order of the recording [1]".into(),
                 y: "error [mm]".into(),
                 log_y: true,
                 band: None,

@@ -47,7 +47,7 @@ pub struct ViewFrame {
 pub struct ViewPose {
     /// Its label.
     pub name: String,
-    /// Its errors: "Error of gripM: 0.31 mm".
+    /// Its errors: "errors: gripM 0.31 mm".
     pub text: String,
     /// x, y, z, qx, qy, qz, qw of every frame with the delivered robot; empty when it is not shown.
     pub nominal: Vec<[f64; 7]>,

@@ -200,18 +200,18 @@ impl HeldOut {
         }
     }
 
-    /// The errors of one pose, by body, for the 3-D view: `Error of gripM: 0.31 mm and 0.2°; of linkM: 0.42 mm`. Empty
+    /// The errors of one pose, by body, for the 3-D view: `errors: gripM 0.31 mm and 0.2°; linkM 0.42 mm`. Empty
     /// where the pose has none.
     #[must_use]
     pub fn errors_of(&self, pose: &str) -> String {
         let of_pose = self.poses.iter().filter(|error| error.pose == pose);
         let parts: Vec<String> = of_pose
-            .map(|error| format!("of {}: {}", error.subject, errors(error)))
+            .map(|error| format!("{} {}", error.subject, errors(error)))
             .collect();
         if parts.is_empty() {
             String::new()
         } else {
-            format!("Error {}", parts.join("; "))
+            format!("errors: {}", parts.join("; "))
         }
     }
 }

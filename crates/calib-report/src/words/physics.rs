@@ -46,11 +46,11 @@ impl MissingPhysics {
     #[must_use]
     pub fn evidence(&self) -> String {
         format!(
-            "{} (`{}`): explains {:.0} % of χ², p = {:.0e}",
+            "{} (`{}`): explains {:.0} % of χ², p = {}",
             self.physics.words(),
             self.parameter,
             100.0 * self.explains,
-            self.p_value.max(1e-300)
+            super::selection::p_value(self.p_value)
         )
     }
 }

@@ -152,11 +152,11 @@ pub(crate) fn saved(step: &SelectionStep) -> String {
     )
 }
 
-/// "0.02", "3e-8".
+/// "0.02", "3e−8".
 pub(crate) fn p_value(p: f64) -> String {
     if p >= 0.001 {
         number::fixed(p, 3)
     } else {
-        format!("{:.0e}", p.max(1e-300))
+        format!("{:.0e}", p.max(1e-300)).replace('-', "−")
     }
 }
