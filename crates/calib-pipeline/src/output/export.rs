@@ -7,13 +7,13 @@ use calib_core::effect::{Drives, Source};
 use calib_core::{EFFECTS, EffectKind};
 use calib_geometry::so3;
 use calib_report::{Change, Unit};
-use calib_urdf::rpy::rpy_from_rotation;
 use calib_urdf::{ChangeRecord, JointId, RobotModel, UrdfEdit, patch};
 use nalgebra::{Isometry3, Vector3};
 
 use crate::error::PipelineError;
 use crate::formulate::kinematics::{Calibration, JointEffects, motion_axis};
 use crate::output::points::added_frames;
+use crate::output::written::{numbers, written};
 use crate::prepare::inputs::Inputs;
 use crate::verify::known::{Known, Number};
 
@@ -33,8 +33,8 @@ pub struct PatchedUrdf {
 /// Origins that moved by less than this (m, rad) keep their text: below any tracker and above rounding.
 const UNCHANGED: f64 = 1e-12;
 
-/// Patches the URDF to the calibrated geometry; verifies by re-reading that its forward kinematics is the
-/// solution's to 1e-12 m.
+/// Patches the URDF to the calibrated geometry, in numbers of nine decimals ([`written`]); verifies by re-reading that the forward kinematics of the text is
+/// that of the numbers that were meant to 1e-12 m.
 ///
 /// # Errors
 /// [`PipelineError::Patch`].
@@ -53,7 +53,7 @@ pub fn patch_urdf(
         if change.translation.vector.norm() > UNCHANGED || change.rotation.angle() > UNCHANGED {
             edits.push(UrdfEdit::SetOrigin {
                 joint: nominal.joint(joint).name.clone(),
-                parent_link_from_joint: new,
+                parent_link_from_joint: written(Some(&old), &new),
             });
         }
     }
@@ -163,12 +163,6 @@ const ORIGIN_NUMBERS: [&str; 6] = [
 
 /// The numbers of [`Number::Mount`] in words.
 const MOUNT_NUMBERS: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
-
-fn numbers(pose: &Isometry3<f64>) -> [f64; 6] {
-    let t = pose.translation.vector;
-    let rpy = rpy_from_rotation(&pose.rotation);
-    [t.x, t.y, t.z, rpy[0], rpy[1], rpy[2]]
-}
 
 /// Name of the file beside a patched URDF that holds what a URDF cannot: `r.calibrated.urdf` gives `r.calibrated.calibration.yaml`.
 #[must_use]

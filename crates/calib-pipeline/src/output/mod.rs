@@ -18,3 +18,4 @@ mod verdict;
 pub mod view;
 pub mod weak;
 mod widths;
+mod written;

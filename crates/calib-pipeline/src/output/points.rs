@@ -6,6 +6,7 @@ use calib_urdf::{LinkId, RobotModel, UrdfEdit};
 use nalgebra::{Isometry3, Point3};
 
 use crate::formulate::kinematics::Calibration;
+use crate::output::written::written;
 use crate::prepare::inputs::Inputs;
 
 /// The bodies and points that the profile adds to the URDF.
@@ -20,7 +21,7 @@ pub(super) fn added_frames(inputs: &Inputs, robot: &Calibration) -> Vec<UrdfEdit
                 name: body.clone(),
                 parent_link: nominal.link(link).name.clone(),
                 joint_name: format!("{body}_mount"),
-                parent_from_frame: *mount,
+                parent_from_frame: written(None, mount),
                 comment: Some(format!("tracking body {body}")),
             });
         }
@@ -31,7 +32,7 @@ pub(super) fn added_frames(inputs: &Inputs, robot: &Calibration) -> Vec<UrdfEdit
             edits.push(UrdfEdit::AddFixedFrame {
                 joint_name: format!("{}_mount", point.name),
                 parent_link: nominal.link(point.link).name.clone(),
-                parent_from_frame: Isometry3::from(point.on_link),
+                parent_from_frame: written(None, &Isometry3::from(point.on_link)),
                 comment: Some(format!("point {} (no orientation)", point.name)),
                 name: point.name,
             });

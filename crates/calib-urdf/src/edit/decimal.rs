@@ -33,9 +33,13 @@ pub fn decimals(values: &[f64]) -> String {
 
 /// An angle that came through a rotation, without the noise of that: 0.09999999999999999 is 0.1.
 ///
-/// Moves it by less than a rounding of the rotation itself, 2.3e-16 rad.
+/// Moves it by less than a rounding of the rotation itself, 2.3e-16 rad; to a number of nine decimals by less than [`SAME_NUMBER`].
 #[must_use]
 pub fn tidy_angle(angle: f64) -> f64 {
+    let short = (angle * 1e9).round() / 1e9;
+    if (short - angle).abs() <= SAME_NUMBER {
+        return short;
+    }
     let rounded = (angle * 1e15).round() / 1e15;
     if (rounded - angle).abs() <= f64::EPSILON {
         rounded
