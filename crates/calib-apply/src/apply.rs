@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use calib_urdf::{ModelDiff, UrdfEdit, diff_origins};
+use calib_urdf::{ModelDiff, Patched, UrdfEdit, diff_origins};
 use nalgebra::Isometry3;
 
 use crate::change::{Destination, FileChange};
@@ -12,7 +12,8 @@ use crate::error::{ApplyError, OriginDifference};
 use crate::files;
 use crate::kind::Kind;
 use crate::result::{self, Calibrated};
-use crate::target::Target;
+use crate::revert::{Recorded, record_of, recorded, reverted};
+use crate::target::{PatchedTarget, Target};
 
 /// What to apply to what.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -64,8 +65,7 @@ pub fn apply(request: &ApplyRequest) -> Result<Applied, ApplyError> {
         target.recover(&mut notes)?;
     }
     let edits = result.edits(target.kind, &mut notes);
-    let patched = target.patch(&result, &edits)?;
-    let state = compare(&result, &patched.before, &request.target)?;
+    let (patched, state) = patched(&result, &mut target, &edits, &mut notes)?;
     let mut moved = diff_origins(
         &result.changed(&result.before),
         &result.changed(&result.after),
@@ -85,17 +85,11 @@ pub fn apply(request: &ApplyRequest) -> Result<Applied, ApplyError> {
             if patched.splices.is_empty() {
                 continue;
             }
-            let record = patched.record(&original);
-            files.push(FileChange {
-                path,
-                original,
-                patched,
-                record,
-                written: None,
-            });
+            files.push(file_change(path, original, patched)?);
         }
     }
     target.add_notes(&files, &mut notes);
+    files::announce(&files, &request.destination, &mut notes);
     if request.destination == Destination::InPlace {
         let many = files.iter().filter(|file| has_other_names(&file.path));
         notes.extend(many.map(|file| {
@@ -114,6 +108,60 @@ pub fn apply(request: &ApplyRequest) -> Result<Applied, ApplyError> {
     };
     files::write(&mut applied.files, &request.destination)?;
     Ok(applied)
+}
+
+/// The target after the edits. Where it holds an earlier change of ours and the calibration did not start from that, the earlier change
+/// is replaced.
+fn patched(
+    result: &Calibrated,
+    target: &mut Target,
+    edits: &[UrdfEdit],
+    notes: &mut Vec<String>,
+) -> Result<(PatchedTarget, State), ApplyError> {
+    let patched = target.patch(result, edits)?;
+    let refused = match compare(result, &patched.before, &target.path) {
+        Ok(state) => return Ok((patched, state)),
+        Err(refused) => refused,
+    };
+    if !target.go_back()? {
+        return Err(refused);
+    }
+    let patched = target.patch(result, edits)?;
+    match compare(result, &patched.before, &target.path) {
+        Ok(state) => {
+            notes.push(
+                "the target holds an earlier calibration, which this one replaces: it started from the same original"
+                    .to_owned(),
+            );
+            Ok((patched, state))
+        }
+        Err(_) => Err(refused),
+    }
+}
+
+/// A changed file with the record that leads back to its first original.
+fn file_change(
+    path: PathBuf,
+    original: String,
+    patched: Patched,
+) -> Result<FileChange, ApplyError> {
+    let own = patched.record(&original);
+    let record = match recorded(&path, &original) {
+        Recorded::After => {
+            let earlier = record_of(&path, &original)?;
+            let first = reverted(&path, &original, &earlier)?;
+            earlier.then(&own, &first, &patched.text)
+        }
+        Recorded::Before | Recorded::No => own,
+    };
+    let on_disk = calib_urdf::source::read_text(&path, &path.display().to_string())?;
+    Ok(FileChange {
+        path,
+        original: on_disk,
+        patched,
+        record,
+        written: None,
+    })
 }
 
 /// Whether a file has more than one name; the system may not tell.

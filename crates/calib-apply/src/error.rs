@@ -61,6 +61,17 @@ pub enum ApplyError {
         /// Why.
         source: std::io::Error,
     },
+    /// A xacro was not changed, but a YAML that it loads was.
+    #[error(
+        "{}: it has no change record: its numbers were changed in {}\n  help: revert that file: calib revert {} --in-place",
+        file.display(), yaml.display(), yaml.display()
+    )]
+    RecordedElsewhere {
+        /// The xacro.
+        file: PathBuf,
+        /// The YAML.
+        yaml: PathBuf,
+    },
     /// The change record beside a file is damaged, or is something else.
     #[error("{}: is not a change record: {source}\n  help: {RECORD_REMEDY}", path.display())]
     NotARecord {
@@ -112,10 +123,10 @@ pub enum ApplyError {
         /// What differs, in the order of the joints' names.
         others: Vec<OriginDifference>,
     },
-    /// The target holds a change already, which has a record.
+    /// The target was edited since a change that has a record: the first original could not be restored.
     #[error(
-        "{}: it holds another change already, which {} records\n  help: revert that first (calib revert {} --in-place), or write elsewhere with --out",
-        file.display(), record.display(), file.display()
+        "{}: it was edited after the change that {} records\n  help: undo those edits, or write elsewhere with --out",
+        file.display(), record.display()
     )]
     ChangedAlready {
         /// The target.

@@ -6,7 +6,7 @@ use calib_files::{FileError, OutputFile, folder_of, remove, replace, write_new};
 
 use crate::change::{Destination, FileChange};
 use crate::error::ApplyError;
-use crate::revert::{Recorded, record_path, recorded};
+use crate::revert::{Recorded, record_path, recorded, waiting_path};
 
 /// Writes the files, each with its record; nothing where they go nowhere.
 pub(super) fn write(files: &mut [FileChange], destination: &Destination) -> Result<(), ApplyError> {
@@ -33,37 +33,66 @@ pub(super) fn write(files: &mut [FileChange], destination: &Destination) -> Resu
 }
 
 /// Over the targets: first all records, then the files. Whatever stops it, every file that was changed has its record, and
-/// a record without its change is recognized by the next call.
+/// a record without its change is recognized by the next call. A record that replaces an earlier one waits beside it until its file is
+/// written: what was stopped leaves the earlier change with its own record.
 fn over(files: &[FileChange]) -> Result<(), ApplyError> {
     let mut records = Vec::new();
     for file in files {
         let record = record_path(&file.path);
-        if record.exists() && recorded(&file.path, &file.original) != Recorded::Before {
-            return Err(ApplyError::ChangedAlready {
-                file: file.path.clone(),
-                record,
-            });
+        let replaces = recorded(&file.path, &file.original) == Recorded::After;
+        if let Some(refused) = refused(file) {
+            return Err(refused);
         }
-        records.push((record, record_text(file)?));
+        let place = if replaces {
+            waiting_path(&file.path)
+        } else {
+            record.clone()
+        };
+        records.push((record, place, record_text(file)?));
     }
     let write_all = || -> Result<(), FileError> {
-        for (record, text) in &records {
-            replace(record, text.as_bytes())?;
+        for (_, place, text) in &records {
+            replace(place, text.as_bytes())?;
         }
         files
             .iter()
-            .try_for_each(|file| replace(&file.path, file.patched.text.as_bytes()))
+            .try_for_each(|file| replace(&file.path, file.patched.text.as_bytes()))?;
+        for (record, place, text) in &records {
+            if place != record {
+                replace(record, text.as_bytes())?;
+                remove(place)?;
+            }
+        }
+        Ok(())
     };
     write_all().map_err(|error| {
         // The error that counts is the first; a record stays where its file could not be restored.
-        for (file, (record, _)) in files.iter().zip(&records) {
-            let changed = recorded(&file.path, &text_of(&file.path)) == Recorded::After;
+        for (file, (_, place, _)) in files.iter().zip(&records) {
+            let changed = text_of(&file.path) == file.patched.text;
             if !changed || replace(&file.path, file.original.as_bytes()).is_ok() {
-                let _ = remove(record);
+                let _ = remove(place);
             }
         }
         error.into()
     })
+}
+
+/// Why a file is not changed in place: it was edited after an earlier change of ours.
+fn refused(file: &FileChange) -> Option<ApplyError> {
+    let record = record_path(&file.path);
+    let edited = record.exists() && recorded(&file.path, &file.original) == Recorded::No;
+    edited.then(|| ApplyError::ChangedAlready {
+        file: file.path.clone(),
+        record,
+    })
+}
+
+/// A dry run says what a change in place would be refused for.
+pub(super) fn announce(files: &[FileChange], destination: &Destination, notes: &mut Vec<String>) {
+    if *destination == Destination::Nowhere {
+        let refusals = files.iter().filter_map(refused);
+        notes.extend(refusals.map(|why| format!("--in-place would be refused: {why}")));
+    }
 }
 
 fn text_of(path: &Path) -> String {

@@ -1,9 +1,9 @@
-//! The original of a changed file, by the record beside it.
+//! The record beside a changed file, and what it says of the file.
 
 use std::path::{Path, PathBuf};
 
-use calib_files::{OutputFile, folder_of, input, remove, replace, write_new};
-use calib_urdf::{ChangeRecord, RevertError, sha256_hex, source};
+use calib_files::input;
+use calib_urdf::{ChangeRecord, sha256_hex, source};
 
 use crate::error::ApplyError;
 
@@ -13,17 +13,42 @@ pub fn record_path(file: &Path) -> PathBuf {
     PathBuf::from(format!("{}.changes.json", file.display()))
 }
 
+/// Where the record of a change waits that replaces an earlier one, until the file holds it.
+pub(crate) fn waiting_path(file: &Path) -> PathBuf {
+    PathBuf::from(format!("{}.next", record_path(file).display()))
+}
+
 /// The record beside a file that `calib run` or `calib apply` wrote.
 ///
 /// # Errors
 /// [`ApplyError::NoRecord`], [`ApplyError::NotARecord`].
 pub fn read_record(file: &Path) -> Result<ChangeRecord, ApplyError> {
-    let path = record_path(file);
+    read_at(record_path(file))
+}
+
+fn read_at(path: PathBuf) -> Result<ChangeRecord, ApplyError> {
     let text = match input::read_text(&path, source::MAX_BYTES) {
         Ok(text) => text,
         Err(source) => return Err(ApplyError::NoRecord { path, source }),
     };
     serde_json::from_str(&text).map_err(|source| ApplyError::NotARecord { path, source })
+}
+
+/// The record that tells of this text: that beside the file, or that of a change that was stopped before its record took the place of
+/// the earlier one.
+///
+/// # Errors
+/// As [`read_record`].
+pub(crate) fn record_of(file: &Path, text: &str) -> Result<ChangeRecord, ApplyError> {
+    let record = read_record(file)?;
+    let found = sha256_hex(text.as_bytes());
+    if found == record.original_sha256 || found == record.patched_sha256 {
+        return Ok(record);
+    }
+    match read_at(waiting_path(file)) {
+        Ok(waiting) if found == waiting.patched_sha256 => Ok(waiting),
+        _ => Ok(record),
+    }
 }
 
 /// How a file stands to the record beside it.
@@ -39,7 +64,7 @@ pub(crate) enum Recorded {
 
 /// How a text stands to the record beside its file.
 pub(crate) fn recorded(file: &Path, text: &str) -> Recorded {
-    let Ok(record) = read_record(file) else {
+    let Ok(record) = record_of(file, text) else {
         return Recorded::No;
     };
     let found = sha256_hex(text.as_bytes());
@@ -49,23 +74,6 @@ pub(crate) fn recorded(file: &Path, text: &str) -> Recorded {
         Recorded::After
     } else {
         Recorded::No
-    }
-}
-
-/// The original bytes of a changed file, by the record beside it. A file that is the original still, because what was to
-/// change it was stopped, is its own original.
-///
-/// # Errors
-/// [`ApplyError`] when the record is missing, or the file was edited since.
-pub fn original(changed: &Path) -> Result<String, ApplyError> {
-    let record = read_record(changed)?;
-    let text = source::read_text(changed, &changed.display().to_string())?;
-    match reverted(changed, &text, &record) {
-        Err(ApplyError::Revert {
-            source: RevertError::AlreadyOriginal,
-            ..
-        }) => Ok(text),
-        original => original,
     }
 }
 
@@ -79,27 +87,4 @@ pub(crate) fn reverted(
         file: file.to_path_buf(),
         source,
     })
-}
-
-/// Writes the original bytes of a changed URDF, xacro or YAML to `out`, which must not exist or hold them already.
-///
-/// # Errors
-/// [`ApplyError`] when the change record is missing, or the file was edited since.
-pub fn revert(changed: &Path, out: &Path) -> Result<PathBuf, ApplyError> {
-    let original = original(changed)?;
-    let name = out.file_name().unwrap_or_default().to_string_lossy();
-    write_new(folder_of(out), &[OutputFile::text(name, original)])?;
-    Ok(out.to_path_buf())
-}
-
-/// Writes the original bytes over the changed file and removes the record, which has done its work. Stopped between the two,
-/// the next call removes the record.
-///
-/// # Errors
-/// [`ApplyError`] when the change record is missing, or the file was edited since; the file is untouched then.
-pub fn revert_in_place(changed: &Path) -> Result<PathBuf, ApplyError> {
-    let original = original(changed)?;
-    replace(changed, original.as_bytes())?;
-    remove(&record_path(changed))?;
-    Ok(changed.to_path_buf())
 }

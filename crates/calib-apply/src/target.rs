@@ -13,7 +13,7 @@ use crate::change::FileChange;
 use crate::error::ApplyError;
 use crate::kind::Kind;
 use crate::result::Calibrated;
-use crate::revert::{Recorded, read_record, recorded, reverted};
+use crate::revert::{Recorded, record_of, recorded, reverted};
 
 /// A target as read.
 #[derive(Debug, Clone)]
@@ -157,11 +157,29 @@ impl Target {
         }
         for ((path, text), stand) in files.into_iter().zip(stands) {
             if stand == Recorded::After {
-                *text = reverted(path, text, &read_record(path)?)?;
+                *text = reverted(path, text, &record_of(path, text)?)?;
             }
         }
         notes.push("an earlier change was stopped between two files: it was done again".to_owned());
         Ok(())
+    }
+
+    /// Goes back, in memory, to the first originals of files that hold an earlier change; whether there was any.
+    ///
+    /// # Errors
+    /// [`ApplyError`] when a record beside a changed file is damaged.
+    pub(super) fn go_back(&mut self) -> Result<bool, ApplyError> {
+        let yaml = self.yaml_paths.iter().zip(&mut self.companions.yaml);
+        let mut files = vec![(&self.path, &mut self.text)];
+        files.extend(yaml.map(|(path, companion)| (path, &mut companion.text)));
+        let mut any = false;
+        for (path, text) in files {
+            if recorded(path, text) == Recorded::After {
+                *text = reverted(path, text, &record_of(path, text)?)?;
+                any = true;
+            }
+        }
+        Ok(any)
     }
 
     /// Makes the edits; nothing is written.
@@ -215,6 +233,16 @@ impl Target {
             );
         }
     }
+}
+
+/// YAMLs that a xacro loads and that hold a change of ours.
+pub(crate) fn changed_yaml(xacro: &Path) -> Vec<PathBuf> {
+    let Ok(target) = Target::read(xacro, None) else {
+        return Vec::new();
+    };
+    let yaml = target.yaml_paths.iter().zip(&target.companions.yaml);
+    let changed = yaml.filter(|(path, yaml)| recorded(path, &yaml.text) == Recorded::After);
+    changed.map(|(path, _)| path.clone()).collect()
 }
 
 /// The origins that a file shows.
@@ -281,7 +309,12 @@ fn resolve(xacro: &Path, argument: &str) -> Option<PathBuf> {
         return None;
     }
     // The package that the xacro is in, or one beside it.
-    let absolute = folder.canonicalize().ok()?;
+    let here = if folder == Path::new("") {
+        Path::new(".")
+    } else {
+        folder
+    };
+    let absolute = here.canonicalize().ok()?;
     let mut up = folder.to_path_buf();
     for ancestor in absolute.ancestors() {
         let named = ancestor.file_name().is_some_and(|n| n == package)

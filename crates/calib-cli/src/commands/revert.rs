@@ -6,7 +6,7 @@ use calib_pipeline::ExitCode;
 use clap::Args;
 
 use crate::error::CliError;
-use crate::terminal::{Console, emit_paths};
+use crate::terminal::{Console, emit_paths, say};
 
 /// Arguments of `calib revert`.
 #[derive(Debug, Args)]
@@ -27,6 +27,9 @@ pub fn run(console: &Console, options: &Revert) -> Result<ExitCode, CliError> {
         Some(out) => calib_apply::revert(&options.file, out)?,
         None => calib_apply::revert_in_place(&options.file)?,
     };
+    for note in calib_apply::not_reverted(&options.file) {
+        say(&format!("note: {note}"));
+    }
     emit_paths(console.json, &[written])?;
     Ok(ExitCode::Accepted)
 }

@@ -78,6 +78,58 @@ pub fn sha256_hex(bytes: &[u8]) -> String {
         })
 }
 
+impl ChangeRecord {
+    /// One record for this change and a later one: `first` is the text before this one, `last` the text after the later one.
+    #[must_use]
+    pub fn then(&self, later: &ChangeRecord, first: &str, last: &str) -> ChangeRecord {
+        let mut changes = self.changes.clone();
+        for change in &later.changes {
+            let same =
+                |c: &&mut Change| (&c.joint, &c.attribute) == (&change.joint, &change.attribute);
+            match changes.iter_mut().find(same) {
+                Some(earlier) => earlier.new.clone_from(&change.new),
+                None => changes.push(change.clone()),
+            }
+        }
+        changes.retain(|c| c.old != c.new);
+        ChangeRecord {
+            calib_changes: RECORD_VERSION,
+            original_sha256: sha256_hex(first.as_bytes()),
+            patched_sha256: sha256_hex(last.as_bytes()),
+            changes,
+            replacements: replaced_lines(first, last),
+        }
+    }
+}
+
+/// Lines that differ, as replacements.
+fn replaced_lines(first: &str, last: &str) -> Vec<Replacement> {
+    let diff = similar::TextDiff::from_lines(first, last);
+    let mut at = 0;
+    let mut replacements: Vec<Replacement> = Vec::new();
+    for change in diff.iter_all_changes() {
+        let line = change.value();
+        if change.tag() == similar::ChangeTag::Equal {
+            at += line.len();
+            continue;
+        }
+        let goes_on = |r: &&mut Replacement| r.at + r.new.len() == at;
+        if replacements.last_mut().filter(goes_on).is_none() {
+            let (old, new) = (String::new(), String::new());
+            replacements.push(Replacement { at, old, new });
+        }
+        if let Some(last) = replacements.last_mut() {
+            if change.tag() == similar::ChangeTag::Insert {
+                last.new += line;
+                at += line.len();
+            } else {
+                last.old += line;
+            }
+        }
+    }
+    replacements
+}
+
 impl Patched {
     /// The patch that a record tells of; `patched_text` is the text that the record belongs to.
     #[must_use]
