@@ -5,8 +5,17 @@ use crate::scratch;
 use scratch::Scratch;
 use serde_json::Value;
 
+/// What changed of the robot since the first recording.
+#[derive(Clone, Copy, Default)]
+struct Since {
+    /// The forearm grew.
+    longer_mm: f64,
+    /// The zero of the elbow's encoder moved.
+    elbow_deg: f64,
+}
+
 /// The robot as it really is: the nominal URDF with errors of a real arm's size.
-fn true_robot(urdf: &str, longer_mm: f64) -> String {
+fn true_robot(urdf: &str, since: Since) -> String {
     let moved = |text: &str, joint: &str, from: &str, to: String| {
         let at = text
             .find(&format!("<joint name=\"{joint}\""))
@@ -19,7 +28,10 @@ fn true_robot(urdf: &str, longer_mm: f64) -> String {
         urdf,
         "elbow",
         "xyz=\"0.375 0 0\" rpy=\"0 0 0\"",
-        "xyz=\"0.3756 0 0.0003\" rpy=\"0.001 0 -0.002\"".to_owned(),
+        format!(
+            "xyz=\"0.3756 0 0.0003\" rpy=\"0.001 {} -0.002\"",
+            since.elbow_deg.to_radians()
+        ),
     );
     moved(
         &text,
@@ -27,15 +39,20 @@ fn true_robot(urdf: &str, longer_mm: f64) -> String {
         "xyz=\"0.375 0 0\" rpy=\"0 0 0\"",
         format!(
             "xyz=\"{} 0 -0.0002\" rpy=\"-0.001 0.002 0.001\"",
-            0.3746 + longer_mm * 1e-3
+            0.3746 + since.longer_mm * 1e-3
         ),
     )
 }
 
 /// Records the true robot again (other noise, other poses, bodies mounted elsewhere) and calibrates it.
-fn session(dir: Scratch, name: &str, seed: u32, longer_mm: f64) -> Scratch {
+fn session(dir: Scratch, name: &str, seed: u32, since: Since) -> Scratch {
     let profile = dir.read("robots/ripley.yaml");
-    let truth = true_robot(&dir.read("robots/ripley/r17.urdf"), longer_mm);
+    let truth = true_robot(
+        &Scratch::new()
+            .robot("ripley")
+            .read("robots/ripley/r17.urdf"),
+        since,
+    );
     let (before, rest) = profile
         .split_once("    joint_offset_deg: 0.3\n")
         .expect("errors");
@@ -85,9 +102,17 @@ fn number<'a>(drift: &'a Value, name: &str) -> &'a Value {
 #[test]
 fn a_longer_forearm_is_found_and_the_rest_is_not() {
     let dir = Scratch::new().robot("ripley");
-    let dir = session(dir, "old", 1, 0.0);
-    let dir = session(dir, "same", 2, 0.0);
-    let dir = session(dir, "longer", 3, 1.0);
+    let dir = session(dir, "old", 1, Since::default());
+    let dir = session(dir, "same", 2, Since::default());
+    let dir = session(
+        dir,
+        "longer",
+        3,
+        Since {
+            longer_mm: 1.0,
+            ..Since::default()
+        },
+    );
     let same = dir.calib(["drift", "old", "same"]).expect(0);
     assert!(
         same.stdout.contains("NO SIGNIFICANT CHANGE"),
@@ -145,9 +170,93 @@ fn reports_that_cannot_be_compared() {
         .file("justin/report.json", justin.read("out/report.json"))
         .file("none/report.json", "{}");
     let mut said = String::new();
-    for (other, code) in [("paper", 3), ("justin", 1), ("none", 3), ("missing", 3)] {
+    for (other, code) in [("paper", 3), ("justin", 4), ("none", 3), ("missing", 3)] {
         let ran = dir.calib(["drift", "ripley", other]).expect(code);
         said += &format!("--- {other}\n{}", ran.stderr);
     }
     insta::assert_snapshot!("refused", said);
+}
+
+/// A month: calibrated, applied, calibrated again from the changed URDF, twice, the second time with an encoder's zero moved.
+#[test]
+fn months_from_the_applied_urdf() {
+    let urdf = "robots/ripley/r17.urdf";
+    let dir = Scratch::new().robot("ripley");
+    let nominal = dir.read(urdf);
+    let dir = session(dir, "march", 1, Since::default());
+    dir.calib(["apply", "march", urdf, "--in-place"]).expect(0);
+    let dir = dated(
+        session(dir, "april", 2, Since::default()),
+        "april",
+        "2026-04-01",
+    );
+    // Another month without a change: nothing is found, although parameters are displacements from another URDF.
+    let same = dir.calib(["drift", "march", "april"]).expect(0);
+    assert!(
+        same.stdout.contains("different nominal URDFs"),
+        "{}",
+        same.stdout
+    );
+    dir.calib(["apply", "april", urdf, "--in-place", "--force"])
+        .expect(0);
+    let moved = Since {
+        elbow_deg: 0.1,
+        ..Since::default()
+    };
+    let dir = dated(session(dir, "may", 3, moved), "may", "2026-05-01");
+    let dir = dated(dir, "march", "2026-03-01");
+    let drift = dir
+        .calib(["drift", "april", "may", "--json"])
+        .expect(1)
+        .json();
+    let zero = number(&drift, "zero.elbow");
+    let (change, sigma) = (
+        zero["change"].as_f64().expect("a number"),
+        zero["sigma"].as_f64().expect("a number"),
+    );
+    assert_eq!(zero["significant"], true, "{zero}");
+    assert!(
+        (change.abs() - 0.1_f64.to_radians()).abs() < 3.0 * sigma,
+        "{zero}"
+    );
+    // By date, whatever the order of the arguments.
+    let history = dir
+        .calib(["history", "may", "march", "april", "-o", "history.html"])
+        .expect(0);
+    let lines: Vec<&str> = history.stdout.lines().collect();
+    assert!(
+        lines[1].starts_with("1  2026-03-01  march"),
+        "{}",
+        history.stdout
+    );
+    assert!(
+        lines[2].ends_with("no significant change"),
+        "{}",
+        history.stdout
+    );
+    assert!(
+        history.stdout.contains("CHANGED: zero angle of elbow"),
+        "{}",
+        history.stdout
+    );
+    assert!(
+        history.stdout.lines().all(|l| l.chars().count() <= 80),
+        "{}",
+        history.stdout
+    );
+    assert_eq!(
+        dir.read("history.html").matches("<svg").count(),
+        lines.iter().filter(|l| l.is_empty()).count()
+    );
+    // Two changes, one revert, the first original.
+    dir.calib(["revert", urdf, "--in-place"]).expect(0);
+    assert_eq!(dir.read(urdf), nominal);
+}
+
+/// The report as it is with the date in the profile.
+fn dated(dir: Scratch, name: &str, date: &str) -> Scratch {
+    let file = format!("{name}/report.json");
+    let mut report: Value = serde_json::from_str(&dir.read(&file)).expect("JSON");
+    report["identification"]["date"] = date.into();
+    dir.file(&file, report.to_string())
 }

@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    apply, check, completions, convert, diff, drift, fit, man, plugins, record, revert, run,
-    schema, simulate, study, view,
+    apply, check, completions, convert, diff, drift, fit, history, man, plugins, record, revert,
+    run, schema, simulate, study, view,
 };
 use crate::terminal::Console;
 
@@ -41,8 +41,11 @@ pub enum Command {
     Apply(apply::Apply),
     /// Compare two robots: URDFs, xacros or kinematics YAMLs
     Diff(diff::Diff),
-    /// Test whether a robot changed between two calibrations (false-alarm rate 1 %); exit code 1 if it did
+    /// Test whether a robot changed between two calibrations (false-alarm rate 1 %); exit code 1 if it did, 4 if they
+    /// cannot be compared
     Drift(drift::Drift),
+    /// Show a robot's quantities over its calibrations
+    History(history::History),
     /// Restore the original of a changed URDF, xacro or YAML
     Revert(revert::Revert),
     /// Simulation studies of the estimators, with the Cramér–Rao bound in every cell

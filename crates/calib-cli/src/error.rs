@@ -111,7 +111,7 @@ impl CliError {
         match self {
             Self::Pipeline(error) => error.exit_code(),
             Self::Apply(error) => of_apply(error),
-            Self::Drift(error) if error.is_refusal() => ExitCode::VerdictFail,
+            Self::Drift(error) if error.is_refusal() => ExitCode::NotObservable,
             Self::Drift(DriftError::Unwritable(_)) | Self::Report(_) | Self::Stdout(_) => {
                 ExitCode::NotWritten
             }

@@ -75,6 +75,13 @@ pub struct Drift {
     pub known_in_one: Vec<String>,
     /// Numbers that neither determines without a convention.
     pub known_in_neither: Vec<String>,
+    /// Numbers that one of the data leaves open by more than 1° or 1 cm: a linear step over that distance is not believed.
+    pub not_credible: Vec<String>,
+    /// Directions left out of the test of everything at once for the same reason, in the calibration that has more.
+    pub directions_not_credible: usize,
+    /// Both start from the same nominal URDF. Otherwise parameters are displacements from different places, and only what no choice of
+    /// frames changes, and effects of joints, are compared.
+    pub same_nominal: bool,
     /// Parameters that only the old calibration had.
     pub only_old: Vec<String>,
     /// Parameters that only the new one has.
@@ -84,9 +91,10 @@ pub struct Drift {
 /// Compares two calibrations of one robot.
 ///
 /// # Errors
-/// [`DriftError`] for two robots, two nominal URDFs of one, or no common parameter.
+/// [`DriftError`] for two robots, or nothing that can be compared.
 pub fn compare(old: &Evidence, new: &Evidence) -> Result<Drift, DriftError> {
     same_robot(old, new)?;
+    let same_nominal = old.description == new.description && !old.description.is_empty();
     let named = |of: &Evidence, other: &Evidence| -> Vec<String> {
         of.parameters
             .iter()
@@ -96,19 +104,35 @@ pub fn compare(old: &Evidence, new: &Evidence) -> Result<Drift, DriftError> {
             .collect()
     };
     let dof = old.degrees_of_freedom.min(new.degrees_of_freedom).max(1.0);
-    let joint = joint(old, new, old.degrees_of_freedom + new.degrees_of_freedom)?;
-    let (mut numbers, mut known_in_one, mut known_in_neither) =
+    let both_dof = old.degrees_of_freedom + new.degrees_of_freedom;
+    let (mut known_in_one, mut known_in_neither, mut not_credible) =
         (Vec::new(), Vec::new(), Vec::new());
+    let mut pairs = Vec::new();
     for number in &old.numbers {
         let Some(other) = new.numbers.iter().find(|n| n.name == number.name) else {
             continue;
         };
+        if !same_nominal && (number.displaces || other.displaces) {
+            continue;
+        }
         match (old.determines(number), new.determines(other)) {
-            (true, true) => numbers.extend(change(old, number, new, other, dof)),
+            (true, true) if !(old.is_credible(number) && new.is_credible(other)) => {
+                not_credible.push(number.name.clone());
+            }
+            (true, true) => pairs.push((number, other)),
             (false, false) => known_in_neither.push(number.name.clone()),
             _ => known_in_one.push(number.name.clone()),
         }
     }
+    let joint = if same_nominal {
+        joint(old, new, both_dof)?
+    } else {
+        of_numbers(old, new, &pairs, both_dof)?
+    };
+    let pairs = pairs.into_iter();
+    let mut numbers: Vec<Changed> = pairs
+        .filter_map(|(number, other)| change(old, number, new, other, dof))
+        .collect();
     holm(&mut numbers);
     let changed = joint.significant || numbers.iter().any(|n| n.significant);
     Ok(Drift {
@@ -122,6 +146,9 @@ pub fn compare(old: &Evidence, new: &Evidence) -> Result<Drift, DriftError> {
         numbers,
         known_in_one,
         known_in_neither,
+        not_credible,
+        directions_not_credible: old.not_credible().max(new.not_credible()),
+        same_nominal,
         only_old: named(old, new),
         only_new: named(new, old),
     })
@@ -132,13 +159,6 @@ fn same_robot(old: &Evidence, new: &Evidence) -> Result<(), DriftError> {
         return Err(DriftError::OtherRobot {
             old: (old.file.clone(), old.robot.clone()),
             new: (new.file.clone(), new.robot.clone()),
-        });
-    }
-    if old.description != new.description || old.description.is_empty() {
-        return Err(DriftError::OtherNominal {
-            old: old.file.clone(),
-            new: new.file.clone(),
-            robot: old.robot.clone(),
         });
     }
     Ok(())
@@ -188,18 +208,68 @@ fn joint(old: &Evidence, new: &Evidence, dof: f64) -> Result<Joint, DriftError> 
     let together = in_range(&a, &y, limit);
     let statistic = (&y - together).norm_squared();
     let degrees = (rank_of(a1) + rank_of(a2)).saturating_sub(rank_of(&a));
+    Ok(tested(statistic, degrees, dof))
+}
+
+/// Equation (1) on the numbers that both data determine: x̃₂ − x̃₁ of them, whitened by both covariances.
+fn of_numbers(
+    old: &Evidence,
+    new: &Evidence,
+    pairs: &[(&Number, &Number)],
+    dof: f64,
+) -> Result<Joint, DriftError> {
+    if pairs.is_empty() {
+        return Err(DriftError::NothingInCommon {
+            old: old.file.clone(),
+            new: new.file.clone(),
+        });
+    }
+    let sides = [
+        old.of_numbers(pairs.iter().map(|(number, _)| *number)),
+        new.of_numbers(pairs.iter().map(|(_, number)| *number)),
+    ];
+    let covariance = sides.iter().fold(
+        DMatrix::zeros(pairs.len(), pairs.len()),
+        |sum, spread: &DMatrix<f64>| sum + spread * spread.transpose(),
+    );
+    let change = DVector::from_iterator(
+        pairs.len(),
+        pairs.iter().map(|(a, b)| step(old, a, new, b).2),
+    );
+    // In units of each number's own σ.
+    let sigma = covariance.diagonal().map(f64::sqrt);
+    let scaled = DMatrix::from_fn(pairs.len(), pairs.len(), |r, c| {
+        covariance[(r, c)] / (sigma[r] * sigma[c])
+    });
+    let change = change.component_div(&sigma);
+    let svd = decompose::svd(&scaled);
+    let (mut statistic, mut degrees) = (0.0, 0);
+    for i in 0..svd.s.len() {
+        if svd.s[i] > INDEPENDENT {
+            statistic += svd.v.column(i).dot(&change).powi(2) / svd.s[i];
+            degrees += 1;
+        }
+    }
+    Ok(tested(statistic, degrees, dof))
+}
+
+/// A combination of numbers whose variance is below this share of theirs is the same number twice.
+const INDEPENDENT: f64 = 1e-6;
+
+/// The test of a squared distance.
+fn tested(statistic: f64, degrees: usize, dof: f64) -> Joint {
     let p_value = if degrees == 0 {
         1.0
     } else {
         chance::f_tail(statistic / degrees as f64, degrees as f64, dof.max(1.0))
     };
-    Ok(Joint {
+    Joint {
         statistic,
         degrees_of_freedom: degrees,
         noise_degrees_of_freedom: dof,
         p_value,
         significant: p_value < 0.5 * FALSE_ALARMS,
-    })
+    }
 }
 
 /// A gauge of one calibration is treated as a gauge of both where that moves no whitened residual by more than this.
@@ -262,6 +332,23 @@ fn in_range(a: &DMatrix<f64>, y: &DVector<f64>, limit: f64) -> DVector<f64> {
     part
 }
 
+/// A number before and after, and its change; angles by the shorter way round.
+fn step(
+    old: &Evidence,
+    old_number: &Number,
+    new: &Evidence,
+    new_number: &Number,
+) -> (f64, f64, f64) {
+    let (from, to) = (old.estimate(old_number).0, new.estimate(new_number).0);
+    let plain = to - from;
+    let change = if old_number.unit == Unit::Radian {
+        plain.sin().atan2(plain.cos())
+    } else {
+        plain
+    };
+    (from, to, change)
+}
+
 /// Equation (2).
 fn change(
     old: &Evidence,
@@ -270,14 +357,8 @@ fn change(
     new_number: &Number,
     dof: f64,
 ) -> Option<Changed> {
-    let (from, old_variance) = old.estimate(old_number);
-    let (to, new_variance) = new.estimate(new_number);
-    let plain = to - from;
-    let change = if old_number.unit == Unit::Radian {
-        plain.sin().atan2(plain.cos())
-    } else {
-        plain
-    };
+    let (from, to, change) = step(old, old_number, new, new_number);
+    let (old_variance, new_variance) = (old.estimate(old_number).1, new.estimate(new_number).1);
     let sigma = (old_variance + new_variance).sqrt();
     if !(sigma > 0.0 && change.is_finite() && sigma.is_finite()) {
         return None;

@@ -34,18 +34,6 @@ pub enum DriftError {
         /// The new report and its robot.
         new: (String, String),
     },
-    /// The calibrations start from two nominal URDFs: their parameters are displacements from different places.
-    #[error(
-        "{old} and {new} start from different nominal URDFs of `{robot}`: their parameters are displacements from different places\n  help: run both recordings with the same URDF, for example the one before the first calibration"
-    )]
-    OtherNominal {
-        /// The old report.
-        old: String,
-        /// The new report.
-        new: String,
-        /// The robot.
-        robot: String,
-    },
     /// Loads or approach of a report may have the signs of an earlier version.
     #[error(
         "{file}: it was written before reports stated the signs of loads: whether {} is counted as giving way is not known\n  help: run that calibration again with this version of calib, from the same recordings",
@@ -59,7 +47,7 @@ pub enum DriftError {
     },
     /// No parameter of the robot is estimated in both.
     #[error(
-        "{old} and {new} have no parameter of the robot in common\n  help: estimate the same parameters in both calibrations"
+        "{old} and {new} have nothing of the robot in common that both determine\n  help: estimate the same parameters in both calibrations"
     )]
     NothingInCommon {
         /// The old report.
@@ -78,10 +66,7 @@ impl DriftError {
     pub fn is_refusal(&self) -> bool {
         matches!(
             self,
-            Self::OtherRobot { .. }
-                | Self::OtherNominal { .. }
-                | Self::OldSigns { .. }
-                | Self::NothingInCommon { .. }
+            Self::OtherRobot { .. } | Self::OldSigns { .. } | Self::NothingInCommon { .. }
         )
     }
 }

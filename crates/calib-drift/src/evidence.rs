@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_geometry::decompose;
-use calib_report::{DataInformation, Parameter, Report, Unit};
+use calib_report::{DataInformation, NoiseKind, Parameter, Report, Unit};
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::DriftError;
@@ -23,6 +23,8 @@ pub struct Number {
     pub gradient: DVector<f64>,
     /// Free of any choice of frames.
     pub gauge_free: bool,
+    /// A displacement from the nominal URDF.
+    pub displaces: bool,
 }
 
 /// What one calibration knows.
@@ -48,13 +50,17 @@ pub struct Evidence {
     pub found: DVector<f64>,
     /// x̃ − x̂, scaled, of least norm.
     pub without_prior: DVector<f64>,
+    /// The part of it along directions that the data see well.
+    pub credible_step: DVector<f64>,
     /// Singular values and directions of `root`.
     pub singular: DVector<f64>,
     /// Columns are directions.
     pub directions: DMatrix<f64>,
     /// How many the data see.
     pub rank: usize,
-    /// Degrees of freedom of the noise.
+    /// How many the data see so well that the linear step to what the data alone say is to be believed.
+    pub credible: usize,
+    /// Degrees of freedom of the noise: those of the level that is known worst.
     pub degrees_of_freedom: f64,
     /// What can be compared.
     pub numbers: Vec<Number>,
@@ -62,6 +68,10 @@ pub struct Evidence {
 
 /// As in `calib-core`: a direction below this share of the strongest is a gauge.
 pub(super) const NULL: f64 = calib_core::NULL_TOLERANCE;
+
+/// A direction that the data alone leave open by more than this (scaled: 1°, 1 cm and the like) bends over that distance: a linear step
+/// along it means nothing.
+const CREDIBLE: f64 = 1.0;
 
 fn scale(unit: Unit) -> f64 {
     match unit {
@@ -71,6 +81,48 @@ fn scale(unit: Unit) -> f64 {
         // Compliances.
         _ => 1e-4,
     }
+}
+
+/// P (x̂ − x₀), scaled: how the priors pull at the estimate.
+fn pull(info: &DataInformation, parameters: &[&Parameter], scale: &DVector<f64>) -> DVector<f64> {
+    DVector::from_iterator(
+        parameters.len(),
+        parameters.iter().enumerate().map(|(i, p)| {
+            info.prior_sigma[i].map_or(0.0, |sigma| {
+                (p.value - p.nominal) / (sigma * sigma) * scale[i]
+            })
+        }),
+    )
+}
+
+/// SHA-256 of the nominal URDF; empty where the report does not tell.
+fn description(report: &Report) -> String {
+    report
+        .outputs
+        .iter()
+        .find_map(|o| o.changes.clone())
+        .and_then(|path| report.inputs.iter().find(|i| i.path == path))
+        .map(|i| i.sha256.clone())
+        .unwrap_or_default()
+}
+
+/// Degrees of freedom of the noise: with levels of their own, the level that is known worst decides how heavy the tails are.
+fn degrees_of_freedom(info: &DataInformation, report: &Report) -> f64 {
+    /// A level whose relative error is larger is nothing beside the others: nobody could see it.
+    const NOTHING: f64 = 0.5;
+    let of_level = |noise: &calib_report::Noise| {
+        let error = noise.relative_error?;
+        let counts = error > 0.0 && (noise.kind != NoiseKind::Joint || error < NOTHING);
+        // σ̂ of ν degrees has the relative error 1 / √(2ν).
+        counts.then(|| 0.5 / error.powi(2))
+    };
+    let levels = report.noise.iter().filter_map(of_level);
+    levels.fold(info.degrees_of_freedom, f64::min)
+}
+
+/// Whether a parameter of this kind is a displacement from the nominal URDF; effects of joints are 0 in every URDF.
+fn displaces(kind: &str) -> bool {
+    ["translation", "rotation", "zero_offset", "point"].contains(&kind)
 }
 
 /// Refuses parameters that follow loads or the approach where a report does not state their signs.
@@ -139,24 +191,22 @@ impl Evidence {
                 root[(r, r + k)] = x * scale[r + k];
             }
         }
-        // P (x̂ − x₀), scaled
-        let pull = DVector::from_iterator(
-            n,
-            parameters.iter().enumerate().map(|(i, p)| {
-                info.prior_sigma[i].map_or(0.0, |sigma| {
-                    (p.value - p.nominal) / (sigma * sigma) * scale[i]
-                })
-            }),
-        );
+        let pull = pull(info, &parameters, &scale);
         let svd = decompose::svd(&root);
         let rank = decompose::rank(&svd.s, NULL);
+        let well = |s: &&f64| **s * CREDIBLE >= 1.0;
+        let credible = svd.s.iter().take(rank).filter(well).count();
         // Uᵀ r = P (x̂ − x₀),  U (x̃ − x̂) = r
         let mut r = DVector::zeros(n);
         let mut without_prior = DVector::zeros(n);
+        let mut credible_step = DVector::zeros(n);
         for i in 0..rank {
             let along = svd.v.column(i).dot(&pull) / svd.s[i];
             r += svd.u.column(i) * along;
             without_prior += svd.v.column(i) * (along / svd.s[i]);
+            if i + 1 == credible {
+                credible_step.copy_from(&without_prior);
+            }
         }
         let found = DVector::from_iterator(
             n,
@@ -172,17 +222,10 @@ impl Evidence {
         if !finite {
             return Err(damaged());
         }
-        let description = report
-            .outputs
-            .iter()
-            .find_map(|o| o.changes.clone())
-            .and_then(|path| report.inputs.iter().find(|i| i.path == path))
-            .map(|i| i.sha256.clone())
-            .unwrap_or_default();
         let mut evidence = Self {
             file: file.to_owned(),
             robot: report.robot.clone(),
-            description,
+            description: description(report),
             of_robot: parameters.iter().map(|p| p.joint.is_some()).collect(),
             parameters: info.parameters.clone(),
             root,
@@ -190,10 +233,12 @@ impl Evidence {
             seen,
             found,
             without_prior,
+            credible_step,
             singular: svd.s,
             directions: svd.v,
             rank,
-            degrees_of_freedom: info.degrees_of_freedom,
+            credible,
+            degrees_of_freedom: degrees_of_freedom(info, report),
             numbers: Vec::new(),
         };
         evidence.numbers = numbers(info, &parameters, &evidence.scale);
@@ -233,6 +278,36 @@ impl Evidence {
         )
     }
 
+    /// Numbers as rows of a matrix whose product with its transpose is their covariance by the data alone.
+    #[must_use]
+    pub(super) fn of_numbers<'n>(&self, numbers: impl Iterator<Item = &'n Number>) -> DMatrix<f64> {
+        let rows: Vec<_> = numbers
+            .map(|number| {
+                let along =
+                    |i: usize| self.directions.column(i).dot(&number.gradient) / self.singular[i];
+                DVector::from_iterator(self.rank, (0..self.rank).map(along)).transpose()
+            })
+            .collect();
+        DMatrix::from_rows(&rows)
+    }
+
+    /// Whether the linear step from the estimate to what the data alone say is short enough for this number to be believed.
+    #[must_use]
+    pub fn is_credible(&self, number: &Number) -> bool {
+        if !matches!(number.unit, Unit::Radian | Unit::Meter) {
+            return true;
+        }
+        let (value, variance) = self.estimate(number);
+        let limit = CREDIBLE * scale(number.unit);
+        variance.sqrt() <= limit && (value - number.value).abs() <= limit
+    }
+
+    /// Directions that the data see too badly for a linear step.
+    #[must_use]
+    pub fn not_credible(&self) -> usize {
+        self.rank - self.credible
+    }
+
     /// A, A x̃ − A x_ref and x̃ − x_ref of the robot's own parameters, in the order of `names`: what is left when tracker and
     /// bodies may stand anywhere. `reference` is x_ref by name, scaled.
     #[must_use]
@@ -242,10 +317,11 @@ impl Evidence {
         let rest: Vec<usize> = (0..self.parameters.len())
             .filter(|i| !shared.contains(i))
             .collect();
-        let mut a = self.root.select_columns(&shared);
-        let mut y = &self.seen - &a * reference;
+        let (root, seen) = self.credibly_seen();
+        let mut a = root.select_columns(&shared);
+        let mut y = seen - &a * reference;
         if !rest.is_empty() {
-            let svd = decompose::svd(&self.root.select_columns(&rest));
+            let svd = decompose::svd(&root.select_columns(&rest));
             let q = svd.u.columns(0, decompose::rank(&svd.s, NULL)).into_owned();
             a -= &q * (q.transpose() * &a);
             y -= &q * (q.transpose() * &y);
@@ -255,13 +331,28 @@ impl Evidence {
             shared
                 .iter()
                 .enumerate()
-                .map(|(k, &i)| self.found[i] + self.without_prior[i] - reference[k]),
+                .map(|(k, &i)| self.found[i] + self.credible_step[i] - reference[k]),
         );
         Side {
             a,
             y,
             from_reference,
         }
+    }
+
+    /// U and U x̃ without the directions that the data see badly.
+    fn credibly_seen(&self) -> (DMatrix<f64>, DVector<f64>) {
+        if self.not_credible() == 0 {
+            return (self.root.clone(), self.seen.clone());
+        }
+        let v = self.directions.columns(0, self.credible);
+        // Left singular vectors, times the singular values.
+        let us = &self.root * v;
+        let mut seen = DVector::zeros(self.seen.len());
+        for (i, column) in us.column_iter().enumerate() {
+            seen += column * (column.dot(&self.seen) / self.singular[i].powi(2));
+        }
+        (us * v.transpose(), seen)
     }
 
     /// x̂ of some parameters, scaled.
@@ -312,6 +403,7 @@ fn numbers(
                 value: q.value,
                 gradient,
                 gauge_free: true,
+                displaces: false,
             }
         })
         .collect();
@@ -328,6 +420,7 @@ fn numbers(
             value: p.value,
             gradient,
             gauge_free: false,
+            displaces: displaces(&p.kind),
         });
     }
     numbers

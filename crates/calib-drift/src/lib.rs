@@ -16,18 +16,26 @@
 //! residuals' degrees of freedom, and z is Student's t. False alarms of everything that is said together: [`FALSE_ALARMS`];
 //! half of it for (1), half for all (2) by Holm's procedure.
 //!
+//! Parameters are displacements from a nominal URDF. Where the two calibrations start from different ones (the second from the URDF that
+//! the first was applied to), (1) is asked of the numbers alone that do not depend on it: d = x̃₂ − x̃₁ of them, s = dᵀ (G₁C₁G₁ᵀ + G₂C₂G₂ᵀ)⁺ d.
+//! The step to x̃ is linear; directions and numbers that a recording leaves open by more than 1° or 1 cm are left out, and said to be.
+//!
 //! What it does **not** protect against: what is the same in both recordings and was modeled in neither (backlash, heat)
 //! may show up as a change where the poses differ.
 
 mod compare;
 mod error;
 mod evidence;
+mod history;
 mod render;
+mod render_history;
 
 pub use compare::{Changed, Drift, Joint, compare};
 pub use error::DriftError;
 pub use evidence::{Evidence, Number};
+pub use history::{Calibration, History, Track, Value, history};
 pub use render::{json, text};
+pub use render_history::{history_json, history_page, history_text};
 
 use std::path::Path;
 

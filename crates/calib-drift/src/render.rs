@@ -65,12 +65,34 @@ pub fn text(drift: &Drift) -> String {
             out += &terminal::wrapped(&format!("{what}: {}", names.join(", ")), "", "  ");
         }
     };
+    list(
+        "left open by one of the recordings by more than 1° or 1 cm, too far for the linear comparison",
+        &drift.not_credible,
+    );
     list("only in the old calibration", &drift.only_old);
     list("only in the new calibration", &drift.only_new);
     list(
         "determined by one of the two recordings only",
         &drift.known_in_one,
     );
+    let mut note = |text: String| {
+        out.push('\n');
+        out += &terminal::wrapped(&text, "", "  ");
+    };
+    if !drift.same_nominal {
+        note(
+            "The two calibrations start from different nominal URDFs: only what no choice of frames changes, and effects of joints, are \
+             compared."
+                .to_owned(),
+        );
+    }
+    if drift.same_nominal && drift.directions_not_credible > 0 {
+        note(format!(
+            "{} combinations of parameters are not in the test of all at once: the recordings leave them open by more than 1° or 1 cm, \
+             too far for the linear comparison.",
+            drift.directions_not_credible
+        ));
+    }
     if !drift.known_in_neither.is_empty() {
         out.push('\n');
         out += &terminal::wrapped(
@@ -126,7 +148,11 @@ fn probability(p: f64) -> String {
 /// # Errors
 /// [`DriftError::Unwritable`] when it has no JSON form.
 pub fn json(drift: &Drift) -> Result<String, DriftError> {
-    let exact = calib_report::json::exact_json(drift)?;
+    rounded(drift)
+}
+
+pub(crate) fn rounded<T: serde::Serialize>(of: &T) -> Result<String, DriftError> {
+    let exact = calib_report::json::exact_json(of)?;
     match serde_json::from_str(&exact) {
         Ok(value) => Ok(calib_report::json::pretty(&calib_report::json::rounded(
             value,

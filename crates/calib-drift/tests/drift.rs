@@ -75,6 +75,7 @@ fn session(rng: &mut ChaCha8Rng, robot: &[f64; 6]) -> Report {
             .enumerate()
             .map(|(i, (name, robot, _))| Parameter {
                 name: (*name).to_owned(),
+                kind: "translation".to_owned(),
                 joint: robot.then(|| name.split('.').next().unwrap_or("").to_owned()),
                 unit: Unit::Meter,
                 value: found[i],
@@ -258,7 +259,6 @@ fn what_cannot_be_compared_is_refused() {
             }
         },
         |r: &mut Report| r.robot = "leg".to_owned(),
-        |r: &mut Report| r.inputs[0].sha256 = "1".to_owned(),
         |r: &mut Report| {
             for p in &mut r.parameters {
                 p.joint = None;
@@ -271,6 +271,79 @@ fn what_cannot_be_compared_is_refused() {
         said.push(refused.expect_err("a refusal").to_string());
     }
     insta::assert_snapshot!(said.join("\n---\n"));
+}
+
+/// The second calibration starts from the URDF that the first was applied to: only what does not depend on it is compared, with the same
+/// rate of false alarms.
+#[test]
+fn other_nominal_urdfs_are_compared_by_what_does_not_depend_on_them() {
+    /// 1 % ± 0.2 %.
+    const PAIRS: usize = 2000;
+    let mut rng = ChaCha8Rng::seed_from_u64(77);
+    let of = |r: &Report| Evidence::of(r, "report.json").expect("a report");
+    let applied = |mut report: Report| {
+        report.inputs[0].sha256 = "1".to_owned();
+        report
+    };
+    let mut alarms = 0;
+    for _ in 0..PAIRS {
+        let (old, new) = (session(&mut rng, &ROBOT), session(&mut rng, &SAME_ROBOT));
+        let found = compare(&of(&old), &of(&applied(new))).expect("one robot");
+        assert!(!found.same_nominal);
+        let names: Vec<&str> = found.numbers.iter().map(|n| n.name.as_str()).collect();
+        assert_eq!(
+            (found.joint.degrees_of_freedom, names),
+            (1, vec!["zero.elbow"])
+        );
+        alarms += usize::from(found.changed);
+    }
+    let rate = alarms as f64 / PAIRS as f64;
+    println!(
+        "{PAIRS} pairs from two nominal URDFs: {alarms} alarms, {:.2} %",
+        100.0 * rate
+    );
+    let spread = (FALSE_ALARMS * (1.0 - FALSE_ALARMS) / PAIRS as f64).sqrt();
+    assert!(rate < FALSE_ALARMS + FAR * spread, "{rate}");
+    let mut moved = SAME_ROBOT;
+    moved[5] += 1e-3;
+    let (old, new) = (session(&mut rng, &ROBOT), session(&mut rng, &moved));
+    let found = compare(&of(&old), &of(&applied(new))).expect("one robot");
+    assert!(found.numbers[0].significant && found.joint.significant);
+}
+
+/// A direction that a recording hardly sees is no evidence: its linear step would be as long as the robot.
+#[test]
+fn what_a_recording_hardly_sees_is_left_out() {
+    let mut rng = ChaCha8Rng::seed_from_u64(78);
+    let of = |r: &Report| Evidence::of(r, "report.json").expect("a report");
+    let (old, mut new) = (session(&mut rng, &ROBOT), session(&mut rng, &SAME_ROBOT));
+    // elbow.x: σ of 5 cm by the data alone, and an estimate that the prior holds.
+    if let Some(info) = &mut new.data_information {
+        for (r, row) in info.root.iter_mut().enumerate() {
+            if let Some(entry) = 2_usize.checked_sub(r).and_then(|c| row.get_mut(c)) {
+                *entry *= if r == 2 {
+                    0.05_f64.recip() / *entry
+                } else {
+                    0.0
+                };
+            }
+            if r == 2 {
+                row.iter_mut().skip(1).for_each(|x| *x = 0.0);
+            }
+        }
+    }
+    let found = compare(&of(&old), &of(&new)).expect("one robot");
+    assert_eq!(found.not_credible, ["elbow.x"]);
+    assert_eq!(
+        (
+            found.directions_not_credible,
+            found.joint.degrees_of_freedom
+        ),
+        (1, 3)
+    );
+    assert!(!found.changed, "{found:?}");
+    let text = calib_drift::text(&found);
+    assert!(text.contains("too far for the linear comparison"), "{text}");
 }
 
 /// A number that is not finite, or a root of zeros, is no panic and no NaN.

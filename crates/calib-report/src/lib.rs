@@ -29,6 +29,7 @@ mod dh_table;
 mod diagnosis;
 mod error;
 mod facts;
+pub mod gallery;
 pub mod glb;
 mod held_out;
 pub mod html;

@@ -7,6 +7,7 @@ pub mod convert;
 pub mod diff;
 pub mod drift;
 pub mod fit;
+pub mod history;
 pub mod man;
 mod plugin_options;
 pub mod plugins;
@@ -35,6 +36,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
         Command::Apply(options) => apply::run(options),
         Command::Diff(options) => diff::run(options),
         Command::Drift(options) => drift::run(options),
+        Command::History(options) => history::run(options),
         Command::Revert(options) => revert::run(console, options),
         Command::Study(options) => study::run(console, options),
         Command::Record(options) => record::run(console, options),

@@ -6,6 +6,8 @@
 //!                                and the angle θ between these normals, which a zero offset moves
 //! ```
 //!
+//! The normal of two parallel axes is the direction from the one to the other, and has no foot: three parallel axes have θ and no d.
+//!
 //! These are Denavit and Hartenberg's four (1955). Where an origin lies on its axis and where a frame's x points are
 //! conventions that a calibration cannot know; none of these numbers contains them.
 
@@ -161,7 +163,7 @@ fn pair(a: &Line, b: &Line, found: &mut Vec<Invariant>) {
         }
         return;
     }
-    let across = between - a.direction.into_inner() * between.dot(&a.direction);
+    let across = across(a, b);
     if !places || across.norm() < ONE_LINE {
         return;
     }
@@ -191,37 +193,50 @@ fn triple(a: &Line, b: &Line, c: &Line, found: &mut Vec<Invariant>) {
     if a.slides || b.slides || c.slides {
         return;
     }
-    let (Some(to_a), Some(to_c)) = (normal(b, a), normal(b, c)) else {
-        return;
-    };
-    found.push(Invariant {
-        kind: InvariantKind::Offset,
-        joints: [b.id; 2],
-        name: format!("offset.{}", b.name),
-        text: format!("offset along {} between {} and {}", b.name, a.name, c.name),
-        unit: Unit::Meter,
-        value: to_c.0 - to_a.0,
-    });
-    let sine = b.direction.dot(&to_a.1.cross(&to_c.1));
-    found.push(Invariant {
-        kind: InvariantKind::Zero,
-        joints: [b.id; 2],
-        name: format!("zero.{}", b.name),
-        text: format!("zero angle of {} between {} and {}", b.name, a.name, c.name),
-        unit: Unit::Radian,
-        value: sine.atan2(to_a.1.dot(&to_c.1)),
-    });
+    if let (Some(to_a), Some(to_c)) = (foot(b, a), foot(b, c)) {
+        found.push(Invariant {
+            kind: InvariantKind::Offset,
+            joints: [b.id; 2],
+            name: format!("offset.{}", b.name),
+            text: format!("offset along {} between {} and {}", b.name, a.name, c.name),
+            unit: Unit::Meter,
+            value: to_c - to_a,
+        });
+    }
+    if let (Some(to_a), Some(to_c)) = (normal(b, a), normal(b, c)) {
+        let sine = b.direction.dot(&to_a.cross(&to_c));
+        found.push(Invariant {
+            kind: InvariantKind::Zero,
+            joints: [b.id; 2],
+            name: format!("zero.{}", b.name),
+            text: format!("zero angle of {} between {} and {}", b.name, a.name, c.name),
+            unit: Unit::Radian,
+            value: sine.atan2(to_a.dot(&to_c)),
+        });
+    }
 }
 
-/// Foot of the common normal on `b` (m along it) and the normal's direction; `None` for parallel axes, which have many.
-fn normal(b: &Line, other: &Line) -> Option<(f64, Vector3<f64>)> {
+/// Foot of the common normal on `b`, m along it; `None` for parallel axes, which have many.
+fn foot(b: &Line, other: &Line) -> Option<f64> {
     let cross = b.direction.cross(&other.direction);
     let squared = cross.norm_squared();
-    if squared.sqrt() <= PARALLEL {
-        return None;
-    }
     // s: |p_b + s·d_b − p_o − t·d_o| is smallest
     let between = other.point - b.point;
-    let s = between.cross(&other.direction).dot(&cross) / squared;
-    Some((s, cross / squared.sqrt()))
+    (squared.sqrt() > PARALLEL).then(|| between.cross(&other.direction).dot(&cross) / squared)
+}
+
+/// Direction of the common normal; `None` for axes on one line.
+fn normal(b: &Line, other: &Line) -> Option<Vector3<f64>> {
+    let cross = b.direction.cross(&other.direction);
+    if cross.norm() > PARALLEL {
+        return Some(cross.normalize());
+    }
+    let across = across(b, other);
+    (across.norm() >= ONE_LINE).then(|| across.normalize())
+}
+
+/// From `a` to a parallel axis, at a right angle to `a`.
+fn across(a: &Line, b: &Line) -> Vector3<f64> {
+    let between = b.point - a.point;
+    between - a.direction.into_inner() * between.dot(&a.direction)
 }

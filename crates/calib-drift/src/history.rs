@@ -1,0 +1,169 @@
+//! The quantities of one robot over its calibrations: what no choice of frames changes, and effects of joints.
+//!
+//! Values are those of the data alone, so that a prior does not hold them back. From one calibration to the next the test is that of
+//! [`compare`]; the table shows what has changed since the first.
+
+use std::path::Path;
+
+use calib_report::Unit;
+use serde::Serialize;
+
+use crate::compare::compare;
+use crate::error::DriftError;
+use crate::evidence::Evidence;
+
+/// One calibration of a history.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Calibration {
+    /// Its report.
+    pub report: String,
+    /// When it was measured, as its profile states it.
+    pub date: Option<String>,
+    /// Whether the robot changed since the calibration before, at a false-alarm rate of 1 %; null for the first, and where the two have
+    /// nothing in common.
+    pub changed: Option<bool>,
+    /// Names of what changed since the calibration before, most certain first.
+    pub what: Vec<String>,
+}
+
+/// A quantity by one calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Value {
+    /// By the data alone.
+    pub value: f64,
+    /// Its σ.
+    pub sigma: f64,
+    /// Since the first calibration that determines it; angles by the shorter way round.
+    pub change: f64,
+    /// σ of the change; 0 for the first.
+    pub change_sigma: f64,
+}
+
+/// A quantity over time.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Track {
+    /// Stable name: `distance.shoulder.elbow`.
+    pub name: String,
+    /// In words.
+    pub text: String,
+    /// Of the numbers.
+    pub unit: Unit,
+    /// One per calibration; null where it does not determine the quantity.
+    pub values: Vec<Option<Value>>,
+}
+
+impl Track {
+    /// The largest change since the first calibration, in units of its σ.
+    fn largest(&self) -> f64 {
+        let values = self.values.iter().flatten();
+        let changes = values.filter(|v| v.change_sigma > 0.0);
+        changes
+            .map(|v| (v.change / v.change_sigma).abs())
+            .fold(0.0, f64::max)
+    }
+}
+
+/// The calibrations of one robot in their order.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct History {
+    /// Version of these keys: 1.
+    pub calib_history: u32,
+    /// The robot.
+    pub robot: String,
+    /// In the order of their dates where all have one, otherwise as they were given.
+    pub calibrations: Vec<Calibration>,
+    /// What changed most comes first.
+    pub quantities: Vec<Track>,
+}
+
+/// The history of a robot from the reports, or folders of results, of its calibrations.
+///
+/// # Errors
+/// [`DriftError`] when one is not a report, holds no covariance, or belongs to another robot.
+pub fn history(reports: &[impl AsRef<Path>]) -> Result<History, DriftError> {
+    let mut all = Vec::new();
+    for path in reports {
+        let path = path.as_ref();
+        let report = calib_report::read_report(path)?;
+        let name = calib_report::report_path(path).display().to_string();
+        let evidence = Evidence::of(&report, &name)?;
+        all.push((report.identification.date.clone(), evidence));
+    }
+    if all.iter().all(|(date, _)| date.is_some()) {
+        // Dates are `2026-11-03`: their order is that of the text.
+        all.sort_by(|a, b| a.0.cmp(&b.0));
+    }
+    let mut calibrations: Vec<Calibration> = Vec::new();
+    for (i, (date, evidence)) in all.iter().enumerate() {
+        let before = i.checked_sub(1).and_then(|before| all.get(before));
+        let drift = match before.map(|(_, before)| compare(before, evidence)) {
+            None | Some(Err(DriftError::NothingInCommon { .. })) => None,
+            Some(drift) => Some(drift?),
+        };
+        let significant = drift.iter().flat_map(|d| &d.numbers);
+        calibrations.push(Calibration {
+            report: evidence.file.clone(),
+            date: date.clone(),
+            changed: drift.as_ref().map(|d| d.changed),
+            what: significant
+                .filter(|n| n.significant && n.gauge_free)
+                .map(|n| n.text.clone())
+                .collect(),
+        });
+    }
+    let evidence: Vec<&Evidence> = all.iter().map(|(_, evidence)| evidence).collect();
+    Ok(History {
+        calib_history: 1,
+        robot: evidence
+            .first()
+            .map_or_else(String::new, |e| e.robot.clone()),
+        calibrations,
+        quantities: tracks(&evidence),
+    })
+}
+
+/// What any of the calibrations determines, what changed most first.
+fn tracks(all: &[&Evidence]) -> Vec<Track> {
+    let mut tracks: Vec<Track> = Vec::new();
+    for number in all.iter().flat_map(|e| &e.numbers) {
+        if number.displaces || tracks.iter().any(|t| t.name == number.name) {
+            continue;
+        }
+        let mut values: Vec<Option<Value>> = Vec::new();
+        let mut first: Option<Value> = None;
+        for evidence in all {
+            let known = evidence.numbers.iter().find(|n| n.name == number.name);
+            let known = known.filter(|n| evidence.determines(n) && evidence.is_credible(n));
+            let value = known.map(|n| {
+                let (value, variance) = evidence.estimate(n);
+                let sigma = variance.sqrt();
+                let (change, change_sigma) = first.map_or((0.0, 0.0), |first| {
+                    let plain = value - first.value;
+                    let change = match n.unit {
+                        Unit::Radian => plain.sin().atan2(plain.cos()),
+                        _ => plain,
+                    };
+                    (change, sigma.hypot(first.sigma))
+                });
+                Value {
+                    value,
+                    sigma,
+                    change,
+                    change_sigma,
+                }
+            });
+            first = first.or(value);
+            values.push(value);
+        }
+        if first.is_some() {
+            tracks.push(Track {
+                name: number.name.clone(),
+                text: number.text.clone(),
+                unit: number.unit,
+                values,
+            });
+        }
+    }
+    tracks.sort_by(|a, b| b.largest().total_cmp(&a.largest()));
+    tracks
+}

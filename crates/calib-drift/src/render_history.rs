@@ -1,0 +1,137 @@
+//! What a person and a program read of a history.
+
+use std::fmt::Write as _;
+
+use calib_report::plots::{Plot, PlotKind, PlotRow};
+use calib_report::{Unit, number, terminal};
+
+use crate::error::DriftError;
+use crate::history::{Calibration, History, Track, Value};
+
+/// The calibration in a table: its number, its date, and its report.
+fn named(i: usize, of: &Calibration) -> String {
+    let date = of.date.as_deref().unwrap_or("no date");
+    format!("{}  {date}", i + 1)
+}
+
+/// Since the calibration before.
+fn since(of: &Calibration) -> String {
+    match of.changed {
+        None => String::new(),
+        Some(false) => "no significant change".to_owned(),
+        Some(true) if of.what.is_empty() => "CHANGED".to_owned(),
+        Some(true) => format!("CHANGED: {}", of.what.join("; ")),
+    }
+}
+
+fn change(value: &Value, unit: Unit) -> String {
+    if value.change_sigma == 0.0 {
+        return String::new();
+    }
+    let sigmas = (value.change / value.change_sigma).abs();
+    let change = number::change(value.change, Some(value.change_sigma), unit);
+    format!("{change}  ({sigmas:.1} σ)")
+}
+
+/// For a terminal, at most 80 columns: the calibrations, then each quantity with its change since the first.
+#[must_use]
+pub fn history_text(history: &History) -> String {
+    let mut out = String::new();
+    // Writing to a String does not fail.
+    let _ = writeln!(
+        out,
+        "{} · {}",
+        history.robot,
+        match history.calibrations.len() {
+            1 => "1 calibration".to_owned(),
+            n => format!("{n} calibrations"),
+        }
+    );
+    for (i, of) in history.calibrations.iter().enumerate() {
+        let line = format!("{}  {}", of.report, since(of));
+        out += &terminal::wrapped(line.trim_end(), &format!("{}  ", named(i, of)), "      ");
+    }
+    for track in &history.quantities {
+        let _ = writeln!(out, "\n{}", track.text);
+        for (i, of) in history.calibrations.iter().enumerate() {
+            let line = match track.values.get(i).copied().flatten() {
+                None => "not determined".to_owned(),
+                Some(v) => format!(
+                    "{}   {}",
+                    number::with_sigma(v.value, Some(v.sigma), track.unit),
+                    change(&v, track.unit)
+                ),
+            };
+            let _ = writeln!(out, "  {}  {}", named(i, of), line.trim_end());
+        }
+    }
+    out
+}
+
+/// The history as a page with a picture of each quantity.
+#[must_use]
+pub fn history_page(history: &History) -> String {
+    let lines: Vec<String> = history
+        .calibrations
+        .iter()
+        .enumerate()
+        .map(|(i, of)| {
+            let line = format!("{}  {}  {}", named(i, of), of.report, since(of));
+            line.trim_end().to_owned()
+        })
+        .collect();
+    let plots: Vec<Plot> = history
+        .quantities
+        .iter()
+        .map(|track| plot(history, track))
+        .collect();
+    calib_report::gallery::page(&format!("History of {}", history.robot), &lines, &plots)
+}
+
+/// A quantity over time: its change since the first calibration, with ± 2 σ.
+fn plot(history: &History, track: &Track) -> Plot {
+    let scale = match track.unit {
+        Unit::Meter => 1e3,
+        Unit::Radian => 1_f64.to_degrees(),
+        _ => 1.0,
+    };
+    let unit = number::unit_name(track.unit);
+    let row = |(i, of): (usize, &Calibration)| {
+        let value = track.values.get(i).copied().flatten();
+        PlotRow {
+            label: named(i, of),
+            mark: value.map(|v| v.change * scale),
+            whisker: value.map(|v| {
+                let sigma = if v.change_sigma == 0.0 {
+                    v.sigma
+                } else {
+                    v.change_sigma
+                };
+                [-2.0, 2.0].map(|times| (v.change + times * sigma) * scale)
+            }),
+            text: value.map_or_else(
+                || "not determined".to_owned(),
+                |v| number::with_sigma(v.value, Some(v.sigma), track.unit),
+            ),
+            ..PlotRow::default()
+        }
+    };
+    Plot {
+        id: format!("plot-{}", track.name.replace('.', "-")),
+        section: "history",
+        title: track.text.clone(),
+        description: "Dot: change since the first calibration; line: ± 2 σ of the change. Right: the value ± σ.".to_owned(),
+        kind: PlotKind::Rows {
+            axis: format!("change [{unit}]"),
+            rows: history.calibrations.iter().enumerate().map(row).collect(),
+        },
+    }
+}
+
+/// For a program: SI, floats with twelve digits.
+///
+/// # Errors
+/// [`DriftError::Unwritable`] when it has no JSON form.
+pub fn history_json(history: &History) -> Result<String, DriftError> {
+    crate::render::rounded(history)
+}
