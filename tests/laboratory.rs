@@ -184,3 +184,78 @@ fn cluster_robust_deviations_agree_where_the_noise_model_is_right() {
         assert!(all.clone().count() > 10 && all.clone().all(both), "{robot}");
     }
 }
+
+/// Justin's recordings as the tracker's own software writes them, with its names of the bodies.
+fn with_the_tracker_s_names() -> Scratch {
+    let mut dir = Scratch::new().robot("justin");
+    for file in ["head_sweep", "hand_sweep", "arm_poses", "torso_tests"] {
+        let file = format!("robots/justin/{file}.csv");
+        let text = dir
+            .read(&file)
+            .replace("heT.", "body_0.")
+            .replace("haT.", "body_1.");
+        dir = dir.file(&file, text);
+    }
+    dir
+}
+
+#[test]
+fn bodies_that_the_tracker_calls_otherwise_are_named_and_mapped() {
+    let profile = "robots/justin.yaml";
+    let said = |dir: &Scratch| dir.calib(["check", profile]).expect(3).stderr;
+    let dir = with_the_tracker_s_names();
+    let told = said(&dir);
+    for part in [
+        "no recording that is fitted shows body `haT`; the recordings have `body_0`, `body_1`",
+        "`names: {haT: body_0}`",
+    ] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+    let mapped = |dir: Scratch| {
+        let names = "names: {heT: body_0, haT: body_1}\nrecordings:\n";
+        dir.edit(profile, "recordings:\n", names)
+    };
+    mapped(dir).calib(["check", profile]).expect(0);
+    let dir = with_the_tracker_s_names();
+    dir.calib([
+        "convert",
+        "robots/justin/arm_poses.csv",
+        "arm.csv",
+        "--map",
+        "haT=body_1",
+    ])
+    .expect(0);
+    assert!(dir.read("arm.csv").contains(",haT.x_m,"));
+
+    // The other reasons for which a body is not there.
+    let all = |dir: Scratch, change: &dyn Fn(&str, String) -> String| {
+        let files = ["head_sweep", "hand_sweep", "arm_poses", "torso_tests"];
+        files.iter().fold(dir, |dir, name| {
+            let file = format!("robots/justin/{name}.csv");
+            let text = change(name, dir.read(&file));
+            dir.file(&file, text)
+        })
+    };
+    let justin = || Scratch::new().robot("justin");
+    let held_out = all(justin(), &|name, text| match name {
+        "torso_tests" => text,
+        _ => text.replace("haT.", "other."),
+    });
+    let told = said(&held_out);
+    assert!(
+        told.contains("only `torso_tests` shows it, which is held out"),
+        "{told}"
+    );
+    let lost = ["head_sweep", "hand_sweep", "arm_poses", "torso_tests"].iter();
+    let lost = lost.fold(justin(), |dir, name| {
+        dir.cells(&format!("robots/justin/{name}.csv"), |_, column, cell| {
+            let cell = if column.starts_with("haT.") { "" } else { cell };
+            cell.to_owned()
+        })
+    });
+    let told = said(&lost);
+    assert!(
+        told.contains("shows body `haT`: it is lost in every row"),
+        "{told}"
+    );
+}

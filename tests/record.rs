@@ -359,7 +359,7 @@ fn refusals_before_anything_is_written() {
         (
             justin(&["--source", "vicon:1", "--recording", "head_sweep"]),
             2,
-            "source `vicon:1`: expected `dtrack:PORT`, `vrpn:HOST[:PORT]`",
+            "source `vicon:1`: expected `dtrack:PORT`, `dtrack:GROUP:PORT[@ADDRESS]`, `vrpn:HOST[:PORT]`",
         ),
         (
             justin(&["--source", "dtrack:0", "--recording", "arm_poses"]),

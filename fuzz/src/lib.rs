@@ -148,15 +148,18 @@ pub fn stream(bytes: &[u8]) {
     assert_eq!(ended.is_err(), broken.is_some());
     assert_eq!(all, pieces);
     for message in pieces {
-        if let vrpn::Message::Pose {
+        if let vrpn::Message::Sensor {
             device,
             stamp,
-            pose,
+            place,
             ..
         } = message
         {
-            finite(&pose);
-            if let Some(frame) = grouper.report(device, stamp, pose) {
+            match place {
+                vrpn::Place::Pose(pose) => finite(&pose),
+                vrpn::Place::Point(point) => assert!(point.iter().all(|x| x.is_finite())),
+            }
+            if let Some(frame) = grouper.report(device, stamp, place) {
                 assert!(frame.device.is_some_and(f64::is_finite));
             }
         }

@@ -43,7 +43,15 @@ pub fn datagram(bytes: &[u8]) -> Result<Vec<Frame>, Error> {
                 Some((body.name.clone(), pose))
             })
             .collect(),
-        markers: Default::default(),
+        markers: recording
+            .markers
+            .iter()
+            .filter(|marker| !marker.unlabeled)
+            .filter_map(|marker| {
+                let point = marker.samples.get(i)?.point(Filled::Include)?;
+                Some((marker.name.clone(), point))
+            })
+            .collect(),
         // Single markers of DTrack carry a number that another marker may have a second later.
         unlabeled: recording
             .markers

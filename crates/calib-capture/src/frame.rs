@@ -14,7 +14,7 @@ pub struct Frame {
     pub bodies: BTreeMap<String, Isometry3<f64>>,
     /// Markers that have a name of their own.
     pub markers: BTreeMap<String, Point3<f64>>,
-    /// Markers without one: the device does not know which marker is which.
+    /// Markers of no body, the one called `marker` included: the device does not know which marker is which.
     pub unlabeled: usize,
 }
 

@@ -44,7 +44,7 @@ pub use joints::{JointColumn, JointListener, JointSource, Unit, parse_joints};
 pub use order::{Arrival, Order};
 pub use screen::{Lines, Screen, Terminal, WIDTH};
 pub use session::{CaptureError, Ended, Key, Moved, Plan, Session, Summary, Watched, WatchedKind};
-pub use source::{Address, BadAddress, Input, Source, SourceError};
+pub use source::{Address, BadAddress, Group, Input, Source, SourceError};
 pub use still::{StillSettings, Stillness};
 pub use survey::{Survey, map_names, survey};
 pub use table::{Mark, POSES, Table, TableError};

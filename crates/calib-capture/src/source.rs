@@ -1,6 +1,6 @@
 //! Where frames come from: a UDP port that DTrack sends to, or a TCP connection to a VRPN server.
 
-use crate::vrpn::{Decoder, GREETING, Grouper, Message, VrpnError};
+use crate::vrpn::{Decoder, GREETING, Grouper, Message, Place, VrpnError};
 use crate::{Frame, dtrack, vrpn};
 use std::fmt;
 use std::io::{ErrorKind, Read, Write};
@@ -11,13 +11,15 @@ use std::time::{Duration, Instant};
 /// How long a VRPN server may take to answer, s.
 const ANSWER: u64 = 5;
 
-/// A tracker's address, as `dtrack:5000`, `vrpn:host`, `vrpn:Tracker0@host:3883`.
+/// A tracker's address, as `dtrack:5000`, `dtrack:239.1.2.3:5000@192.168.0.10`, `vrpn:host`, `vrpn:Tracker0@host:3883`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
     /// DTrack sends to this port of this computer.
     Dtrack {
         /// UDP port.
         port: u16,
+        /// The multicast group that DTrack sends to, where it does not send to this computer alone.
+        group: Option<Group>,
     },
     /// A VRPN server.
     Vrpn {
@@ -30,10 +32,19 @@ pub enum Address {
     },
 }
 
+/// A multicast group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Its address, 224.0.0.0 to 239.255.255.255.
+    pub address: Ipv4Addr,
+    /// This computer's address in the tracker's network; unspecified: the system chooses.
+    pub interface: Ipv4Addr,
+}
+
 /// A source that is none.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "source `{found}`: expected `dtrack:PORT`, `vrpn:HOST[:PORT]` or `vrpn:DEVICE@HOST[:PORT]`"
+    "source `{found}`: expected `dtrack:PORT`, `dtrack:GROUP:PORT[@ADDRESS]`, `vrpn:HOST[:PORT]` or `vrpn:DEVICE@HOST[:PORT]`"
 )]
 pub struct BadAddress {
     /// What was given.
@@ -48,14 +59,14 @@ impl FromStr for Address {
             found: text.to_string(),
         };
         if text == "dtrack" {
-            return Ok(Address::Dtrack { port: dtrack::PORT });
+            return Ok(Address::Dtrack {
+                port: dtrack::PORT,
+                group: None,
+            });
         }
         let (kind, rest) = text.split_once(':').ok_or_else(bad)?;
         match kind {
-            "dtrack" => rest
-                .parse()
-                .map(|port| Address::Dtrack { port })
-                .map_err(|_| bad()),
+            "dtrack" => dtrack_address(rest).ok_or_else(bad),
             "vrpn" => {
                 let (device, rest) = match rest.split_once('@') {
                     Some((device, rest)) => (Some(device.to_string()), rest),
@@ -79,10 +90,38 @@ impl FromStr for Address {
     }
 }
 
+/// `PORT` or `GROUP:PORT[@ADDRESS]`.
+fn dtrack_address(text: &str) -> Option<Address> {
+    let Some((group, rest)) = text.split_once(':') else {
+        let port = text.parse().ok()?;
+        return Some(Address::Dtrack { port, group: None });
+    };
+    let (port, interface) = match rest.split_once('@') {
+        Some((port, interface)) => (port, interface.parse().ok()?),
+        None => (rest, Ipv4Addr::UNSPECIFIED),
+    };
+    let address: Ipv4Addr = group.parse().ok()?;
+    let group = Group { address, interface };
+    address.is_multicast().then_some(Address::Dtrack {
+        port: port.parse().ok()?,
+        group: Some(group),
+    })
+}
+
 impl fmt::Display for Address {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Address::Dtrack { port } => write!(f, "dtrack:{port}"),
+            Address::Dtrack { port, group: None } => write!(f, "dtrack:{port}"),
+            Address::Dtrack {
+                port,
+                group: Some(Group { address, interface }),
+            } => {
+                write!(f, "dtrack:{address}:{port}")?;
+                if !interface.is_unspecified() {
+                    write!(f, "@{interface}")?;
+                }
+                Ok(())
+            }
             Address::Vrpn { device, host, port } => {
                 f.write_str("vrpn:")?;
                 if let Some(device) = device {
@@ -100,6 +139,18 @@ pub enum SourceError {
     /// The port of this computer cannot be opened.
     #[error("UDP port {port} cannot be opened: {source}. Check that no other program uses it.")]
     Port {
+        /// The port.
+        port: u16,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The multicast group cannot be joined.
+    #[error(
+        "the multicast group {address} cannot be joined: {source}. State this computer's address in the tracker's network: `--source dtrack:{address}:{port}@ADDRESS`."
+    )]
+    Join {
+        /// The group.
+        address: Ipv4Addr,
         /// The port.
         port: u16,
         /// Why.
@@ -196,13 +247,18 @@ impl Source {
     /// [`SourceError`].
     pub fn open(address: &Address) -> Result<Source, SourceError> {
         match address {
-            Address::Dtrack { port } => {
-                let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, *port)).map_err(|source| {
-                    SourceError::Port {
-                        port: *port,
+            Address::Dtrack { port, group } => {
+                let port = *port;
+                let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port))
+                    .map_err(|source| SourceError::Port { port, source })?;
+                if let Some(Group { address, interface }) = group {
+                    let joined = socket.join_multicast_v4(address, interface);
+                    joined.map_err(|source| SourceError::Join {
+                        address: *address,
+                        port,
                         source,
-                    }
-                })?;
+                    })?;
+                }
                 Ok(Source::Dtrack { socket })
             }
             Address::Vrpn { device, host, port } => {
@@ -380,20 +436,15 @@ impl Connection {
         let (mut frames, mut bad) = (Vec::new(), None);
         for message in messages {
             match message {
-                Message::Pose {
+                Message::Sensor {
                     device,
                     sensor,
                     stamp,
-                    pose,
-                } => {
-                    if self.is_mine(&device)? {
-                        let name = format!("{device}_{sensor}");
-                        frames.extend(self.grouper.report(name, stamp, pose));
-                    }
-                }
+                    place,
+                } => frames.extend(self.report(&device, sensor, stamp, place)?),
                 Message::BadPose { device, sensor } => {
                     bad = Some(format!(
-                        "sensor {sensor} of `{device}` reports no orientation"
+                        "sensor {sensor} of `{device}` reports an orientation that is none"
                     ));
                 }
                 Message::Goodbye => {
@@ -406,6 +457,22 @@ impl Connection {
             Some(why) if frames.is_empty() => Input::Foreign(why),
             _ => Input::Frames(frames),
         })
+    }
+
+    /// Takes the report of a sensor; the frame that it completes.
+    fn report(
+        &mut self,
+        device: &str,
+        sensor: i32,
+        stamp: (i32, i32),
+        place: Place,
+    ) -> Result<Option<Frame>, SourceError> {
+        if !self.is_mine(device)? {
+            return Ok(None);
+        }
+        Ok(self
+            .grouper
+            .report(format!("{device}_{sensor}"), stamp, place))
     }
 
     /// Whether the device is the one to be recorded; an error when that is open.

@@ -12,7 +12,7 @@
 //! connection need not share a clock.
 
 use crate::Frame;
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use std::collections::BTreeMap;
 
 /// Port of a VRPN server unless told otherwise.
@@ -60,18 +60,18 @@ pub enum VrpnError {
 /// What a message means to us.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Message {
-    /// A sensor's pose.
-    Pose {
+    /// Where a sensor is.
+    Sensor {
         /// Name of the device.
         device: String,
         /// Sensor of the device, from 0.
         sensor: i32,
         /// The device's time, whole seconds and µs.
         stamp: (i32, i32),
-        /// `tracker_from_sensor`, m.
-        pose: Isometry3<f64>,
+        /// Its pose, or its place where its quaternion is zero.
+        place: Place,
     },
-    /// A pose that is none: not finite, or a quaternion that is not of length 1.
+    /// A pose that is none: not finite, or a quaternion that is neither zero nor of length 1.
     BadPose {
         /// Name of the device.
         device: String,
@@ -242,19 +242,28 @@ fn pose(device: String, stamp: (i32, i32), payload: &[u8]) -> Option<Message> {
         *value = f64::from_be_bytes(bytes.try_into().ok()?);
     }
     let q = Quaternion::new(v[6], v[3], v[4], v[5]);
+    let finite = v.iter().all(|value| value.is_finite()) && (0..1_000_000).contains(&stamp.1);
+    if finite && q.norm() == 0.0 {
+        return Some(Message::Sensor {
+            device,
+            sensor,
+            stamp,
+            place: Place::Point(Point3::new(v[0], v[1], v[2])),
+        });
+    }
     let unit = (q.norm() - 1.0).abs() <= UNIT_TOLERANCE;
-    if !unit || v.iter().any(|value| !value.is_finite()) || !(0..1_000_000).contains(&stamp.1) {
+    if !unit || !finite {
         return Some(Message::BadPose { device, sensor });
     }
     let pose = Isometry3::from_parts(
         Translation3::new(v[0], v[1], v[2]),
         UnitQuaternion::from_quaternion(q),
     );
-    Some(Message::Pose {
+    Some(Message::Sensor {
         device,
         sensor,
         stamp,
-        pose,
+        place: Place::Pose(pose),
     })
 }
 
@@ -266,6 +275,28 @@ fn int(bytes: &[u8], at: usize) -> Option<i32> {
 /// Reports of one device whose stamps are this close belong to one frame, s.
 const SAME_FRAME: f64 = 0.002;
 
+/// Where a sensor is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place {
+    /// `tracker_from_sensor`, m.
+    Pose(Isometry3<f64>),
+    /// Its place in the tracker's frame, m.
+    Point(Point3<f64>),
+}
+
+impl Place {
+    fn put(self, name: String, frame: &mut Frame) {
+        match self {
+            Place::Pose(pose) => {
+                frame.bodies.insert(name, pose);
+            }
+            Place::Point(point) => {
+                frame.markers.insert(name, point);
+            }
+        }
+    }
+}
+
 /// Puts the sensors of one device that were reported for the same instant into one frame.
 #[derive(Clone, Debug, Default)]
 pub struct Grouper {
@@ -274,25 +305,21 @@ pub struct Grouper {
 
 impl Grouper {
     /// Takes a report; gives the frame before when this one begins the next.
-    pub fn report(
-        &mut self,
-        name: String,
-        stamp: (i32, i32),
-        pose: Isometry3<f64>,
-    ) -> Option<Frame> {
+    pub fn report(&mut self, name: String, stamp: (i32, i32), place: Place) -> Option<Frame> {
         let t = f64::from(stamp.0) + f64::from(stamp.1) * 1e-6;
         if let Some((began, frame)) = &mut self.open
             && (t - *began).abs() <= SAME_FRAME
             && !frame.bodies.contains_key(&name)
+            && !frame.markers.contains_key(&name)
         {
-            frame.bodies.insert(name, pose);
+            place.put(name, frame);
             return None;
         }
-        let frame = Frame {
+        let mut frame = Frame {
             device: Some(t),
-            bodies: BTreeMap::from([(name, pose)]),
             ..Frame::default()
         };
+        place.put(name, &mut frame);
         self.open.replace((t, frame)).map(|(_, frame)| frame)
     }
 

@@ -5,12 +5,14 @@
 
 mod data;
 mod file;
+mod seen;
 
 use std::error::Error as _;
 use std::path::Path;
 
 pub use data::{DataProblem, NotATrack};
 pub use file::{NamedBy, UnreadFile, WhyUnread};
+pub use seen::SeenInstead;
 
 /// Exit codes of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

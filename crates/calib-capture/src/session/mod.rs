@@ -334,9 +334,10 @@ impl Session {
             self.restarted = true;
             return Ok(());
         }
-        if frame.unlabeled > 0 && !std::mem::replace(&mut self.unlabeled, true) {
+        let recorded = usize::from(self.plan.watched.iter().any(|w| w.from == "marker"));
+        if frame.unlabeled > recorded && !std::mem::replace(&mut self.unlabeled, true) {
             screen.line(
-                "Markers that belong to no body are not recorded, because their numbers change. Define bodies in the tracker.",
+                "Markers that belong to no body are not recorded, because their numbers change. Define bodies in the tracker, or leave one such marker in view: --map NAME=marker.",
             );
         }
         self.see(frame, host);

@@ -17,7 +17,11 @@ fn pose(x: f64) -> Isometry3<f64> {
 }
 
 fn udp() -> (Source, UdpSocket) {
-    let source = Source::open(&Address::Dtrack { port: 0 }).expect("a free port");
+    let source = Source::open(&Address::Dtrack {
+        port: 0,
+        group: None,
+    })
+    .expect("a free port");
     let sender = UdpSocket::bind("127.0.0.1:0").expect("a free port");
     sender
         .connect(("127.0.0.1", source.port().expect("bound")))
@@ -335,4 +339,32 @@ fn a_stream_that_goes_wrong_in_the_middle_keeps_what_was_recorded() {
     drop(thread.join());
     let recording = read_path(&path, &ReadOptions::default()).expect("readable");
     assert!(recording.timelines[0].len() >= 10);
+}
+
+#[test]
+fn a_multicast_group_and_a_single_marker() {
+    let address: Address = "dtrack:239.77.3.1:0@127.0.0.1".parse().expect("an address");
+    assert_eq!(address.to_string(), "dtrack:239.77.3.1:0@127.0.0.1");
+    let mut source = Source::open(&address).expect("joined");
+    // Bound to the loopback, so that the group is that of the loopback.
+    let sender = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+    let to = ("239.77.3.1", source.port().expect("bound"));
+    for text in [
+        "fr 1\r\n3d 1 [7 1.000][1000 2000 3000]\r\n\0",
+        "fr 2\r\n3d 2 [7 1.000][1 2 3] [9 1.000][4 5 6]\r\n\0",
+        "fr 3\r\n3d 1 [9 1.000][1001 2000 3000]\r\n\0",
+    ] {
+        sender.send_to(text.as_bytes(), to).expect("sent");
+    }
+    let frames = frames(inputs(&mut source, 3));
+    let x: Vec<Option<f64>> = frames.iter().map(|f| Some(f.point("marker")?.x)).collect();
+    // Whatever its number; of two, nobody knows which is which.
+    assert_eq!(x, [Some(1.0), None, Some(1.001)]);
+    for bad in [
+        "dtrack:10.0.0.1:5000",
+        "dtrack:239.1.2.3",
+        "dtrack:239.1.2.3:5000@here",
+    ] {
+        assert!(bad.parse::<Address>().is_err(), "{bad}");
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::senders::{greeting, message, name, real, report};
 use calib_capture::dtrack::datagram;
-use calib_capture::vrpn::{Decoder, Grouper, Message, VrpnError};
+use calib_capture::vrpn::{Decoder, Grouper, Message, Place, VrpnError};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 
@@ -31,11 +31,11 @@ fn whole_and_byte_by_byte_say_the_same() {
     assert_eq!(all.len(), 4);
     assert_eq!(
         all[1],
-        Message::Pose {
+        Message::Sensor {
             device: "Head".into(),
             sensor: 2,
             stamp: (10, 250_000),
-            pose: pose(2.0)
+            place: Place::Pose(pose(2.0))
         }
     );
     assert_eq!(all[3], Message::Goodbye);
@@ -124,7 +124,7 @@ fn reports_of_one_instant_are_one_frame() {
         (10_100, 0),
         (20_000, 2),
     ] {
-        frames.extend(grouper.report(format!("s{sensor}"), (7, t), pose(0.0)));
+        frames.extend(grouper.report(format!("s{sensor}"), (7, t), Place::Pose(pose(0.0))));
     }
     frames.extend(grouper.finish());
     let names: Vec<String> = frames
@@ -152,7 +152,7 @@ fn a_real_stream_that_was_cut() {
     for piece in bytes.chunks(97) {
         for message in decoder.push(piece).expect("vrpn") {
             match message {
-                Message::Pose { device, sensor, .. } => {
+                Message::Sensor { device, sensor, .. } => {
                     *counts.entry((device, sensor)).or_default() += 1
                 }
                 other => panic!("{other:?}"),
@@ -199,7 +199,12 @@ fn the_synthetic_log_gives_what_vrpns_client_printed() {
     }
     let mut ours: BTreeMap<i32, Vec<Isometry3<f64>>> = BTreeMap::new();
     for message in Decoder::default().push(&bytes).expect("vrpn") {
-        if let Message::Pose { sensor, pose, .. } = message {
+        if let Message::Sensor {
+            sensor,
+            place: Place::Pose(pose),
+            ..
+        } = message
+        {
             ours.entry(sensor).or_default().push(pose);
         }
     }
@@ -233,4 +238,32 @@ fn the_synthetic_log_gives_what_vrpns_client_printed() {
             }
         }
     }
+}
+
+#[test]
+fn a_sensor_without_orientation_is_a_marker() {
+    let mut bytes = greeting("Leds");
+    let mut point = report((1, 0), 3, &pose(1.5));
+    point[56..80].fill(0);
+    // The last of the quaternion.
+    point[80..].fill(0);
+    bytes.extend(point);
+    let messages = Decoder::default().push(&bytes).expect("vrpn");
+    let [
+        Message::Sensor {
+            device,
+            sensor,
+            stamp,
+            place: Place::Point(point),
+        },
+    ] = &messages[..]
+    else {
+        panic!("{messages:?}");
+    };
+    assert_eq!((device.as_str(), *sensor, point.x), ("Leds", 3, 1.5));
+    let mut grouper = Grouper::default();
+    grouper.report("s0".into(), *stamp, Place::Pose(pose(0.0)));
+    grouper.report("s3".into(), *stamp, Place::Point(*point));
+    let frame = grouper.finish().expect("a frame");
+    assert_eq!((frame.bodies.len(), frame.point("s3")), (1, Some(*point)));
 }

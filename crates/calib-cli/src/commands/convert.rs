@@ -7,6 +7,7 @@ use calib_pipeline::ExitCode;
 use calib_recording::{ReadOptions, WriteOptions, read_path_with, write_recording};
 use clap::Args;
 
+use super::names::names_of;
 use crate::error::CliError;
 use crate::terminal::{Console, byte_bar, emit_paths, say};
 
@@ -20,6 +21,9 @@ pub struct Convert {
     /// Reader to use [default: detected from the content]
     #[arg(long)]
     format: Option<String>,
+    /// Name to write for a body or marker and its name in the recording, as `gripM=body_0`
+    #[arg(long, value_delimiter = ',')]
+    map: Vec<String>,
 }
 
 /// Converts, and prints the names of the tables.
@@ -59,12 +63,15 @@ fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Conv
         input,
         output,
         format,
+        map,
     } = options;
+    let names = names_of(map)?;
     let options = ReadOptions {
         format: format.clone(),
         ..ReadOptions::default()
     };
-    let recording = read_path_with(input, &options, progress)?;
+    let mut recording = read_path_with(input, &options, progress)?;
+    recording.rename(&names);
     let mut notes = vec![format!("read as {}", recording.meta.format)];
     notes.extend(recording.meta.conversions.iter().cloned());
     notes.extend(

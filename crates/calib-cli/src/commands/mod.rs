@@ -9,6 +9,7 @@ pub mod drift;
 pub mod fit;
 pub mod history;
 pub mod man;
+mod names;
 mod plugin_options;
 pub mod plugins;
 pub mod record;

@@ -5,6 +5,8 @@ use calib_finding::{Finding, Severity};
 use calib_recording::NotOneTable;
 use calib_urdf::{JointKind, UnknownName};
 
+use super::seen::{SeenInstead, did_you_mean};
+
 /// What the recordings lack that the profile asks of them.
 #[derive(Debug, thiserror::Error)]
 pub enum DataProblem {
@@ -122,12 +124,12 @@ pub enum DataProblem {
         hold: f64,
     },
     /// A body that no fitted recording shows.
-    #[error("no recording that is fitted shows body `{body}`")]
+    #[error("no recording that is fitted shows body `{body}`{}", seen.words())]
     BodyNotSeen {
         /// The body.
         body: String,
-        /// What the recordings have that is called almost like it, or like its first marker.
-        meant: Option<String>,
+        /// What the recordings have instead.
+        seen: Box<SeenInstead>,
     },
     /// Markers that make no body.
     #[error("body `{body}`: {why}")]
@@ -182,22 +184,19 @@ impl DataProblem {
             Self::NothingStandsStill { .. } => {
                 "hold each posture for a second, or take rows of the motion: `timing: {poses: continuous}`"
             }
-            Self::BodyNotSeen { meant, .. } => {
-                let remedy = "record it, check the column names, or remove it from the profile";
-                return format!("{}{remedy}", did_you_mean(meant));
-            }
+            Self::BodyNotSeen { body, seen } => return seen.remedy(body),
             Self::NoCoordinates { columns, meant, .. } => {
-                let near = did_you_mean(meant);
+                let near = did_you_mean(meant.as_ref());
                 return format!(
                     "{near}name the columns `{columns}.x_mm`, `{columns}.y_mm`, `{columns}.z_mm`"
                 );
             }
             Self::NoSpotNames { meant, .. } => {
-                let near = did_you_mean(meant);
+                let near = did_you_mean(meant.as_ref());
                 return format!("{near}add the column: the name of the touched spot in every row");
             }
             Self::UnknownSpot { spot, meant, .. } => {
-                let near = did_you_mean(meant);
+                let near = did_you_mean(meant.as_ref());
                 return format!("{near}correct the name, or state where `{spot}` is under `at_mm`");
             }
             Self::NotABody { .. } => {
@@ -206,11 +205,6 @@ impl DataProblem {
         };
         text.to_owned()
     }
-}
-
-fn did_you_mean(meant: &Option<String>) -> String {
-    let meant = meant.as_ref();
-    meant.map_or_else(String::new, |m| format!("did you mean `{m}`? "))
 }
 
 fn errors(findings: &[Finding]) -> impl Iterator<Item = &Finding> {

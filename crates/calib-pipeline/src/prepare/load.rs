@@ -48,6 +48,7 @@ pub fn load_recordings(robot: RobotProfile, plugins: Plugins) -> Result<Inputs, 
             let of_robot = read_robot_log(&robot, name, spec, log, &estimators, &mut digests)?;
             recording = with_robot_log(recording, of_robot);
         }
+        recording.rename(&robot.profile.names);
         let loaded = match &spec.timing {
             None => {
                 let poses = recording

@@ -1,6 +1,6 @@
 //! Where each tracking body was in every row: its markers, and its pose where it has a frame.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::rigid_body::{BodyPoses, Distances, NotABody, RowPose, Template, body_poses};
 use calib_finding::nearest_word;
@@ -9,7 +9,7 @@ use calib_profile::{Body, BodyKind, Usage};
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
-use crate::error::{DataProblem, PipelineError};
+use crate::error::{DataProblem, PipelineError, SeenInstead};
 use crate::prepare::inputs::{Inputs, Loaded};
 
 /// One body over all recordings.
@@ -88,21 +88,67 @@ fn slices(tracks: &[Vec<Option<Point3<f64>>>]) -> Vec<&[Option<Point3<f64>>]> {
     tracks.iter().map(Vec::as_slice).collect()
 }
 
-/// What the recordings have that is called almost like the body, or like its first marker.
-fn recorded_as(inputs: &Inputs, name: &str, body: &Body) -> Option<String> {
-    let recordings = || inputs.recordings.values();
-    let near = match &body.kind {
-        BodyKind::Pose => {
-            let bodies = recordings().flat_map(|r| r.poses.bodies.keys());
-            let strangers = bodies.filter(|b| !inputs.robot.profile.bodies.contains_key(*b));
-            nearest_word(name, strangers.map(String::as_str))
-        }
-        BodyKind::Markers { names, .. } => names.first().and_then(|first| {
-            let markers = recordings().flat_map(|r| r.poses.markers.keys());
-            nearest_word(first, markers.map(String::as_str))
-        }),
+/// Why no fitted recording shows the body: what the recordings have in its place.
+fn seen_instead(inputs: &Inputs, name: &str, body: &Body) -> SeenInstead {
+    let own = std::slice::from_ref(&name);
+    let markers: Vec<&str> = match &body.kind {
+        BodyKind::Pose => Vec::new(),
+        BodyKind::Markers { names, .. } => names.iter().map(String::as_str).collect(),
     };
-    near.map(str::to_owned)
+    let wanted = if markers.is_empty() {
+        own
+    } else {
+        &markers[..]
+    };
+    let samples = |loaded: &Loaded, of: &str| match &body.kind {
+        BodyKind::Pose => loaded
+            .poses
+            .bodies
+            .get(of)
+            .map(|t| t.iter().flatten().count()),
+        BodyKind::Markers { .. } => {
+            let track = loaded.poses.markers.get(of);
+            track.map(|t| t.iter().flatten().count())
+        }
+    };
+    let shown = |loaded: &&Loaded| wanted.iter().any(|of| samples(loaded, of) > Some(0));
+    let recordings = || inputs.recordings.values();
+    let held_out: Vec<String> = recordings().filter(shown).map(|r| r.name.clone()).collect();
+    if !held_out.is_empty() {
+        return SeenInstead::HeldOut {
+            recordings: held_out,
+        };
+    }
+    if recordings().any(|r| wanted.iter().any(|of| samples(r, of).is_some())) {
+        return SeenInstead::AlwaysLost;
+    }
+    match &body.kind {
+        BodyKind::Pose if recordings().any(|r| r.poses.markers.contains_key(name)) => {
+            return SeenInstead::Point;
+        }
+        BodyKind::Markers { .. } if recordings().any(|r| r.poses.bodies.contains_key(name)) => {
+            return SeenInstead::Pose;
+        }
+        _ => {}
+    }
+    let declared = &inputs.robot.profile.bodies;
+    let known = |other: &&String| {
+        let is_marker =
+            |b: &Body| matches!(&b.kind, BodyKind::Markers { names, .. } if names.contains(*other));
+        declared.contains_key(*other) || declared.values().any(is_marker)
+    };
+    let others: BTreeSet<&String> = match &body.kind {
+        BodyKind::Pose => recordings().flat_map(|r| r.poses.bodies.keys()).collect(),
+        BodyKind::Markers { .. } => recordings().flat_map(|r| r.poses.markers.keys()).collect(),
+    };
+    let names: Vec<String> = others.into_iter().filter(|o| !known(o)).cloned().collect();
+    let wanted = wanted.first().copied().unwrap_or(name);
+    let meant = nearest_word(wanted, names.iter().map(String::as_str)).map(str::to_owned);
+    SeenInstead::Others {
+        names,
+        wanted: wanted.to_owned(),
+        meant,
+    }
 }
 
 /// A marker that wanders on its body: it is loose or mislabeled.
@@ -149,7 +195,7 @@ fn body_track(
     let not_seen = || {
         let problem = DataProblem::BodyNotSeen {
             body: name.to_owned(),
-            meant: recorded_as(inputs, name, body),
+            seen: Box::new(seen_instead(inputs, name, body)),
         };
         PipelineError::data(&inputs.robot.file, problem)
     };

@@ -154,6 +154,7 @@ impl<'a> Checker<'a> {
                     .map(|f| self.measured_root(f)),
             },
             bodies: self.bodies(),
+            names: self.tracker_names(),
             recordings: raw
                 .recordings
                 .iter()

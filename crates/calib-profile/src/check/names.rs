@@ -29,6 +29,28 @@ impl MarkerList {
 }
 
 impl Checker<'_> {
+    /// Each key is a body or marker, and no two of them are one of the tracker's.
+    pub(super) fn tracker_names(&mut self) -> BTreeMap<String, String> {
+        let raw = self.raw;
+        let bodies = raw.bodies.iter();
+        let known: BTreeSet<&String> = bodies
+            .flat_map(|(name, body)| std::iter::once(name).chain(&body.markers))
+            .collect();
+        let mut taken = BTreeMap::new();
+        for (name, from) in &raw.names {
+            let path = ["names", name.as_str()];
+            self.known("body or marker", &path, name, known.iter().copied());
+            if let Some(other) = taken.insert(from, name) {
+                self.problem(
+                    &path,
+                    format!("`{from}` is the tracker's name of `{other}` already"),
+                    "give each body and marker a tracker name of its own",
+                );
+            }
+        }
+        raw.names.clone()
+    }
+
     /// Notes that nothing `what` is called `name`; its place is the key that is the name, or else the value.
     fn unknown(&mut self, path: &[&str], name: &str, finding: String, remedy: String) {
         let place = match path.last() {

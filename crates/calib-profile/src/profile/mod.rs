@@ -47,6 +47,8 @@ pub struct Profile {
     pub tracker: Tracker,
     /// Tracking bodies by name.
     pub bodies: BTreeMap<String, Body>,
+    /// The tracker's name of a body or marker, by its name in the profile.
+    pub names: BTreeMap<String, String>,
     /// Recordings by name.
     pub recordings: BTreeMap<String, RecordingSpec>,
     /// Plugins to load, by name.

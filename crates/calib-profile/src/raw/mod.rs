@@ -42,6 +42,10 @@ pub struct RawProfile {
     pub tracker: RawTracker,
     /// What the tracker sees, by name, and which link each body is bolted to.
     pub bodies: BTreeMap<String, RawBody>,
+    /// The tracker's own names of bodies and markers, where they differ: name in this profile → name in the recordings and in what a
+    /// live tracker sends.
+    #[serde(default)]
+    pub names: BTreeMap<String, String>,
     /// The recordings, by name.
     pub recordings: BTreeMap<String, RawRecording>,
     /// Plugins to load, by name; found beside the profile in `plugins/` or on the search path.

@@ -9,6 +9,8 @@
 //! 3d 1 [7 1.000][x y z]                                      a marker of no body
 //! ```
 //!
+//! A marker of no body has a number that another may have later. The only one of a frame is also the marker `marker`.
+//!
 //! In `6d` lines a lost body is absent; so is everything in a frame without the line. Angles are ignored, the matrix
 //! has six decimals and is made orthonormal. Unknown lines are skipped, as the protocol asks.
 
@@ -32,6 +34,9 @@ pub(super) const READER: Reader = Reader {
     read,
 };
 
+/// Name of the only marker of no body in a frame.
+const ALONE: &str = "marker";
+
 /// Half a day: `ts` counts from midnight, so going back by more than this is the next day.
 const HALF_DAY: f64 = 43_200.0;
 const DAY: f64 = 86_400.0;
@@ -53,6 +58,8 @@ struct Log {
     days: f64,
     bodies: BTreeMap<String, BodyStream>,
     markers: BTreeMap<u64, MarkerStream>,
+    /// The only single marker of a frame, where there is one.
+    alone: Vec<MarkerSample>,
     samples: usize,
     dense: usize,
     backwards: Vec<u64>,
@@ -186,10 +193,15 @@ impl Log {
             }
             "3d" => {
                 let count = fields.count("the number of markers")?;
+                let sample = self.frames.len().saturating_sub(1);
                 for _ in 0..count {
                     let id = fields.block("id qu")?;
                     let xyz = fields.block("x y z")?;
-                    self.marker(line, &id, &xyz)?;
+                    let point = self.marker(line, &id, &xyz)?;
+                    if count == 1 {
+                        self.alone.resize(sample, MarkerSample::Lost);
+                        push(&mut self.alone, point);
+                    }
                 }
                 Ok(())
             }
@@ -337,7 +349,7 @@ impl Log {
         Ok(())
     }
 
-    fn marker(&mut self, line: u64, id: &[f64], xyz: &[f64]) -> Placed<()> {
+    fn marker(&mut self, line: u64, id: &[f64], xyz: &[f64]) -> Placed<MarkerSample> {
         let ([id, ..], [x, y, z]) = (id, xyz) else {
             return unexpected(
                 line,
@@ -371,7 +383,8 @@ impl Log {
         stream.samples.resize(sample, MarkerSample::Lost);
         let per_meter = LengthUnit::Mm.per_meter();
         let point = Point3::new(x / per_meter, y / per_meter, z / per_meter);
-        push(&mut stream.samples, MarkerSample::Measured(point));
+        let point = MarkerSample::Measured(point);
+        push(&mut stream.samples, point);
         self.samples += 1;
         self.dense += sample + 1 - length;
         sparse(
@@ -380,7 +393,8 @@ impl Log {
             self.samples,
             self.bodies.len() + self.markers.len(),
             self.frames.len(),
-        )
+        )?;
+        Ok(point)
     }
 
     fn finish(mut self, line: u64) -> Placed<Recording> {
@@ -457,6 +471,16 @@ impl Log {
         });
         recording.bodies = self.bodies.into_values().collect();
         recording.markers = self.markers.into_values().collect();
+        if !self.alone.is_empty() {
+            self.alone.resize(n, MarkerSample::Lost);
+            recording.markers.push(MarkerStream {
+                name: ALONE.to_string(),
+                body: None,
+                unlabeled: false,
+                timeline: 0,
+                samples: self.alone,
+            });
+        }
         Ok(recording)
     }
 }

@@ -8,6 +8,7 @@ use calib_profile::{Body, BodyKind, RecordingSpec};
 use calib_urdf::{JointId, LinkId, RobotModel};
 
 use super::RecordError;
+use crate::commands::names::names_of;
 
 /// The bodies and markers of the profile with the tracker's names for them.
 pub(super) fn watched(
@@ -25,13 +26,10 @@ pub(super) fn watched(
             }
         }
     }
-    let mut given = BTreeMap::new();
-    for text in map {
-        let Some((name, from)) = text.split_once('=') else {
-            return Err(RecordError::Map(text.clone()));
-        };
-        given.insert(name.to_string(), from.to_string());
-    }
+    let mut given: BTreeMap<String, String> = robot.profile.names.clone();
+    // A name that is not sent now may be the profile's own in another laboratory.
+    given.retain(|name, from| heard.tracker.contains(from) || !heard.tracker.contains(name));
+    given.extend(names_of(map)?);
     let watched = map_names(&wanted, &given, &heard.tracker).map_err(RecordError::Names)?;
     let unseen: Vec<&str> = watched
         .iter()

@@ -32,7 +32,8 @@ const SURVEY: f64 = 1.0;
 pub struct Record {
     /// The robot's profile
     pub(super) profile: PathBuf,
-    /// `dtrack:PORT` (DTrack sends to this port), `vrpn:HOST[:PORT]` or `vrpn:DEVICE@HOST[:PORT]`
+    /// `dtrack:PORT` (DTrack sends to this port), `dtrack:GROUP:PORT[@ADDRESS]` (multicast; ADDRESS: this computer's, in the
+    /// tracker's network), `vrpn:HOST[:PORT]` or `vrpn:DEVICE@HOST[:PORT]`
     #[arg(long)]
     pub(super) source: String,
     /// Recording of the profile; required if it has several
@@ -50,7 +51,7 @@ pub struct Record {
     /// Value of a joint that does not move, as `waist_deg=20`
     #[arg(long, value_delimiter = ',')]
     pub(super) at: Vec<String>,
-    /// Body or marker of the profile and the tracker's name for it, as `gripM=body_0`
+    /// Body or marker of the profile and the tracker's name for it, as `gripM=body_0` [default: `names` of the profile]
     #[arg(long, value_delimiter = ',')]
     pub(super) map: Vec<String>,
     /// Number of values of each swept joint [default: 11 for one joint, 6 for several]
