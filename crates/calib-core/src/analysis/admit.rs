@@ -20,14 +20,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use crate::analysis::solution::Solution;
 use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::accumulate;
-use crate::solve::robust::{RejectReason, RobustSettings, gate_of};
+use crate::solve::robust::{RejectReason, Rejection, RobustSettings, gate_of};
 use crate::solve::whitened::{covariance_of, whitened};
 
 /// What became of the rejected vectors.
@@ -60,10 +59,8 @@ const HARM: f64 = 1.5;
 const FEW: f64 = 0.2;
 
 /// Every observation that may take part: not held out, and not where another marker should be.
-pub(crate) fn eligible(solution: &Solution) -> Vec<f64> {
-    let model = &solution.model;
-    let swapped: BTreeSet<(usize, usize)> = solution
-        .rejected
+pub(crate) fn eligible(model: &Model, rejected: &[Rejection]) -> Vec<f64> {
+    let swapped: BTreeSet<(usize, usize)> = rejected
         .iter()
         .filter(|r| r.reason == RejectReason::Swap)
         .map(|r| (r.measurement.index(), r.item))

@@ -9,6 +9,7 @@ use std::collections::BTreeSet;
 use crate::analysis::information::Information;
 use crate::analysis::looked_at::fewer;
 use crate::analysis::observability::observe;
+use crate::analysis::precision::{FULL, Precision, ROUGH};
 use crate::analysis::settings::Settings;
 use crate::analysis::solution::{NoiseEstimate, Solution, describe_parameters};
 use crate::graph::error::Error;
@@ -23,12 +24,6 @@ use crate::solve::normal::data_cost;
 use crate::solve::robust::{RejectReason, Rejection, clean, clean_near, explain, gate};
 use crate::solve::rows::add_block;
 
-/// Noise levels have settled when log σ² changes by less than this: 0.05 % in σ.
-const NOISE_SETTLED: f64 = 1e-3;
-/// Values need not be better than 1e-3 σ while outliers are still being decided…
-const BETWEEN_ROUNDS: f64 = 1e-6;
-/// …and than 1e-2 σ from one round of the noise levels to the next: sums of squares do not change in the first order at the minimum.
-const BETWEEN_LEVELS: f64 = 1e-4;
 /// Gate and refit alternate; the set settles in two or three rounds unless an observation lies at the border.
 const GATE_ROUNDS: usize = 6;
 
@@ -59,30 +54,87 @@ pub fn solve_kept(
     solve_of(model, Some(&kept.weights), settings)
 }
 
-fn solve_of(model: Model, kept: Option<&[f64]>, settings: &Settings) -> Result<Solution, Error> {
-    // 1: fitted, 0: held out or rejected before
+/// A fit of which nothing is said but where it ended.
+pub(crate) struct Trial {
+    pub model: Model,
+    pub values: Values,
+    /// Robust weight per observation.
+    pub weights: Vec<f64>,
+    /// σ² per group.
+    pub theta: Vec<f64>,
+    pub rejected: Vec<Rejection>,
+}
+
+impl Trial {
+    pub(crate) fn objective(&self) -> Objective<'_> {
+        Objective {
+            model: &self.model,
+            weights: &self.weights,
+            theta: &self.theta,
+        }
+    }
+}
+
+/// As [`solve`]; where no outliers are told, only as near the minimum as predictions of left-out samples need. `levels`: σ² per group to begin with, in place of the stated
+/// ones.
+pub(crate) fn try_out(
+    problem: &Problem,
+    levels: Option<&[f64]>,
+    settings: &Settings,
+) -> Result<Trial, Error> {
+    let model = Model::new(problem)?;
+    let mask = mask_of(&model, None)?;
+    let mut theta = stated_levels(&model);
+    if let Some(levels) = levels.filter(|levels| levels.len() == theta.len()) {
+        let groups = model.problem.groups.iter().zip(&mut theta).zip(levels);
+        let estimated = groups.filter(|((group, _), _)| group.estimate);
+        estimated.for_each(|((_, theta), level)| *theta = *level);
+    }
+    let mut work = Workspace::new(&model);
+    // What the gate keeps hangs on the noise levels: a little less of them, and a trial of TIAGo lost two parts that its run supports.
+    let precision = match settings.robust.enabled {
+        true => FULL,
+        false => ROUGH,
+    };
+    let mut fit = Fit::new(&model, settings, precision, 0);
+    let (minimum, weights) = fit.robustly(&mask, &mut theta, &mut work);
+    if minimum.status == SolveStatus::NotEvaluable {
+        return Err(Error::NotEvaluable);
+    }
+    let rejected = explain(&model, &minimum.values, &theta, &mask, &weights, &mut work);
+    Ok(Trial {
+        values: minimum.values,
+        rejected,
+        weights,
+        theta,
+        model,
+    })
+}
+
+/// σ² of every group as it is stated.
+fn stated_levels(model: &Model) -> Vec<f64> {
+    let groups = model.problem.groups.iter();
+    groups.map(|g| g.sigma * g.sigma).collect()
+}
+
+/// Per observation: 1 fitted, 0 held out or rejected before.
+fn mask_of(model: &Model, kept: Option<&[f64]>) -> Result<Vec<f64>, Error> {
     let fitted = |(o, observation): (usize, &Observation)| {
         let taken = kept.is_none_or(|kept| kept[o] > 0.0);
-        if taken && !model.is_held_out(observation.sample) {
-            1.0
-        } else {
-            0.0
-        }
+        f64::from(u8::from(taken && !model.is_held_out(observation.sample)))
     };
     let mask: Vec<f64> = model.observations.iter().enumerate().map(fitted).collect();
     if mask.iter().all(|w| *w == 0.0) {
         return Err(Error::NoObservations);
     }
-    let groups = &model.problem.groups;
-    let stated: Vec<f64> = groups.iter().map(|g| g.sigma * g.sigma).collect();
+    Ok(mask)
+}
+
+fn solve_of(model: Model, kept: Option<&[f64]>, settings: &Settings) -> Result<Solution, Error> {
+    let mask = mask_of(&model, kept)?;
     let mut work = Workspace::new(&model);
-    let mut fit = Fit {
-        model: &model,
-        settings,
-        iterations: 0,
-        relative_sigma: vec![None; stated.len()],
-    };
-    let mut theta = stated.clone();
+    let mut fit = Fit::new(&model, settings, FULL, 0);
+    let mut theta = stated_levels(&model);
     let (minimum, weights) = fit.robustly(&mask, &mut theta, &mut work);
     let found = Found {
         minimum,
@@ -121,21 +173,10 @@ pub(crate) fn refit(
     let mask: Vec<f64> = model
         .observations
         .iter()
-        .map(|o| {
-            if model.is_held_out(o.sample) {
-                0.0
-            } else {
-                1.0
-            }
-        })
+        .map(|o| f64::from(u8::from(!model.is_held_out(o.sample))))
         .collect();
     let mut work = Workspace::new(&model);
-    let mut fit = Fit {
-        model: &model,
-        settings,
-        iterations,
-        relative_sigma: vec![None; theta.len()],
-    };
+    let mut fit = Fit::new(&model, settings, FULL, iterations);
     let minimum = fit.with_noise(&values, &weights, &mut theta, &mut work);
     let found = Found {
         minimum,
@@ -170,11 +211,32 @@ const MOST_ITERATIONS: usize = 500;
 struct Fit<'a> {
     model: &'a Model,
     settings: &'a Settings,
+    precision: Precision,
     iterations: usize,
     relative_sigma: Vec<Option<f64>>,
 }
 
-impl Fit<'_> {
+impl<'a> Fit<'a> {
+    fn new(
+        model: &'a Model,
+        settings: &'a Settings,
+        precision: Precision,
+        iterations: usize,
+    ) -> Self {
+        Self {
+            model,
+            settings,
+            precision,
+            iterations,
+            relative_sigma: vec![None; model.problem.groups.len()],
+        }
+    }
+
+    /// Decrement of the last round.
+    fn last(&self) -> f64 {
+        self.settings.minimize.decrement.max(self.precision.last)
+    }
+
     /// Linearizations that are left for all further rounds.
     fn left(&self) -> usize {
         // The last round counts its start and its last step.
@@ -188,8 +250,7 @@ impl Fit<'_> {
             weights,
             theta,
         } = found;
-        let groups = self.model.problem.groups.iter();
-        let stated: Vec<f64> = groups.map(|g| g.sigma * g.sigma).collect();
+        let stated = stated_levels(self.model);
         let objective = Objective {
             model: self.model,
             weights,
@@ -245,7 +306,8 @@ impl Fit<'_> {
         let model = self.model;
         let robust = &self.settings.robust;
         let mut weights = mask.to_vec();
-        let mut minimum = self.minimize(start, &weights, theta, work, BETWEEN_ROUNDS);
+        let mut minimum =
+            self.minimize(start, &weights, theta, work, self.precision.between_rounds);
         if robust.enabled
             && minimum.status != SolveStatus::NotEvaluable
             && let Some((values, kept, iterations)) =
@@ -319,15 +381,9 @@ impl Fit<'_> {
     ) -> Minimum {
         if self.settings.noise_rounds == 0 || !self.model.problem.groups.iter().any(|g| g.estimate)
         {
-            return self.minimize(
-                start,
-                weights,
-                theta,
-                work,
-                self.settings.minimize.decrement,
-            );
+            return self.minimize(start, weights, theta, work, self.last());
         }
-        let mut minimum = self.minimize(start, weights, theta, work, BETWEEN_ROUNDS);
+        let mut minimum = self.minimize(start, weights, theta, work, self.precision.between_rounds);
         for _ in 0..self.settings.noise_rounds {
             if minimum.status == SolveStatus::NotEvaluable || self.left() == 0 {
                 break;
@@ -348,18 +404,13 @@ impl Fit<'_> {
             };
             self.relative_sigma = relative_sigma;
             *theta = next;
-            if change < NOISE_SETTLED {
+            if change < self.precision.settled {
                 break;
             }
-            minimum = self.minimize(&minimum.values, weights, theta, work, BETWEEN_LEVELS);
+            let decrement = self.precision.between_levels;
+            minimum = self.minimize(&minimum.values, weights, theta, work, decrement);
         }
-        self.minimize(
-            &minimum.values,
-            weights,
-            theta,
-            work,
-            self.settings.minimize.decrement,
-        )
+        self.minimize(&minimum.values, weights, theta, work, self.last())
     }
 }
 

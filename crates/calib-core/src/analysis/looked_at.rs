@@ -5,11 +5,16 @@
 //! into blocks of equal length and one sample of each is taken, at a place that follows no pattern: a stride would see only one posture of a
 //! motion that repeats with it. Which samples are taken does not depend on the residuals, so that every test is exact for those it looks at.
 
+use std::collections::BTreeSet;
+
 use crate::analysis::solution::Solution;
 use crate::model::layout::Model;
 
 /// Samples that tests look at, at most; fewer are all looked at.
 const MOST: usize = 4096;
+
+/// Poses that statements of the noise are fitted to and tried on at most, evenly over all.
+const POSES: usize = 200;
 
 /// Samples that are looked at, in their order.
 pub(crate) struct LookedAt {
@@ -62,6 +67,17 @@ pub(crate) fn fewer(model: &Model, weights: &[f64]) -> Option<Vec<f64>> {
         out[own.clone()].copy_from_slice(&weights[own]);
     }
     Some(out)
+}
+
+/// Weights without those of poses beyond [`POSES`], evenly over all.
+pub(crate) fn thinned(model: &Model, weights: &[f64]) -> Vec<f64> {
+    let observations = || model.observations.iter().zip(weights);
+    let kept = observations().filter(|(_, w)| **w > 0.0);
+    let samples: BTreeSet<usize> = kept.map(|(o, _)| o.sample).collect();
+    let step = samples.len().div_ceil(POSES).max(1);
+    let used: BTreeSet<usize> = samples.iter().copied().step_by(step).collect();
+    let of = |sample: usize, w: f64| if used.contains(&sample) { w } else { 0.0 };
+    observations().map(|(o, w)| of(o.sample, *w)).collect()
 }
 
 /// At most about `most` of `samples`, which are in order. Recordings share them; what a short one leaves is for the longer ones.

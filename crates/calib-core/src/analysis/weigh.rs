@@ -20,7 +20,7 @@
 //! The gate of the robust fit is tried in the same way ([`admit`](crate::analysis::admit)): a model that physics is missing
 //! from finds its hardest poses unlikely.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -30,6 +30,7 @@ use crate::analysis::admit::{
     Admission, eligible, is_harmed, left_out_squares, many_rejected, touched, wider,
 };
 use crate::analysis::estimate::{Start, refit};
+use crate::analysis::looked_at::thinned;
 use crate::analysis::scores::{Scores, mean, paired};
 use crate::analysis::settings::Settings;
 use crate::analysis::solution::Solution;
@@ -104,8 +105,6 @@ pub struct Weighed {
 
 /// Fewer left-out poses do not tell noise models apart.
 const FEWEST: usize = 10;
-/// Poses that candidates are fitted to and tried on at most, evenly over all.
-const POSES: usize = 200;
 /// Below this ratio of rms errors nobody can tell weights apart.
 const SAME: f64 = 1.005;
 /// A larger statement must be likelier by this many standard errors. With one, every second robot whose joints are alike is
@@ -133,8 +132,8 @@ impl Solution {
     pub fn weighed(&self, models: &[NoiseModel], settings: &Settings) -> Option<Weighed> {
         let mut weights = self.weights.clone();
         let stated = self.model.problem();
-        let (mut trials, mut choice) = self.tried(stated, models, &weights)?;
-        let eligible = eligible(self);
+        let (mut trials, mut choice) = self.fitted().tried(stated, models, &weights)?;
+        let eligible = eligible(&self.model, &self.rejected);
         let rejected = settings
             .robust
             .enabled
@@ -146,7 +145,7 @@ impl Solution {
             let (admission, more) = self.admitted(safe, &eligible, rejected)?;
             if let Some(more) = more {
                 weights = more;
-                (trials, choice) = self.tried(stated, models, &weights)?;
+                (trials, choice) = self.fitted().tried(stated, models, &weights)?;
             }
             choice.admission = Some(admission);
         }
@@ -172,46 +171,11 @@ impl Solution {
         Some(Weighed { choice, solution })
     }
 
-    /// The noise from pose to pose whose weights may be used on the observations that this fit kept: that of the joints where
-    /// it predicts no worse than equal weights, else the chosen one. `stated` is the problem with [`NoiseModel::Joint`]. `None` as in
-    /// [`weighed`](Self::weighed).
-    pub(crate) fn noise_of(&self, stated: &Problem) -> Option<NoiseModel> {
-        let (_, choice) = self.tried(stated, &NoiseModel::ALL, &self.weights)?;
-        let mut candidates = choice.candidates.iter();
-        let of_joints = candidates.any(|c| c.model == NoiseModel::Joint && c.admitted);
-        Some(if of_joints {
-            NoiseModel::Joint
-        } else {
-            choice.chosen
-        })
-    }
-
-    /// Every candidate, fitted to the kept observations of at most [`POSES`] poses, and the choice among them.
-    fn tried(
-        &self,
-        problem: &Problem,
-        models: &[NoiseModel],
-        weights: &[f64],
-    ) -> Option<(Vec<Trial>, NoiseChoice)> {
-        let thinned = self.thinned(weights);
-        let mut trials: Vec<Trial> = models
-            .par_iter()
-            .filter_map(|&model| Trial::new(problem, model, self, &thinned))
-            .collect();
-        trials.sort_by_key(|t| t.noise);
-        let choice = choose(&trials)?;
-        Some((trials, choice))
-    }
-
-    /// Weights without those of poses beyond [`POSES`], evenly over all.
-    fn thinned(&self, weights: &[f64]) -> Vec<f64> {
-        let observations = || self.model.observations.iter().zip(weights);
-        let kept = observations().filter(|(_, w)| **w > 0.0);
-        let samples: BTreeSet<usize> = kept.map(|(o, _)| o.sample).collect();
-        let step = samples.len().div_ceil(POSES).max(1);
-        let used: BTreeSet<usize> = samples.iter().copied().step_by(step).collect();
-        let of = |sample: usize, w: f64| if used.contains(&sample) { w } else { 0.0 };
-        observations().map(|(o, w)| of(o.sample, *w)).collect()
+    fn fitted(&self) -> Fitted<'_> {
+        Fitted {
+            objective: self.objective(),
+            values: &self.values,
+        }
     }
 
     /// Whether the predictions of all poses gain by what the gate rejected, under noise that trusts no model of the robot, and
@@ -222,7 +186,7 @@ impl Solution {
         eligible: &[f64],
         rejected: usize,
     ) -> Option<(Admission, Option<Vec<f64>>)> {
-        let everything = self.thinned(eligible);
+        let everything = thinned(&self.model, eligible);
         let among = |weights: &[f64]| -> Vec<f64> {
             let pairs = weights.iter().zip(&everything);
             pairs.map(|(w, e)| w.min(*e)).collect()
@@ -278,6 +242,47 @@ impl Solution {
     }
 }
 
+/// Where a fit ended, as far as what is random from pose to pose needs it.
+#[derive(Clone, Copy)]
+pub(crate) struct Fitted<'a> {
+    /// With the weights of what it kept and the levels that it found.
+    pub objective: Objective<'a>,
+    pub values: &'a Values,
+}
+
+impl Fitted<'_> {
+    /// The noise from pose to pose whose weights may be used on the observations that this fit kept: that of the joints where
+    /// it predicts no worse than equal weights, else the chosen one. `stated` is the problem with [`NoiseModel::Joint`]. `None` as in
+    /// [`weighed`](Solution::weighed).
+    pub(crate) fn noise_of(&self, stated: &Problem) -> Option<NoiseModel> {
+        let (_, choice) = self.tried(stated, &NoiseModel::ALL, self.objective.weights)?;
+        let mut candidates = choice.candidates.iter();
+        let of_joints = candidates.any(|c| c.model == NoiseModel::Joint && c.admitted);
+        Some(if of_joints {
+            NoiseModel::Joint
+        } else {
+            choice.chosen
+        })
+    }
+
+    /// Every candidate, fitted to the kept observations of some poses, and the choice among them.
+    fn tried(
+        &self,
+        problem: &Problem,
+        models: &[NoiseModel],
+        weights: &[f64],
+    ) -> Option<(Vec<Trial>, NoiseChoice)> {
+        let thinned = thinned(self.objective.model, weights);
+        let mut trials: Vec<Trial> = models
+            .par_iter()
+            .filter_map(|&model| Trial::new(problem, model, *self, &thinned))
+            .collect();
+        trials.sort_by_key(|t| t.noise);
+        let choice = choose(&trials)?;
+        Some((trials, choice))
+    }
+}
+
 /// One candidate, fitted to the thinned poses.
 struct Trial {
     noise: NoiseModel,
@@ -290,20 +295,20 @@ impl Trial {
     fn new(
         problem: &Problem,
         noise: NoiseModel,
-        reference: &Solution,
+        reference: Fitted,
         weights: &[f64],
     ) -> Option<Self> {
         let model = Model::new(&problem.with_noise_model(noise)?).ok()?;
-        let mut theta = start_levels(&model, reference);
+        let mut theta = start_levels(&model, reference.objective);
         let mut work = Workspace::new(&model);
         // The fit itself is one of the candidates.
         let itself = noise == NoiseModel::Joint
-            && std::ptr::eq(problem, reference.model.problem())
-            && weights == reference.weights;
+            && std::ptr::eq(problem, reference.objective.model.problem())
+            && weights == reference.objective.weights;
         let values = if itself {
             reference.values.clone()
         } else {
-            settle(&model, &reference.values, weights, &mut theta, &mut work)?
+            settle(&model, reference.values, weights, &mut theta, &mut work)?
         };
         let objective = Objective {
             model: &model,
@@ -341,12 +346,11 @@ impl Trial {
 }
 
 /// σ² of every group: as found where the reference has it, else the joints' for a joint, else as stated.
-fn start_levels(model: &Model, reference: &Solution) -> Vec<f64> {
-    let joint = reference
-        .noise
-        .iter()
-        .find(|n| n.kind == NoiseKind::Joint)
-        .map(|n| n.sigma * n.sigma);
+fn start_levels(model: &Model, reference: Objective) -> Vec<f64> {
+    let groups = reference.model.problem.groups.iter();
+    let mut known = groups.zip(reference.theta);
+    let joint = known.find(|(group, _)| group.kind == NoiseKind::Joint);
+    let joint = joint.map(|(_, theta)| *theta);
     let groups = model.problem.groups.iter().enumerate();
     groups
         .map(|(g, group)| {

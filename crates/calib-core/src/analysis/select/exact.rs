@@ -6,11 +6,12 @@ use nalgebra::{Cholesky, DVector};
 
 use crate::analysis::admit::{eligible, many_rejected};
 use crate::analysis::compare::mean_and_error;
-use crate::analysis::estimate::solve;
+use crate::analysis::estimate::{Trial, try_out};
+use crate::analysis::information::Information;
 use crate::analysis::select::linear::{Linearization, measured_covariance};
 use crate::analysis::select::task::Task;
-use crate::analysis::solution::Solution;
 use crate::analysis::validate::{CrossValidation, VectorError, predictions};
+use crate::analysis::weigh;
 use crate::graph::edge::EdgeKind;
 use crate::graph::error::Error;
 use crate::graph::ids::{MeasurementId, ParameterId};
@@ -35,7 +36,7 @@ struct Predicted {
 
 /// A model fitted in full.
 pub(super) struct Fitted {
-    pub solution: Solution,
+    pub trial: Trial,
     /// What is random from pose to pose.
     pub noise: NoiseModel,
     /// σ² of D per noise group: those of the first model.
@@ -78,7 +79,7 @@ impl Task<'_> {
     /// The problem with these parts free, the others at their nominal values.
     fn with(&self, chosen: &BTreeSet<usize>, near: Option<&Fitted>, noise: NoiseModel) -> Problem {
         let mut problem = self.under(noise);
-        let values = near.map_or(&[][..], |fit| &fit.solution.values.0);
+        let values = near.map_or(&[][..], |fit| &fit.trial.values.0);
         for (parameter, value) in problem.parameters.iter_mut().zip(values) {
             parameter.start = *value;
         }
@@ -123,7 +124,11 @@ impl Task<'_> {
             return Ok(None);
         }
         let stated = self.with(chosen, Some(fit), NoiseModel::Joint);
-        match fit.solution.noise_of(&stated) {
+        let reference = weigh::Fitted {
+            objective: fit.trial.objective(),
+            values: &fit.trial.values,
+        };
+        match reference.noise_of(&stated) {
             Some(noise) if noise != fit.noise => {
                 self.fitted_under(chosen, Some(fit), noise).map(Some)
             }
@@ -137,31 +142,33 @@ impl Task<'_> {
         near: Option<&Fitted>,
         noise: NoiseModel,
     ) -> Result<Fitted, Error> {
-        let solution = solve(&self.with(chosen, near, noise), self.settings)?;
-        let levels = near.map_or_else(|| solution.theta.clone(), |first| first.levels.clone());
+        // Outliers are told from the stated levels, as they are in a run.
+        let same = near.filter(|near| near.noise == noise && !self.settings.robust.enabled);
+        let found = same.map(|near| &near.trial.theta[..]);
+        let trial = try_out(&self.with(chosen, near, noise), found, self.settings)?;
+        let levels = near.map_or_else(|| trial.theta.clone(), |first| first.levels.clone());
         let step = self.step();
         let wanted = |sample: usize| sample.is_multiple_of(step);
-        let left_out = solution.leave_out(wanted).ok_or(Error::NotEvaluable)?;
+        let (objective, values) = (trial.objective(), &trial.values);
+        let left_out = predictions(objective, values, &trial.weights, true, &wanted);
+        let left_out = left_out.ok_or(Error::NotEvaluable)?;
         let most = match self.settings.robust.enabled {
             true => LARGEST,
             false => f64::INFINITY,
         };
         let mut predicted = BTreeMap::new();
-        for of in [Some(left_out), rejected(&solution, &wanted)]
-            .iter()
-            .flatten()
-        {
+        for of in [Some(left_out), rejected(&trial, &wanted)].iter().flatten() {
             for sample in &of.samples {
                 for v in &sample.vectors {
                     let key = (sample.sample, v.measurement, v.item);
-                    if let Some(found) = Predicted::of(&solution.model, &levels, sample.sample, v) {
+                    if let Some(found) = Predicted::of(&trial.model, &levels, sample.sample, v) {
                         predicted.entry(key).or_insert(found.at_most(most));
                     }
                 }
             }
         }
         Ok(Fitted {
-            solution,
+            trial,
             noise,
             levels,
             predicted,
@@ -170,7 +177,7 @@ impl Task<'_> {
 
     /// Linearized in everything that a part can free.
     pub(super) fn linearized(&self, at: &Fitted) -> Result<Linearization, Error> {
-        self.linearized_with(at, &at.solution.weights)
+        self.linearized_with(at, &at.trial.weights)
     }
 
     /// The same with the vectors that the gate rejected, where they are more than chance rejects: what a part explains cannot be seen in
@@ -179,28 +186,29 @@ impl Task<'_> {
         &self,
         at: &Fitted,
     ) -> Result<Option<Linearization>, Error> {
-        let everything = eligible(&at.solution);
-        let many = many_rejected(&at.solution.weights, &everything).is_some();
+        let everything = eligible(&at.trial.model, &at.trial.rejected);
+        let many = many_rejected(&at.trial.weights, &everything).is_some();
         many.then(|| self.linearized_with(at, &everything))
             .transpose()
     }
 
     fn linearized_with(&self, at: &Fitted, weights: &[f64]) -> Result<Linearization, Error> {
         let model = Model::new(&self.under(at.noise))?;
-        let linear = Linearization::at(&at.solution, weights, model, &at.levels, self.step());
+        let linear = Linearization::at(&at.trial, weights, model, &at.levels, self.step());
         linear.ok_or(Error::NotEvaluable)
     }
 }
 
 /// What the gate rejected, predicted from what it kept: a better model may explain it.
-fn rejected(solution: &Solution, wanted: &dyn Fn(usize) -> bool) -> Option<CrossValidation> {
-    let pairs = eligible(solution).into_iter().zip(&solution.weights);
+fn rejected(trial: &Trial, wanted: &dyn Fn(usize) -> bool) -> Option<CrossValidation> {
+    let pairs = eligible(&trial.model, &trial.rejected)
+        .into_iter()
+        .zip(&trial.weights);
     let rejected: Vec<f64> = pairs.map(|(e, w)| if *w > 0.0 { 0.0 } else { e }).collect();
     if rejected.iter().all(|r| *r == 0.0) {
         return None;
     }
-    let objective = solution.objective();
-    predictions(objective, &solution.values, &rejected, false, wanted)
+    predictions(trial.objective(), &trial.values, &rejected, false, wanted)
 }
 
 impl Predicted {
@@ -266,6 +274,13 @@ impl Fitted {
             gain: (gain * scale, error * scale),
             rms: (rms(positions.0), rms(positions.1)),
         }
+    }
+
+    /// Parameters that the data determine; 0 where the model cannot be evaluated.
+    pub(super) fn rank(&self) -> usize {
+        let trial = &self.trial;
+        let found = Information::at(&trial.model, &trial.values, &trial.weights, &trial.theta);
+        found.map_or(0, |information| information.rank)
     }
 
     /// Position error of what it predicts, root mean square, m.

@@ -8,10 +8,12 @@
 //! x̂ are the values at which it is linearized, M the parameters of the model, N the others. No refit is needed to score a
 //! subset, to leave a sample out of it, or to fit it to some of the samples.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::analysis::solution::Solution;
+use crate::analysis::estimate::Trial;
+use crate::analysis::select::stack::Stack;
+use crate::analysis::select::sums::Sums;
 use crate::model::layout::Model;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::rows::add_block;
@@ -39,11 +41,11 @@ pub(super) struct Linear<'a> {
     /// How many samples one of them stands for.
     pub factor: f64,
     /// Σ AᵀA.
-    h: DMatrix<f64>,
+    pub h: DMatrix<f64>,
     /// Σ Aᵀw.
     g: DVector<f64>,
     /// x̂ − x₀ per column.
-    off: DVector<f64>,
+    pub off: DVector<f64>,
     rows: f64,
     squares: f64,
 }
@@ -64,9 +66,9 @@ pub(super) struct Linearization {
 const CHUNK: usize = 32;
 
 impl Linearization {
-    /// At a solution, with these weights; `model`: the same with more free; `theta`: levels of D; one by one every `step`-th sample.
+    /// Where a fit ended, with these weights; `model`: the same with more free; `theta`: levels of D; one by one every `step`-th sample.
     pub(super) fn at(
-        solution: &Solution,
+        at: &Trial,
         weights: &[f64],
         model: Model,
         theta: &[f64],
@@ -76,23 +78,21 @@ impl Linearization {
         let objective = Objective {
             model: &model,
             weights,
-            theta: &solution.theta,
+            theta: &at.theta,
         };
         let mut work = Workspace::new(&model);
-        work.cache.update(&model.problem, &solution.values);
+        work.cache.update(&model.problem, &at.values);
         let all: Vec<usize> = (0..model.problem.samples).collect();
         let sums = |chunk: &[usize]| {
             let mut work = work.clone();
-            let mut sum = Sums::new(n);
-            for &sample in chunk {
-                if let Some(s) = whitened(objective, &solution.values, sample, &mut work) {
-                    sum.add(&s);
-                    if sample % step == 0 {
-                        sum.samples.push(Sample::of(&model, sample, s, theta));
-                    }
-                }
-            }
-            sum
+            let of = |&sample| Some((sample, whitened(objective, &at.values, sample, &mut work)?));
+            let rows: Vec<(usize, Whitened)> = chunk.iter().filter_map(of).collect();
+            let each: Vec<_> = rows.iter().map(|(_, s)| (&s.a, &s.w)).collect();
+            let mut sums = Sums::of(n, &each);
+            let looked_at = rows.into_iter().filter(|(sample, _)| sample % step == 0);
+            let own = looked_at.map(|(sample, s)| Sample::of(&model, sample, s, theta));
+            sums.samples = own.collect();
+            sums
         };
         let parts: Vec<Sums> = all.par_chunks(CHUNK).map(sums).collect();
         let mut total = Sums::new(n);
@@ -104,7 +104,7 @@ impl Linearization {
             model
                 .columns
                 .iter()
-                .map(|&p| solution.values.0[p] - model.problem.parameters[p].nominal),
+                .map(|&p| at.values.0[p] - model.problem.parameters[p].nominal),
         );
         (!total.samples.is_empty()).then(|| Self {
             factor: total.count as f64 / total.samples.len() as f64,
@@ -139,29 +139,47 @@ impl Linearization {
         }
     }
 
-    /// The same on some of the samples that are looked at one by one.
-    pub(super) fn of_samples(&self, wanted: impl Fn(usize) -> bool) -> Linear<'_> {
+    /// The same on the samples that are looked at one by one, without those of each fold in turn.
+    pub(super) fn without_folds(
+        &self,
+        folds: usize,
+        fold_of: impl Fn(usize) -> Option<usize> + Sync,
+    ) -> Vec<Linear<'_>> {
         let n = self.off.len();
-        let samples: Vec<&Sample> = self.samples.iter().filter(|s| wanted(s.number)).collect();
-        let mut h = DMatrix::zeros(n, n);
-        let mut g = DVector::zeros(n);
-        let (mut rows, mut squares) = (0.0, 0.0);
-        for s in &samples {
-            h.gemm_tr(1.0, &s.a, &s.a, 1.0);
-            g.gemv_tr(1.0, &s.a, &s.w, 1.0);
-            rows += s.w.len() as f64;
-            squares += s.w.norm_squared();
-        }
-        Linear {
-            model: &self.model,
-            samples,
-            factor: 1.0,
-            h,
-            g,
-            off: self.off.clone(),
-            rows,
-            squares,
-        }
+        let sums = |samples: &[&Sample]| {
+            let mut total = Sums::new(n);
+            for chunk in samples.chunks(CHUNK) {
+                let each: Vec<_> = chunk.iter().map(|s| (&s.a, &s.w)).collect();
+                total.join(Sums::of(n, &each));
+            }
+            total
+        };
+        let of = |wanted: &dyn Fn(usize) -> bool| -> Vec<&Sample> {
+            let own = self.samples.iter().filter(|s| wanted(s.number));
+            own.collect()
+        };
+        let own: Vec<Sums> = (0..folds)
+            .into_par_iter()
+            .map(|fold| sums(&of(&|s| fold_of(s) == Some(fold))))
+            .collect();
+        let rest = sums(&of(&|s| fold_of(s).is_none_or(|fold| fold >= folds)));
+        let without = |left: usize| {
+            let mut total = Sums::new(n);
+            total.add(&rest);
+            let others = own.iter().enumerate().filter(|(fold, _)| *fold != left);
+            others.for_each(|(_, own)| total.add(own));
+            Linear {
+                model: &self.model,
+                samples: of(&|s| fold_of(s) != Some(left)),
+                factor: 1.0,
+                h: total.h,
+                g: total.g,
+                off: self.off.clone(),
+                rows: total.rows,
+                squares: total.squares,
+            }
+        };
+        (0..folds).map(without).collect()
     }
 
     /// Samples that are looked at one by one.
@@ -225,60 +243,20 @@ pub(super) fn measured_covariance(
     d
 }
 
-/// Sums over samples.
-struct Sums {
-    h: DMatrix<f64>,
-    g: DVector<f64>,
-    rows: f64,
-    squares: f64,
-    count: usize,
-    samples: Vec<Sample>,
-}
-
-impl Sums {
-    fn new(n: usize) -> Self {
-        Self {
-            h: DMatrix::zeros(n, n),
-            g: DVector::zeros(n),
-            rows: 0.0,
-            squares: 0.0,
-            count: 0,
-            samples: Vec::new(),
-        }
-    }
-
-    fn add(&mut self, s: &Whitened) {
-        self.h.gemm_tr(1.0, &s.a, &s.a, 1.0);
-        self.g.gemv_tr(1.0, &s.a, &s.w, 1.0);
-        self.rows += s.w.len() as f64;
-        self.squares += s.w.norm_squared();
-        self.count += 1;
-    }
-
-    fn join(&mut self, other: Self) {
-        self.h += other.h;
-        self.g += other.g;
-        self.rows += other.rows;
-        self.squares += other.squares;
-        self.count += other.count;
-        self.samples.extend(other.samples);
-    }
-}
-
 /// A model fitted by equation (2).
 pub(super) struct Fitted<'a> {
-    linear: &'a Linear<'a>,
+    pub linear: &'a Linear<'a>,
     /// M, sorted.
-    active: Vec<usize>,
+    pub active: Vec<usize>,
     /// C.
-    c: DMatrix<f64>,
+    pub c: DMatrix<f64>,
     /// δ of all columns.
     pub delta: DVector<f64>,
 }
 
 impl Linear<'_> {
     /// 1/σ² of a column's prior.
-    fn prior(&self, column: usize) -> f64 {
+    pub(super) fn prior(&self, column: usize) -> f64 {
         let parameter = &self.model.problem.parameters[self.model.columns[column]];
         parameter.prior_sigma.map_or(0.0, |sigma| sigma.powi(-2))
     }
@@ -371,47 +349,32 @@ impl Fitted<'_> {
         &s.w + &s.a * &self.delta
     }
 
-    /// A_M of a sample.
-    fn own(&self, s: &Sample) -> DMatrix<f64> {
-        s.a.select_columns(&self.active)
+    /// `of` each sample, with what its rows say of it, and its place there.
+    pub(super) fn of_each<T: Send>(&self, of: impl Fn(&Stack<'_>, usize) -> T + Sync) -> Vec<T> {
+        let chunks = self.linear.samples.par_chunks(CHUNK);
+        let each = chunks.flat_map_iter(|chunk| {
+            let stack = Stack::new(self, chunk);
+            (0..chunk.len()).map(|i| of(&stack, i)).collect::<Vec<T>>()
+        });
+        each.collect()
     }
 
-    /// (I − Q)⁻¹, Q = A_M C A_Mᵀ; `None` where the sample alone determines something.
-    fn left_out(&self, own: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-        let m = own.nrows();
-        let q = own * &self.c * own.transpose();
-        // A direction of leverage 1 has no Cholesky factor, or a pivot of rounding.
-        const LEVERAGE_LEFT: f64 = 1e-9;
-        let factor = Cholesky::<f64, Dyn>::new(DMatrix::identity(m, m) - q)?;
-        let least = factor.l_dirty().diagonal().min();
-        (least * least > LEVERAGE_LEFT).then(|| factor.inverse())
+    /// Whitened error of each sample predicted from the others; `None` where it cannot be.
+    pub(super) fn predicted(&self) -> Vec<Option<DVector<f64>>> {
+        self.of_each(|stack, i| Some(stack.left_out(i)? * self.residual(stack.samples[i])))
     }
 
-    /// Whitened error of a sample predicted from the others; `None` where it cannot be.
-    pub(super) fn predicted(&self, s: &Sample) -> Option<DVector<f64>> {
-        Some(self.left_out(&self.own(s))? * self.residual(s))
-    }
-
-    /// Losses of each sample predicted from the others.
-    pub(super) fn losses(&self) -> Vec<Option<f64>> {
-        let loss = |s: &&Sample| Some(s.loss(&self.predicted(s)?));
-        self.linear.samples.par_iter().map(loss).collect()
-    }
-
-    /// For each block of the columns `beside`: losses of the model with it, and the matrix K of its shares.
-    pub(super) fn extended(
-        &self,
-        beside: &Beside,
-        blocks: &[Vec<usize>],
-    ) -> Vec<(Vec<Option<f64>>, DMatrix<f64>)> {
+    /// Losses of each sample predicted from the others, and for each block of the columns `beside`: losses of the model with it, and
+    /// the matrix K of its shares.
+    pub(super) fn extended(&self, beside: &Beside, blocks: &[Vec<usize>]) -> Extended {
         let steps: Vec<Option<Extension>> = blocks.iter().map(|b| beside.extension(b)).collect();
-        let of_sample = |s: &&Sample| -> Vec<(Option<f64>, DVector<f64>)> {
-            let own = self.own(s);
+        let of_sample = |stack: &Stack<'_>, i: usize| {
+            let s = stack.samples[i];
             let w = self.residual(s);
-            let b = s.a.select_columns(&beside.columns) - &own * &beside.taken;
-            let g = self.left_out(&own);
-            let each = blocks.iter().zip(&steps);
-            each.map(|(block, step)| {
+            let b = s.a.select_columns(&beside.columns) - stack.own(i) * &beside.taken;
+            let g = stack.left_out(i);
+            let base = g.as_ref().map(|g| s.loss(&(g * &w)));
+            let each = blocks.iter().zip(&steps).map(|(block, step)| {
                 let b = b.select_columns(block);
                 let Some(step) = step else {
                     return (None, DVector::zeros(block.len()));
@@ -419,20 +382,34 @@ impl Fitted<'_> {
                 let share = b.tr_mul(&(&w + &b * &step.free));
                 let loss = g.as_ref().and_then(|g| step.loss(s, g, &w, &b));
                 (loss, share)
-            })
-            .collect()
+            });
+            (base, each.collect::<Vec<_>>())
         };
-        let per_sample: Vec<_> = self.linear.samples.par_iter().map(of_sample).collect();
+        let per_sample = self.of_each(of_sample);
         let collect = |k: usize| {
             let size = blocks[k].len();
             let mut clusters = DMatrix::zeros(size, size);
-            for sample in &per_sample {
+            for (_, sample) in &per_sample {
                 clusters.ger(self.linear.factor, &sample[k].1, &sample[k].1, 1.0);
             }
-            (per_sample.iter().map(|s| s[k].0).collect(), clusters)
+            (per_sample.iter().map(|s| s.1[k].0).collect(), clusters)
         };
-        (0..blocks.len()).map(collect).collect()
+        Extended {
+            base: per_sample.iter().map(|s| s.0).collect(),
+            with: (0..blocks.len()).map(collect).collect(),
+        }
     }
+}
+
+/// Loss of each sample; `None` where it cannot be predicted from the others.
+pub(super) type Losses = Vec<Option<f64>>;
+
+/// What [`Fitted::extended`] gives.
+pub(super) struct Extended {
+    /// Of the model itself.
+    pub base: Losses,
+    /// Of the model with each block, and K.
+    pub with: Vec<(Losses, DMatrix<f64>)>,
 }
 
 /// What a block adds to a model.

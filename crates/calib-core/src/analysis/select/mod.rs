@@ -31,10 +31,13 @@ use crate::graph::ids::ParameterId;
 use crate::graph::problem::Problem;
 
 mod exact;
+mod less;
 mod linear;
 mod nested;
 mod path;
+mod stack;
 mod step;
+mod sums;
 mod task;
 mod widen;
 

@@ -40,13 +40,13 @@ pub(super) fn nested(
     if linear.samples().len() < LEAST * folds.len() || folds.len() < 2 {
         return None;
     }
-    let each = |fold: usize| {
-        let training = linear.of_samples(|sample| fold_of(sample) != Some(fold));
+    let trainings = linear.without_folds(folds.len(), fold_of);
+    let each = |(fold, training): (usize, &Linear<'_>)| {
         let samples = linear.samples().iter();
         let held: Vec<&Sample> = samples
             .filter(|s| fold_of(s.number) == Some(fold))
             .collect();
-        let found = choose(task, linear, &training)?;
+        let found = choose(task, linear, training)?;
         let error = |parts: &BTreeSet<usize>| {
             let fitted = training.fit(task.active(linear, parts))?;
             let each = held.iter().map(|s| squares(linear, s, &fitted.residual(s)));
@@ -59,7 +59,7 @@ pub(super) fn nested(
             added: found.difference(task.first).copied().collect(),
         })
     };
-    let found: Vec<Option<Fold>> = (0..folds.len()).into_par_iter().map(each).collect();
+    let found: Vec<Option<Fold>> = trainings.par_iter().enumerate().map(each).collect();
     let found: Vec<Fold> = found.into_iter().collect::<Option<_>>()?;
     let rms = |of: fn(&Fold) -> Squares| {
         let all = found.iter().map(of);
@@ -138,8 +138,9 @@ pub(super) fn left_out_rms(
     chosen: &BTreeSet<usize>,
 ) -> Option<f64> {
     let fitted = linear.fit(task.active(linearization, chosen))?;
-    let of = |s: &&Sample| Some(squares(linearization, s, &fitted.predicted(s)?));
-    let each = linear.samples.iter().filter_map(of);
+    let predicted = fitted.predicted();
+    let of = |(s, e): (&&Sample, &Option<_>)| Some(squares(linearization, s, e.as_ref()?));
+    let each = linear.samples.iter().zip(&predicted).filter_map(of);
     let (sum, count) = each.fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     Some((sum / count.max(1) as f64).sqrt())
 }

@@ -56,13 +56,12 @@ pub(super) fn select(task: &Task<'_>, progress: &mut dyn FnMut(usize)) -> Result
         last = Some(next);
     }
     let current = last.as_ref().unwrap_or(&first);
-    let rank = |fit: &Fitted| fit.solution.information.rank;
     Ok(Selection {
         unsupported: course.unsupported(&linear),
         nested: nested(task, &linear, &course.chosen),
         rms: first.against(current).rms,
-        ranks: (rank(&first), rank(current)),
-        values: current.solution.values.0.clone(),
+        ranks: (first.rank(), current.rank()),
+        values: current.trial.values.0.clone(),
         parts: course.chosen,
         steps: course.steps,
         tested: course.tested,
@@ -83,6 +82,9 @@ struct Course<'a> {
     fits: usize,
     progress: &'a mut dyn FnMut(usize),
 }
+
+/// What was scored, the best prediction first, and how many parts could be tested.
+type Scores = (Vec<Candidate>, usize);
 
 /// Parts that were added in one linearization, not yet fitted in full.
 struct Batch {
@@ -108,7 +110,7 @@ impl Course<'_> {
         linear: &Linearization,
         current: &Fitted,
     ) -> Result<Option<Fitted>, Error> {
-        let batch = self.batch(linear)?;
+        let (batch, found) = self.batch(linear)?;
         if batch.steps.len() > 1 {
             let next = self.fit(&batch.chosen, Some(current))?;
             if current.against(&next).is_better() {
@@ -116,12 +118,12 @@ impl Course<'_> {
                 return Ok(Some(next));
             }
         }
-        let (next, found) = self.one_more(linear, current)?;
+        let (next, found) = self.one_more(linear, current, Some(found))?;
         if next.is_some() {
             return Ok(next);
         }
         if let Some(with_rejected) = self.task.linearized_with_rejected(current)?
-            && let (Some(next), _) = self.one_more(&with_rejected, current)?
+            && let (Some(next), _) = self.one_more(&with_rejected, current, None)?
         {
             return Ok(Some(next));
         }
@@ -138,7 +140,7 @@ impl Course<'_> {
 
     /// Parts that each predict better than without them, as long as the linearization holds: weights and outliers are those of
     /// a model whose errors are not much larger.
-    fn batch(&self, linearization: &Linearization) -> Result<Batch, Error> {
+    fn batch(&self, linearization: &Linearization) -> Result<(Batch, Scores), Error> {
         /// Of the mean square at which it is linearized.
         const LEFT: f64 = 0.3;
         let task = self.task;
@@ -151,13 +153,16 @@ impl Course<'_> {
         let mut used = self.used.clone();
         let mut left = 1.0;
         let mut before = None;
+        let mut first = None;
         while left > LEFT && batch.steps.len() < task.rule.steps {
             let active = task.active(linearization, &batch.chosen);
             let mut possible = additions(&columns, &active);
             possible.retain(|a| !used.contains(&a.part));
             let stage = Stage::after(self.added() + batch.steps.len(), task.rule);
             let found = candidates(&linear, &active, &possible, stage);
-            let (found, _) = found.ok_or(Error::NotEvaluable)?;
+            let scores = found.ok_or(Error::NotEvaluable)?;
+            let found = scores.0.clone();
+            first.get_or_insert(scores);
             let mut proposed = task.proposed(&found, false);
             proposed.retain(|c| !self.refused.contains(&c.part) && c.predicts_better());
             let Some((part, alike)) = simplest(&linear, &active, &proposed, task.parts, task.rule)
@@ -177,23 +182,29 @@ impl Course<'_> {
                 ..step_of(part, StepOutcome::Added)
             });
         }
-        Ok(batch)
+        Ok((batch, first.unwrap_or_default()))
     }
 
-    /// The model with one part more, or the members of one group; and all that was scored.
+    /// The model with one part more, or the members of one group; and all that was scored, where it is not `known`.
     fn one_more(
         &mut self,
         linear: &Linearization,
         current: &Fitted,
+        known: Option<Scores>,
     ) -> Result<(Option<Fitted>, Vec<Candidate>), Error> {
         let task = self.task;
         let all = linear.all();
         let active = task.active(linear, &self.chosen);
-        let mut possible = additions(&task.columns(linear), &active);
-        possible.retain(|a| !self.used.contains(&a.part));
-        let stage = Stage::after(self.added(), task.rule);
-        let found = candidates(&all, &active, &possible, stage);
-        let (found, count) = found.ok_or(Error::NotEvaluable)?;
+        let (found, count) = match known {
+            Some(known) => known,
+            None => {
+                let mut possible = additions(&task.columns(linear), &active);
+                possible.retain(|a| !self.used.contains(&a.part));
+                let stage = Stage::after(self.added(), task.rule);
+                let found = candidates(&all, &active, &possible, stage);
+                found.ok_or(Error::NotEvaluable)?
+            }
+        };
         self.tested = self.tested.max(count);
         for groups in [false, true] {
             for _ in 0..TRIES {

@@ -5,7 +5,8 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::analysis::compare::{mean_and_error, paired};
 use crate::analysis::score::{Scored, Tested};
-use crate::analysis::select::linear::{Beside, Fitted, Linear};
+use crate::analysis::select::less::Less;
+use crate::analysis::select::linear::{Beside, Extended, Fitted, Linear, Losses};
 use crate::analysis::select::{Part, SelectionRule};
 
 /// Differences of information criteria up to 2 decide nothing (Burnham & Anderson 2002).
@@ -28,9 +29,16 @@ pub(super) struct Candidate {
     /// p after correction for what else was tested.
     pub p_corrected: f64,
     /// Losses per sample, each predicted from the others.
-    pub losses: Vec<Option<f64>>,
+    pub losses: Losses,
     /// Mean loss that it saves, relative to that without it, and its standard error.
     pub gain: (f64, f64),
+}
+
+impl Tested {
+    /// What χ² loses less what chance alone would take, 2 a parameter (Akaike).
+    fn evidence(&self) -> f64 {
+        self.chi2 - 2.0 * self.rank as f64
+    }
 }
 
 impl Candidate {
@@ -41,7 +49,7 @@ impl Candidate {
 
     /// What χ² loses less what chance alone would take, 2 a parameter (Akaike).
     pub(super) fn evidence(&self) -> f64 {
-        self.tested.chi2 - 2.0 * self.tested.rank as f64
+        self.tested.evidence()
     }
 
     /// Whether a linearized fit predicts better with it.
@@ -90,35 +98,10 @@ pub(super) fn candidates(
     stage: Stage,
 ) -> Option<(Vec<Candidate>, usize)> {
     let fitted = linear.fit(active.to_vec())?;
-    let excess = fitted.excess();
-    let samples = linear.samples.len();
-    let test = |beside: &Beside, block: &[usize], clusters: Option<&DMatrix<f64>>| {
-        let (u, information, raw) = beside.part(block);
-        if let &[place] = block
-            && !linear.allows(beside.columns[place], -u[0] / information[(0, 0)])
-        {
-            return None;
-        }
-        let scored = Scored {
-            u: &u,
-            information: &information,
-            raw: &raw,
-            clusters,
-            excess,
-            samples,
-        };
-        let mut tested = scored.test()?;
-        tested.p_value = tail(tested.rank, tested.z2, samples);
-        Some(tested)
-    };
+    let tests = Tests::of(&fitted);
     // Without the samples: z² is at most what the sums say.
-    let (beside, blocks) = blocks(&fitted, additions);
-    let mut first: Vec<(f64, usize)> = Vec::new();
-    for (i, block) in blocks.iter().enumerate() {
-        if let Some(tested) = test(&beside, block, None) {
-            first.push((tested.p_value, i));
-        }
-    }
+    let tested = tests.by_sums(additions).into_iter();
+    let mut first: Vec<(f64, usize)> = tested.map(|(i, tested)| (tested.p_value, i)).collect();
     let count = first.len();
     // p m / (k + 1), k parts found before: the share of false ones stays the same (Benjamini & Hochberg 1995).
     let factor = count as f64 / (stage.found + 1) as f64;
@@ -127,12 +110,11 @@ pub(super) fn candidates(
     let asked = |p: f64| p * factor <= stage.significance;
     let kept = kept.filter(|(place, (p, _))| *place < SHOWN || (*place < stage.most && asked(*p)));
     let looked_at: Vec<Addition> = kept.map(|(_, (_, i))| additions[*i].clone()).collect();
-    let (beside, blocks) = self::blocks(&fitted, &looked_at);
-    let base = fitted.losses();
-    let extended = fitted.extended(&beside, &blocks);
+    let (beside, blocks) = blocks(&fitted, &looked_at);
+    let Extended { base, with } = fitted.extended(&beside, &blocks);
     let mut out = Vec::new();
-    for ((addition, block), (losses, clusters)) in looked_at.iter().zip(&blocks).zip(extended) {
-        let Some(tested) = test(&beside, block, Some(&clusters)) else {
+    for ((addition, block), (losses, clusters)) in looked_at.iter().zip(&blocks).zip(with) {
+        let Some(tested) = tests.of_block(&beside, block, Some(&clusters)) else {
             continue;
         };
         out.push(Candidate {
@@ -146,6 +128,114 @@ pub(super) fn candidates(
     }
     out.sort_by(|a, b| b.gain.0.total_cmp(&a.gain.0).then(a.part.cmp(&b.part)));
     Some((out, count))
+}
+
+/// Score tests beside one model.
+struct Tests<'a> {
+    fitted: &'a Fitted<'a>,
+    excess: f64,
+    samples: usize,
+}
+
+impl<'a> Tests<'a> {
+    fn of(fitted: &'a Fitted<'a>) -> Self {
+        Self {
+            excess: fitted.excess(),
+            samples: fitted.linear.samples.len(),
+            fitted,
+        }
+    }
+
+    /// `None` where a block cannot be tested, or a physical limit forbids it.
+    fn of_block(
+        &self,
+        beside: &Beside,
+        block: &[usize],
+        clusters: Option<&DMatrix<f64>>,
+    ) -> Option<Tested> {
+        let (u, information, raw) = beside.part(block);
+        if let &[place] = block {
+            let change = -u[0] / information[(0, 0)];
+            if !self.fitted.linear.allows(beside.columns[place], change) {
+                return None;
+            }
+        }
+        let scored = Scored {
+            u: &u,
+            information: &information,
+            raw: &raw,
+            clusters,
+            excess: self.excess,
+            samples: self.samples,
+        };
+        let mut tested = scored.test()?;
+        tested.p_value = tail(tested.rank, tested.z2, self.samples);
+        Some(tested)
+    }
+
+    /// What the sums alone say, by place among the additions.
+    fn by_sums(&self, additions: &[Addition]) -> Vec<(usize, Tested)> {
+        let (beside, blocks) = blocks(self.fitted, additions);
+        let each = blocks.iter().enumerate();
+        each.filter_map(|(i, block)| Some((i, self.of_block(&beside, block, None)?)))
+            .collect()
+    }
+}
+
+/// Evidence of each addition that can be tested, by place.
+pub(super) fn evidence(fitted: &Fitted<'_>, additions: &[Addition]) -> Vec<(usize, f64)> {
+    let tested = Tests::of(fitted).by_sums(additions).into_iter();
+    tested.map(|(i, tested)| (i, tested.evidence())).collect()
+}
+
+/// What a model's predictions owe to some of its columns.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Saved {
+    pub part: usize,
+    /// Mean loss that they save, relative to that without them, and its standard error.
+    pub gain: (f64, f64),
+}
+
+impl Saved {
+    /// Whether the model predicts better with them.
+    pub(super) fn predicts_better(&self) -> bool {
+        self.gain.0 > self.gain.1
+    }
+}
+
+/// What each of these sets of a model's columns saves; those that cannot be tested are left out.
+pub(super) fn saved(fitted: &Fitted<'_>, sets: &[Addition]) -> Vec<Saved> {
+    let testable = |set: &Addition| {
+        let less = fitted.less(&set.columns)?;
+        let allowed = match set.columns[..] {
+            [column] => fitted.linear.allows(column, less.moved[0]),
+            _ => true,
+        };
+        (allowed && is_seen(&less)).then_some(less)
+    };
+    let less: Vec<Option<Less>> = sets.iter().map(testable).collect();
+    let (with, without) = fitted.losses_without(&less);
+    let each = sets.iter().zip(without).filter_map(|(set, without)| {
+        let without = without?;
+        Some(Saved {
+            part: set.part,
+            gain: relative(paired(&without, &with), &without),
+        })
+    });
+    each.collect()
+}
+
+/// Whether the rest of the model does not imitate all of the columns.
+fn is_seen(less: &Less) -> bool {
+    let scored = Scored {
+        u: &less.moved,
+        information: &less.by_data,
+        raw: &less.raw,
+        clusters: None,
+        excess: 1.0,
+        samples: 1,
+    };
+    scored.test().is_some()
 }
 
 /// All columns of additions, and the places of each.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::analysis::select::linear::{Linear, Linearization};
 use crate::analysis::select::step::{
-    Addition, Candidate, EQUAL, Stage, additions, candidates, without,
+    Addition, Candidate, EQUAL, Saved, additions, evidence, saved,
 };
 use crate::analysis::select::{Part, SelectionRule};
 use crate::analysis::settings::Settings;
@@ -113,26 +113,39 @@ impl Task<'_> {
         chosen: &BTreeSet<usize>,
     ) -> Option<(usize, usize)> {
         let columns = self.columns(linearization);
+        let whole = linear.fit(self.active(linearization, chosen))?;
         let better = |&part: &usize| {
-            let mut rest = chosen.clone();
-            rest.remove(&part);
-            let active = self.active(linearization, &rest);
-            let mut possible = additions(&columns, &active);
+            let own = self.own(linearization, chosen, part).columns;
+            let without = (!own.is_empty()).then(|| whole.without(&own))??;
+            let mut possible = additions(&columns, &without.active);
             let joint = self.joint(part);
             possible.retain(|a| {
                 a.part == part || (self.joint(a.part) == joint && self.members(a.part).len() == 1)
             });
-            let (found, _) = candidates(linear, &active, &possible, Stage::ALL)?;
-            let own = found.iter().find(|c| c.part == part)?.evidence();
-            let best = found
-                .iter()
-                .max_by(|a, b| a.evidence().total_cmp(&b.evidence()))?;
-            let more = best.evidence() - own;
-            (more > EQUAL).then_some((more, (part, best.part)))
+            let found = evidence(&without, &possible);
+            let own = found.iter().find(|(i, _)| possible[*i].part == part)?.1;
+            let best = found.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let more = best.1 - own;
+            (more > EQUAL).then_some((more, (part, possible[best.0].part)))
         };
         let added = chosen.difference(self.first);
         let found = added.filter_map(better);
         found.max_by(|a, b| a.0.total_cmp(&b.0)).map(|f| f.1)
+    }
+
+    /// The columns that a model has because of one part alone.
+    fn own(
+        &self,
+        linearization: &Linearization,
+        chosen: &BTreeSet<usize>,
+        part: usize,
+    ) -> Addition {
+        let mut rest = chosen.clone();
+        rest.remove(&part);
+        let others = self.parameters_of(&rest);
+        let own = self.parameters_of(&BTreeSet::from([part]));
+        let columns = linearization.columns(own.into_iter().filter(|p| !others.contains(p)));
+        Addition { part, columns }
     }
 
     /// What each of some parts of a model saves.
@@ -142,18 +155,12 @@ impl Task<'_> {
         linear: &Linear<'_>,
         chosen: &BTreeSet<usize>,
         parts: &[usize],
-    ) -> Vec<Candidate> {
-        let columns = self.columns(linearization);
-        let each = parts.iter().filter_map(|&part| {
-            let mut rest = chosen.clone();
-            rest.remove(&part);
-            let active = self.active(linearization, &rest);
-            let own = without(&columns[part], &active);
-            let addition = Addition { part, columns: own };
-            candidates(linear, &active, &[addition], Stage::ALL)?
-                .0
-                .pop()
-        });
-        each.collect()
+    ) -> Vec<Saved> {
+        let own = parts
+            .iter()
+            .map(|&part| self.own(linearization, chosen, part));
+        let own: Vec<Addition> = own.filter(|own| !own.columns.is_empty()).collect();
+        let fitted = linear.fit(self.active(linearization, chosen));
+        fitted.map_or_else(Vec::new, |fitted| saved(&fitted, &own))
     }
 }
