@@ -8,7 +8,7 @@ use calib_core::{EFFECTS, EffectKind};
 use calib_geometry::so3;
 use calib_report::{Change, Unit};
 use calib_urdf::{ChangeRecord, JointId, RobotModel, UrdfEdit, patch};
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Vector3;
 
 use crate::error::PipelineError;
 use crate::formulate::kinematics::{Calibration, JointEffects, motion_axis};
