@@ -15,6 +15,8 @@ struct Outlier {
     marker: usize,
     /// By how much, m.
     off: f64,
+    /// The distance that is farthest off, in its own σ.
+    sigmas: f64,
 }
 
 impl<'a> Body<'a> {
@@ -66,7 +68,7 @@ impl<'a> Body<'a> {
             findings.extend(self.bending(outliers.iter().map(|outlier| outlier.row).collect()));
             return findings;
         }
-        outliers.retain(|outlier| outlier.off > OWN_SIGMAS * self.scatter(outlier.marker));
+        outliers.retain(|outlier| outlier.sigmas > OWN_SIGMAS);
         if let Some(worst) = outliers.iter().max_by(|a, b| a.off.total_cmp(&b.off)) {
             findings.push(
                 self.finding(catalog::MARKER_OUTLIER)
@@ -88,6 +90,7 @@ impl<'a> Body<'a> {
             row: poses.rows[row],
             marker,
             off,
+            sigmas: self.sigmas(&points),
         }
     }
 
@@ -138,6 +141,15 @@ impl<'a> Body<'a> {
     fn deviation(&self, points: &[Option<Point3<f64>>]) -> f64 {
         let departures = self.pairs.iter().filter_map(|pair| {
             Some(((points[pair.i]? - points[pair.j]?).norm() - pair.distance).abs())
+        });
+        departures.fold(0.0, f64::max)
+    }
+
+    /// The same in σ of each distance.
+    fn sigmas(&self, points: &[Option<Point3<f64>>]) -> f64 {
+        let departures = self.pairs.iter().filter_map(|pair| {
+            let departure = ((points[pair.i]? - points[pair.j]?).norm() - pair.distance).abs();
+            Some(departure / pair.sigma)
         });
         departures.fold(0.0, f64::max)
     }

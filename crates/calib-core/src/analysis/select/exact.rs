@@ -8,7 +8,8 @@ use crate::analysis::admit::{eligible, many_rejected};
 use crate::analysis::compare::mean_and_error;
 use crate::analysis::estimate::{Trial, try_out};
 use crate::analysis::information::Information;
-use crate::analysis::select::linear::{Linearization, measured_covariance};
+use crate::analysis::select::linear::Linearization;
+use crate::analysis::select::sample::measured_covariance;
 use crate::analysis::select::task::Task;
 use crate::analysis::validate::{CrossValidation, VectorError, predictions};
 use crate::analysis::weigh;
@@ -142,7 +143,7 @@ impl Task<'_> {
         near: Option<&Fitted>,
         noise: NoiseModel,
     ) -> Result<Fitted, Error> {
-        // Outliers are told from the stated levels, as they are in a run.
+        // Outliers are judged at the stated levels, as in a run.
         let same = near.filter(|near| near.noise == noise && !self.settings.robust.enabled);
         let found = same.map(|near| &near.trial.theta[..]);
         let trial = try_out(&self.with(chosen, near, noise), found, self.settings)?;

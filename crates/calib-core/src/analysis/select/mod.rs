@@ -35,6 +35,7 @@ mod less;
 mod linear;
 mod nested;
 mod path;
+mod sample;
 mod stack;
 mod step;
 mod sums;

@@ -6,7 +6,8 @@ use rayon::prelude::*;
 
 use crate::analysis::folds::folds;
 use crate::analysis::select::NestedError;
-use crate::analysis::select::linear::{Linear, Linearization, Sample};
+use crate::analysis::select::linear::{Linear, Linearization};
+use crate::analysis::select::sample::Sample;
 use crate::analysis::select::step::{Stage, additions, candidates, simplest};
 use crate::analysis::select::task::{EXCHANGES, Task};
 

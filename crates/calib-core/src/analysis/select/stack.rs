@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DMatrixView, Dyn};
 
-use crate::analysis::select::linear::{Fitted, Sample};
+use crate::analysis::select::sample::Sample;
 
 /// Samples whose rows are looked at together, for one model.
 pub(super) struct Stack<'a> {
@@ -16,19 +16,20 @@ pub(super) struct Stack<'a> {
 }
 
 impl<'a> Stack<'a> {
-    pub(super) fn new(fitted: &Fitted<'_>, samples: &'a [&'a Sample]) -> Self {
+    /// `active`: the columns of M; `c`: their C.
+    pub(super) fn new(active: &[usize], c: &DMatrix<f64>, samples: &'a [&'a Sample]) -> Self {
         let mut first = vec![0];
         for s in samples {
             first.push(first[first.len() - 1] + s.w.len());
         }
-        let mut own = DMatrix::zeros(first[samples.len()], fitted.active.len());
+        let mut own = DMatrix::zeros(first[samples.len()], active.len());
         for (s, &at) in samples.iter().zip(&first) {
-            for (k, &column) in fitted.active.iter().enumerate() {
+            for (k, &column) in active.iter().enumerate() {
                 let mut rows = own.view_mut((at, k), (s.w.len(), 1));
                 rows.copy_from(&s.a.column(column));
             }
         }
-        let along = &own * &fitted.c;
+        let along = &own * c;
         Self {
             samples,
             first,

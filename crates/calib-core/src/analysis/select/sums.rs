@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::analysis::select::linear::Sample;
+use crate::analysis::select::sample::Sample;
 
 /// Sums over samples.
 pub(super) struct Sums {
