@@ -33,7 +33,7 @@ pub struct PatchedUrdf {
 /// Origins that moved by less than this (m, rad) keep their text: below any tracker and above rounding.
 const UNCHANGED: f64 = 1e-12;
 
-/// Patches the URDF to the calibrated geometry, in numbers of nine decimals ([`written`]); verifies by re-reading that the forward kinematics of the text is
+/// Patches the URDF to the calibrated geometry, in numbers of nine decimals (`written`); verifies by re-reading that the forward kinematics of the text is
 /// that of the numbers that were meant to 1e-12 m.
 ///
 /// # Errors
