@@ -285,6 +285,32 @@ fn of_a_hand_eye_calibration_the_transforms_are_shown() {
     assert_eq!(mount["observable"], true);
 }
 
+/// The robot is calibrated again from its calibrated URDF: nothing is gained, and no change is proposed.
+#[test]
+fn where_nothing_is_gained_no_change_is_proposed() {
+    let setting = Setting {
+        validation: true,
+        ..Setting::new(Design::Random(40), FOUR, 54)
+    };
+    let limits = "joint_axes]\n  limits: {held_out_rms_mm: 2, held_out_max_mm: 6}";
+    let dir = setting.folder().edit("arm.yaml", "joint_axes]", limits);
+    let first = dir.calib(["run", "arm.yaml", "--out", "out"]).expect(0);
+    assert!(first.stdout.contains("calib apply"), "{}", first.stdout);
+    let calibrated = dir.read("out/arm.calibrated.urdf");
+    let dir = dir.file("robots/ripley/r17.urdf", calibrated);
+    let again = dir.calib(["run", "arm.yaml", "--out", "again"]).expect(0);
+    let report = dir.json("again/report.json");
+    let reasons = report["reason_ids"].as_array().expect("a list");
+    assert!(
+        reasons
+            .iter()
+            .any(|id| id == "not-better-than-registration"),
+        "{reasons:?}"
+    );
+    assert!(!again.stdout.contains("calib apply"), "{}", again.stdout);
+    assert!(again.stdout.contains("Keep the URDF"), "{}", again.stdout);
+}
+
 /// About normal with variance 1, the same for the same number: twelve of a scrambled sequence.
 fn normal(number: usize) -> f64 {
     let uniform = |k: usize| {

@@ -221,7 +221,7 @@ fn remedy(request: &HandEyeRequest, e: &HandEye) -> Option<&'static str> {
     found.then_some(match request.inverted {
         true => "Run it again without --inverted, or give the flange in the robot's base.",
         false => {
-            "If the measured poses are those of the target in the camera, run it again with --inverted; else give the flange in the robot's base."
+            "If the measured poses are those of a board or tag in the camera, run it again with --inverted; else give the flange in the robot's base."
         }
     })
 }

@@ -99,7 +99,7 @@ pub struct HandEyeRequest {
     pub robot: String,
     /// Prefix of the columns of the measured pose `tracker_from_body`, or the name of a body.
     pub measured: String,
-    /// The measured pose is `body_from_tracker`: a camera states where the target is in the camera.
+    /// The measured pose is `body_from_tracker`: a detector states where the board or tag is in the camera.
     pub inverted: bool,
     /// The body is a camera's optical frame (z along the view, x to the right): its URDF frame (x along the view, z up) is asked for as well.
     pub optical: bool,

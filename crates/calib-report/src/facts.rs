@@ -82,6 +82,8 @@ pub enum NextStep {
         /// The file with what was found: where bodies and tracker are.
         scene: String,
     },
+    /// The URDF predicts as well as it is.
+    NothingGained,
     /// Fix the problems of a rejected result.
     FixProblems,
     /// Record validation poses and set limits.

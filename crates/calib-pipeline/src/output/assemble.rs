@@ -62,7 +62,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         scope: scope.iter().map(Scope::sentence).collect(),
         not_for: scope.iter().filter_map(Scope::excluded).collect(),
         limits,
-        next_steps: next_steps(e, verdict, &missing)
+        next_steps: next_steps(e, &judgment, &missing)
             .iter()
             .map(NextStep::sentence)
             .collect(),

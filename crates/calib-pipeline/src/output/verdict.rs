@@ -1,7 +1,9 @@
 //! The limits of the profile against what was measured, the scope, and what to do next.
 
 use calib_profile::{Limits, Method};
-use calib_report::{HeldOut, Limit, Limited, MissingPhysics, NextStep, Scope, Verdict};
+use calib_report::{
+    HeldOut, Judgment, Limit, Limited, MissingPhysics, NextStep, ReasonId, Scope, Verdict,
+};
 
 use crate::output::evidence::Evidence;
 use crate::output::export::calibration_name;
@@ -119,16 +121,19 @@ fn effects_file(e: &Evidence<'_>) -> Option<String> {
 
 pub(crate) fn next_steps(
     e: &Evidence<'_>,
-    verdict: Verdict,
+    judgment: &Judgment,
     missing: &[MissingPhysics],
 ) -> Vec<NextStep> {
     let has_limits = e.inputs.robot.profile.solve.limits != Limits::default();
     let has_validation = e.held_out.as_ref().is_some_and(|h| !h.left_out);
     let unchanged = e.urdf.changes.is_empty() && effects_file(e).is_none();
-    let mut steps = vec![match verdict {
+    let no_better = ReasonId::NotBetterThanRegistration;
+    let gains = !judgment.reasons.iter().any(|r| r.id == no_better);
+    let mut steps = vec![match judgment.verdict {
         Verdict::Accepted | Verdict::AcceptedWithWarnings if unchanged => NextStep::KeepUrdf {
             scene: e.inputs.robot.profile.outputs.scene.clone(),
         },
+        Verdict::Accepted | Verdict::AcceptedWithWarnings if !gains => NextStep::NothingGained,
         Verdict::Accepted | Verdict::AcceptedWithWarnings => NextStep::Use {
             urdf: e.inputs.robot.profile.outputs.urdf.clone(),
             effects: effects_file(e),

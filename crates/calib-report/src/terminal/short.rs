@@ -6,7 +6,7 @@ use crate::words::headline::{Headline, headline, steps};
 use crate::words::prose::sentence;
 use crate::words::remarks::{Remark, remarks};
 use crate::words::{self, diagnosis};
-use crate::{Effect, Report, Unit, Verdict, number};
+use crate::{Effect, Report, Unit, number};
 use anstyle::AnsiColor;
 
 /// Rows of a summary: a terminal has 24, and the command and the next prompt stand in it, too.
@@ -178,12 +178,5 @@ fn tail(report: &Report, look: Look, places: Places<'_>) -> Vec<String> {
 fn next(report: &Report, places: Places<'_>) -> Option<String> {
     let urdf = diagnosis::nominal_urdf(report);
     let command = urdf.and_then(|urdf| diagnosis::apply(report, places.folder, &places.of(urdf)));
-    match (command, report.verdict) {
-        (Some(command), Verdict::Accepted | Verdict::AcceptedWithWarnings)
-            if !report.changes.is_empty() =>
-        {
-            Some(command)
-        }
-        _ => report.next_steps.first().map(|step| sentence(step)),
-    }
+    command.or_else(|| report.next_steps.first().map(|step| sentence(step)))
 }

@@ -200,11 +200,13 @@ pub(crate) fn nominal_urdf(report: &Report) -> Option<&str> {
     outputs.find_map(|output: &Output| output.changes.as_deref())
 }
 
-/// The command that shows what an accepted result would change in a URDF, from these places.
+/// The command that shows what an accepted result would change in a URDF, from these places; `None` where nothing is gained by the change.
 pub(crate) fn apply(report: &Report, results: &str, urdf: &str) -> Option<String> {
     let accepted = matches!(
         report.verdict,
         Verdict::Accepted | Verdict::AcceptedWithWarnings
     );
-    accepted.then(|| format!("calib apply {results} {urdf} --diff"))
+    let no_better = ReasonId::NotBetterThanRegistration;
+    let gains = !report.changes.is_empty() && !report.reason_ids.contains(&no_better);
+    (accepted && gains).then(|| format!("calib apply {results} {urdf} --diff"))
 }

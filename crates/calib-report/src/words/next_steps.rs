@@ -17,6 +17,10 @@ impl NextStep {
             Self::KeepUrdf { scene } => format!(
                 "Keep the URDF: nothing of the robot itself was estimated. `{scene}` has where bodies and tracker are."
             ),
+            Self::NothingGained => {
+                "Keep the URDF: with bodies and tracker placed, it predicts new poses as well as the calibrated one."
+                    .to_owned()
+            }
             Self::FixProblems => {
                 "Do not use this result until the problems above are fixed.".to_owned()
             }
