@@ -514,7 +514,7 @@ fn a_run_is_applied_to_the_robot_it_was_made_for() {
 
 #[test]
 fn a_rejected_calibration_is_not_applied() {
-    let dir = Scratch::new().robot("ripley").edit(
+    let dir = Scratch::new().brief("ripley").edit(
         "robots/ripley.yaml",
         "held_out_max_mm: 4",
         "held_out_max_mm: 0.1",

@@ -49,7 +49,7 @@ fn session(dir: Scratch, name: &str, seed: u32, since: Since) -> Scratch {
     let profile = dir.read("robots/ripley.yaml");
     let truth = true_robot(
         &Scratch::new()
-            .robot("ripley")
+            .brief("ripley")
             .read("robots/ripley/r17.urdf"),
         since,
     );
@@ -101,7 +101,7 @@ fn number<'a>(drift: &'a Value, name: &str) -> &'a Value {
 
 #[test]
 fn a_longer_forearm_is_found_and_the_rest_is_not() {
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     let dir = session(dir, "old", 1, Since::default());
     let dir = session(dir, "same", 2, Since::default());
     let dir = session(
@@ -181,7 +181,7 @@ fn reports_that_cannot_be_compared() {
 #[test]
 fn months_from_the_applied_urdf() {
     let urdf = "robots/ripley/r17.urdf";
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     let nominal = dir.read(urdf);
     let dir = session(dir, "march", 1, Since::default());
     dir.calib(["apply", "march", urdf, "--in-place"]).expect(0);

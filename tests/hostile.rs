@@ -41,7 +41,7 @@ fn code(dir: &Scratch, line: &str) -> i32 {
 #[cfg(target_os = "linux")]
 #[test]
 fn lost_output_is_an_error_and_a_lost_reader_is_none() {
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     let commands = [
         "calib schema",
         "calib completions bash",
@@ -107,7 +107,7 @@ fn lost_output_is_an_error_and_a_lost_reader_is_none() {
 #[cfg(unix)]
 #[test]
 fn pipes_and_devices_are_refused_and_never_waited_for() {
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     let made = Command::new("mkfifo").arg(dir.path("pipe")).status();
     assert!(made.is_ok_and(|status| status.success()), "mkfifo");
     for special in ["pipe", "/dev/zero", "/dev/null"] {
@@ -165,7 +165,7 @@ fn pipes_and_devices_are_refused_and_never_waited_for() {
 #[test]
 fn an_error_as_json_has_id_place_and_remedy_on_standard_output() {
     let dir = Scratch::new()
-        .robot("ripley")
+        .brief("ripley")
         .file(
             "bad.yaml",
             "calib: 1\nrobot: {name: r, urdf: r.urdf}\nnothing: 1\n",
@@ -230,7 +230,7 @@ fn an_error_as_json_has_id_place_and_remedy_on_standard_output() {
 fn no_control_character_of_a_file_reaches_the_terminal() {
     let evil = "\u{1b}]0;owned\u{7}\u{1b}[2J\u{9b}31m\u{202e}";
     let dir = Scratch::new()
-        .robot("ripley")
+        .brief("ripley")
         .file(&format!("{evil}.csv"), "pose,a_rad\n0,x\n")
         .file("labels.csv", format!("pose,{evil}_rad\n0,x\n"))
         .file(
@@ -267,7 +267,7 @@ fn no_control_character_of_a_file_reaches_the_terminal() {
 
 #[test]
 fn names_that_cannot_be_files_are_found_before_the_fit() {
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     let text = dir.read("robots/ripley.yaml");
     // Without names of its own for the files.
     let (head, rest) = text.split_once("\noutputs:").expect("outputs");
@@ -295,7 +295,7 @@ fn names_that_cannot_be_files_are_found_before_the_fit() {
 fn a_plugin_elsewhere_needs_a_pin_or_leave() {
     // No library: what is asked is whether it would be opened, which fails in another way.
     let dir = Scratch::new()
-        .robot("ripley")
+        .brief("ripley")
         .file("elsewhere/x.so", "not a library")
         .file("robots/plugins/x.so", "not a library");
     let profile = dir.read("robots/ripley.yaml");

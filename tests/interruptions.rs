@@ -199,7 +199,7 @@ const RUN: &[&str] = &[
 #[test]
 fn run_in_a_fresh_and_in_a_used_folder() {
     // The used folder holds an earlier run of another method.
-    let fresh = || Scratch::new().robot("ripley");
+    let fresh = || Scratch::new().brief("ripley");
     let old = &finished("ripley", "ml").dir;
     let used = || {
         let filled = |dir: Scratch, (name, bytes): (String, Vec<u8>)| {
@@ -226,7 +226,7 @@ fn run_in_a_fresh_and_in_a_used_folder() {
 fn simulate_and_convert() {
     let simulate = &["simulate", "robots/ripley.yaml", "--out", "sim"];
     let convert = &["convert", "robots/ripley/checks.csv", "out/checks.csv"];
-    let fresh = || Scratch::new().robot("ripley");
+    let fresh = || Scratch::new().brief("ripley");
     for (name, arguments, every) in [
         ("simulate", simulate as &[&str], 29),
         ("convert", convert, 7),
@@ -404,7 +404,7 @@ fn record() {
     };
     walk(&Trial {
         name: "record",
-        prepare: &|| Scratch::new().robot("justin"),
+        prepare: &|| Scratch::new().brief("justin"),
         arguments: &record,
         code: 3,
         every: 17,
@@ -417,7 +417,7 @@ fn record() {
 
 #[test]
 fn a_second_run_into_a_folder_ends_with_seven() {
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     let held = calib_files::ResultsFolder::open(&dir.path("out")).expect("a free folder");
     let ran = dir.calib_with(RUN).expect(7);
     assert!(

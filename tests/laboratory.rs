@@ -46,7 +46,7 @@ fn lines(dir: &Scratch) -> (Vec<String>, Vec<String>) {
 
 #[test]
 fn rows_that_are_written_twice_count_once() {
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     let (head, rows) = lines(&dir);
     let twice: Vec<String> = rows.iter().flat_map(|r| [r.clone(), r.clone()]).collect();
     let text = [head, twice].concat().join("\n") + "\n";
@@ -64,7 +64,7 @@ fn rows_that_are_written_twice_count_once() {
 /// Marker errors of 0.5 mm that keep nine tenths of the error of the row before.
 #[test]
 fn noise_with_a_memory_is_said_and_widens_the_uncertainty() {
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     let (head, rows) = lines(&dir);
     let header: Vec<&str> = head[head.len() - 1].split(',').collect();
     let mut rng = ChaCha8Rng::seed_from_u64(4);
@@ -138,7 +138,7 @@ fn lagging(lag: f64) -> Scratch {
     table.joint_units = streams.robot.joint_units.clone();
     table.joints = joints;
     let text = write_poses(&table, &WriteOptions::micro()).expect("plain names");
-    Scratch::new().robot("ripley").file(POSES, text)
+    Scratch::new().brief("ripley").file(POSES, text)
 }
 
 #[test]
@@ -187,7 +187,7 @@ fn cluster_robust_deviations_agree_where_the_noise_model_is_right() {
 
 /// Justin's recordings as the tracker's own software writes them, with its names of the bodies.
 fn with_the_tracker_s_names() -> Scratch {
-    let mut dir = Scratch::new().robot("justin");
+    let mut dir = Scratch::new().brief("justin");
     for file in ["head_sweep", "hand_sweep", "arm_poses", "torso_tests"] {
         let file = format!("robots/justin/{file}.csv");
         let text = dir
@@ -236,7 +236,7 @@ fn bodies_that_the_tracker_calls_otherwise_are_named_and_mapped() {
             dir.file(&file, text)
         })
     };
-    let justin = || Scratch::new().robot("justin");
+    let justin = || Scratch::new().brief("justin");
     let held_out = all(justin(), &|name, text| match name {
         "torso_tests" => text,
         _ => text.replace("haT.", "other."),

@@ -136,7 +136,7 @@ fn the_outputs_of_the_shipped_robots_pass() {
 #[test]
 fn the_outputs_of_a_robot_with_meshes_pass() {
     for masses in [true, false] {
-        let dir = Scratch::new().robot("ripley");
+        let dir = Scratch::new().brief("ripley");
         let urdf = std::fs::read_to_string(dir.path("robots/ripley/r17.urdf")).expect("a URDF");
         let dir = dir
             .file("robots/ripley/r17.urdf", dressed(&urdf, masses))

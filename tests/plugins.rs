@@ -73,7 +73,7 @@ fn assert_same(a: &Value, b: &Value, at: &str) {
 
 #[test]
 fn a_reader_in_c_gives_the_calibration_of_the_built_in_one() {
-    let mut dir = Scratch::new().robot("ripley");
+    let mut dir = Scratch::new().brief("ripley");
     if column_reader(&dir).is_none() {
         return;
     }
@@ -156,7 +156,7 @@ fn an_estimator_in_rust_is_named_like_a_built_in_one() {
         library.display()
     );
     let dir = Scratch::new()
-        .robot("justin")
+        .brief("justin")
         .edit("robots/justin.yaml", "recordings:\n", &plugins)
         .edit(
             "robots/justin.yaml",
@@ -173,7 +173,7 @@ fn an_estimator_in_rust_is_named_like_a_built_in_one() {
         "--allow-plugins",
     ]);
     assert!(ran.code == 0 || ran.code == 1, "{}", ran.stderr);
-    let built_in = Scratch::new().robot("justin");
+    let built_in = Scratch::new().brief("justin");
     built_in.calib([
         "run",
         "robots/justin.yaml",
@@ -220,7 +220,7 @@ fn an_estimator_in_rust_is_named_like_a_built_in_one() {
 #[test]
 fn what_is_no_plugin_is_refused_and_nothing_is_written() {
     let dir = Scratch::new()
-        .robot("justin")
+        .brief("justin")
         .file("robots/notes.so", "no library at all")
         .edit(
             "robots/justin.yaml",
@@ -232,7 +232,7 @@ fn what_is_no_plugin_is_refused_and_nothing_is_written() {
     assert!(ran.stderr.contains("notes"), "{}", ran.stderr);
     assert!(!dir.path("out").exists());
     let pinned = Scratch::new()
-        .robot("justin")
+        .brief("justin")
         .file("robots/notes.so", "no library at all")
         .edit(
             "robots/justin.yaml",
@@ -251,7 +251,7 @@ fn what_is_no_plugin_is_refused_and_nothing_is_written() {
 fn an_estimator_that_does_not_exist_is_a_usage_error_with_the_nearest() {
     let dir =
         Scratch::new()
-            .robot("justin")
+            .brief("justin")
             .edit("robots/justin.yaml", "center: sfe", "center: sfx");
     let ran = dir.calib(["run", "robots/justin.yaml", "--out", "out"]);
     assert_eq!(ran.code, 2, "{}", ran.stderr);
@@ -260,7 +260,7 @@ fn an_estimator_that_does_not_exist_is_a_usage_error_with_the_nearest() {
 
 #[test]
 fn a_built_in_report_writer_runs_by_name() {
-    let dir = Scratch::new().robot("ripley").edit(
+    let dir = Scratch::new().brief("ripley").edit(
         "robots/ripley.yaml",
         "  add_bodies: [linkM, gripM]",
         "  add_bodies: [linkM, gripM]\n  reports: {summary: {}}",

@@ -101,7 +101,7 @@ fn head_sweep<'a>(source: &'a str, more: &[&'a str]) -> Vec<&'a str> {
 
 #[test]
 fn a_kill_leaves_a_file_that_reads_and_goes_on() {
-    let dir = Scratch::new().robot("justin");
+    let dir = Scratch::new().brief("justin");
     let out = dir.path("sweep.csv");
     let port = free_port();
     let source = format!("dtrack:{port}");
@@ -160,7 +160,7 @@ fn a_kill_leaves_a_file_that_reads_and_goes_on() {
 #[cfg(unix)]
 #[test]
 fn an_interrupt_ends_with_whole_poses_and_says_how_to_go_on() {
-    let dir = Scratch::new().robot("justin");
+    let dir = Scratch::new().brief("justin");
     let port = free_port();
     let source = format!("dtrack:{port}");
     let arguments = head_sweep(&source, &["--hold", "0.4", "--poses", "2"]);
@@ -270,7 +270,7 @@ fn shipped(text: &str) -> Vec<Pose> {
 /// what `calib run` takes.
 #[test]
 fn what_is_recorded_live_is_what_run_reads() {
-    let dir = Scratch::new().robot("justin");
+    let dir = Scratch::new().brief("justin");
     let file = "robots/justin/arm_poses.csv";
     // Every third pose: each is held for a tenth of a second.
     let poses: Vec<Pose> = shipped(&dir.read(file)).into_iter().step_by(3).collect();
@@ -339,7 +339,7 @@ fn what_is_recorded_live_is_what_run_reads() {
 
 #[test]
 fn refusals_before_anything_is_written() {
-    let dir = Scratch::new().robot("justin").robot("ripley");
+    let dir = Scratch::new().brief("justin").brief("ripley");
     let before = dir.files("");
     let refused = |arguments: &[&str]| {
         let child = start(&dir, arguments);
@@ -409,7 +409,7 @@ fn refusals_before_anything_is_written() {
 
 #[test]
 fn a_tracker_that_sends_other_names_is_refused() {
-    let dir = Scratch::new().robot("justin");
+    let dir = Scratch::new().brief("justin");
     let port = free_port();
     let stop = Arc::new(AtomicBool::new(false));
     let sender = still_body(port, 1, stop.clone());

@@ -223,7 +223,7 @@ fn inputs_are_untouched_and_named_with_their_digests() {
 
 #[test]
 fn the_results_of_an_earlier_run_are_replaced() {
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     dir.calib([
         "run",
         "robots/ripley.yaml",
@@ -248,7 +248,7 @@ fn the_results_of_an_earlier_run_are_replaced() {
 
 #[test]
 fn results_go_to_a_folder_of_the_profile_s_name_unless_told_otherwise() {
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     dir.calib(["run", "robots/ripley.yaml", "--method", "paper"])
         .expect(1);
     assert!(dir.files("results/ripley").contains_key("report.json"));
@@ -257,7 +257,7 @@ fn results_go_to_a_folder_of_the_profile_s_name_unless_told_otherwise() {
 #[test]
 fn a_foreign_file_is_never_overwritten() {
     let dir = Scratch::new()
-        .robot("ripley")
+        .brief("ripley")
         .file("out/report.md", "my notes");
     let ran = dir
         .calib([
@@ -283,7 +283,7 @@ fn a_foreign_file_is_never_overwritten() {
 #[test]
 fn a_folder_that_cannot_be_written_to_ends_with_seven() {
     // Below a file there is no folder, for the superuser neither.
-    let dir = Scratch::new().robot("ripley").file("taken", "a file");
+    let dir = Scratch::new().brief("ripley").file("taken", "a file");
     let before = dir.files("");
     let ran = dir
         .calib([
@@ -340,7 +340,7 @@ fn recordings_are_remade_byte_for_byte() {
 
 #[test]
 fn another_seed_gives_other_recordings() {
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     dir.calib([
         "simulate",
         "robots/ripley.yaml",
@@ -434,7 +434,7 @@ fn the_paper_s_method_places_the_robot_by_all_recordings() {
 
 #[test]
 fn missing_compliance_is_noticed_and_gone_when_it_is_freed() {
-    let stiff = Scratch::new().robot("justin").edit(
+    let stiff = Scratch::new().brief("justin").edit(
         "robots/justin.yaml",
         "joint_axes, compliance]",
         "joint_axes]",
@@ -461,7 +461,7 @@ fn missing_compliance_is_noticed_and_gone_when_it_is_freed() {
 
 #[test]
 fn a_limit_that_was_not_set_is_not_a_pass() {
-    let dir = Scratch::new().robot("ripley").edit(
+    let dir = Scratch::new().brief("ripley").edit(
         "robots/ripley.yaml",
         "  limits: {held_out_rms_mm: 1.5, held_out_max_mm: 4}\n",
         "",
@@ -473,7 +473,7 @@ fn a_limit_that_was_not_set_is_not_a_pass() {
 
 #[test]
 fn the_report_is_printed_as_it_is_written() {
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     let ran = dir
         .calib(["run", "robots/ripley.yaml", "--json", "--out", "out"])
         .expect(0);
@@ -490,7 +490,7 @@ fn bad_data_stop_a_run_unless_it_is_forced() {
         }
     };
     let dir = Scratch::new()
-        .robot("ripley")
+        .brief("ripley")
         .cells("robots/ripley/base_sweep.csv", outside);
     let profile = "robots/ripley.yaml";
     dir.calib(["run", profile, "--out", "out"]).expect(3);
@@ -512,7 +512,7 @@ fn a_body_that_its_sweep_never_saw() {
         }
     };
     let dir = Scratch::new()
-        .robot("ripley")
+        .brief("ripley")
         .cells("robots/ripley/base_sweep.csv", unseen);
     let profile = "robots/ripley.yaml";
     let severities = |folder: &str| -> Vec<String> {

@@ -75,7 +75,7 @@ fn only_numbers_of_poses_differ_besides_the_added_bodies() {
 /// Without added bodies the file has the same lines, and each changed line is an `<origin>`.
 #[test]
 fn without_added_bodies_only_origins_change() {
-    let dir = Scratch::new().robot("ripley").edit(
+    let dir = Scratch::new().brief("ripley").edit(
         "robots/ripley.yaml",
         "  add_bodies: [linkM, gripM]\n",
         "",
@@ -112,7 +112,7 @@ fn other_people_s_bytes_are_kept() {
             );
         format!("\u{feff}{}", text.replace('\n', "\r\n"))
     };
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     let text = odd(&dir.read("robots/ripley/r17.urdf"));
     let dir = dir.file("robots/ripley/r17.urdf", &text);
     dir.calib(["run", "robots/ripley.yaml", "--out", "out"])
@@ -268,10 +268,10 @@ fn reverting_overwrites_nothing() {
 
 #[test]
 fn the_difference_is_shown() {
-    let dir = Scratch::new().robot("ripley").file(
+    let dir = Scratch::new().brief("ripley").file(
         "a.urdf",
         Scratch::new()
-            .robot("ripley")
+            .brief("ripley")
             .read("robots/ripley/r17.urdf"),
     );
     let moved = dir.read("a.urdf").replace(

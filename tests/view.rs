@@ -192,7 +192,7 @@ fn programs_read_json_from_every_command() {
 
 #[test]
 fn the_progress_of_a_study_is_json_lines() {
-    let dir = Scratch::new().robot("ripley");
+    let dir = Scratch::new().brief("ripley");
     let two = ["study", "ripley", "--trials", "2", "--recorded", "1"];
     let ran = dir.calib_with(&[&two[..], &["--out", "out", "--json"]].concat());
     let ran = ran.expect(0);

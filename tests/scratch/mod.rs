@@ -23,6 +23,30 @@ pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
+/// Every second data row of a table of more than 30 rows, every third of more than 100.
+fn thinned(table: &str) -> String {
+    let mut rows = 0;
+    let of_data: Vec<Option<usize>> = table
+        .lines()
+        .map(|line| {
+            rows += usize::from(!line.starts_with('#'));
+            (!line.starts_with('#')).then(|| rows - 1)
+        })
+        .collect();
+    let every = match rows {
+        0..=31 => 1,
+        32..=101 => 2,
+        _ => 3,
+    };
+    // Row 0 is the header.
+    let kept = |row: &Option<usize>| row.is_none_or(|row| row == 0 || (row - 1) % every == 0);
+    let lines = table.lines().zip(&of_data);
+    lines
+        .filter(|(_, row)| kept(row))
+        .map(|(line, _)| format!("{line}\n"))
+        .collect()
+}
+
 /// Files below a folder, by path relative to it.
 pub type Files = BTreeMap<String, Vec<u8>>;
 
@@ -57,6 +81,19 @@ impl Scratch {
             }
         }
         self
+    }
+
+    /// Copies a shipped robot with half of the poses of its recordings, a third of those of long ones: for tests of what does not depend
+    /// on how many poses there are. A run takes half the time.
+    pub fn brief(self, name: &str) -> Self {
+        let dir = self.robot(name);
+        for (file, bytes) in dir.files(&format!("robots/{name}")) {
+            if file.ends_with(".csv") {
+                let text = String::from_utf8(bytes).expect("a table is text");
+                dir.write(&format!("robots/{name}/{file}"), thinned(&text).as_bytes());
+            }
+        }
+        dir
     }
 
     /// Adds or replaces a file.

@@ -15,7 +15,7 @@ use calib_estimator::{
 };
 use nalgebra::{Matrix2, Matrix4, Matrix6, Vector2, Vector3, Vector4};
 
-use crate::axis_frame::AxisFrame;
+use crate::{axis_frame::AxisFrame, products::Products};
 
 const MAX_STEPS: usize = 200;
 
@@ -40,12 +40,17 @@ pub(crate) fn linearize_marker(
     axis: &Axis,
 ) -> Normal {
     let AxisFrame { e1, e2, n } = axis.frame;
-    let mut total = 0.0;
-    let (mut sum_a, mut sum_r) = (Vector4::zeros(), Vector4::zeros());
-    let (mut mean_a, mut mean_r) = (0.0, 0.0);
-    let mut hessian = Matrix4::zeros();
-    let mut gradient = Vector4::zeros();
-    let mut cost = 0.0;
+    let (mut total, mut cost, mut mean_a, mut mean_r) = (0.0, 0.0, 0.0, 0.0);
+    // Σ w of d, û and a û across the axis, and of their products: all that the two rows of a sample consist of.
+    let (mut of_d, mut of_u, mut of_au) = (Vector2::zeros(), Vector2::zeros(), Vector2::zeros());
+    let (mut dd, mut uu, mut auu, mut aauu) = (
+        Products::ZERO,
+        Products::ZERO,
+        Products::ZERO,
+        Products::ZERO,
+    );
+    let (mut pull_d, mut pull_u, mut pull_au) =
+        (Vector2::zeros(), Vector2::zeros(), Vector2::zeros());
     // Residuals relative to the first sample's: differences keep their digits.
     let first = samples
         .clone()
@@ -62,20 +67,39 @@ pub(crate) fn linearize_marker(
         } else {
             Vector3::zeros()
         };
-        let (u1, u2) = (u.dot(&e1), u.dot(&e2));
         // ∂a = d·(α e₁ + β e₂);  ∂|w| = −a û·(α e₁ + β e₂) − û·(γ e₁ + δ e₂)
-        let j_a = Vector4::new(d.dot(&e1), d.dot(&e2), 0.0, 0.0);
-        let j_r = Vector4::new(-a * u1, -a * u2, -u1, -u2);
+        let across_d = Vector2::new(d.dot(&e1), d.dot(&e2));
+        let across_u = Vector2::new(u.dot(&e1), u.dot(&e2));
         let (e_a, e_r) = (a - a0, length - r0);
-        hessian += (j_a * j_a.transpose() + j_r * j_r.transpose()) * weight;
-        gradient += (j_a * e_a + j_r * e_r) * weight;
+        dd.add(weight, across_d);
+        uu.add(weight, across_u);
+        auu.add(weight * a, across_u);
+        aauu.add(weight * a * a, across_u);
+        pull_d += across_d * (weight * e_a);
+        pull_u += across_u * (weight * e_r);
+        pull_au += across_u * (weight * a * e_r);
         cost += weight * (e_a * e_a + e_r * e_r);
-        sum_a += j_a * weight;
-        sum_r += j_r * weight;
+        of_d += across_d * weight;
+        of_u += across_u * weight;
+        of_au += across_u * (weight * a);
         mean_a += weight * e_a;
         mean_r += weight * e_r;
         total += weight;
     }
+    let mut hessian = Matrix4::zeros();
+    hessian
+        .fixed_view_mut::<2, 2>(0, 0)
+        .copy_from(&(dd.matrix() + aauu.matrix()));
+    hessian
+        .fixed_view_mut::<2, 2>(0, 2)
+        .copy_from(&auu.matrix());
+    hessian
+        .fixed_view_mut::<2, 2>(2, 0)
+        .copy_from(&auu.matrix());
+    hessian.fixed_view_mut::<2, 2>(2, 2).copy_from(&uu.matrix());
+    let of = |head: Vector2<f64>, tail: Vector2<f64>| Vector4::new(head.x, head.y, tail.x, tail.y);
+    let mut gradient = of(pull_d - pull_au, -pull_u);
+    let (sum_a, sum_r) = (of(of_d, Vector2::zeros()), of(-of_au, -of_u));
     // Heights and radii are means: center residuals and rows.
     mean_a /= total;
     mean_r /= total;

@@ -48,6 +48,7 @@ mod options;
 mod outcome;
 pub mod planar_radial;
 pub mod plane;
+mod products;
 mod registry;
 pub mod robust_frame;
 pub mod robust_line;

@@ -239,29 +239,31 @@ fn one_sided_jacobi(a: &mut [f64], v: &mut [f64], s: &mut [f64], n: usize) {
     a.iter_mut().for_each(|x| *x /= scale);
     let threshold = f64::EPSILON;
     for _ in 0..MAX_SWEEPS {
+        // Squared norms of the columns: kept up to date within a sweep, and new with each.
+        for j in 0..n {
+            let column = &a[j * n..(j + 1) * n];
+            s[j] = dot(column, column);
+        }
         let mut rotated = false;
         for p in 0..n {
             for q in p + 1..n {
-                let (mut alpha, mut beta, mut gamma) = (0.0, 0.0, 0.0);
-                for k in 0..n {
-                    let (x, y) = (a[p * n + k], a[q * n + k]);
-                    alpha += x * x;
-                    beta += y * y;
-                    gamma += x * y;
-                }
+                let (x, y) = pair(a, p, q, n);
+                let gamma = dot(x, y);
+                let product = s[p] * s[q];
                 // Underflowing columns are zero columns.
-                if gamma == 0.0
-                    || gamma.abs() <= threshold * (alpha * beta).sqrt()
-                    || alpha * beta == 0.0
-                {
+                if gamma == 0.0 || gamma.abs() <= threshold * product.sqrt() || product == 0.0 {
                     continue;
                 }
                 rotated = true;
-                let zeta = (beta - alpha) / (2.0 * gamma);
-                let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
-                let c = 1.0 / t.hypot(1.0);
-                rotate(a, p, q, n, c, c * t);
-                rotate(v, p, q, n, c, c * t);
+                let (t, c) = rotation((s[q] - s[p]) / (2.0 * gamma));
+                rotate(x, y, c, c * t);
+                (s[p], s[q]) = match 16.0 * t.abs() * gamma.abs() < s[p].min(s[q]) {
+                    true => (s[p] - t * gamma, s[q] + t * gamma),
+                    // What is left of a column after most of it went has too few digits as a difference.
+                    false => (dot(x, x), dot(y, y)),
+                };
+                let (x, y) = pair(v, p, q, n);
+                rotate(x, y, c, c * t);
             }
         }
         if !rotated {
@@ -290,12 +292,49 @@ fn one_sided_jacobi(a: &mut [f64], v: &mut [f64], s: &mut [f64], n: usize) {
     s.iter_mut().for_each(|x| *x *= scale);
 }
 
-/// Columns p and q ← (c p − s q, s p + c q).
-fn rotate(a: &mut [f64], p: usize, q: usize, n: usize, c: f64, s: f64) {
-    for k in 0..n {
-        let (x, y) = (a[p * n + k], a[q * n + k]);
-        a[p * n + k] = c * x - s * y;
-        a[q * n + k] = s * x + c * y;
+/// Columns `p < q` of an n × n column-major matrix.
+#[inline]
+fn pair(a: &mut [f64], p: usize, q: usize, n: usize) -> (&mut [f64], &mut [f64]) {
+    let (before, from_q) = a.split_at_mut(q * n);
+    (&mut before[p * n..(p + 1) * n], &mut from_q[..n])
+}
+
+/// `x'y` in four sums that run beside each other: one sum would wait for each of its additions.
+#[inline]
+fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let (fours_x, rest_x) = x.as_chunks::<4>();
+    let (fours_y, rest_y) = y.as_chunks::<4>();
+    let mut sums = [0.0; 4];
+    for (x, y) in fours_x.iter().zip(fours_y) {
+        for i in 0..4 {
+            sums[i] += x[i] * y[i];
+        }
+    }
+    let rest: f64 = rest_x.iter().zip(rest_y).map(|(x, y)| x * y).sum();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
+/// Tangent and cosine of the rotation that makes two columns orthogonal, the smaller of the two angles, from the cotangent of twice the angle.
+///
+/// Square roots only, which every machine rounds alike.
+#[inline]
+fn rotation(cotangent: f64) -> (f64, f64) {
+    let size = cotangent.abs();
+    // Above 1e8 the root is `size` to the last digit, and its square might overflow.
+    let root = if size < 1e8 {
+        (size * size + 1.0).sqrt()
+    } else {
+        size
+    };
+    let t = cotangent.signum() / (size + root);
+    (t, 1.0 / (t * t + 1.0).sqrt())
+}
+
+/// Columns x and y ← (c x − s y, s x + c y).
+#[inline]
+fn rotate(x: &mut [f64], y: &mut [f64], c: f64, s: f64) {
+    for (x, y) in x.iter_mut().zip(y) {
+        (*x, *y) = (c * *x - s * *y, s * *x + c * *y);
     }
 }
 
@@ -366,19 +405,16 @@ fn cyclic_jacobi(a: &mut [f64], v: &mut [f64], values: &mut [f64], n: usize) {
                     continue;
                 }
                 rotated = true;
-                let theta = (aqq - app) / (2.0 * off);
-                let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-                let c = 1.0 / t.hypot(1.0);
-                let s = c * t;
-                rotate(a, p, q, n, c, s);
+                let (t, c) = rotation((aqq - app) / (2.0 * off));
+                let (x, y) = pair(a, p, q, n);
+                rotate(x, y, c, c * t);
+                // The rows are the columns of a symmetric matrix, but for the four entries where both meet.
+                (x[p], x[q], y[p], y[q]) = (app - t * off, 0.0, 0.0, aqq + t * off);
                 for k in 0..n {
-                    let (x, y) = (a[k * n + p], a[k * n + q]);
-                    a[k * n + p] = c * x - s * y;
-                    a[k * n + q] = s * x + c * y;
+                    (a[k * n + p], a[k * n + q]) = (a[p * n + k], a[q * n + k]);
                 }
-                a[p * n + q] = 0.0;
-                a[q * n + p] = 0.0;
-                rotate(v, p, q, n, c, s);
+                let (x, y) = pair(v, p, q, n);
+                rotate(x, y, c, c * t);
             }
         }
         if !rotated {

@@ -255,9 +255,19 @@ impl Bundle {
                 row.fixed_rows_mut::<3>(4 + 3 * p).copy_from(c);
             }
             let inverse = 1.0 / (frame.own * (1.0 + damping));
-            h.ger(-inverse, &row, &row, 1.0);
+            // The lower triangle.
+            for (k, mut column) in h.column_iter_mut().enumerate() {
+                let by = inverse * row[k];
+                for (entry, value) in column.as_mut_slice()[k..]
+                    .iter_mut()
+                    .zip(&row.as_slice()[k..])
+                {
+                    *entry -= by * value;
+                }
+            }
             g.axpy(-inverse * frame.gradient, &row, 1.0);
         }
+        h.fill_upper_triangle_with_lower_triangle();
         h.iter().all(|x| x.is_finite()).then_some((h, g))
     }
 }
@@ -308,8 +318,7 @@ impl Problem for Bundle {
                 let mut corner = normal.shared.fixed_view_mut::<4, 4>(0, 0);
                 corner += j.transpose() * j * w;
                 let side = j.transpose() * rz * w;
-                let mut right = normal.shared.fixed_view_mut::<4, 3>(0, at);
-                right += side;
+                // The lower triangle.
                 let mut below = normal.shared.fixed_view_mut::<3, 4>(at, 0);
                 below += side.transpose();
                 for k in 0..3 {
@@ -326,6 +335,7 @@ impl Problem for Bundle {
             }
             normal.frames.push(block);
         }
+        normal.shared.fill_upper_triangle_with_lower_triangle();
         normal
     }
 
