@@ -59,10 +59,12 @@ const RIDGE: f64 = 1e-4;
 const WEAKEST: usize = 12;
 /// Rounds of exchanges at the most.
 const ROUNDS: usize = 20;
+/// Postures that exchanges choose from: those with the largest derivative of the criterion.
+const PROMISING: usize = 300;
 /// Rounds in which the mixture takes new postures, how many each, and steps of the weights in each round.
 const ADMISSIONS: usize = 4;
-const ADMITTED: usize = 60;
-const STEPS: usize = 60;
+const ADMITTED: usize = 40;
+const STEPS: usize = 50;
 /// An exchange that gains less of the criterion ends the rounds: log of a determinant, relative for a trace.
 const GAIN: f64 = 1e-6;
 
@@ -76,12 +78,41 @@ impl Question<'_> {
             free[i] = false;
         }
         let mut chosen = state.greedy(count, &mut free);
+        drop(state);
+        self.exchanged(&mut chosen, &free);
+        chosen
+    }
+
+    /// Exchanges the weakest of the chosen for others of those that are free and promise most.
+    fn exchanged(&self, chosen: &mut [usize], free: &[bool]) {
+        let n = self.before.nrows();
+        let ridged = self.information(chosen) + DMatrix::identity(n, n) * RIDGE;
+        let Some(gains) = self.gains(&ridged) else {
+            return;
+        };
+        let mut promising: Vec<usize> = (0..free.len()).filter(|i| free[*i]).collect();
+        promising.sort_by(|a, b| gains[*b].total_cmp(&gains[*a]).then(a.cmp(b)));
+        promising.truncate(PROMISING);
+        let among: Vec<usize> = chosen.iter().copied().chain(promising).collect();
+        let rows: Vec<DMatrix<f64>> = among.iter().map(|i| self.rows[*i].clone()).collect();
+        let question = Question {
+            rows: &rows,
+            ..*self
+        };
+        let mut state = State::new(&question);
+        let mut places: Vec<usize> = (0..chosen.len()).collect();
+        let mut free: Vec<bool> = (0..among.len()).map(|i| i >= chosen.len()).collect();
+        for i in 0..chosen.len() {
+            state.update(i, 1.0);
+        }
         for _ in 0..ROUNDS {
-            if !state.exchange(&mut chosen, &mut free) {
+            if !state.exchange(&mut places, &mut free) {
                 break;
             }
         }
-        chosen
+        for (chosen, place) in chosen.iter_mut().zip(places) {
+            *chosen = among[place];
+        }
     }
 
     /// The postures one after the other, each the best beside those before it.

@@ -33,6 +33,10 @@ fn thirty_six_of_three_thousand_candidates_of_forty_parameters() {
             "{name}: choice {choice:.2?}, certificate {certificate:?} {:.2?}",
             start.elapsed() - choice
         );
-        assert!(choice.as_secs_f64() <= 1.0, "{choice:?}");
+        // The development profile is a few times slower.
+        assert!(
+            cfg!(debug_assertions) || choice.as_secs_f64() <= 1.0,
+            "{choice:?}"
+        );
     }
 }
