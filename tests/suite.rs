@@ -22,6 +22,7 @@ mod laboratory;
 mod layering;
 mod loads;
 mod outputs;
+mod plan;
 mod plugins;
 mod real_robots;
 mod record;

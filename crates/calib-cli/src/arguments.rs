@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    apply, check, completions, convert, diff, drift, fit, history, man, plugins, record, revert,
-    run, schema, simulate, study, view,
+    apply, check, completions, convert, diff, drift, fit, history, man, plan, plugins, record,
+    revert, run, schema, simulate, study, view,
 };
 use crate::terminal::Console;
 
@@ -33,6 +33,8 @@ pub enum Command {
     View(view::View),
     /// Check a profile and its recordings without solving
     Check(check::Check),
+    /// Choose the postures to record next, and say what they will tell
+    Plan(plan::PlanPostures),
     /// Simulate recordings with known truth for a profile
     Simulate(simulate::Simulate),
     /// Run one estimator on one table, without a profile

@@ -8,6 +8,7 @@ use calib_drift::DriftError;
 use calib_files::FileError;
 use calib_fit::FitError;
 use calib_pipeline::{ExitCode, PipelineError};
+use calib_plan::PlanError;
 use calib_plugin::NewProjectError;
 use calib_study::StudyError;
 use calib_study::cases::CaseError;
@@ -30,6 +31,15 @@ pub enum CliError {
     /// Of `calib fit`.
     #[error(transparent)]
     Fit(#[from] FitError),
+    /// Of `calib plan`.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A σ that is asked for is none.
+    #[error("{sigma} is not a σ\n  help: give a number above 0, in mm: `--sigma-mm 0.1`")]
+    NotASigma {
+        /// What was given.
+        sigma: f64,
+    },
     /// A file was not written.
     #[error(transparent)]
     File(#[from] FileError),
@@ -110,6 +120,7 @@ impl CliError {
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Pipeline(error) => error.exit_code(),
+            Self::Plan(error) => error.exit_code(),
             Self::Apply(error) => of_apply(error),
             Self::Drift(error) if error.is_refusal() => ExitCode::NotObservable,
             Self::Drift(DriftError::Unwritable(_)) | Self::Report(_) | Self::Stdout(_) => {
@@ -126,7 +137,8 @@ impl CliError {
             Self::Capture(CaptureError::Source(SourceError::Port { .. })) => ExitCode::Usage,
             Self::Capture(CaptureError::Source(_)) => ExitCode::Data,
             Self::Capture(CaptureError::Table(_)) => ExitCode::NotWritten,
-            Self::Simulation { .. }
+            Self::NotASigma { .. }
+            | Self::Simulation { .. }
             | Self::Json { .. }
             | Self::Fit(_)
             | Self::Study(_)
@@ -141,7 +153,7 @@ impl CliError {
     #[must_use]
     pub fn remedy(&self) -> Option<&'static str> {
         match self {
-            Self::Pipeline(error) => Some(error.remedy()),
+            Self::Pipeline(error) | Self::Plan(PlanError::Pipeline(error)) => Some(error.remedy()),
             Self::Apply(ApplyError::Read(_)) => {
                 Some("correct it there, or export the nominal URDF again")
             }

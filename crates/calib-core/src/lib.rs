@@ -43,6 +43,7 @@
 //! | which physics is missing | [`Solution::goodness_of_fit`], with [`Problem::candidate`] effects |
 //! | did something move meanwhile | [`Solution::changes`] |
 //! | has the noise a memory, and what does that cost | [`Solution::dependence`], [`Solution::under`] |
+//! | what would a posture tell that was not recorded yet | [`Model::whitened_rows`], [`Model::linear_points`] |
 //! | which model | [`compare()`]; which effects and axes it should have: [`select()`] |
 //! | what is random from pose to pose | [`Solution::weighed`] |
 //! | how wide the priors should be | [`Solution::widened`] |

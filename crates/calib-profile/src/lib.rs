@@ -31,12 +31,12 @@ pub use error::{Problem, ProfileError};
 pub use locate::Place;
 pub use nalgebra;
 pub use profile::{
-    Body, BodyKind, ByRow, Clocks, Contact, ContactBase, Error3, Free, FreeEffect, FromRoot,
-    JointException, JointFree, JointFreeSet, Limits, LinkTransform, Load, Loop, Method, Noise,
-    Orientation, Origin, OriginFreeSet, Outputs, ParameterValue, Plugin, PointChoice, Prior,
-    Profile, Protocol, RecordingSpec, RobotLoad, RobotLog, SharedWidth, SimErrors, SimMount,
-    SimNoise, Simulation, Solve, Split, Spots, Steps, SweptAxis, TimedPoses, Timing, Tip, Touched,
-    Tracker, UpAxis, Usage,
+    Body, BodyKind, ByRow, Camera, Clocks, Contact, ContactBase, Error3, Facing, Free, FreeEffect,
+    FromRoot, JointException, JointFree, JointFreeSet, KeepOut, Limits, LinkTransform, Load, Loop,
+    Method, Noise, Orientation, Origin, OriginFreeSet, Outputs, ParameterValue, PlanSpec, Plugin,
+    PointChoice, Prior, Profile, Protocol, RecordingSpec, RobotLoad, RobotLog, SharedWidth,
+    SimErrors, SimMount, SimNoise, Simulation, Solve, Split, Spots, Steps, SweptAxis, TimedPoses,
+    Timing, Tip, Touched, Tracker, UpAxis, Usage,
 };
 pub use schema::json_schema;
 

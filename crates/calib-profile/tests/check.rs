@@ -58,6 +58,42 @@ fn axes_are_sorted_from_the_root_whatever_their_letters() {
 
 /// What is wrong, the place that the message names, and a word that it must say.
 const WRONG: &[(&str, &str, &str, &str)] = &[
+    (
+        "calib: 1",
+        "plan: {joints: {pan_deg: [-200, 90]}}\ncalib: 1",
+        "arm.yaml:1:",
+        "limits",
+    ),
+    (
+        "calib: 1",
+        "plan: {cameras: {c: {at_mm: [0, 0, 0], toward_mm: [0, 0, 0], field_deg: 50}}, min_cameras: 1}\ncalib: 1",
+        "arm.yaml:1:",
+        "looks at itself",
+    ),
+    (
+        "calib: 1",
+        "plan: {cameras: {c: {at_mm: [0, 0, 0], toward_mm: [1, 0, 0], field_deg: 50}}}\ncalib: 1",
+        "arm.yaml:1:",
+        "2 cameras are asked for, 1 are declared",
+    ),
+    (
+        "calib: 1",
+        "plan: {facing: {hend: {normal: [0, 0, 1], within_deg: 60}}}\ncalib: 1",
+        "arm.yaml:1:",
+        "did you mean `hand`?",
+    ),
+    (
+        "calib: 1",
+        "plan: {task_box_mm: [[0, 0, 0], [100, 0, 100]]}\ncalib: 1",
+        "arm.yaml:1:",
+        "differ in all three",
+    ),
+    (
+        "calib: 1",
+        "plan: {hold: {pan_deg: 3}, joints: {pan_deg: [0, 9]}}\ncalib: 1",
+        "arm.yaml:1:",
+        "both move and be held",
+    ),
     ("calib: 1", "calib: 2", "arm.yaml:1:8", "version 2"),
     (
         "link: tip",

@@ -10,6 +10,7 @@ pub mod fit;
 pub mod history;
 pub mod man;
 mod names;
+pub mod plan;
 mod plugin_options;
 pub mod plugins;
 pub mod record;
@@ -32,6 +33,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
     match &arguments.command {
         Command::Run(options) => run::run(console, options),
         Command::Check(options) => check::run(console.color, options),
+        Command::Plan(options) => plan::run(console, options),
         Command::Simulate(options) => simulate::run(console, options),
         Command::Fit(options) => fit::run(options),
         Command::Apply(options) => apply::run(options),

@@ -6,6 +6,7 @@ use calib_apply::ApplyError;
 use calib_drift::DriftError;
 use calib_files::FileError;
 use calib_pipeline::PipelineError;
+use calib_plan::PlanError;
 use calib_recording::At;
 use serde::Serialize;
 
@@ -49,7 +50,8 @@ impl CliError {
     #[must_use]
     pub fn id(&self) -> &'static str {
         match self {
-            Self::Pipeline(error) => of_pipeline(error),
+            Self::Pipeline(error) | Self::Plan(PlanError::Pipeline(error)) => of_pipeline(error),
+            Self::Plan(_) | Self::NotASigma { .. } => "plan",
             Self::Apply(error) => of_apply(error),
             Self::Drift(_) => "drift",
             Self::Fit(_) => "fit",
@@ -71,7 +73,10 @@ impl CliError {
     #[must_use]
     pub fn place(&self) -> Option<Place> {
         Some(match self {
-            Self::Pipeline(error) => return place_of_pipeline(error),
+            Self::Pipeline(error) | Self::Plan(PlanError::Pipeline(error)) => {
+                return place_of_pipeline(error);
+            }
+            Self::Plan(error) => Place::of(error.file()?.to_owned()),
             Self::Apply(ApplyError::Read(error)) => place_of_urdf(error)?,
             Self::Apply(ApplyError::File(error)) | Self::File(error) => place_of_file(error)?,
             Self::Drift(DriftError::Report(error)) => Place::path(error.path()),

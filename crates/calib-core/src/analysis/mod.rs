@@ -16,6 +16,7 @@ mod less_noise;
 mod looked_at;
 pub(crate) mod observability;
 mod own_levels;
+mod posture;
 mod precision;
 pub(crate) mod sandwich;
 pub(crate) mod score;

@@ -17,6 +17,7 @@ mod limits;
 mod long;
 mod noise;
 mod own_levels;
+mod posture;
 mod robust;
 mod select;
 mod spread;

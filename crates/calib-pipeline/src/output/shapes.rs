@@ -11,7 +11,7 @@ use calib_finding::{About, Fact, Finding, catalog};
 use calib_report::view3d::Solid;
 use calib_urdf::mesh::{MeshFormat, Triangle};
 use calib_urdf::sha256_hex;
-use calib_urdf::visual::{Geometry, Visual, visuals};
+use calib_urdf::visual::{Geometry, Visual, collisions, visuals};
 
 use crate::prepare::inputs::{Digest, RobotProfile};
 
@@ -92,6 +92,37 @@ pub fn solids(robot: &RobotProfile, findings: &mut Vec<Finding>) -> (Vec<Solid>,
         );
     }
     (solids, read)
+}
+
+/// The shapes that stand for the links where collisions are looked for: those of `<collision>`, else of `<visual>`, link by link.
+/// Also the links of which some shape could not be read.
+#[must_use]
+pub fn collision_solids(robot: &RobotProfile) -> (Vec<Solid>, Vec<String>) {
+    let file = &robot.profile.urdf;
+    let (Ok((stated, bad)), Ok((drawn, faults))) = (
+        collisions(&robot.urdf_text, file),
+        visuals(&robot.urdf_text, file),
+    ) else {
+        return (Vec::new(), Vec::new());
+    };
+    let has_own = |link: &String| stated.iter().any(|shape| shape.link == *link);
+    let drawn = drawn.iter().filter(|shape| !has_own(&shape.link));
+    let (mut solids, mut unread) = (Vec::new(), Vec::new());
+    unread.extend(bad.into_iter().map(|fault| fault.link));
+    let faults = faults.into_iter().filter(|fault| !has_own(&fault.link));
+    unread.extend(faults.map(|fault| fault.link));
+    for shape in stated.iter().chain(drawn) {
+        let Ok(link) = robot.model.link_id(&shape.link) else {
+            continue;
+        };
+        match solid(robot, link.index(), shape) {
+            Ok((solid, _)) => solids.push(solid),
+            Err(_) => unread.push(shape.link.clone()),
+        }
+    }
+    unread.sort();
+    unread.dedup();
+    (solids, unread)
 }
 
 /// One shape and the file that was read for it; else the file, and why it is not drawn.

@@ -64,6 +64,7 @@ mod contact;
 mod load;
 mod names;
 mod origin;
+mod plan;
 mod recording;
 mod simulate;
 mod solve;
@@ -172,6 +173,7 @@ impl<'a> Checker<'a> {
             contacts: self.contacts(),
             solve: self.solve(&raw.solve),
             outputs: self.outputs(),
+            plan: self.plan(&raw.plan),
             simulate: raw.simulate.as_ref().map(|s| self.simulation(s)),
         }
     }

@@ -4,6 +4,7 @@ mod body;
 mod contact;
 mod load;
 mod origin;
+mod plan;
 mod recording;
 mod simulate;
 mod solve;
@@ -13,6 +14,7 @@ pub use body::{Body, BodyKind};
 pub use contact::{ByRow, Contact, ContactBase, Spots, Tip};
 pub use load::RobotLoad;
 pub use origin::{LinkTransform, Loop, Orientation, Origin, PointChoice, SweptAxis};
+pub use plan::{Camera, Facing, KeepOut, PlanSpec};
 pub use recording::{RecordingSpec, RobotLog, Timing};
 pub use simulate::{Error3, Protocol, SimErrors, SimMount, SimNoise, Simulation, Steps};
 pub use solve::{
@@ -67,6 +69,8 @@ pub struct Profile {
     pub solve: Solve,
     /// What is written.
     pub outputs: Outputs,
+    /// Which postures may be planned, and what the tracker sees.
+    pub plan: PlanSpec,
     /// How to simulate, when the profile says.
     pub simulate: Option<Simulation>,
 }

@@ -7,6 +7,7 @@ mod body;
 mod contact;
 mod free;
 mod origin;
+mod plan;
 mod recording;
 mod robot;
 mod simulate;
@@ -18,6 +19,7 @@ pub use contact::{RawContact, RawContactPoint};
 pub(crate) use free::{ANGLE, MASS, MASS_CENTER, POSITION, PRIOR_KEYS};
 pub use free::{RawFree, RawJointFree, RawPrior};
 pub use origin::{RawLoop, RawOrientation, RawOrigin, RawPoint, RawTransform};
+pub use plan::{RawCamera, RawFacing, RawKeepOut, RawPlan};
 pub use recording::{RawClocks, RawRecording, RawRobotLog, RawTimedPoses, RawTiming, RawUse};
 pub use robot::{RawPayload, RawRobot};
 pub use simulate::{RawProtocol, RawSimErrors, RawSimMount, RawSimNoise, RawSimulate, RawSteps};
@@ -72,6 +74,9 @@ pub struct RawProfile {
     /// What is written.
     #[serde(default)]
     pub outputs: RawOutputs,
+    /// Which postures `calib plan` may propose, and what the tracker sees.
+    #[serde(default)]
+    pub plan: RawPlan,
     /// How `calib simulate` makes recordings with known truth for this robot.
     #[serde(default)]
     pub simulate: Option<RawSimulate>,

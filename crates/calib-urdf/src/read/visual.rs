@@ -40,7 +40,7 @@ pub enum Geometry {
     },
 }
 
-/// One `<visual>` of a link.
+/// One `<visual>` or `<collision>` of a link.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Visual {
@@ -83,11 +83,30 @@ pub fn visuals(
     text: &str,
     name_for_errors: &str,
 ) -> Result<(Vec<Visual>, Vec<VisualFault>), ReadError> {
+    shapes(text, name_for_errors, "visual")
+}
+
+/// The same of `<collision>`: the shapes that the robot's maker states for collision checks.
+///
+/// # Errors
+/// As [`visuals`].
+pub fn collisions(
+    text: &str,
+    name_for_errors: &str,
+) -> Result<(Vec<Visual>, Vec<VisualFault>), ReadError> {
+    shapes(text, name_for_errors, "collision")
+}
+
+fn shapes(
+    text: &str,
+    name_for_errors: &str,
+    tag: &str,
+) -> Result<(Vec<Visual>, Vec<VisualFault>), ReadError> {
     let document = parse(text, name_for_errors)?;
     let (mut shapes, mut faults) = (Vec::new(), Vec::new());
     for link in top_level(&document, "link") {
         let name = link.own("name").unwrap_or("");
-        for visual in link.children().filter(|node| node.has_tag_name("visual")) {
+        for visual in link.children().filter(|node| node.has_tag_name(tag)) {
             match shape(visual) {
                 Ok((link_from_visual, geometry)) => shapes.push(Visual {
                     link: name.to_owned(),
@@ -190,6 +209,9 @@ mod tests {
 </link>
 </robot>"#;
         let (shapes, faults) = visuals(text, "r.urdf").expect("XML");
+        let (stated, _) = collisions(text, "r.urdf").expect("XML");
+        assert_eq!(stated.len(), 1);
+        assert_eq!(stated[0].geometry, Geometry::Sphere { radius: 9.0 });
         let names: Vec<&str> = shapes.iter().map(|s| s.link.as_str()).collect();
         assert_eq!(names, ["a", "a", "b"]);
         assert_eq!(

@@ -1,0 +1,139 @@
+//! Postures that the robot can take and the tracker can see.
+
+use std::collections::BTreeMap;
+
+use calib_urdf::{LinkId, RobotModel};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::joints::JointBox;
+use crate::scene::{Contact, Scene, rigid_parts};
+use crate::sight::{Seen, Sight, normalize};
+
+/// A posture that is possible and seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Joint positions by joint index, rad or m.
+    pub q: Vec<f64>,
+    /// What is seen, in the order of [`Sight::subjects`].
+    pub seen: Vec<Seen>,
+}
+
+/// How many postures each constraint removed; each is counted at the first that removes it.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Postures that were looked at.
+    pub tried: usize,
+    /// Two links too near to each other.
+    pub self_collision: usize,
+    /// The pair of links that did so most often.
+    pub worst_pair: Option<[String; 2]>,
+    /// A link too near to the ground.
+    pub ground: usize,
+    /// A link too near to a keep-out, by its name.
+    pub keep_outs: BTreeMap<String, usize>,
+    /// No moving body is seen by enough cameras.
+    pub not_seen: usize,
+    /// What is left.
+    pub feasible: usize,
+}
+
+/// What decides whether a posture is possible.
+#[derive(Debug, Clone)]
+pub struct Feasible<'a> {
+    /// The robot.
+    pub model: &'a RobotModel,
+    /// What it must not touch.
+    pub scene: Scene,
+    /// What is seen.
+    pub sight: Sight,
+    parts: Vec<usize>,
+}
+
+/// On a straight motion no joint moves further than this between two looks, rad and m: 2° and 10 mm. A link of 1 m moves 35 mm by that, and
+/// half way between two looks it is at most 18 mm from one of them: less than the usual clearance of 20 mm.
+const LOOKS: (f64, f64) = (0.035, 0.01);
+
+impl<'a> Feasible<'a> {
+    /// For a robot, its surroundings and its tracker.
+    #[must_use]
+    pub fn new(model: &'a RobotModel, scene: Scene, sight: Sight) -> Self {
+        Self {
+            model,
+            scene,
+            sight,
+            parts: rigid_parts(model),
+        }
+    }
+
+    /// A posture, or why not.
+    ///
+    /// # Errors
+    /// The contact; `None` for a posture in which nothing is seen.
+    pub fn candidate(&self, q: Vec<f64>) -> Result<Candidate, Option<Contact>> {
+        let root_from_link = self.model.forward_kinematics(&q);
+        let placed = self.scene.placed(&root_from_link);
+        if let Some(contact) = self.scene.contact(&placed) {
+            return Err(Some(contact));
+        }
+        let scene = (&self.scene, self.parts.as_slice());
+        let seen = self.sight.seen(scene, &placed, &root_from_link);
+        if !self.sight.measures(&seen) {
+            return Err(None);
+        }
+        Ok(Candidate { q, seen })
+    }
+
+    /// Those of some postures that are possible, and what removed the others.
+    #[must_use]
+    pub fn all(&self, postures: Vec<Vec<f64>>) -> (Vec<Candidate>, Counts) {
+        let mut counts = Counts {
+            tried: postures.len(),
+            ..Counts::default()
+        };
+        let judged: Vec<_> = postures
+            .into_par_iter()
+            .map(|q| self.candidate(q))
+            .collect();
+        let mut pairs: BTreeMap<(LinkId, LinkId), usize> = BTreeMap::new();
+        let mut kept = Vec::new();
+        for one in judged {
+            match one {
+                Ok(candidate) => kept.push(candidate),
+                Err(None) => counts.not_seen += 1,
+                Err(Some(Contact::Ground)) => counts.ground += 1,
+                Err(Some(Contact::KeepOut(name))) => {
+                    *counts.keep_outs.entry(name).or_default() += 1
+                }
+                Err(Some(Contact::Links(a, b))) => {
+                    counts.self_collision += 1;
+                    *pairs.entry((a, b)).or_default() += 1;
+                }
+            }
+        }
+        let name = |link: LinkId| self.model.link(link).name.clone();
+        let worst = pairs.into_iter().max_by_key(|(_, count)| *count);
+        counts.worst_pair = worst.map(|((a, b), _)| [name(a), name(b)]);
+        counts.feasible = kept.len();
+        let mut seen: Vec<Vec<Seen>> = kept
+            .iter_mut()
+            .map(|c| std::mem::take(&mut c.seen))
+            .collect();
+        normalize(&mut seen);
+        for (candidate, seen) in kept.iter_mut().zip(seen) {
+            candidate.seen = seen;
+        }
+        (kept, counts)
+    }
+
+    /// Whether the straight motion of all joints between two postures touches nothing.
+    #[must_use]
+    pub fn clear(&self, joints: &JointBox, from: &[f64], to: &[f64]) -> bool {
+        let way = joints.between(from, to, LOOKS);
+        let free = |q: &Vec<f64>| {
+            let placed = self.scene.placed(&self.model.forward_kinematics(q));
+            self.scene.contact(&placed).is_none()
+        };
+        way.iter().all(free)
+    }
+}

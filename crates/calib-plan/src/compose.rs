@@ -1,0 +1,250 @@
+//! From candidates to a list: what is chosen by information, what fills the space, what is repeated, and in which order.
+
+use nalgebra::DMatrix;
+
+use crate::candidates::Candidate;
+use crate::design::Question;
+use crate::error::PlanError;
+use crate::list::{Plan, Posture, Why};
+use crate::note::Note;
+use crate::order::{Ways, detour};
+use crate::prepare::Prepared;
+
+/// Postures per posture that fills the space.
+const FILLING: usize = 4;
+/// Postures per pair from both sides.
+const PAIR_EVERY: usize = 18;
+/// Postures in the order of information, before the order of the way: a list that is stopped early is then still good.
+const BY_INFORMATION: usize = 24;
+/// Joints go back so far to come from the other side, rad and m: more than any backlash.
+const BACK: (f64, f64) = (0.14, 0.02);
+/// Detours are looked for among so many candidates.
+const DETOURS: usize = 300;
+
+/// A plan of so many postures.
+///
+/// # Errors
+/// [`PlanError::TooFew`], and those of the linearization.
+pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError> {
+    let held_out = poses.div_ceil(FILLING);
+    if prepared.candidates.len() < poses {
+        return Err(PlanError::TooFew {
+            file: prepared.known.robot.file.clone(),
+            asked: poses,
+            counts: Box::new(prepared.counts.clone()),
+        });
+    }
+    let pairs = pairs_of(poses);
+    let Choice {
+        filling,
+        chosen: by_information,
+        information: _,
+    } = choice(prepared, poses);
+    let efficiency = certificate(prepared, &filling, &by_information);
+    let mut notes = prepared.notes.clone();
+    let chosen: Vec<usize> = by_information.iter().chain(&filling).copied().collect();
+    let order = in_order(prepared, &chosen);
+    let of = |i: usize| prepared.candidates[i].clone();
+    let mut list: Vec<(Candidate, Why, Option<usize>)> = order
+        .iter()
+        .map(|&i| {
+            let why = if filling.contains(&i) {
+                Why::SpaceFilling
+            } else {
+                Why::Information
+            };
+            (of(i), why, None)
+        })
+        .collect();
+    // First the ways around, so that it is known from where each posture is approached.
+    with_detours(prepared, &mut list);
+    let found = both_sides(prepared, &mut list, pairs);
+    if found < pairs {
+        notes.push(Note::FewerPairs {
+            planned: pairs,
+            found,
+        });
+    }
+    let blocked = with_detours(prepared, &mut list);
+    if !blocked.is_empty() {
+        notes.push(Note::NoClearMotion { to: blocked });
+    }
+    let as_recorded: Vec<Candidate> = list
+        .iter()
+        .map(|(candidate, why, _)| {
+            let mut candidate = candidate.clone();
+            if *why == Why::Detour {
+                candidate.seen.fill(None);
+            }
+            candidate
+        })
+        .collect();
+    let (sigma_before, after, parameters) = prepared.predicted(&as_recorded)?;
+    let times = list.windows(2);
+    let motion_time = times
+        .map(|w| prepared.joints.time(&w[0].0.q, &w[1].0.q))
+        .sum();
+    let postures = list.into_iter().zip(&after);
+    let postures = postures.map(|((candidate, why, repeats), sigma)| Posture {
+        seen: candidate.seen.iter().flatten().count(),
+        q: candidate.q,
+        why,
+        repeats,
+        sigma: *sigma,
+    });
+    Ok(Plan {
+        robot: prepared.known.robot.profile.robot.clone(),
+        goal: prepared.options.goal,
+        joints: prepared.joints.clone(),
+        postures: postures.collect(),
+        held_out: prepared.held_out(held_out),
+        counts: prepared.counts.clone(),
+        efficiency,
+        sigma_before,
+        sigma: after.last().copied().flatten(),
+        parameters,
+        motion_time,
+        notes,
+    })
+}
+
+/// What is chosen of the candidates.
+pub(crate) struct Choice {
+    /// Those that fill the space.
+    pub filling: Vec<usize>,
+    /// Those chosen by information beside them.
+    pub chosen: Vec<usize>,
+    /// M with all of them.
+    pub information: DMatrix<f64>,
+}
+
+fn pairs_of(poses: usize) -> usize {
+    (poses / PAIR_EVERY).max(usize::from(poses >= 12))
+}
+
+/// The choice for a plan of so many postures, those from both sides left out.
+pub(crate) fn choice(prepared: &Prepared<'_>, poses: usize) -> Choice {
+    // The sequence begins with postures that fill the space, however many of it are possible.
+    let filling: Vec<usize> = (0..poses.div_ceil(FILLING)).collect();
+    let with_filling = beside(prepared, &filling);
+    let question = Question {
+        rows: &prepared.rows,
+        before: &with_filling,
+        criterion: &prepared.criterion,
+    };
+    let count = poses - filling.len() - 2 * pairs_of(poses);
+    let chosen = question.choose(count, &filling);
+    let information = question.information(&chosen);
+    Choice {
+        filling,
+        chosen,
+        information,
+    }
+}
+
+/// M₀ with the postures that fill the space.
+fn beside(prepared: &Prepared<'_>, filling: &[usize]) -> DMatrix<f64> {
+    let mut m = prepared.before.clone();
+    for &i in filling {
+        let y = &prepared.rows[i];
+        m.gemm_tr(1.0, y, y, 1.0);
+    }
+    m
+}
+
+fn certificate(prepared: &Prepared<'_>, filling: &[usize], chosen: &[usize]) -> f64 {
+    let question = Question {
+        rows: &prepared.rows,
+        before: &beside(prepared, filling),
+        criterion: &prepared.criterion,
+    };
+    question.certificate(chosen).unwrap_or(0.0)
+}
+
+/// The first by information, one after the other; the rest by a short way.
+fn in_order(prepared: &Prepared<'_>, chosen: &[usize]) -> Vec<usize> {
+    let rows: Vec<_> = chosen.iter().map(|i| prepared.rows[*i].clone()).collect();
+    let question = Question {
+        rows: &rows,
+        before: &prepared.before,
+        criterion: &prepared.criterion,
+    };
+    let first = question.greedy(BY_INFORMATION.min(chosen.len()));
+    let rest: Vec<usize> = (0..chosen.len()).filter(|i| !first.contains(i)).collect();
+    let postures: Vec<&[f64]> = chosen
+        .iter()
+        .map(|i| prepared.candidates[*i].q.as_slice())
+        .collect();
+    let ways = Ways::new(&prepared.feasible, &prepared.joints, &postures);
+    let rest = ways.shortest(first.last().copied(), &rest);
+    first.into_iter().chain(rest).map(|k| chosen[k]).collect()
+}
+
+/// Adds earlier postures again, every joint coming from the other side; how many.
+fn both_sides(
+    prepared: &Prepared<'_>,
+    list: &mut Vec<(Candidate, Why, Option<usize>)>,
+    pairs: usize,
+) -> usize {
+    let mut found = 0;
+    for k in 1..list.len() {
+        if found == pairs {
+            break;
+        }
+        if list[k].1 != Why::Information {
+            continue;
+        }
+        let (before, again) = (list[k - 1].0.q.clone(), list[k].0.clone());
+        // The joint went on beyond the posture, so that it comes back against its first direction.
+        let mut q = again.q.clone();
+        for m in &prepared.joints.moved {
+            let j = m.joint.index();
+            let back = if m.turns { BACK.0 } else { BACK.1 };
+            q[j] = m.rounded(q[j] + back * (again.q[j] - before[j]).signum());
+        }
+        let Ok(approach) = prepared.feasible.candidate(q) else {
+            continue;
+        };
+        if !prepared
+            .feasible
+            .clear(&prepared.joints, &approach.q, &again.q)
+        {
+            continue;
+        }
+        list.push((approach, Why::Approach, None));
+        list.push((again, Why::OtherSide, Some(k)));
+        found += 1;
+    }
+    found
+}
+
+/// Puts postures on the way where the straight motion is blocked; numbers (from 1, detours counted) of those that stay blocked.
+fn with_detours(
+    prepared: &Prepared<'_>,
+    list: &mut Vec<(Candidate, Why, Option<usize>)>,
+) -> Vec<usize> {
+    let (mut out, mut blocked): (Vec<(Candidate, Why, Option<usize>)>, _) =
+        (Vec::new(), Vec::new());
+    // Where each posture of the list went.
+    let mut place = Vec::new();
+    for mut next in std::mem::take(list) {
+        if let Some(last) = out.last() {
+            let (feasible, joints) = (&prepared.feasible, &prepared.joints);
+            if !feasible.clear(joints, &last.0.q, &next.0.q) {
+                let step = prepared.candidates.len().div_ceil(DETOURS).max(1);
+                let others = prepared.candidates.iter().step_by(step);
+                let others = others.map(|c| c.q.as_slice());
+                let by = detour(feasible, joints, (&last.0.q, &next.0.q), others);
+                match by.and_then(|q| feasible.candidate(q.to_vec()).ok()) {
+                    Some(by) => out.push((by, Why::Detour, None)),
+                    None => blocked.push(out.len() + 1),
+                }
+            }
+        }
+        place.push(out.len());
+        next.2 = next.2.map(|k| place[k] + 1);
+        out.push(next);
+    }
+    *list = out;
+    blocked
+}

@@ -1,0 +1,423 @@
+//! The choice of postures: greedy, exchange, and a certificate.
+//!
+//! ```text
+//! M = M₀ + Σ_i Y_iᵀ Y_i,   K = M⁻¹                    Y_i: whitened rows of posture i (calib-core), M₀: known before   (1)
+//! determinant   log det M                    H = K                                                                     (2)
+//! subset        −log det S K Sᵀ              H = K Sᵀ (S K Sᵀ)⁻¹ S K     the others are nuisances                      (3)
+//! trace         −tr(L K)                     H = K L K                                                                 (4)
+//! ```
+//!
+//! H is the derivative by M. A posture changes K by a matrix of its rows' rank (Woodbury, with `C = 1 ± Y K Yᵀ`):
+//!
+//! ```text
+//! K ± = K ∓ K Yᵀ C⁻¹ Y K                                                                                              (5)
+//! gain by (2): log det C,   by (3): log det C − log det(C ∓ Y H Yᵀ),   by (4): tr(C⁻¹ Y H Yᵀ)                         (6)
+//! ```
+//!
+//! All three criteria are concave in M and homogeneous, so that no n postures, in any mixture, are better than
+//!
+//! ```text
+//! efficiency ≥ tr(H M) / (tr(H M₀) + n max_i tr(H Y_iᵀ Y_i))                                                          (7)
+//! ```
+//!
+//! times those of M: per parameter for (2) and (3), where `tr(H M)` is their number (det^(1/p) by the inequality of the means),
+//! and in variance for (4) (Cauchy–Schwarz); in σ the square root of it. (7) is tight at the best mixture M* only, so that it is
+//! taken there (multiplicative weights), and the postures are compared with it:
+//!
+//! ```text
+//! efficiency of M ≥ (7) at M* × (det K*/det K)^(1/p),   tr(L K*)/tr(L K)                                              (8)
+//! ```
+
+use nalgebra::{Cholesky, DMatrix};
+use rayon::prelude::*;
+
+/// What a design is to be good at.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Criterion {
+    /// All parameters, equation (2): D-optimal.
+    Determinant,
+    /// Some combinations of them, the rows of the matrix, equation (3): D_s-optimal.
+    Subset(DMatrix<f64>),
+    /// The mean variance of a task, equation (4), L ≥ 0: I-optimal; with L = 1 A-optimal.
+    Trace(DMatrix<f64>),
+}
+
+/// What is to be chosen from.
+#[derive(Debug, Clone, Copy)]
+pub struct Question<'a> {
+    /// Y of equation (1) by posture: any number of rows, the same columns.
+    pub rows: &'a [DMatrix<f64>],
+    /// M₀ of equation (1).
+    pub before: &'a DMatrix<f64>,
+    /// What is to be good.
+    pub criterion: &'a Criterion,
+}
+
+/// Added to M₀ while too few postures are chosen: a hundred prior σ (a meter, a hundred degrees) of what has no prior.
+const RIDGE: f64 = 1e-4;
+/// A round of exchanges, the weakest first, ends when so many in a row gain nothing.
+const WEAKEST: usize = 12;
+/// Rounds of exchanges at the most.
+const ROUNDS: usize = 20;
+/// Postures that exchanges choose from: those with the largest derivative of the criterion.
+const PROMISING: usize = 300;
+/// Rounds in which the mixture takes new postures, how many each, and steps of the weights in each round.
+const ADMISSIONS: usize = 4;
+const ADMITTED: usize = 40;
+const STEPS: usize = 50;
+/// An exchange that gains less of the criterion ends the rounds: log of a determinant, relative for a trace.
+const GAIN: f64 = 1e-6;
+
+impl Question<'_> {
+    /// Chooses `count` postures that are not among `taken`; fewer where there are fewer.
+    #[must_use]
+    pub fn choose(&self, count: usize, taken: &[usize]) -> Vec<usize> {
+        let mut state = State::new(self);
+        let mut free = vec![true; self.rows.len()];
+        for &i in taken {
+            free[i] = false;
+        }
+        let mut chosen = state.greedy(count, &mut free);
+        drop(state);
+        self.exchanged(&mut chosen, &free);
+        chosen
+    }
+
+    /// Exchanges the weakest of the chosen for others of those that are free and promise most.
+    fn exchanged(&self, chosen: &mut [usize], free: &[bool]) {
+        let n = self.before.nrows();
+        let ridged = self.information(chosen) + DMatrix::identity(n, n) * RIDGE;
+        let Some(gains) = self.gains(&ridged) else {
+            return;
+        };
+        let mut promising: Vec<usize> = (0..free.len()).filter(|i| free[*i]).collect();
+        promising.sort_by(|a, b| gains[*b].total_cmp(&gains[*a]).then(a.cmp(b)));
+        promising.truncate(PROMISING);
+        let among: Vec<usize> = chosen.iter().copied().chain(promising).collect();
+        let rows: Vec<DMatrix<f64>> = among.iter().map(|i| self.rows[*i].clone()).collect();
+        let question = Question {
+            rows: &rows,
+            ..*self
+        };
+        let mut state = State::new(&question);
+        let mut places: Vec<usize> = (0..chosen.len()).collect();
+        let mut free: Vec<bool> = (0..among.len()).map(|i| i >= chosen.len()).collect();
+        for i in 0..chosen.len() {
+            state.update(i, 1.0);
+        }
+        for _ in 0..ROUNDS {
+            if !state.exchange(&mut places, &mut free) {
+                break;
+            }
+        }
+        for (chosen, place) in chosen.iter_mut().zip(places) {
+            *chosen = among[place];
+        }
+    }
+
+    /// The postures one after the other, each the best beside those before it.
+    #[must_use]
+    pub fn greedy(&self, count: usize) -> Vec<usize> {
+        State::new(self).greedy(count, &mut vec![true; self.rows.len()])
+    }
+
+    /// M of equation (1).
+    #[must_use]
+    pub fn information(&self, chosen: &[usize]) -> DMatrix<f64> {
+        let mut m = self.before.clone();
+        for &i in chosen {
+            m.gemm_tr(1.0, &self.rows[i], &self.rows[i], 1.0);
+        }
+        m
+    }
+
+    /// The share of the best possible that some postures reach at least: equation (7) at the best mixture, and equation (8) from
+    /// there to the postures. Per parameter; of a trace in σ. `None` where M is singular.
+    #[must_use]
+    pub fn certificate(&self, chosen: &[usize]) -> Option<f64> {
+        let n = chosen.len() as f64;
+        let own = self.information(chosen);
+        let (mixture, gains) = self.mixture(chosen)?;
+        let mut best = 0.0_f64;
+        for (m, gains) in [(&own, self.gains(&own)?), (&mixture, gains)] {
+            let k = inverse(m)?;
+            let h = self.criterion.derivative(&k)?;
+            let largest = gains.iter().copied().fold(0.0, f64::max);
+            let bound = h.dot(self.before) + n * largest;
+            let at_mixture = (h.dot(m) / bound).min(1.0);
+            best = best.max(at_mixture * self.criterion.ratio(&inverse(&own)?, &k)?);
+        }
+        Some(match self.criterion {
+            Criterion::Trace(_) => best.min(1.0).sqrt(),
+            _ => best.min(1.0),
+        })
+    }
+
+    /// tr(H Y_iᵀ Y_i) of all postures at M.
+    fn gains(&self, m: &DMatrix<f64>) -> Option<Vec<f64>> {
+        let h = self.criterion.derivative(&inverse(m)?)?;
+        let rows = self.rows.par_iter();
+        Some(rows.map(|y| (y * &h).dot(y)).collect())
+    }
+
+    /// M of a mixture of as many postures that is nearly the best, by multiplicative weights, and the gains there.
+    fn mixture(&self, chosen: &[usize]) -> Option<(DMatrix<f64>, Vec<f64>)> {
+        let n = chosen.len() as f64;
+        // The weights of a trace grow by the root of their gain (Yu 2010), those of a determinant by the gain.
+        let power = match self.criterion {
+            Criterion::Trace(_) => 0.5,
+            _ => 1.0,
+        };
+        let mut m = self.information(chosen);
+        let mut gains = self.gains(&m)?;
+        let mut weights: Vec<(usize, f64)> = chosen.iter().map(|i| (*i, 1.0)).collect();
+        for _ in 0..ADMISSIONS {
+            self.admit(&mut weights, &gains, n);
+            for _ in 0..STEPS {
+                m = self.before.clone();
+                for (i, w) in &weights {
+                    m.gemm_tr(*w, &self.rows[*i], &self.rows[*i], 1.0);
+                }
+                let h = self.criterion.derivative(&inverse(&m)?)?;
+                let grown = weights.par_iter().map(|(i, w)| {
+                    let y = &self.rows[*i];
+                    w * (y * &h).dot(y).max(0.0).powf(power)
+                });
+                let grown: Vec<f64> = grown.collect();
+                let all: f64 = grown.iter().sum();
+                for (weight, grown) in weights.iter_mut().zip(grown) {
+                    weight.1 = n * grown / all;
+                }
+            }
+            gains = self.gains(&m)?;
+        }
+        Some((m, gains))
+    }
+
+    /// Takes the postures with the largest gains among those that have a weight, and drops those without.
+    fn admit(&self, weights: &mut Vec<(usize, f64)>, gains: &[f64], n: f64) {
+        /// Part of all weight that the admitted get together.
+        const SHARE: f64 = 0.2;
+        /// A weight below this is dropped.
+        const NOTHING: f64 = 1e-4;
+        weights.retain(|w| w.1 > NOTHING);
+        let mut by_gain: Vec<usize> = (0..gains.len()).collect();
+        by_gain.sort_by(|a, b| gains[*b].total_cmp(&gains[*a]).then(a.cmp(b)));
+        let known: Vec<usize> = weights.iter().map(|w| w.0).collect();
+        let new = by_gain.into_iter().filter(|i| !known.contains(i));
+        let new: Vec<usize> = new.take(ADMITTED).collect();
+        for weight in weights.iter_mut() {
+            weight.1 *= 1.0 - SHARE;
+        }
+        let each = SHARE * n / new.len().max(1) as f64;
+        weights.extend(new.into_iter().map(|i| (i, each)));
+    }
+
+    /// The criterion of some postures, the larger the better; `None` where M is singular.
+    #[must_use]
+    pub fn value(&self, chosen: &[usize]) -> Option<f64> {
+        self.criterion.value(&inverse(&self.information(chosen))?)
+    }
+}
+
+impl Criterion {
+    /// Equation (8): how much worse K is than another one.
+    fn ratio(&self, k: &DMatrix<f64>, best: &DMatrix<f64>) -> Option<f64> {
+        let (own, best) = (self.value(k)?, self.value(best)?);
+        Some(match self {
+            Self::Determinant => ((own - best) / k.nrows() as f64).exp(),
+            Self::Subset(s) => ((own - best) / s.nrows() as f64).exp(),
+            Self::Trace(_) => best / own,
+        })
+    }
+
+    /// Equations (2) to (4) from K.
+    fn value(&self, k: &DMatrix<f64>) -> Option<f64> {
+        match self {
+            Self::Determinant => Some(-log_det(k)?),
+            Self::Subset(s) => Some(-log_det(&(s * k * s.transpose()))?),
+            Self::Trace(l) => Some(-l.dot(k)),
+        }
+    }
+
+    /// H from K.
+    fn derivative(&self, k: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        match self {
+            Self::Determinant => Some(k.clone()),
+            Self::Subset(s) => {
+                let sk = s * k;
+                let inner = inverse(&(&sk * s.transpose()))?;
+                Some(sk.transpose() * inner * sk)
+            }
+            Self::Trace(l) => Some(k * l * k),
+        }
+    }
+}
+
+/// K, H, and what follows from them for every posture.
+struct State<'a> {
+    question: &'a Question<'a>,
+    k: DMatrix<f64>,
+    h: DMatrix<f64>,
+    /// Y K Yᵀ.
+    s: Vec<DMatrix<f64>>,
+    /// Y H Yᵀ; empty for the determinant, where it is Y K Yᵀ.
+    t: Vec<DMatrix<f64>>,
+}
+
+impl<'a> State<'a> {
+    fn new(question: &'a Question<'a>) -> Self {
+        let n = question.before.nrows();
+        let ridged = question.before + DMatrix::identity(n, n) * RIDGE;
+        let k = inverse(&ridged).unwrap_or_else(|| DMatrix::identity(n, n) / RIDGE);
+        let h = question.criterion.derivative(&k);
+        let h = h.unwrap_or_else(|| DMatrix::zeros(n, n));
+        let around = |m: &DMatrix<f64>| -> Vec<DMatrix<f64>> {
+            let rows = question.rows.par_iter();
+            rows.map(|y| y * m * y.transpose()).collect()
+        };
+        let (s, t) = match question.criterion {
+            Criterion::Determinant => (around(&k), Vec::new()),
+            _ => (around(&k), around(&h)),
+        };
+        Self {
+            question,
+            k,
+            h,
+            s,
+            t,
+        }
+    }
+
+    fn greedy(&mut self, count: usize, free: &mut [bool]) -> Vec<usize> {
+        let mut chosen = Vec::new();
+        while chosen.len() < count {
+            let Some(best) = self.best(free) else { break };
+            self.update(best.0, 1.0);
+            free[best.0] = false;
+            chosen.push(best.0);
+        }
+        chosen
+    }
+
+    /// Equation (6): what adding (`sign` 1) or removing (−1) a posture changes the criterion by.
+    fn change(&self, i: usize, sign: f64) -> f64 {
+        let s = &self.s[i];
+        let c = DMatrix::identity(s.nrows(), s.nrows()) + s * sign;
+        let Some(root) = Cholesky::new(c.clone()) else {
+            return f64::NEG_INFINITY;
+        };
+        let log_det_c = 2.0 * root.l_dirty().diagonal().map(f64::ln).sum();
+        match self.question.criterion {
+            Criterion::Determinant => log_det_c,
+            Criterion::Subset(_) => match log_det(&(c - &self.t[i] * sign)) {
+                Some(rest) => log_det_c - rest,
+                None => f64::NEG_INFINITY,
+            },
+            Criterion::Trace(_) => sign * root.solve(&self.t[i]).trace(),
+        }
+    }
+
+    /// The free posture that gains most, and its gain; of equal ones the first.
+    fn best(&self, free: &[bool]) -> Option<(usize, f64)> {
+        let gains: Vec<(usize, f64)> = (0..free.len())
+            .into_par_iter()
+            .filter(|i| free[*i])
+            .map(|i| (i, self.change(i, 1.0)))
+            .collect();
+        let better = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
+        gains.into_iter().reduce(better)
+    }
+
+    /// Equation (5), and its consequences for every posture.
+    fn update(&mut self, i: usize, sign: f64) {
+        let y = &self.question.rows[i];
+        let c = DMatrix::identity(y.nrows(), y.nrows()) + &self.s[i] * sign;
+        let Some(root) = Cholesky::new(c) else { return };
+        // W = K Yᵀ C^(−½): K± = K ∓ W Wᵀ
+        let Some(w) = root.l().solve_lower_triangular(&(y * &self.k)) else {
+            return;
+        };
+        let w = w.transpose();
+        let rows = self.question.rows;
+        self.k -= &w * w.transpose() * sign;
+        let of_k = |(s, y): (&mut DMatrix<f64>, &DMatrix<f64>)| {
+            let yw = y * &w;
+            s.gemm(-sign, &yw, &yw.transpose(), 1.0);
+        };
+        self.s.par_iter_mut().zip(rows).for_each(of_k);
+        match self.question.criterion {
+            Criterion::Determinant => {}
+            Criterion::Trace(l) => {
+                // H± = H ∓ W (K L W)ᵀ ∓ (K L W) Wᵀ + W (Wᵀ L W) Wᵀ, with K before the change
+                let lw = l * &w;
+                let g = w.transpose() * &lw;
+                let klw = (&self.k + &w * w.transpose() * sign) * lw;
+                let half = &klw - &w * &g * (0.5 * sign);
+                self.h -= (&half * w.transpose() + &w * half.transpose()) * sign;
+                let of_h = |(t, y): (&mut DMatrix<f64>, &DMatrix<f64>)| {
+                    let (yw, yh) = (y * &w, y * &half);
+                    t.gemm(-sign, &yh, &yw.transpose(), 1.0);
+                    t.gemm(-sign, &yw, &yh.transpose(), 1.0);
+                };
+                self.t.par_iter_mut().zip(rows).for_each(of_h);
+            }
+            Criterion::Subset(_) => {
+                if let Some(h) = self.question.criterion.derivative(&self.k) {
+                    self.h = h;
+                    let h = &self.h;
+                    let of_h = |(t, y): (&mut DMatrix<f64>, &DMatrix<f64>)| {
+                        *t = y * h * y.transpose();
+                    };
+                    self.t.par_iter_mut().zip(rows).for_each(of_h);
+                }
+            }
+        }
+    }
+
+    /// Replaces the weakest postures where others are better; whether that gained anything.
+    fn exchange(&mut self, chosen: &mut [usize], free: &mut [bool]) -> bool {
+        let mut by_loss: Vec<(usize, f64)> = (0..chosen.len())
+            .map(|place| (place, self.change(chosen[place], -1.0)))
+            .collect();
+        by_loss.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let scale = match self.question.criterion {
+            Criterion::Trace(l) => l.dot(&self.k).abs(),
+            _ => 1.0,
+        };
+        let (mut gained, mut in_vain) = (false, 0);
+        for (place, _) in by_loss {
+            if in_vain == WEAKEST {
+                break;
+            }
+            let old = chosen[place];
+            let loss = self.change(old, -1.0);
+            if !loss.is_finite() {
+                continue;
+            }
+            self.update(old, -1.0);
+            free[old] = true;
+            let best = self.best(free).filter(|best| best.1.is_finite());
+            let new = match best {
+                Some((new, gain)) if gain + loss > GAIN * scale => new,
+                _ => old,
+            };
+            gained |= new != old;
+            in_vain = if new == old { in_vain + 1 } else { 0 };
+            self.update(new, 1.0);
+            free[new] = false;
+            chosen[place] = new;
+        }
+        gained
+    }
+}
+
+fn inverse(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    Some(Cholesky::new(m.clone())?.inverse())
+}
+
+fn log_det(m: &DMatrix<f64>) -> Option<f64> {
+    let root = Cholesky::new(m.clone())?;
+    let log_det = 2.0 * root.l_dirty().diagonal().map(f64::ln).sum();
+    log_det.is_finite().then_some(log_det)
+}

@@ -1,0 +1,154 @@
+//! Why there is no plan.
+
+use calib_pipeline::{ExitCode, PipelineError};
+
+use crate::candidates::Counts;
+use crate::words;
+
+/// Why there is no plan.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// The profile, the robot or its recordings.
+    #[error(transparent)]
+    Pipeline(#[from] PipelineError),
+    /// No posture of the joint ranges is possible.
+    #[error("{file}: none of {} postures is possible: {}\n  help: {}", counts.tried, words::removed(counts), words::most_removing(counts))]
+    NoPosture {
+        /// The profile.
+        file: String,
+        /// What removed how many.
+        counts: Box<Counts>,
+    },
+    /// Fewer postures are possible than were asked for.
+    #[error("{file}: {} of {} postures are possible, {asked} are asked for: {}\n  help: {}", counts.feasible, counts.tried, words::removed(counts), words::most_removing(counts))]
+    TooFew {
+        /// The profile.
+        file: String,
+        /// Postures that were asked for, held-out ones among them.
+        asked: usize,
+        /// What removed how many.
+        counts: Box<Counts>,
+    },
+    /// A joint slides without limits.
+    #[error(
+        "{file}: joint `{joint}` slides and has no limits\n  help: give its range: `plan: {{joints: {{{joint}_mm: [0, 500]}}}}`"
+    )]
+    NoRange {
+        /// The profile.
+        file: String,
+        /// The joint.
+        joint: String,
+    },
+    /// Cameras are given in a frame of which nobody knows where it is.
+    #[error(
+        "{file}: the cameras are given in the frame of the tracker, and it is not known where the robot stands in it\n  help: give `tracker: {{from_root: …}}`, or record some postures first"
+    )]
+    NoPlace {
+        /// The profile.
+        file: String,
+    },
+    /// A posture of the task list cannot be taken.
+    #[error(
+        "{file}, row {row}: joint `{joint}` is asked to be at {found}, its range is {range}\n  help: give postures inside the joint ranges, or widen `plan.joints`"
+    )]
+    OutOfReach {
+        /// The list.
+        file: String,
+        /// Row from 1.
+        row: usize,
+        /// The joint.
+        joint: String,
+        /// Where it is asked to be.
+        found: String,
+        /// Where it can be.
+        range: String,
+    },
+    /// The task box is not reached.
+    #[error(
+        "{file}: {found} of {tried} postures bring the tool into `plan.task_box_mm`\n  help: the box is in the frame of the robot's root, mm; the tool reaches {reach}"
+    )]
+    BoxOutOfReach {
+        /// The profile.
+        file: String,
+        /// Postures in the box.
+        found: usize,
+        /// Postures tried.
+        tried: usize,
+        /// What the tool reaches.
+        reach: String,
+    },
+    /// Joints of a list are not joints of this robot.
+    #[error(
+        "{file}: {why}\n  help: give a table of joint positions of this robot, `<joint>_deg` in the header"
+    )]
+    NotJoints {
+        /// The list.
+        file: String,
+        /// Why.
+        why: String,
+    },
+    /// The σ that was asked for is not reached.
+    #[error(
+        "{file}: σ of {asked} is not reached with {most} postures: {reached}\n  help: ask for more, reduce the tracker's noise, or move markers further apart (`calib plan --poses {most}` shows what remains)"
+    )]
+    NotReached {
+        /// The profile.
+        file: String,
+        /// Asked for.
+        asked: String,
+        /// Most postures that were tried.
+        most: usize,
+        /// What they reach.
+        reached: String,
+    },
+    /// A posture of the profile's robot tells nothing.
+    #[error(
+        "{file}: nothing is free, so no posture tells anything\n  help: name what is to be found under `solve.free`"
+    )]
+    NothingFree {
+        /// The profile.
+        file: String,
+    },
+    /// A plan cannot be written or read.
+    #[error("{file}: {why}\n  help: {help}")]
+    Table {
+        /// The file.
+        file: String,
+        /// Why.
+        why: String,
+        /// What to do.
+        help: &'static str,
+    },
+}
+
+impl PlanError {
+    /// The file that it is about; `None`: the error of the pipeline knows.
+    #[must_use]
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Self::Pipeline(_) => None,
+            Self::NoPosture { file, .. }
+            | Self::TooFew { file, .. }
+            | Self::NoRange { file, .. }
+            | Self::NoPlace { file }
+            | Self::OutOfReach { file, .. }
+            | Self::BoxOutOfReach { file, .. }
+            | Self::NotJoints { file, .. }
+            | Self::NotReached { file, .. }
+            | Self::NothingFree { file }
+            | Self::Table { file, .. } => Some(file),
+        }
+    }
+
+    /// The exit code of the program.
+    #[must_use]
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Pipeline(error) => error.exit_code(),
+            Self::NotReached { .. } => ExitCode::VerdictFail,
+            Self::OutOfReach { .. } | Self::NotJoints { .. } => ExitCode::Data,
+            Self::Table { .. } => ExitCode::NotWritten,
+            _ => ExitCode::Usage,
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! The joint box: what moves, how far, how fast; postures that fill it.
+
+use calib_profile::PlanSpec;
+use calib_urdf::{JointId, JointKind, RobotModel};
+
+/// A joint that planned postures move.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moved {
+    /// The joint.
+    pub joint: JointId,
+    /// Least position, rad or m.
+    pub low: f64,
+    /// Largest position, rad or m.
+    pub high: f64,
+    /// Speed, rad/s or m/s: the URDF's, or 1 rad/s and 0.25 m/s.
+    pub speed: f64,
+    /// Whether it turns.
+    pub turns: bool,
+}
+
+/// What planned postures move.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointBox {
+    /// Moved joints, in the order of the URDF.
+    pub moved: Vec<Moved>,
+    /// Positions of all others, by joint index.
+    pub base: Vec<f64>,
+}
+
+/// Planned positions are whole hundredths of a degree and hundredths of a millimeter: a list that a person can type.
+const STEP_RAD: f64 = std::f64::consts::PI / 18000.0;
+/// As [`STEP_RAD`], m.
+const STEP_M: f64 = 1e-5;
+
+impl JointBox {
+    /// Of the joints that move a body: the profile's ranges, else the URDF's limits, else ±180°. Joints of `still` stand at the
+    /// position given there unless the profile gives a range. `Err`: a joint that slides without limits.
+    ///
+    /// # Errors
+    /// The joint that has no range.
+    pub fn new(
+        model: &RobotModel,
+        spec: &PlanSpec,
+        used: &[JointId],
+        still: &[(JointId, f64)],
+    ) -> Result<Self, JointId> {
+        let mut base = model.zero_positions();
+        for (joint, value) in still {
+            base[joint.index()] = *value;
+        }
+        for (joint, value) in &spec.hold {
+            base[joint.index()] = *value;
+        }
+        let mut moved = Vec::new();
+        for id in model.independent_joints() {
+            let joint = model.joint(id);
+            let stated = spec.joints.get(&id).copied();
+            let stands = spec.hold.contains_key(&id) || still.iter().any(|s| s.0 == id);
+            if stated.is_none() && (stands || !used.contains(&id)) {
+                continue;
+            }
+            let turns = joint.kind.turns();
+            let endless = matches!(joint.kind, JointKind::Continuous { .. });
+            let limits = joint.limits.range().filter(|_| !endless);
+            let turn = turns.then_some((-std::f64::consts::PI, std::f64::consts::PI));
+            let (low, high) = stated.or(limits).or(turn).ok_or(id)?;
+            let usual = if turns { 1.0 } else { 0.25 };
+            let speed = joint.limits.velocity.filter(|v| *v > 0.0).unwrap_or(usual);
+            moved.push(Moved {
+                joint: id,
+                low,
+                high,
+                speed,
+                turns,
+            });
+        }
+        Ok(Self { moved, base })
+    }
+
+    /// Postures by an Owen-scrambled Sobol sequence, the same for the same seed; at most 65 536.
+    #[must_use]
+    pub fn postures(&self, count: usize, seed: u32) -> Vec<Vec<f64>> {
+        let count = count.min(1 << 16) as u32;
+        (0..count).map(|i| self.posture(i, seed)).collect()
+    }
+
+    fn posture(&self, i: u32, seed: u32) -> Vec<f64> {
+        let mut q = self.base.clone();
+        for (d, m) in self.moved.iter().enumerate() {
+            let u = f64::from(sobol_burley::sample(i, d as u32, seed));
+            q[m.joint.index()] = m.rounded(m.low + (m.high - m.low) * u);
+        }
+        q
+    }
+
+    /// Time from one posture to another, s: that of the slowest joint.
+    #[must_use]
+    pub fn time(&self, from: &[f64], to: &[f64]) -> f64 {
+        let of = |m: &Moved| (to[m.joint.index()] - from[m.joint.index()]).abs() / m.speed;
+        self.moved.iter().map(of).fold(0.0, f64::max)
+    }
+
+    /// Distance of postures where every range counts the same.
+    #[must_use]
+    pub fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
+        let of = |m: &Moved| {
+            let range = (m.high - m.low).max(1e-9);
+            ((a[m.joint.index()] - b[m.joint.index()]) / range).powi(2)
+        };
+        self.moved.iter().map(of).sum::<f64>().sqrt()
+    }
+
+    /// Postures on the straight way between two, the ends left out, so near to each other that no joint moves more than `turn`
+    /// (rad) or `slide` (m) between them.
+    #[must_use]
+    pub fn between(&self, from: &[f64], to: &[f64], (turn, slide): (f64, f64)) -> Vec<Vec<f64>> {
+        let steps = |m: &Moved| {
+            let step = if m.turns { turn } else { slide };
+            (to[m.joint.index()] - from[m.joint.index()]).abs() / step
+        };
+        let steps = self.moved.iter().map(steps).fold(0.0, f64::max).ceil() as usize;
+        let at = |k: usize| {
+            let t = k as f64 / steps as f64;
+            from.iter().zip(to).map(|(a, b)| a + (b - a) * t).collect()
+        };
+        (1..steps).map(at).collect()
+    }
+
+    /// A posture inside the ranges.
+    #[must_use]
+    pub fn holds(&self, q: &[f64]) -> bool {
+        let inside = |m: &Moved| (m.low - 1e-3..=m.high + 1e-3).contains(&q[m.joint.index()]);
+        self.moved.iter().all(inside)
+    }
+}
+
+impl Moved {
+    /// The nearest position that is written, inside the range.
+    #[must_use]
+    pub fn rounded(&self, q: f64) -> f64 {
+        let step = if self.turns { STEP_RAD } else { STEP_M };
+        let (first, last) = ((self.low / step).ceil(), (self.high / step).floor());
+        if first > last {
+            return self.low;
+        }
+        (q / step).round().clamp(first, last) * step
+    }
+}
+
+/// Factor and name of the unit in which a joint is written.
+pub(crate) fn shown(turns: bool) -> (f64, &'static str) {
+    if turns {
+        (180.0 / std::f64::consts::PI, "deg")
+    } else {
+        (1e3, "mm")
+    }
+}

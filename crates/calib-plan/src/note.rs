@@ -1,0 +1,71 @@
+//! What a plan assumed, and what it could not look at: facts; [`crate::words`] makes the sentences.
+
+use serde::Serialize;
+
+/// One assumption or limit of a plan.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(tag = "id", rename_all = "snake_case")]
+pub enum Note {
+    /// Recordings of the profile whose files do not exist.
+    NotRecordedYet {
+        /// Their names.
+        recordings: Vec<String>,
+    },
+    /// Recordings exist but could not be fitted: nothing was taken from them.
+    RecordingsUnused {
+        /// Why.
+        why: String,
+    },
+    /// Mounts, markers and the robot's place are those of the profile's `simulate` section.
+    FromSimulation,
+    /// Where a body is mounted is not known: at the origin of its link.
+    MountAssumed {
+        /// The body.
+        body: String,
+    },
+    /// Where the markers of a body are is not known: a layout of usual size.
+    LayoutAssumed {
+        /// The body.
+        body: String,
+    },
+    /// The tracker's noise is not stated.
+    NoiseAssumed,
+    /// Joints that stood still in all recordings stand still in the plan.
+    JointsStill {
+        /// Their names.
+        joints: Vec<String>,
+    },
+    /// Links that move and have no shape: collisions with them are not found.
+    NoShape {
+        /// Their names.
+        links: Vec<String>,
+    },
+    /// Links of which a shape could not be read.
+    ShapeUnread {
+        /// Their names.
+        links: Vec<String>,
+    },
+    /// Pairs of links that touch in nearly all postures by the size of their capsules: not compared.
+    PairsNotCompared {
+        /// The first link of each and the second.
+        pairs: Vec<[String; 2]>,
+    },
+    /// No cameras are stated: every marker counts as seen.
+    EverythingSeen,
+    /// Sides that markers face were stated, but no cameras.
+    FacingUnused,
+    /// Motions that touch something whichever way they are taken.
+    NoClearMotion {
+        /// Numbers of the postures at their ends.
+        to: Vec<usize>,
+    },
+    /// Fewer postures from both sides than planned: the way to them is blocked.
+    FewerPairs {
+        /// How many were planned.
+        planned: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// The task depends on something that neither plan nor prior determines.
+    TaskOpen,
+}

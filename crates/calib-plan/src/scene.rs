@@ -1,0 +1,212 @@
+//! What a posture must not touch: the robot itself, keep-outs, the ground.
+
+use std::collections::BTreeMap;
+
+use calib_profile::{KeepOut, PlanSpec};
+use calib_report::view3d::Solid;
+use calib_urdf::{JointKind, LinkId, RobotModel};
+use nalgebra::{Isometry3, Point3};
+
+use crate::shape::{Capsule, capsules};
+
+/// Why a posture or a motion is not possible.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Contact {
+    /// Two links are too near to each other.
+    Links(LinkId, LinkId),
+    /// A link is too near to a keep-out.
+    KeepOut(String),
+    /// A link is too near to the ground.
+    Ground,
+}
+
+/// A capsule of a link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkCapsule {
+    /// The link that carries it.
+    pub link: LinkId,
+    /// The links that no joint moves against it have the same number.
+    pub body: usize,
+    /// In the link's frame.
+    pub capsule: Capsule,
+}
+
+/// What a posture must not touch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// All capsules of the robot.
+    pub capsules: Vec<LinkCapsule>,
+    /// Pairs of rigid parts that are compared, lower number first.
+    pub pairs: Vec<(usize, usize)>,
+    /// Pairs that touch in nearly all postures, so that their capsules tell nothing: not compared.
+    pub always: Vec<(usize, usize)>,
+    keep_outs: BTreeMap<String, KeepOut>,
+    ground: Option<f64>,
+    clearance: f64,
+    /// The rigid part of the root: it may stand on the ground and in a keep-out.
+    root: usize,
+}
+
+/// Pairs that touch in more than this share of all postures of the joint box do so by the size of their capsules.
+const ALWAYS: f64 = 0.9;
+
+impl Scene {
+    /// From the shapes of the links; `postures` (over the joint box) tell which pairs touch always.
+    #[must_use]
+    pub fn new(
+        model: &RobotModel,
+        solids: &[Solid],
+        spec: &PlanSpec,
+        postures: &[Vec<f64>],
+    ) -> Self {
+        let body = rigid_parts(model);
+        let mut all = Vec::new();
+        for solid in solids {
+            let points: Vec<Point3<f64>> = solid.points.iter().map(|p| Point3::from(*p)).collect();
+            let Some(link) = model.link_ids().nth(solid.frame) else {
+                continue;
+            };
+            all.extend(capsules(&points).into_iter().map(|capsule| LinkCapsule {
+                link,
+                body: body[link.index()],
+                capsule,
+            }));
+        }
+        let neighbors = neighbors(model, &body);
+        let parts = all
+            .iter()
+            .map(|c| c.body)
+            .collect::<std::collections::BTreeSet<_>>();
+        let parts: Vec<usize> = parts.into_iter().collect();
+        let mut pairs = Vec::new();
+        for (i, a) in parts.iter().enumerate() {
+            for b in &parts[i + 1..] {
+                if !neighbors.contains(&(*a, *b)) {
+                    pairs.push((*a, *b));
+                }
+            }
+        }
+        let mut scene = Self {
+            capsules: all,
+            pairs,
+            always: Vec::new(),
+            keep_outs: spec.keep_outs.clone(),
+            ground: spec.ground,
+            clearance: spec.clearance,
+            root: body[model.root().index()],
+        };
+        scene.skip_those_that_touch_always(model, postures);
+        scene
+    }
+
+    fn skip_those_that_touch_always(&mut self, model: &RobotModel, postures: &[Vec<f64>]) {
+        let mut touching = vec![0_usize; self.pairs.len()];
+        for q in postures {
+            let placed = self.placed(&model.forward_kinematics(q));
+            for (count, pair) in touching.iter_mut().zip(&self.pairs) {
+                *count += usize::from(self.near(&placed, *pair, 0.0).is_some());
+            }
+        }
+        let limit = ALWAYS * postures.len() as f64;
+        let pairs = std::mem::take(&mut self.pairs);
+        for (pair, count) in pairs.into_iter().zip(touching) {
+            if !postures.is_empty() && count as f64 > limit {
+                self.always.push(pair);
+            } else {
+                self.pairs.push(pair);
+            }
+        }
+    }
+
+    /// All capsules where the links are.
+    #[must_use]
+    pub fn placed(&self, root_from_link: &[Isometry3<f64>]) -> Vec<Capsule> {
+        let place = |c: &LinkCapsule| c.capsule.moved(&root_from_link[c.link.index()]);
+        self.capsules.iter().map(place).collect()
+    }
+
+    /// What the robot would touch; `None`: nothing.
+    #[must_use]
+    pub fn contact(&self, placed: &[Capsule]) -> Option<Contact> {
+        for (c, at) in self.capsules.iter().zip(placed) {
+            if c.body == self.root {
+                continue;
+            }
+            if self
+                .ground
+                .is_some_and(|z| at.lowest() < z + self.clearance)
+            {
+                return Some(Contact::Ground);
+            }
+            for (name, b) in &self.keep_outs {
+                if at.distance_to_box(&b.size, &b.root_from_box) < self.clearance {
+                    return Some(Contact::KeepOut(name.clone()));
+                }
+            }
+        }
+        let touching = self
+            .pairs
+            .iter()
+            .find_map(|pair| self.near(placed, *pair, self.clearance));
+        touching.map(|(a, b)| Contact::Links(a, b))
+    }
+
+    /// The first capsules of a pair of parts that are too near.
+    fn near(
+        &self,
+        placed: &[Capsule],
+        (a, b): (usize, usize),
+        clearance: f64,
+    ) -> Option<(LinkId, LinkId)> {
+        let of = |part: usize| {
+            let all = self.capsules.iter().enumerate();
+            all.filter(move |(_, c)| c.body == part)
+        };
+        for (i, first) in of(a) {
+            for (j, second) in of(b) {
+                if placed[i].distance(&placed[j]) < clearance {
+                    return Some((first.link, second.link));
+                }
+            }
+        }
+        None
+    }
+
+    /// Whether a line of sight to a point of a link passes all other rigid parts.
+    #[must_use]
+    pub fn sees(
+        &self,
+        placed: &[Capsule],
+        from: &Point3<f64>,
+        (to, body): (&Point3<f64>, usize),
+    ) -> bool {
+        let others = self.capsules.iter().zip(placed);
+        let mut others = others.filter(|(c, _)| c.body != body);
+        !others.any(|(_, at)| at.hides(from, to))
+    }
+}
+
+/// Number of the rigid part that each link belongs to: links joined by fixed joints are one.
+#[must_use]
+pub fn rigid_parts(model: &RobotModel) -> Vec<usize> {
+    let mut part: Vec<usize> = (0..model.links().len()).collect();
+    // Parents first, by the length of the way to the root.
+    let mut joints: Vec<_> = model.joint_ids().collect();
+    joints.sort_by_key(|j| model.chain_to_root(model.joint(*j).child).len());
+    for id in joints {
+        let joint = model.joint(id);
+        if joint.kind == JointKind::Fixed {
+            part[joint.child.index()] = part[joint.parent.index()];
+        }
+    }
+    part
+}
+
+/// Pairs of rigid parts with one joint between them, lower number first.
+fn neighbors(model: &RobotModel, part: &[usize]) -> Vec<(usize, usize)> {
+    let of = |joint: &calib_urdf::Joint| {
+        let (a, b) = (part[joint.parent.index()], part[joint.child.index()]);
+        (a != b).then_some((a.min(b), a.max(b)))
+    };
+    model.joints().iter().filter_map(of).collect()
+}

@@ -1,0 +1,158 @@
+//! What the tracker sees of a posture.
+//!
+//! ```text
+//! seen by camera c:  ∠(axis, p − c) ≤ field/2,  |p − c| ≤ range,  no capsule of another rigid part on the way,
+//!                    ∠(n, c − p) ≤ the greatest angle of the marker                                               (1)
+//! Σ ∝ (Σ_c (1 − d_c d_cᵀ)/ρ_c²)⁻¹     of a marker, from the directions d and distances ρ of the cameras that see it  (2)
+//! ```
+//!
+//! (2) is a triangulation with equal angular noise; its trace over all markers that are seen is on average that of the stated σ.
+
+use std::collections::BTreeMap;
+
+use calib_profile::{Camera, Facing, PlanSpec};
+use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
+
+use crate::scene::Scene;
+use crate::shape::Capsule;
+
+/// A marker, or the origin of a body that the tracker states as a pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Subject {
+    /// The body.
+    pub body: String,
+    /// The marker; `None`: the body's pose.
+    pub marker: Option<String>,
+    /// Index of the link that carries it.
+    pub link: usize,
+    /// In the frame of the link, m.
+    pub at: Point3<f64>,
+    /// The side that it shows, in the frame of the link.
+    pub facing: Option<Facing>,
+    /// Whether planned postures move it.
+    pub moves: bool,
+}
+
+/// The tracker's eyes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sight {
+    /// Where the robot stands (`tracker_from_root`).
+    pub tracker_from_root: Isometry3<f64>,
+    /// Everything that can be seen.
+    pub subjects: Vec<Subject>,
+    cameras: Vec<Camera>,
+    least: usize,
+}
+
+/// What is seen of one subject: equation (2) where there are cameras, up to a factor that all share.
+pub type Seen = Option<Option<Matrix3<f64>>>;
+
+impl Sight {
+    /// Of the profile's cameras.
+    #[must_use]
+    pub fn new(spec: &PlanSpec, subjects: Vec<Subject>, tracker_from_root: Isometry3<f64>) -> Self {
+        Self {
+            tracker_from_root,
+            subjects,
+            cameras: spec.cameras.values().cloned().collect(),
+            least: spec.min_cameras,
+        }
+    }
+
+    /// Whether anything decides what is seen.
+    #[must_use]
+    pub fn has_cameras(&self) -> bool {
+        !self.cameras.is_empty()
+    }
+
+    /// Equation (1) for every subject; `occluders` where links can hide it.
+    #[must_use]
+    pub fn seen(
+        &self,
+        (scene, body_of_link): (&Scene, &[usize]),
+        placed: &[Capsule],
+        root_from_link: &[Isometry3<f64>],
+    ) -> Vec<Seen> {
+        let root_from_tracker = self.tracker_from_root.inverse();
+        let of = |subject: &Subject| {
+            if self.cameras.is_empty() {
+                return Some(None);
+            }
+            let link = &root_from_link[subject.link];
+            let at = link * subject.at;
+            let in_tracker = self.tracker_from_root * at;
+            let (mut count, mut information) = (0, Matrix3::zeros());
+            for camera in &self.cameras {
+                let eye = root_from_tracker * camera.at;
+                let visible = camera.covers(&in_tracker)
+                    && shown(subject.facing.as_ref(), link, &(eye - at))
+                    && scene.sees(placed, &eye, (&at, body_of_link[subject.link]));
+                if visible {
+                    count += 1;
+                    information += across(&(in_tracker - camera.at));
+                }
+            }
+            (count >= self.least).then(|| information.try_inverse())
+        };
+        self.subjects.iter().map(of).collect()
+    }
+
+    /// Whether what is seen is a measurement of a moving body: its pose, or as many of its markers as span it.
+    #[must_use]
+    pub fn measures(&self, seen: &[Seen]) -> bool {
+        /// Markers that span a body.
+        const SPAN: usize = 3;
+        let mut of_body: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
+        for (subject, seen) in self.subjects.iter().zip(seen).filter(|(s, _)| s.moves) {
+            let (all, visible) = of_body.entry(&subject.body).or_default();
+            *all += 1;
+            *visible += usize::from(seen.is_some());
+        }
+        let mut counts = of_body.values();
+        counts.any(|(all, visible)| *visible >= SPAN.min(*all))
+    }
+}
+
+/// Covariance shapes whose mean trace over everything that is seen is 3.
+pub fn normalize(all: &mut [Vec<Seen>]) {
+    let shapes = || all.iter().flatten().flatten().flatten();
+    let (sum, count) = shapes().fold((0.0, 0), |(s, n), m| (s + m.trace(), n + 1));
+    if count == 0 || sum <= 0.0 {
+        return;
+    }
+    let factor = 3.0 * f64::from(count) / sum;
+    for shape in all.iter_mut().flatten().flatten().flatten() {
+        *shape *= factor;
+    }
+}
+
+/// (1 − d dᵀ)/ρ²; with 1e-3 along the sight, so that one camera gives a covariance, if a long one.
+fn across(sight: &Vector3<f64>) -> Matrix3<f64> {
+    /// Information along the line of sight relative to that across it.
+    const ALONG: f64 = 1e-3;
+    let Some(d) = Unit::try_new(*sight, 1e-9) else {
+        return Matrix3::identity();
+    };
+    let dd = d.into_inner() * d.transpose();
+    (Matrix3::identity() - dd * (1.0 - ALONG)) / sight.norm_squared()
+}
+
+/// Whether the side that is shown looks toward the eye.
+fn shown(facing: Option<&Facing>, root_from_link: &Isometry3<f64>, to_eye: &Vector3<f64>) -> bool {
+    facing.is_none_or(|facing| {
+        let normal = root_from_link.rotation * facing.normal.into_inner();
+        normal.angle(to_eye) <= facing.within
+    })
+}
+
+/// A camera's field.
+trait Covers {
+    fn covers(&self, point: &Point3<f64>) -> bool;
+}
+
+impl Covers for Camera {
+    fn covers(&self, point: &Point3<f64>) -> bool {
+        let sight = point - self.at;
+        sight.norm() <= self.range && self.axis.angle(&sight) <= self.half_field
+    }
+}

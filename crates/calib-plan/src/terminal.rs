@@ -1,0 +1,97 @@
+//! The summary on the terminal: at most 24 lines.
+
+use std::fmt::Write as _;
+
+use calib_report::terminal::wrapped;
+
+use crate::list::{Plan, Why};
+use crate::words;
+
+/// Lines for notes at the most.
+const NOTES: usize = 9;
+
+/// The summary; `folder`: where the files are.
+#[must_use]
+pub fn summary(plan: &Plan, folder: &str) -> String {
+    let mut text = String::new();
+    let count = |why: Why| plan.postures.iter().filter(|p| p.why == why).count();
+    let detours = count(Why::Detour);
+    let measured = plan.postures.len() - detours;
+    // Writing to a String does not fail.
+    let _ = writeln!(
+        text,
+        "Plan for {}: {measured} postures to record, {} to validate with",
+        plan.robot,
+        plan.held_out.len()
+    );
+    let _ = writeln!(text, "chosen for     {}", words::goal(plan.goal));
+    let _ = writeln!(
+        text,
+        "expected σ     {} (before: {})",
+        words::length(plan.sigma),
+        words::length(plan.sigma_before)
+    );
+    let stops = [12, 24].into_iter().filter(|n| *n < measured);
+    let stops: Vec<String> = stops
+        .map(|n| format!("{n}: {}", words::length(after(plan, n))))
+        .collect();
+    if !stops.is_empty() {
+        let _ = writeln!(text, "if stopped at  {}", stops.join(", "));
+    }
+    let _ = writeln!(
+        text,
+        "efficiency     at least {:.1} % of the best possible {} (certified)",
+        (plan.efficiency * 1000.0).floor() / 10.0,
+        words::efficiency_of(plan.goal)
+    );
+    let _ = writeln!(
+        text,
+        "postures       {} by information, {} space-filling, {} from both sides; {detours} detours",
+        count(Why::Information),
+        count(Why::SpaceFilling),
+        count(Why::OtherSide)
+    );
+    let candidates = format!(
+        "{} of {} possible; {}",
+        plan.counts.feasible,
+        plan.counts.tried,
+        words::removed(&plan.counts)
+    );
+    text += &wrapped(&candidates, "candidates     ", "               ");
+    let _ = writeln!(
+        text,
+        "motion         {:.0} s without the holds",
+        plan.motion_time
+    );
+    let weak = plan.weak();
+    if !weak.is_empty() {
+        let names: Vec<&str> = weak.iter().take(3).map(|p| p.name.as_str()).collect();
+        let line = format!(
+            "{} parameters remain near their prior: {}",
+            weak.len(),
+            names.join(", ")
+        );
+        text += &wrapped(&line, "weak           ", "               ");
+    }
+    let mut notes = String::new();
+    for (k, note) in plan.notes.iter().enumerate() {
+        let one = wrapped(&words::note(note), "note: ", "      ");
+        if notes.lines().count() + one.lines().count() > NOTES {
+            let _ = writeln!(notes, "note: {} more in plan.html", plan.notes.len() - k);
+            break;
+        }
+        notes += &one;
+    }
+    text += &notes;
+    let _ = writeln!(
+        text,
+        "Record the postures of {folder}/plan.csv in this order; see {folder}/plan.html"
+    );
+    text
+}
+
+/// σ after so many measured postures.
+fn after(plan: &Plan, count: usize) -> Option<f64> {
+    let mut measured = plan.postures.iter().filter(|p| p.why != Why::Detour);
+    measured.nth(count - 1)?.sigma
+}

@@ -1,0 +1,223 @@
+//! Every sentence of a plan.
+
+use calib_finding::number;
+use calib_report::Unit;
+use nalgebra::Vector3;
+
+use crate::candidates::Counts;
+use crate::list::{Goal, Why};
+use crate::note::Note;
+
+/// A length with its unit; what is not determined says so.
+#[must_use]
+pub fn length(meters: Option<f64>) -> String {
+    match meters {
+        Some(m) => format!("{} mm", millimeters(m)),
+        None => "not determined".to_owned(),
+    }
+}
+
+/// Three significant digits of a length, mm.
+#[must_use]
+pub fn millimeters(meters: f64) -> String {
+    let mm = meters * 1e3;
+    let digits = if mm > 0.0 {
+        (2.0 - mm.log10().floor()).clamp(0.0, 6.0) as usize
+    } else {
+        0
+    };
+    number::fixed(mm, digits)
+}
+
+/// A region of the root's frame.
+#[must_use]
+pub fn region([low, high]: &[Vector3<f64>; 2]) -> String {
+    let of = |i: usize| {
+        let mm = |x: f64| number::fixed(x * 1e3, 0);
+        format!(
+            "{} … {} mm in {}",
+            mm(low[i]),
+            mm(high[i]),
+            ["x", "y", "z"][i]
+        )
+    };
+    [0, 1, 2].map(of).join(", ")
+}
+
+/// What each constraint removed.
+#[must_use]
+pub fn removed(counts: &Counts) -> String {
+    let mut parts = Vec::new();
+    let mut add = |count: usize, why: String| {
+        if count > 0 {
+            parts.push(format!("{why} removes {count}"));
+        }
+    };
+    let pair = match &counts.worst_pair {
+        Some([a, b]) => format!("self-collision (most often `{a}` with `{b}`)"),
+        None => "self-collision".to_owned(),
+    };
+    add(counts.self_collision, pair);
+    add(counts.ground, "the ground".to_owned());
+    for (name, count) in &counts.keep_outs {
+        add(*count, format!("keep-out `{name}`"));
+    }
+    add(counts.not_seen, "visibility".to_owned());
+    if parts.is_empty() {
+        return "no constraint removes any".to_owned();
+    }
+    parts.join(", ")
+}
+
+/// What to do about the constraint that removes most.
+#[must_use]
+pub fn most_removing(counts: &Counts) -> String {
+    let keep_out = counts.keep_outs.iter().max_by_key(|(_, count)| **count);
+    let by_box = keep_out.map_or(0, |k| *k.1);
+    let largest = [
+        counts.self_collision,
+        counts.ground,
+        by_box,
+        counts.not_seen,
+    ];
+    let most = largest.iter().max().copied().unwrap_or(0);
+    if most == 0 {
+        "ask for fewer postures, or give more `--candidates`".to_owned()
+    } else if counts.not_seen == most {
+        "check place, direction and field of the cameras, `min_cameras` and `facing` under `plan`"
+            .to_owned()
+    } else if counts.self_collision == most {
+        "check the collision shapes of these links in the URDF, or reduce `plan.clearance_mm`"
+            .to_owned()
+    } else if counts.ground == most {
+        "check `plan.ground_mm`: it is a height in the frame of the robot's root".to_owned()
+    } else {
+        let name = keep_out.map_or("", |k| k.0.as_str());
+        format!(
+            "check place and size of `plan.keep_outs.{name}`: the box is in the frame of the robot's root"
+        )
+    }
+}
+
+/// Why a posture is in the list.
+#[must_use]
+pub fn why(why: Why) -> &'static str {
+    match why {
+        Why::Information => "information",
+        Why::SpaceFilling => "space-filling",
+        Why::Approach => "approach",
+        Why::OtherSide => "other side",
+        Why::Detour => "detour",
+    }
+}
+
+/// What that means.
+#[must_use]
+pub fn why_in_full(why: Why) -> &'static str {
+    match why {
+        Why::Information => "adds most to what is known",
+        Why::SpaceFilling => "fills the joint ranges, for effects that the model does not have",
+        Why::Approach => {
+            "all joints move past the posture that follows, which is then approached from the other side"
+        }
+        Why::OtherSide => {
+            "an earlier posture again, approached from the other side: shows backlash and noise"
+        }
+        Why::Detour => "only on the way around an obstacle: do not record",
+    }
+}
+
+/// What the postures are chosen for.
+#[must_use]
+pub fn goal(goal: Goal) -> &'static str {
+    match goal {
+        Goal::Task => "the tool's position over the task postures (I-optimal)",
+        Goal::Parameters => "all parameters together (D-optimal)",
+        Goal::Variances => "the mean variance of the parameters (A-optimal)",
+    }
+}
+
+/// The unit in which the efficiency is stated.
+#[must_use]
+pub fn efficiency_of(goal: Goal) -> &'static str {
+    match goal {
+        Goal::Task | Goal::Variances => "in σ",
+        Goal::Parameters => "per parameter",
+    }
+}
+
+/// A note as a sentence, with what to do.
+#[must_use]
+pub fn note(note: &Note) -> String {
+    let names = |names: &[String]| {
+        let quoted: Vec<String> = names.iter().map(|n| format!("`{n}`")).collect();
+        quoted.join(", ")
+    };
+    match note {
+        Note::NotRecordedYet { recordings } => {
+            format!("Not recorded yet: {}. The plan does not count on them.", names(recordings))
+        }
+        Note::RecordingsUnused { why } => format!(
+            "The recordings that exist could not be fitted and were not used: {}",
+            why.lines().next().unwrap_or_default()
+        ),
+        Note::FromSimulation => "Mounts, markers and the robot's place are taken from the profile's `simulate` section.".to_owned(),
+        Note::MountAssumed { body } => format!(
+            "It is not known where `{body}` is mounted: assumed at the origin of its link. State `mount` for a better plan."
+        ),
+        Note::LayoutAssumed { body } => format!(
+            "It is not known where the markers of `{body}` are: assumed about 50 mm from its origin. State `template_mm` for a better plan."
+        ),
+        Note::NoiseAssumed => {
+            "The tracker's noise is not stated: the σ are in proportion to the default noise. State `tracker.marker_sigma_mm` or `body_sigma_mm`.".to_owned()
+        }
+        Note::JointsStill { joints } => format!(
+            "Held, because no recording moves them: {}. To move them, give their ranges under `plan.joints`.",
+            names(joints)
+        ),
+        Note::NoShape { links } => format!(
+            "Collisions are not checked for links without shapes: {}.",
+            names(links)
+        ),
+        Note::ShapeUnread { links } => format!(
+            "Some shapes could not be read, and collisions with them are not checked: {}.",
+            names(links)
+        ),
+        Note::PairsNotCompared { pairs } => {
+            let of = |p: &[String; 2]| format!("`{}` with `{}`", p[0], p[1]);
+            let all: Vec<String> = pairs.iter().map(of).collect();
+            format!(
+                "Not compared, because their capsules overlap in nearly all postures: {}. Watch them in the first run.",
+                all.join(", ")
+            )
+        }
+        Note::EverythingSeen => {
+            "No cameras are stated: every marker counts as seen. State `plan.cameras` where markers can be hidden.".to_owned()
+        }
+        Note::FacingUnused => "`plan.facing` needs `plan.cameras`: it was not used.".to_owned(),
+        Note::NoClearMotion { to } => {
+            let all: Vec<String> = to.iter().map(usize::to_string).collect();
+            format!(
+                "No collision-free motion was found to posture {}: move there with a motion planner or by hand.",
+                all.join(", ")
+            )
+        }
+        Note::FewerPairs { planned, found } => format!(
+            "{found} of {planned} postures could be planned from both sides: obstacles or joint limits are in the way."
+        ),
+        Note::TaskOpen => {
+            "The tool's position depends on something that neither the plan nor a prior determines; its σ is not stated. Fix it in the profile or state a prior.".to_owned()
+        }
+    }
+}
+
+/// σ of a parameter in the unit in which it is read.
+#[must_use]
+pub fn parameter_sigma(sigma: Option<f64>, unit: calib_core::Unit) -> String {
+    let unit = match unit {
+        calib_core::Unit::Meter => Unit::Meter,
+        calib_core::Unit::Radian => Unit::Radian,
+        _ => return sigma.map_or_else(|| "—".to_owned(), |s| format!("{s:.2e}")),
+    };
+    number::sigma(sigma, unit)
+}

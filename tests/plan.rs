@@ -1,0 +1,103 @@
+//! `calib plan` on robots that were and were not recorded.
+
+use crate::scratch::Scratch;
+
+#[test]
+fn a_robot_that_was_never_recorded_has_a_plan() {
+    let dir = Scratch::new().robot("ripley");
+    for file in ["base_sweep", "wrist_sweep", "arm_poses", "checks"] {
+        std::fs::remove_file(dir.path(&format!("robots/ripley/{file}.csv"))).expect("a recording");
+    }
+    let ran = dir.calib([
+        "plan",
+        "robots/ripley.yaml",
+        "--poses",
+        "18",
+        "--candidates",
+        "512",
+        "--out",
+        "out",
+    ]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stdout.lines().count() <= 24, "{}", ran.stdout);
+    assert!(
+        ran.stdout.contains("18 postures to record"),
+        "{}",
+        ran.stdout
+    );
+    assert!(ran.stdout.contains("Not recorded yet"), "{}", ran.stdout);
+    for file in [
+        "plan.csv",
+        "held_out.csv",
+        "plan.yaml",
+        "trajectory.json",
+        "plan.html",
+    ] {
+        assert!(dir.path(&format!("out/{file}")).is_file(), "{file}");
+    }
+    // The list itself is a table of postures.
+    let again = dir.calib([
+        "plan",
+        "robots/ripley.yaml",
+        "--poses",
+        "6",
+        "--candidates",
+        "256",
+        "--task",
+        "out/plan.csv",
+        "--out",
+        "out2",
+        "--json",
+    ]);
+    assert_eq!(again.code, 0, "{}", again.stderr);
+    let plan: serde_json::Value = serde_json::from_str(&again.stdout).expect("JSON");
+    assert_eq!(plan["postures"].as_array().map(Vec::len), Some(6), "{plan}");
+}
+
+#[test]
+fn what_is_recorded_already_counts() {
+    let dir = Scratch::new().robot("ripley");
+    let ran = dir.calib([
+        "plan",
+        "robots/ripley.yaml",
+        "--poses",
+        "6",
+        "--candidates",
+        "256",
+        "--out",
+        "out",
+        "--json",
+    ]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let plan: serde_json::Value = serde_json::from_str(&ran.stdout).expect("JSON");
+    let (before, after) = (
+        plan["sigma_before_mm"].as_f64(),
+        plan["sigma_after_mm"].as_f64(),
+    );
+    let (before, after) = (before.expect("recorded"), after.expect("planned"));
+    assert!(after < before && before < 1.0, "{before} {after}");
+}
+
+#[test]
+fn a_plan_that_is_impossible_says_what_removes_the_postures() {
+    let dir = Scratch::new().robot("ripley").edit(
+        "robots/ripley.yaml",
+        "solve:",
+        "plan: {ground_mm: 9000}\nsolve:",
+    );
+    let ran = dir.calib([
+        "plan",
+        "robots/ripley.yaml",
+        "--candidates",
+        "128",
+        "--out",
+        "out",
+    ]);
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("the ground removes 128"),
+        "{}",
+        ran.stderr
+    );
+    assert!(!dir.path("out/plan.csv").exists());
+}
