@@ -85,7 +85,12 @@ pub fn history_page(history: &History) -> String {
         .iter()
         .map(|track| plot(history, track))
         .collect();
-    calib_report::gallery::page(&format!("History of {}", history.robot), &lines, &plots)
+    calib_report::gallery::page(
+        &format!("History of {}", history.robot),
+        &lines,
+        &plots,
+        &[],
+    )
 }
 
 /// A quantity over time: its change since the first calibration, with ± 2 σ.

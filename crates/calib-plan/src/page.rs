@@ -1,6 +1,6 @@
 //! `plan.html`: the plan as one page that needs no other file.
 
-use calib_report::gallery;
+use calib_report::gallery::{self, Grid};
 use calib_report::plots::{Plot, PlotKind, PlotRow, Series};
 use calib_urdf::RobotModel;
 
@@ -40,29 +40,51 @@ pub fn page(plan: &Plan, model: &RobotModel, profile: &str) -> String {
         ),
     ];
     lines.extend(plan.notes.iter().map(words::note));
-    lines.extend(plan.postures.iter().enumerate().map(|(i, p)| {
-        let joints = plan.joints.moved.iter().map(|m| {
-            let (factor, unit) = shown(m.turns);
-            format!(
-                "{} {:.2} {unit}",
-                model.joint(m.joint).name,
-                p.q[m.joint.index()] * factor
-            )
-        });
-        let joints: Vec<String> = joints.collect();
+    let reasons = [
+        Why::Information,
+        Why::SpaceFilling,
+        Why::Approach,
+        Why::OtherSide,
+        Why::Detour,
+    ];
+    let used = |why: &Why| plan.postures.iter().any(|p| p.why == *why);
+    lines.extend(
+        reasons
+            .into_iter()
+            .filter(used)
+            .map(|why| format!("Reason `{}`: {}.", words::why(why), words::why_in_full(why))),
+    );
+    let title = format!("Plan for {}", plan.robot);
+    gallery::page(&title, &lines, &plots(plan), &[postures(plan, model)])
+}
+
+/// The postures in their order.
+fn postures(plan: &Plan, model: &RobotModel) -> Grid {
+    let joints = plan.joints.moved.iter();
+    let heads = joints.map(|m| format!("`{}` [{}]", model.joint(m.joint).name, shown(m.turns).1));
+    let mut header = vec!["posture".to_owned(), "why".to_owned()];
+    header.extend(heads);
+    header.push("expected σ after it".to_owned());
+    let rows = plan.postures.iter().enumerate().map(|(i, p)| {
         let repeats = p
             .repeats
             .map_or_else(String::new, |k| format!(" of posture {k}"));
-        format!(
-            "Posture {} ({}{repeats}: {}): {}; expected σ {}",
-            i + 1,
-            words::why(p.why),
-            words::why_in_full(p.why),
-            joints.join(", "),
-            words::length(p.sigma)
-        )
-    }));
-    gallery::page(&format!("Plan for {}", plan.robot), &lines, &plots(plan))
+        let mut cells = vec![
+            (i + 1).to_string(),
+            format!("{}{repeats}", words::why(p.why)),
+        ];
+        cells.extend(plan.joints.moved.iter().map(|m| {
+            let value = p.q[m.joint.index()] * shown(m.turns).0;
+            format!("{value:.2}").replace('-', "−")
+        }));
+        cells.push(words::length(p.sigma));
+        cells
+    });
+    Grid {
+        title: "Postures".to_owned(),
+        header,
+        rows: rows.collect(),
+    }
 }
 
 /// σ against the number of postures, and what is left of the priors.
@@ -113,7 +135,7 @@ fn plots(plan: &Plan) -> Vec<Plot> {
             id: "priors".to_owned(),
             section: "plan",
             title: "What remains of the priors".to_owned(),
-            description: "σ of each parameter after the plan in percent of the σ of its prior. Near 100 %: the postures do not show it.".to_owned(),
+            description: "σ of each parameter after the plan in percent of the σ of its prior. Near 100 %: the postures do not show it, or predictions depend on it only together with others (a convention).".to_owned(),
             kind: PlotKind::Rows {
                 axis: "% of the prior σ".to_owned(),
                 rows,

@@ -131,6 +131,11 @@ impl Markup {
     }
 }
 
+/// HTML of a text whose backticks mark names and commands.
+pub(crate) fn marked(text: &str) -> String {
+    Markup::from_text(text).0
+}
+
 /// The page. The view is thinned to a size that suits a page ([`View3d::thinned`]).
 ///
 /// # Errors
