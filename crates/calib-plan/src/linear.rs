@@ -152,7 +152,7 @@ impl Known {
         }
         Ok(Linear {
             names: free().map(|p| p.name.clone()).collect(),
-            scale: DVector::from_iterator(model.free(), free().map(|p| p.scale())),
+            scale: DVector::from_iterator(model.free(), free().map(calib_core::Parameter::scale)),
             has_prior: free().map(|p| p.prior_sigma.is_some()).collect(),
             units: free().map(|p| p.unit).collect(),
             recorded,

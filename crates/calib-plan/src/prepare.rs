@@ -296,6 +296,9 @@ fn tool_subject(sight: &Sight) -> Option<&Subject> {
     })
 }
 
+/// σ of the task before the first posture and after each, m (`None`: not determined), and what becomes of the parameters.
+pub type Predicted = (Option<f64>, Vec<Option<f64>>, Vec<Parameter>);
+
 impl Prepared<'_> {
     /// Held-out postures: independent of the candidates, possible and seen, in the task box where there is one.
     #[must_use]
@@ -319,10 +322,7 @@ impl Prepared<'_> {
     ///
     /// # Errors
     /// [`PlanError::Pipeline`] where the problem cannot be stated.
-    pub fn predicted(
-        &self,
-        postures: &[Candidate],
-    ) -> Result<(Option<f64>, Vec<Option<f64>>, Vec<Parameter>), PlanError> {
+    pub fn predicted(&self, postures: &[Candidate]) -> Result<Predicted, PlanError> {
         let subjects = &self.feasible.sight.subjects;
         let linear = self.known.linearize(postures, subjects, &self.task)?;
         let all = [linear.recorded.as_slice(), linear.planned.as_slice()];

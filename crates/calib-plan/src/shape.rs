@@ -155,8 +155,11 @@ pub fn capsules(points: &[Point3<f64>]) -> Vec<Capsule> {
     }]
 }
 
-/// Center, axes and half extents of a box around points, the longest first.
-fn oriented_box(points: &[Point3<f64>]) -> Option<(Point3<f64>, [Vector3<f64>; 3], [f64; 3])> {
+/// Center, axes and half extents of a box, the longest first.
+type OrientedBox = (Point3<f64>, [Vector3<f64>; 3], [f64; 3]);
+
+/// The smaller of the boxes along the scatter of the points and along the axes of their frame.
+fn oriented_box(points: &[Point3<f64>]) -> Option<OrientedBox> {
     let n = points.len();
     let mean = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n.max(1) as f64;
     if n == 0 || !mean.iter().all(|x| x.is_finite()) {

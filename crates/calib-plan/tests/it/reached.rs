@@ -82,7 +82,7 @@ fn one(known: &Known, plan: &Plan, task: &[Vec<f64>], seed: u64) -> (Vec<f64>, u
         let true_place = truth.tracker_from_root * links[link] * truth.mounts["hand"];
         let error = found.position - true_place * Point3::origin();
         squares.push(error.norm_squared());
-        let inverse = found.covariance.and_then(|c| c.try_inverse());
+        let inverse = found.covariance.and_then(nalgebra::Matrix::try_inverse);
         let inverse = inverse.expect("determined");
         inside += usize::from((error.transpose() * inverse * error)[0] < CHI2_95_THREE);
     }

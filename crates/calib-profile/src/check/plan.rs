@@ -68,9 +68,8 @@ impl Checker<'_> {
         let mut cameras = BTreeMap::new();
         for (name, camera) in &raw.cameras {
             let at = |key: &'static str| ["plan", "cameras", name.as_str(), key];
-            if !(camera.field_deg > 0.0 && camera.field_deg <= 180.0)
-                && !self.named_already(camera.field_deg)
-            {
+            let possible = camera.field_deg > 0.0 && camera.field_deg <= 180.0;
+            if !possible && !self.named_already(camera.field_deg) {
                 self.problem(
                     &at("field_deg"),
                     format!("{} is not a field of view", camera.field_deg),
