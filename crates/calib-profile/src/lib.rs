@@ -35,8 +35,8 @@ pub use profile::{
     JointException, JointFree, JointFreeSet, Limits, LinkTransform, Load, Loop, Method, Noise,
     Orientation, Origin, OriginFreeSet, Outputs, ParameterValue, Plugin, PointChoice, Prior,
     Profile, Protocol, RecordingSpec, RobotLoad, RobotLog, SharedWidth, SimErrors, SimMount,
-    SimNoise, Simulation, Solve, Split, Spots, Steps, SweptAxis, TimedPoses, Timing, Tip, Touched,
-    Tracker, UpAxis, Usage,
+    SimNoise, Simulation, Solve, Split, Spots, StartFrom, Steps, SweptAxis, TimedPoses, Timing,
+    Tip, Touched, Tracker, UpAxis, Usage,
 };
 pub use schema::json_schema;
 
