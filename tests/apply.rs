@@ -467,6 +467,8 @@ fn a_ur_arm_s_yaml_keeps_the_digits_of_what_did_not_change() {
     let urdf = "<robot name=\"ur\"><link name=\"a\"/><link name=\"b\"/><link name=\"c\"/>\
         <joint name=\"shoulder_pan_joint\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/><origin xyz=\"0 0 0.162512\" rpy=\"0 0 0\"/><axis xyz=\"0 0 1\"/></joint>\
         <joint name=\"shoulder_lift_joint\" type=\"continuous\"><parent link=\"b\"/><child link=\"c\"/><origin xyz=\"0 0 0\" rpy=\"1.570796 0 0\"/><axis xyz=\"0 0 1\"/></joint></robot>";
+    // A quarter of a turn in the URDF's six decimals.
+    let quarter = (std::f64::consts::FRAC_PI_2 * 1e6).floor() / 1e6;
     // The yaw of the first joint, and y of the second.
     let edit = |joint: &str, xyz: [f64; 3], rpy: [f64; 3]| UrdfEdit::SetOrigin {
         joint: joint.to_owned(),
@@ -484,7 +486,7 @@ fn a_ur_arm_s_yaml_keeps_the_digits_of_what_did_not_change() {
         edit(
             "shoulder_lift_joint",
             [0.0, 0.001, 0.0],
-            [1.570796, 0.0, 0.0],
+            [quarter, 0.0, 0.0],
         ),
     ];
     let done = patch(urdf, "r", &edits).expect("a patch");
