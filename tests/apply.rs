@@ -338,6 +338,175 @@ fn a_ur_arm_s_kinematics_yaml() {
     assert!(dir.read("k.yaml") == yaml);
 }
 
+/// A macro for each joint, called once for each: the numbers of a joint are in its call.
+const CALLS: &str = r#"<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:macro name="axis" params="name parent child xyz rpy:='0 0 0'">
+    <joint name="${name}" type="revolute">
+      <parent link="${parent}"/><child link="${child}"/>
+      <origin xyz="${xyz}" rpy="${rpy}"/>
+    </joint>
+  </xacro:macro>
+  <xacro:axis name="shoulder" parent="base" child="upper" xyz="0 0 0.3" rpy="0 0 0"/>
+  <xacro:axis name="elbow" parent="upper" child="fore" xyz="0.4 0 0" rpy="0 ${0} 0"/>
+  <xacro:axis rpy="0 0 0" xyz="0.25 0 0" name="wrist" parent="fore" child="hand"/>
+</robot>
+"#;
+
+#[test]
+fn a_macro_that_is_called_for_each_joint_is_patched_in_its_calls() {
+    let dir = with_xacro(CALLS);
+    let xacro = "my_arm/urdf/arm.urdf.xacro";
+    dir.calib(["apply", RESULT, xacro, "--in-place"]).expect(0);
+    let changed = dir.read(xacro);
+    let macro_end = changed.find("</xacro:macro>").expect("the macro");
+    assert_eq!(changed[..macro_end], CALLS[..macro_end]);
+    let calibrated = RobotModel::from_urdf_text(&dir.read(RESULT), "r").expect("a robot");
+    for line in changed.lines().filter(|line| line.contains("<xacro:axis")) {
+        let of = |key: &str| {
+            let (_, rest) = line.split_once(&format!(" {key}=\"")).expect(key);
+            rest.split('"').next().unwrap_or_default().to_owned()
+        };
+        let numbers = |key: &str| -> Vec<f64> {
+            let numbers = of(key);
+            numbers.split(' ').map(|x| x.parse().expect(line)).collect()
+        };
+        let (xyz, rpy) = (numbers("xyz"), numbers("rpy"));
+        let written = Isometry3::from_parts(
+            Translation3::new(xyz[0], xyz[1], xyz[2]),
+            rotation_from_rpy(&Vector3::new(rpy[0], rpy[1], rpy[2])),
+        );
+        let joint = calibrated.joint_id(&of("name")).expect("a joint");
+        let off = calibrated.joint(joint).parent_link_from_joint.inverse() * written;
+        assert!(
+            off.translation.vector.norm() < 2e-9 && off.rotation.angle() < 2e-9,
+            "{line}"
+        );
+    }
+    dir.calib(["revert", xacro, "--in-place"]).expect(0);
+    assert!(dir.read(xacro) == CALLS);
+    // What does not stand in a call of its own is refused.
+    for (from, to, said) in [
+        (" rpy=\"0 0 0\"/>", "/>", "computes"),
+        (
+            "<origin xyz=\"${xyz}\"",
+            "<origin xyz=\"0.4 0 0\"",
+            "several joints",
+        ),
+        (
+            "xyz=\"0.4 0 0\"",
+            "xyz=\"${0.2 * 2} 0 ${height}\"",
+            "computes",
+        ),
+        (
+            "<parent link=\"${parent}\"/>",
+            "<parent link=\"${parent}\"/><safety xyz=\"${xyz}\"/>",
+            "the parameter `xyz` of the macro",
+        ),
+        ("name=\"elbow\"", "name=\"wrist\"", "several joints"),
+    ] {
+        let other = CALLS.replacen(from, to, 1);
+        assert_ne!(other, CALLS, "{from}");
+        let dir = with_xacro(&other);
+        let ran = dir.calib(["apply", RESULT, xacro, "--in-place"]);
+        assert_ne!(ran.code, 0, "{to}");
+        println!("{to}: {}", ran.stderr);
+        assert!(ran.stderr.contains(said), "{to}: {}", ran.stderr);
+        assert!(dir.read(xacro) == other, "{to}: it was changed");
+    }
+}
+
+/// The file is named as it is in its own folder, and packages are sought above it.
+#[test]
+fn a_bare_file_name_finds_its_package() {
+    let dir = with_xacro(PROPERTIES);
+    let place = "my_arm/urdf";
+    let command = "calib apply ../../result/r.calibrated.urdf arm.urdf.xacro --in-place";
+    dir.quoted(place, command).expect(0);
+    let changed = dir.read("my_arm/config/arm.yaml");
+    assert_ne!(changed, YAML);
+    let dry = format!("{} --diff", command.trim_end_matches(" --in-place"));
+    let again = dir.quoted(place, &dry).expect(0);
+    assert!(again.stdout.contains("nothing to do"), "{}", again.stdout);
+    // The xacro goes back alone, and says what still holds its part.
+    let back = dir
+        .quoted(place, "calib revert arm.urdf.xacro --in-place")
+        .expect(0);
+    let said = format!("{}{}", back.stdout, back.stderr);
+    assert!(said.contains("arm.yaml"), "{said}");
+    assert!(dir.read("my_arm/urdf/arm.urdf.xacro") == PROPERTIES);
+    dir.calib(["revert", "my_arm/config/arm.yaml", "--in-place"])
+        .expect(0);
+    assert!(dir.read("my_arm/config/arm.yaml") == YAML);
+}
+
+/// A dry run says what a change in place would be refused for.
+#[test]
+fn a_dry_run_says_what_would_be_refused() {
+    let dir = result(Scratch::new(), "result", ARM, &["elbow"]).file("arm.urdf", ARM);
+    let first = dir
+        .calib(["apply", RESULT, "arm.urdf", "--in-place"])
+        .expect(0);
+    assert!(!first.stdout.contains("refused"), "{}", first.stdout);
+    // The next month: another joint, from the changed file, which somebody edited since.
+    let edited = dir
+        .read("arm.urdf")
+        .replace("</robot>", "<!-- by hand -->\n</robot>");
+    let dir = result(dir, "result", &edited, &["wrist"]).file("arm.urdf", &edited);
+    let dry = dir.calib(["apply", RESULT, "arm.urdf", "--diff"]);
+    let said = format!("{}{}", dry.stdout, dry.stderr);
+    assert!(said.contains("--in-place would be refused"), "{said}");
+    let ran = dir.calib(["apply", RESULT, "arm.urdf", "--in-place"]);
+    assert_ne!(ran.code, 0, "{}", ran.stdout);
+    assert!(dir.read("arm.urdf") == edited);
+}
+
+/// The controller's YAML has sixteen digits, the expanded URDF that was calibrated six decimals.
+#[test]
+fn a_ur_arm_s_yaml_keeps_the_digits_of_what_did_not_change() {
+    let yaml = "kinematics:\n  shoulder:\n    x: 0\n    y: 0\n    z: 0.1625123456789\n    roll: -0\n    pitch: 0\n    yaw: -1.2345678901e-07\n  upper_arm:\n    x: -1.23456789e-07\n    y: 0\n    z: 0\n    roll: 1.570796326794897\n    pitch: 0\n    yaw: 0\n";
+    let urdf = "<robot name=\"ur\"><link name=\"a\"/><link name=\"b\"/><link name=\"c\"/>\
+        <joint name=\"shoulder_pan_joint\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/><origin xyz=\"0 0 0.162512\" rpy=\"0 0 0\"/><axis xyz=\"0 0 1\"/></joint>\
+        <joint name=\"shoulder_lift_joint\" type=\"continuous\"><parent link=\"b\"/><child link=\"c\"/><origin xyz=\"0 0 0\" rpy=\"1.570796 0 0\"/><axis xyz=\"0 0 1\"/></joint></robot>";
+    // A quarter of a turn in the URDF's six decimals.
+    let quarter = (std::f64::consts::FRAC_PI_2 * 1e6).floor() / 1e6;
+    // The yaw of the first joint, and y of the second.
+    let edit = |joint: &str, xyz: [f64; 3], rpy: [f64; 3]| UrdfEdit::SetOrigin {
+        joint: joint.to_owned(),
+        parent_link_from_joint: Isometry3::from_parts(
+            Translation3::from(Vector3::from(xyz)),
+            rotation_from_rpy(&Vector3::from(rpy)),
+        ),
+    };
+    let edits = [
+        edit(
+            "shoulder_pan_joint",
+            [0.0, 0.0, 0.162512],
+            [0.0, 0.0, 0.002],
+        ),
+        edit(
+            "shoulder_lift_joint",
+            [0.0, 0.001, 0.0],
+            [quarter, 0.0, 0.0],
+        ),
+    ];
+    let done = patch(urdf, "r", &edits).expect("a patch");
+    let record = serde_json::to_string(&done.record(urdf)).expect("JSON");
+    let dir = Scratch::new()
+        .file(RESULT, done.text)
+        .file("result/r.calibrated.urdf.changes.json", record)
+        .file("k.yaml", yaml);
+    dir.calib(["apply", RESULT, "k.yaml", "--in-place"])
+        .expect(0);
+    let expected = yaml
+        .replacen("yaw: -1.2345678901e-07", "yaw: 0.001999877", 1)
+        .replacen(
+            "x: -1.23456789e-07\n    y: 0",
+            "x: -1.23456789e-07\n    y: 0.001",
+            1,
+        );
+    assert_eq!(dir.read("k.yaml"), expected);
+}
+
 #[test]
 fn what_several_joints_share_is_refused() {
     let twice = PROPERTIES.replace(

@@ -272,6 +272,49 @@ fn places_and_points_are_found_with_the_offsets() {
     let z = z(&report, "table.place.z", height);
     assert!(z.abs() < 4.0, "{}", parameter(&report, "table.place.z"));
     tells_what_was_touched(&dir.json("out/arm.scene.json"));
+    // The terminal has what was touched, and the tip, with their σ.
+    let full = dir
+        .calib(["run", "arm.yaml", "--out", "again", "--full"])
+        .expect(0);
+    let section = |heading: &str| {
+        let (_, rest) = full.stdout.split_once(heading).expect(heading);
+        rest.split("\n\n").next().unwrap_or_default().to_owned()
+    };
+    let tip = section("Contact points in their links");
+    assert!(
+        tip.contains("tip") && tip.matches('±').count() == 3,
+        "{tip}"
+    );
+    let places = section("Transforms [mm]");
+    assert!(
+        places.contains("l0_from_t") && places.contains('±'),
+        "{places}"
+    );
+    assert!(
+        !full.stdout.contains("contact-direction"),
+        "{}",
+        full.stdout
+    );
+}
+
+#[test]
+fn one_plane_names_the_directions_that_it_does_not_hold() {
+    let lines = PROFILE.lines().filter(|line| {
+        let of = |name: &str| line.starts_with(&format!("  {name}: {{"));
+        !["bar", "edge", "socket", "again"].into_iter().any(of)
+    });
+    let profile: Vec<&str> = lines.collect();
+    let dir = laboratory(&profile.join("\n"));
+    let checked = dir.calib(["check", "arm.yaml"]).expect(0);
+    let said = checked
+        .stdout
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ");
+    assert!(
+        said.contains("holds the tip along x, y of the robot's root"),
+        "{said}"
+    );
 }
 
 /// The scene has the tip with its σ and every touched thing with its frame; without a tracker nothing was measured.

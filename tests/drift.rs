@@ -7,11 +7,11 @@ use serde_json::Value;
 
 /// What changed of the robot since the first recording.
 #[derive(Clone, Copy, Default)]
-struct Since {
+pub(crate) struct Since {
     /// The forearm grew.
-    longer_mm: f64,
-    /// The zero of the elbow's encoder moved.
-    elbow_deg: f64,
+    pub(crate) longer_mm: f64,
+    /// The zero of this joint's encoder moved.
+    pub(crate) zero_deg: Option<(&'static str, f64)>,
 }
 
 /// The robot as it really is: the nominal URDF with errors of a real arm's size.
@@ -24,28 +24,53 @@ fn true_robot(urdf: &str, since: Since) -> String {
         assert!(tail.contains(from), "{joint}: {from}");
         head.to_owned() + &tail.replacen(from, &to, 1)
     };
-    let text = moved(
-        urdf,
-        "elbow",
-        "xyz=\"0.375 0 0\" rpy=\"0 0 0\"",
-        format!(
-            "xyz=\"0.3756 0 0.0003\" rpy=\"0.001 {} -0.002\"",
-            since.elbow_deg.to_radians()
+    let zero = |joint: &str| match since.zero_deg {
+        Some((moved, deg)) if moved == joint => deg.to_radians(),
+        _ => 0.0,
+    };
+    let forearm = 0.3746 + since.longer_mm * 1e-3;
+    let (elbow, pitch) = (zero("elbow"), 0.002 + zero("wrist_pitch"));
+    // Joint, its origin by design, and what it really is.
+    let origins = [
+        (
+            "waist",
+            "0 0 0.033268",
+            format!("xyz=\"0 0 0.033268\" rpy=\"0 0 {}\"", zero("waist")),
         ),
-    );
-    moved(
-        &text,
-        "wrist_pitch",
-        "xyz=\"0.375 0 0\" rpy=\"0 0 0\"",
-        format!(
-            "xyz=\"{} 0 -0.0002\" rpy=\"-0.001 0.002 0.001\"",
-            0.3746 + since.longer_mm * 1e-3
+        (
+            "shoulder",
+            "0 0 0.321732",
+            format!("xyz=\"0 0 0.321732\" rpy=\"0 {} 0\"", zero("shoulder")),
         ),
-    )
+        (
+            "elbow",
+            "0.375 0 0",
+            format!("xyz=\"0.3756 0 0.0003\" rpy=\"0.001 {elbow} -0.002\""),
+        ),
+        (
+            "wrist_pitch",
+            "0.375 0 0",
+            format!("xyz=\"{forearm} 0 -0.0002\" rpy=\"-0.001 {pitch} 0.001\""),
+        ),
+        (
+            "wrist_roll",
+            "0.042405 0 0",
+            format!("xyz=\"0.042405 0 0\" rpy=\"{} 0 0\"", zero("wrist_roll")),
+        ),
+    ];
+    let origins = origins.into_iter();
+    origins.fold(urdf.to_owned(), |text, (joint, design, real)| {
+        moved(
+            &text,
+            joint,
+            &format!("xyz=\"{design}\" rpy=\"0 0 0\""),
+            real,
+        )
+    })
 }
 
 /// Records the true robot again (other noise, other poses, bodies mounted elsewhere) and calibrates it.
-fn session(dir: Scratch, name: &str, seed: u32, since: Since) -> Scratch {
+pub(crate) fn session(dir: Scratch, name: &str, seed: u32, since: Since) -> Scratch {
     let profile = dir.read("robots/ripley.yaml");
     let truth = true_robot(
         &Scratch::new()
@@ -93,7 +118,7 @@ fn session(dir: Scratch, name: &str, seed: u32, since: Since) -> Scratch {
     dir
 }
 
-fn number<'a>(drift: &'a Value, name: &str) -> &'a Value {
+pub(crate) fn number<'a>(drift: &'a Value, name: &str) -> &'a Value {
     let numbers = drift["numbers"].as_array().expect("numbers");
     let found = numbers.iter().find(|n| n["name"] == name);
     found.unwrap_or_else(|| panic!("{name} is not among {numbers:?}"))
@@ -200,7 +225,7 @@ fn months_from_the_applied_urdf() {
     dir.calib(["apply", "april", urdf, "--in-place", "--force"])
         .expect(0);
     let moved = Since {
-        elbow_deg: 0.1,
+        zero_deg: Some(("elbow", 0.1)),
         ..Since::default()
     };
     let dir = dated(session(dir, "may", 3, moved), "may", "2026-05-01");

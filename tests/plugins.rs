@@ -208,6 +208,32 @@ fn an_estimator_in_rust_is_named_like_a_built_in_one() {
         .sqrt();
     // Two estimators of one center from 63 poses at 0.5 mm: within a millimeter, and not the same numbers.
     assert!(distance < 1e-3 && distance > 0.0, "{distance}");
+    // Whose code it was stands in the report and in the scene.
+    let [report, scene] = ["out/report.json", "out/justin.scene.json"].map(|file| dir.json(file));
+    for components in [&report["components"], &scene["provenance"]["components"]] {
+        let components = components.as_array().expect("a list");
+        let used = |kind: &str| components.iter().find(|c| c["kind"] == kind).expect(kind);
+        let center = used("calib.cor/1");
+        assert_eq!(center["name"], "geometric_median");
+        assert_eq!(center["plugin"]["name"], "geometric-median");
+        let hash = center["plugin"]["sha256"].as_str().expect("a hash");
+        assert_eq!(hash.len(), 64, "{hash}");
+        assert!(used("calib.reader/1")["plugin"].is_null());
+    }
+    let page = dir.read("out/report.md");
+    assert!(page.contains("plugin geometric-median"), "{page}");
+    let table = root().join("robots/justin/head_sweep.csv");
+    let table = table.to_str().expect("a path");
+    let place = library.to_str().expect("a path");
+    let only = ["--use-only", "heT"];
+    let fit = [
+        "fit", "cor", table, "--plugin", place, only[0], only[1], "--json",
+    ];
+    let fitted = dir.calib(fit);
+    assert_eq!(fitted.code, 0, "{}", fitted.stderr);
+    let fitted: Value = serde_json::from_str(&fitted.stdout).expect("JSON");
+    assert_eq!(fitted["plugin"]["name"], "geometric-median");
+    assert!(fitted["rms_m"].as_f64() < Some(1e-3));
     let off = dir.calib(["run", "robots/justin.yaml", "--no-plugins", "--out", "off"]);
     assert_eq!(off.code, 6);
     assert!(
@@ -245,6 +271,190 @@ fn what_is_no_plugin_is_refused_and_nothing_is_written() {
     let ran = pinned.calib(["run", "robots/justin.yaml", "--out", "out"]);
     assert_eq!(ran.code, 6, "{}", ran.stderr);
     assert!(ran.stderr.contains("0000"), "{}", ran.stderr);
+}
+
+/// What a stranger does from an installed program: a project, its library, and a file that only it reads.
+#[test]
+fn a_reader_of_a_new_project_is_asked_whether_it_knows_a_file() {
+    let dir = Scratch::new().file("sweep.txt", "#my_table 1\n0.00,1.5,-20.25,300\n0.01,,,\n");
+    let made = dir.calib([
+        "plugins", "new", "my-table", "--kind", "reader", "--lang", "c",
+    ]);
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    let built = Command::new("cc")
+        .args([
+            "-std=c11",
+            "-fPIC",
+            "-shared",
+            "-Iinclude",
+            "plugin.c",
+            "-o",
+            "my-table.so",
+        ])
+        .current_dir(dir.path("my-table"))
+        .status();
+    if built.is_err() {
+        skipped_tests::skip("no C compiler");
+        return;
+    }
+    let place = "./my-table/my-table.so";
+    let alone = dir.calib(["convert", "sweep.txt", "alone.csv"]);
+    assert_ne!(alone.code, 0, "{}", alone.stdout);
+    let marker = "marker=ball";
+    let convert = [
+        "convert",
+        "sweep.txt",
+        "sweep.csv",
+        "--plugin",
+        place,
+        "--parameter",
+        marker,
+    ];
+    let converted = dir.calib(convert);
+    assert_eq!(converted.code, 0, "{}", converted.stderr);
+    assert!(
+        converted.stderr.contains("read as my_table"),
+        "{}",
+        converted.stderr
+    );
+    assert!(
+        dir.read("sweep.csv").contains("ball"),
+        "{}",
+        dir.read("sweep.csv")
+    );
+    let wrong = [
+        "convert",
+        "sweep.txt",
+        "x.csv",
+        "--plugin",
+        place,
+        "--parameter",
+        "markr=ball",
+    ];
+    let wrong = dir.calib(wrong);
+    assert_eq!(wrong.code, 2, "{}", wrong.stderr);
+    assert!(
+        wrong.stderr.contains("did you mean `marker`?"),
+        "{}",
+        wrong.stderr
+    );
+}
+
+/// The project's estimator of a center states no covariance: its number counts, and what stands in place of σ is said.
+#[test]
+fn a_center_of_a_new_project_shapes_the_result() {
+    let dir = Scratch::new().robot("ripley");
+    let new = [
+        "plugins",
+        "new",
+        "my-sphere",
+        "--kind",
+        "center",
+        "--lang",
+        "c",
+        "--out",
+        "new",
+    ];
+    dir.calib(new).expect(0);
+    let project = dir.path("new/my-sphere");
+    std::fs::create_dir(dir.path("robots/plugins")).expect("a folder");
+    let library = dir.path("robots/plugins/libmy-sphere.so");
+    let built = Command::new("cc")
+        .args([
+            "-std=c11",
+            "-O1",
+            "-fPIC",
+            "-shared",
+            "-Iinclude",
+            "plugin.c",
+            "-lm",
+            "-o",
+        ])
+        .arg(&library)
+        .current_dir(&project)
+        .status();
+    if built.is_err() {
+        skipped_tests::skip("no C compiler");
+        return;
+    }
+    let plain = [
+        "run",
+        "robots/ripley.yaml",
+        "--method",
+        "paper",
+        "--out",
+        "plain",
+    ];
+    dir.calib(plain);
+    let dir = dir
+        .edit("robots/ripley.yaml", "center: sfe", "center: my_sphere")
+        .edit(
+            "robots/ripley.yaml",
+            "recordings:\n",
+            "plugins: {my-sphere: {}}\nrecordings:\n",
+        );
+    let ran = dir.calib([
+        "run",
+        "robots/ripley.yaml",
+        "--method",
+        "paper",
+        "--out",
+        "out",
+    ]);
+    assert!(ran.code < 2, "{}", ran.stderr);
+    let report = dir.json("out/report.json");
+    let findings = report["findings"].as_array().expect("findings");
+    let said = findings
+        .iter()
+        .find(|f| f["id"] == "origin-without-covariance");
+    assert_eq!(said.expect("said")["facts"]["estimator"], "my_sphere");
+    let place = |report: &Value| {
+        let all = report["transforms"].as_array().expect("transforms");
+        let found = all.iter().find(|t| t["name"] == "linkM_from_base");
+        let found = found.expect("the base")["translation_m"].clone();
+        [0, 1, 2].map(|i| found[i].as_f64().expect("m"))
+    };
+    let (own, built_in) = (place(&report), place(&dir.json("plain/report.json")));
+    let squares = own.iter().zip(built_in).map(|(a, b)| (a - b).powi(2));
+    let distance = squares.sum::<f64>().sqrt();
+    // The same formula with another rounding at most: within a tenth of a millimeter.
+    assert!(distance < 1e-4, "{distance}");
+}
+
+#[test]
+fn check_refuses_what_run_would_refuse() {
+    for (from, to, said) in [
+        ("center: sfe", "center: sfx", "sfe"),
+        (
+            "center: sfe",
+            "center: sfe\n    center_parameters: {weak_fractoin: 0.1}",
+            "weak_fraction",
+        ),
+        ("center: sfe", "center: score", "two bodies"),
+    ] {
+        let dir = Scratch::new()
+            .robot("justin")
+            .edit("robots/justin.yaml", from, to);
+        let checked = dir.calib(["check", "robots/justin.yaml"]);
+        let ran = dir.calib(["run", "robots/justin.yaml", "--out", "out"]);
+        assert_eq!(
+            (checked.code, ran.code),
+            (2, 2),
+            "{to}: {} {}",
+            checked.stderr,
+            ran.stderr
+        );
+        assert!(checked.stderr.contains(said), "{to}: {}", checked.stderr);
+        assert_eq!(checked.stderr, ran.stderr);
+    }
+    let dir = Scratch::new().robot("ripley").edit(
+        "robots/ripley.yaml",
+        "  add_bodies: [linkM, gripM]",
+        "  add_bodies: [linkM, gripM]\n  reports: {sumary: {}}",
+    );
+    let checked = dir.calib(["check", "robots/ripley.yaml"]);
+    assert_eq!(checked.code, 2, "{}", checked.stderr);
+    assert!(checked.stderr.contains("summary"), "{}", checked.stderr);
 }
 
 #[test]

@@ -226,6 +226,7 @@ const REPORT_PARTS: &[(&str, &[&str])] = &[
     ("checks", &["loops", "estimators", "noise", "clocks"]),
     ("effects", &["tested_effects", "prior_widths"]),
     ("kinematics", &["dh_table"]),
+    ("components", &["components"]),
     ("verification", &["verification"]),
     ("residuals", &["residuals"]),
     (

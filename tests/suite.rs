@@ -21,6 +21,7 @@ mod interruptions;
 mod laboratory;
 mod layering;
 mod loads;
+mod month;
 mod outputs;
 mod plan;
 mod plugins;

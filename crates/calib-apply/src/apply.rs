@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use calib_urdf::rpy::{rotation_from_rpy, rpy_from_rotation};
 use calib_urdf::{ModelDiff, Patched, UrdfEdit, diff_origins};
 use nalgebra::Isometry3;
 
@@ -120,6 +121,10 @@ fn patched(
 ) -> Result<(PatchedTarget, State), ApplyError> {
     let patched = target.patch(result, edits)?;
     let refused = match compare(result, &patched.before, &target.path) {
+        Ok(State::Before) => {
+            let edits = with_own_digits(result, &patched.before, edits);
+            return Ok((target.patch(result, &edits)?, State::Before));
+        }
         Ok(state) => return Ok((patched, state)),
         Err(refused) => refused,
     };
@@ -137,6 +142,59 @@ fn patched(
         }
         Err(_) => Err(refused),
     }
+}
+
+/// The edits as changes of what stands in the target. A target may state its numbers with more digits than the file that was calibrated (an
+/// expanded URDF has six decimals, a UR arm's YAML sixteen): a coordinate that the calibration left alone keeps them, and a rotation is
+/// changed by what the calibration changed of it.
+fn with_own_digits(
+    result: &Calibrated,
+    there: &BTreeMap<String, Isometry3<f64>>,
+    edits: &[UrdfEdit],
+) -> Vec<UrdfEdit> {
+    /// The last decimal that is written, m and rad.
+    const WRITTEN: f64 = 1e-9;
+    const UNCHANGED: f64 = 0.5 * WRITTEN;
+    /// Closer than this the target has the same digits, m and rad.
+    const SAME_DIGITS: f64 = 1e-12;
+    let own = |edit: &UrdfEdit| -> Option<UrdfEdit> {
+        let UrdfEdit::SetOrigin {
+            joint,
+            parent_link_from_joint: wanted,
+        } = edit
+        else {
+            return None;
+        };
+        let (there, before) = (there.get(joint)?, result.before(joint)?);
+        let off = before.inverse() * there;
+        if off.translation.vector.norm() + off.rotation.angle() < SAME_DIGITS {
+            return None;
+        }
+        let mut own = *wanted;
+        own.rotation = wanted.rotation * before.rotation.inverse() * there.rotation;
+        let (new, old) = (
+            rpy_from_rotation(&own.rotation),
+            rpy_from_rotation(&there.rotation),
+        );
+        own.rotation = rotation_from_rpy(&new.zip_map(&old, |new, old| match new - old {
+            change if change.abs() < UNCHANGED => old,
+            _ => (new / WRITTEN).round() * WRITTEN,
+        }));
+        let coordinates = own.translation.vector.iter_mut().enumerate();
+        for (i, own) in coordinates {
+            if (*own - before.translation.vector[i]).abs() < UNCHANGED {
+                *own = there.translation.vector[i];
+            }
+        }
+        Some(UrdfEdit::SetOrigin {
+            joint: joint.clone(),
+            parent_link_from_joint: own,
+        })
+    };
+    let edits = edits.iter();
+    edits
+        .map(|edit| own(edit).unwrap_or_else(|| edit.clone()))
+        .collect()
 }
 
 /// A changed file with the record that leads back to its first original.

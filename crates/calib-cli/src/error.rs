@@ -95,7 +95,9 @@ pub enum CliError {
     #[error(transparent)]
     View(#[from] ViewError),
     /// A plugin project cannot be made.
-    #[error("{0}\n  help: calib plugins new NAME --lang rust|c --out FOLDER")]
+    #[error(
+        "{0}\n  help: calib plugins new NAME --kind center|axis|reader|report --lang rust|c --out FOLDER"
+    )]
     NewPlugin(NewProjectError),
     /// What a command printed is lost.
     #[error(
@@ -129,6 +131,7 @@ impl CliError {
             Self::Drift(_)
             | Self::Recording(_)
             | Self::Fit(FitError::Data { .. } | FitError::Recording(_)) => ExitCode::Data,
+            Self::Fit(FitError::Plugin(error)) => calib_pipeline::error::exit_code_of(error),
             Self::File(error)
             | Self::Study(StudyError::File(error))
             | Self::Cases(CaseError::State(error)) => of_file(error),

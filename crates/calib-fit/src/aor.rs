@@ -31,6 +31,9 @@ fn command() -> Command<AorEstimate> {
 /// # Errors
 /// As [`crate::cor`].
 pub fn aor(request: &TableRequest) -> Result<Answer, FitError> {
+    if !request.plugins.is_empty() {
+        return crate::plugin::aor(request);
+    }
     let command = command();
     if request.list {
         return Ok(command.list());

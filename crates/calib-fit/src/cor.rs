@@ -34,6 +34,9 @@ fn command() -> Command<CorEstimate> {
 /// # Errors
 /// [`FitError`] for tables that cannot be read and estimators that do not fit them.
 pub fn cor(request: &TableRequest) -> Result<Answer, FitError> {
+    if !request.plugins.is_empty() {
+        return crate::plugin::cor(request);
+    }
     let command = command();
     if request.list {
         return Ok(command.list());

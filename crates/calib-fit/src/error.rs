@@ -25,4 +25,7 @@ pub enum FitError {
     /// The table cannot be read.
     #[error(transparent)]
     Recording(#[from] calib_recording::Error),
+    /// A plugin was not loaded, or its estimator failed.
+    #[error("{0}\n  help: `calib plugins check PLUGIN` tests a plugin and lists what it offers")]
+    Plugin(#[from] calib_plugin::PluginError),
 }

@@ -11,6 +11,7 @@ mod error;
 mod frame;
 mod handeye;
 mod noise;
+mod plugin;
 mod road;
 mod table;
 
@@ -63,6 +64,10 @@ pub struct TableRequest {
     pub center_m: Option<Point3<f64>>,
     /// Axes: the side that the direction is reported towards.
     pub towards: Option<Vector3<f64>>,
+    /// Plugins, by name or path: where any is named, its estimator answers.
+    pub plugins: Vec<String>,
+    /// Parameters of the plugin's estimator: names and values as they were written.
+    pub parameters: Vec<(String, String)>,
 }
 
 /// What to make a frame of.

@@ -5,11 +5,13 @@ use std::path::Path;
 
 use calib_finding::{Finding, Severity, catalog};
 use calib_geometry::statistics::median;
-use calib_profile::{BodyKind, Usage};
+use calib_profile::{BodyKind, Method, Usage};
 use calib_report::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck, DataChecks};
 
 use crate::error::{ExitCode, PipelineError};
+use crate::estimate::paper;
 use crate::estimate::start::start;
+use crate::formulate::by_likelihood::only_a_cross_check;
 use crate::formulate::{bad_rows, model_checks};
 use crate::options::Plugins;
 use crate::output::of_data::{coverage, lost, used_for};
@@ -17,6 +19,7 @@ use crate::prepare::aligned::Alignment;
 use crate::prepare::checks;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
+use crate::prepare::named;
 use crate::prepare::relabel::relabel;
 use crate::prepare::robot::load_robot;
 use crate::prepare::tracks::{BodyTrack, body_tracks};
@@ -47,6 +50,21 @@ pub fn check(profile: &Path, plugins: Plugins) -> Result<DataChecks, PipelineErr
             let wrong = findings.iter().any(is_wrong);
             if !wrong && inputs.robot.profile.solve.robust {
                 findings.extend(bad_rows::bad_rows_of_inputs(&inputs, &tracks)?.findings);
+            }
+            // What a plugin does with these data shows when it is called.
+            if !wrong && named::plugins_find_origins(&inputs) {
+                let mut of_origins = Vec::new();
+                paper::origins(
+                    &inputs,
+                    &tracks,
+                    &start,
+                    &inputs.estimators,
+                    &mut of_origins,
+                )?;
+                if inputs.robot.profile.solve.method == Method::Ml {
+                    only_a_cross_check(&mut of_origins);
+                }
+                findings.extend(of_origins);
             }
         }
         // What the data checks found is the reason.

@@ -132,6 +132,16 @@ fn chain(error: &calib_plugin::PluginError) -> String {
     text
 }
 
+/// The exit code of what went wrong with a plugin or an estimator.
+#[must_use]
+pub fn exit_code_of(error: &calib_plugin::PluginError) -> ExitCode {
+    match error.exit_code() {
+        2 => ExitCode::Usage,
+        3 => ExitCode::Data,
+        _ => ExitCode::Plugin,
+    }
+}
+
 impl PipelineError {
     /// The exit code of this error.
     #[must_use]
@@ -148,11 +158,7 @@ impl PipelineError {
             | Self::Origin { .. } => ExitCode::Usage,
             Self::Recording(_) | Self::Data { .. } => ExitCode::Data,
             Self::Solve(_) => ExitCode::NotConverged,
-            Self::Plugin(error) => match error.exit_code() {
-                2 => ExitCode::Usage,
-                3 => ExitCode::Data,
-                _ => ExitCode::Plugin,
-            },
+            Self::Plugin(error) => exit_code_of(error),
             Self::Edit(_) | Self::Patch { .. } | Self::Report(_) => ExitCode::NotWritten,
         }
     }

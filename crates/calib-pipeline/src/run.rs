@@ -9,10 +9,10 @@ use calib_profile::Method;
 use calib_report::Report;
 
 use crate::error::{ExitCode, PipelineError};
-use crate::estimate::paper;
 use crate::formulate::by_closed_forms::{paper_assumptions, paper_result};
 use crate::formulate::by_likelihood::likelihood;
 use crate::formulate::checked::check_data;
+use crate::formulate::from_origins::origins;
 use crate::formulate::solved::{Solved, nominal};
 use crate::formulate::without_effects::refitted;
 use crate::output::assemble::assemble;
@@ -75,14 +75,8 @@ pub fn run_on(
     inputs.digests.extend(meshes);
     let mut checked = check_data(&mut inputs, of_shapes, options.force)?;
     progress("estimate origins");
-    let origins = paper::origins(
-        &inputs,
-        &checked.tracks,
-        &checked.start,
-        &inputs.estimators,
-        &mut checked.findings,
-    )?;
     let nominal = nominal(&inputs, &checked.start);
+    let origins = origins(&inputs, &mut checked, &nominal)?;
     let method = options.method(&inputs.robot.profile);
     let solved = match method {
         Method::Paper => {

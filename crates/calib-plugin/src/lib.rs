@@ -79,9 +79,9 @@ pub use host::{
     Cancel, Control, Description, Found, Host, LoadedPlugin, PluginError, Progress, SearchPath,
 };
 #[cfg(feature = "host")]
-pub use new_project::{Language, NewProjectError, new_project};
+pub use new_project::{Language, NewProjectError, kind_from_name, new_project};
 #[cfg(feature = "host")]
-pub use parameters::{ParameterError, schema, validate};
+pub use parameters::{ParameterError, schema, typed, validate};
 #[cfg(feature = "host")]
 pub use registry::{Bound, Entry, Origin, Registry, Tables};
 

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use calib_files::{FileError, OutputFile, new_folder};
 
+use crate::offer::Kind;
+
 /// The language of a new plugin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Language {
@@ -29,12 +31,34 @@ impl Language {
     }
 }
 
+/// The kind with this short name: `center`, `axis`, `reader` or `report`.
+///
+/// # Errors
+/// [`NewProjectError::Kind`].
+pub fn kind_from_name(name: &str) -> Result<Kind, NewProjectError> {
+    match name {
+        "center" => Ok(Kind::Cor),
+        "axis" => Ok(Kind::Aor),
+        "reader" => Ok(Kind::Reader),
+        "report" => Ok(Kind::Report),
+        other => Err(NewProjectError::Kind {
+            got: other.to_string(),
+        }),
+    }
+}
+
 /// Why no project was made.
 #[derive(Debug, thiserror::Error)]
 pub enum NewProjectError {
     /// Not a language there is a template for.
     #[error("unknown language `{got}`, expected one of `rust`, `c`")]
     Language {
+        /// What was asked for.
+        got: String,
+    },
+    /// Not a kind there is a template for.
+    #[error("unknown kind `{got}`, expected one of `center`, `axis`, `reader`, `report`")]
+    Kind {
         /// What was asked for.
         got: String,
     },
@@ -81,6 +105,7 @@ const AUTHOR_SIDE: &[(&str, &str)] = &[
 /// [`NewProjectError`]; then nothing is left behind.
 pub fn new_project(
     name: &str,
+    kind: Kind,
     language: Language,
     folder: &Path,
 ) -> Result<PathBuf, NewProjectError> {
@@ -93,7 +118,7 @@ pub fn new_project(
         });
     }
     let project = folder.join(name);
-    let files: Vec<OutputFile> = files(name, language)
+    let files: Vec<OutputFile> = files(name, kind, language)
         .into_iter()
         .map(|(name, text)| OutputFile::text(name, text))
         .collect();
@@ -101,7 +126,44 @@ pub fn new_project(
     Ok(project)
 }
 
-fn files(name: &str, language: Language) -> Vec<(String, String)> {
+/// What differs from kind to kind: the templates, and how a profile uses the result.
+struct Template {
+    rust: &'static str,
+    c: &'static str,
+    c_test: &'static str,
+    used: &'static str,
+}
+
+fn template(kind: Kind) -> Template {
+    match kind {
+        Kind::Cor => Template {
+            rust: include_str!("../templates/rust/center.rs.in"),
+            c: include_str!("../templates/c/center.c.in"),
+            c_test: include_str!("../templates/c/test.center.c.in"),
+            used: "origins:\n  wrist: {center: @OFFER@}     # beside its other keys",
+        },
+        Kind::Aor => Template {
+            rust: include_str!("../templates/rust/axis.rs.in"),
+            c: include_str!("../templates/c/axis.c.in"),
+            c_test: include_str!("../templates/c/test.axis.c.in"),
+            used: "origins:\n  wrist: {axis: @OFFER@}       # beside its other keys",
+        },
+        Kind::Reader => Template {
+            rust: include_str!("../templates/rust/reader.rs.in"),
+            c: include_str!("../templates/c/reader.c.in"),
+            c_test: include_str!("../templates/c/test.reader.c.in"),
+            used: "recordings:\n  sweep: {file: sweep.txt, use: sweep, reader: @OFFER@}",
+        },
+        Kind::Report => Template {
+            rust: include_str!("../templates/rust/report.rs.in"),
+            c: include_str!("../templates/c/report.c.in"),
+            c_test: include_str!("../templates/c/test.report.c.in"),
+            used: "outputs:\n  reports: {@OFFER@: {}}",
+        },
+    }
+}
+
+fn files(name: &str, kind: Kind, language: Language) -> Vec<(String, String)> {
     let offer = name.replace('-', "_");
     let library = format!(
         "{}{}{}",
@@ -109,8 +171,14 @@ fn files(name: &str, language: Language) -> Vec<(String, String)> {
         name.replace('-', "_"),
         std::env::consts::DLL_SUFFIX
     );
+    let of_kind = template(kind);
+    let used = format!("plugins: {{@NAME@: {{}}}}\n{}", of_kind.used);
+    let entry = include_str!("../templates/c/entry.c.in");
     let filled = |path: &str, template: &str| {
         let text = template
+            .replace("@ENTRY@\n", entry)
+            .replace("@USE@", &used)
+            .replace("@WORD@", kind.word())
             .replace("@NAME@", name)
             .replace("@OFFER@", &offer)
             .replace("@LIBRARY@", &library)
@@ -125,7 +193,7 @@ fn files(name: &str, language: Language) -> Vec<(String, String)> {
                     include_str!("../templates/rust/Cargo.toml.in"),
                 ),
                 filled("README.md", include_str!("../templates/rust/README.md.in")),
-                filled("src/lib.rs", include_str!("../templates/rust/lib.rs.in")),
+                filled("src/lib.rs", of_kind.rust),
                 (".gitignore".to_string(), "target/\n".to_string()),
                 filled(
                     "calib-plugin/Cargo.toml",
@@ -140,8 +208,9 @@ fn files(name: &str, language: Language) -> Vec<(String, String)> {
             files
         }
         Language::C => vec![
-            filled("plugin.c", include_str!("../templates/c/plugin.c.in")),
-            filled("test.c", include_str!("../templates/c/test.c.in")),
+            filled("plugin.c", of_kind.c),
+            filled("test.c", of_kind.c_test),
+            filled("host.h", include_str!("../templates/c/host.h.in")),
             filled("Makefile", include_str!("../templates/c/Makefile.in")),
             filled("README.md", include_str!("../templates/c/README.md.in")),
             (

@@ -228,3 +228,23 @@ pub fn schema(parameters: &[Parameter]) -> serde_json::Value {
         "additionalProperties": false,
     })
 }
+
+/// Values that were written as text, in the types that the offer describes. A text that is no value of its type, and one of a parameter
+/// that there is not, stays a text, which [`validate`] refuses.
+#[must_use]
+pub fn typed(parameters: &[Parameter], given: &[(String, String)]) -> BTreeMap<String, Value> {
+    let value = |name: &str, text: &str| {
+        let described = parameters.iter().find(|p| p.name == name)?;
+        match described.value {
+            Value::Bool(_) => text.parse().ok().map(Value::Bool),
+            Value::Integer(_) => text.parse().ok().map(Value::Integer),
+            Value::Number(_) => text.parse().ok().map(Value::Number),
+            Value::Text(_) => None,
+        }
+    };
+    let typed = given.iter().map(|(name, text)| {
+        let value = value(name, text).unwrap_or_else(|| Value::Text(text.clone()));
+        (name.clone(), value)
+    });
+    typed.collect()
+}

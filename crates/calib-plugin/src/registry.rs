@@ -7,12 +7,15 @@ use crate::{
     call::Call,
     host::{Control, LoadedPlugin, PluginError},
     kinds::{Aor, Cor, Reader, ReportWriter},
-    motion::Motion,
+    motion::{Motion, Shape},
     offer::{Kind, Offer, Value},
     parameters,
     streams::{ReportFile, ReportInput, Source, Streams},
     verify,
 };
+
+/// The most bytes of a file that a reader is shown to recognize its format.
+const HEAD_BYTES: usize = 4096;
 
 /// Where something comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,6 +30,8 @@ pub enum Origin {
         version: String,
         /// Its file; `None`: linked into the program.
         path: Option<PathBuf>,
+        /// SHA-256 of the file, 64 hexadecimal digits; `None`: linked into the program.
+        sha256: Option<String>,
     },
 }
 
@@ -160,6 +165,21 @@ impl<T: ?Sized> Entry<T> {
         }
     }
 
+    /// Whether it takes data of this shape.
+    ///
+    /// # Errors
+    /// [`PluginError::Shape`] with the shapes that it takes.
+    pub fn takes(&self, shape: Shape) -> Result<(), PluginError> {
+        if self.offer.shapes.contains(&shape) {
+            return Ok(());
+        }
+        Err(PluginError::Shape {
+            of: self.title(),
+            takes: self.offer.shapes.iter().map(|shape| shape.word()).collect(),
+            got: shape.word(),
+        })
+    }
+
     /// Ready to be called, with these parameters.
     ///
     /// # Errors
@@ -221,20 +241,7 @@ impl<T: ?Sized> Bound<T> {
     }
 
     fn takes(&self, motion: &Motion<'_>) -> Result<(), PluginError> {
-        if self.entry.offer.shapes.contains(&motion.shape) {
-            return Ok(());
-        }
-        Err(PluginError::Shape {
-            of: self.entry.title(),
-            takes: self
-                .entry
-                .offer
-                .shapes
-                .iter()
-                .map(|shape| shape.word())
-                .collect(),
-            got: motion.shape.word(),
-        })
+        self.entry.takes(motion.shape)
     }
 }
 
@@ -366,6 +373,17 @@ impl<T: ?Sized> Registry<T> {
     /// All, by name.
     pub fn iter(&self) -> impl Iterator<Item = &Entry<T>> {
         self.entries.values()
+    }
+}
+
+impl Registry<dyn Reader> {
+    /// The first reader of a plugin, by name, that recognizes these first bytes; built-in readers are not asked.
+    #[must_use]
+    pub fn recognizing(&self, bytes: &[u8]) -> Option<&Entry<dyn Reader>> {
+        let head = &bytes[..bytes.len().min(HEAD_BYTES)];
+        self.iter()
+            .filter(|e| *e.origin() != Origin::BuiltIn)
+            .find(|e| e.recognizes(head))
     }
 }
 

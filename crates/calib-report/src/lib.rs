@@ -23,6 +23,8 @@
 
 mod budget;
 mod check;
+mod component;
+mod contact_point;
 pub mod csv;
 mod data;
 mod dh_table;
@@ -62,6 +64,8 @@ mod words;
 
 pub use calib_finding::{Finding, Severity, Unit, number};
 pub use check::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck, DataChecks};
+pub use component::{Component, PluginFile};
+pub use contact_point::ContactPoint;
 pub use data::{
     AccuracyLimit, Clock, Fates, FitSummary, Input, JointCoverage, Lost, Noise, NoiseCandidate,
     NoiseChoice, Output, RecordingSummary, RecordingUse, Rejected, RejectedFor, TestAnswer,

@@ -1,9 +1,10 @@
 use crate::verdict::{Effect, Judgment, Reason, ReasonId};
 use crate::{
-    AccuracyLimit, Change, Clock, DataInformation, DhTable, Diagnosis, EstimatorResult, Finding,
-    FitSummary, Identification, Input, JointCoverage, LoopClosure, Noise, NoiseChoice,
-    NotObservable, Output, Parameter, PriorWidth, RecordingSummary, Rejected, Residuals,
-    RobotChange, Selection, TestedEffect, Transform, Unit, Verification, WeakDirections, Workspace,
+    AccuracyLimit, Change, Clock, Component, ContactPoint, DataInformation, DhTable, Diagnosis,
+    EstimatorResult, Finding, FitSummary, Identification, Input, JointCoverage, LoopClosure, Noise,
+    NoiseChoice, NotObservable, Output, Parameter, PriorWidth, RecordingSummary, Rejected,
+    Residuals, RobotChange, Selection, TestedEffect, Transform, Unit, Verification, WeakDirections,
+    Workspace,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -51,6 +52,9 @@ pub struct Report {
     pub next_steps: Vec<String>,
     /// Estimated transforms, and those derived from them.
     pub transforms: Vec<Transform>,
+    /// Points of the robot that touch something. Empty without contacts.
+    #[serde(default)]
+    pub contact_points: Vec<ContactPoint>,
     /// Every scalar unknown.
     pub parameters: Vec<Parameter>,
     /// What changed of the robot itself, in numbers that no choice of frames changes; the most significant first.
@@ -120,6 +124,9 @@ pub struct Report {
     pub findings: Vec<Finding>,
     /// Files that were read.
     pub inputs: Vec<Input>,
+    /// Estimators, readers and report writers that the profile named or that were found for it.
+    #[serde(default)]
+    pub components: Vec<Component>,
     /// Files that were written.
     #[serde(default)]
     pub outputs: Vec<Output>,

@@ -10,9 +10,9 @@ mod known;
 mod launch;
 mod sdf;
 
-pub use known::{SceneJoint, SceneTip, SceneTouched, SceneVerdict, TouchedShape};
+pub use known::{Provenance, SceneJoint, SceneTip, SceneTouched, SceneVerdict, TouchedShape};
 
-use crate::{Input, JointValue, ReportError, Status, json};
+use crate::{JointValue, ReportError, Status, json};
 use nalgebra::{Isometry3, Matrix6};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -225,19 +225,6 @@ pub enum Shape {
         /// m.
         length_m: f64,
     },
-}
-
-/// Where a scene comes from.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct Provenance {
-    /// The program.
-    pub tool: String,
-    /// Its version.
-    pub version: String,
-    /// The profile, relative.
-    pub profile: String,
-    /// What was read.
-    pub inputs: Vec<Input>,
 }
 
 /// How far a quaternion's length may be from 1: rounding of 64-bit arithmetic over a long chain.

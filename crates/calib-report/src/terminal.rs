@@ -50,6 +50,7 @@ pub fn full(report: &Report, look: Look, places: Places<'_>) -> String {
         screen.text += &selection(choice);
     }
     screen.transforms();
+    screen.contact_points();
     screen.changes();
     screen.answers();
     screen.findings();
@@ -201,6 +202,20 @@ impl Screen<'_> {
                 cell(2),
                 words::transforms::short_status(transform).to_owned(),
             ]);
+        }
+        self.text += &table.plain(self.look.columns);
+    }
+
+    /// Points of the robot that touch something, in the frames of their links.
+    fn contact_points(&mut self) {
+        let points = words::transforms::contact_points(self.report);
+        if points.is_empty() {
+            return;
+        }
+        self.heading(words::transforms::CONTACT_POINTS);
+        let mut table = Table::new(&["<", ">x", ">y", ">z"]);
+        for row in points {
+            table.row(row);
         }
         self.text += &table.plain(self.look.columns);
     }

@@ -4,10 +4,14 @@ use std::path::{Path, PathBuf};
 
 use calib_files::{OutputFile, write_new};
 use calib_pipeline::ExitCode;
-use calib_recording::{ReadOptions, WriteOptions, read_path_with, write_recording};
+use calib_pipeline::error::PipelineError;
+use calib_pipeline::prepare::{estimators::Estimators, readers};
+use calib_plugin::{Origin, typed};
+use calib_recording::{ReadOptions, Recording, WriteOptions, read_path_with, write_recording};
 use clap::Args;
 
 use super::names::names_of;
+use super::plugin_options::NamedPlugins;
 use crate::error::CliError;
 use crate::terminal::{Console, byte_bar, emit_paths, say};
 
@@ -24,6 +28,9 @@ pub struct Convert {
     /// Name to write for a body or marker and its name in the recording, as `gripM=body_0`
     #[arg(long, value_delimiter = ',')]
     map: Vec<String>,
+    /// Plugins whose readers are asked first
+    #[command(flatten)]
+    plugins: NamedPlugins,
 }
 
 /// Converts, and prints the names of the tables.
@@ -56,6 +63,30 @@ struct Converted {
     notes: Vec<String>,
 }
 
+/// Reads a recording with the reader of a plugin that is named, or that recognizes the file; `None` where no plugin's reader is meant.
+fn read_by_plugin(
+    input: &Path,
+    format: Option<&str>,
+    named: &NamedPlugins,
+) -> Result<Option<Recording>, CliError> {
+    let table = Estimators::with_plugins(&named.plugin)?.tables.reader;
+    let largest = ReadOptions::default().max_bytes;
+    // Why a file cannot be read is said where the built-in readers open it.
+    let Ok(bytes) = calib_files::input::read(input, largest) else {
+        return Ok(None);
+    };
+    let entry = match format {
+        Some(id) => Some(table.get(id).map_err(PipelineError::from)?),
+        None => table.recognizing(&bytes),
+    };
+    let Some(entry) = entry.filter(|e| *e.origin() != Origin::BuiltIn) else {
+        return Ok(None);
+    };
+    let parameters = typed(&entry.offer().parameters, &named.parameter);
+    let shown = input.display().to_string();
+    Ok(Some(readers::read(entry, &parameters, &shown, &bytes)?))
+}
+
 /// Reads a recording of any known format and renders it as canonical CSV; `progress(bytes read, bytes in all)` is told
 /// how far the reading is.
 fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Converted, CliError> {
@@ -64,13 +95,23 @@ fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Conv
         output,
         format,
         map,
+        plugins,
     } = options;
     let names = names_of(map)?;
-    let options = ReadOptions {
-        format: format.clone(),
-        ..ReadOptions::default()
+    let by_plugin = match plugins.plugin.is_empty() {
+        true => None,
+        false => read_by_plugin(input, format.as_deref(), plugins)?,
     };
-    let mut recording = read_path_with(input, &options, progress)?;
+    let mut recording = match by_plugin {
+        Some(recording) => recording,
+        None => {
+            let options = ReadOptions {
+                format: format.clone(),
+                ..ReadOptions::default()
+            };
+            read_path_with(input, &options, progress)?
+        }
+    };
     recording.rename(&names);
     let mut notes = vec![format!("read as {}", recording.meta.format)];
     notes.extend(recording.meta.conversions.iter().cloned());

@@ -6,6 +6,7 @@ use calib_fit as fit;
 use calib_pipeline::ExitCode;
 use clap::{Args, Subcommand};
 
+use super::plugin_options::NamedPlugins;
 use crate::error::CliError;
 use crate::terminal::emit;
 
@@ -89,6 +90,9 @@ pub struct FitTable {
     /// Direction that fixes the sign of the axis if there are no joint angles (axes)
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     pub towards: Option<[f64; 3]>,
+    /// Plugins whose estimator is used
+    #[command(flatten)]
+    pub plugins: NamedPlugins,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
@@ -257,6 +261,8 @@ impl FitTable {
             joint: self.joint.clone(),
             center_m: self.center_m.map(Into::into),
             towards: self.towards.map(Into::into),
+            plugins: self.plugins.plugin.clone(),
+            parameters: self.plugins.parameter.clone(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Which plugins a command that reads a profile may load.
+//! Which plugins a command may load: those of a profile, or those that its flags name.
 
 use calib_pipeline::options::Plugins;
 use clap::Args;
@@ -24,4 +24,23 @@ impl PluginOptions {
             (false, false) => Plugins::Placed,
         }
     }
+}
+
+/// Plugins of a command that reads no profile.
+#[derive(Debug, Clone, Args)]
+pub struct NamedPlugins {
+    /// Plugin to load, by name or path; can be given several times
+    #[arg(long, value_name = "PLUGIN")]
+    pub plugin: Vec<String>,
+    /// Parameter of the plugin's estimator or reader; can be given several times
+    #[arg(long, value_name = "NAME=VALUE", value_parser = pair, requires = "plugin")]
+    pub parameter: Vec<(String, String)>,
+}
+
+/// A name and its value.
+fn pair(text: &str) -> Result<(String, String), String> {
+    let parts = text.split_once('=');
+    parts
+        .map(|(name, value)| (name.trim().to_owned(), value.to_owned()))
+        .ok_or_else(|| "write a name and a value, like `iterations=20`".to_owned())
 }

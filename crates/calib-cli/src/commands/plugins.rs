@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::estimators::Estimators;
 use calib_plugin::check::{Limits, Row, check};
-use calib_plugin::{HEADER, Host, Kind, Language, Offer, SearchPath, new_project};
+use calib_plugin::{HEADER, Host, Kind, Language, Offer, SearchPath, kind_from_name, new_project};
 
 use clap::{Args, Subcommand};
 use serde_json::json;
@@ -34,6 +34,9 @@ enum Plugins {
     New {
         /// Name of the plugin: lower-case letters, digits, hyphens
         name: String,
+        /// What it offers: center, axis, reader or report
+        #[arg(long, default_value = "center")]
+        kind: String,
         /// Language: rust or c
         #[arg(long, default_value = "rust")]
         lang: String,
@@ -63,8 +66,14 @@ pub fn run(console: &Console, options: &PluginsCommand) -> Result<ExitCode, CliE
             Ok(ExitCode::Accepted)
         }
         Some(Plugins::Check { plugin }) => checked(json, plugin),
-        Some(Plugins::New { name, lang, out }) => {
-            let folder = new_project(name, Language::from_name(lang)?, out)?;
+        Some(Plugins::New {
+            name,
+            kind,
+            lang,
+            out,
+        }) => {
+            let (kind, language) = (kind_from_name(kind)?, Language::from_name(lang)?);
+            let folder = new_project(name, kind, language, out)?;
             emit_paths(json, &[folder])?;
             Ok(ExitCode::Accepted)
         }

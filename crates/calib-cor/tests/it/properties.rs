@@ -157,9 +157,9 @@ proptest! {
                 // Two bodies: the center is reported in the second body, which moves along.
                 let expected = if info.input == InputKind::TwoBodies { before.center } else { step * before.center };
                 let off = (after.center - expected).norm();
-                prop_assert!(off < allowed, "{}: {off:e}", info.id);
+                prop_assert!(off < allowed, "`{}`: the center of the moved tracker is {off:e} m from the moved center, at most {allowed:e}", info.id);
                 let (a, b) = (before.covariance.trace(), after.covariance.trace());
-                prop_assert!((a / b - 1.0).abs() < 1e-4, "{}: covariance {a:e} {b:e}", info.id);
+                prop_assert!((a / b - 1.0).abs() < 1e-4, "`{}`: moving the tracker changes the trace of the covariance from {a:e} to {b:e} m²", info.id);
             }
         }
     }
@@ -170,9 +170,9 @@ proptest! {
             let meters = run(&scene, info.id, info.input);
             let millimeters = run(&scaled(&scene, 1000.0), info.id, info.input);
             let off = (millimeters.center.coords / 1000.0 - meters.center.coords).norm();
-            prop_assert!(off < slack(info.id), "{}: {off:e}", info.id);
+            prop_assert!(off < slack(info.id), "`{}`: the center in millimeters is {off:e} m from that in meters, at most {:e}", info.id, slack(info.id));
             let ratio = millimeters.covariance.trace() / meters.covariance.trace() / 1e6;
-            prop_assert!((ratio - 1.0).abs() < 1e-4, "{}: covariance ratio {ratio}", info.id);
+            prop_assert!((ratio - 1.0).abs() < 1e-4, "`{}`: the covariance in mm² is {ratio} times that in m² instead of once", info.id);
         }
     }
 
@@ -183,7 +183,7 @@ proptest! {
             let b = run(&shuffled(&scene, seed), info.id, info.input);
             let off = (a.center - b.center).norm();
             let allowed = if depends_on_order(info.id) { a.covariance.trace().sqrt() } else { slack(info.id) };
-            prop_assert!(off < allowed, "{}: {off:e}", info.id);
+            prop_assert!(off < allowed, "`{}`: samples in another order move the center by {off:e} m, at most {allowed:e} (`depends_on_order` has the exceptions)", info.id);
         }
     }
 
@@ -199,7 +199,7 @@ proptest! {
             let e = run(&scene, info.id, info.input);
             let error = e.center.coords - scene.center;
             let d = error.dot(&e.covariance.cholesky().expect("positive definite").solve(&error));
-            prop_assert!(d < FAR, "{}: {d}", info.id);
+            prop_assert!(d < FAR, "`{}`: the squared distance from the truth is {d} by its own covariance, at most {FAR}: the covariance is too small, or the center biased", info.id);
         }
     }
 
@@ -280,8 +280,8 @@ proptest! {
                 if let Ok(outcome) = fit(info.id, input, &options)
                     && let Some(e) = outcome.estimate()
                 {
-                    prop_assert!(e.center.iter().all(|x| x.is_finite()), "{}: {e:?}", info.id);
-                    prop_assert!(e.covariance.iter().all(|x| x.is_finite()), "{}: {e:?}", info.id);
+                    prop_assert!(e.center.iter().all(|x| x.is_finite()), "`{}`: the center is not finite: {e:?}", info.id);
+                    prop_assert!(e.covariance.iter().all(|x| x.is_finite()), "`{}`: the covariance is not finite: {e:?}", info.id);
                 }
             }
         }

@@ -19,6 +19,15 @@ super::topic! {
             "The sweep `{sweep}` does not determine the origin: the axis has no mean direction in the body.",
             "Check the poses of the body in the sweep.";
     }
+    /// An estimator that states no uncertainty.
+    ORIGIN_WITHOUT_COVARIANCE = "origin-without-covariance" {
+        "center": Warning,
+            "The center estimator `{estimator}` states no covariance: the σ of the prior ({sigma}) stands in its place, in every direction.",
+            "Name an estimator that states a covariance, or let the plugin give one (`covariance_m2`).";
+        "axis": Warning,
+            "The axis estimator `{estimator}` states no covariance: the σ of the prior stand in its place ({sigma} across the axis, {sigma_angle} for its direction).",
+            "Name an estimator that states a covariance, or let the plugin give one (`covariance`).";
+    }
     /// What the method `paper` assumes.
     PAPER_ASSUMPTIONS = "paper-assumptions" {
         "": Info,
@@ -132,6 +141,12 @@ super::topic! {
         "tracked": Warning,
             "The size of the robot is not observable: the priors alone determine it to ±{sigma:percent}, {at_reach} at the reach of {reach:m}.",
             "Record poses in which the joints move together over their ranges.";
+    }
+    /// Contacts that leave a direction of the root open.
+    CONTACT_DIRECTION_MISSING = "contact-direction-missing" {
+        "": Warning,
+            "No contact holds the tip along {directions} of the robot's root: what the joints do along it shows only through the tilt of what is touched.",
+            "Add a contact that does: a plane with its normal there, an edge across it, or a socket.";
     }
     /// Priors, not data, hold what matters at the tool.
     HELD_BY_PRIORS = "held-by-priors" {

@@ -220,7 +220,8 @@ fn of_the_wrong_sign(fit: &MlFit) -> Vec<Finding> {
 }
 
 /// The closed forms are start values here: where one has no answer, the likelihood may still have it.
-fn only_a_cross_check(findings: &mut [Finding]) {
+/// An origin that its sweep does not determine is a warning: the fit of all loops does not need its closed form.
+pub(crate) fn only_a_cross_check(findings: &mut [Finding]) {
     for finding in findings
         .iter_mut()
         .filter(|f| f.id == catalog::ORIGIN_NOT_OBSERVABLE)

@@ -8,6 +8,7 @@ use calib_finding::{Finding, Subject};
 use calib_profile::{UpAxis, Usage};
 
 use crate::estimate::start::Start;
+use crate::formulate::contact_directions;
 use crate::formulate::row_checks::rows;
 use crate::formulate::structural::{keep_unexplained, structural};
 use crate::prepare::inputs::Inputs;
@@ -32,6 +33,7 @@ pub fn before_the_fit(
     if found.rows_count {
         findings.extend(rows(inputs, tracks, &found));
     }
+    findings.extend(contact_directions::missing(inputs));
     for (name, loaded) in &inputs.recordings {
         // What the person says counts more than what the exporter wrote.
         let stated = inputs.robot.profile.tracker.up_axis.map(UpAxis::name);

@@ -12,12 +12,13 @@ use crate::output::evidence::Evidence;
 use crate::output::facts::facts;
 use crate::output::of_data::{coverage, estimators, findings, recordings, rejected};
 use crate::output::of_fit::{
-    fit_summary, missing_physics, noise, noise_choice, not_observable, parameters, standardized,
-    tested_effects, transform,
+    contact_points, fit_summary, missing_physics, noise, noise_choice, not_observable, parameters,
+    standardized, tested_effects, transform,
 };
 use crate::output::verdict::{limits, next_steps, scope};
 use crate::output::weak::{self, weak_directions};
 use crate::output::widths::prior_widths;
+use crate::prepare::named;
 use crate::verify::accuracy::{accuracy_limits, workspace};
 use crate::verify::dh_table::dh_table;
 use crate::verify::information::data_information;
@@ -67,6 +68,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             .map(NextStep::sentence)
             .collect(),
         transforms: e.found.iter().map(transform).collect(),
+        contact_points: contact_points(e, &parameters),
         robot_changes: e
             .fit
             .zip(information.as_ref())
@@ -109,6 +111,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
                 sha256: d.sha256.clone(),
             })
             .collect(),
+        components: named::components(e.inputs),
         reproduce: vec![reproduce(e)],
         undo: vec![format!(
             "calib revert {} --out original.urdf",

@@ -6,8 +6,8 @@ use calib_core::{Gauge, GoodnessOfFit, NoiseKind};
 use calib_geometry::statistics::median;
 use calib_profile::Profile;
 use calib_report::{
-    Cause, FitSummary, NotObservable, Parameter, Standardized, Term, TestAnswer, TestedEffect,
-    Transform, Unit,
+    Cause, ContactPoint, FitSummary, NotObservable, Parameter, Standardized, Term, TestAnswer,
+    TestedEffect, Transform, Unit,
 };
 
 use crate::formulate::formulation::MlFit;
@@ -311,4 +311,24 @@ pub(crate) fn missing_physics(test: &calib_core::ScoreTest) -> calib_report::Mis
         explains: test.explains,
         p_value: test.p_corrected,
     }
+}
+
+/// Points of the robot that touch something, with σ where they were estimated.
+pub(crate) fn contact_points(e: &Evidence<'_>, parameters: &[Parameter]) -> Vec<ContactPoint> {
+    let profile = &e.inputs.robot.profile;
+    let point = |(name, tip): (&String, &calib_profile::Tip)| {
+        let sigma = |axis: &str| {
+            let name = format!("{name}.{axis}");
+            parameters.iter().find(|p| p.name == name)?.sigma
+        };
+        let sigmas = sigma("x").zip(sigma("y")).zip(sigma("z"));
+        let at = e.robot.contact_points.get(name).copied();
+        ContactPoint {
+            name: name.clone(),
+            link: e.inputs.robot.model.link(tip.link).name.clone(),
+            position_m: at.unwrap_or(tip.at).coords.into(),
+            sigma_m: sigmas.map(|((x, y), z)| [x, y, z]),
+        }
+    };
+    profile.points.iter().map(point).collect()
 }

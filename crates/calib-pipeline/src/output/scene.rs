@@ -19,6 +19,7 @@ use crate::formulate::solved::Solved;
 use crate::output::model_file::{fitted_range, mimic, motion, outward};
 use crate::output::points::{body_frame, point_frames};
 use crate::prepare::inputs::{Digest, Inputs};
+use crate::prepare::named;
 use crate::prepare::tracks::BodyTrack;
 
 /// The calibrated world: tracker, robot root, bodies, origins, touched things, and links at the zero position.
@@ -368,5 +369,7 @@ fn provenance(inputs: &Inputs) -> Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         profile: inputs.robot.file.clone(),
         inputs: inputs.digests.iter().map(input).collect(),
+        components: named::components(inputs),
+        date: inputs.robot.profile.identification.date.clone(),
     }
 }

@@ -97,6 +97,20 @@ impl Estimators {
         Ok(estimators)
     }
 
+    /// With plugins that the user names, found on the search path or by their path. None is loaded where `CALIB_NO_PLUGINS` is set.
+    ///
+    /// # Errors
+    /// As [`Estimators::of_profile`].
+    pub fn with_plugins(plugins: &[String]) -> Result<Self, PipelineError> {
+        let mut estimators = Self::built_in()?;
+        let refused = std::env::var_os("CALIB_NO_PLUGINS").is_some_and(|set| !set.is_empty());
+        let host = Host::new(SearchPath::from_environment(None), !refused);
+        for plugin in plugins {
+            estimators.tables.add(&host.load(plugin, None)?)?;
+        }
+        Ok(estimators)
+    }
+
     /// Finds a center; `Ok(Err(reason))` when the data do not determine one.
     ///
     /// # Errors

@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use calib_files::input;
-use calib_plugin::{Control, Source};
 use calib_profile::{Profile, RecordingSpec, RobotLog};
 use calib_recording::{ColumnMap, Filled, Meta, Poses, ReadOptions, Recording};
 use calib_urdf::sha256_hex;
@@ -13,10 +12,10 @@ use crate::error::{DataProblem, NamedBy, PipelineError, WhyUnread};
 use crate::options::Plugins;
 use crate::prepare::align::align;
 use crate::prepare::estimators::{Estimators, values};
-use crate::prepare::readers;
 use crate::prepare::robot::urdf_warnings;
 use crate::prepare::rows::prepare;
 use crate::prepare::timelines::with_robot_log;
+use crate::prepare::{named, readers};
 
 pub use crate::prepare::excluded::Excluded;
 pub use crate::prepare::inputs::{Digest, Inputs, Loaded, RobotProfile};
@@ -28,6 +27,7 @@ pub use crate::prepare::robot::load_robot;
 /// [`PipelineError`] with file, place and remedy.
 pub fn load_recordings(robot: RobotProfile, plugins: Plugins) -> Result<Inputs, PipelineError> {
     let estimators = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
+    named::check(&robot.profile, &estimators.tables)?;
     let mut recordings = BTreeMap::new();
     let mut findings = urdf_warnings(&robot);
     let mut digests = robot.digests.clone();
@@ -158,6 +158,7 @@ pub fn of_tables(
     plugins: Plugins,
 ) -> Result<Inputs, PipelineError> {
     let estimators = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
+    named::check(&robot.profile, &estimators.tables)?;
     let mut recordings = BTreeMap::new();
     let mut findings = Vec::new();
     for (name, spec) in &robot.profile.recordings {
@@ -184,7 +185,8 @@ pub fn of_tables(
     })
 }
 
-/// Reads one file with the profile's reader: a built-in one directly, a plugin's across the border.
+/// Reads one file with the profile's reader, or with that of a plugin which recognizes it: a built-in one directly, a plugin's across the
+/// border.
 fn read(
     spec: &RecordingSpec,
     texts: &[&String],
@@ -197,29 +199,21 @@ fn read(
             .iter()
             .any(|r| r.id == id)
     };
-    match &spec.reader {
-        Some(id) if !built_in(id) || !spec.reader_parameters.is_empty() => {
-            let reader = estimators
-                .tables
-                .reader
-                .get(id)?
-                .with(&values(&spec.reader_parameters))?;
-            let source = Source { name: shown, bytes };
-            Ok(readers::recording(
-                reader.read(&source, &Control::default())?,
-                shown,
-                id,
-            ))
-        }
-        format => {
-            let options = ReadOptions {
-                format: format.clone(),
-                columns: column_map(spec, texts),
-                ..ReadOptions::default()
-            };
-            Ok(calib_recording::read_bytes(shown, bytes, &options)?)
-        }
-    }
+    let of_tables = &estimators.tables.reader;
+    let entry = match &spec.reader {
+        Some(id) if !built_in(id) || !spec.reader_parameters.is_empty() => Some(of_tables.get(id)?),
+        None if spec.columns.is_none() => of_tables.recognizing(bytes),
+        _ => None,
+    };
+    let Some(entry) = entry else {
+        let options = ReadOptions {
+            format: spec.reader.clone(),
+            columns: column_map(spec, texts),
+            ..ReadOptions::default()
+        };
+        return Ok(calib_recording::read_bytes(shown, bytes, &options)?);
+    };
+    readers::read(entry, &values(&spec.reader_parameters), shown, bytes)
 }
 
 /// Text columns that the profile needs of a recording: its groups, and the names of touched spots.

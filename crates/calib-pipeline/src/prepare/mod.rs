@@ -9,6 +9,7 @@ pub mod excluded;
 pub mod inputs;
 pub mod load;
 pub mod loads;
+pub(crate) mod named;
 pub mod readers;
 pub mod relabel;
 pub mod repeats;

@@ -1,14 +1,19 @@
 //! Readers and report writers by name: built-in ones and those of plugins in one table.
 
+use std::collections::BTreeMap;
+
 use calib_plugin::{
-    BodyPose, BodyTrack, ByFn, Call, Entry, Failure, JointTrack, JointUnit, Kind, MarkerSample,
-    MarkerTrack, Offer, ReportFile, ReportInput, Source, Streams, Timeline, TorqueTrack,
+    BodyPose, BodyTrack, ByFn, Call, Control, Entry, Failure, JointTrack, JointUnit, Kind,
+    MarkerSample, MarkerTrack, Offer, ReportFile, ReportInput, Source, Streams, Timeline,
+    TorqueTrack, Value,
 };
 use calib_recording::readers::Reader;
 use calib_recording::{
     BodyStream, JointStream, MarkerStream, ReadOptions, Recording, TorqueStream,
 };
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Vector3};
+
+use crate::error::PipelineError;
 
 /// A built-in reader as an entry of the table.
 #[must_use]
@@ -26,6 +31,21 @@ pub fn built_in_reader(reader: &'static Reader) -> Entry<dyn calib_plugin::Reade
             Ok(streams(&recording))
         },
     ))
+}
+
+/// Reads a file with a reader of the table; `shown` names the file in messages.
+///
+/// # Errors
+/// [`PipelineError::Plugin`] for parameters that it does not have, and for files that it refuses.
+pub fn read(
+    entry: &Entry<dyn calib_plugin::Reader>,
+    parameters: &BTreeMap<String, Value>,
+    shown: &str,
+    bytes: &[u8],
+) -> Result<Recording, PipelineError> {
+    let source = Source { name: shown, bytes };
+    let streams = entry.with(parameters)?.read(&source, &Control::default())?;
+    Ok(recording(streams, shown, &entry.offer().name))
 }
 
 /// The built-in report writers: what `calib run` writes, from `report.json` alone.

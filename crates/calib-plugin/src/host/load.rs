@@ -39,6 +39,8 @@ pub struct LoadedPlugin {
     pub description: Description,
     /// Its file, as it was found; `None` for one that is linked into the program.
     pub path: Option<PathBuf>,
+    /// SHA-256 of the file, 64 hexadecimal digits; `None` for one that is linked into the program.
+    pub sha256: Option<String>,
     /// How long `describe` took.
     pub described_in: Duration,
     cor: Vec<Entry<dyn Cor>>,
@@ -86,8 +88,9 @@ impl Host {
             });
         }
         let path = self.search.find(name_or_path)?;
+        let found = pin::sha256(&path)?;
         match sha256 {
-            Some(pin) => pin::check(name_or_path, &path, pin)?,
+            Some(pin) => pin::check(name_or_path, &path, &found, pin)?,
             None if self.foreign || self.search.holds(&path) => {}
             None => {
                 return Err(PluginError::Foreign {
@@ -96,7 +99,7 @@ impl Host {
                 });
             }
         }
-        open(&path)
+        open(&path, found)
     }
 
     /// A plugin that is linked into the program, from [`entry!`](crate::entry).
@@ -105,11 +108,11 @@ impl Host {
     /// As [`Host::load`].
     pub fn adopt(entry: &'static abi::Entry) -> Result<LoadedPlugin, PluginError> {
         // SAFETY: the entry is a constant of this program.
-        unsafe { from_entry(entry, None) }
+        unsafe { from_entry(entry, None, None) }
     }
 }
 
-fn open(path: &Path) -> Result<LoadedPlugin, PluginError> {
+fn open(path: &Path, sha256: String) -> Result<LoadedPlugin, PluginError> {
     let shown = path.display().to_string();
     // The loader of a static program gives no reason that a person could use.
     if cfg!(all(target_env = "musl", target_feature = "crt-static")) {
@@ -134,7 +137,7 @@ fn open(path: &Path) -> Result<LoadedPlugin, PluginError> {
         reason: chain(&error),
     })?;
     // SAFETY: the symbol of the contract, in a library that stays in memory.
-    unsafe { from_entry(entry, Some(path)) }
+    unsafe { from_entry(entry, Some(path), Some(sha256)) }
 }
 
 /// A loaded plugin with all its offers.
@@ -144,6 +147,7 @@ fn open(path: &Path) -> Result<LoadedPlugin, PluginError> {
 unsafe fn from_entry(
     entry: *const abi::Entry,
     path: Option<&Path>,
+    sha256: Option<String>,
 ) -> Result<LoadedPlugin, PluginError> {
     let shown = path.map_or("in the program".to_string(), |path| {
         path.display().to_string()
@@ -184,6 +188,7 @@ unsafe fn from_entry(
     let mut plugin = LoadedPlugin {
         description,
         path: path.map(Path::to_path_buf),
+        sha256,
         described_in,
         cor: Vec::new(),
         aor: Vec::new(),
@@ -210,6 +215,7 @@ impl LoadedPlugin {
             plugin: self.description.name.clone(),
             version: self.description.version.clone(),
             path: self.path.clone(),
+            sha256: self.sha256.clone(),
         };
         let what = format!("{} `{}`", offer.kind.id(), offer.name);
         let table = |problem: String| format!("the table of {what}: {problem}");

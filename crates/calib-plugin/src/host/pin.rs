@@ -1,4 +1,4 @@
-//! The `sha256:` pin of a profile.
+//! The SHA-256 of a plugin's file, and the `sha256:` pin of a profile.
 
 use std::path::Path;
 
@@ -9,11 +9,25 @@ use super::PluginError;
 /// Libraries with debug information have some hundred megabytes.
 const LARGEST: u64 = 1 << 30;
 
-/// Compares the file with the pin, before any of its code can run.
+/// The hash of a file, 64 hexadecimal digits.
 ///
 /// # Errors
-/// [`PluginError::BadPin`], [`PluginError::Unreadable`], [`PluginError::Pin`].
-pub(super) fn check(name: &str, path: &Path, pin: &str) -> Result<(), PluginError> {
+/// [`PluginError::Unreadable`].
+pub(super) fn sha256(path: &Path) -> Result<String, PluginError> {
+    let bytes =
+        calib_files::input::read(path, LARGEST).map_err(|error| PluginError::Unreadable {
+            path: path.display().to_string(),
+            reason: error.to_string(),
+        })?;
+    let digest = Sha256::digest(&bytes);
+    Ok(digest.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Compares the hash of a file with the pin, before any of its code can run.
+///
+/// # Errors
+/// [`PluginError::BadPin`], [`PluginError::Pin`].
+pub(super) fn check(name: &str, path: &Path, found: &str, pin: &str) -> Result<(), PluginError> {
     let needed = pin
         .strip_prefix("sha256:")
         .unwrap_or(pin)
@@ -24,22 +38,12 @@ pub(super) fn check(name: &str, path: &Path, pin: &str) -> Result<(), PluginErro
             pin: pin.to_string(),
         });
     }
-    let shown = path.display().to_string();
-    let bytes =
-        calib_files::input::read(path, LARGEST).map_err(|error| PluginError::Unreadable {
-            path: shown.clone(),
-            reason: error.to_string(),
-        })?;
-    let found: String = Sha256::digest(&bytes)
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
     if found == needed {
         return Ok(());
     }
     Err(PluginError::Pin {
-        path: shown,
-        found,
+        path: path.display().to_string(),
+        found: found.to_string(),
         needed,
     })
 }

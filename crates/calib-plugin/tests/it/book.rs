@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use calib_plugin::{Language, new_project};
+use calib_plugin::{Kind, Language, new_project};
 
 use crate::bed::file;
 
@@ -18,7 +18,7 @@ fn the_code_of_the_book_is_the_code_of_the_templates() {
     let folder = tempfile::tempdir().unwrap();
     let source = |language: Language, path: &str| {
         let name = format!("my-sphere-{}", path.len());
-        let project: PathBuf = new_project(&name, language, folder.path()).unwrap();
+        let project: PathBuf = new_project(&name, Kind::Cor, language, folder.path()).unwrap();
         let text = std::fs::read_to_string(project.join(path)).unwrap();
         plain(&text)
             .replace(&name, "my-sphere")

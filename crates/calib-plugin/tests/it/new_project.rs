@@ -3,9 +3,9 @@
 use std::{collections::BTreeMap, path::Path, process::Command, time::Duration};
 
 use calib_plugin::{
-    Control, Host, Language, MotionData, SearchPath,
+    Control, Host, Kind, Language, MotionData, SearchPath,
     check::{Limits, check},
-    new_project,
+    kind_from_name, new_project,
 };
 
 use crate::bed::compiler;
@@ -55,7 +55,7 @@ fn cargo(command: &str, project: &Path, target: &Path) {
 #[test]
 fn a_rust_project_is_complete() {
     let folder = tempfile::tempdir().unwrap();
-    let project = new_project("my-sphere", Language::Rust, folder.path()).unwrap();
+    let project = new_project("my-sphere", Kind::Cor, Language::Rust, folder.path()).unwrap();
     insta::assert_snapshot!(tree(&project).join("\n"));
     // Offline and with no registry: it depends on nothing outside of its folder.
     let target = folder.path().join("target");
@@ -99,45 +99,149 @@ fn a_rust_project_is_complete() {
     );
 }
 
+/// Runs a command in a folder, which must succeed; `None` where it is not installed.
+fn runs(command: &mut Command, folder: &Path) -> Option<()> {
+    let output = match command.current_dir(folder).output() {
+        Ok(output) => output,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            skipped_tests::skip(&format!("{command:?} is not installed"));
+            return None;
+        }
+        Err(error) => panic!("{command:?}: {error}"),
+    };
+    let messages = String::from_utf8_lossy(&output.stderr);
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{command:?}\n{messages}\n{said}");
+    Some(())
+}
+
+/// The other kinds in Rust: without cargo, which would compile the author's side once for each.
 #[test]
-fn a_c_project_is_complete() {
+fn rust_projects_of_every_kind_are_complete() {
     let folder = tempfile::tempdir().unwrap();
-    let project = new_project("my-sphere", Language::C, folder.path()).unwrap();
-    insta::assert_snapshot!(tree(&project).join("\n"));
+    let mut author_side = false;
+    for name in ["axis", "reader", "report"] {
+        let kind = kind_from_name(name).unwrap();
+        let project = new_project(&format!("my-{name}"), kind, Language::Rust, folder.path());
+        let project = project.unwrap();
+        let rustc = |arguments: &[&str]| {
+            let mut command = Command::new("rustc");
+            command
+                .args(["--edition", "2024", "-Dwarnings", "-L", "."])
+                .args(arguments)
+                .env("CARGO_PKG_VERSION", "0.1.0")
+                .env("CARGO_PKG_LICENSE", "MIT");
+            command
+        };
+        if !author_side {
+            let source = project.join("calib-plugin/src/lib.rs");
+            let of_author = [source.to_str().unwrap(), "--crate-type", "rlib"];
+            let mut command = rustc(&of_author);
+            if runs(
+                command.args(["--crate-name", "calib_plugin"]),
+                folder.path(),
+            )
+            .is_none()
+            {
+                return;
+            }
+            author_side = true;
+        }
+        let source = project.join("src/lib.rs");
+        let with = ["--extern", "calib_plugin=libcalib_plugin.rlib"];
+        let tests = [source.to_str().unwrap(), "--test", "-o", "tests"];
+        runs(rustc(&tests).args(with), folder.path());
+        runs(
+            &mut Command::new(folder.path().join("tests")),
+            folder.path(),
+        );
+        let library = format!("lib{name}.so");
+        let plugin = [
+            source.to_str().unwrap(),
+            "--crate-type",
+            "cdylib",
+            "-o",
+            &library,
+        ];
+        runs(rustc(&plugin).args(with), folder.path());
+        passes(&folder.path().join(&library));
+    }
+}
+
+#[test]
+fn c_projects_of_every_kind_are_complete() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["center", "axis", "reader", "report"] {
+        let kind = kind_from_name(name).unwrap();
+        let project = new_project(&format!("my-{name}"), kind, Language::C, folder.path()).unwrap();
+        if name == "center" {
+            insta::assert_snapshot!("a_c_project_is_complete", tree(&project).join("\n"));
+        }
+        if cfg!(windows) || compiler("cc", &["--version"]).is_none() {
+            return;
+        }
+        let flags = "CFLAGS=-std=c11 -Wall -Wextra -Werror -pedantic -O1 -fPIC -Iinclude";
+        if runs(Command::new("make").arg(flags), &project).is_none() {
+            return;
+        }
+        runs(Command::new("make").args(["test", flags]), &project);
+        let suffix = std::env::consts::DLL_SUFFIX;
+        passes(&project.join(format!("libmy-{name}{suffix}")));
+    }
+}
+
+/// What an author forgets ends with a line that says so, not with a segmentation fault.
+#[test]
+fn a_c_test_says_what_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
     if cfg!(windows) || compiler("cc", &["--version"]).is_none() {
         return;
     }
-    let flags = "CFLAGS=-std=c11 -Wall -Wextra -Werror -pedantic -O2 -fPIC -Iinclude";
-    for target in ["all-but-check", "test"] {
-        let mut make = Command::new("make");
-        make.current_dir(&project).arg(flags);
-        if target == "test" {
-            make.arg("test");
-        }
-        let output = match make.output() {
-            Ok(output) => output,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                skipped_tests::skip("no `make`");
-                return;
-            }
-            Err(error) => panic!("make: {error}"),
-        };
-        let messages = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "make {target}\n{messages}");
+    let project = new_project("my-sphere", Kind::Cor, Language::C, folder.path()).unwrap();
+    let source = std::fs::read_to_string(project.join("plugin.c")).unwrap();
+    for (from, to, said) in [
+        ("? &table : NULL", "? NULL : NULL", "find() knows the kind"),
+        (".fit = fit", ".fit = NULL", "the table has fit()"),
+        (
+            "CALIB_TAKES_POINTS | CALIB_TAKES_MARKERS",
+            "CALIB_TAKES_POSES",
+            "it takes points",
+        ),
+        (
+            ".offer_count = sizeof offers / sizeof offers[0]",
+            ".offer_count = 0",
+            "the plugin offers something",
+        ),
+    ] {
+        let changed = source.replace(from, to);
+        assert_ne!(changed, source, "{from}");
+        std::fs::write(project.join("plugin.c"), changed).unwrap();
+        let built = Command::new("cc")
+            .args([
+                "-std=c11",
+                "-w",
+                "-Iinclude",
+                "plugin.c",
+                "test.c",
+                "-o",
+                "t",
+                "-lm",
+            ])
+            .current_dir(&project)
+            .status();
+        assert!(built.unwrap().success(), "{to}");
+        let ran = Command::new(project.join("t")).output().unwrap();
+        let text = String::from_utf8_lossy(&ran.stdout);
+        assert_eq!(ran.status.code(), Some(1), "{to}: {text}");
+        assert!(text.contains(said), "{to}: {text}");
     }
-    let file = format!(
-        "{}my-sphere{}",
-        std::env::consts::DLL_PREFIX,
-        std::env::consts::DLL_SUFFIX
-    );
-    passes(&project.join(file));
 }
 
 #[test]
 fn bad_names_and_folders_in_use_leave_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["", "My", "1st", "a/b", "..", "a_b", "calib-plugin"] {
-        let error = new_project(name, Language::C, folder.path()).unwrap_err();
+        let error = new_project(name, Kind::Cor, Language::C, folder.path()).unwrap_err();
         assert_eq!(
             error.to_string(),
             format!(
@@ -145,14 +249,15 @@ fn bad_names_and_folders_in_use_leave_nothing_behind() {
             )
         );
     }
-    new_project("twice", Language::C, folder.path()).unwrap();
-    let error = new_project("twice", Language::Rust, folder.path()).unwrap_err();
+    new_project("twice", Kind::Cor, Language::C, folder.path()).unwrap();
+    let error = new_project("twice", Kind::Cor, Language::Rust, folder.path()).unwrap_err();
     assert!(
         error.to_string().contains("twice exists already\n  help: "),
         "{error}"
     );
     let missing = new_project(
         "x",
+        Kind::Cor,
         Language::C,
         &folder.path().join("twice").join("plugin.c"),
     );

@@ -28,6 +28,7 @@ impl Checker<'_> {
         let limits = self.limits(&raw.limits);
         Solve {
             method: raw.method,
+            start_from: raw.start_from,
             free: raw.free.iter().copied().collect(),
             joints,
             prior,

@@ -25,7 +25,7 @@ pub use solve::{
 pub use crate::raw::{
     RawClocks as Clocks, RawFree as Free, RawIdentification as Identification,
     RawJointFree as JointFree, RawLoad as Load, RawMethod as Method, RawSplit as Split,
-    RawTimedPoses as TimedPoses, RawUpAxis as UpAxis, RawUse as Usage,
+    RawStart as StartFrom, RawTimedPoses as TimedPoses, RawUpAxis as UpAxis, RawUse as Usage,
 };
 pub use crate::raw::{RawPlugin as Plugin, RawValue as ParameterValue};
 

@@ -1,6 +1,6 @@
 //! What is estimated, with priors, noise levels and limits of the verdict.
 
-use super::{Free, JointFree, Load, Method};
+use super::{Free, JointFree, Load, Method, StartFrom};
 use crate::raw::{ANGLE, POSITION};
 use calib_core::EFFECTS;
 use calib_core::NoiseModel;
@@ -14,6 +14,8 @@ use std::collections::BTreeSet;
 pub struct Solve {
     /// Closed forms or maximum likelihood.
     pub method: Method,
+    /// Where maximum likelihood starts.
+    pub start_from: StartFrom,
     /// What is free for all moved joints.
     pub free: BTreeSet<Free>,
     /// Exceptions by joint.

@@ -23,7 +23,9 @@ pub use plan::{RawCamera, RawFacing, RawKeepOut, RawPlan};
 pub use recording::{RawClocks, RawRecording, RawRobotLog, RawTimedPoses, RawTiming, RawUse};
 pub use robot::{RawPayload, RawRobot};
 pub use simulate::{RawProtocol, RawSimErrors, RawSimMount, RawSimNoise, RawSimulate, RawSteps};
-pub use solve::{RawJointSolve, RawLimits, RawLoad, RawMethod, RawNoise, RawNoiseModel, RawSolve};
+pub use solve::{
+    RawJointSolve, RawLimits, RawLoad, RawMethod, RawNoise, RawNoiseModel, RawSolve, RawStart,
+};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

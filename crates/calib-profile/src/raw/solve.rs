@@ -16,6 +16,17 @@ pub enum RawMethod {
     Ml,
 }
 
+/// Where the fit of all loops starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawStart {
+    /// At the nominal robot, with the bodies where it sees them.
+    #[default]
+    Nominal,
+    /// At the mounts that the estimators of `origins` find; elsewhere as `nominal`.
+    Origins,
+}
+
 /// Extra effects or prior width of one joint (fixed joints included).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -115,6 +126,8 @@ pub struct RawLimits {
 pub struct RawSolve {
     /// `ml` (default) or `paper`.
     pub method: RawMethod,
+    /// Where `ml` starts: `nominal` (default), or `origins`, at the mounts that the estimators of `origins` find.
+    pub start_from: RawStart,
     /// What is free, for all moved joints.
     pub free: Vec<RawFree>,
     /// Exceptions by joint.
@@ -135,6 +148,7 @@ impl Default for RawSolve {
     fn default() -> Self {
         Self {
             method: RawMethod::Ml,
+            start_from: RawStart::default(),
             free: vec![
                 RawFree::Bodies,
                 RawFree::Tracker,

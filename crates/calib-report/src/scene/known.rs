@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::robot_model::{ModelMimic, ModelMotion};
-use crate::{Report, Status, Verdict};
+use crate::{Component, Input, Report, Status, Verdict};
 
 /// What a calibration is worth.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -112,4 +112,23 @@ impl SceneVerdict {
             not_for: report.not_for.clone(),
         }
     }
+}
+
+/// Where a scene comes from.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Provenance {
+    /// The program.
+    pub tool: String,
+    /// Its version.
+    pub version: String,
+    /// The profile, relative.
+    pub profile: String,
+    /// What was read.
+    pub inputs: Vec<Input>,
+    /// Estimators, readers and report writers that were used, with the plugins that they are from.
+    #[serde(default)]
+    pub components: Vec<Component>,
+    /// When it was measured, as the profile states it; null where it does not.
+    #[serde(default)]
+    pub date: Option<String>,
 }

@@ -340,6 +340,13 @@ pub(super) fn files(page: &mut Page, report: &Report) {
         table.row([code(&input.path), input.sha256.clone()]);
     }
     page.table("", table);
+    if !report.components.is_empty() {
+        let mut table = Table::new(&["<used", "<for", "<from", "<SHA-256"]);
+        for component in &report.components {
+            table.row(words::files::component(component, report));
+        }
+        page.table("", table);
+    }
     let mut table = Table::new(&["<written", "<content", "<SHA-256"]);
     for output in &report.outputs {
         table.row([

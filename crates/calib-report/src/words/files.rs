@@ -1,7 +1,7 @@
 //! Files read and written, and the commands about them.
 
 use super::prose::{code, commands, counted, or};
-use crate::Report;
+use crate::{Component, Report};
 
 pub(crate) fn changed(report: &Report) -> Vec<String> {
     let replaced = report.outputs.iter().filter_map(|output| {
@@ -45,6 +45,26 @@ pub(crate) fn reproduce(report: &Report) -> Vec<String> {
 pub(crate) fn in_results(of: &[String]) -> Vec<String> {
     let with_place = |command| format!("In the folder of the results: {command}");
     commands(of).into_iter().map(with_place).collect()
+}
+
+/// The row of an estimator, reader or report writer: what it is, what used it, whose code it is, and the hash of that.
+pub(crate) fn component(of: &Component, report: &Report) -> [String; 4] {
+    let kind = match of.kind.as_str() {
+        "calib.cor/1" => "center estimator",
+        "calib.aor/1" => "axis estimator",
+        "calib.reader/1" => "reader",
+        "calib.report/1" => "report writer",
+        other => other,
+    };
+    let (from, sha256) = match &of.plugin {
+        None => (format!("calib {}", report.version), String::new()),
+        Some(plugin) => (
+            format!("plugin {} {}", plugin.name, plugin.version),
+            plugin.sha256.clone().unwrap_or_default(),
+        ),
+    };
+    let name = format!("{kind} {}", code(&of.name));
+    [name, of.used_for.join(", "), from, sha256]
 }
 
 /// Program and seed, below the table of files.

@@ -1,6 +1,6 @@
 //! Where bodies and tracker are, in a line each.
 
-use crate::{Report, Transform, Unit, number};
+use crate::{ContactPoint, Report, Transform, Unit, number};
 
 /// So many are shown where they are all that was looked for.
 const FEW: usize = 3;
@@ -55,4 +55,19 @@ pub(crate) fn short_status(transform: &Transform) -> &'static str {
         ALL.. => "open",
         _ => "in part",
     }
+}
+
+/// Heading of [`contact_points`] on a terminal.
+pub(crate) const CONTACT_POINTS: &str = "Contact points in their links [mm]";
+
+/// Name and coordinates with σ of every contact point, mm.
+pub(crate) fn contact_points(report: &Report) -> Vec<[String; 4]> {
+    let row = |point: &ContactPoint| {
+        let cell = |i: usize| {
+            let sigma = point.sigma_m.map(|sigma| sigma[i]);
+            number::bare_with_sigma(point.position_m[i], sigma, Unit::Meter)
+        };
+        [point.name.clone(), cell(0), cell(1), cell(2)]
+    };
+    report.contact_points.iter().map(row).collect()
 }

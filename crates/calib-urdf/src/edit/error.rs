@@ -196,6 +196,11 @@ pub enum SharedValue {
         /// The property.
         name: String,
     },
+    /// A parameter that its macro uses more than once.
+    Parameter {
+        /// The parameter.
+        name: String,
+    },
     /// A value of a YAML file that the xacro loads.
     Yaml {
         /// Its keys, separated by points.
@@ -209,6 +214,7 @@ impl SharedValue {
     fn noun(&self) -> &'static str {
         match self {
             Self::Property { .. } => "property",
+            Self::Parameter { .. } => "parameter",
             Self::Yaml { .. } => "value",
         }
     }
@@ -218,6 +224,7 @@ impl std::fmt::Display for SharedValue {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Property { name } => write!(f, "the property `{name}`"),
+            Self::Parameter { name } => write!(f, "the parameter `{name}` of the macro"),
             Self::Yaml { keys, file } => write!(f, "`{keys}` of {file}"),
         }
     }

@@ -4,10 +4,13 @@
 //! (see `xacro_value`), and stands for one joint. It may not where xacro computes it, where a macro is used more than
 //! once, and where branches give several texts.
 
+mod call;
 pub mod companions;
 mod expression;
 pub mod origins;
 pub(crate) mod value;
+
+pub(crate) use call::{called, mentions, parameter};
 
 use crate::edit::error::EditError;
 use crate::error::Place;
@@ -98,13 +101,29 @@ fn used_once(
     if lines.len() == 1 {
         return Ok(());
     }
-    Err(EditError::XacroMacro {
+    Err(several_calls(document, text, node, joint, file))
+}
+
+/// The refusal of an element of a macro whose one text would be several joints.
+pub(crate) fn several_calls(
+    document: &Document<'_>,
+    text: &str,
+    node: Node<'_, '_>,
+    joint: &str,
+    file: &str,
+) -> EditError {
+    let definition = enclosing_macro(node);
+    let lines = definition.map_or_else(Vec::new, |of| use_lines(document, of, text));
+    EditError::XacroMacro {
         file: file.to_owned(),
         place: Place::of_byte(text, node.range().start),
         joint: joint.to_owned(),
-        macro_name: definition.own("name").unwrap_or("").to_owned(),
+        macro_name: definition
+            .and_then(|of| of.own("name"))
+            .unwrap_or("")
+            .to_owned(),
         lines,
-    })
+    }
 }
 
 fn template(file: &str, place: Place, joint: &str, node: Node<'_, '_>) -> EditError {

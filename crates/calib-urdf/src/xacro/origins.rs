@@ -76,6 +76,6 @@ fn read(context: &Context<'_, '_>, origin: Node<'_, '_>, name: &str) -> Option<[
         return parse_numbers(attribute.value()).ok();
     }
     let raw = value_range(context.text, &attribute);
-    let cells = cells::<3>(context, raw, origin).ok()?;
+    let cells = cells::<3>(context, raw, origin, None).ok()?;
     Some(std::array::from_fn(|i| cells[i].value))
 }

@@ -18,7 +18,7 @@ use crate::xacro::companions::{Companions, loaded, unseen};
 use crate::xacro::expression::{
     Access, Root, constant, expressions, look_ups, whole, words as value_words,
 };
-use crate::xacro::{enclosing_macro, is_xacro, words};
+use crate::xacro::{enclosing_macro, is_xacro, mentions, parameter, words};
 use crate::yaml::{YamlKind, YamlNode};
 use roxmltree::{Document, Node};
 use std::ops::Range;
@@ -88,6 +88,8 @@ impl Leaf {
 pub(crate) enum Unwritable {
     /// xacro does more than to look up a value.
     Computed,
+    /// A parameter that the macro uses more than once.
+    SharedParameter { name: String, lines: Vec<usize> },
     /// The YAML was not found.
     NotFound(String),
     /// The YAML cannot be read.
@@ -101,11 +103,12 @@ pub(crate) enum Unwritable {
     },
 }
 
-/// The N numbers of an attribute whose value is at these bytes.
+/// The N numbers of an attribute whose value is at these bytes; those of a macro's parameter are in the `call`, where one is known.
 pub(crate) fn cells<const N: usize>(
     context: &Context<'_, '_>,
     raw: Range<usize>,
     joint: Node<'_, '_>,
+    call: Option<Node<'_, '_>>,
 ) -> Result<[Cell; N], Unwritable> {
     let mut found = Vec::new();
     for (offset, word) in value_words(&context.text[raw.clone()]) {
@@ -119,11 +122,42 @@ pub(crate) fn cells<const N: usize>(
             });
             continue;
         }
+        let definition = call.and_then(|_| enclosing_macro(joint));
+        let named = definition.and_then(|of| Some((of, parameter(word, of)?)));
+        if let (Some(call), Some((definition, name))) = (call, named) {
+            let lines = mentions(context.text, definition, name);
+            if lines.len() > 1 {
+                let name = name.to_owned();
+                return Err(Unwritable::SharedParameter { name, lines });
+            }
+            found.extend(of_call(context, call, name)?);
+            continue;
+        }
         let access = whole(word).and_then(Access::parse);
         let access = access.ok_or(Unwritable::Computed)?;
         found.extend(follow_to_numbers(context, &access, joint)?);
     }
     found.try_into().map_err(|_| Unwritable::Computed)
+}
+
+/// The numbers that a call gives a parameter.
+fn of_call(
+    context: &Context<'_, '_>,
+    call: Node<'_, '_>,
+    name: &str,
+) -> Result<Vec<Cell>, Unwritable> {
+    let attribute = call.own_attribute(name).ok_or(Unwritable::Computed)?;
+    let range = value_range(context.text, &attribute);
+    let mut cells = Vec::new();
+    for (offset, word) in value_words(&context.text[range.clone()]) {
+        cells.push(Cell {
+            yaml: None,
+            range: range.start + offset..range.start + offset + word.len(),
+            value: number(word).ok_or(Unwritable::Computed)?,
+            from: None,
+        });
+    }
+    Ok(cells)
 }
 
 /// A literal or constant number.

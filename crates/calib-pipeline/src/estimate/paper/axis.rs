@@ -31,6 +31,9 @@ impl Task<'_> {
             Ok(axis) => axis,
             Err(reason) => return Ok(self.refused(findings, Refusal::Axis(reason))),
         };
+        if axis.direction_variance.is_none() || axis.point_variance.is_none() {
+            self.without_covariance(findings, true);
+        }
         let Some((rotation, slide)) = self.assumed_rotation().zip(self.slide(&axis.line, found))
         else {
             return Ok(self.refused(findings, Refusal::Orientation));

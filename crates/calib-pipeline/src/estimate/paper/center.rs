@@ -29,10 +29,13 @@ pub(super) fn center_sigma(estimate: &CenterFit) -> Option<f64> {
 
 impl Task<'_> {
     /// The center by the profile's estimator, and by the others that take the same data.
-    pub(super) fn center(&self) -> Result<Centers, PipelineError> {
+    pub(super) fn center(&self, findings: &mut Vec<Finding>) -> Result<Centers, PipelineError> {
         let id = &self.origin.center;
         let parameters = crate::prepare::estimators::values(&self.origin.center_parameters);
         let chosen = self.fit_center(id, &parameters)?;
+        if chosen.as_ref().is_ok_and(|fit| fit.covariance.is_none()) {
+            self.without_covariance(findings, false);
+        }
         let mut others = Vec::new();
         for other in ["sfe", "hse", "hotspot_ml", "ml_sphere", "ball_bundle"] {
             if other != id
@@ -179,7 +182,7 @@ impl Task<'_> {
         &self,
         findings: &mut Vec<Finding>,
     ) -> Result<OriginEstimate, PipelineError> {
-        let Centers { chosen, others } = self.center()?;
+        let Centers { chosen, others } = self.center(findings)?;
         let estimate = match chosen {
             Ok(estimate) => estimate,
             Err(reason) => return Ok(self.refused(findings, Refusal::Center(reason))),

@@ -19,7 +19,7 @@ impl Task<'_> {
         &self,
         findings: &mut Vec<Finding>,
     ) -> Result<OriginEstimate, PipelineError> {
-        let Centers { chosen, others } = self.center()?;
+        let Centers { chosen, others } = self.center(findings)?;
         let estimate = match chosen {
             Ok(estimate) => estimate,
             Err(reason) => return Ok(self.refused(findings, Refusal::Center(reason))),

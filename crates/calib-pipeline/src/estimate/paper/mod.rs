@@ -136,6 +136,22 @@ impl Task<'_> {
         }
     }
 
+    /// Says that an estimator stated no uncertainty, and what stands in its place.
+    fn without_covariance(&self, findings: &mut Vec<Finding>, of_axis: bool) {
+        let (form, estimator) = match of_axis {
+            false => ("center", &self.origin.center),
+            true => ("axis", &self.origin.axis),
+        };
+        let prior = &self.inputs.robot.profile.solve.prior;
+        let about = About::Origin(self.name.to_owned());
+        findings.push(
+            Finding::of_kind(catalog::ORIGIN_WITHOUT_COVARIANCE, form, about)
+                .with("estimator", Fact::name(estimator))
+                .with("sigma", Fact::meters(prior.position))
+                .with_some("sigma_angle", of_axis.then(|| Fact::radians(prior.angle))),
+        );
+    }
+
     fn refused(&self, findings: &mut Vec<Finding>, why: Refusal) -> OriginEstimate {
         let about = About::Origin(self.name.to_owned());
         let (form, estimator, said) = match why {

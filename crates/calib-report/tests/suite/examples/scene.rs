@@ -97,6 +97,7 @@ pub fn scene() -> Scene {
             version: "0.1.0".into(),
             profile: "robots/ripley.yaml".into(),
             inputs: inputs(),
+            ..Provenance::default()
         },
         ..Scene::default()
     }

@@ -10,6 +10,7 @@ use crate::read::numbers::parse_numbers;
 use crate::read::source::OwnAttributes as _;
 use crate::read::source::value_range;
 use crate::xacro;
+use crate::xacro::value::Context;
 use roxmltree::Node;
 
 /// An attribute of a joint's child element, written or not.
@@ -17,6 +18,8 @@ pub(super) struct Site<'j, 'd, 't> {
     pub(super) element: Node<'d, 't>,
     pub(super) joint: &'j str,
     pub(super) name: &'static str,
+    /// The call of the macro that gives this joint, where there are several calls.
+    pub(super) call: Option<Node<'d, 't>>,
 }
 
 impl Site<'_, '_, '_> {
@@ -38,6 +41,7 @@ impl Patcher<'_, '_> {
             element,
             joint,
             name,
+            call,
         } = *site;
         let Some(attribute) = element.own_attribute(name) else {
             let new = new(default);
@@ -46,6 +50,9 @@ impl Patcher<'_, '_> {
                 .zip(&new)
                 .all(|(old, new)| same_number(*old, *new))
             {
+                if call.is_some() {
+                    return Err(self.one_text(site));
+                }
                 self.insert_attribute(site, &decimals(&new));
             }
             return Ok(());
@@ -73,6 +80,9 @@ impl Patcher<'_, '_> {
         if splices.is_empty() {
             return Ok(());
         }
+        if call.is_some() {
+            return Err(self.one_text(site));
+        }
         let local: Vec<Splice> = splices
             .iter()
             .map(|splice| Splice {
@@ -89,6 +99,12 @@ impl Patcher<'_, '_> {
         });
         self.splices.extend(splices);
         Ok(())
+    }
+
+    /// A number in the text of a macro that several calls share.
+    pub(super) fn one_text(&self, site: &Site<'_, '_, '_>) -> EditError {
+        let Context { text, document, .. } = self.context;
+        xacro::several_calls(document, text, site.element, site.joint, self.file)
     }
 
     fn insert_attribute(&mut self, site: &Site<'_, '_, '_>, value: &str) {

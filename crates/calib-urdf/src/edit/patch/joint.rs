@@ -9,6 +9,8 @@ use crate::edit::rotation::{is_zero, quaternion_near, rpy_for};
 use crate::kinematics::rpy::{angle_between, rotation_from_rpy, rpy_from_rotation};
 use crate::read::source::OwnAttributes as _;
 use crate::read::source::child;
+use crate::xacro;
+use crate::xacro::value::Context;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3, Vector4};
 
 impl Patcher<'_, '_> {
@@ -17,7 +19,7 @@ impl Patcher<'_, '_> {
         joint: &str,
         wanted: &Isometry3<f64>,
     ) -> Result<(), EditError> {
-        let node = self.joint(joint)?;
+        let (node, call) = self.joint_and_call(joint)?;
         let xyz = wanted.translation.vector;
         let mut before = Isometry3::identity();
         let Some(origin) = child(node, "origin") else {
@@ -27,6 +29,10 @@ impl Patcher<'_, '_> {
                 && angle_between(&wanted.rotation, &UnitQuaternion::identity()) <= SAME_NUMBER
             {
                 return Ok(());
+            }
+            if call.is_some() {
+                let Context { text, document, .. } = self.context;
+                return Err(xacro::several_calls(document, text, node, joint, self.file));
             }
             let element = format!(
                 "<{}origin xyz=\"{}\" rpy=\"{}\"/>",
@@ -41,6 +47,7 @@ impl Patcher<'_, '_> {
             element: origin,
             joint,
             name,
+            call,
         };
         self.set_numbers::<3>(&site("xyz"), [0.0; 3], |old| {
             before.translation.vector = old.into();
@@ -84,6 +91,7 @@ impl Patcher<'_, '_> {
                     element: axis,
                     joint,
                     name: "xyz",
+                    call: None,
                 };
                 self.set_numbers::<3>(&site, [1.0, 0.0, 0.0], keep_direction)
             }
@@ -128,6 +136,7 @@ impl Patcher<'_, '_> {
             element: limit,
             joint,
             name,
+            call: None,
         };
         self.set_numbers::<1>(&site("lower"), [f64::NAN], |_| [lower])?;
         self.set_numbers::<1>(&site("upper"), [f64::NAN], |_| [upper])

@@ -7,6 +7,7 @@ use crate::edit::decimal::{Splice, decimal, same_number};
 use crate::edit::error::{EditError, SharedValue};
 use crate::error::Place;
 use crate::xacro::value::{Cell, Leaf, Unwritable, cells, readers};
+use roxmltree::Node;
 use std::ops::Range;
 
 impl Patcher<'_, '_> {
@@ -17,11 +18,17 @@ impl Patcher<'_, '_> {
         raw: Range<usize>,
         new: impl FnOnce([f64; N]) -> [f64; N],
     ) -> Result<(), EditError> {
-        let cells = cells::<N>(&self.context, raw.clone(), site.element)
+        let cells = cells::<N>(&self.context, raw.clone(), site.element, site.call)
             .map_err(|why| self.unwritable(why, site, raw.clone()))?;
         let wanted = new(std::array::from_fn(|i| cells[i].value));
         for (cell, wanted) in cells.iter().zip(wanted) {
             if !same_number(cell.value, wanted) {
+                let in_call = |call: Node<'_, '_>| {
+                    cell.yaml.is_none() && call.range().contains(&cell.range.start)
+                };
+                if !site.call.is_none_or(in_call) {
+                    return Err(self.one_text(site));
+                }
                 self.set_cell(site, raw.start, cell, wanted)?;
             }
         }
@@ -106,6 +113,14 @@ impl Patcher<'_, '_> {
                 joint,
                 attribute: site.name.to_owned(),
                 found: self.context.text[raw].to_owned(),
+            },
+            Unwritable::SharedParameter { name, lines } => EditError::XacroShared {
+                file,
+                place,
+                joint,
+                value: Box::new(SharedValue::Parameter { name }),
+                lines: lines.into(),
+                included: Vec::new().into(),
             },
             Unwritable::NotFound(argument) => EditError::XacroYamlNotFound {
                 file,

@@ -52,6 +52,23 @@ impl<'t, 'd> Patcher<'t, 'd> {
             })
     }
 
+    /// The element of a joint, and the call that gives it where its macro is called several times.
+    pub(super) fn joint_and_call(
+        &self,
+        name: &str,
+    ) -> Result<(Node<'d, 't>, Option<Node<'d, 't>>), EditError> {
+        match self.joint(name) {
+            Ok(node) => Ok((node, None)),
+            Err(refused @ (EditError::XacroMacro { .. } | EditError::XacroTemplate { .. })) => {
+                match xacro::called(self.context.document, name) {
+                    Some((node, call)) => Ok((node, Some(call))),
+                    None => Err(refused),
+                }
+            }
+            Err(refused) => Err(refused),
+        }
+    }
+
     /// Inserts `text` at byte `at`; `new` is what the list of changes shows of it.
     pub(super) fn insert(
         &mut self,

@@ -1,0 +1,122 @@
+//! Estimators, readers and report writers that a profile names: whether they are there and take what they would be given, and whose code
+//! they are. Asked before a file is opened, so that `calib check` refuses what `calib run` would.
+
+use std::collections::BTreeMap;
+
+use calib_plugin::{Entry, Kind, Origin as From, Shape, Tables};
+use calib_profile::{BodyKind, Origin, Profile};
+use calib_report::{Component, PluginFile};
+
+use crate::error::PipelineError;
+use crate::prepare::estimators::values;
+use crate::prepare::inputs::Inputs;
+
+/// Whether an origin's estimator is that of an axis, not of a center.
+fn is_line(origin: &Origin) -> bool {
+    origin.axes.len() == 1
+}
+
+/// Refuses names that are not there, parameters that they do not have, and data that they do not take.
+///
+/// # Errors
+/// [`PipelineError::Plugin`].
+pub(crate) fn check(profile: &Profile, tables: &Tables) -> Result<(), PipelineError> {
+    for origin in profile.origins.values() {
+        let center = tables.cor.get(&origin.center)?;
+        center.with(&values(&origin.center_parameters))?;
+        let axis = tables.aor.get(&origin.axis)?;
+        axis.with(&values(&origin.axis_parameters))?;
+        let markers = matches!(
+            profile.bodies.get(&origin.body).map(|b| &b.kind),
+            Some(BodyKind::Markers { .. })
+        );
+        if is_line(origin) {
+            axis.takes(Shape::Poses)?;
+        } else if !(markers && center.offer().shapes.contains(&Shape::Markers)) {
+            center.takes(Shape::Poses)?;
+        }
+    }
+    for spec in profile.recordings.values() {
+        if let Some(reader) = &spec.reader {
+            let reader = tables.reader.get(reader)?;
+            reader.with(&values(&spec.reader_parameters))?;
+        }
+        if let Some(reader) = spec.robot_log.as_ref().and_then(|log| log.reader.as_ref()) {
+            tables.reader.get(reader)?;
+        }
+    }
+    for (writer, parameters) in &profile.outputs.reports {
+        tables.report.get(writer)?.with(&values(parameters))?;
+    }
+    Ok(())
+}
+
+/// Whether an origin is found by a plugin.
+pub(crate) fn plugins_find_origins(inputs: &Inputs) -> bool {
+    let tables = &inputs.estimators.tables;
+    let mut origins = inputs.robot.profile.origins.values();
+    origins.any(|origin| {
+        let of_plugin = match is_line(origin) {
+            true => tables.aor.get(&origin.axis).map(|e| e.origin().clone()),
+            false => tables.cor.get(&origin.center).map(|e| e.origin().clone()),
+        };
+        of_plugin.is_ok_and(|from| from != From::BuiltIn)
+    })
+}
+
+/// Everything that the profile's origins, recordings and outputs used, by kind and name.
+pub(crate) fn components(inputs: &Inputs) -> Vec<Component> {
+    let (profile, tables) = (&inputs.robot.profile, &inputs.estimators.tables);
+    let mut used = Used::default();
+    for (name, origin) in &profile.origins {
+        match is_line(origin) {
+            true => used.add(tables.aor.get(&origin.axis).ok(), name),
+            false => used.add(tables.cor.get(&origin.center).ok(), name),
+        }
+    }
+    for (name, recording) in &inputs.recordings {
+        used.add(tables.reader.get(&recording.meta.format).ok(), name);
+    }
+    for (name, spec) in &profile.recordings {
+        let log = spec.robot_log.as_ref().and_then(|log| log.reader.as_ref());
+        used.add(log.and_then(|id| tables.reader.get(id).ok()), name);
+    }
+    for name in profile.outputs.reports.keys() {
+        used.add(tables.report.get(name).ok(), name);
+    }
+    used.0.into_values().collect()
+}
+
+/// Components by kind and name.
+#[derive(Default)]
+struct Used(BTreeMap<(Kind, String), Component>);
+
+impl Used {
+    fn add<T: ?Sized>(&mut self, entry: Option<&Entry<T>>, by: &str) {
+        let Some(entry) = entry else { return };
+        let offer = entry.offer();
+        let plugin = match entry.origin() {
+            From::BuiltIn => None,
+            From::Plugin {
+                plugin,
+                version,
+                sha256,
+                ..
+            } => Some(PluginFile {
+                name: plugin.clone(),
+                version: version.clone(),
+                sha256: sha256.clone(),
+            }),
+        };
+        let key = (offer.kind, offer.name.clone());
+        let component = self.0.entry(key).or_insert_with(|| Component {
+            kind: offer.kind.id().to_owned(),
+            name: offer.name.clone(),
+            used_for: Vec::new(),
+            plugin,
+        });
+        if !component.used_for.iter().any(|known| known == by) {
+            component.used_for.push(by.to_owned());
+        }
+    }
+}

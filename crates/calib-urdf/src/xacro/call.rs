@@ -1,0 +1,82 @@
+//! A joint of a macro that is called several times: the one call that gives it, by the name that the call's parameters make.
+//!
+//! ```text
+//! <xacro:macro name="axis" params="name xyz rpy">  <joint name="${name}" …> <origin xyz="${xyz}" rpy="${rpy}"/> …
+//! <xacro:axis name="elbow" xyz="0.3 0 0" rpy="0 0 0"/>          the numbers of `elbow` stand here
+//! ```
+
+use crate::error::Place;
+use crate::read::source::OwnAttributes as _;
+use crate::xacro::expression::{expressions, whole};
+use crate::xacro::{enclosing_macro, is_expression, is_joint, is_xacro, words};
+use roxmltree::{Document, Node};
+
+/// The joint's element in its macro and the one call that gives it this name; `None` where no call or several do, or where xacro computes
+/// the name of a call that might.
+pub(crate) fn called<'a, 'b>(
+    document: &'a Document<'b>,
+    name: &str,
+) -> Option<(Node<'a, 'b>, Node<'a, 'b>)> {
+    let mut found = Vec::new();
+    for joint in document.descendants().filter(|node| is_joint(*node)) {
+        let pattern = joint.own("name")?;
+        let Some(definition) = enclosing_macro(joint) else {
+            if pattern == name || is_expression(pattern) {
+                return None;
+            }
+            continue;
+        };
+        let macro_name = definition.own("name")?;
+        let calls = document.descendants();
+        for call in calls.filter(|node| is_xacro(*node, macro_name)) {
+            if enclosing_macro(call).is_some() {
+                return None;
+            }
+            if with_parameters(pattern, call)? == name {
+                found.push((joint, call));
+            }
+        }
+    }
+    match found.as_slice() {
+        [only] => Some(*only),
+        _ => None,
+    }
+}
+
+/// A name with the parameters of a call in their places; `None` where it needs more than literal parameters.
+fn with_parameters(pattern: &str, call: Node<'_, '_>) -> Option<String> {
+    let (mut name, mut rest) = (String::new(), pattern);
+    while let Some(begin) = rest.find("${") {
+        let end = begin + rest[begin..].find('}')?;
+        let value = call.own(rest[begin + 2..end].trim())?;
+        if is_expression(value) {
+            return None;
+        }
+        name += &rest[..begin];
+        name += value;
+        rest = &rest[end + 1..];
+    }
+    (!is_expression(rest)).then(|| name + rest)
+}
+
+/// The parameter of a macro that a word of an attribute consists of.
+pub(crate) fn parameter<'w>(word: &'w str, definition: Node<'_, '_>) -> Option<&'w str> {
+    let name = whole(word)?.trim();
+    let parameters = definition.own("params").unwrap_or("");
+    words(parameters).any(|word| word == name).then_some(name)
+}
+
+/// The lines of the expressions of a macro's body that mention a parameter.
+pub(crate) fn mentions(text: &str, definition: Node<'_, '_>, parameter: &str) -> Vec<usize> {
+    let mut lines = Vec::new();
+    for node in definition.descendants() {
+        let attributes = node.attributes().map(|a| (a.value(), a.range().start));
+        let own = node.text().filter(|_| node.is_text());
+        let own = own.map(|own| (own, node.range().start));
+        for (value, at) in attributes.chain(own) {
+            let of = expressions(value).filter(|e| words(e).any(|word| word == parameter));
+            lines.extend(of.map(|_| Place::of_byte(text, at).line));
+        }
+    }
+    lines
+}
