@@ -67,7 +67,12 @@ pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError>
     }
     let blocked = with_detours(prepared, &mut list);
     if !blocked.is_empty() {
-        notes.push(Note::NoClearMotion { to: blocked });
+        let before = |place: &usize| {
+            let before = list[..*place].iter();
+            before.filter(|(_, why, _)| *why != Why::Detour).count()
+        };
+        let to = blocked.iter().map(before).collect();
+        notes.push(Note::NoClearMotion { to });
     }
     let as_recorded: Vec<Candidate> = list
         .iter()
@@ -104,6 +109,7 @@ pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError>
         sigma: after.last().copied().flatten(),
         parameters,
         motion_time,
+        blocked,
         notes,
     })
 }
@@ -218,7 +224,7 @@ fn both_sides(
     found
 }
 
-/// Puts postures on the way where the straight motion is blocked; numbers (from 1, detours counted) of those that stay blocked.
+/// Puts postures on the way where the straight motion is blocked; places in the list of those that stay blocked.
 fn with_detours(
     prepared: &Prepared<'_>,
     list: &mut Vec<(Candidate, Why, Option<usize>)>,
@@ -237,12 +243,12 @@ fn with_detours(
                 let by = detour(feasible, joints, (&last.0.q, &next.0.q), others);
                 match by.and_then(|q| feasible.candidate(q.to_vec()).ok()) {
                     Some(by) => out.push((by, Why::Detour, None)),
-                    None => blocked.push(out.len() + 1),
+                    None => blocked.push(out.len()),
                 }
             }
         }
         place.push(out.len());
-        next.2 = next.2.map(|k| place[k] + 1);
+        next.2 = next.2.map(|k| place[k]);
         out.push(next);
     }
     *list = out;

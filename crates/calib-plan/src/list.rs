@@ -42,7 +42,7 @@ pub struct Posture {
     pub q: Vec<f64>,
     /// Why.
     pub why: Why,
-    /// Number of the earlier posture that [`Why::OtherSide`] repeats.
+    /// Place in the list of the earlier posture that [`Why::OtherSide`] repeats.
     pub repeats: Option<usize>,
     /// How many subjects are seen.
     pub seen: usize,
@@ -75,6 +75,8 @@ pub struct Plan {
     pub parameters: Vec<Parameter>,
     /// Time of all motions, s.
     pub motion_time: f64,
+    /// Places in the list of the postures to which no collision-free motion was found.
+    pub blocked: Vec<usize>,
     /// What was assumed.
     pub notes: Vec<Note>,
 }
@@ -93,6 +95,14 @@ pub struct Parameter {
 }
 
 impl Plan {
+    /// The number of a posture in `plan.csv`, from its place in the list; `None`: it is only on the way, and nothing is recorded there.
+    #[must_use]
+    pub fn pose(&self, place: usize) -> Option<usize> {
+        let of = self.postures.get(place)?;
+        let before = self.postures[..place].iter();
+        (of.why != Why::Detour).then(|| before.filter(|p| p.why != Why::Detour).count())
+    }
+
     /// Parameters with a prior that the plan hardly narrows: by less than 30 %.
     #[must_use]
     pub fn weak(&self) -> Vec<&Parameter> {

@@ -56,7 +56,7 @@ pub enum Note {
     FacingUnused,
     /// Motions that touch something whichever way they are taken.
     NoClearMotion {
-        /// Numbers of the postures at their ends.
+        /// Numbers in `plan.csv` of the postures at their ends.
         to: Vec<usize>,
     },
     /// Fewer postures from both sides than planned: the way to them is blocked.

@@ -62,15 +62,17 @@ pub fn page(plan: &Plan, model: &RobotModel, profile: &str) -> String {
 fn postures(plan: &Plan, model: &RobotModel) -> Grid {
     let joints = plan.joints.moved.iter();
     let heads = joints.map(|m| format!("`{}` [{}]", model.joint(m.joint).name, shown(m.turns).1));
-    let mut header = vec!["posture".to_owned(), "why".to_owned()];
+    let mut header = vec!["pose".to_owned(), "why".to_owned()];
     header.extend(heads);
     header.push("expected σ after it".to_owned());
     let rows = plan.postures.iter().enumerate().map(|(i, p)| {
         let repeats = p
             .repeats
-            .map_or_else(String::new, |k| format!(" of posture {k}"));
+            .and_then(|place| plan.pose(place))
+            .map_or_else(String::new, |k| format!(" of pose {k}"));
         let mut cells = vec![
-            (i + 1).to_string(),
+            plan.pose(i)
+                .map_or_else(|| "on the way".to_owned(), |k| k.to_string()),
             format!("{}{repeats}", words::why(p.why)),
         ];
         cells.extend(plan.joints.moved.iter().map(|m| {

@@ -198,7 +198,7 @@ pub fn note(note: &Note) -> String {
         Note::NoClearMotion { to } => {
             let all: Vec<String> = to.iter().map(usize::to_string).collect();
             format!(
-                "No collision-free motion was found to posture {}: move there with a motion planner or by hand.",
+                "No collision-free motion was found to pose {}: move there with a motion planner or by hand. `trajectory.json` is not written.",
                 all.join(", ")
             )
         }

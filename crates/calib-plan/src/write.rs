@@ -42,11 +42,11 @@ pub struct PlanFile {
 /// A posture as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PostureLine {
-    /// From 1.
-    pub number: usize,
+    /// As in `plan.csv`; absent: only on the way, nothing is recorded.
+    pub pose: Option<usize>,
     /// Why it is there.
     pub why: Why,
-    /// The earlier posture that it repeats.
+    /// The earlier pose that it repeats.
     pub repeats: Option<usize>,
     /// σ of the task after it, mm.
     pub sigma_mm: Option<f64>,
@@ -80,9 +80,9 @@ impl Plan {
             efficiency_at_least: rounded(self.efficiency, 4),
             postures: postures
                 .map(|(i, p)| PostureLine {
-                    number: i + 1,
+                    pose: self.pose(i),
                     why: p.why,
-                    repeats: p.repeats,
+                    repeats: p.repeats.and_then(|place| self.pose(place)),
                     sigma_mm: mm(p.sigma),
                     joints: by_name(model, &self.joints, &p.q),
                 })
@@ -95,7 +95,7 @@ impl Plan {
         }
     }
 
-    /// All files: `plan.yaml`, `plan.csv`, `held_out.csv`, `trajectory.json`, `plan.html`.
+    /// All files: `plan.yaml`, `plan.csv`, `held_out.csv`, `plan.html`, and `trajectory.json` where every motion is free.
     ///
     /// # Errors
     /// [`PlanError::Table`] where a name cannot stand in a table.
@@ -105,13 +105,17 @@ impl Plan {
         let recorded = self.postures.iter().filter(|p| p.why != Why::Detour);
         let q: Vec<&Vec<f64>> = recorded.map(|p| &p.q).collect();
         let held_out: Vec<&Vec<f64>> = self.held_out.iter().collect();
-        Ok(vec![
+        let mut files = vec![
             OutputFile::text("plan.yaml", yaml),
             OutputFile::text("plan.csv", table(model, profile, &q)?),
             OutputFile::text("held_out.csv", table(model, profile, &held_out)?),
-            OutputFile::text("trajectory.json", self.trajectory(model)?),
             OutputFile::text("plan.html", page(self, model, profile)),
-        ])
+        ];
+        // A list of points that a controller would drive through must not lead through anything.
+        if self.blocked.is_empty() {
+            files.push(OutputFile::text("trajectory.json", self.trajectory(model)?));
+        }
+        Ok(files)
     }
 
     /// What `--json` prints.
@@ -130,7 +134,8 @@ impl Plan {
         Ok(text.map_err(|e| unwritable("the plan", &e))? + "\n")
     }
 
-    /// A ROS 2 `trajectory_msgs/JointTrajectory` as JSON, rad and m, at a third of the joints' speed with 2 s at each posture.
+    /// A ROS 2 `trajectory_msgs/JointTrajectory` as JSON, rad and m, at a third of the joints' speed with 2 s at each posture. Its first
+    /// point leaves time to come from anywhere in the joint ranges at that speed.
     fn trajectory(&self, model: &RobotModel) -> Result<String, PlanError> {
         /// Speed beside the limit.
         const SPEED: f64 = 1.0 / 3.0;
@@ -141,6 +146,13 @@ impl Plan {
             .iter()
             .map(|m| model.joint(m.joint).name.as_str())
             .collect();
+        let corner = |of: fn(&crate::joints::Moved) -> f64| {
+            let mut q = self.joints.base.clone();
+            for m in moved {
+                q[m.joint.index()] = of(m);
+            }
+            q
+        };
         let mut at = 0.0;
         let mut points = Vec::new();
         let stamp = |t: f64| {
@@ -150,7 +162,7 @@ impl Plan {
         for (i, posture) in self.postures.iter().enumerate() {
             at += match i.checked_sub(1) {
                 Some(last) => self.joints.time(&self.postures[last].q, &posture.q) / SPEED,
-                None => HOLD,
+                None => self.joints.time(&corner(|m| m.low), &corner(|m| m.high)) / SPEED,
             };
             let of = |m: &crate::joints::Moved| rounded(posture.q[m.joint.index()], 6);
             let positions: Vec<f64> = moved.iter().map(of).collect();

@@ -158,7 +158,7 @@ fn a_posture_from_the_other_side_has_all_joints_coming_back() {
     let found = planned(&known, &few(24));
     let last = found.postures.iter().position(|p| p.why == Why::OtherSide);
     let last = last.expect("one is planned");
-    let first = found.postures[last].repeats.expect("it repeats one") - 1;
+    let first = found.postures[last].repeats.expect("it repeats one");
     let at = |k: usize, j: usize| found.postures[k].q[j];
     let mut turned = 0;
     for m in &found.joints.moved {
@@ -183,18 +183,15 @@ fn nothing_touches_by_points_sampled_on_the_capsules() {
     assert!(prepared.counts.keep_outs["post"] > 0);
     let model = &known.robot.model;
     let scene = &prepared.feasible.scene;
-    let blocked: Vec<usize> = found
-        .notes
-        .iter()
-        .filter_map(|n| match n {
-            calib_plan::Note::NoClearMotion { to } => Some(to.clone()),
-            _ => None,
-        })
-        .flatten()
-        .collect();
+    let says = |n: &calib_plan::Note| matches!(n, calib_plan::Note::NoClearMotion { .. });
+    assert_eq!(found.blocked.is_empty(), !found.notes.iter().any(says));
+    let files = found.files(&known.robot.model, "six.yaml");
+    let files = files.unwrap_or_else(|e| panic!("{e}"));
+    let drives = files.iter().any(|f| f.name == "trajectory.json");
+    assert_eq!(drives, found.blocked.is_empty());
     let mut looked = 0;
     for (k, pair) in found.postures.windows(2).enumerate() {
-        if blocked.contains(&(k + 2)) {
+        if found.blocked.contains(&(k + 1)) {
             continue;
         }
         // Other places than those that the planner looks at.
