@@ -94,7 +94,7 @@ pub struct Prepared<'a> {
 /// Candidates, task and linearization.
 ///
 /// # Errors
-/// As [`plan`].
+/// As [`plan`](crate::plan::plan).
 pub fn prepare<'a>(known: &'a Known, options: &'a Options) -> Result<Prepared<'a>, PlanError> {
     let model = &known.robot.model;
     let spec = &known.robot.profile.plan;
