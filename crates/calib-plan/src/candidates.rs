@@ -48,21 +48,26 @@ pub struct Feasible<'a> {
     /// What is seen.
     pub sight: Sight,
     parts: Vec<usize>,
+    levers: Vec<f64>,
 }
 
-/// On a straight motion no joint moves further than this between two looks, rad and m: 2° and 10 mm. A link of 1 m moves 35 mm by that, and
-/// half way between two looks it is at most 18 mm from one of them: less than the usual clearance of 20 mm.
-const LOOKS: (f64, f64) = (0.035, 0.01);
+/// Near something, a motion is looked at again after this share of the clearance, and not before [`LEAST_STEP`]: between two looks the distance
+/// is then at most half of that below the clearance.
+const STEP: f64 = 0.25;
+/// Least step between two looks, m.
+const LEAST_STEP: f64 = 1e-3;
 
 impl<'a> Feasible<'a> {
     /// For a robot, its surroundings and its tracker.
     #[must_use]
-    pub fn new(model: &'a RobotModel, scene: Scene, sight: Sight) -> Self {
+    pub fn new(model: &'a RobotModel, joints: &JointBox, scene: Scene, sight: Sight) -> Self {
+        let levers = scene.levers(model, &joints.travel(model));
         Self {
             model,
             scene,
             sight,
             parts: rigid_parts(model),
+            levers,
         }
     }
 
@@ -126,14 +131,25 @@ impl<'a> Feasible<'a> {
         (kept, counts)
     }
 
-    /// Whether the straight motion of all joints between two postures touches nothing.
+    /// Whether the straight motion of all joints between two postures touches nothing, however thin it is.
+    ///
+    /// Conservative advancement: where everything is at least d away, nothing is touched before some point has moved by d.
     #[must_use]
-    pub fn clear(&self, joints: &JointBox, from: &[f64], to: &[f64]) -> bool {
-        let way = joints.between(from, to, LOOKS);
-        let free = |q: &Vec<f64>| {
-            let placed = self.scene.placed(&self.model.forward_kinematics(q));
-            self.scene.contact(&placed).is_none()
-        };
-        way.iter().all(free)
+    pub fn clear(&self, from: &[f64], to: &[f64]) -> bool {
+        let moves = from.iter().zip(to).zip(&self.levers);
+        let length: f64 = moves.map(|((a, b), lever)| (b - a).abs() * lever).sum();
+        let clearance = self.scene.clearance;
+        let mut done = 0.0;
+        while done < length {
+            let t = done / length;
+            let q: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + (b - a) * t).collect();
+            let placed = self.scene.placed(&self.model.forward_kinematics(&q));
+            let nearest = self.scene.nearest(&placed);
+            if nearest < clearance {
+                return false;
+            }
+            done += (nearest - clearance).max(STEP * clearance).max(LEAST_STEP);
+        }
+        true
     }
 }

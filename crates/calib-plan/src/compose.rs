@@ -211,10 +211,7 @@ fn both_sides(
         let Ok(approach) = prepared.feasible.candidate(q) else {
             continue;
         };
-        if !prepared
-            .feasible
-            .clear(&prepared.joints, &approach.q, &again.q)
-        {
+        if !prepared.feasible.clear(&approach.q, &again.q) {
             continue;
         }
         list.push((approach, Why::Approach, None));
@@ -236,7 +233,7 @@ fn with_detours(
     for mut next in std::mem::take(list) {
         if let Some(last) = out.last() {
             let (feasible, joints) = (&prepared.feasible, &prepared.joints);
-            if !feasible.clear(joints, &last.0.q, &next.0.q) {
+            if !feasible.clear(&last.0.q, &next.0.q) {
                 let step = prepared.candidates.len().div_ceil(DETOURS).max(1);
                 let others = prepared.candidates.iter().step_by(step);
                 let others = others.map(|c| c.q.as_slice());

@@ -110,20 +110,24 @@ impl JointBox {
         self.moved.iter().map(of).sum::<f64>().sqrt()
     }
 
-    /// Postures on the straight way between two, the ends left out, so near to each other that no joint moves more than `turn`
-    /// (rad) or `slide` (m) between them.
+    /// The largest displacement of each sliding joint from 0, by joint index, m; 0 of all others.
     #[must_use]
-    pub fn between(&self, from: &[f64], to: &[f64], (turn, slide): (f64, f64)) -> Vec<Vec<f64>> {
-        let steps = |m: &Moved| {
-            let step = if m.turns { turn } else { slide };
-            (to[m.joint.index()] - from[m.joint.index()]).abs() / step
+    pub fn travel(&self, model: &RobotModel) -> Vec<f64> {
+        let (mut low, mut high) = (self.base.clone(), self.base.clone());
+        for m in &self.moved {
+            (low[m.joint.index()], high[m.joint.index()]) = (m.low, m.high);
+        }
+        let of = |id: JointId| {
+            let joint = model.joint(id);
+            let (law, slides) = (
+                &joint.law,
+                matches!(joint.kind, JointKind::Prismatic { .. }),
+            );
+            let ends = [low[law.source.index()], high[law.source.index()]];
+            let ends = ends.map(|q| (law.multiplier * q + law.offset).abs());
+            if slides { ends[0].max(ends[1]) } else { 0.0 }
         };
-        let steps = self.moved.iter().map(steps).fold(0.0, f64::max).ceil() as usize;
-        let at = |k: usize| {
-            let t = k as f64 / steps as f64;
-            from.iter().zip(to).map(|(a, b)| a + (b - a) * t).collect()
-        };
-        (1..steps).map(at).collect()
+        model.joint_ids().map(of).collect()
     }
 
     /// A posture inside the ranges.

@@ -47,7 +47,7 @@ pub struct Known {
 const LAYOUT: f64 = 0.05;
 
 impl Known {
-    /// Reads the recordings of the profile that exist, and fits them.
+    /// Reads the recordings of the profile that exist, and fits them; those with errors are not used, and a note says why.
     ///
     /// # Errors
     /// [`PipelineError`] for a recording that exists and cannot be read.
@@ -89,7 +89,8 @@ impl Known {
 
     /// From recordings: a fit of everything that the profile frees.
     fn fitted(robot: &RobotProfile, mut inputs: Inputs) -> Result<Self, PipelineError> {
-        let checked = check_data(&mut inputs, Vec::new(), true)?;
+        // Recordings with errors would plan for another robot than this one.
+        let checked = check_data(&mut inputs, Vec::new(), false)?;
         let mut settings = Settings::default();
         settings.robust.enabled = robot.profile.solve.robust;
         let stated = ml::state(&inputs, &checked.tracks, &checked.start, FreeSet::Profile);

@@ -26,7 +26,7 @@ impl Ways {
                 return 0.0;
             }
             let time = joints.time(postures[i], postures[j]);
-            let clear = feasible.clear(joints, postures[i], postures[j]);
+            let clear = feasible.clear(postures[i], postures[j]);
             if clear { time } else { time + BLOCKED }
         };
         let upper: Vec<f64> = (0..n * n).into_par_iter().map(of).collect();
@@ -117,6 +117,6 @@ pub fn detour<'q>(
         .map(|q| (joints.time(from, q) + joints.time(q, to), q))
         .collect();
     by_time.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let clear = |q: &[f64]| feasible.clear(joints, from, q) && feasible.clear(joints, q, to);
+    let clear = |q: &[f64]| feasible.clear(from, q) && feasible.clear(q, to);
     by_time.into_iter().map(|b| b.1).find(|q| clear(q))
 }

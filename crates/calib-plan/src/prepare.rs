@@ -110,7 +110,7 @@ pub fn prepare<'a>(known: &'a Known, options: &'a Options) -> Result<Prepared<'a
     notes.extend(of_scene(known, &joints, &scene, unread));
     let moves = |link: LinkId| joints.moved.iter().any(|m| model.carries(m.joint, link));
     let sight = Sight::new(spec, known.subjects(&moves), known.start.tracker_from_root);
-    let feasible = Feasible::new(model, scene, sight);
+    let feasible = Feasible::new(model, &joints, scene, sight);
     let (candidates, counts) = feasible.all(joints.postures(options.candidates, options.seed));
     if candidates.is_empty() {
         let counts = Box::new(counts);

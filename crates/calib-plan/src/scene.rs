@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use calib_profile::{KeepOut, PlanSpec};
 use calib_report::view3d::Solid;
-use calib_urdf::{JointKind, LinkId, RobotModel};
+use calib_urdf::{JointId, JointKind, LinkId, RobotModel};
 use nalgebra::{Isometry3, Point3};
 
 use crate::shape::{Capsule, capsules};
@@ -40,9 +40,10 @@ pub struct Scene {
     pub pairs: Vec<(usize, usize)>,
     /// Pairs that touch in nearly all postures, so that their capsules tell nothing: not compared.
     pub always: Vec<(usize, usize)>,
+    /// Distance that is kept, m.
+    pub clearance: f64,
     keep_outs: BTreeMap<String, KeepOut>,
     ground: Option<f64>,
-    clearance: f64,
     /// The rigid part of the root: it may stand on the ground and in a keep-out.
     root: usize,
 }
@@ -128,10 +129,7 @@ impl Scene {
     /// What the robot would touch; `None`: nothing.
     #[must_use]
     pub fn contact(&self, placed: &[Capsule]) -> Option<Contact> {
-        for (c, at) in self.capsules.iter().zip(placed) {
-            if c.body == self.root {
-                continue;
-            }
+        for (_, at) in self.moving(placed) {
             if self
                 .ground
                 .is_some_and(|z| at.lowest() < z + self.clearance)
@@ -149,6 +147,67 @@ impl Scene {
             .iter()
             .find_map(|pair| self.near(placed, *pair, self.clearance));
         touching.map(|(a, b)| Contact::Links(a, b))
+    }
+
+    /// Distance of the robot to what it must not touch and of its parts to each other, m; below 0 where they overlap.
+    #[must_use]
+    pub fn nearest(&self, placed: &[Capsule]) -> f64 {
+        let mut least = f64::INFINITY;
+        for (_, at) in self.moving(placed) {
+            if let Some(ground) = self.ground {
+                least = least.min(at.lowest() - ground);
+            }
+            for b in self.keep_outs.values() {
+                least = least.min(at.distance_to_box(&b.size, &b.root_from_box));
+            }
+        }
+        for (i, first) in self.capsules.iter().enumerate() {
+            for (j, second) in self.capsules.iter().enumerate().skip(i + 1) {
+                let (a, b) = (first.body.min(second.body), first.body.max(second.body));
+                if self.pairs.contains(&(a, b)) {
+                    least = least.min(placed[i].distance(&placed[j]));
+                }
+            }
+        }
+        least
+    }
+
+    /// Capsules of all parts but the root's.
+    fn moving<'a>(
+        &'a self,
+        placed: &'a [Capsule],
+    ) -> impl Iterator<Item = (&'a LinkCapsule, &'a Capsule)> {
+        let all = self.capsules.iter().zip(placed);
+        all.filter(|(c, _)| c.body != self.root)
+    }
+
+    /// How far any point of a capsule moves at the most by one unit (rad, m) of each joint, by joint index: the length of the way from the
+    /// joint to the farthest point that it carries, whatever the posture. A joint that follows another adds to that one.
+    ///
+    /// `travel`: the largest displacement of each sliding joint from 0, m.
+    #[must_use]
+    pub fn levers(&self, model: &RobotModel, travel: &[f64]) -> Vec<f64> {
+        let mut levers = vec![0.0; model.joints().len()];
+        for id in model.joint_ids() {
+            let joint = model.joint(id);
+            let carried = self.capsules.iter().filter(|c| model.carries(id, c.link));
+            let reach = |c: &LinkCapsule| {
+                let own = c.capsule.a.coords.norm().max(c.capsule.b.coords.norm()) + c.capsule.r;
+                let way = model.chain_to_root(c.link).into_iter();
+                let way = way.take_while(|above| *above != id);
+                let of = |j: JointId| {
+                    let origin = model.joint(j).parent_link_from_joint.translation;
+                    origin.vector.norm() + travel[j.index()]
+                };
+                own + way.map(of).sum::<f64>()
+            };
+            let reach = match joint.kind.turns() {
+                true => carried.map(reach).fold(0.0, f64::max),
+                false => f64::from(u8::from(carried.count() > 0)),
+            };
+            levers[joint.law.source.index()] += joint.law.multiplier.abs() * reach;
+        }
+        levers
     }
 
     /// The first capsules of a pair of parts that are too near.

@@ -158,8 +158,8 @@ pub fn note(note: &Note) -> String {
             format!("Not recorded yet: {}. The plan does not count on them.", names(recordings))
         }
         Note::RecordingsUnused { why } => format!(
-            "The recordings that exist could not be fitted and were not used: {}",
-            why.lines().next().unwrap_or_default()
+            "The recordings that exist were not used: {}. `calib check` says more.",
+            why.lines().next().unwrap_or_default().trim_end_matches('.')
         ),
         Note::FromSimulation => "Mounts, markers and the robot's place are taken from the profile's `simulate` section.".to_owned(),
         Note::MountAssumed { body } => format!(

@@ -10,7 +10,7 @@ use rand::seq::index::sample;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::robots::{Seen, five, six};
+use crate::robots::{SCARA, SEVEN, SIX, Seen, five, known, robot, six};
 
 /// Few candidates: the tests are about laws, not about the last percent.
 fn few(poses: usize) -> Options {
@@ -226,6 +226,74 @@ fn nothing_touches_by_points_sampled_on_the_capsules() {
         }
     }
     assert!(looked > 200, "{looked}");
+}
+
+/// No point of the robot moves further than the sum over the joints of their move times the way to the farthest point that they carry.
+#[test]
+fn no_point_moves_further_than_the_levers_say() {
+    for joints in [SIX, SCARA, SEVEN] {
+        let known = known(robot(joints, Seen::Markers(4), true, ""));
+        let options = few(10);
+        let prepared = prepare(&known, &options).unwrap_or_else(|e| panic!("{e}"));
+        let (scene, model) = (&prepared.feasible.scene, &known.robot.model);
+        let levers = scene.levers(model, &prepared.joints.travel(model));
+        let mut tightest: f64 = 0.0;
+        for pair in prepared.candidates.windows(2) {
+            // A thousandth of the motion, where the way of a point is nearly straight.
+            let from = &pair[0].q;
+            let to: Vec<f64> = from
+                .iter()
+                .zip(&pair[1].q)
+                .map(|(a, b)| a + (b - a) * 1e-3)
+                .collect();
+            let bound: f64 = from
+                .iter()
+                .zip(&to)
+                .zip(&levers)
+                .map(|((a, b), l)| (b - a).abs() * l)
+                .sum();
+            let [first, second] = [from, &to].map(|q| scene.placed(&model.forward_kinematics(q)));
+            for (a, b) in first.iter().zip(&second) {
+                let moved = (a.a - b.a).norm().max((a.b - b.b).norm());
+                assert!(moved <= bound * (1.0 + 1e-9), "{moved} against {bound}");
+                tightest = tightest.max(moved / bound);
+            }
+        }
+        assert!(tightest > 0.2, "the bound is of no use: {tightest}");
+    }
+}
+
+/// All joints move at once past a plate of 2 mm.
+#[test]
+fn no_motion_that_is_called_clear_passes_through_a_thin_plate() {
+    let extra = "plan:\n  clearance_mm: 4\n  keep_outs:\n    \
+                 plate: {size_mm: [2, 600, 600], center: {xyz_mm: [380, 0, 500]}}\n";
+    let known = six(Seen::Markers(4), extra);
+    let options = few(20);
+    let prepared = prepare(&known, &options).unwrap_or_else(|e| panic!("{e}"));
+    let (feasible, model) = (&prepared.feasible, &known.robot.model);
+    let (mut clear, mut blocked) = (0, 0);
+    for pair in prepared.candidates.windows(2) {
+        let (from, to) = (&pair[0].q, &pair[1].q);
+        if !feasible.clear(from, to) {
+            blocked += 1;
+            continue;
+        }
+        clear += 1;
+        for k in 0..=1500 {
+            let t = f64::from(k) / 1500.0;
+            let q = from.iter().zip(to).map(|(a, b)| a + (b - a) * t);
+            let q: Vec<f64> = q.collect();
+            let placed = feasible.scene.placed(&model.forward_kinematics(&q));
+            // The clearance of 4 mm, and half a step below it.
+            let nearest = feasible.scene.nearest(&placed);
+            assert!(nearest >= 0.0035 - 1e-9, "{nearest} at {t}");
+        }
+    }
+    assert!(
+        clear >= 10 && blocked >= 10,
+        "{clear} clear, {blocked} blocked"
+    );
 }
 
 /// Points on a capsule.

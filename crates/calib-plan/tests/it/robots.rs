@@ -18,7 +18,7 @@ type JointLine = (
     f64,
 );
 
-const SIX: &[JointLine] = &[
+pub const SIX: &[JointLine] = &[
     ("j1", "revolute", "0 0 0.29", "0 0 1", -2.8, 2.8),
     ("j2", "revolute", "0.03 0 0.11", "0 1 0", -1.2, 1.6),
     ("j3", "revolute", "0 0 0.35", "0 1 0", -1.5, 1.2),
@@ -27,14 +27,14 @@ const SIX: &[JointLine] = &[
     ("j6", "revolute", "0.08 0 0", "1 0 0", -3.0, 3.0),
 ];
 
-const SCARA: &[JointLine] = &[
+pub const SCARA: &[JointLine] = &[
     ("j1", "revolute", "0 0 0.3", "0 0 1", -2.3, 2.3),
     ("j2", "revolute", "0.35 0 0", "0 0 1", -2.4, 2.4),
     ("j3", "prismatic", "0.3 0 0", "0 0 1", -0.2, 0.0),
     ("j4", "revolute", "0 0 -0.05", "0 0 1", -3.0, 3.0),
 ];
 
-const SEVEN: &[JointLine] = &[
+pub const SEVEN: &[JointLine] = &[
     ("j1", "revolute", "0 0 0.2", "0 0 1", -2.8, 2.8),
     ("j2", "revolute", "0 0 0.15", "0 1 0", -1.9, 1.9),
     ("j3", "revolute", "0 0 0.2", "0 0 1", -2.8, 2.8),
