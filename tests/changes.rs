@@ -125,6 +125,51 @@ fn a_body_that_slips_is_named_with_its_row() {
     assert!((distance - 1.5e-3).abs() < 0.4e-3, "{found:#}");
 }
 
+/// Ripley with one joint that is off its readings by σ, drawn for each row from a plain generator.
+fn scattered(joint: &str, sigma_deg: f64) -> Scratch {
+    let mut dir = Scratch::new().robot("ripley");
+    let mut state: u64 = 1;
+    let mut uniform = || {
+        state = (state * 1_103_515_245 + 12_345) % (1 << 31);
+        state as f64 / (1u64 << 31) as f64
+    };
+    for table in [&[POSES][..], &LATER].concat() {
+        let mut column: Option<usize> = None;
+        let lines: Vec<String> = dir
+            .read(table)
+            .lines()
+            .map(|line| {
+                let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+                match column {
+                    Some(column) if !line.starts_with('#') => {
+                        let normal = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+                        let q: f64 = cells[column].parse().expect("a reading");
+                        cells[column] = format!("{:.5}", q + sigma_deg * normal);
+                    }
+                    _ => column = cells.iter().position(|c| *c == format!("{joint}_deg")),
+                }
+                cells.join(",")
+            })
+            .collect();
+        dir = dir.file(table, lines.join("\n") + "\n");
+    }
+    dir
+}
+
+#[test]
+fn a_joint_that_scatters_is_named_and_no_change() {
+    for (joint, sigma) in [("elbow", 0.2), ("shoulder", 0.2)] {
+        let (_, report) = run(&scattered(joint, sigma));
+        let change = finding(&report, "changed-while-recording");
+        assert!(change.is_none(), "{joint}: {change:#?}");
+        let found = finding(&report, "joint-scatters").expect("the joint is named");
+        assert_eq!(found["facts"]["joint"], joint, "{found:#}");
+        let found = found["facts"]["sigma"]["value"].as_f64().expect("an angle");
+        let ratio = found.to_degrees() / sigma;
+        assert!((0.5..2.0).contains(&ratio), "{joint}: {ratio}");
+    }
+}
+
 /// The profile gives the body that slipped two mounts, the first also in the recordings `before`.
 fn split(dir: Scratch, before: &str) -> Scratch {
     dir.edit(

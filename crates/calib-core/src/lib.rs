@@ -139,7 +139,7 @@ pub use nalgebra;
 pub use analysis::admit::Admission;
 pub use analysis::bounds::Unbounded;
 pub use analysis::change::contest::{Contest, Suspect};
-pub use analysis::change::{Change, ChangeScan, ChangeSettings, Moved};
+pub use analysis::change::{Change, ChangeScan, ChangeSettings, Moved, Scatter};
 pub use analysis::closure::{ClosureStatistics, Spread};
 pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};
 pub use analysis::dependence::{Dependence, MemoryOf};

@@ -150,10 +150,11 @@ fn changed(report: &Report) -> Option<Diagnosis> {
 }
 
 /// Findings that name a cause of errors, the most likely first.
-const CAUSES: [Id; 3] = [
+const CAUSES: [Id; 4] = [
     catalog::CLOCK_LAG,
     catalog::JOINT_GAIN,
     catalog::JOINT_COUPLING,
+    catalog::JOINT_SCATTERS,
 ];
 
 fn named(report: &Report) -> Option<Diagnosis> {

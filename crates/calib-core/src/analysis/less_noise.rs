@@ -40,6 +40,17 @@ pub(crate) fn profiled(freedom: f64, levels: &[Level], level: usize, gain: f64) 
 impl Solution {
     /// The same solution with less noise from pose to pose, level by level; none with many samples, or where nothing is random.
     pub(crate) fn with_less_noise(&self, samples: usize) -> Vec<Self> {
+        if samples >= MANY {
+            return Vec::new();
+        }
+        let shares = SHARES.iter();
+        shares
+            .filter_map(|share| self.with_pose_noise_times(*share))
+            .collect()
+    }
+
+    /// The same solution with this share of the noise from pose to pose; `None` where nothing is random.
+    pub(crate) fn with_pose_noise_times(&self, share: f64) -> Option<Self> {
         let edges = self.model.problem.edges.iter();
         let mut groups: Vec<usize> = edges
             .filter_map(|edge| match &edge.kind {
@@ -50,16 +61,10 @@ impl Solution {
             .collect();
         groups.sort_unstable();
         groups.dedup();
-        if samples >= MANY || groups.is_empty() {
-            return Vec::new();
+        let mut out = (!groups.is_empty()).then(|| self.clone())?;
+        for group in groups {
+            out.theta[group] *= share * share;
         }
-        let less = |share: &f64| {
-            let mut out = self.clone();
-            for &group in &groups {
-                out.theta[group] *= share * share;
-            }
-            out
-        };
-        SHARES.iter().map(less).collect()
+        Some(out)
     }
 }

@@ -34,4 +34,13 @@ super::topic! {
             "The tracker reports lengths that differ by {scale:ppm} ± {sigma_scale:ppm} from those of the robot and the stated templates (positive: too long).",
             "Check the tracker's calibration and the unit of the export against a known length.";
     }
+    /// A joint stops off its readings by more than the others.
+    JOINT_SCATTERS = "joint-scatters" {
+        "rows": Warning,
+            "Joint `{joint}` deviates from its readings by {sigma} (σ), differently in each row and more than the other joints. That explains what would else look like a change while recording.",
+            "Check the encoder, the coupling and the brake of this joint, and record a row only when the joint is at rest. If it does scatter like this, state `solve: {noise: {model: joint_each}}`.";
+        "stops": Warning,
+            "Joint `{joint}` deviates from its readings by {sigma} (σ), differently at each stop and more than the other joints. That explains what would else look like a change while recording.",
+            "Check the encoder, the coupling and the brake of this joint, and look for effects of its gear. In the poses to come, let the joint stop often and from both sides.";
+    }
 }

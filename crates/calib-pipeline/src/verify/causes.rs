@@ -34,6 +34,8 @@ pub struct Causes {
     pub change: Option<Finding>,
     /// The same, as the scan found it.
     pub changed: Option<Change>,
+    /// The joint whose scatter looked like a change.
+    pub scatter: Option<Finding>,
     /// Findings from before the fit that other causes explain.
     pub explained: Vec<Finding>,
 }
@@ -75,6 +77,20 @@ impl Cause<'_> {
 #[must_use]
 pub fn causes(inputs: &Inputs, fit: &MlFit, before: &[Finding]) -> Causes {
     let (scan, goodness) = rayon::join(|| changes::scan(fit), || fit.solution.goodness_of_fit());
+    let scatter = |scan: &ChangeScan| changes::scatter(inputs, fit, scan);
+    Causes {
+        scatter: scan.as_ref().and_then(scatter),
+        ..those_that_hold(inputs, fit, before, scan, goodness)
+    }
+}
+
+fn those_that_hold(
+    inputs: &Inputs,
+    fit: &MlFit,
+    before: &[Finding],
+    scan: Option<ChangeScan>,
+    goodness: Option<GoodnessOfFit>,
+) -> Causes {
     let everything = || {
         Causes {
             change: scan.as_ref().and_then(|scan| {
@@ -308,7 +324,7 @@ impl Outcome<'_> {
                 goodness
             }),
             explained,
-            changed: None,
+            ..Causes::default()
         }
         .with_change_of(scan)
     }

@@ -76,6 +76,29 @@ pub fn finding(inputs: &Inputs, fit: &MlFit, scan: &ChangeScan, beside: Beside) 
     })
 }
 
+/// The joint whose scatter looked like a change; none where something did change.
+#[must_use]
+pub fn scatter(inputs: &Inputs, fit: &MlFit, scan: &ChangeScan) -> Option<Finding> {
+    let scatter = scan.scatter?;
+    if scan.significant().is_some() {
+        return None;
+    }
+    let names = Names { inputs, fit };
+    let joint = names.joint(scatter.joint)?;
+    let kind = if scatter.by_stop { "stops" } else { "rows" };
+    let sigma = match joint.kind.turns() {
+        true => Fact::radians(scatter.sigma),
+        false => Fact::meters(scatter.sigma),
+    };
+    let subject = Subject::joint(joint.name.clone());
+    let finding = Finding::of_kind(catalog::JOINT_SCATTERS, kind, subject);
+    Some(
+        finding
+            .with("joint", Fact::name(joint.name.clone()))
+            .with("sigma", sigma),
+    )
+}
+
 /// What moved, as the profile and the URDF call it.
 #[must_use]
 pub fn name_of(inputs: &Inputs, fit: &MlFit, moved: Moved) -> Option<String> {

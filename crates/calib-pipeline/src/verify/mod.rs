@@ -85,6 +85,9 @@ pub fn verified(
     if missing && !verified.findings.is_empty() {
         verified.findings = applied::still_moved(inputs, checked, &verified);
     }
+    // Beside missing physics, what a joint does is that.
+    let scatter = verified.causes.scatter.clone().filter(|_| !missing);
+    verified.findings.extend(scatter);
     if let Some(changed) = verified.causes.change.clone() {
         verified.findings = one_cause(changed, verified.findings);
     }

@@ -131,6 +131,12 @@ impl Candidates {
         known.map_or_else(Vector3::zeros, |(_, middle)| *middle)
     }
 
+    /// Joints, and the column of each.
+    pub(crate) fn joint_columns(&self) -> (Vec<EdgeId>, Vec<usize>) {
+        let joints = self.joints.iter();
+        joints.map(|(edge, c)| (EdgeId::of(*edge), *c)).unzip()
+    }
+
     /// B̃ = L⁻¹ B of one sample, all candidates side by side.
     pub(crate) fn whitened(
         &self,

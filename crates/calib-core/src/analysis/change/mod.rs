@@ -18,13 +18,14 @@
 //!
 //! How large T becomes by chance over all ranges is simulated from the model. Candidates have up to six columns, so
 //! every T counts from its own quantile of that simulation; the largest excess is compared with the quantile of the
-//! largest excess. What it does **not** protect against: physics that is missing in the model and follows the order of the samples, as
+//! largest excess. What one joint that scatters more than the others explains is no change (`scatter`). What it does **not** protect against: physics that is missing in the model and follows the order of the samples, as
 //! in sweeps of one joint after another; [`Solution::goodness_of_fit`] says whether it explains more.
 
 mod chance;
 pub(crate) mod columns;
 pub(crate) mod contest;
 mod levels;
+mod scatter;
 mod sums;
 
 use serde::{Deserialize, Serialize};
@@ -34,6 +35,7 @@ use crate::graph::ids::{EdgeId, FrameId};
 use chance::Chance;
 use columns::{Candidates, Pattern};
 use levels::{Best, Levels};
+pub use scatter::Scatter;
 use sums::{Design, LEAST, SIMULATED};
 
 /// What may have moved.
@@ -119,6 +121,8 @@ pub struct ChangeScan {
     pub cost_per_row: f64,
     /// The rows that the fit rejected were scanned as well.
     pub with_rejected: bool,
+    /// The joint that scatters more than the others, where that explains the data better; looked for where something seems to have changed.
+    pub scatter: Option<Scatter>,
 }
 
 impl ChangeScan {
@@ -158,11 +162,11 @@ impl Solution {
     #[must_use]
     pub fn changes(&self, settings: &ChangeSettings) -> Option<ChangeScan> {
         let kept = self.scan(settings)?;
-        let Some(scan) = self
-            .with_rejected(settings)
-            .and_then(|all| all.scan(settings))
+        let beside = |at: &Self, scan| at.beside_scatter(scan, &settings.borders);
+        let all = self.with_rejected(settings);
+        let Some((all, scan)) = all.and_then(|all| all.scan(settings).map(|scan| (all, scan)))
         else {
-            return Some(kept);
+            return Some(beside(self, kept));
         };
         let explained = |change: &Change| {
             scan.cost_per_row * (1.0 - change.explains) < EXPLAINED * kept.cost_per_row
@@ -170,10 +174,10 @@ impl Solution {
         Some(if scan.significant().is_some_and(explained) {
             ChangeScan {
                 with_rejected: true,
-                ..scan
+                ..beside(&all, scan)
             }
         } else {
-            kept
+            beside(self, kept)
         })
     }
 
@@ -258,6 +262,7 @@ impl Solution {
             threshold: chance.threshold,
             cost_per_row: design.cost / design.rows,
             with_rejected: false,
+            scatter: None,
         })
     }
 }

@@ -1,0 +1,397 @@
+//! Does a joint that scatters explain what a scan took for changes?
+//!
+//! The scan knows one σ for all joints. Where one of them stops off its reading by more than the others, a stretch of rows in which it
+//! stopped on one side by chance looks like a step. The errors of that joint, one draw in every row or in every stop, are
+//! beside the change then, G their columns:
+//!
+//! ```text
+//! 2 ln L(τ) = −ν ln(F − Uᵀ (K + τ⁻²)⁻¹ U) − ln|I + τ² K| − Σ ln|V| − ln|H|,   K = Σ G̃ᵀG̃ − Eᵀ C E,   E = Σ Aᵀ G̃       (1)
+//! T' = max 2 ln L(with the change) − max 2 ln L(without)                                                       (2)
+//! ```
+//!
+//! each over τ, over the joint that scatters or none, and over the noise of all joints as it was found and a tenth of it. U, F, ν, V, H
+//! and C as in the scan; with a joint that scatters 2 ln L is lowered by 10, as so many are tried. What remains of T is what the change explains beside
+//! the best of them. Where a change alone explains clearly more than any joint's scatter alone, nothing is taken from it.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::columns::Candidates;
+use super::contest::holds;
+use super::{Change, ChangeScan};
+use crate::analysis::looked_at::looked_at;
+use crate::analysis::solution::Solution;
+use crate::graph::axis::Axis;
+use crate::graph::edge::EdgeKind;
+use crate::graph::ids::EdgeId;
+use crate::solve::equations::{NormalEquations, Workspace};
+use crate::solve::normal::add_prior;
+use crate::solve::whitened::{covariance_of, whitened};
+
+/// Samples that are looked at: (1) costs their cube.
+const SAMPLES: usize = 240;
+/// Changes that are looked at, most significant first.
+const CHANGES: usize = 8;
+/// Fewer stops are no scatter: one draw more is a step.
+const STOPS: usize = 6;
+/// Scatters that are tried, rad.
+const TRIED: [f64; 7] = [1.5e-4, 3e-4, 6e-4, 1.2e-3, 2.5e-3, 5e-3, 1e-2];
+/// The same of joints that slide, m per rad.
+const SLIDING: f64 = 0.1;
+/// A joint rests while its reading stays within this, rad.
+const AT_REST: f64 = 2e-3;
+/// What 2 ln L must be larger by for a joint to scatter: some eighty combinations of joint, size and draws are tried.
+const SHOWN: f64 = 10.0;
+/// So many draws must be seen to be larger than half of their σ, as two of three are: one or two of them are a step.
+const DRAWS: usize = 4;
+/// A change alone that explains more than a joint's scatter alone by this much is no scatter: twice the log-likelihood ratio of 20 : 1.
+const DISTINCT: f64 = 6.0;
+/// The noise of all joints beside one that scatters, as a share of the one that was found with it.
+const OTHERS: f64 = 0.1;
+
+/// A joint that stops off its readings by more than the others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Scatter {
+    /// Which.
+    pub joint: EdgeId,
+    /// One draw for each stop, and not for each row.
+    pub by_stop: bool,
+    /// Standard deviation of the draws, rad or m.
+    pub sigma: f64,
+    /// By how much 2 ln L is larger with it, without any change, beyond what is expected of the best of so many.
+    pub score: f64,
+}
+
+/// One sample in whitened form.
+struct Sample {
+    a: DMatrix<f64>,
+    /// Columns of the joints, in the order of [`Level::joints`].
+    joints: DMatrix<f64>,
+    /// Columns of the changes.
+    changes: DMatrix<f64>,
+}
+
+/// Sums that do not depend on the joint that scatters, at one level of the noise of all joints.
+struct Level {
+    /// Numbers of the samples.
+    numbers: Vec<usize>,
+    samples: Vec<Sample>,
+    /// Whitened residuals at the minimum.
+    residuals: Vec<DVector<f64>>,
+    joints: Vec<EdgeId>,
+    /// First column of each change, and one past the last.
+    starts: Vec<usize>,
+    /// C, C E of the changes.
+    covariance: DMatrix<f64>,
+    ce: DMatrix<f64>,
+    /// U and I of all changes.
+    u: DVector<f64>,
+    information: DMatrix<f64>,
+    cost: f64,
+    freedom: f64,
+    log_det: f64,
+}
+
+/// −2 ln L without a change, and with each.
+#[derive(Clone)]
+struct Fits {
+    without: f64,
+    with: Vec<f64>,
+}
+
+impl Solution {
+    /// Takes from the significant changes of a scan what a joint that scatters explains.
+    pub(super) fn beside_scatter(&self, mut scan: ChangeScan, borders: &[usize]) -> ChangeScan {
+        let least = scan.threshold;
+        let significant = scan.changes.iter().filter(|c| c.excess > least);
+        let list: Vec<Change> = significant.take(CHANGES).cloned().collect();
+        if list.is_empty() {
+            return scan;
+        }
+        let of = |solution: &Self| Level::new(solution, &list, borders);
+        let lower = self.with_pose_noise_times(OTHERS);
+        let levels: Vec<Level> = [Some(self), lower.as_ref()]
+            .into_iter()
+            .flatten()
+            .filter_map(of)
+            .collect();
+        let Some(first) = levels.first() else {
+            return scan;
+        };
+        let alone = first.without_scatter();
+        let mut cases: Vec<(usize, usize, Vec<usize>, bool)> = Vec::new();
+        for (l, level) in levels.iter().enumerate() {
+            for (j, joint) in level.joints.iter().enumerate() {
+                let rows: Vec<usize> = (0..level.samples.len()).collect();
+                let stops = self.stops(*joint, &level.numbers, borders);
+                if (STOPS..rows.len()).contains(&count(&stops)) {
+                    cases.push((l, j, stops, true));
+                }
+                cases.push((l, j, rows, false));
+            }
+        }
+        let tried = cases
+            .par_iter()
+            .flat_map_iter(|(l, j, groups, by_stop)| {
+                let level = &levels[*l];
+                let joint = level.joints[*j];
+                let unit = self.unit_of(joint);
+                let fits = level.scattering(*j, groups, unit);
+                fits.into_iter().map(move |(sigma, fits)| {
+                    let scatter = Scatter {
+                        joint,
+                        by_stop: *by_stop,
+                        sigma,
+                        score: alone.without - fits.without - SHOWN,
+                    };
+                    (scatter, fits)
+                })
+            })
+            .collect::<Vec<_>>();
+        let better = |a: &Option<Scatter>, b: &Scatter| a.is_none_or(|a| b.score > a.score);
+        let (mut best, mut least) = (None, alone.clone());
+        for (scatter, fits) in tried {
+            if scatter.score > 0.0 && better(&best, &scatter) {
+                best = Some(scatter);
+            }
+            least.without = least.without.min(fits.without + SHOWN);
+            for (least, own) in least.with.iter_mut().zip(&fits.with) {
+                *least = least.min(own + SHOWN);
+            }
+        }
+        let alone_by = alone.with.iter().map(|with| alone.without - with);
+        let of_change = alone_by.fold(0.0, f64::max);
+        if best.is_none_or(|scatter| scatter.score + SHOWN + DISTINCT < of_change) {
+            return scan;
+        }
+        for (k, change) in scan.changes.iter_mut().take(list.len()).enumerate() {
+            let before = alone.without - alone.with[k];
+            let part = (least.without - least.with[k]) / before;
+            if before > 0.0 && part.is_finite() {
+                let quantile = change.score - change.excess;
+                change.score *= part.clamp(0.0, 1.0);
+                change.excess = change.score - quantile;
+            }
+        }
+        let order = |a: &Change, b: &Change| {
+            let by_excess = b.excess.total_cmp(&a.excess);
+            by_excess.then(a.moved.cmp(&b.moved))
+        };
+        scan.changes.sort_by(order);
+        scan.scatter = best;
+        scan
+    }
+
+    /// 1 of joints that turn.
+    fn unit_of(&self, joint: EdgeId) -> f64 {
+        match &self.model.problem.edges[joint.index()].kind {
+            EdgeKind::Joint(joint) if matches!(joint.axis, Axis::Prismatic(_)) => SLIDING,
+            _ => 1.0,
+        }
+    }
+
+    /// The stop that each sample belongs to: a new one where the reading changes or a recording begins.
+    fn stops(&self, joint: EdgeId, samples: &[usize], borders: &[usize]) -> Vec<usize> {
+        let EdgeKind::Joint(own) = &self.model.problem.edges[joint.index()].kind else {
+            return Vec::new();
+        };
+        let tolerance = AT_REST * self.unit_of(joint);
+        let recording = |s: usize| borders.partition_point(|b| *b <= s);
+        let (mut stop, mut first) = (0, None);
+        let mut of = |&s: &usize| {
+            let here = (recording(s), own.q[s]);
+            let same = first
+                .is_some_and(|(r, q): (usize, f64)| r == here.0 && (q - here.1).abs() <= tolerance);
+            if !same {
+                stop += usize::from(first.is_some());
+                first = Some(here);
+            }
+            stop
+        };
+        samples.iter().map(&mut of).collect()
+    }
+}
+
+/// Groups in a list that numbers them from 0 on.
+fn count(groups: &[usize]) -> usize {
+    groups.last().map_or(0, |last| last + 1)
+}
+
+impl Level {
+    fn new(solution: &Solution, changes: &[Change], borders: &[usize]) -> Option<Self> {
+        let model = &solution.model;
+        let candidates = Candidates::new(solution);
+        let used = solution.used_samples();
+        let of_change = |change: &Change| {
+            let number = candidates
+                .list
+                .iter()
+                .position(|c| c.moved == change.moved)?;
+            let own = &candidates.list[number];
+            let holds = holds(change, own.pattern, borders, &used, model.problem.samples);
+            Some((own.columns.clone(), holds, candidates.prior(number)))
+        };
+        let parts: Vec<_> = changes.iter().map(of_change).collect::<Option<_>>()?;
+        let mut starts = vec![0];
+        for (columns, ..) in &parts {
+            starts.push(starts[starts.len() - 1] + columns.len());
+        }
+        let width = starts[parts.len()];
+        let (joints, places) = candidates.joint_columns();
+        let n = model.free();
+        let (mut h, mut g) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let (mut e, mut own) = (DMatrix::zeros(n, width), DMatrix::zeros(width, width));
+        let mut out = Self {
+            numbers: Vec::new(),
+            samples: Vec::new(),
+            residuals: Vec::new(),
+            joints,
+            starts,
+            covariance: DMatrix::zeros(0, 0),
+            ce: DMatrix::zeros(0, 0),
+            u: DVector::zeros(width),
+            information: DMatrix::zeros(0, 0),
+            cost: 0.0,
+            freedom: 0.0,
+            log_det: 0.0,
+        };
+        let mut work = Workspace::new(model);
+        work.cache.update(&model.problem, &solution.values);
+        for sample in looked_at(&used, borders, SAMPLES).samples {
+            let objective = solution.objective();
+            let Some(rows) = whitened(objective, &solution.values, sample, &mut work) else {
+                continue;
+            };
+            let all = candidates.whitened(solution, sample, &rows, &work);
+            let mut b = DMatrix::zeros(rows.w.len(), width);
+            for (k, (columns, holds, _)) in parts.iter().enumerate() {
+                let part = all.columns_range(columns.clone()) * holds[sample];
+                b.columns_mut(out.starts[k], columns.len()).copy_from(&part);
+            }
+            h.gemm_tr(1.0, &rows.a, &rows.a, 1.0);
+            g.gemv_tr(1.0, &rows.a, &rows.w, 1.0);
+            e.gemm_tr(1.0, &rows.a, &b, 1.0);
+            own.gemm_tr(1.0, &b, &b, 1.0);
+            out.cost += rows.w.norm_squared();
+            out.freedom += rows.w.len() as f64;
+            out.log_det += rows.log_det;
+            out.numbers.push(sample);
+            out.residuals.push(rows.w);
+            out.samples.push(Sample {
+                a: rows.a,
+                joints: all.select_columns(&places),
+                changes: b,
+            });
+        }
+        let mut system = NormalEquations::of(&h, &g);
+        add_prior(model, &solution.values, &mut system);
+        out.covariance = covariance_of(&system)?;
+        let gradient = DVector::from_column_slice(&system.g);
+        let step = -(&out.covariance * &gradient);
+        out.cost += system.prior + gradient.dot(&step);
+        for (w, sample) in out.residuals.iter_mut().zip(&out.samples) {
+            w.gemv(1.0, &sample.a, &step, 1.0);
+            out.u.gemv_tr(1.0, &sample.changes, w, 1.0);
+        }
+        out.ce = &out.covariance * &e;
+        out.information = own - e.tr_mul(&out.ce);
+        for (k, (_, _, prior)) in parts.iter().enumerate() {
+            for i in out.starts[k]..out.starts[k + 1] {
+                out.information[(i, i)] += prior;
+            }
+        }
+        let parameters = model.columns.iter().map(|p| &model.problem.parameters[*p]);
+        let priors = parameters.filter(|p| p.prior_sigma.is_some()).count();
+        out.freedom = (out.freedom + priors as f64 - n as f64).max(1.0);
+        // ln|H| = −ln|C|
+        out.log_det -= log_det(&Cholesky::new(out.covariance.clone())?);
+        (out.cost.is_finite() && out.cost > 0.0).then_some(out)
+    }
+
+    /// −2 ln L of equation (1), where `gain` of the cost is explained.
+    fn surprise(&self, gain: f64, log_det: f64) -> f64 {
+        /// Exact data have no noise to compare with.
+        const LEFT: f64 = 1e-12;
+        let left = (self.cost - gain).max(self.cost * LEFT);
+        self.freedom * left.ln() + self.log_det + log_det
+    }
+
+    /// No joint scatters.
+    fn without_scatter(&self) -> Fits {
+        self.fits(0.0, 0.0, &self.u, &self.information)
+    }
+
+    /// Given what the scatter explains, and U and I of the changes beside it.
+    fn fits(&self, gain: f64, log_det: f64, u: &DVector<f64>, information: &DMatrix<f64>) -> Fits {
+        let with = self.starts.windows(2).map(|range| {
+            let (first, width) = (range[0], range[1] - range[0]);
+            let own = information
+                .view((first, first), (width, width))
+                .into_owned();
+            let u = u.rows(first, width).into_owned();
+            let more = Cholesky::new(own).map_or(0.0, |factor| u.dot(&factor.solve(&u)));
+            self.surprise(gain + more, log_det)
+        });
+        Fits {
+            without: self.surprise(gain, log_det),
+            with: with.collect(),
+        }
+    }
+
+    /// One joint scatters, with one draw for every group of samples: by σ, in `unit` rad.
+    fn scattering(&self, joint: usize, groups: &[usize], unit: f64) -> Vec<(f64, Fits)> {
+        let (n, m) = (self.covariance.nrows(), count(groups));
+        let width = self.u.len();
+        let (mut e, mut u) = (DMatrix::zeros(n, m), DVector::zeros(m));
+        let mut diagonal = DVector::<f64>::zeros(m);
+        let mut cross = DMatrix::<f64>::zeros(m, width);
+        for ((sample, w), &group) in self.samples.iter().zip(&self.residuals).zip(groups) {
+            let own = sample.joints.column(joint);
+            e.column_mut(group).gemv_tr(1.0, &sample.a, &own, 1.0);
+            u[group] += own.dot(w);
+            diagonal[group] += own.norm_squared();
+            let beside = sample.changes.tr_mul(&own);
+            for c in 0..width {
+                cross[(group, c)] += beside[c];
+            }
+        }
+        cross -= e.tr_mul(&self.ce);
+        let mut k = -(e.transpose() * (&self.covariance * &e));
+        for i in 0..m {
+            k[(i, i)] += diagonal[i];
+        }
+        // σ² of one unit of whitened noise.
+        let s2 = self.cost / self.freedom;
+        let of = |&sigma: &f64| {
+            let tau2 = (sigma * unit).powi(2) / s2;
+            let mut inner = k.clone();
+            for i in 0..m {
+                inner[(i, i)] += 1.0 / tau2;
+            }
+            let factor = Cholesky::new(inner)?;
+            let solved = factor.solve(&u);
+            let gain = u.dot(&solved);
+            let crossed = factor.solve(&cross);
+            let beside = &self.u - cross.tr_mul(&solved);
+            let information = &self.information - cross.tr_mul(&crossed);
+            let log_det = log_det(&factor) + m as f64 * tau2.ln();
+            let fits = self.fits(gain, log_det, &beside, &information);
+            let s2 = ((self.cost - gain) / self.freedom).max(0.0);
+            let sigma = (tau2 * s2).sqrt();
+            let draws = solved.iter().filter(|draw| draw.abs() > 0.5 * sigma);
+            (draws.count() >= DRAWS).then_some((sigma, fits))
+        };
+        TRIED.iter().filter_map(of).collect()
+    }
+}
+
+/// ln of the determinant of what was factored.
+fn log_det(factor: &Cholesky<f64, nalgebra::Dyn>) -> f64 {
+    factor
+        .l_dirty()
+        .diagonal()
+        .iter()
+        .map(|x| 2.0 * x.ln())
+        .sum()
+}
