@@ -259,3 +259,40 @@ fn bodies_that_the_tracker_calls_otherwise_are_named_and_mapped() {
         "{told}"
     );
 }
+
+/// A column that was shifted in a spreadsheet is of no kind that a hypothesis knows; the joint is named all the same.
+#[test]
+fn a_joint_whose_column_was_shifted_is_named() {
+    let table = "robots/ripley/arm_poses.csv";
+    let dir = Scratch::new().robot("ripley");
+    let text = dir.read(table);
+    let (comments, rows): (Vec<&str>, Vec<&str>) = text.lines().partition(|l| l.starts_with('#'));
+    let mut rows: Vec<Vec<String>> = rows
+        .iter()
+        .map(|row| row.split(',').map(str::to_owned).collect())
+        .collect();
+    let elbow = rows[0]
+        .iter()
+        .position(|c| c == "elbow_deg")
+        .expect("a column");
+    for i in (2..rows.len()).rev() {
+        rows[i][elbow] = rows[i - 1][elbow].clone();
+    }
+    let rows = rows.iter().map(|row| row.join(","));
+    let all: Vec<String> = comments
+        .into_iter()
+        .map(str::to_owned)
+        .chain(rows)
+        .collect();
+    let dir = dir.file(table, all.join("\n") + "\n");
+    let ran = dir.calib(["check", "robots/ripley.yaml"]);
+    assert_ne!(ran.code, 0);
+    let said = format!("{}{}", ran.stdout, ran.stderr);
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    for part in [
+        "Without the readings of joint `elbow` in `arm_poses`",
+        "What belongs to a row stands 1 row later in this column.",
+    ] {
+        assert!(said.contains(part), "{part}:\n{said}");
+    }
+}

@@ -10,6 +10,8 @@ use std::f64::consts::TAU;
 const STILL: f64 = 1e-3;
 /// How far beyond a limit a joint may be: controllers overshoot by about this, rad or m.
 const OVER_LIMIT: f64 = 2e-3;
+/// Fewer readings that a full turn brings inside are single mistakes.
+const WRAPPED: usize = 3;
 /// Part of the asked range that must be covered. Grids of ten steps end half a step early.
 const COVERED: f64 = 0.9;
 /// Revolute joints turn at most this often to either side; more is degrees taken for radians.
@@ -92,8 +94,14 @@ pub(super) fn limits(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
             .filter(|&q| outside(q))
             .max_by(|a, b| (a - low).max(high - a).total_cmp(&(b - low).max(high - b)));
         let amount = |value: f64| Fact::number(value, unit(poses, joint));
+        // A full turn more or less brings every reading inside.
+        let turns = unit(poses, joint) == Unit::Radian;
+        let inside = |q: f64| !outside(q + TAU) || !outside(q - TAU);
+        let wraps =
+            turns && rows.len() >= WRAPPED && q.iter().flatten().all(|&q| !outside(q) || inside(q));
+        let kind = if wraps { "wraps" } else { "" };
         findings.push(
-            Finding::new(catalog::JOINT_OUTSIDE_LIMITS, Subject::joint(joint))
+            Finding::of_kind(catalog::JOINT_OUTSIDE_LIMITS, kind, Subject::joint(joint))
                 .with("rows", Fact::count(rows.len()))
                 .with("low", amount(low))
                 .with("high", amount(high))

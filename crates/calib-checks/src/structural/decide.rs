@@ -12,6 +12,7 @@ use super::likelihood::{Opinion, opinion};
 use super::naming::{Asked, EQUIVALENT_WITHIN, on_twin};
 use super::outcome::{Correction, Decision, Design, Evidence, Named, Options, Outcome};
 use super::ranking::{Ranking, distinct, few_samples, ratio};
+use super::readings::wrong_readings;
 use super::scan::{Scan, Score, Scored};
 use super::screen::screen;
 use super::thinning::thinned;
@@ -39,6 +40,7 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
             best: None,
             ratio: 1.0,
         },
+        readings: None,
         continuous: None,
         rms: 0.0,
         expected: None,
@@ -92,13 +94,14 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
         outcome.continuous =
             continuous::continuous(&apply_all(&correction, work), &screened, options);
     }
-    outcome.screened = screened
-        .iter()
-        .map(|s| SampleIndex {
-            row: rows[s.row],
-            ..*s
-        })
-        .collect();
+    let original = |s: &SampleIndex| SampleIndex {
+        row: rows[s.row],
+        ..*s
+    };
+    outcome.screened = screened.iter().map(original).collect();
+    if matches!(outcome.decision, Decision::Undecided { .. }) {
+        outcome.readings = wrong_readings(data, &outcome, options);
+    }
     Ok(outcome)
 }
 

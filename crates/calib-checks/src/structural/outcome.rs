@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::continuous::Continuous;
 use super::hypothesis::Scoped;
 use super::ids::{JointIndex, RecordingIndex, SampleIndex};
+use super::readings::WrongReadings;
 
 /// How decisions are made. The defaults are measured, see the book's page on structural hypotheses.
 #[derive(Debug, Clone, PartialEq)]
@@ -157,6 +158,8 @@ pub enum Decision {
 pub struct Outcome {
     /// The decision on discrete hypotheses.
     pub decision: Decision,
+    /// Where nothing is named: the joint without whose readings nominal errors explain the data.
+    pub readings: Option<WrongReadings>,
     /// A gain or a coupling that the data demand beside (or without) the discrete correction.
     pub continuous: Option<Continuous>,
     /// Residual of the data as they are, rms, m, screened samples left out.

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 use super::chain::{Motion, Walk};
 use super::data::{Data, Measured};
 use super::hypothesis::{Hypothesis, Scope, Scoped};
-use super::ids::{JointIndex, LinkIndex};
+use super::ids::{JointIndex, LinkIndex, SampleIndex};
 use super::scan::{Fit, Scan};
 
 /// Alternations between registration and the estimated part; the residual falls by half or more in each.
@@ -218,13 +218,23 @@ fn missing_column(scope: Scope, joint: JointIndex, data: &Data) -> Data {
     let mut filled = data.clone();
     rows.iter()
         .for_each(|&i| filled.readings[i][joint.0] = Some(0.0));
-    let links: Vec<LinkIndex> = data.bodies.iter().map(|b| b.link).collect();
-    let mut walk = Walk::new(&data.chain, &links);
-    let range = range(data, joint);
+    estimated(filled, joint, &rows, &[]).0
+}
+
+/// The data with the position of a joint in these rows taken from the tracker, and the residual of the registration, rms, m.
+pub(super) fn estimated(
+    mut filled: Data,
+    joint: JointIndex,
+    rows: &[usize],
+    screened: &[SampleIndex],
+) -> (Data, f64) {
+    let links: Vec<LinkIndex> = filled.bodies.iter().map(|b| b.link).collect();
+    let mut walk = Walk::new(&filled.chain, &links);
+    let range = range(&filled, joint);
     let mut last = f64::INFINITY;
     for _ in 0..ALTERNATIONS {
         let found: Vec<f64> = {
-            let scan = Scan::new(&filled, &[]);
+            let scan = Scan::new(&filled, screened);
             let fit = scan.fit(None);
             if fit.score.rms > last * (1.0 - SETTLED) {
                 break;
@@ -238,7 +248,7 @@ fn missing_column(scope: Scope, joint: JointIndex, data: &Data) -> Data {
             filled.readings[i][joint.0] = Some(q);
         }
     }
-    filled
+    (filled, last)
 }
 
 /// The reading of one joint that explains a row best.

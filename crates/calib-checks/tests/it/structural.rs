@@ -580,3 +580,68 @@ fn study_of_clean_data() {
         }
     }
 }
+
+/// The column of one joint, wrong in a way that is no hypothesis.
+fn spoiled(data: &Data, joint: usize, how: usize) -> Data {
+    let mut out = data.clone();
+    let n = data.readings.len();
+    let q: Vec<f64> = data.readings.iter().map(|r| r[joint].unwrap()).collect();
+    let mut sorted = q.clone();
+    sorted.sort_by(f64::total_cmp);
+    for (i, row) in out.readings.iter_mut().enumerate() {
+        row[joint] = Some(match how {
+            // Shifted against the other columns, sorted, smoothed.
+            0 => q[(i + n - 1) % n],
+            1 => sorted[i],
+            _ => (q[(i + n - 1) % n] + q[i] + q[(i + 1) % n]) / 3.0,
+        });
+    }
+    out
+}
+
+#[test]
+fn a_joint_whose_column_is_wrong_in_any_way_is_named() {
+    let (mut right, mut wrong, mut shifts, mut cases) = (0, Vec::new(), 0, 0);
+    let bodies = [1, 2, 4].map(BodyKind::Markers);
+    for seed in 0..36_u64 {
+        let body = match seed % 4 {
+            3 => BodyKind::Pose,
+            k => bodies[k as usize],
+        };
+        let poses = [20, 40][(seed / 4) as usize % 2];
+        let errors = [SMALL, BIG][(seed / 8) as usize % 2];
+        let setting = Setting::new(51_000 + seed, Plan::Poses(poses), body, errors);
+        let (joint, how) = (1 + (seed as usize % 2), seed as usize % 3);
+        let data = spoiled(&setting.data(true), joint, how);
+        let outcome = explain(&data, &options()).unwrap();
+        cases += 1;
+        let Some(found) = outcome.readings else {
+            continue;
+        };
+        match found.joint == JointIndex(joint) {
+            true => right += 1,
+            false => wrong.push((seed, found)),
+        }
+        shifts += usize::from(how == 0 && found.shift == Some(1));
+        assert!(how == 0 || found.shift.is_none(), "{seed}: {found:?}");
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
+    assert!(
+        right * 10 >= cases * 8 && shifts >= 9,
+        "{right} of {cases}, {shifts} shifts"
+    );
+}
+
+/// Two columns are wrong: without the readings of one joint the data still disagree, and no joint is named that is right.
+#[test]
+fn no_joint_is_named_whose_column_is_right() {
+    for seed in 0..12_u64 {
+        let body = [BodyKind::Markers(1), BodyKind::Markers(4), BodyKind::Pose][seed as usize % 3];
+        let setting = Setting::new(52_000 + seed, Plan::Poses(20), body, BIG);
+        let data = spoiled(&spoiled(&setting.data(true), 1, 0), 2, 1);
+        let outcome = explain(&data, &options()).unwrap();
+        if let Some(found) = outcome.readings {
+            assert!([1, 2].contains(&found.joint.0), "{seed}: {found:?}");
+        }
+    }
+}

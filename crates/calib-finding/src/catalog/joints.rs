@@ -75,6 +75,9 @@ super::topic! {
         "": Error,
             "{rows:row} outside the limits {low} to {high}; the worst value is {worst}.",
             "Check the joint's name, sign and zero, or correct the limits in the URDF.";
+        "wraps": Error,
+            "{rows:row} outside the limits {low} to {high}; the worst value is {worst}. A full turn more or less, all lie within.",
+            "If the readings jump by 360° where the joint passes a boundary, as those of many controllers do, add or subtract 360° in these rows. Otherwise check the joint's name, sign and zero, or the limits in the URDF.";
     }
     /// A joint covers less of its range than the profile asks for.
     COVERAGE = "coverage" {

@@ -135,6 +135,9 @@ super::topic! {
     }
     /// The recordings contradict the nominal robot, and nothing that is known explains it.
     MODEL_DISAGREES = "model-disagrees" {
+        "readings": Error,
+            "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}. Without the readings of joint `{joint}`[[ in {recordings:code}]], its position taken from the tracker instead, {best} rms remain[[ ({next} without those of another joint)]]. In {off} of {rows:row} they are off by more than {least}, in half of them by more than {median}.[[ What belongs to a row stands {earlier:row} earlier in this column.]][[ What belongs to a row stands {later:row} later in this column.]]",
+            "Look at the column of this joint: values that are sorted, smoothed, stuck or shifted against the other columns, or those of another joint.";
         "undecided": Error,
             "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}; no single mistake and no pair explains it[[; the best attempt, {leading:code}, leaves {best}]].",
             "Check that URDF and robot are the same model, the links of the bodies, and that joints and tracker recorded the same motion.";

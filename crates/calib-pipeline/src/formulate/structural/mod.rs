@@ -14,7 +14,8 @@ mod named;
 use std::collections::BTreeMap;
 
 use calib_checks::structural::{
-    Chain, Decision, Options, Outcome, RecordingIndex, explain, registration_residual, thin,
+    Chain, Decision, Options, Outcome, RecordingIndex, Scope, WrongReadings, explain,
+    registration_residual, thin,
 };
 use calib_finding::{Fact, Finding, Severity, Subject, catalog};
 use calib_profile::Usage;
@@ -114,10 +115,49 @@ fn of_validation(all: &Layout<'_>, fitted: &Outcome, mut options: Options) -> Ve
     errors.filter(|f| f.severity == Severity::Error).collect()
 }
 
+/// The joint whose readings are wrong.
+fn readings(layout: &Layout<'_>, outcome: &Outcome, found: &WrongReadings) -> Finding {
+    let name = layout.joint(found.joint);
+    let recordings = layout.recordings_in(found.scope);
+    let subject = Subject {
+        recordings: recordings.iter().map(|r| (*r).to_owned()).collect(),
+        ..Subject::joint(name)
+    };
+    let turns = layout.data.chain.turns(found.joint.0) == Some(true);
+    let size = |x: f64| {
+        if turns {
+            Fact::radians(x)
+        } else {
+            Fact::meters(x)
+        }
+    };
+    let rows = |shift: i8| Fact::count(usize::from(shift.unsigned_abs()));
+    let some = (found.scope != Scope::All).then_some(recordings);
+    Finding::of_kind(catalog::MODEL_DISAGREES, "readings", subject)
+        .with("joint", Fact::name(name))
+        .with_some("recordings", some.map(Fact::names))
+        .with("none", Fact::meters(outcome.rms))
+        .with_some("limit", outcome.expected.map(|e| Fact::meters(e.limit)))
+        .with("best", Fact::meters(found.rms))
+        .with_some("next", found.next.map(Fact::meters))
+        .with("off", Fact::count(found.off))
+        .with("rows", Fact::count(found.rows))
+        .with("least", size(found.least))
+        .with("median", size(found.median))
+        .with_some("earlier", found.shift.filter(|s| *s < 0).map(rows))
+        .with_some("later", found.shift.filter(|s| *s > 0).map(rows))
+}
+
 /// The findings of a decision.
 fn decision(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
     match &outcome.decision {
         Decision::Named(named) => named::findings(layout, outcome, named),
+        Decision::Undecided { .. } if outcome.readings.is_some() => {
+            let found = outcome.readings.iter();
+            found
+                .map(|found| readings(layout, outcome, found))
+                .collect()
+        }
         Decision::Undecided { leading, .. } => {
             let limit = outcome.expected.map(|e| e.limit);
             let beyond = limit.is_none_or(|limit| outcome.rms > NOT_NOMINAL * limit);
