@@ -40,6 +40,11 @@ pub enum CliError {
         /// What was given.
         sigma: f64,
     },
+    /// Estimators of plugins are tried in studies of estimators.
+    #[error(
+        "--plugin is for the studies of estimators\n  help: calib study cor|aor --plugin PLUGIN; plugins of a profile are named in it"
+    )]
+    NoEstimatorStudied,
     /// A file was not written.
     #[error(transparent)]
     File(#[from] FileError),
@@ -148,6 +153,7 @@ impl CliError {
             | Self::Cases(_)
             | Self::Record(_)
             | Self::View(_)
+            | Self::NoEstimatorStudied
             | Self::NewPlugin(_) => ExitCode::Usage,
         }
     }

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use calib_cor::Pose;
 use calib_plugin::{
-    Answer as Estimated, AorFit, BodyPose, Control, CorFit, Entry, Host, MotionData, Offer, Origin,
-    PluginError, Registry, SearchPath, Shape, Tables, typed,
+    Answer as Estimated, AorFit, BodyPose, Control, CorFit, Entry, MotionData, Offer, Origin,
+    PluginError, Registry, Shape, Tables, typed,
 };
 use serde_json::{Value, json};
 
@@ -14,14 +14,10 @@ use crate::error::FitError;
 use crate::table::Table;
 use crate::{TableRequest, usage};
 
-/// The plugins that a request names. Nothing is loaded where `CALIB_NO_PLUGINS` is set.
+/// What the plugins that a request names offer.
 fn tables(request: &TableRequest) -> Result<Tables, PluginError> {
-    let refused = std::env::var_os("CALIB_NO_PLUGINS").is_some_and(|set| !set.is_empty());
-    let host = Host::new(SearchPath::from_environment(None), !refused);
     let mut tables = Tables::default();
-    for plugin in &request.plugins {
-        tables.add(&host.load(plugin, None)?)?;
-    }
+    tables.add_named(&request.plugins)?;
     Ok(tables)
 }
 

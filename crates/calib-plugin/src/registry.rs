@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fmt, path::PathBuf, sync::Arc};
 use crate::{
     answer::{Answer, AorFit, CorFit, Failure},
     call::Call,
-    host::{Control, LoadedPlugin, PluginError},
+    host::{Control, Host, LoadedPlugin, PluginError, SearchPath},
     kinds::{Aor, Cor, Reader, ReportWriter},
     motion::{Motion, Shape},
     offer::{Kind, Offer, Value},
@@ -432,6 +432,18 @@ impl Tables {
             .reports()
             .iter()
             .try_for_each(|entry| self.report.register(entry.clone()))
+    }
+
+    /// Adds what the plugins of these names or paths offer, as a user names them. None is loaded where `CALIB_NO_PLUGINS` is set.
+    ///
+    /// # Errors
+    /// [`PluginError`] for plugins that are not found, not loaded or switched off, and for names that are taken.
+    pub fn add_named(&mut self, plugins: &[String]) -> Result<(), PluginError> {
+        let refused = std::env::var_os("CALIB_NO_PLUGINS").is_some_and(|set| !set.is_empty());
+        let host = Host::new(SearchPath::from_environment(None), !refused);
+        plugins
+            .iter()
+            .try_for_each(|plugin| self.add(&host.load(plugin, None)?))
     }
 
     /// Description and origin of everything, by kind and name.

@@ -144,6 +144,9 @@ pub struct Cell {
     pub method: String,
     /// Its id in the table of estimators.
     pub estimator: String,
+    /// Whether a plugin offers it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub from_plugin: bool,
     /// The quantity.
     pub quantity: Quantity,
     /// Trials run.

@@ -39,10 +39,12 @@ mod run;
 mod settings;
 mod state;
 mod tally;
+mod tried;
 
 pub use cell::{Cell, Part, Quantity, Scene};
 pub use claims::{Claim, Measured};
 pub use held::{Standard, Standing, Worst};
 pub use render::{Figure, csv, json, long_tables, markdown, svg, write};
-pub use run::{StudyResult, run};
+pub use run::{StudyResult, run, run_with};
 pub use settings::{Study, StudyError, StudyOptions};
+pub use tried::Tried;

@@ -19,6 +19,7 @@ use crate::{
     settings::{Study, StudyError, StudyOptions},
     state::State,
     tally::Tally,
+    tried::Tried,
 };
 
 /// Trials that one thread does at a stretch: sums are joined block by block, whoever ran them.
@@ -31,6 +32,9 @@ pub struct StudyResult {
     pub calib_study: u32,
     /// Which study.
     pub study: Study,
+    /// Estimators of plugins that were tried, with the plugins.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub plugins: Vec<String>,
     /// Trials of an ordinary cell.
     pub trials: u64,
     /// Seed of all draws.
@@ -54,17 +58,30 @@ pub fn run(
     options: &StudyOptions,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<StudyResult, StudyError> {
+    run_with(study, &Tried::default(), options, progress)
+}
+
+/// As [`run`], with estimators of plugins beside the built-in ones, on the scenes whose measurements they take.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with(
+    study: Study,
+    tried: &Tried,
+    options: &StudyOptions,
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<StudyResult, StudyError> {
     if options.trials == 0 {
         return Err(StudyError::NoTrials { got: 0 });
     }
-    let mut plan = plan(study);
+    let mut plan = plan(study, tried);
     if !options.only.is_empty() {
         plan.retain(|e| {
             let id = e.scene().id();
             options.only.iter().any(|start| id.starts_with(start))
         });
     }
-    let state = State::open(study, options)?;
+    let state = State::open(study, tried, options)?;
     let threads = options.threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -97,23 +114,26 @@ pub fn run(
     lock(&state).close(&order, &cells)?;
 
     let cells: Vec<Cell> = cells.into_iter().flatten().collect();
+    let own = cells.iter().filter(|c| !c.from_plugin);
+    let own: Vec<Cell> = own.cloned().collect();
     Ok(StudyResult {
         calib_study: 1,
+        plugins: tried.names(),
         study,
         trials: options.trials,
         seed: options.seed,
         fits: fits(&cells),
-        standards: held::standards(study, &cells),
-        claims: claims::claims(study, &cells),
+        standards: held::standards(study, &own),
+        claims: claims::claims(study, &own),
         cells,
     })
 }
 
 /// The scenes of a study, in the order of its report.
-fn plan(study: Study) -> Vec<Box<dyn Experiment>> {
+fn plan(study: Study, tried: &Tried) -> Vec<Box<dyn Experiment>> {
     match study {
-        Study::Cor => cor::plan(),
-        Study::Aor => aor::plan(),
+        Study::Cor => cor::plan(tried),
+        Study::Aor => aor::plan(tried),
     }
 }
 

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     cell::Cell,
     settings::{Study, StudyError, StudyOptions},
+    tried::Tried,
 };
 
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -20,6 +21,8 @@ struct Header {
     study: Study,
     trials: u64,
     seed: u64,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    plugins: Vec<String>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -35,7 +38,7 @@ pub(crate) struct State {
 }
 
 impl State {
-    pub fn open(study: Study, options: &StudyOptions) -> Result<Self, StudyError> {
+    pub fn open(study: Study, tried: &Tried, options: &StudyOptions) -> Result<Self, StudyError> {
         // The file of a part of the scenes would pass for the file of all.
         let Some(folder) = options.out.as_ref().filter(|_| options.only.is_empty()) else {
             return Ok(Self {
@@ -49,6 +52,7 @@ impl State {
             study,
             trials: options.trials,
             seed: options.seed,
+            plugins: tried.names(),
         };
         let path = folder.join(format!("{}.state.jsonl", study.word()));
         let settings = serde_json::to_string(&header)?;
@@ -100,8 +104,12 @@ fn parsed(line: &str) -> Option<Line<Vec<Cell>>> {
 
 impl Header {
     fn words(&self) -> String {
+        let with = match self.plugins.as_slice() {
+            [] => String::new(),
+            names => format!(" and {}", names.join(", ")),
+        };
         format!(
-            "`{}` with {} trials and seed {} (version {})",
+            "`{}` with {} trials, seed {}{with} (version {})",
             self.study.word(),
             self.trials,
             self.seed,

@@ -100,7 +100,8 @@ impl Tally {
         let mut cell = Cell {
             scene: scene.clone(),
             method: row.method.clone(),
-            estimator: row.estimator.to_owned(),
+            estimator: row.estimator.clone(),
+            from_plugin: row.from_plugin,
             quantity: row.quantity,
             trials: self.trials,
             answered: self.answered,
@@ -175,7 +176,9 @@ impl Tally {
 #[derive(Debug, Clone)]
 pub(crate) struct Row {
     pub method: String,
-    pub estimator: &'static str,
+    pub estimator: String,
+    /// Whether a plugin offers the estimator.
+    pub from_plugin: bool,
     pub quantity: Quantity,
     /// Trace of the Cramér–Rao bound, squared unit.
     pub bound: Option<f64>,
@@ -203,7 +206,8 @@ mod tests {
     fn row(bound: f64) -> Row {
         Row {
             method: "m".into(),
-            estimator: "m",
+            estimator: "m".to_owned(),
+            from_plugin: false,
             quantity: Quantity::Center,
             bound: Some(bound),
             control: Some(bound),

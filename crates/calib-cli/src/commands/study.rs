@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use calib_files::{OutputFile, write_results};
-use calib_pipeline::ExitCode;
-use calib_study::{Study, StudyOptions, cases, faults};
+use calib_pipeline::{ExitCode, PipelineError};
+use calib_plugin::Tables;
+use calib_study::{Study, StudyOptions, Tried, cases, faults};
 use clap::{Args, ValueEnum};
 
-use super::plugin_options::PluginOptions;
+use super::plugin_options::{NamedPlugins, PluginOptions};
 use crate::error::CliError;
 use crate::terminal::{Console, Counted, emit, emit_written};
 
@@ -41,6 +42,9 @@ pub struct StudyRun {
     /// Which plugins are loaded
     #[command(flatten)]
     plugins: PluginOptions,
+    /// Estimators of plugins to try beside the built-in ones [cor, aor]
+    #[command(flatten)]
+    named: NamedPlugins,
     /// Print JSON instead of Markdown
     #[arg(long)]
     json: bool,
@@ -63,6 +67,10 @@ enum StudyName {
 
 /// Runs a study.
 pub fn run(console: &Console, study: &StudyRun) -> Result<ExitCode, CliError> {
+    let of_estimators = matches!(study.study, StudyName::Cor | StudyName::Aor);
+    if !of_estimators && !study.named.plugin.is_empty() {
+        return Err(CliError::NoEstimatorStudied);
+    }
     match study.study {
         StudyName::Cor => estimators(console, study, Study::Cor),
         StudyName::Aor => estimators(console, study, Study::Aor),
@@ -83,8 +91,13 @@ fn estimators(console: &Console, study: &StudyRun, which: Study) -> Result<ExitC
         resume: !study.restart,
         only: Vec::new(),
     };
+    let mut tables = Tables::default();
+    let added = tables.add_named(&study.named.plugin);
+    let tried = added.and_then(|()| Tried::of(&tables, &study.named.parameter));
+    let tried = tried.map_err(PipelineError::from)?;
     let bar = Counted::new(console, "trials");
-    let result = calib_study::run(which, &options, &|done, total| bar.at(done, total))?;
+    let progress = |done, total| bar.at(done, total);
+    let result = calib_study::run_with(which, &tried, &options, &progress)?;
     bar.end();
     emit(&if study.json {
         calib_study::json(&result)

@@ -60,7 +60,7 @@ impl CliError {
             Self::Table { .. } => "table-not-written",
             Self::Simulation { .. } => "simulation",
             Self::Json { .. } | Self::Report(_) => "report-not-written",
-            Self::Study(_) | Self::Cases(_) => "study",
+            Self::Study(_) | Self::Cases(_) | Self::NoEstimatorStudied => "study",
             Self::Record(_) => "record",
             Self::View(_) => "view",
             Self::Capture(_) => "capture",

@@ -103,11 +103,7 @@ impl Estimators {
     /// As [`Estimators::of_profile`].
     pub fn with_plugins(plugins: &[String]) -> Result<Self, PipelineError> {
         let mut estimators = Self::built_in()?;
-        let refused = std::env::var_os("CALIB_NO_PLUGINS").is_some_and(|set| !set.is_empty());
-        let host = Host::new(SearchPath::from_environment(None), !refused);
-        for plugin in plugins {
-            estimators.tables.add(&host.load(plugin, None)?)?;
-        }
+        estimators.tables.add_named(plugins)?;
         Ok(estimators)
     }
 

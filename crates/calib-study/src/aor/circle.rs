@@ -11,13 +11,16 @@
 use calib_aor::{Input, Options, bounds};
 use nalgebra::{Matrix2, Matrix6, Point3, Vector2, Vector3};
 
-use super::method::{Method, POINT, arm, axis, method, truth, turned};
+use calib_plugin::{Aor, Shape};
+
+use super::method::{Method, POINT, arm, axis, method, plugin_rows, record, taking, truth, turned};
 use crate::{
     cell::Scene,
     experiment::Experiment,
     motion::steps,
     noise::Noise,
     tally::{Row, Tally},
+    tried::{Tool, Tried, motion},
 };
 
 pub(crate) struct CircleScene {
@@ -27,11 +30,12 @@ pub(crate) struct CircleScene {
     /// Factors of n·ε_i in the tilt of (2).
     factors: Vec<Vector3<f64>>,
     methods: Vec<Method>,
+    plugins: Vec<(Tool<dyn Aor>, Shape)>,
     rows: Vec<Row>,
 }
 
 impl CircleScene {
-    pub fn new(scene: Scene, [from, to]: [f64; 2]) -> Self {
+    pub fn new(scene: Scene, [from, to]: [f64; 2], tried: &Tried) -> Self {
         let n = axis().into_inner();
         let start = arm(scene.radius_m);
         let arms: Vec<Vector3<f64>> = steps(from, to, scene.samples)
@@ -68,12 +72,15 @@ impl CircleScene {
         let positions: Vec<Point3<f64>> = arms.iter().map(|a| Point3::from(POINT + a)).collect();
         let free = bounds::common_line(&[positions], &truth(), scene.sigma_t_m);
         let control = inverse.map(|s| variance * s.trace() / scene.radius_m.powi(2));
-        let (methods, rows) = methods(free, held, control);
+        let (methods, mut rows) = methods(free, held, control);
+        let plugins = taking(tried, &[Shape::Points]);
+        rows.extend(plugins.iter().map(|(t, _)| plugin_rows(t, (free, control))));
         Self {
             scene,
             arms,
             factors,
             methods,
+            plugins,
             rows: rows.into_iter().flatten().collect(),
         }
     }
@@ -161,6 +168,10 @@ impl Experiment for CircleScene {
             if number.is_multiple_of(method.every) {
                 method.record(&Input::Points(&tracks), Some(linear), pair);
             }
+        }
+        let pairs = tallies[2 * self.methods.len()..].chunks_mut(2);
+        for ((tool, shape), pair) in self.plugins.iter().zip(pairs) {
+            record(tool, &motion(*shape, &tracks, &[]), Some(linear), pair);
         }
     }
 }

@@ -79,7 +79,8 @@ impl FrameScene {
             };
             Row {
                 method: name.to_owned(),
-                estimator: id,
+                estimator: id.to_owned(),
+                from_plugin: false,
                 quantity,
                 bound: bound.map(|b| b.fixed_view::<3, 3>(first, first).trace()),
                 control: None,

@@ -3,7 +3,9 @@
 use calib_aor::{Input, Options, bounds};
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
 
-use super::method::{Method, POINT, axis, method, truth, turned};
+use calib_plugin::{Aor, Shape};
+
+use super::method::{Method, POINT, axis, method, plugin_rows, record, taking, truth, turned};
 use crate::{
     cell::Scene,
     experiment::Experiment,
@@ -11,6 +13,7 @@ use crate::{
     motion::steps,
     noise::Noise,
     tally::{Row, Tally},
+    tried::{Tool, Tried, motion},
 };
 
 const MARKERS: usize = 4;
@@ -24,11 +27,12 @@ pub(crate) struct HingeScene {
     free: Option<Linear>,
     encoded: Option<Linear>,
     methods: Vec<Method>,
+    plugins: Vec<(Tool<dyn Aor>, Shape)>,
     rows: Vec<Row>,
 }
 
 impl HingeScene {
-    pub fn new(scene: Scene, arc: f64) -> Self {
+    pub fn new(scene: Scene, arc: f64, tried: &Tried) -> Self {
         let angles: Vec<f64> = steps(0.0, arc, scene.samples).collect();
         let places = layout(scene.radius_m);
         let at = |p: &Vector3<f64>| Point3::from(POINT + p);
@@ -49,7 +53,14 @@ impl HingeScene {
         let encoded = rigid(&angles, &places, true);
         let control = |of: &Option<Linear>| of.as_ref().map(|l| l.trace * sigma * sigma);
         let (unknown, known) = (control(&free), control(&encoded));
-        let (methods, rows): (Vec<Method>, Vec<[Row; 2]>) = [
+        let plugins = taking(tried, &[Shape::Markers, Shape::Points]);
+        let of_plugins = plugins.iter().map(|(tool, shape)| {
+            let rigid = *shape == Shape::Markers;
+            let bound = if rigid { bundle(false) } else { spheres };
+            plugin_rows(tool, (bound, unknown))
+        });
+        let of_plugins: Vec<[Row; 2]> = of_plugins.collect();
+        let (methods, mut rows): (Vec<Method>, Vec<[Row; 2]>) = [
             method(
                 "hinge_bundle",
                 "hinge_bundle",
@@ -78,6 +89,7 @@ impl HingeScene {
         .into_iter()
         .flatten()
         .unzip();
+        rows.extend(of_plugins);
         Self {
             scene: Scene {
                 condition: format!("{MARKERS} markers"),
@@ -88,6 +100,7 @@ impl HingeScene {
             free,
             encoded,
             methods,
+            plugins,
             rows: rows.into_iter().flatten().collect(),
         }
     }
@@ -187,6 +200,10 @@ impl Experiment for HingeScene {
                 known
             };
             method.record(&Input::Markers(&tracks), Some(linear), pair);
+        }
+        let pairs = tallies[2 * self.methods.len()..].chunks_mut(2);
+        for ((tool, shape), pair) in self.plugins.iter().zip(pairs) {
+            record(tool, &motion(*shape, &tracks, &[]), Some(unknown), pair);
         }
     }
 }

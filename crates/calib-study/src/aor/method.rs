@@ -4,9 +4,12 @@ use calib_aor::{EstimatorInfo, Input, Options, estimators};
 use calib_geometry::Line;
 use nalgebra::{Matrix6, Point3, Unit, UnitQuaternion, Vector3};
 
+use calib_plugin::{Aor, MotionData, Shape};
+
 use crate::{
     cell::Quantity,
     tally::{Row, Tally},
+    tried::{Tool, Tried},
 };
 
 /// A point of the axis in the tracker's frame, m.
@@ -55,11 +58,10 @@ pub(crate) fn method(
     let info = estimators().iter().find(|e| e.id == id)?;
     let row = |quantity, first: usize| Row {
         method: name.to_owned(),
-        estimator: info.id,
+        estimator: info.id.to_owned(),
+        from_plugin: false,
         quantity,
-        bound: bound
-            .map(|b| b.fixed_view::<3, 3>(first, first).trace())
-            .filter(|b| *b > 0.0),
+        bound: part(bound, first),
         control: control.filter(|_| quantity == Quantity::Direction),
     };
     let rows = [row(Quantity::Direction, 0), row(Quantity::Offset, 3)];
@@ -76,29 +78,78 @@ pub(crate) fn method(
 impl Method {
     /// Runs the estimator; `tallies`: direction, offset. `linear`: the efficient linear estimator's direction error.
     pub fn record(&self, input: &Input<'_>, linear: Option<Vector3<f64>>, tallies: &mut [Tally]) {
-        let [direction, offset] = tallies else {
-            return;
-        };
         let outcome = match self.info.run(input, &self.options.only(self.info.options)) {
             Ok(outcome) => outcome,
             Err(_) => {
-                direction.verdict(false, false);
-                offset.verdict(false, false);
+                tallies.iter_mut().for_each(|t| t.verdict(false, false));
                 return;
             }
         };
         let Some(e) = outcome.estimate() else {
-            direction.verdict(false, false);
-            offset.verdict(false, false);
+            tallies.iter_mut().for_each(|t| t.verdict(false, false));
             return;
         };
-        let observable = outcome.is_observable();
-        let covariance = |first: usize| e.covariance.fixed_view::<3, 3>(first, first).trace();
-        direction.error(observable, tilt(&e.line.direction), covariance(0), linear);
-        // The estimate's covariance is that of its own point, not of the one nearest to ours.
-        let beside = e.line.closest_point_to(&Point3::from(POINT)) - Point3::from(POINT);
-        offset.error(observable, beside, f64::NAN, None);
+        let covariance = e.covariance.fixed_view::<3, 3>(0, 0).trace();
+        recorded(
+            &e.line,
+            (outcome.is_observable(), covariance),
+            linear,
+            tallies,
+        );
     }
+}
+
+/// The errors of a line; the trace of the covariance of its direction may be NaN.
+fn recorded(
+    line: &Line,
+    (observable, covariance): (bool, f64),
+    linear: Option<Vector3<f64>>,
+    tallies: &mut [Tally],
+) {
+    let [direction, offset] = tallies else {
+        return;
+    };
+    direction.error(observable, tilt(&line.direction), covariance, linear);
+    // The estimate's covariance is that of its own point, not of the one nearest to ours.
+    let beside = line.closest_point_to(&Point3::from(POINT)) - Point3::from(POINT);
+    offset.error(observable, beside, f64::NAN, None);
+}
+
+/// One trial of an estimator of a plugin; `tallies`: direction, offset.
+pub(crate) fn record(
+    tool: &Tool<dyn Aor>,
+    motion: &MotionData,
+    linear: Option<Vector3<f64>>,
+    tallies: &mut [Tally],
+) {
+    match tool.axis(motion) {
+        Some((line, answer)) => recorded(&line, answer, linear, tallies),
+        None => tallies.iter_mut().for_each(|t| t.verdict(false, false)),
+    }
+}
+
+/// Estimators of plugins that take one of these shapes, the first that fits.
+pub(crate) fn taking(tried: &Tried, shapes: &[Shape]) -> Vec<(Tool<dyn Aor>, Shape)> {
+    let all = tried.axes().iter();
+    all.filter_map(|tool| Some((tool.clone(), tool.takes(shapes)?)))
+        .collect()
+}
+
+/// The rows of an estimator of a plugin.
+pub(crate) fn plugin_rows(
+    tool: &Tool<dyn Aor>,
+    (bound, control): (Option<Matrix6<f64>>, Option<f64>),
+) -> [Row; 2] {
+    [
+        tool.row(Quantity::Direction, part(bound, 0), control),
+        tool.row(Quantity::Offset, part(bound, 3), None),
+    ]
+}
+
+/// Trace of the bound of the direction (0) or of the point (3).
+fn part(bound: Option<Matrix6<f64>>, first: usize) -> Option<f64> {
+    let trace = bound.map(|b| b.fixed_view::<3, 3>(first, first).trace());
+    trace.filter(|b| *b > 0.0)
 }
 
 /// The rotation vector that turns the true axis to the estimate, across the axis; an axis has no sign.

@@ -11,6 +11,7 @@ mod poses;
 use crate::{
     cell::{Part, Scene},
     experiment::Experiment,
+    tried::Tried,
 };
 
 /// The paper's counts of poses for one axis.
@@ -29,14 +30,18 @@ pub(crate) const AXES: [(&str, [f64; 2]); 2] =
     [("hand z", [-45.0, 135.0]), ("hand x", [-45.0, 80.0])];
 
 /// Every scene of the study.
-pub(crate) fn plan() -> Vec<Box<dyn Experiment>> {
+pub(crate) fn plan(tried: &Tried) -> Vec<Box<dyn Experiment>> {
     let mut plan: Vec<Box<dyn Experiment>> = Vec::new();
     for (name, range) in AXES {
         for samples in COUNTS {
             for radius_mm in RADII_MM {
                 for sigma_mm in SIGMAS_MM {
                     let scene = scene(Part::Grid, name, samples, radius_mm, sigma_mm);
-                    plan.push(Box::new(circle::CircleScene::new(scene.clone(), range)));
+                    plan.push(Box::new(circle::CircleScene::new(
+                        scene.clone(),
+                        range,
+                        tried,
+                    )));
                     for turn_deg in TURNS_DEG {
                         plan.push(Box::new(poses::PoseScene::new(
                             Scene {
@@ -44,6 +49,7 @@ pub(crate) fn plan() -> Vec<Box<dyn Experiment>> {
                                 ..scene.clone()
                             },
                             range,
+                            tried,
                         )));
                     }
                 }
@@ -56,7 +62,7 @@ pub(crate) fn plan() -> Vec<Box<dyn Experiment>> {
                 for sigma_mm in SIGMAS_MM {
                     let motion = format!("arc {arc}°");
                     let scene = scene(Part::Markers, &motion, samples, radius_mm, sigma_mm);
-                    plan.push(Box::new(hinge::HingeScene::new(scene, arc)));
+                    plan.push(Box::new(hinge::HingeScene::new(scene, arc, tried)));
                 }
             }
         }

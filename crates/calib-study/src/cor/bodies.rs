@@ -63,7 +63,8 @@ impl BodiesScene {
         let rows = estimator
             .map(|info| Row {
                 method: info.id.to_owned(),
-                estimator: info.id,
+                estimator: info.id.to_owned(),
+                from_plugin: false,
                 quantity: Quantity::Center,
                 bound: bound.map(|c| c.fixed_view::<3, 3>(3, 3).trace()),
                 control: None,

@@ -90,7 +90,8 @@ impl DepthScene {
             if let Some(info) = estimators().iter().find(|e| e.id == id) {
                 rows.push(Row {
                     method: name.to_owned(),
-                    estimator: info.id,
+                    estimator: info.id.to_owned(),
+                    from_plugin: false,
                     quantity: Quantity::Center,
                     bound: bound.map(|c| c.trace()),
                     control: bound.map(|c| c.trace()),

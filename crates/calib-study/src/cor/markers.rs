@@ -1,19 +1,21 @@
 //! Raw markers of a rigid body on a ball joint: the bundle against spheres of the same markers.
 
 use calib_cor::{Input, Options, bounds};
+use calib_plugin::{Cor, Shape};
 use nalgebra::{DMatrix, Matrix3, Point3, UnitQuaternion, Vector3};
 
 use super::{
-    method::{Gets, Method, method, record},
+    method::{Gets, Method, method, record, taking},
     poses::{CENTER, body_point},
 };
 use crate::{
-    cell::Scene,
+    cell::{Quantity, Scene},
     experiment::Experiment,
     linear::{Linear, linear},
     motion::Range,
     noise::Noise,
     tally::{Row, Tally},
+    tried::{Tool, Tried, motion},
 };
 
 /// Four markers around the body's origin, m: a cluster of 60–90 mm.
@@ -32,11 +34,12 @@ pub(crate) struct MarkerScene {
     /// The efficient linear estimator of the bundle, of noise in the body's axes.
     gains: Vec<DMatrix<f64>>,
     methods: Vec<Method>,
+    plugins: Vec<(Tool<dyn Cor>, Shape)>,
     rows: Vec<Row>,
 }
 
 impl MarkerScene {
-    pub fn new(scene: Scene) -> Self {
+    pub fn new(scene: Scene, tried: &Tried) -> Self {
         let turns = Range::Hand.turns(scene.samples);
         let point = body_point(scene.radius_m);
         let layout: Vec<Vector3<f64>> = CLUSTER.iter().map(|b| b - point).collect();
@@ -57,7 +60,7 @@ impl MarkerScene {
         .into_iter()
         .flatten()
         .collect();
-        let rows = methods
+        let mut rows: Vec<Row> = methods
             .iter()
             .map(|m| {
                 let own = m.info.id == "ball_bundle";
@@ -67,6 +70,12 @@ impl MarkerScene {
                 }
             })
             .collect();
+        let plugins = taking(tried, &[Shape::Markers, Shape::Points]);
+        rows.extend(plugins.iter().map(|(tool, shape)| {
+            let rigid = *shape == Shape::Markers;
+            let bound = if rigid { bundle } else { spheres };
+            tool.row(Quantity::Center, bound, control)
+        }));
         Self {
             scene: Scene {
                 condition: "4 markers".to_owned(),
@@ -76,6 +85,7 @@ impl MarkerScene {
             layout,
             gains: rigid.map_or_else(Vec::new, |l| l.gains),
             methods,
+            plugins,
             rows,
         }
     }
@@ -135,9 +145,14 @@ impl Experiment for MarkerScene {
             }
         }
         let options = Options::default();
-        for (method, tally) in self.methods.iter().zip(tallies) {
+        let (own, others) = tallies.split_at_mut(self.methods.len());
+        for (method, tally) in self.methods.iter().zip(own) {
             let input = Input::Markers(&tracks);
             record(method.info, &input, &options, (CENTER, Some(linear)), tally);
+        }
+        for ((tool, shape), tally) in self.plugins.iter().zip(others) {
+            let motion = motion(*shape, &tracks, &[]);
+            tool.record(&motion, (CENTER, Some(linear)), tally);
         }
     }
 }

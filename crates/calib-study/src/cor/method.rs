@@ -1,11 +1,13 @@
 //! An estimator of the table, and how a study uses it.
 
 use calib_cor::{EstimatorInfo, Input, Options, estimators};
+use calib_plugin::{Cor, Shape};
 use nalgebra::Vector3;
 
 use crate::{
     cell::Quantity,
     tally::{Row, Tally},
+    tried::{Tool, Tried},
 };
 
 /// The data a method is given.
@@ -44,11 +46,19 @@ pub(crate) fn method(
     })
 }
 
+/// Estimators of plugins that take one of these shapes, the first that fits.
+pub(crate) fn taking(tried: &Tried, shapes: &[Shape]) -> Vec<(Tool<dyn Cor>, Shape)> {
+    let all = tried.centers().iter();
+    all.filter_map(|tool| Some((tool.clone(), tool.takes(shapes)?)))
+        .collect()
+}
+
 impl Method {
     pub fn row(&self, bound: Option<f64>) -> Row {
         Row {
             method: self.name.to_owned(),
-            estimator: self.info.id,
+            estimator: self.info.id.to_owned(),
+            from_plugin: false,
             quantity: Quantity::Center,
             bound,
             control: bound,

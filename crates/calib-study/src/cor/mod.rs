@@ -13,6 +13,7 @@ use crate::{
     cell::{Part, Scene},
     experiment::Experiment,
     motion::{Range, grid},
+    tried::Tried,
 };
 
 /// The paper's counts of poses.
@@ -29,7 +30,7 @@ pub(crate) const DEPTHS: [f64; 2] = [3.0, 5.0];
 pub(crate) const ARCS_DEG: [f64; 5] = [180.0, 90.0, 45.0, 30.0, 20.0];
 
 /// Every scene of the study.
-pub(crate) fn plan() -> Vec<Box<dyn Experiment>> {
+pub(crate) fn plan(tried: &Tried) -> Vec<Box<dyn Experiment>> {
     let mut plan: Vec<Box<dyn Experiment>> = Vec::new();
     for samples in COUNTS {
         for radius_mm in RADII_MM {
@@ -38,19 +39,18 @@ pub(crate) fn plan() -> Vec<Box<dyn Experiment>> {
                     plan.push(Box::new(poses::PoseScene::paper(
                         Range::Hand,
                         scene(Part::Grid, samples, radius_mm, sigma_mm, turn_deg),
+                        tried,
                     )));
                 }
                 plan.push(Box::new(poses::PoseScene::paper(
                     Range::Head,
                     scene(Part::Grid, samples, radius_mm, sigma_mm, 1.0),
+                    tried,
                 )));
-                plan.push(Box::new(markers::MarkerScene::new(scene(
-                    Part::Markers,
-                    samples,
-                    radius_mm,
-                    sigma_mm,
-                    0.0,
-                ))));
+                plan.push(Box::new(markers::MarkerScene::new(
+                    scene(Part::Markers, samples, radius_mm, sigma_mm, 0.0),
+                    tried,
+                )));
             }
             for sigma_mm in [0.5, 1.0, 2.5, 5.0] {
                 for ratio in DEPTHS {
@@ -84,6 +84,7 @@ pub(crate) fn plan() -> Vec<Box<dyn Experiment>> {
                 format!("{arc}° × {arc}°"),
                 turns,
                 scene(Part::Arc, 63, 250.0, sigma_mm, 0.1),
+                tried,
             )));
         }
     }

@@ -92,7 +92,8 @@ impl OneAxis {
             if let Some(info) = estimators().iter().find(|e| e.id == id) {
                 rows.push(Row {
                     method: name.to_owned(),
-                    estimator: info.id,
+                    estimator: info.id.to_owned(),
+                    from_plugin: false,
                     quantity: Quantity::Center,
                     bound: None,
                     control: None,

@@ -81,7 +81,8 @@ impl OutlierScene {
             if let Some(info) = estimators().iter().find(|e| e.id == id) {
                 rows.push(Row {
                     method: name,
-                    estimator: info.id,
+                    estimator: info.id.to_owned(),
+                    from_plugin: false,
                     quantity: Quantity::Center,
                     // The bound of the clean recording; with outliers nobody reaches it.
                     bound: ball.bound(gets),
@@ -98,7 +99,8 @@ impl OutlierScene {
         let oracle = (reach < scene.radius_m).then(|| {
             rows.push(Row {
                 method: "known mixture, points".to_owned(),
-                estimator: "known_mixture",
+                estimator: "known_mixture".to_owned(),
+                from_plugin: false,
                 quantity: Quantity::Center,
                 bound: ball.bound(Gets::Points),
                 control: None,

@@ -9,13 +9,16 @@
 use calib_cor::{Input, Options, Pose, bounds};
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 
-use super::method::{Gets, Method, method, record};
+use calib_plugin::{Cor, Shape};
+
+use super::method::{Gets, Method, method, record, taking};
 use crate::{
-    cell::Scene,
+    cell::{Quantity, Scene},
     experiment::Experiment,
     motion::Range,
     noise::Noise,
     tally::{Row, Tally},
+    tried::{Tool, Tried, motion},
 };
 
 /// The center in the tracker's frame, m: a tripod's distance away, no coordinate special.
@@ -147,11 +150,19 @@ impl Ball {
     }
 }
 
+fn gets(shape: Shape) -> Gets {
+    match shape {
+        Shape::Poses => Gets::Poses,
+        _ => Gets::Points,
+    }
+}
+
 /// Methods on one ball.
 pub(crate) struct PoseScene {
     scene: Scene,
     ball: Ball,
     methods: Vec<Method>,
+    plugins: Vec<(Tool<dyn Cor>, Shape)>,
     rows: Vec<Row>,
     stated: Options,
     unstated: Options,
@@ -160,7 +171,7 @@ pub(crate) struct PoseScene {
 impl PoseScene {
     /// The paper's grid. Positions do not depend on orientation noise: the point estimators that are not the paper's run
     /// where it is zero; the robust ones for poses at 1°.
-    pub fn paper(range: Range, scene: Scene) -> Self {
+    pub fn paper(range: Range, scene: Scene, tried: &Tried) -> Self {
         let scene = Scene {
             motion: range.word().to_owned(),
             ..scene
@@ -197,11 +208,16 @@ impl PoseScene {
                 method("consensus, poses", "consensus", Gets::Poses, false, 5),
             ]);
         }
-        Self::with(scene, turns, methods)
+        Self::with(scene, turns, methods, tried)
     }
 
     /// A range of motion in the study of bias.
-    pub fn arc(motion: String, turns: Vec<UnitQuaternion<f64>>, scene: Scene) -> Self {
+    pub fn arc(
+        motion: String,
+        turns: Vec<UnitQuaternion<f64>>,
+        scene: Scene,
+        tried: &Tried,
+    ) -> Self {
         let methods = vec![
             method("kasa", "kasa", Gets::Points, false, 1),
             method("sfe", "sfe", Gets::Points, false, 1),
@@ -213,19 +229,30 @@ impl PoseScene {
             method("hse", "hse", Gets::Poses, false, 1),
             method("hotspot_ml, σ known", "hotspot_ml", Gets::Poses, true, 1),
         ];
-        Self::with(Scene { motion, ..scene }, turns, methods)
+        Self::with(Scene { motion, ..scene }, turns, methods, tried)
     }
 
-    fn with(scene: Scene, turns: Vec<UnitQuaternion<f64>>, methods: Vec<Option<Method>>) -> Self {
+    fn with(
+        scene: Scene,
+        turns: Vec<UnitQuaternion<f64>>,
+        methods: Vec<Option<Method>>,
+        tried: &Tried,
+    ) -> Self {
         let ball = Ball::new(turns, &scene);
         let methods: Vec<Method> = methods.into_iter().flatten().collect();
-        let rows = methods.iter().map(|m| m.row(ball.bound(m.gets))).collect();
+        let mut rows: Vec<Row> = methods.iter().map(|m| m.row(ball.bound(m.gets))).collect();
+        let plugins = taking(tried, &[Shape::Poses, Shape::Points]);
+        rows.extend(plugins.iter().map(|(tool, shape)| {
+            let bound = ball.bound(gets(*shape));
+            tool.row(Quantity::Center, bound, bound)
+        }));
         Self {
             stated: ball.options(true),
             unstated: ball.options(false),
             scene,
             ball,
             methods,
+            plugins,
             rows,
         }
     }
@@ -242,7 +269,8 @@ impl Experiment for PoseScene {
 
     fn trial(&self, number: u64, noise: &mut Noise, tallies: &mut [Tally]) {
         let draw = self.ball.draw(noise);
-        for (method, tally) in self.methods.iter().zip(tallies) {
+        let (own, others) = tallies.split_at_mut(self.methods.len());
+        for (method, tally) in self.methods.iter().zip(own) {
             if !number.is_multiple_of(method.every) {
                 continue;
             }
@@ -256,6 +284,19 @@ impl Experiment for PoseScene {
                 &self.unstated
             };
             record(method.info, &input, options, (CENTER, Some(linear)), tally);
+        }
+        for ((tool, shape), tally) in self.plugins.iter().zip(others) {
+            let poses: Vec<_> = draw
+                .poses
+                .iter()
+                .map(|p| p.map(|p| (p.rotation, p.translation)))
+                .collect();
+            let linear = match gets(*shape) {
+                Gets::Points => draw.of_points,
+                Gets::Poses => draw.of_poses,
+            };
+            let motion = motion(*shape, &draw.tracks, &poses);
+            tool.record(&motion, (CENTER, Some(linear)), tally);
         }
     }
 }

@@ -1,4 +1,5 @@
 //! The studies.
 
 mod faults;
+mod plugins;
 mod study;

@@ -8,9 +8,10 @@ mod table;
 use std::fmt::Write;
 
 use page::Page;
+use table::{Table, efficiency, shown, table};
 
 use super::text::three;
-use crate::{held::Standing, run::StudyResult, settings::Study};
+use crate::{cell::Cell, held::Standing, run::StudyResult, settings::Study};
 
 /// The study as Markdown; of long tables it names the file that [`long_tables`] is.
 #[must_use]
@@ -49,11 +50,40 @@ fn page(result: &StudyResult) -> Page {
     );
     standards(&mut out, result);
     claims(&mut out, result);
+    let (others, own): (Vec<Cell>, Vec<Cell>) =
+        result.cells.iter().cloned().partition(|c| c.from_plugin);
+    if !others.is_empty() {
+        let _ = writeln!(out, "Tried beside them: {}.\n", result.plugins.join("; "));
+        of_plugins(&mut out, &others);
+    }
     match result.study {
-        Study::Cor => cor::tables(&mut out, &result.cells),
-        Study::Aor => aor::tables(&mut out, &result.cells),
+        Study::Cor => cor::tables(&mut out, &own),
+        Study::Aor => aor::tables(&mut out, &own),
     }
     out
+}
+
+/// Estimators of plugins in all scenes that they were tried in.
+fn of_plugins(out: &mut Page, cells: &[Cell]) {
+    table(
+        out,
+        cells,
+        &Table {
+            title: "Estimators of plugins: efficiency",
+            note: "Against the bound of what each was given; then its rms error, and the share of the trials that it answered.",
+            picked: &|_| true,
+            shown: &|c| {
+                let answered = c.answered as f64 / c.trials.max(1) as f64;
+                let unit = if c.quantity.is_angle() { "°" } else { "mm" };
+                format!(
+                    "{}; rms {} {unit}; {:.0} %",
+                    efficiency(c),
+                    shown(c, c.rms),
+                    100.0 * answered
+                )
+            },
+        },
+    );
 }
 
 fn standards(out: &mut Page, result: &StudyResult) {
