@@ -296,3 +296,76 @@ fn a_joint_whose_column_was_shifted_is_named() {
         assert!(said.contains(part), "{part}:\n{said}");
     }
 }
+
+/// The table of the arm's poses with the tracker's cells of some rows changed: all of one marker, or of all (an empty name).
+fn tracked(dir: &Scratch, marker: &str, change: impl Fn(usize, f64) -> Option<f64>) -> String {
+    let (head, rows) = lines(dir);
+    let header: Vec<&str> = head.last().expect("a header").split(',').collect();
+    let row = |(k, row): (usize, &String)| {
+        let cells = row.split(',').zip(&header).map(|(cell, name)| {
+            let own = name.ends_with("_m") && name.starts_with(marker);
+            match cell.parse().ok().filter(|_| own) {
+                Some(x) => change(k, x).map_or(cell.to_owned(), |x| format!("{x:.6}")),
+                None => cell.to_owned(),
+            }
+        });
+        cells.collect::<Vec<_>>().join(",")
+    };
+    let rows: Vec<String> = rows.iter().enumerate().map(row).collect();
+    [head, rows].concat().join("\n") + "\n"
+}
+
+#[test]
+fn a_number_that_stands_for_a_lost_sample_is_lost() {
+    let dir = Scratch::new().robot("ripley");
+    let text = tracked(&dir, "gripM_1", |k, _| (k % 7 == 0).then_some(-9999.0));
+    let dir = dir.file(POSES, text);
+    let (ran, report) = run(&dir);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let said = finding(&report, "placeholder-triplet").expect("said");
+    assert_eq!(said["facts"]["samples"], 6, "{said:#}");
+}
+
+/// Few rows in which the tracker's frame was off: the robust fit gets them right, and they do not stop the run.
+#[test]
+fn rows_in_which_the_tracker_was_off_do_not_stop_a_run() {
+    let dir = Scratch::new().robot("ripley");
+    let text = tracked(&dir, "", |k, x| (k % 20 == 3).then_some(x + 0.04));
+    let dir = dir.file(POSES, text);
+    let (ran, report) = run(&dir);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let said = finding(&report, "row-outlier").expect("said");
+    assert_eq!(said["severity"], "warning", "{said:#}");
+}
+
+/// A column that never moved in the checks: no unit that was mistaken, although that explains a little.
+#[test]
+fn a_joint_that_is_stuck_in_the_checks_is_named() {
+    let table = "robots/ripley/checks.csv";
+    let dir = Scratch::new().robot("ripley");
+    let text = dir.read(table);
+    let mut column: Option<usize> = None;
+    let mut first: Option<String> = None;
+    let out: Vec<String> = text
+        .lines()
+        .map(|line| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            match column {
+                Some(c) => {
+                    let held = first.get_or_insert_with(|| cells[c].clone());
+                    cells[c].clone_from(held);
+                }
+                None => column = cells.iter().position(|c| c == "wrist_roll_deg"),
+            }
+            cells.join(",")
+        })
+        .collect();
+    let dir = dir.file(table, out.join("\n") + "\n");
+    let ran = dir.calib(["check", PROFILE, "--json"]);
+    let said: Value = serde_json::from_str(&ran.stdout).expect("JSON");
+    let said = said.to_string();
+    assert!(
+        said.contains("model-disagrees") && !said.contains("unit-mismatch"),
+        "{said}"
+    );
+}

@@ -28,6 +28,7 @@ mod column_map;
 mod error;
 mod growth;
 mod model;
+mod placeholder;
 mod poses;
 pub mod readers;
 mod table;

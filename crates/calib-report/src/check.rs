@@ -144,6 +144,7 @@ impl DataCheck {
             ],
             Self::Markers => &[
                 catalog::ALL_ZERO_TRIPLET,
+                catalog::PLACEHOLDER_TRIPLET,
                 catalog::DUPLICATE_COLUMN,
                 catalog::FROZEN,
                 catalog::VIRTUAL_POINTS,

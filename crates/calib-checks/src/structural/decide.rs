@@ -12,7 +12,7 @@ use super::likelihood::{Opinion, opinion};
 use super::naming::{Asked, EQUIVALENT_WITHIN, on_twin};
 use super::outcome::{Correction, Decision, Design, Evidence, Named, Options, Outcome};
 use super::ranking::{Ranking, distinct, few_samples, ratio};
-use super::readings::wrong_readings;
+use super::readings::{WrongReadings, wrong_readings};
 use super::scan::{Scan, Score, Scored};
 use super::screen::screen;
 use super::thinning::thinned;
@@ -99,10 +99,34 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
         ..*s
     };
     outcome.screened = screened.iter().map(original).collect();
-    if matches!(outcome.decision, Decision::Undecided { .. }) {
-        outcome.readings = wrong_readings(data, &outcome, options);
+    match &outcome.decision {
+        Decision::Undecided { .. } => {
+            outcome.readings = wrong_readings(data, &outcome, options);
+        }
+        Decision::Named(named) if named.evidence.ratio < options.pair_ratio => {
+            if let Some(found) = better_than(named, data, &outcome, options) {
+                let ratio = named.evidence.ratio;
+                outcome.readings = Some(found);
+                outcome.decision = undecided(None, ratio);
+            }
+        }
+        _ => {}
     }
     Ok(outcome)
+}
+
+/// The joint whose readings are wrong, where that explains clearly more than the name, and most of them are off after the correction as well.
+fn better_than(
+    named: &Named,
+    data: &Data,
+    outcome: &Outcome,
+    options: &Options,
+) -> Option<WrongReadings> {
+    let found = wrong_readings(data, outcome, options)?;
+    let corrected = apply_all(&named.correction, data);
+    let still = wrong_readings(&corrected, outcome, options)?;
+    let clearly = found.rms * options.name_ratio <= named.evidence.best;
+    (clearly && still.joint == found.joint && 2 * still.off >= still.rows).then_some(found)
 }
 
 /// Residual of the registration of the data as they are, rms, m: all samples count.

@@ -10,6 +10,12 @@ super::topic! {
             "{samples:sample} at exactly (0, 0, 0); taken as lost.",
             "Export lost samples as empty. If the origin is a measured place, set `columns: {zero_is_a_point: true}` for the recording.";
     }
+    /// Samples whose three coordinates are one number that stands for nothing.
+    PLACEHOLDER_TRIPLET = "placeholder-triplet" {
+        "": Warning,
+            "{samples:sample} whose coordinates are all the same number, one that stands for a lost sample; taken as lost.",
+            "Export lost samples as empty.";
+    }
     /// Two markers with the same coordinates.
     DUPLICATE_COLUMN = "duplicate-column" {
         "": Error,

@@ -169,8 +169,11 @@ super::topic! {
     /// Rows that no fit explains.
     ROW_OUTLIER = "row-outlier" {
         "several_bodies": Error,
-            "Several bodies disagree with the robot's model at once in {count:row}.",
-            "Correct or drop the joint values of these rows.";
+            "Several bodies disagree with the robot's model at once in {count:row}: their joint values are wrong, or the tracker's frame was off.",
+            "Correct or drop these rows.";
+        "several_bodies_few": Warning,
+            "Several bodies disagree with the robot's model at once in {count:row}: their joint values are wrong, or the tracker's frame was off.",
+            "Look at these rows. A robust fit rejects them.";
         "one_body": Warning,
             "{count:row} deviate by up to {position} and {angle}, {ratio} times the usual; no motion between rows explains it[[; an error of joint {joints:or} alone would]].",
             "Look at these rows: a wrong reading, or backlash of that joint. A robust fit rejects them.";

@@ -20,6 +20,8 @@ use crate::prepare::tracks::BodyTrack;
 
 /// Parts of a joint's range in which the deviating rows must be the minority.
 const PARTS: usize = 4;
+/// Wrong rows of a recording, as a part of all, that a robust fit rejects without harm.
+const FEW: f64 = 0.1;
 /// Rows of such a part that say something.
 const ENOUGH_IN_PART: usize = 5;
 /// Deviation of orientation, rad (34°), that no motion between two readings explains.
@@ -113,7 +115,7 @@ pub fn rows<'a>(
         return Vec::new();
     }
     let mut all = deviating(inputs, tracks, structural, &all);
-    let mut findings = in_several_bodies(&mut all);
+    let mut findings = in_several_bodies(inputs, &mut all);
     for rows in &all {
         match part_of_a_range(inputs, rows) {
             Some(finding) => findings.push(finding),
@@ -249,8 +251,9 @@ fn kind(off: f64, deviation: &Deviation, moving: bool) -> Kind {
     }
 }
 
-/// Rows in which several bodies deviate at once: not the bodies are wrong there, but what the joints are said to be.
-fn in_several_bodies(all: &mut Vec<Rows<'_>>) -> Vec<Finding> {
+/// Rows in which several bodies deviate at once: not the bodies are wrong there, but what the joints are said to be, or the tracker's frame.
+fn in_several_bodies(inputs: &Inputs, all: &mut Vec<Rows<'_>>) -> Vec<Finding> {
+    let robust = inputs.robot.profile.solve.robust;
     let mut count: BTreeMap<(String, usize), usize> = BTreeMap::new();
     let far = |row: &Row| row.kind != Kind::Unsettled;
     for rows in all.iter() {
@@ -274,13 +277,17 @@ fn in_several_bodies(all: &mut Vec<Rows<'_>>) -> Vec<Finding> {
     }
     all.retain(|rows| !rows.rows.is_empty());
     let finding = |(recording, rows): (String, BTreeSet<u64>)| {
-        Finding::of_kind(
-            catalog::ROW_OUTLIER,
-            "several_bodies",
-            Subject::recording(recording),
-        )
-        .with("count", Fact::count(rows.len()))
-        .at_rows(rows)
+        let all = inputs.recordings[&recording].poses.len() as f64;
+        // A robust fit is right where so few rows are wrong.
+        let few = robust && rows.len() as f64 <= FEW * all;
+        let kind = if few {
+            "several_bodies_few"
+        } else {
+            "several_bodies"
+        };
+        Finding::of_kind(catalog::ROW_OUTLIER, kind, Subject::recording(recording))
+            .with("count", Fact::count(rows.len()))
+            .at_rows(rows)
     };
     by_recording.into_iter().map(finding).collect()
 }

@@ -3,6 +3,7 @@
 use crate::error::{At, Placed, Problem};
 use crate::growth::push;
 use crate::model::{BodyStream, MarkerSample, MarkerStream};
+use crate::placeholder::{Placeholders, is_placeholder_point};
 use crate::table::UNIT_TOLERANCE;
 use crate::text::{Number, Separator, cells, not_a_number, number};
 use calib_finding::{About, Fact, Finding, Subject, catalog};
@@ -113,6 +114,7 @@ pub(super) struct MarkerTrack {
     /// The device computes these points instead of measuring them.
     pub filled: bool,
     zeros: Vec<u64>,
+    placeholders: Placeholders,
 }
 
 impl MarkerTrack {
@@ -129,6 +131,7 @@ impl MarkerTrack {
             columns,
             filled,
             zeros: Vec::new(),
+            placeholders: Placeholders::default(),
         }
     }
 
@@ -146,6 +149,11 @@ impl MarkerTrack {
         push(
             &mut self.stream.samples,
             match triplet(line, &self.stream.name, coordinates, units_per_meter)? {
+                Triplet::Point(point) if is_placeholder_point(&point) => {
+                    self.placeholders
+                        .take(&self.stream.name, point.coords.into(), row);
+                    MarkerSample::Lost
+                }
                 Triplet::Point(point) if self.filled => MarkerSample::Filled(point),
                 Triplet::Point(point) => MarkerSample::Measured(point),
                 Triplet::Lost => MarkerSample::Lost,
@@ -158,7 +166,8 @@ impl MarkerTrack {
         Ok(())
     }
 
-    pub(super) fn finish(self, findings: &mut Vec<Finding>) -> MarkerStream {
+    pub(super) fn finish(mut self, findings: &mut Vec<Finding>) -> MarkerStream {
+        findings.extend(self.placeholders.findings());
         findings.extend(all_zero(Subject::marker(&self.stream.name), self.zeros));
         self.stream
     }

@@ -125,6 +125,7 @@ impl Rows<'_> {
                     .with("count", Fact::count(rows.len()))
                     .at_rows(rows)
             });
-        zeros.chain(nans).collect()
+        let placeholders = self.placeholders.findings();
+        zeros.chain(placeholders).chain(nans).collect()
     }
 }

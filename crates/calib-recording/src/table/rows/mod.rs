@@ -13,6 +13,7 @@ use crate::column_map::ColumnMap;
 use crate::error::{At, Placed, Problem, excerpt};
 use crate::growth::push;
 use crate::model::{MarkerSample, Timeline};
+use crate::placeholder::Placeholders;
 use crate::text::{Number, Separator, cells, number, unquoted};
 use nalgebra::Isometry3;
 use std::collections::BTreeMap;
@@ -52,6 +53,7 @@ pub(super) struct Rows<'a> {
     samples: usize,
     dense: usize,
     zeros: BTreeMap<String, Vec<u64>>,
+    placeholders: Placeholders,
     nans: BTreeMap<String, Vec<u64>>,
 }
 
@@ -87,6 +89,7 @@ impl<'a> Rows<'a> {
             samples: 0,
             dense: 0,
             zeros: BTreeMap::new(),
+            placeholders: Placeholders::default(),
             nans: BTreeMap::new(),
             layout,
             separator,

@@ -3,6 +3,7 @@
 use super::{Rows, State};
 use crate::error::{At, Placed, Problem};
 use crate::model::MarkerSample;
+use crate::placeholder::is_placeholder;
 use crate::table::header::{BodyPlan, Rotation};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
@@ -40,6 +41,11 @@ impl Rows<'_> {
         if x == 0.0 && y == 0.0 && z == 0.0 && !self.map.is_some_and(|map| map.zero_is_a_point) {
             let name = self.name_of(&plan.name).to_string();
             self.zeros.entry(name).or_default().push(line);
+            return Ok(MarkerSample::Lost);
+        }
+        if is_placeholder([x, y, z]) {
+            let name = self.name_of(&plan.name).to_string();
+            self.placeholders.take(&name, [x, y, z], line);
             return Ok(MarkerSample::Lost);
         }
         let point = Point3::new(x, y, z);
@@ -82,6 +88,12 @@ impl Rows<'_> {
             && matches!(rotation, Rotation::Quaternion(_))
         {
             self.zeros.entry(name).or_default().push(line);
+            return Ok(None);
+        }
+        if self
+            .placeholders
+            .take(&name, position.map(|slot| self.values[slot]), line)
+        {
             return Ok(None);
         }
         let value = |slot: usize| self.values[slot];

@@ -1,0 +1,88 @@
+//! Numbers that trackers write in place of a sample that they lost.
+
+use std::collections::BTreeMap;
+
+use calib_finding::{Fact, Finding, Subject, catalog};
+use nalgebra::Point3;
+
+/// Nothing is measured as far away, m.
+const FAR: f64 = 1e5;
+/// Nines before the point, at least: 999.
+const LEAST: f64 = 1e3;
+
+/// Whether all three coordinates (m) are one number that stands for nothing: −9999, 999.9, −3.7·10²⁸, in meters or millimeters. Three equal
+/// coordinates of this form are not measured.
+pub(crate) fn is_placeholder([x, y, z]: [f64; 3]) -> bool {
+    x == y && y == z && (x.abs() >= FAR || nines(x.abs()) || nines(x.abs() * 1e3))
+}
+
+/// 999, 9999.9, 99999.99, …: a power of ten less one of the last digit.
+fn nines(value: f64) -> bool {
+    [1.0, 0.1, 0.01, 0.001].iter().any(|last| {
+        let next = value + last;
+        let power = 10.0_f64.powf(next.log10().round());
+        power >= LEAST && (next - power).abs() < 1e-9 * power
+    })
+}
+
+/// Rows of lost samples by marker or body.
+#[derive(Default)]
+pub(crate) struct Placeholders(BTreeMap<String, Vec<u64>>);
+
+impl Placeholders {
+    /// Notes the sample where it is one.
+    pub(crate) fn take(&mut self, name: &str, at: [f64; 3], row: u64) -> bool {
+        let is = is_placeholder(at);
+        if is {
+            self.0.entry(name.to_owned()).or_default().push(row);
+        }
+        is
+    }
+
+    /// What was read as lost without saying so.
+    pub(crate) fn findings(&mut self) -> Vec<Finding> {
+        let all = std::mem::take(&mut self.0).into_iter();
+        all.map(|(name, rows)| {
+            Finding::new(catalog::PLACEHOLDER_TRIPLET, Subject::marker(name))
+                .with("samples", Fact::count(rows.len()))
+                .at_rows(rows)
+        })
+        .collect()
+    }
+}
+
+/// As [`is_placeholder`], of a point.
+pub(crate) fn is_placeholder_point(point: &Point3<f64>) -> bool {
+    is_placeholder(point.coords.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_of_trackers_are_placeholders_and_measurements_are_not() {
+        // −9999 m and mm, NDI's −3.697314E28, 999.9 mm and so on.
+        for v in [
+            -9999.0,
+            -9.999,
+            -3.697314e28,
+            0.9999,
+            999.0,
+            99999.99,
+            9.99999,
+            1e37,
+        ] {
+            assert!(is_placeholder([v, v, v]), "{v}");
+        }
+        for v in [
+            [0.5, 0.5, 0.5],
+            [1.0, 1.0, 1.0],
+            [-9.999, -9.999, -9.998],
+            [0.09, 0.09, 0.09],
+            [0.0; 3],
+        ] {
+            assert!(!is_placeholder(v), "{v:?}");
+        }
+    }
+}
