@@ -10,12 +10,15 @@ use serde::Serialize;
 use super::data::Data;
 use super::hypothesis::Scope;
 use super::ids::{JointIndex, RecordingIndex, SampleIndex};
+use super::scan::Scan;
 use super::special::estimated;
 use super::thinning::thinned;
 use super::{Options, Outcome};
 
 /// Rows that are looked at: every row costs a search for the joint's position in each of up to twelve rounds.
 const ROWS: usize = 160;
+/// Degrees of freedom that must be left.
+const LEAST_FREEDOM: f64 = 20.0;
 /// A joint in one recording is named in place of the same joint in all where that leaves at most so much more.
 const NARROWER: f64 = 1.3;
 /// Readings are off where they differ by more than this many σ of the priors.
@@ -145,6 +148,13 @@ fn without(data: &Data, joint: JointIndex, scope: Scope, screened: &[SampleIndex
         |i: &usize| scope.contains(data.recording[*i]) && data.readings[*i][joint.0].is_some();
     let rows: Vec<usize> = all.filter(inside).collect();
     let (data, rms) = estimated(data.clone(), joint, &rows, screened);
+    // Every position that was estimated takes a degree of freedom.
+    let (_, freedom) = Scan::new(&data, screened).freedom();
+    let left = freedom - rows.len() as f64;
+    let rms = match left >= LEAST_FREEDOM {
+        true => rms * (freedom / left).sqrt(),
+        false => f64::INFINITY,
+    };
     Tried {
         joint,
         scope,
