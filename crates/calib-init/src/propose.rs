@@ -1,0 +1,532 @@
+//! From a URDF and files to a proposal.
+
+use std::collections::BTreeMap;
+
+use calib_checks::structural::{Chain, Decision, Hypothesis, Scoped};
+use calib_recording::Poses;
+use calib_urdf::{JointId, LinkId, RobotModel};
+
+use crate::bodies::{self, Found};
+use crate::correct;
+use crate::error::InitError;
+use crate::fact::{About, CERTAIN, Fact, Place, Residuals, Rival};
+use crate::limits;
+use crate::links::{Assigned, Choice, Scene, moves_bodies};
+use crate::proposal::{Body, Noise, Proposal, Recording, Table};
+use crate::robot;
+use crate::session::{self, Draft, Use};
+use crate::skeleton;
+use crate::source::{File, Source};
+use crate::tables;
+
+/// What the caller knows.
+#[derive(Debug, Clone, Default)]
+pub struct Request {
+    /// Name of the robot; that of the URDF where absent.
+    pub name: Option<String>,
+    /// The URDF as messages name it.
+    pub urdf_shown: String,
+    /// The URDF, relative to the profile.
+    pub urdf_path: String,
+    /// The schema beside the profile, if there is one.
+    pub schema: Option<String>,
+    /// The link that carries the markers.
+    pub markers_on: Option<String>,
+    /// Where nothing was recorded: the folder of the recordings to be, relative to the profile.
+    pub folder: String,
+}
+
+/// Corrections that are tried one after the other: a table with more mistakes is one to look at.
+const CORRECTIONS: usize = 4;
+
+/// The profile of a robot.
+///
+/// # Errors
+/// [`InitError`] where the robot has no moving joint, a file has neither joints nor a log, nothing moves, or clocks cannot be brought together.
+pub fn propose(
+    model: &RobotModel,
+    request: &Request,
+    files: &[File],
+) -> Result<Proposal, InitError> {
+    let tips = robot::tips(model);
+    let Some(longest) = tips.first() else {
+        return Err(InitError::NothingMoves {
+            file: request.urdf_shown.clone(),
+        });
+    };
+    let stated = match &request.markers_on {
+        None => None,
+        Some(name) => Some(model.link_id(name).map_err(|unknown| {
+            InitError::NoSuchLink {
+                unknown,
+                tips: tips
+                    .iter()
+                    .map(|t| model.link(t.link).name.clone())
+                    .collect(),
+            }
+        })?),
+    };
+    let mut proposal = Proposal {
+        robot: robot_name(model, request),
+        urdf: request.urdf_path.clone(),
+        schema: request.schema.clone(),
+        noise: Noise::default(),
+        bodies: Vec::new(),
+        recordings: Vec::new(),
+        skeleton: None,
+        facts: vec![joints(model)],
+    };
+    if files.is_empty() {
+        without_recordings(model, request, stated, longest, &mut proposal);
+    } else {
+        with_recordings(model, files, stated, longest, &mut proposal)?;
+    }
+    let about = match proposal.noise.marker.or(proposal.noise.body.map(|b| b.0)) {
+        Some(sigma) => About::Limits { sigma },
+        None => About::NoLimits,
+    };
+    debug_assert_eq!(
+        limits::of(&proposal.noise).is_none(),
+        about == About::NoLimits
+    );
+    proposal.facts.push(Fact::new(Place::Limits, about));
+    Ok(proposal)
+}
+
+fn robot_name(model: &RobotModel, request: &Request) -> String {
+    let stated = request
+        .name
+        .clone()
+        .unwrap_or_else(|| model.name().to_owned());
+    let clean: String = stated
+        .chars()
+        .map(|c| {
+            if c.is_alphanumeric() || matches!(c, '-' | '_') {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect();
+    match clean.is_empty() {
+        true => "robot".to_owned(),
+        false => clean,
+    }
+}
+
+fn joints(model: &RobotModel) -> Fact {
+    let moving: Vec<JointId> = model.independent_joints().collect();
+    let unlimited = moving.iter().filter(|j| {
+        let joint = model.joint(**j);
+        // A joint that turns without end says so.
+        joint.limits.range().is_none()
+            && !matches!(joint.kind, calib_urdf::JointKind::Continuous { .. })
+    });
+    let unlimited: Vec<JointId> = unlimited.copied().collect();
+    let about = About::Joints {
+        moving: moving.len(),
+        unlimited: robot::names(model, &unlimited)
+            .iter()
+            .map(|n| (*n).to_owned())
+            .collect(),
+    };
+    Fact::new(Place::Robot, about)
+}
+
+/// A body at the end of the longest chain, and postures to record.
+fn without_recordings(
+    model: &RobotModel,
+    request: &Request,
+    stated: Option<LinkId>,
+    longest: &robot::Tip,
+    proposal: &mut Proposal,
+) {
+    const BODY: &str = "tool";
+    let link = stated.unwrap_or(longest.link);
+    let named = |link: LinkId| model.link(link).name.clone();
+    let about = match stated {
+        Some(link) => About::LinkStated {
+            link: named(link),
+            rms: None,
+            better: None,
+        },
+        None => About::TipOfChain {
+            link: named(link),
+            joints: longest.joints.len(),
+            others: robot::tips(model)
+                .iter()
+                .skip(1)
+                .map(|tip| named(tip.link))
+                .collect(),
+        },
+    };
+    proposal
+        .facts
+        .push(Fact::new(Place::Body(BODY.to_owned()), about));
+    let joints = robot::movers(model, link);
+    let skeleton = skeleton::skeleton(model, &joints);
+    proposal.bodies.push(Body {
+        name: BODY.to_owned(),
+        markers: (1..=4).map(|i| format!("{BODY}_{i}")).collect(),
+        link,
+    });
+    let uses = [
+        ("sweep", Use::Sweep(skeleton.sweep.clone())),
+        ("poses", Use::Static),
+        ("checks", Use::Validation),
+    ];
+    for (name, usage) in uses {
+        proposal.recordings.push(Recording {
+            name: name.to_owned(),
+            table: Table {
+                path: format!("{}/{name}.csv", request.folder),
+                columns: None,
+            },
+            log: None,
+            stream: None,
+            usage,
+            hold: Vec::new(),
+        });
+    }
+    proposal.skeleton = Some(skeleton);
+    proposal
+        .facts
+        .push(Fact::new(Place::Tracker, About::SigmaUnknown));
+    proposal
+        .facts
+        .push(Fact::new(Place::Simulate, About::Invented));
+}
+
+/// Everything from the files.
+fn with_recordings(
+    model: &RobotModel,
+    files: &[File],
+    stated: Option<LinkId>,
+    longest: &robot::Tip,
+    proposal: &mut Proposal,
+) -> Result<(), InitError> {
+    if let Some(twice) = files
+        .iter()
+        .enumerate()
+        .find(|(i, f)| files[..*i].iter().any(|o| o.path == f.path))
+    {
+        return Err(InitError::Twice {
+            file: twice.1.shown.clone(),
+        });
+    }
+    let read = files.iter().map(|file| Source::read(model, file));
+    let mut sources: Vec<Source> = read.collect::<Result<_, _>>()?;
+    let (mut drafts, of_files) = session::drafts(model, &sources)?;
+    let (found, of_bodies) = bodies::bodies(&sources);
+    let start = stated.unwrap_or_else(|| last_recorded(model, &sources).unwrap_or(longest.link));
+    proposal.bodies = found
+        .iter()
+        .map(|body| Body {
+            name: body.name.clone(),
+            markers: body.markers.clone(),
+            link: start,
+        })
+        .collect();
+    proposal.recordings = recordings(&drafts, &sources);
+    let mut poses = tables::tables(model, proposal, &drafts, &sources)?;
+    if stated.is_none() && poses.iter().all(|p| session::moved(model, p).is_empty()) {
+        return Err(InitError::NoMotion {
+            files: sources.iter().map(|s| s.file.shown.clone()).collect(),
+            tip: model.link(longest.link).name.clone(),
+        });
+    }
+    let mut of_links = Vec::new();
+    let mut corrections = Vec::new();
+    for _ in 0..=CORRECTIONS {
+        let scene = Scene {
+            model,
+            bodies: &found,
+            tables: &poses,
+        };
+        let asked = ask(&scene, stated);
+        for (body, link) in &asked.assigned.on {
+            proposal.bodies[*body].link = *link;
+        }
+        of_links = asked.facts(&scene, stated);
+        let next = next_correction(model, &sources, &drafts, &found, &asked.assigned)?;
+        corrections.extend(next.facts);
+        let Some(new) = next.sources.filter(|_| corrections.len() <= CORRECTIONS) else {
+            break;
+        };
+        sources = new;
+        proposal.recordings = recordings(&drafts, &sources);
+        poses = tables::tables(model, proposal, &drafts, &sources)?;
+    }
+    let of_uses = session::uses(model, &mut drafts, &poses);
+    proposal.recordings = recordings(&drafts, &sources);
+    let missing = missing(model, proposal, &poses);
+    proposal.noise = noise(&of_bodies);
+    proposal
+        .facts
+        .extend([of_files, of_uses, of_bodies, of_links, missing, corrections].concat());
+    Ok(())
+}
+
+/// The last link that recorded joints move.
+fn last_recorded(model: &RobotModel, sources: &[Source]) -> Option<LinkId> {
+    let names = sources
+        .iter()
+        .flat_map(|s| &s.recording.joints)
+        .map(|j| j.name.as_str());
+    let joints: Vec<JointId> = names.filter_map(|n| model.joint_id(n).ok()).collect();
+    let child = |j: &JointId| model.joint(*j).child;
+    let last = joints
+        .iter()
+        .max_by_key(|j| robot::movers(model, child(j)).len())?;
+    Some(robot::group(model, child(last)))
+}
+
+fn recordings(drafts: &[Draft], sources: &[Source]) -> Vec<Recording> {
+    let table = |i: usize| Table {
+        path: sources[i].file.path.clone(),
+        columns: sources[i].columns.clone(),
+    };
+    let of = |draft: &Draft| Recording {
+        name: draft.name.clone(),
+        table: table(draft.source),
+        log: draft.log.map(table),
+        stream: draft.stream,
+        usage: draft.usage.clone(),
+        hold: Vec::new(),
+    };
+    drafts.iter().map(of).collect()
+}
+
+fn noise(facts: &[Fact]) -> Noise {
+    let mut noise = Noise::default();
+    for fact in facts {
+        match fact.about {
+            About::MarkerSigma { sigma, .. } => noise.marker = Some(sigma),
+            About::BodySigma {
+                position,
+                orientation,
+            } => noise.body = Some((position, orientation)),
+            _ => {}
+        }
+    }
+    noise
+}
+
+/// Links for all bodies, with what the hypotheses say.
+struct Asked {
+    choices: BTreeMap<usize, Choice>,
+    assigned: Assigned,
+}
+
+fn ask(scene: &Scene<'_>, stated: Option<LinkId>) -> Asked {
+    let none = Asked {
+        choices: BTreeMap::new(),
+        assigned: Assigned {
+            on: Vec::new(),
+            outcome: None,
+        },
+    };
+    // A model that was read is a tree.
+    let Ok(chain) = Chain::from_model(scene.model) else {
+        return none;
+    };
+    let chosen = (0..scene.bodies.len()).filter_map(|b| Some((b, scene.choose(&chain, b)?)));
+    let choices: Vec<(usize, Choice)> = chosen.collect();
+    // The body that follows the stated link best is the one that was meant.
+    let on_stated = stated.and_then(|link| {
+        let group = robot::group(scene.model, link);
+        let rms = |c: &Choice| {
+            c.all
+                .iter()
+                .find(|(l, _)| *l == group)
+                .map_or(f64::INFINITY, |(_, rms)| *rms / c.rms.max(1e-9))
+        };
+        let best = choices
+            .iter()
+            .min_by(|a, b| rms(&a.1).total_cmp(&rms(&b.1)))?;
+        Some((best.0, link))
+    });
+    let stated: Vec<(usize, LinkId)> = on_stated.into_iter().collect();
+    let assigned = scene.assign(&chain, &choices, &stated);
+    Asked {
+        choices: choices.into_iter().collect(),
+        assigned,
+    }
+}
+
+impl Asked {
+    /// The link of each body, with its runner-up.
+    fn facts(&self, scene: &Scene<'_>, stated: Option<LinkId>) -> Vec<Fact> {
+        let model = scene.model;
+        let named = |link: LinkId| model.link(link).name.clone();
+        let moving = scene.moving();
+        let mut facts = Vec::new();
+        for (body, link) in &self.assigned.on {
+            let Some(choice) = self.choices.get(body) else {
+                continue;
+            };
+            let group = robot::group(model, *link);
+            let rms = choice
+                .all
+                .iter()
+                .find(|(l, _)| *l == group)
+                .map_or(choice.rms, |(_, rms)| *rms);
+            let rivals = || {
+                choice
+                    .all
+                    .iter()
+                    .filter(|(l, _)| *l != group && !choice.same.contains(&named(*l)))
+            };
+            let rival = |(l, rms): &(LinkId, f64)| Rival {
+                link: named(*l),
+                rms: *rms,
+            };
+            let carried = robot::movers(model, *link);
+            let about = if stated == Some(*link) {
+                About::LinkStated {
+                    link: named(*link),
+                    rms: Some(rms),
+                    better: rivals().find(|(_, other)| CERTAIN * other < rms).map(rival),
+                }
+            } else if !carried.iter().any(|j| moving.contains(j)) {
+                About::Still {
+                    link: named(*link),
+                    rms,
+                }
+            } else {
+                // Links between which no joint with a column lies are the same for these recordings.
+                let next = match group == robot::group(model, choice.link) {
+                    true => choice.next.clone(),
+                    false => rivals().next().map(rival),
+                };
+                About::Link {
+                    link: named(*link),
+                    rms,
+                    next,
+                    same: choice.same.clone(),
+                }
+            };
+            facts.push(Fact::new(
+                Place::Body(scene.bodies[*body].name.clone()),
+                about,
+            ));
+        }
+        facts
+    }
+}
+
+/// A correction that was applied, or why none was.
+struct Next {
+    facts: Vec<Fact>,
+    sources: Option<Vec<Source>>,
+}
+
+fn next_correction(
+    model: &RobotModel,
+    sources: &[Source],
+    drafts: &[Draft],
+    found: &[Found],
+    assigned: &Assigned,
+) -> Result<Next, InitError> {
+    let mut next = Next {
+        facts: Vec::new(),
+        sources: None,
+    };
+    let Some(outcome) = &assigned.outcome else {
+        return Ok(next);
+    };
+    let named = match &outcome.decision {
+        Decision::Named(named) => named,
+        Decision::Undecided { .. } => {
+            let limit = outcome.expected.map_or(0.0, |e| e.limit);
+            let about = About::Disagrees {
+                rms: outcome.rms,
+                limit,
+            };
+            next.facts.push(Fact::new(Place::Recordings, about));
+            return Ok(next);
+        }
+        _ => return Ok(next),
+    };
+    if moves_bodies(&named.correction) {
+        return Ok(next);
+    }
+    let bodies: Vec<String> = assigned
+        .on
+        .iter()
+        .map(|(b, _)| found[*b].name.clone())
+        .collect();
+    let residuals = Residuals {
+        none: named.evidence.none,
+        best: named.evidence.best,
+        next: named.evidence.next,
+    };
+    let mut new = sources.to_vec();
+    for scoped in &named.correction {
+        let mistake = correct::mistake(model, &bodies, &scoped.hypothesis);
+        let done = correct::corrected(model, &new, drafts, scoped)?;
+        let about = match &done {
+            Some(_) => About::Corrected {
+                mistake,
+                residuals,
+                equivalent: named.equivalent.len(),
+            },
+            None => About::NotCorrected { mistake, residuals },
+        };
+        next.facts.push(Fact::new(place_of(drafts, scoped), about));
+        if let Some(done) = done {
+            new = done;
+            next.sources = Some(new.clone());
+        }
+    }
+    Ok(next)
+}
+
+/// A mistake of one recording stands there.
+fn place_of(drafts: &[Draft], scoped: &Scoped) -> Place {
+    let inside: Vec<&Draft> = drafts
+        .iter()
+        .enumerate()
+        .filter(|(r, _)| {
+            scoped
+                .scope
+                .contains(calib_checks::structural::RecordingIndex(*r))
+        })
+        .map(|(_, draft)| draft)
+        .collect();
+    match (inside.as_slice(), scoped.hypothesis) {
+        ([one], _) => Place::Recording(one.name.clone()),
+        (_, Hypothesis::TrackerUnit { .. } | Hypothesis::Mirrored) => Place::Tracker,
+        _ => Place::Recordings,
+    }
+}
+
+/// Joints that carry a body and have no column are held at 0, and said.
+fn missing(model: &RobotModel, proposal: &mut Proposal, tables: &[Poses]) -> Vec<Fact> {
+    let mut facts = Vec::new();
+    let carriers = proposal
+        .bodies
+        .iter()
+        .flat_map(|body| robot::movers(model, body.link));
+    let mut carriers: Vec<JointId> = carriers.collect();
+    carriers.sort_unstable();
+    carriers.dedup();
+    for (recording, poses) in proposal.recordings.iter_mut().zip(tables) {
+        let without = carriers
+            .iter()
+            .filter(|j| !poses.joints.contains_key(&model.joint(**j).name));
+        let without: Vec<JointId> = without.copied().collect();
+        if !without.is_empty() {
+            let joints = robot::names(model, &without)
+                .iter()
+                .map(|n| (*n).to_owned())
+                .collect();
+            facts.push(Fact::new(
+                Place::Recording(recording.name.clone()),
+                About::JointsMissing { joints },
+            ));
+        }
+        recording.hold = without;
+    }
+    facts
+}
