@@ -4,8 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::rigid_body::{body_poses, rigid_groups};
 use calib_recording::{BodyStream, Filled, MarkerStream};
+use calib_urdf::RobotModel;
 use nalgebra::Point3;
 
+use crate::error::InitError;
 use crate::fact::{About, Fact, Place};
 use crate::source::Source;
 
@@ -213,6 +215,58 @@ fn free(base: String, taken: &mut BTreeSet<String>) -> String {
     let name = names.find(|name| !taken.contains(name)).unwrap_or(base);
     taken.insert(name.clone());
     name
+}
+
+/// Bodies whose two markers are not one after all, as a body for each marker.
+#[must_use]
+pub fn split(found: Vec<Found>, facts: &mut Vec<Fact>, apart: &[usize]) -> Vec<Found> {
+    let mut taken: BTreeSet<String> = found.iter().map(|body| body.name.clone()).collect();
+    let mut new = Vec::new();
+    for (i, body) in found.into_iter().enumerate() {
+        if !apart.contains(&i) {
+            new.push(body);
+            continue;
+        }
+        facts.retain(|fact| fact.place != Place::Body(body.name.clone()));
+        for marker in body.markers {
+            let name = free(marker.clone(), &mut taken);
+            let about = About::Points { markers: 1 };
+            facts.push(Fact::new(Place::Body(name.clone()), about));
+            new.push(Found {
+                name,
+                markers: vec![marker],
+            });
+        }
+    }
+    new
+}
+
+/// Sources without the markers that were left out, where a column map can leave them out.
+///
+/// # Errors
+/// As [`Source::with_columns`].
+pub fn without_left_out(
+    model: &RobotModel,
+    sources: &mut [Source],
+    facts: &[Fact],
+) -> Result<(), InitError> {
+    let left_out = facts.iter().flat_map(|fact| match &fact.about {
+        About::Duplicate { marker, .. } => std::slice::from_ref(marker),
+        About::Seldom { markers } => markers,
+        _ => &[],
+    });
+    let left_out: BTreeSet<&String> = left_out.collect();
+    for source in sources {
+        let Some(mut map) = source.columns.clone() else {
+            continue;
+        };
+        let before = map.markers.len();
+        map.markers.retain(|name, _| !left_out.contains(name));
+        if map.markers.len() < before {
+            *source = source.with_columns(model, map)?;
+        }
+    }
+    Ok(())
 }
 
 /// Scatter of a pose that stays where it is: a body beside the robot.

@@ -113,11 +113,23 @@ fn new_map(model: &RobotModel, source: &Source, hypothesis: &Hypothesis) -> Opti
             set(model, &mut map, &a, of_b);
             set(model, &mut map, &b, of_a);
         }
-        Hypothesis::Units { mistake } if mistake.of_angles() => {
-            let bare = |column: &String| !name::unit(column).native;
-            let turning = map.joints.values().chain(&map.joint_columns);
-            if turning.clone().count() == 0 || !turning.clone().all(bare) {
-                return None;
+        Hypothesis::Unit { joint: j, mistake } => {
+            let column = column_of(source, &map, &joint(j))?;
+            return renamed(source, &map, &[column], really(mistake));
+        }
+        Hypothesis::Units { mistake } => {
+            let is_one = |name: &String| {
+                let id = model.joint_id(name);
+                id.is_ok_and(|id| model.joint(id).kind.turns() == mistake.of_angles())
+            };
+            let names = source.recording.joints.iter().map(|s| &s.name);
+            let of = names
+                .filter(|n| is_one(n))
+                .map(|n| column_of(source, &map, n));
+            let columns: Vec<String> = of.collect::<Option<_>>()?;
+            let bare = columns.iter().all(|column| !name::unit(column).native);
+            if !(bare && mistake.of_angles()) {
+                return renamed(source, &map, &columns, really(mistake));
             }
             map.angles = match really(mistake) {
                 "deg" => AngleUnit::Deg,
@@ -125,14 +137,15 @@ fn new_map(model: &RobotModel, source: &Source, hypothesis: &Hypothesis) -> Opti
             };
         }
         Hypothesis::TrackerUnit { mistake } => {
-            let markers = map.markers.values().flatten();
-            let bodies = map.bodies.values().flat_map(|b| &b.position);
-            let mut columns = markers.chain(bodies);
-            let lengths = &map.prismatic;
-            let bare = columns.clone().count() > 0 && columns.all(|c| !name::unit(c).native);
+            let columns = places(source, &map);
+            let bare = columns.iter().all(|column| !name::unit(column).native);
             // One unit for all lengths of the map.
-            if !bare || lengths.values().any(|c| !name::unit(c).native) {
-                return None;
+            let alone = map
+                .prismatic
+                .values()
+                .all(|column| name::unit(column).native);
+            if !(bare && alone) {
+                return renamed(source, &map, &columns, really(mistake));
             }
             map.lengths = match really(mistake) {
                 "mm" => LengthUnit::Mm,
@@ -144,6 +157,71 @@ fn new_map(model: &RobotModel, source: &Source, hypothesis: &Hypothesis) -> Opti
     Some(map)
 }
 
+/// Columns of positions: those of the map, and those that the readers' own rules take.
+fn places(source: &Source, map: &ColumnMap) -> Vec<String> {
+    let mapped = map.markers.values().flatten();
+    let bodies = map.bodies.values().flat_map(|b| &b.position);
+    let mut columns: Vec<String> = mapped.chain(bodies).cloned().collect();
+    let of_joints: Vec<&String> = map.prismatic.values().collect();
+    let is_place = |column: &String| {
+        let unit = name::unit(column);
+        let letters = ['x', 'y', 'z'].into_iter();
+        unit.native
+            && matches!(unit.unit, Some(NamedUnit::Length(_)))
+            && !of_joints.contains(&column)
+            && letters
+                .filter(|l| name::coordinate(unit.stem, *l).is_some())
+                .count()
+                > 0
+    };
+    for name in header(&source.file.bytes).map_or_else(Vec::new, |table| table.names) {
+        if is_place(&name) && !columns.contains(&name) {
+            columns.push(name);
+        }
+    }
+    columns
+}
+
+/// The map with names of its own for these columns, which state the unit; the header line of the file is not read any more.
+fn renamed(source: &Source, map: &ColumnMap, columns: &[String], unit: &str) -> Option<ColumnMap> {
+    let table = header(&source.file.bytes)?;
+    if columns.is_empty() || map.decimal_comma {
+        return None;
+    }
+    let new = |name: &String| match columns.contains(name) {
+        true => format!("{}_{unit}", name::unit(name).stem),
+        false => name.clone(),
+    };
+    let mut renamed = map.clone();
+    let names = if map.names.is_empty() {
+        &table.names
+    } else {
+        &map.names
+    };
+    renamed.names = names.iter().map(new).collect();
+    renamed.skip_lines = table.line;
+    renamed.delimiter = Some(table.delimiter);
+    let (bare, moved): (Vec<_>, Vec<_>) = map
+        .joint_columns
+        .iter()
+        .cloned()
+        .partition(|column| !columns.contains(column));
+    renamed.joint_columns = bare;
+    renamed
+        .joints
+        .extend(moved.into_iter().map(|name| (name.clone(), name)));
+    let joints = renamed
+        .joints
+        .values_mut()
+        .chain(renamed.prismatic.values_mut());
+    let markers = renamed.markers.values_mut().flatten();
+    let bodies = renamed.bodies.values_mut().flat_map(|b| &mut b.position);
+    for column in joints.chain(markers).chain(bodies) {
+        *column = new(column);
+    }
+    Some(renamed)
+}
+
 /// The column of a joint, by the map or by its own name.
 fn column_of(source: &Source, map: &ColumnMap, joint: &str) -> Option<String> {
     let mapped = map.joints.get(joint).or_else(|| map.prismatic.get(joint));
@@ -152,11 +230,16 @@ fn column_of(source: &Source, map: &ColumnMap, joint: &str) -> Option<String> {
         return Some(column.clone());
     }
     let table = header(&source.file.bytes)?;
+    let names = if map.names.is_empty() {
+        &table.names
+    } else {
+        &map.names
+    };
     let named = |name: &&String| {
         let unit = name::unit(name);
         unit.stem == joint && matches!(unit.unit, Some(NamedUnit::Angle(_) | NamedUnit::Length(_)))
     };
-    table.names.iter().find(named).cloned()
+    names.iter().find(named).cloned()
 }
 
 /// Gives a joint a column.

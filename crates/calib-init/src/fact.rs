@@ -315,8 +315,8 @@ pub enum About {
     Log {
         /// The file.
         file: String,
-        /// Paired because it is the only one, or else by names or order.
-        only: bool,
+        /// It is the only one, or shares most words with the name of the tracker's file; else paired by order.
+        named: bool,
     },
     /// A mistake in the recordings that the profile corrects.
     Corrected {
@@ -333,6 +333,13 @@ pub enum About {
         mistake: Mistake,
         /// What it explains.
         residuals: Residuals,
+    },
+    /// No mistake stands out: signs, order, units and links agree with the robot.
+    Agrees {
+        /// Residual of the registration to the nominal robot, rms, m.
+        rms: f64,
+        /// Poses.
+        rows: usize,
     },
     /// The recordings disagree with the robot, and no single mistake explains it.
     Disagrees {
@@ -391,7 +398,7 @@ fn is_guess(about: &About) -> bool {
             near || !same.is_empty()
         }
         About::Time { named, .. } => !named,
-        About::Log { only, .. } => !only,
+        About::Log { named, .. } => !named,
         About::TipOfChain { .. }
         | About::JointsByOrder { .. }
         | About::JointsMissing { .. }

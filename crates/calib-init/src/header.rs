@@ -1,5 +1,7 @@
 //! The header of a delimited table, and the first of its numbers.
 
+use calib_recording::Delimiter;
+
 /// Rows that are looked at.
 const ROWS: usize = 400;
 /// Bytes that are looked at: a header of a thousand columns and its rows.
@@ -14,6 +16,10 @@ pub struct Header {
     pub columns: Vec<Vec<Option<f64>>>,
     /// Numbers are written `1,5`.
     pub decimal_comma: bool,
+    /// The line of the header, from 1.
+    pub line: u64,
+    /// What separates the cells.
+    pub delimiter: Delimiter,
 }
 
 impl Header {
@@ -60,15 +66,16 @@ pub fn header(bytes: &[u8]) -> Option<Header> {
     };
     let mut lines = text
         .lines()
-        .filter(|line| !line.trim().is_empty() && !line.starts_with('#'));
-    let first = lines.next()?;
+        .enumerate()
+        .filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+    let (above, first) = lines.next()?;
     let separator = separator(first);
     let names: Vec<String> = cells(first, separator).map(str::to_owned).collect();
     // Without a single name that is none of a number it is a table without header.
     if names.len() < 2 || names.iter().all(|n| n.parse::<f64>().is_ok()) {
         return None;
     }
-    let rows: Vec<&str> = lines.take(ROWS).collect();
+    let rows: Vec<&str> = lines.take(ROWS).map(|(_, line)| line).collect();
     let is_number = |cell: &str| cell.parse::<f64>().is_ok();
     // `1,5` where something else than a comma separates.
     let comma = |cell: &str| !is_number(cell) && is_number(&cell.replacen(',', ".", 1));
@@ -89,6 +96,13 @@ pub fn header(bytes: &[u8]) -> Option<Header> {
         names,
         columns,
         decimal_comma,
+        line: above as u64 + 1,
+        delimiter: match separator {
+            Some(';') => Delimiter::Semicolon,
+            Some('\t') => Delimiter::Tab,
+            Some(_) => Delimiter::Comma,
+            None => Delimiter::Space,
+        },
     })
 }
 
@@ -111,7 +125,7 @@ fn cells(line: &str, separator: Option<char>) -> Box<dyn Iterator<Item = &str> +
 
 #[cfg(test)]
 mod tests {
-    use super::header;
+    use super::*;
 
     #[test]
     fn a_header_is_found_and_numbers_are_no_header() {
@@ -120,6 +134,7 @@ mod tests {
         assert_eq!(found.names, ["q 1", "x", "y"]);
         assert_eq!(found.columns[1], [Some(2.5), None]);
         assert_eq!(found.span(0), 4.0);
+        assert_eq!((found.line, found.delimiter), (3, Delimiter::Semicolon));
         let comma = header(b"a;b\n1,5;2\n").expect("a table");
         assert!(comma.decimal_comma && comma.largest(0) == 1.5);
         assert_eq!(header(b"1,2,3\n4,5,6\n"), None);

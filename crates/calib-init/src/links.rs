@@ -12,7 +12,7 @@ use calib_recording::Poses;
 use calib_urdf::{JointId, LinkId, RobotModel};
 
 use crate::bodies::Found;
-use crate::fact::Rival;
+use crate::fact::{CERTAIN, Rival};
 use crate::robot;
 
 /// Noise of a pose, m and rad: what the pipeline takes where the profile states none.
@@ -187,6 +187,36 @@ impl Scene<'_> {
         }
     }
 
+    /// Bodies of two markers that follow different links: two markers alone can keep their distance by chance.
+    #[must_use]
+    pub fn not_rigid(&self) -> Vec<usize> {
+        let Ok(chain) = Chain::from_model(self.model) else {
+            return Vec::new();
+        };
+        let alone = |marker: &String, poses: &[Poses]| {
+            let one = [Found {
+                name: marker.clone(),
+                markers: vec![marker.clone()],
+            }];
+            let scene = Scene {
+                model: self.model,
+                bodies: &one,
+                tables: poses,
+            };
+            scene.choose(&chain, 0)
+        };
+        let apart = |(i, body): (usize, &Found)| {
+            let [first, second] = body.markers.as_slice() else {
+                return None;
+            };
+            let (first, second) = (alone(first, self.tables)?, alone(second, self.tables)?);
+            let together = self.choose(&chain, i)?;
+            let each = ((first.rms.powi(2) + second.rms.powi(2)) / 2.0).sqrt();
+            (first.link != second.link && together.rms > CERTAIN * each).then_some(i)
+        };
+        self.bodies.iter().enumerate().filter_map(apart).collect()
+    }
+
     /// Asks the structural hypotheses about bodies on these links.
     #[must_use]
     pub fn ask(&self, chain: &Chain, on: &[(usize, LinkId)]) -> Option<Outcome> {
@@ -260,7 +290,7 @@ impl Scene<'_> {
                 }
                 on[at].1 = *tip;
                 let asked = Assigned::new(on.clone(), self.ask(chain, &on));
-                if asked.left() < 0.9 * best.left() {
+                if asked.explains_more_than(&best) {
                     best = asked;
                 }
             }
@@ -304,6 +334,14 @@ impl Assigned {
         })
     }
 
+    /// A clearly smaller residual, or about the same with fewer corrections.
+    fn explains_more_than(&self, other: &Self) -> bool {
+        let corrections = |a: &Self| a.named().map_or(0, |named| named.correction.len());
+        let fewer = corrections(self) < corrections(other);
+        let limit = if fewer { SAME.0 } else { 1.0 / SAME.0 };
+        self.left() < limit * other.left()
+    }
+
     /// The residual after the correction, m.
     fn left(&self) -> f64 {
         let rms = self.outcome.as_ref().map_or(f64::INFINITY, |o| o.rms);
@@ -311,14 +349,11 @@ impl Assigned {
     }
 }
 
-/// Whether a correction is about links alone.
+/// Whether a hypothesis is about the links that carry bodies.
 #[must_use]
-pub fn moves_bodies(correction: &Correction) -> bool {
-    let of_links = |h: &Hypothesis| {
-        matches!(
-            h,
-            Hypothesis::WrongLink { .. } | Hypothesis::ExchangedBodies { .. }
-        )
-    };
-    correction.iter().all(|s| of_links(&s.hypothesis))
+pub fn is_of_links(hypothesis: &Hypothesis) -> bool {
+    matches!(
+        hypothesis,
+        Hypothesis::WrongLink { .. } | Hypothesis::ExchangedBodies { .. }
+    )
 }

@@ -11,7 +11,7 @@ use crate::correct;
 use crate::error::InitError;
 use crate::fact::{About, CERTAIN, Fact, Place, Residuals, Rival};
 use crate::limits;
-use crate::links::{Assigned, Choice, Scene, moves_bodies};
+use crate::links::{Assigned, Choice, Scene, is_of_links};
 use crate::proposal::{Body, Noise, Proposal, Recording, Table};
 use crate::robot;
 use crate::session::{self, Draft, Use};
@@ -217,16 +217,10 @@ fn with_recordings(
     let read = files.iter().map(|file| Source::read(model, file));
     let mut sources: Vec<Source> = read.collect::<Result<_, _>>()?;
     let (mut drafts, of_files) = session::drafts(model, &sources)?;
-    let (found, of_bodies) = bodies::bodies(&sources);
+    let (mut found, mut of_bodies) = bodies::bodies(&sources);
+    bodies::without_left_out(model, &mut sources, &of_bodies)?;
     let start = stated.unwrap_or_else(|| last_recorded(model, &sources).unwrap_or(longest.link));
-    proposal.bodies = found
-        .iter()
-        .map(|body| Body {
-            name: body.name.clone(),
-            markers: body.markers.clone(),
-            link: start,
-        })
-        .collect();
+    proposal.bodies = on_link(&found, start);
     proposal.recordings = recordings(&drafts, &sources);
     let mut poses = tables::tables(model, proposal, &drafts, &sources)?;
     if stated.is_none() && poses.iter().all(|p| session::moved(model, p).is_empty()) {
@@ -235,6 +229,14 @@ fn with_recordings(
             tip: model.link(longest.link).name.clone(),
         });
     }
+    let scene = Scene {
+        model,
+        bodies: &found,
+        tables: &poses,
+    };
+    let apart = scene.not_rigid();
+    found = bodies::split(found, &mut of_bodies, &apart);
+    proposal.bodies = on_link(&found, start);
     let mut of_links = Vec::new();
     let mut corrections = Vec::new();
     for _ in 0..=CORRECTIONS {
@@ -279,6 +281,15 @@ fn last_recorded(model: &RobotModel, sources: &[Source]) -> Option<LinkId> {
         .iter()
         .max_by_key(|j| robot::movers(model, child(j)).len())?;
     Some(robot::group(model, child(last)))
+}
+
+fn on_link(found: &[Found], link: LinkId) -> Vec<Body> {
+    let on = |body: &Found| Body {
+        name: body.name.clone(),
+        markers: body.markers.clone(),
+        link,
+    };
+    found.iter().map(on).collect()
 }
 
 fn recordings(drafts: &[Draft], sources: &[Source]) -> Vec<Recording> {
@@ -446,11 +457,16 @@ fn next_correction(
             next.facts.push(Fact::new(Place::Recordings, about));
             return Ok(next);
         }
+        Decision::Consistent { .. } => {
+            let about = About::Agrees {
+                rms: outcome.rms,
+                rows: outcome.rows,
+            };
+            next.facts.push(Fact::new(Place::Recordings, about));
+            return Ok(next);
+        }
         _ => return Ok(next),
     };
-    if moves_bodies(&named.correction) {
-        return Ok(next);
-    }
     let bodies: Vec<String> = assigned
         .on
         .iter()
@@ -462,7 +478,12 @@ fn next_correction(
         next: named.evidence.next,
     };
     let mut new = sources.to_vec();
-    for scoped in &named.correction {
+    // Links are chosen again when the tables are right.
+    let of_tables = named
+        .correction
+        .iter()
+        .filter(|s| !is_of_links(&s.hypothesis));
+    for scoped in of_tables {
         let mistake = correct::mistake(model, &bodies, &scoped.hypothesis);
         let done = correct::corrected(model, &new, drafts, scoped)?;
         let about = match &done {

@@ -80,13 +80,13 @@ pub fn drafts(
     let pairs = paired(sources, &only_tracked, &only_joints);
     if let Some(i) = only_tracked
         .iter()
-        .find(|i| !pairs.iter().any(|(t, _)| t == *i))
+        .find(|i| !pairs.iter().any(|pair| pair.0 == **i))
     {
         return Err(without_joints(model, &sources[*i]));
     }
     if let Some(i) = only_joints
         .iter()
-        .find(|i| !pairs.iter().any(|(_, l)| l == *i))
+        .find(|i| !pairs.iter().any(|pair| pair.1 == **i))
     {
         return Err(InitError::NothingTracked {
             file: sources[*i].file.shown.clone(),
@@ -100,7 +100,8 @@ pub fn drafts(
         if only_joints.contains(&i) {
             continue;
         }
-        let log = pairs.iter().find(|(t, _)| *t == i).map(|(_, log)| *log);
+        let pair = pairs.iter().find(|pair| pair.0 == i);
+        let log = pair.map(|pair| pair.1);
         let name = free_name(source.stem(), &mut taken);
         let place = || Place::Recording(name.clone());
         let read = source
@@ -110,8 +111,8 @@ pub fn drafts(
         facts.extend(read.map(|about| Fact::new(place(), about.clone())));
         if let Some(log) = log {
             let file = sources[log].file.path.clone();
-            let only = only_joints.len() == 1;
-            facts.push(Fact::new(place(), About::Log { file, only }));
+            let named = pair.is_some_and(|pair| pair.2);
+            facts.push(Fact::new(place(), About::Log { file, named }));
         }
         let joints = &sources[log.unwrap_or(i)].recording;
         let stream = stream(&source.recording, joints, log.is_some());
@@ -151,8 +152,8 @@ fn without_joints(model: &RobotModel, source: &Source) -> InitError {
     }
 }
 
-/// Tracker's files and logs: those whose names share most words first, else in the order given.
-fn paired(sources: &[Source], tracked: &[usize], logs: &[usize]) -> Vec<(usize, usize)> {
+/// Tracker's files and logs: those whose names share most words, else in the order given; and whether the names decide.
+fn paired(sources: &[Source], tracked: &[usize], logs: &[usize]) -> Vec<(usize, usize, bool)> {
     let common = |a: usize, b: usize| {
         let words = name::words(sources[a].stem());
         let others = name::words(sources[b].stem());
@@ -163,8 +164,10 @@ fn paired(sources: &[Source], tracked: &[usize], logs: &[usize]) -> Vec<(usize, 
     for &file in tracked {
         let best = open.iter().enumerate();
         let best = best.max_by_key(|(at, log)| (common(file, **log), std::cmp::Reverse(*at)));
-        if let Some((at, _)) = best {
-            pairs.push((file, open.remove(at)));
+        if let Some((at, log)) = best {
+            let most = common(file, *log);
+            let named = logs.iter().filter(|l| common(file, **l) >= most).count() == 1;
+            pairs.push((file, open.remove(at), named));
         }
     }
     pairs

@@ -13,14 +13,20 @@ use crate::words;
 #[must_use]
 pub fn summary(proposal: &Proposal, file: &str, findings: Option<&[Finding]>) -> String {
     let mut text = String::new();
-    let mut block = |title: &str, facts: &mut dyn Iterator<Item = &Fact>| {
-        let mut begun = false;
-        for fact in facts {
-            if !begun {
-                let _ = writeln!(text, "\n{title}");
-                begun = true;
+    let mut block = |title: &str, facts: &[&Fact]| {
+        if !facts.is_empty() {
+            let _ = writeln!(text, "\n{title}");
+        }
+        for (i, fact) in facts.iter().enumerate() {
+            // What several parts have in common is said once.
+            if facts[..i].iter().any(|f| f.about == fact.about) {
+                continue;
             }
-            let key = words::place(&fact.place);
+            let same = facts.iter().filter(|f| f.about == fact.about).count() - 1;
+            let key = match same {
+                0 => words::place(&fact.place),
+                n => format!("{} and {n} more", words::place(&fact.place)),
+            };
             let line = format!("{key}: {}", words::sentence(&fact.about));
             text += &wrapped(&line, "  ", "    ");
             if !text.ends_with('\n') {
@@ -28,11 +34,9 @@ pub fn summary(proposal: &Proposal, file: &str, findings: Option<&[Finding]>) ->
             }
         }
     };
-    block("Found", &mut proposal.facts.iter().filter(|f| !f.check));
-    block(
-        "To check (marked CHECK in the file)",
-        &mut proposal.to_check(),
-    );
+    let (to_check, found): (Vec<&Fact>, Vec<&Fact>) = proposal.facts.iter().partition(|f| f.check);
+    block("Found", &found);
+    block("To check (marked CHECK in the file)", &to_check);
     let all = findings.unwrap_or_default();
     let errors: Vec<&Finding> = all
         .iter()

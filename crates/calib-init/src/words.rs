@@ -81,6 +81,11 @@ pub fn sentence(about: &About) -> String {
             found(mistake),
             improvement(residuals)
         ),
+        About::Agrees { rms, rows } => format!(
+            "Order, signs and units of the joints agree with the nominal robot: {} fit it to {} rms, and no mistake explains them better.",
+            plural(*rows, "pose", "poses"),
+            mm(*rms)
+        ),
         About::Disagrees { rms, limit } => format!(
             "The recordings fit the nominal robot to {} rms only; errors of 1° and 10 mm explain {}, and no single mistake explains it. See what `calib check` says.",
             mm(*rms),
@@ -288,8 +293,8 @@ fn of_session(about: &About) -> String {
         About::LeftOutInTurn => "No recording is held out: the report leaves every pose out in turn. Separate poses, recorded on another day, tell more.".to_owned(),
         About::Holds { holds } => format!("A stream in which the robot holds {}: each gives one pose.", plural(*holds, "time", "times")),
         About::Continuous => "A stream of a motion: rows are taken from it.".to_owned(),
-        About::Log { file, only: true } => format!("The joints are in the robot's own log `{file}`, with a clock of its own."),
-        About::Log { file, only: false } => format!("The joints are in the robot's own log `{file}`, paired by the names of the files, with a clock of its own."),
+        About::Log { file, named: true } => format!("The joints are in the robot's own log `{file}`, with a clock of its own."),
+        About::Log { file, named: false } => format!("The joints are in the robot's own log `{file}`, with a clock of its own. The names of the files do not tell which log belongs to which recording: they are paired in their order."),
         About::Limits { sigma } => format!(
             "The largest errors that you accept. Proposed: 5 and 14 times the noise of {}; your task decides.",
             mm(*sigma)

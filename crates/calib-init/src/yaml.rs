@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use calib_recording::{AngleUnit, BodyColumns, ColumnMap, LengthUnit, TimeUnit};
+use calib_recording::{AngleUnit, BodyColumns, ColumnMap, Delimiter, LengthUnit, TimeUnit};
 
 /// A text, quoted where YAML would read something else.
 #[must_use]
@@ -68,6 +68,21 @@ pub fn columns(columns: &ColumnMap, indent: &str) -> String {
         // Writing to a String does not fail.
         let _ = writeln!(out, "{indent}{key}: {value}");
     };
+    if columns.skip_lines > 0 {
+        line("skip_lines", columns.skip_lines.to_string());
+    }
+    if let Some(delimiter) = columns.delimiter {
+        let word = match delimiter {
+            Delimiter::Comma => "comma",
+            Delimiter::Semicolon => "semicolon",
+            Delimiter::Tab => "tab",
+            Delimiter::Space => "space",
+        };
+        line("delimiter", word.to_owned());
+    }
+    if !columns.names.is_empty() {
+        line("names", list(&columns.names));
+    }
     if columns.decimal_comma {
         line("decimal_comma", "true".to_owned());
     }

@@ -54,7 +54,7 @@ fn every_kind_of_body_is_found_on_its_link_over_designs() {
                 proposal.bodies
             );
             assert!(
-                is_on(&proposal, "hand", "link_6"),
+                is_on(&proposal, &proposal.bodies[0].name, "link_6"),
                 "{design:?} {kind:?}: {:?}",
                 proposal.facts
             );
@@ -206,6 +206,67 @@ fn foreign_names_and_units_become_a_column_map() {
         assert_eq!(map.markers["P2"], ["P2_x", "P2_y", "P2_z"]);
         assert_eq!(map.angles == calib_recording::AngleUnit::Rad, radians);
         assert_eq!(map.lengths == calib_recording::LengthUnit::M, !millimeters);
+    }
+}
+
+#[test]
+fn degrees_that_could_be_radians_are_told_by_the_motion() {
+    let good = recordings(&[("hand", "flange", Kind::Markers(3))], Design::Small, 55);
+    let bare = |name: &str| name.replace("_deg", "");
+    let table = with_names(&text(&good["poses"]), bare);
+    let proposal = proposed(&[file("poses", table)]);
+    let wanted = Mistake::Unit {
+        joint: None,
+        unit: "deg",
+    };
+    assert_eq!(mistakes(&proposal), [&wanted]);
+    let map = proposal.recordings[0]
+        .table
+        .columns
+        .as_ref()
+        .expect("a map");
+    assert_eq!(map.angles, calib_recording::AngleUnit::Deg);
+    assert!(is_on(&proposal, "hand", "link_6"));
+}
+
+#[test]
+fn units_that_the_names_state_wrongly_are_corrected_by_other_names() {
+    let good = recordings(&[("hand", "flange", Kind::Markers(3))], Design::Random, 56);
+    let files = |wrong: &dyn Fn(&str) -> String| -> Vec<_> {
+        let of = |(name, poses): (&String, &_)| file(name, with_names(&text(poses), wrong));
+        good.iter().map(of).collect()
+    };
+    let unit = |joint: Option<&str>| Mistake::Unit {
+        joint: joint.map(str::to_owned),
+        unit: "deg",
+    };
+    // All angles, one angle, and the tracker.
+    let all = proposed(&files(&|name| name.replace("_deg", "_rad")));
+    assert_eq!(mistakes(&all), [&unit(None)]);
+    let one = proposed(&files(&|name| name.replace("joint_3_deg", "joint_3_rad")));
+    assert_eq!(mistakes(&one), [&unit(Some("joint_3"))]);
+    let tracker = proposed(&files(&|name| match name.ends_with("_m") {
+        true => name.replace("_m", "_mm"),
+        false => name.to_owned(),
+    }));
+    assert_eq!(mistakes(&tracker), [&Mistake::TrackerUnit { unit: "m" }]);
+    for proposal in [all, one, tracker] {
+        let map = proposal.recordings[0]
+            .table
+            .columns
+            .as_ref()
+            .expect("a map");
+        assert!(
+            map.names.contains(&"joint_3_deg".to_owned()),
+            "{:?}",
+            map.names
+        );
+        assert!(
+            map.names.contains(&"hand_1.x_m".to_owned()),
+            "{:?}",
+            map.names
+        );
+        assert_eq!(link_of(&proposal, "hand"), "link_6");
     }
 }
 

@@ -38,6 +38,8 @@ pub enum Design {
     Random,
     /// One recording for each joint.
     Sweeps,
+    /// All joints at random by a few degrees: the numbers do not tell degrees from radians.
+    Small,
 }
 
 pub fn arm() -> RobotModel {
@@ -76,6 +78,15 @@ fn profile(bodies: &[On], design: Design) -> String {
     }
     let (mut files, mut protocols) = (String::new(), String::new());
     match design {
+        Design::Small => {
+            let _ = writeln!(files, "  poses: {{file: poses.csv, use: static}}");
+            let ranges: Vec<String> = (1..=6).map(|j| format!("joint_{j}_deg: [-5, 5]")).collect();
+            let _ = writeln!(
+                protocols,
+                "    poses: {{random: {{{}}}, poses: 24}}",
+                ranges.join(", ")
+            );
+        }
         Design::Random => {
             for (name, poses) in [("poses", 24), ("more", 10)] {
                 let _ = writeln!(files, "  {name}: {{file: {name}.csv, use: static}}");
