@@ -2,7 +2,6 @@
 
 use crate::scratch;
 
-use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -39,6 +38,22 @@ impl Written {
     fn to_check(&self) -> usize {
         let facts = self.json["facts"].as_array().expect("a list");
         facts.iter().filter(|f| f["check"] == true).count()
+    }
+}
+
+impl Written {
+    /// A row of the table of the book's page.
+    fn row(&self, name: &str, bodies: &[(&str, &str)]) -> String {
+        let links: Vec<String> = bodies.iter().map(|(body, _)| self.link(body)).collect();
+        let held = self
+            .held_out_mm
+            .map_or("-".to_owned(), |mm| format!("{mm:.2}"));
+        format!(
+            "| {name} | 0 | {} | {} | {:.1} | {held} |",
+            self.to_check(),
+            links.join(", "),
+            self.seconds
+        )
     }
 }
 
@@ -102,6 +117,10 @@ fn the_export_of_the_tutorial_needs_no_line_of_a_profile() {
         "{:?}",
         made.held_out_mm
     );
+    println!(
+        "{}",
+        made.row("the tutorial's arm, two clocks", &[("Plate", "")])
+    );
     // Nothing is written over.
     let again = made
         .dir
@@ -144,6 +163,7 @@ fn the_shipped_robots_are_found_again_from_their_tables() {
             );
         }
         assert!(made.json["errors"].as_array().is_some_and(Vec::is_empty));
+        println!("{}", made.row(&format!("`{robot}`, shipped"), links));
     }
 }
 
@@ -156,18 +176,19 @@ fn rigid(urdf: &str, a: &str, b: &str) -> bool {
 
 #[test]
 fn from_a_urdf_alone_to_a_plan_and_a_run() {
-    let urdf = std::fs::read(root().join("book/src/tutorial/arm.urdf")).expect("committed");
-    let dir = Scratch::new().file("arm.urdf", urdf);
-    let made = dir.calib(["init", "arm.urdf", "--markers-on", "flange"]);
+    let urdf = std::fs::read(root().join("robots/ripley/r17.urdf")).expect("committed");
+    let dir = Scratch::new().file("r17.urdf", urdf);
+    let made = dir.calib(["init", "r17.urdf", "--markers-on", "gripper"]);
     assert_eq!(made.code, 0, "{}", made.stderr);
+    let profile = "robots/ripley.yaml";
     assert!(
-        made.stdout.starts_with("Wrote robots/lab_arm.yaml\n"),
+        made.stdout.starts_with(&format!("Wrote {profile}\n")),
         "{}",
         made.stdout
     );
     let plan = dir.calib([
         "plan",
-        "robots/lab_arm.yaml",
+        profile,
         "--poses",
         "8",
         "--candidates",
@@ -176,9 +197,9 @@ fn from_a_urdf_alone_to_a_plan_and_a_run() {
         "plan",
     ]);
     assert_eq!(plan.code, 0, "{}", plan.stderr);
-    let simulated = dir.calib(["simulate", "robots/lab_arm.yaml", "--out", "robots/lab_arm"]);
+    let simulated = dir.calib(["simulate", profile, "--out", "robots/ripley"]);
     assert_eq!(simulated.code, 0, "{}", simulated.stderr);
-    let ran = dir.calib(["run", "robots/lab_arm.yaml", "--out", "out"]);
+    let ran = dir.calib(["run", profile, "--out", "out"]);
     assert!(ran.code < 2, "{}{}", ran.stdout, ran.stderr);
 }
 
@@ -251,13 +272,10 @@ const REAL: [Real; 3] = [
     },
 ];
 
-/// The table of the book's page: `cargo test -p calib-cli --test suite init::real -- --nocapture`.
+/// With the other rows of the book's table: `cargo test -p calib-cli --test suite init:: -- --nocapture`.
 #[test]
 fn real_robots_run_without_an_edit() {
     let Some(data) = data() else { return };
-    let mut table = String::from(
-        "| robot | edits | to check | links | init, s | held out, mm |\n|---|---|---|---|---|---|\n",
-    );
     for real in &REAL {
         let read = |path: &str| std::fs::read(data.join(path)).expect("part of the data");
         let mut dir = Scratch::new().file("robot.urdf", read(real.urdf));
@@ -277,22 +295,28 @@ fn real_robots_run_without_an_edit() {
                 made.link(body)
             );
         }
-        let held = made
-            .held_out_mm
-            .map_or("-".to_owned(), |mm| format!("{mm:.2}"));
-        let links: Vec<String> = real.links.iter().map(|(body, _)| made.link(body)).collect();
-        let _ = writeln!(
-            table,
-            "| `{}` | 0 | {} | {} | {:.1} | {held} |",
-            real.name,
-            made.to_check(),
-            links.join(", "),
-            made.seconds
-        );
+        println!("{}", made.row(&format!("`{}`", real.name), real.links));
         assert!(made.run < 2);
         if real.name == "tiago_qualisys" {
             assert!(made.has("duplicate"), "the fourth marker repeats the third");
         }
     }
-    println!("{table}");
+}
+
+/// Poses of a flange and of a tracked body, and no joints: the command that is named solves it.
+#[test]
+fn pairs_of_poses_lead_to_the_hand_eye_solver() {
+    let Some(data) = data() else { return };
+    let table = std::fs::read(data.join("ur10_handeye/ur10_axzb.csv")).expect("part of the data");
+    let urdf = std::fs::read(root().join("book/src/tutorial/arm.urdf")).expect("committed");
+    let dir = Scratch::new()
+        .file("arm.urdf", urdf)
+        .file("pairs.csv", table);
+    let refused = dir.calib(["init", "arm.urdf", "pairs.csv"]);
+    assert_eq!(refused.code, 3);
+    let named = "calib fit handeye pairs.csv --robot flange --measured meas";
+    assert!(refused.stderr.contains(named), "{}", refused.stderr);
+    let call: Vec<&str> = named.split(' ').skip(1).collect();
+    let solved = dir.calib_with(&call);
+    assert_eq!(solved.code, 0, "{}{}", solved.stdout, solved.stderr);
 }

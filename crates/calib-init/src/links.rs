@@ -5,16 +5,18 @@
 //! about the best links and about the ends of the chains, and the assignment with the smallest residual after its correction is kept.
 
 use calib_checks::structural::{
-    Body, Chain, Correction, Data, Decision, Hypothesis, LinkIndex, Measured, Named, Options,
-    Outcome, RecordingIndex, apply_all, explain, registration_residual, thin,
+    Body, Chain, Data, Decision, Hypothesis, LinkIndex, Measured, Named, Options, Outcome,
+    RecordingIndex, Scope, Scoped, UnitMistake, apply, explain, registration_residual, thin,
 };
 use calib_recording::Poses;
 use calib_urdf::{JointId, LinkId, RobotModel};
 
 use crate::bodies::Found;
-use crate::fact::{CERTAIN, Rival};
+use crate::fact::{CERTAIN, Residuals, Rival};
 use crate::robot;
 
+/// Another unit of length must divide the residual by this.
+const OTHER_UNIT: f64 = 5.0;
 /// Noise of a pose, m and rad: what the pipeline takes where the profile states none.
 const POSE_SIGMA: (f64, f64) = (3e-4, 1e-3);
 /// Rows that a link is chosen from.
@@ -134,15 +136,74 @@ impl Scene<'_> {
     /// The link of a body; `None` where no row shows it with joints.
     #[must_use]
     pub fn choose(&self, chain: &Chain, body: usize) -> Option<Choice> {
-        let groups = robot::groups(self.model);
-        let mut data = thin(&self.data(chain, &[(body, self.model.root())]), ROWS);
+        let mut all = self.residuals(chain, body, None)?;
+        all.sort_by(|a, b| a.1.total_cmp(&b.1));
+        Some(self.chosen(all))
+    }
+
+    /// Residual of a body on each group of links, rms, m, after a correction.
+    fn residuals(
+        &self,
+        chain: &Chain,
+        body: usize,
+        correction: Option<&Scoped>,
+    ) -> Option<Vec<(LinkId, f64)>> {
+        let data = thin(&self.data(chain, &[(body, self.model.root())]), ROWS);
+        let mut data = match correction {
+            Some(scoped) => apply(scoped, &data),
+            None => data,
+        };
         let mut all = Vec::new();
-        for link in groups {
+        for link in robot::groups(self.model) {
             data.bodies[0].link = LinkIndex::from(link);
             all.push((link, registration_residual(&data).ok()?));
         }
-        all.sort_by(|a, b| a.1.total_cmp(&b.1));
-        Some(self.chosen(all))
+        Some(all)
+    }
+
+    /// The unit of the tracker's lengths, if another one explains the motion of the bodies better on whatever links. A body read too small seems to
+    /// stand still, so this is asked before any link: residuals are compared as densities of what was measured, per unit of the file.
+    #[must_use]
+    pub fn tracker_unit(&self) -> Option<(Scoped, Residuals)> {
+        let chain = Chain::from_model(self.model).ok()?;
+        let least = |body: usize, correction: Option<&Scoped>| {
+            let all = self.residuals(&chain, body, correction)?;
+            all.into_iter().map(|(_, rms)| rms).min_by(f64::total_cmp)
+        };
+        let mut best: Option<(f64, Scoped, Residuals)> = None;
+        for mistake in [
+            UnitMistake::MillimetersReadAsMeters,
+            UnitMistake::MetersReadAsMillimeters,
+        ] {
+            let scoped = Scoped {
+                hypothesis: Hypothesis::TrackerUnit { mistake },
+                scope: Scope::All,
+            };
+            let (mut gain, mut none, mut after) = (0.0, 0.0_f64, 0.0_f64);
+            for body in 0..self.bodies.len() {
+                let (Some(as_read), Some(scaled)) = (least(body, None), least(body, Some(&scoped)))
+                else {
+                    continue;
+                };
+                // Half of what a pose states has no unit of length.
+                let share = if self.bodies[body].markers.is_empty() {
+                    0.5
+                } else {
+                    1.0
+                };
+                gain += (as_read / scaled).ln() + share * mistake.factor().ln();
+                (none, after) = (none.max(as_read), after.max(scaled));
+            }
+            let residuals = Residuals {
+                none,
+                best: after,
+                next: None,
+            };
+            if gain > OTHER_UNIT.ln() && best.as_ref().is_none_or(|b| gain > b.0) {
+                best = Some((gain, scoped, residuals));
+            }
+        }
+        best.map(|(_, scoped, residuals)| (scoped, residuals))
     }
 
     fn chosen(&self, all: Vec<(LinkId, f64)>) -> Choice {
@@ -226,18 +287,6 @@ impl Scene<'_> {
         options.score_tests = false;
         options.most_rows = ROWS_OF_HYPOTHESES;
         explain(&data, &options).ok()
-    }
-
-    /// The residual after a correction, rms, m.
-    #[must_use]
-    pub fn after(
-        &self,
-        chain: &Chain,
-        on: &[(usize, LinkId)],
-        correction: &Correction,
-    ) -> Option<f64> {
-        let data = thin(&self.data(chain, on), ROWS_OF_HYPOTHESES);
-        registration_residual(&apply_all(correction, &data)).ok()
     }
 
     /// The assignment that explains the recordings best after its correction, among the links that bodies follow best and the ends of the chains.

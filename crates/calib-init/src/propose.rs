@@ -1,17 +1,14 @@
 //! From a URDF and files to a proposal.
 
-use std::collections::BTreeMap;
-
-use calib_checks::structural::{Chain, Decision, Hypothesis, Scoped};
 use calib_recording::Poses;
 use calib_urdf::{JointId, LinkId, RobotModel};
 
+use crate::ask::{apply_one, ask, next_correction};
 use crate::bodies::{self, Found};
-use crate::correct;
 use crate::error::InitError;
-use crate::fact::{About, CERTAIN, Fact, Place, Residuals, Rival};
+use crate::fact::{About, Fact, Place};
 use crate::limits;
-use crate::links::{Assigned, Choice, Scene, is_of_links};
+use crate::links::Scene;
 use crate::proposal::{Body, Noise, Proposal, Recording, Table};
 use crate::robot;
 use crate::session::{self, Draft, Use};
@@ -229,6 +226,22 @@ fn with_recordings(
             tip: model.link(longest.link).name.clone(),
         });
     }
+    let mut corrections = Vec::new();
+    let scene = Scene {
+        model,
+        bodies: &found,
+        tables: &poses,
+    };
+    if let Some((scoped, residuals)) = scene.tracker_unit() {
+        let (fact, new) = apply_one(model, &sources, &drafts, &[], &scoped, (residuals, 0))?;
+        corrections.push(fact);
+        if let Some(new) = new {
+            sources = new;
+            (found, of_bodies) = bodies::bodies(&sources);
+            proposal.recordings = recordings(&drafts, &sources);
+            poses = tables::tables(model, proposal, &drafts, &sources)?;
+        }
+    }
     let scene = Scene {
         model,
         bodies: &found,
@@ -238,7 +251,6 @@ fn with_recordings(
     found = bodies::split(found, &mut of_bodies, &apart);
     proposal.bodies = on_link(&found, start);
     let mut of_links = Vec::new();
-    let mut corrections = Vec::new();
     for _ in 0..=CORRECTIONS {
         let scene = Scene {
             model,
@@ -321,205 +333,6 @@ fn noise(facts: &[Fact]) -> Noise {
         }
     }
     noise
-}
-
-/// Links for all bodies, with what the hypotheses say.
-struct Asked {
-    choices: BTreeMap<usize, Choice>,
-    assigned: Assigned,
-}
-
-fn ask(scene: &Scene<'_>, stated: Option<LinkId>) -> Asked {
-    let none = Asked {
-        choices: BTreeMap::new(),
-        assigned: Assigned {
-            on: Vec::new(),
-            outcome: None,
-        },
-    };
-    // A model that was read is a tree.
-    let Ok(chain) = Chain::from_model(scene.model) else {
-        return none;
-    };
-    let chosen = (0..scene.bodies.len()).filter_map(|b| Some((b, scene.choose(&chain, b)?)));
-    let choices: Vec<(usize, Choice)> = chosen.collect();
-    // The body that follows the stated link best is the one that was meant.
-    let on_stated = stated.and_then(|link| {
-        let group = robot::group(scene.model, link);
-        let rms = |c: &Choice| {
-            c.all
-                .iter()
-                .find(|(l, _)| *l == group)
-                .map_or(f64::INFINITY, |(_, rms)| *rms / c.rms.max(1e-9))
-        };
-        let best = choices
-            .iter()
-            .min_by(|a, b| rms(&a.1).total_cmp(&rms(&b.1)))?;
-        Some((best.0, link))
-    });
-    let stated: Vec<(usize, LinkId)> = on_stated.into_iter().collect();
-    let assigned = scene.assign(&chain, &choices, &stated);
-    Asked {
-        choices: choices.into_iter().collect(),
-        assigned,
-    }
-}
-
-impl Asked {
-    /// The link of each body, with its runner-up.
-    fn facts(&self, scene: &Scene<'_>, stated: Option<LinkId>) -> Vec<Fact> {
-        let model = scene.model;
-        let named = |link: LinkId| model.link(link).name.clone();
-        let moving = scene.moving();
-        let mut facts = Vec::new();
-        for (body, link) in &self.assigned.on {
-            let Some(choice) = self.choices.get(body) else {
-                continue;
-            };
-            let group = robot::group(model, *link);
-            let rms = choice
-                .all
-                .iter()
-                .find(|(l, _)| *l == group)
-                .map_or(choice.rms, |(_, rms)| *rms);
-            let rivals = || {
-                choice
-                    .all
-                    .iter()
-                    .filter(|(l, _)| *l != group && !choice.same.contains(&named(*l)))
-            };
-            let rival = |(l, rms): &(LinkId, f64)| Rival {
-                link: named(*l),
-                rms: *rms,
-            };
-            let carried = robot::movers(model, *link);
-            let about = if stated == Some(*link) {
-                About::LinkStated {
-                    link: named(*link),
-                    rms: Some(rms),
-                    better: rivals().find(|(_, other)| CERTAIN * other < rms).map(rival),
-                }
-            } else if !carried.iter().any(|j| moving.contains(j)) {
-                About::Still {
-                    link: named(*link),
-                    rms,
-                }
-            } else {
-                // Links between which no joint with a column lies are the same for these recordings.
-                let next = match group == robot::group(model, choice.link) {
-                    true => choice.next.clone(),
-                    false => rivals().next().map(rival),
-                };
-                About::Link {
-                    link: named(*link),
-                    rms,
-                    next,
-                    same: choice.same.clone(),
-                }
-            };
-            facts.push(Fact::new(
-                Place::Body(scene.bodies[*body].name.clone()),
-                about,
-            ));
-        }
-        facts
-    }
-}
-
-/// A correction that was applied, or why none was.
-struct Next {
-    facts: Vec<Fact>,
-    sources: Option<Vec<Source>>,
-}
-
-fn next_correction(
-    model: &RobotModel,
-    sources: &[Source],
-    drafts: &[Draft],
-    found: &[Found],
-    assigned: &Assigned,
-) -> Result<Next, InitError> {
-    let mut next = Next {
-        facts: Vec::new(),
-        sources: None,
-    };
-    let Some(outcome) = &assigned.outcome else {
-        return Ok(next);
-    };
-    let named = match &outcome.decision {
-        Decision::Named(named) => named,
-        Decision::Undecided { .. } => {
-            let limit = outcome.expected.map_or(0.0, |e| e.limit);
-            let about = About::Disagrees {
-                rms: outcome.rms,
-                limit,
-            };
-            next.facts.push(Fact::new(Place::Recordings, about));
-            return Ok(next);
-        }
-        Decision::Consistent { .. } => {
-            let about = About::Agrees {
-                rms: outcome.rms,
-                rows: outcome.rows,
-            };
-            next.facts.push(Fact::new(Place::Recordings, about));
-            return Ok(next);
-        }
-        _ => return Ok(next),
-    };
-    let bodies: Vec<String> = assigned
-        .on
-        .iter()
-        .map(|(b, _)| found[*b].name.clone())
-        .collect();
-    let residuals = Residuals {
-        none: named.evidence.none,
-        best: named.evidence.best,
-        next: named.evidence.next,
-    };
-    let mut new = sources.to_vec();
-    // Links are chosen again when the tables are right.
-    let of_tables = named
-        .correction
-        .iter()
-        .filter(|s| !is_of_links(&s.hypothesis));
-    for scoped in of_tables {
-        let mistake = correct::mistake(model, &bodies, &scoped.hypothesis);
-        let done = correct::corrected(model, &new, drafts, scoped)?;
-        let about = match &done {
-            Some(_) => About::Corrected {
-                mistake,
-                residuals,
-                equivalent: named.equivalent.len(),
-            },
-            None => About::NotCorrected { mistake, residuals },
-        };
-        next.facts.push(Fact::new(place_of(drafts, scoped), about));
-        if let Some(done) = done {
-            new = done;
-            next.sources = Some(new.clone());
-        }
-    }
-    Ok(next)
-}
-
-/// A mistake of one recording stands there.
-fn place_of(drafts: &[Draft], scoped: &Scoped) -> Place {
-    let inside: Vec<&Draft> = drafts
-        .iter()
-        .enumerate()
-        .filter(|(r, _)| {
-            scoped
-                .scope
-                .contains(calib_checks::structural::RecordingIndex(*r))
-        })
-        .map(|(_, draft)| draft)
-        .collect();
-    match (inside.as_slice(), scoped.hypothesis) {
-        ([one], _) => Place::Recording(one.name.clone()),
-        (_, Hypothesis::TrackerUnit { .. } | Hypothesis::Mirrored) => Place::Tracker,
-        _ => Place::Recordings,
-    }
 }
 
 /// Joints that carry a body and have no column are held at 0, and said.

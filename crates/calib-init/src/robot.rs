@@ -48,7 +48,11 @@ pub struct Tip {
     pub joints: Vec<JointId>,
 }
 
-/// The ends of the chains, the one with most joints first.
+/// Joints of an arm that carry a gripper, at the least: a fork behind fewer is one of wheels, or of arms.
+const BEFORE_FINGERS: usize = 2;
+
+/// The ends of the chains, the one with most joints first. Where a chain forks in its last joint the ends are fingers, and the link before the fork
+/// stands for them.
 #[must_use]
 pub fn tips(model: &RobotModel) -> Vec<Tip> {
     let all = groups(model);
@@ -65,6 +69,25 @@ pub fn tips(model: &RobotModel) -> Vec<Tip> {
         })
         .filter(|tip| !tip.joints.is_empty())
         .collect();
+    let before = |tip: &Tip| tip.joints[..tip.joints.len() - 1].to_vec();
+    let forks: Vec<Vec<JointId>> = tips.iter().map(before).collect();
+    let is_finger = |joints: &Vec<JointId>| {
+        let fork = &joints[..joints.len() - 1];
+        fork.len() >= BEFORE_FINGERS && forks.iter().filter(|f| *f == fork).count() > 1
+    };
+    for tip in &mut tips {
+        if is_finger(&tip.joints) {
+            tip.joints.pop();
+            let last = tip.joints.last().map(|j| model.joint(*j).child);
+            tip.link = last.map_or(tip.link, |link| group(model, link));
+        }
+    }
+    let mut known: Vec<LinkId> = Vec::new();
+    tips.retain(|tip| {
+        let new = !known.contains(&tip.link);
+        known.push(tip.link);
+        new
+    });
     tips.sort_by_key(|tip| std::cmp::Reverse(tip.joints.len()));
     tips
 }
