@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use calib_checks::structural::{Chain, Decision, Hypothesis, RecordingIndex, Scoped};
+use calib_checks::structural::{Chain, Correction, Decision, Hypothesis, RecordingIndex, Scoped};
 use calib_urdf::{LinkId, RobotModel};
 
 use crate::bodies::Found;
@@ -165,6 +165,11 @@ pub fn next_correction(
             next.facts.push(Fact::new(Place::Recordings, about));
             return Ok(next);
         }
+        Decision::TooFewData { .. } => {
+            let about = About::TooFew { rows: outcome.rows };
+            next.facts.push(Fact::new(Place::Recordings, about));
+            return Ok(next);
+        }
         _ => return Ok(next),
     };
     let bodies: Vec<String> = assigned
@@ -177,22 +182,58 @@ pub fn next_correction(
         best: named.evidence.best,
         next: named.evidence.next,
     };
-    let mut new = sources.to_vec();
-    // Links are chosen again when the tables are right.
-    let of_tables = named
-        .correction
-        .iter()
-        .filter(|s| !is_of_links(&s.hypothesis));
-    for scoped in of_tables {
-        let evidence = (residuals, named.equivalent.len());
-        let (fact, done) = apply_one(model, &new, drafts, &bodies, scoped, evidence)?;
-        next.facts.push(fact);
-        if let Some(done) = done {
-            new = done;
-            next.sources = Some(new.clone());
+    let evidence = (residuals, named.equivalent.len());
+    // Of corrections that the recordings do not distinguish, one that a column map can hold.
+    let mut first = None;
+    let is_of_tables = |c: &&Correction| c.iter().any(|s| !is_of_links(&s.hypothesis));
+    let equivalent = named.equivalent.iter().filter(is_of_tables);
+    for correction in std::iter::once(&named.correction).chain(equivalent) {
+        let all = apply_each(model, sources, drafts, &bodies, correction, evidence)?;
+        if all.complete {
+            first = Some(all);
+            break;
         }
+        first.get_or_insert(all);
+    }
+    if let Some(applied) = first {
+        next.facts.extend(applied.facts);
+        next.sources = applied.sources;
     }
     Ok(next)
+}
+
+/// Corrections applied one after the other.
+struct Applied {
+    facts: Vec<Fact>,
+    /// Where any was applied.
+    sources: Option<Vec<Source>>,
+    /// All of them were.
+    complete: bool,
+}
+
+fn apply_each(
+    model: &RobotModel,
+    sources: &[Source],
+    drafts: &[Draft],
+    bodies: &[String],
+    correction: &Correction,
+    evidence: (Residuals, usize),
+) -> Result<Applied, InitError> {
+    let mut applied = Applied {
+        facts: Vec::new(),
+        sources: None,
+        complete: true,
+    };
+    // Links are chosen again when the tables are right.
+    let of_tables = correction.iter().filter(|s| !is_of_links(&s.hypothesis));
+    for scoped in of_tables {
+        let now = applied.sources.as_deref().unwrap_or(sources);
+        let (fact, done) = apply_one(model, now, drafts, bodies, scoped, evidence)?;
+        applied.facts.push(fact);
+        applied.complete &= done.is_some();
+        applied.sources = done.or(applied.sources);
+    }
+    Ok(applied)
 }
 
 /// A correction, in the column maps where these can hold it, and its fact. `evidence`: residuals, and how many corrections are equivalent.

@@ -78,6 +78,15 @@ pub enum InitError {
         /// What it has.
         columns: Vec<String>,
     },
+    /// Nothing is seen often enough to be a body.
+    #[error(
+        "{}: no marker and no body is seen in four poses or more\n  help: record at least ten poses that differ",
+        .files.join(", ")
+    )]
+    NothingSeen {
+        /// The recordings.
+        files: Vec<String>,
+    },
     /// The robot stood still.
     #[error(
         "{}: no joint moves in any row, so that no link can be found\n  help: name the link that carries the markers: `--markers-on {tip}`; for a calibration record poses that differ",
@@ -121,7 +130,9 @@ impl InitError {
             | Self::HandEye { file, .. }
             | Self::NothingTracked { file, .. }
             | Self::Twice { file } => Some(file),
-            Self::NoMotion { files, .. } => files.first().map(String::as_str),
+            Self::NoMotion { files, .. } | Self::NothingSeen { files } => {
+                files.first().map(String::as_str)
+            }
             _ => None,
         }
     }
@@ -135,6 +146,7 @@ impl InitError {
             | Self::NoJoints { .. }
             | Self::HandEye { .. }
             | Self::NothingTracked { .. }
+            | Self::NothingSeen { .. }
             | Self::NoMotion { .. } => ExitCode::Data,
             _ => ExitCode::Usage,
         }

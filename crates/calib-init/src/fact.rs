@@ -177,6 +177,11 @@ pub enum About {
         /// Links that these recordings do not distinguish from it.
         same: Vec<String>,
     },
+    /// Nothing shows which link carries the body: the last one that recorded joints move is taken.
+    LinkUnknown {
+        /// The link.
+        link: String,
+    },
     /// Nothing that the recordings moved carries the body.
     Still {
         /// The link.
@@ -341,6 +346,11 @@ pub enum About {
         /// Poses.
         rows: usize,
     },
+    /// Too few poses to test order, signs and units.
+    TooFew {
+        /// Poses.
+        rows: usize,
+    },
     /// The recordings disagree with the robot, and no single mistake explains it.
     Disagrees {
         /// Residual, rms, m.
@@ -400,6 +410,8 @@ fn is_guess(about: &About) -> bool {
         About::Time { named, .. } => !named,
         About::Log { named, .. } => !named,
         About::TipOfChain { .. }
+        | About::LinkUnknown { .. }
+        | About::TooFew { .. }
         | About::JointsByOrder { .. }
         | About::JointsMissing { .. }
         | About::Duplicate { .. }

@@ -178,7 +178,7 @@ pub fn numbered(name: &str) -> Option<(&str, u32, &str)> {
 
 /// A coordinate letter of a name, `(before, behind)`: `x1`, `hand_x`, `handX`, `TX`, `pos.x`.
 #[must_use]
-pub fn coordinate<'n>(name: &'n str, letter: char) -> Option<(&'n str, &'n str)> {
+pub fn coordinate(name: &str, letter: char) -> Option<(&str, &str)> {
     let upper = letter.to_ascii_uppercase();
     let places = name
         .char_indices()
@@ -203,7 +203,7 @@ pub fn coordinate<'n>(name: &'n str, letter: char) -> Option<(&'n str, &'n str)>
 
 /// A part of a quaternion, `(before, behind)`: `hand_qx`, `qw`.
 #[must_use]
-pub fn quaternion<'n>(name: &'n str, letter: char) -> Option<(&'n str, &'n str)> {
+pub fn quaternion(name: &str, letter: char) -> Option<(&str, &str)> {
     let wanted = [
         format!("q{letter}"),
         format!("Q{}", letter.to_ascii_uppercase()),

@@ -215,6 +215,11 @@ fn with_recordings(
     let mut sources: Vec<Source> = read.collect::<Result<_, _>>()?;
     let (mut drafts, of_files) = session::drafts(model, &sources)?;
     let (mut found, mut of_bodies) = bodies::bodies(&sources);
+    if found.is_empty() {
+        return Err(InitError::NothingSeen {
+            files: sources.iter().map(|s| s.file.shown.clone()).collect(),
+        });
+    }
     bodies::without_left_out(model, &mut sources, &of_bodies)?;
     let start = stated.unwrap_or_else(|| last_recorded(model, &sources).unwrap_or(longest.link));
     proposal.bodies = on_link(&found, start);
@@ -270,6 +275,13 @@ fn with_recordings(
         sources = new;
         proposal.recordings = recordings(&drafts, &sources);
         poses = tables::tables(model, proposal, &drafts, &sources)?;
+    }
+    for body in &proposal.bodies {
+        let place = Place::Body(body.name.clone());
+        if !of_links.iter().any(|fact| fact.place == place) {
+            let link = model.link(body.link).name.clone();
+            of_links.push(Fact::new(place, About::LinkUnknown { link }));
+        }
     }
     let of_uses = session::uses(model, &mut drafts, &poses);
     proposal.recordings = recordings(&drafts, &sources);

@@ -63,6 +63,7 @@ pub fn sentence(about: &About) -> String {
         | About::TipOfChain { .. }
         | About::LinkStated { .. }
         | About::Link { .. }
+        | About::LinkUnknown { .. }
         | About::Still { .. } => of_links(about),
         About::JointsByName { .. }
         | About::JointsByOrder { .. }
@@ -85,6 +86,10 @@ pub fn sentence(about: &About) -> String {
             "Order, signs and units of the joints agree with the nominal robot: {} fit it to {} rms, and no mistake explains them better.",
             plural(*rows, "pose", "poses"),
             mm(*rms)
+        ),
+        About::TooFew { rows } => format!(
+            "{} are too few to test the order, signs and units of the joints.",
+            plural(*rows, "pose", "poses")
         ),
         About::Disagrees { rms, limit } => format!(
             "The recordings fit the nominal robot to {} rms only; errors of 1° and 10 mm explain {}, and no single mistake explains it. See what `calib check` says.",
@@ -149,6 +154,9 @@ fn of_links(about: &About) -> String {
             };
             format!("The body follows `{link}` to {} rms{next}.{same}", mm(*rms))
         }
+        About::LinkUnknown { link } => format!(
+            "No pose shows this body together with moving joints. `{link}` is the last link that recorded joints move: name the link that carries it."
+        ),
         About::Still { link, rms } => {
             format!(
                 "The body stands still to {} rms: it is fixed to `{link}`, or stands beside the robot.",

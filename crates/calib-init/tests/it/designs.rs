@@ -166,6 +166,50 @@ fn wrong_signs_and_exchanged_columns_are_found_and_corrected() {
 }
 
 #[test]
+fn two_wrong_signs_are_both_corrected() {
+    let good = recordings(&[("hand", "flange", Kind::Markers(4))], Design::Random, 42);
+    let files: Vec<_> = good
+        .iter()
+        .map(|(name, poses)| {
+            let negated = |c: &str, cell: &str| match c {
+                "joint_3_deg" | "joint_5_deg" => {
+                    (-cell.parse::<f64>().expect("a number")).to_string()
+                }
+                _ => cell.to_owned(),
+            };
+            file(name, with_cells(&text(poses), negated))
+        })
+        .collect();
+    let proposal = proposed(&files);
+    let mut joints: Vec<&str> = mistakes(&proposal)
+        .into_iter()
+        .filter_map(|mistake| match mistake {
+            Mistake::Sign { joint } => Some(joint.as_str()),
+            _ => None,
+        })
+        .collect();
+    joints.sort_unstable();
+    assert_eq!(joints, ["joint_3", "joint_5"]);
+    assert_eq!(link_of(&proposal, "hand"), "link_6");
+}
+
+#[test]
+fn few_poses_are_said_to_be_few_and_every_body_has_a_word_about_its_link() {
+    let good = recordings(&[("hand", "flange", Kind::Markers(1))], Design::Random, 43);
+    for (rows, few) in [(24, false), (5, true)] {
+        let kept: Vec<usize> = (0..rows).collect();
+        let proposal = proposed(&[file("poses", text(&good["poses"].select(&kept)))]);
+        let of_link = |f: &&Fact| matches!(f.about, About::Link { .. } | About::LinkUnknown { .. });
+        let links = proposal.facts.iter().filter(of_link).count();
+        assert_eq!(links, proposal.bodies.len(), "{rows}: {:?}", proposal.facts);
+        let said = proposal
+            .to_check()
+            .any(|f| matches!(f.about, About::TooFew { .. }));
+        assert_eq!(said, few, "{rows}: {:?}", proposal.facts);
+    }
+}
+
+#[test]
 fn foreign_names_and_units_become_a_column_map() {
     let good = recordings(&[("hand", "flange", Kind::Markers(3))], Design::Random, 51);
     let foreign = |name: &str| {

@@ -45,6 +45,8 @@ fn bad_input_is_named_with_a_remedy() {
         ..request()
     };
     assert!(propose(&arm(), &stated, &[file("still", still)]).is_ok());
+    let two = text(&good["poses"].select(&[0, 1]));
+    assert!(refused(&[file("two", two)]).contains("four poses or more"));
     // Joints alone, and the same file twice.
     let joints = "pose,joint_1_deg,joint_2_deg\n0,1,2\n1,3,4\n";
     assert!(refused(&[file("joints", joints)]).contains("nothing was tracked"));
