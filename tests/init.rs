@@ -272,9 +272,8 @@ const REAL: [Real; 3] = [
     },
 ];
 
-/// With the other rows of the book's table: `cargo test -p calib-cli --test suite init:: -- --nocapture`.
-#[test]
-fn real_robots_run_without_an_edit() {
+/// Writes and runs the profiles of all real robots; of long tables every n-th posture.
+fn real_robots(every: usize) {
     let Some(data) = data() else { return };
     for real in &REAL {
         let read = |path: &str| std::fs::read(data.join(path)).expect("part of the data");
@@ -282,7 +281,12 @@ fn real_robots_run_without_an_edit() {
         let mut names = Vec::new();
         for file in real.files {
             let name = file.rsplit('/').next().expect("a file");
-            dir = dir.file(name, read(file));
+            let text = String::from_utf8(read(file)).expect("a table is text");
+            let every = if text.lines().count() > 100 { every } else { 1 };
+            let rows = text.lines().enumerate();
+            let kept = rows.filter(|(row, _)| *row == 0 || row % every == 0);
+            let kept: String = kept.map(|(_, line)| format!("{line}\n")).collect();
+            dir = dir.file(name, kept);
             names.push(name);
         }
         let made = written(dir, "robot.urdf", &names);
@@ -301,6 +305,18 @@ fn real_robots_run_without_an_edit() {
             assert!(made.has("duplicate"), "the fourth marker repeats the third");
         }
     }
+}
+
+#[test]
+fn real_robots_run_without_an_edit() {
+    real_robots(6);
+}
+
+/// With the other rows of the book's table: `cargo test -p calib-cli --test suite init:: -- --include-ignored --nocapture`.
+#[test]
+#[ignore = "study: a run of 350 postures"]
+fn study_of_real_robots_with_all_postures() {
+    real_robots(1);
 }
 
 /// Poses of a flange and of a tracked body, and no joints: the command that is named solves it.
