@@ -30,6 +30,7 @@ const LAYERS: &[(&str, u8)] = &[
     ("calib-apply", 5),
     ("calib-drift", 5),
     ("calib-fit", 5),
+    ("calib-init", 6),
     ("calib-plan", 6),
     ("calib-study", 6),
     ("calib-cli", 7),

@@ -16,6 +16,7 @@ mod facts;
 mod fit;
 mod hostile;
 mod hygiene;
+mod init;
 mod inputs;
 mod interruptions;
 mod laboratory;

@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    apply, check, completions, convert, diff, drift, fit, history, man, plan, plugins, record,
-    revert, run, schema, simulate, study, view,
+    apply, check, completions, convert, diff, drift, fit, history, init, man, plan, plugins,
+    record, revert, run, schema, simulate, study, view,
 };
 use crate::terminal::Console;
 
@@ -31,6 +31,8 @@ pub enum Command {
     Run(run::Run),
     /// Show the report of a folder of results
     View(view::View),
+    /// Write the first profile of a robot: from its URDF and any recordings, with the evidence for every guess
+    Init(init::Init),
     /// Check a profile and its recordings without solving
     Check(check::Check),
     /// Choose the postures to record next, and say what they will tell

@@ -7,6 +7,7 @@ use calib_capture::{CaptureError, SourceError};
 use calib_drift::DriftError;
 use calib_files::FileError;
 use calib_fit::FitError;
+use calib_init::InitError;
 use calib_pipeline::{ExitCode, PipelineError};
 use calib_plan::PlanError;
 use calib_plugin::NewProjectError;
@@ -31,6 +32,9 @@ pub enum CliError {
     /// Of `calib fit`.
     #[error(transparent)]
     Fit(#[from] FitError),
+    /// Of `calib init`.
+    #[error(transparent)]
+    Init(#[from] InitError),
     /// Of `calib plan`.
     #[error(transparent)]
     Plan(#[from] PlanError),
@@ -128,6 +132,7 @@ impl CliError {
         match self {
             Self::Pipeline(error) => error.exit_code(),
             Self::Plan(error) => error.exit_code(),
+            Self::Init(error) => error.exit_code(),
             Self::Apply(error) => of_apply(error),
             Self::Drift(error) if error.is_refusal() => ExitCode::NotObservable,
             Self::Drift(DriftError::Unwritable(_)) | Self::Report(_) | Self::Stdout(_) => {
@@ -162,7 +167,9 @@ impl CliError {
     #[must_use]
     pub fn remedy(&self) -> Option<&'static str> {
         match self {
-            Self::Pipeline(error) | Self::Plan(PlanError::Pipeline(error)) => Some(error.remedy()),
+            Self::Pipeline(error)
+            | Self::Plan(PlanError::Pipeline(error))
+            | Self::Init(InitError::Pipeline(error)) => Some(error.remedy()),
             Self::Apply(ApplyError::Read(_)) => {
                 Some("correct it there, or export the nominal URDF again")
             }

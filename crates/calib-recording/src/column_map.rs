@@ -41,6 +41,9 @@ pub struct ColumnMap {
     /// Prismatic joints: joint name → column.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub prismatic: BTreeMap<String, String>,
+    /// Joints of this map whose columns count the other way than the URDF's axis: their values are negated.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub reversed: Vec<String>,
     /// Joint torques in N·m: joint name → column.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub torques: BTreeMap<String, String>,
@@ -236,6 +239,7 @@ impl ColumnMap {
                 &base.joint_columns,
             ),
             prismatic: or(&self.prismatic, &default.prismatic, &base.prismatic),
+            reversed: or(&self.reversed, &default.reversed, &base.reversed),
             torques: or(&self.torques, &default.torques, &base.torques),
             markers: or(&self.markers, &default.markers, &base.markers),
             bodies: or(&self.bodies, &default.bodies, &base.bodies),

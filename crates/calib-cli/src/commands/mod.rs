@@ -8,6 +8,7 @@ pub mod diff;
 pub mod drift;
 pub mod fit;
 pub mod history;
+pub mod init;
 pub mod man;
 mod names;
 pub mod plan;
@@ -32,6 +33,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
     let console = &arguments.console;
     match &arguments.command {
         Command::Run(options) => run::run(console, options),
+        Command::Init(options) => init::run(console, options),
         Command::Check(options) => check::run(console.color, options),
         Command::Plan(options) => plan::run(console, options),
         Command::Simulate(options) => simulate::run(console, options),

@@ -5,6 +5,7 @@ use std::path::Path;
 use calib_apply::ApplyError;
 use calib_drift::DriftError;
 use calib_files::FileError;
+use calib_init::InitError;
 use calib_pipeline::PipelineError;
 use calib_plan::PlanError;
 use calib_recording::At;
@@ -50,7 +51,12 @@ impl CliError {
     #[must_use]
     pub fn id(&self) -> &'static str {
         match self {
-            Self::Pipeline(error) | Self::Plan(PlanError::Pipeline(error)) => of_pipeline(error),
+            Self::Pipeline(error)
+            | Self::Plan(PlanError::Pipeline(error))
+            | Self::Init(InitError::Pipeline(error)) => of_pipeline(error),
+            Self::Init(InitError::Urdf(_)) => "urdf",
+            Self::Init(InitError::Recording(_)) => "recording",
+            Self::Init(_) => "init",
             Self::Plan(_) | Self::NotASigma { .. } => "plan",
             Self::Apply(error) => of_apply(error),
             Self::Drift(_) => "drift",
@@ -73,9 +79,14 @@ impl CliError {
     #[must_use]
     pub fn place(&self) -> Option<Place> {
         Some(match self {
-            Self::Pipeline(error) | Self::Plan(PlanError::Pipeline(error)) => {
+            Self::Pipeline(error)
+            | Self::Plan(PlanError::Pipeline(error))
+            | Self::Init(InitError::Pipeline(error)) => {
                 return place_of_pipeline(error);
             }
+            Self::Init(InitError::Urdf(error)) => place_of_urdf(error)?,
+            Self::Init(InitError::Recording(error)) => place_of_recording(error),
+            Self::Init(error) => Place::of(error.file()?.to_owned()),
             Self::Plan(error) => Place::of(error.file()?.to_owned()),
             Self::Apply(ApplyError::Read(error)) => place_of_urdf(error)?,
             Self::Apply(ApplyError::File(error)) | Self::File(error) => place_of_file(error)?,

@@ -5,7 +5,7 @@ super::topic! {
     JOINT_SIGN = "joint-sign" {
         "": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with the opposite sign of joint `{joint}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Negate this joint's column, or reverse its axis in the URDF: `<axis xyz=\"{axis}\"/>`.";
+            "Negate this joint's column in the profile: `columns: {joints: {{joint}: <column>}, reversed: [{joint}]}`, or reverse its axis in the URDF: `<axis xyz=\"{axis}\"/>`.";
     }
     /// Two joint columns are exchanged.
     JOINT_ORDER = "joint-order" {

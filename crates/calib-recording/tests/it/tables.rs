@@ -211,6 +211,37 @@ fn the_order_and_the_separators_of_a_table_of_points_change_nothing() {
 }
 
 #[test]
+fn a_column_that_counts_the_other_way_is_negated_by_the_map() {
+    let text = "q1,elbow_deg,tip.x_m,tip.y_m,tip.z_m\n0.5,90,1,2,3\n";
+    let read = |reversed: &[&str]| {
+        let columns = ColumnMap {
+            joints: [("wrist", "q1"), ("elbow", "elbow_deg")]
+                .map(|(joint, column)| (joint.to_owned(), column.to_owned()))
+                .into(),
+            reversed: reversed.iter().map(|r| (*r).to_owned()).collect(),
+            ..ColumnMap::default()
+        };
+        let options = ReadOptions {
+            columns: Some(columns),
+            ..ReadOptions::default()
+        };
+        read_bytes("t.csv", text.as_bytes(), &options)
+    };
+    let joints = |reversed: &[&str]| {
+        let poses = read(reversed).expect("a table").poses(Filled::Exclude);
+        let joints = poses.expect("one table").joints;
+        [joints["wrist"][0], joints["elbow"][0]]
+    };
+    let half_pi = std::f64::consts::FRAC_PI_2;
+    assert_eq!(joints(&[]), [Some(0.5), Some(half_pi)]);
+    assert_eq!(joints(&["wrist", "elbow"]), [Some(-0.5), Some(-half_pi)]);
+    let wrong = read(&["hand"])
+        .expect_err("not a joint of the map")
+        .to_string();
+    assert!(wrong.contains("`reversed` names `hand`"), "{wrong}");
+}
+
+#[test]
 fn zeros_and_nan_are_lost_with_a_finding() {
     let recording = read(
         "m.x_m,m.y_m,m.z_m,n.x_m,n.y_m,n.z_m\n0,0,0,1,2,3\n1,1,1,nan,NaN,NULL\n0.0,-0,0,1,2,3\n",

@@ -138,11 +138,23 @@ impl Mapping<'_> {
     /// Joints and torques.
     fn robot(&mut self, map: &ColumnMap) -> Result<(), Problem> {
         let named = map.joint_columns.iter().map(|name| (name, name));
+        let sign = |joint: &String| match map.reversed.contains(joint) {
+            true => -1.0,
+            false => 1.0,
+        };
         for (joint, column) in map.joints.iter().chain(named) {
-            self.joint(joint, column, JointUnit::Angle)?;
+            self.joint(joint, column, JointUnit::Angle, sign(joint))?;
         }
         for (joint, column) in &map.prismatic {
-            self.joint(joint, column, JointUnit::Length)?;
+            self.joint(joint, column, JointUnit::Length, sign(joint))?;
+        }
+        let joints = &self.layout.joints;
+        let unknown = |name: &&String| !joints.iter().any(|(joint, ..)| joint == *name);
+        if let Some(name) = map.reversed.iter().find(unknown) {
+            return Err(Problem::Misfit {
+                found: format!("`reversed` names `{name}`, which is not among the map's joints"),
+                expected: format!("`joints: {{{name}: <column>}}` beside it"),
+            });
         }
         for (joint, column) in &map.torques {
             let what = format!("torque of `{joint}`");
@@ -152,11 +164,19 @@ impl Mapping<'_> {
         Ok(())
     }
 
-    fn joint(&mut self, joint: &str, column: &str, unit: JointUnit) -> Result<(), Problem> {
-        let scale = match unit {
+    /// `sign`: −1 for a column that counts the other way.
+    fn joint(
+        &mut self,
+        joint: &str,
+        column: &str,
+        unit: JointUnit,
+        sign: f64,
+    ) -> Result<(), Problem> {
+        let per_unit = match unit {
             JointUnit::Angle => self.angles(column)?,
             JointUnit::Length => self.lengths(column)?,
         };
+        let scale = sign * per_unit;
         let what = format!("joint `{joint}`");
         let slot = self.take(&what, column, SlotKind::Robot, scale)?;
         self.layout.joints.push((joint.to_string(), unit, slot));

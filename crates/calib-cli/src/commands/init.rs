@@ -1,0 +1,141 @@
+//! `calib init`.
+
+use std::path::{Component, Path, PathBuf};
+
+use calib_files::{FileError, OutputFile, folder_of, input, make_folder, write_new};
+use calib_init::{File, InitError, Request, json, propose, terminal, write};
+use calib_pipeline::ExitCode;
+use calib_pipeline::check;
+use calib_pipeline::options::Plugins;
+use calib_recording::ReadOptions;
+use calib_urdf::RobotModel;
+use clap::Args;
+
+use crate::error::CliError;
+use crate::terminal::{Console, emit, spinner};
+
+/// Arguments of `calib init`.
+#[derive(Debug, Args)]
+pub struct Init {
+    /// The robot's URDF
+    urdf: PathBuf,
+    /// Recordings: tables with joints and markers, or a tracker's files and the robot's logs
+    recordings: Vec<PathBuf>,
+    /// The link that carries the markers [default: the link whose motion they follow, or the end of the longest chain]
+    #[arg(long, value_name = "LINK")]
+    markers_on: Option<String>,
+    /// The profile to write; it must not exist [default: robots/ROBOT.yaml]
+    #[arg(short, long)]
+    out: Option<PathBuf>,
+}
+
+/// Writes the profile, checks it, and says what it rests on.
+pub fn run(console: &Console, options: &Init) -> Result<ExitCode, CliError> {
+    let bar = spinner(console.quiet);
+    bar.set_message("read the URDF");
+    let shown = options.urdf.display().to_string();
+    let model = RobotModel::from_urdf_file(&options.urdf).map_err(InitError::from)?;
+    let out = options
+        .out
+        .clone()
+        .unwrap_or_else(|| default_profile(&model, &options.urdf));
+    if out.symlink_metadata().is_ok() {
+        return Err(FileError::Exists { path: out }.into());
+    }
+    let folder = folder_of(&out);
+    bar.set_message("read the recordings");
+    let files = options.recordings.iter().map(|path| file(folder, path));
+    let files: Vec<File> = files.collect::<Result<_, _>>()?;
+    bar.set_message("find joints, bodies and links");
+    let stem = stem(&out);
+    let schema = "profile.schema.json";
+    let request = Request {
+        name: (model.name().is_empty()).then(|| stem.clone()),
+        urdf_shown: shown,
+        urdf_path: relative(folder, &options.urdf),
+        schema: folder.join(schema).is_file().then(|| schema.to_owned()),
+        markers_on: options.markers_on.clone(),
+        folder: stem,
+    };
+    let proposal = propose(&model, &request, &files)?;
+    let text = write::profile(&model, &proposal);
+    make_folder(folder)?;
+    let name = out.file_name().map_or_else(
+        || "profile.yaml".to_owned(),
+        |n| n.to_string_lossy().into_owned(),
+    );
+    write_new(folder, &[OutputFile::text(name, text)])?;
+    bar.set_message("check the profile");
+    let checked = match files.is_empty() {
+        true => None,
+        false => Some(check::check(&out, Plugins::default())?),
+    };
+    bar.finish_and_clear();
+    let shown = out.display().to_string();
+    let findings = checked.as_ref().map(|c| c.findings.as_slice());
+    emit(&match (console.json, console.quiet) {
+        (true, _) => {
+            calib_report::json::pretty(&json::proposal(&proposal, &shown, findings)) + "\n"
+        }
+        (false, true) => format!("{shown}\n"),
+        (false, false) => terminal::summary(&proposal, &shown, findings),
+    })?;
+    Ok(checked
+        .as_ref()
+        .map_or(ExitCode::Accepted, check::exit_code))
+}
+
+fn default_profile(model: &RobotModel, urdf: &Path) -> PathBuf {
+    let name = match model.name() {
+        "" => stem(urdf),
+        name => name.replace(|c: char| !c.is_alphanumeric() && c != '-', "_"),
+    };
+    Path::new("robots").join(format!("{name}.yaml"))
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem()
+        .map_or_else(|| "robot".to_owned(), |s| s.to_string_lossy().into_owned())
+}
+
+/// A recording with its bytes.
+fn file(folder: &Path, path: &Path) -> Result<File, CliError> {
+    let shown = path.display().to_string();
+    let largest = ReadOptions::default().max_bytes;
+    let bytes = input::read(path, largest).map_err(|source| InitError::Unread {
+        file: shown.clone(),
+        source,
+    })?;
+    Ok(File {
+        path: relative(folder, path),
+        shown,
+        bytes,
+    })
+}
+
+/// A path as seen from a folder, with `/`.
+fn relative(folder: &Path, path: &Path) -> String {
+    let (from, to) = (absolute(folder), absolute(path));
+    let common = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+    let up = std::iter::repeat_n("..", from.len() - common).map(str::to_owned);
+    let down = to[common..].iter().cloned();
+    up.chain(down).collect::<Vec<_>>().join("/")
+}
+
+/// The parts of a path from the root, without `.` and `..`.
+fn absolute(path: &Path) -> Vec<String> {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let mut parts = Vec::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir | Component::RootDir => {}
+            Component::ParentDir => {
+                parts.pop();
+            }
+            Component::Prefix(_) | Component::Normal(_) => {
+                parts.push(part.as_os_str().to_string_lossy().into_owned());
+            }
+        }
+    }
+    parts
+}

@@ -1,0 +1,368 @@
+//! Columns of somebody else's table: which are joints of this robot, which are markers and bodies, and in what units.
+//!
+//! A name that is a joint's, up to words such as `joint` or `actual`, decides. Columns that are only numbered (`q1` … `q6`) go to the joints of a
+//! chain in their order from the root, and the order is tested by the motion afterwards ([`links`](crate::links)). Units stand in the names, or follow
+//! from the largest numbers: no joint moves by more than a turn and a bit, and no marker is further away than the robot reaches many times.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use calib_recording::{AngleUnit, BodyColumns, ColumnMap, LengthUnit, TimeColumn, TimeUnit};
+use calib_urdf::{JointId, JointKind, RobotModel};
+
+use crate::fact::{About, AngleHow, LengthHow};
+use crate::header::Header;
+use crate::name::{self, NamedUnit};
+use crate::robot;
+
+/// Largest angle in radians that is no angle in degrees: one turn, and a tenth.
+const TURN: f64 = 2.2 * std::f64::consts::PI;
+/// Markers spread over so many times the robot's reach are not in meters.
+const FAR: f64 = 20.0;
+
+/// A column map with what it was made from.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Guess {
+    /// The map.
+    pub map: ColumnMap,
+    /// What was found, and how.
+    pub facts: Vec<About>,
+    /// Joint and its column.
+    pub joints: Vec<(JointId, String)>,
+    /// Joints and columns are paired by their order alone.
+    pub by_order: bool,
+}
+
+/// The map of a table.
+#[must_use]
+pub fn guess(model: &RobotModel, header: &Header) -> Guess {
+    let mut guess = Guess::default();
+    guess.map.decimal_comma = header.decimal_comma;
+    let mut used: BTreeSet<usize> = BTreeSet::new();
+    time(header, &mut guess, &mut used);
+    tracked(header, &mut guess, &mut used);
+    joints(model, header, &mut guess, &mut used);
+    angles(model, header, &mut guess);
+    lengths(model, header, &mut guess);
+    let ignored =
+        (0..header.names.len()).filter(|i| !used.contains(i) && !header.names[*i].is_empty());
+    let ignored: Vec<String> = ignored.map(|i| header.names[i].clone()).collect();
+    if !ignored.is_empty() {
+        guess.facts.push(About::Ignored { columns: ignored });
+    }
+    guess
+}
+
+/// A column of time: named so, with numbers that never decrease.
+fn time(header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>) {
+    const NAMES: [&str; 7] = [
+        "t",
+        "time",
+        "timestamp",
+        "timestamps",
+        "stamp",
+        "ts",
+        "secs",
+    ];
+    let named = |i: &usize| {
+        let unit = name::unit(&header.names[*i]);
+        let is_time = !matches!(unit.unit, Some(NamedUnit::Angle(_) | NamedUnit::Length(_)));
+        is_time && NAMES.contains(&unit.stem.to_ascii_lowercase().as_str())
+    };
+    let rises = |i: &usize| {
+        let t: Vec<f64> = header.columns[*i].iter().flatten().copied().collect();
+        t.len() > 1 && t.windows(2).all(|pair| pair[1] >= pair[0]) && t[t.len() - 1] > t[0]
+    };
+    let Some(i) = (0..header.names.len()).filter(named).find(rises) else {
+        return;
+    };
+    let stated = match name::unit(&header.names[i]).unit {
+        Some(NamedUnit::Time(unit)) => Some(unit),
+        _ => None,
+    };
+    let unit = stated.unwrap_or_else(|| unit_of_time(&header.columns[i]));
+    used.insert(i);
+    guess.map.time = Some(TimeColumn {
+        column: header.names[i].clone(),
+        unit,
+    });
+    guess.facts.push(About::Time {
+        column: header.names[i].clone(),
+        unit,
+        named: stated.is_some(),
+    });
+}
+
+/// Seconds, unless the numbers are those of a clock since 1970 in a smaller unit, or whole numbers many steps apart.
+fn unit_of_time(column: &[Option<f64>]) -> TimeUnit {
+    let t: Vec<f64> = column.iter().flatten().copied().collect();
+    let last = t.last().copied().unwrap_or(0.0);
+    let whole = t.iter().all(|t| t.fract() == 0.0);
+    let step = if t.len() > 1 {
+        (last - t[0]) / (t.len() - 1) as f64
+    } else {
+        0.0
+    };
+    match last {
+        x if x > 1e17 => TimeUnit::Ns,
+        x if x > 1e14 => TimeUnit::Us,
+        x if x > 1e11 => TimeUnit::Ms,
+        _ if whole && (1.0..=200.0).contains(&step) && t.len() > 100 => TimeUnit::Ms,
+        _ => TimeUnit::S,
+    }
+}
+
+/// Columns of one thing: what stands around the letter → the columns by letter.
+type Groups = BTreeMap<(String, String), [Option<usize>; 4]>;
+
+/// Columns in threes (x, y, z) and in fours (a quaternion).
+fn tracked(header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>) {
+    let (mut places, mut turns) = (Groups::new(), Groups::new());
+    for i in (0..header.names.len()).filter(|i| !used.contains(i) && header.has_numbers(*i)) {
+        let unit = name::unit(&header.names[i]);
+        if matches!(unit.unit, Some(NamedUnit::Angle(_) | NamedUnit::Time(_))) {
+            continue;
+        }
+        for (k, letter) in ['x', 'y', 'z', 'w'].into_iter().enumerate() {
+            if let Some((before, behind)) = name::quaternion(unit.stem, letter) {
+                let group = turns.entry((before.to_owned(), behind.to_owned()));
+                group.or_default()[k].get_or_insert(i);
+            } else if k < 3
+                && let Some((before, behind)) = name::coordinate(unit.stem, letter)
+                && !name::is_no_position(unit.stem)
+            {
+                let group = places.entry((before.to_owned(), behind.to_owned()));
+                group.or_default()[k].get_or_insert(i);
+            }
+        }
+    }
+    let names = |columns: &[usize]| -> Vec<String> {
+        columns.iter().map(|i| header.names[*i].clone()).collect()
+    };
+    let mut named: BTreeMap<String, [usize; 3]> = BTreeMap::new();
+    for ((before, behind), columns) in &places {
+        if let [Some(x), Some(y), Some(z), _] = *columns {
+            named.insert(name::of_rest(before, behind, 'm'), [x, y, z]);
+        }
+    }
+    for ((before, behind), columns) in &turns {
+        let name = name::of_rest(before, behind, 'm');
+        if let [Some(x), Some(y), Some(z), Some(w)] = *columns
+            && let Some(position) = named.remove(&name)
+        {
+            used.extend(position.iter().chain(&[x, y, z, w]));
+            let body = BodyColumns {
+                position: names(&position).try_into().unwrap_or_default(),
+                quaternion_xyzw: names(&[x, y, z, w]).try_into().ok(),
+                ..BodyColumns::default()
+            };
+            guess.map.bodies.insert(name, body);
+        }
+    }
+    for (name, position) in named {
+        used.extend(position);
+        let position = names(&position).try_into().unwrap_or_default();
+        guess.map.markers.insert(name, position);
+    }
+}
+
+/// Columns of joints.
+fn joints(model: &RobotModel, header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>) {
+    let free = |used: &BTreeSet<usize>, i: &usize| !used.contains(i) && header.has_numbers(*i);
+    let mut found: BTreeMap<JointId, usize> = BTreeMap::new();
+    let stem = |i: usize| name::unit(&header.names[i]).stem;
+    for joint in model.independent_joints() {
+        let wanted = &model.joint(joint).name;
+        let columns = (0..header.names.len()).filter(|i| free(used, i));
+        let columns: Vec<usize> = columns
+            .filter(|i| fits(model, joint, &header.names[*i]))
+            .collect();
+        // The joint's own name, else its words.
+        let exact = columns
+            .iter()
+            .find(|i| stem(**i) == wanted || header.names[**i] == *wanted);
+        // A number alone is no name: some count from 0, some from 1.
+        let key = name::key(wanted);
+        let told = key.chars().any(char::is_alphabetic);
+        let mut alike = columns
+            .iter()
+            .filter(|i| told && name::key(stem(**i)) == key && !name::is_no_position(stem(**i)));
+        let column = exact.or_else(|| alike.next());
+        if let Some(column) = column {
+            found.insert(joint, *column);
+            used.insert(*column);
+        }
+    }
+    let by_name = found.len();
+    // One column alone may have a joint's name by chance.
+    if by_name < 2
+        && let Some(family) = family(model, header, used)
+    {
+        found.values().for_each(|i| {
+            used.remove(i);
+        });
+        guess.by_order = true;
+        found = family;
+        used.extend(found.values());
+    }
+    let pairs = |found: &BTreeMap<JointId, usize>| -> Vec<(String, String)> {
+        let of = |(joint, i): (&JointId, &usize)| {
+            (model.joint(*joint).name.clone(), header.names[*i].clone())
+        };
+        found.iter().map(of).collect()
+    };
+    if guess.by_order {
+        guess.facts.push(About::JointsByOrder {
+            pairs: pairs(&found),
+        });
+    } else if !found.is_empty() {
+        guess.facts.push(About::JointsByName { count: found.len() });
+    }
+    for (joint, column) in &found {
+        let name = model.joint(*joint).name.clone();
+        let column = header.names[*column].clone();
+        guess.joints.push((*joint, column.clone()));
+        match model.joint(*joint).kind {
+            JointKind::Prismatic { .. } => {
+                guess.map.prismatic.insert(name, column);
+            }
+            _ if name == column => guess.map.joint_columns.push(name),
+            _ => {
+                guess.map.joints.insert(name, column);
+            }
+        }
+    }
+}
+
+/// The unit in a column's name does not speak against the joint.
+fn fits(model: &RobotModel, joint: JointId, column: &str) -> bool {
+    match name::unit(column).unit {
+        Some(NamedUnit::Angle(_)) => model.joint(joint).kind.turns(),
+        Some(NamedUnit::Length(_)) => !model.joint(joint).kind.turns(),
+        Some(NamedUnit::Time(_)) => false,
+        None => true,
+    }
+}
+
+/// Numbered columns for the joints of a chain, in their order from the root.
+fn family(
+    model: &RobotModel,
+    header: &Header,
+    used: &BTreeSet<usize>,
+) -> Option<BTreeMap<JointId, usize>> {
+    let mut families: BTreeMap<(String, String), Vec<(u32, usize)>> = BTreeMap::new();
+    for i in (0..header.names.len()).filter(|i| !used.contains(i) && header.has_numbers(*i)) {
+        if name::is_no_position(&header.names[i]) {
+            continue;
+        }
+        if let Some((before, number, behind)) = name::numbered(&header.names[i]) {
+            let key = (before.to_owned(), behind.to_owned());
+            families.entry(key).or_default().push((number, i));
+        }
+    }
+    let chains: Vec<Vec<JointId>> = robot::tips(model)
+        .into_iter()
+        .map(|tip| tip.joints)
+        .collect();
+    let consecutive = |of: &[(u32, usize)]| of.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1);
+    let mut best: Option<(bool, usize, BTreeMap<JointId, usize>)> = None;
+    for mut members in families.into_values() {
+        members.sort_unstable();
+        if members.len() < 2 || !consecutive(&members) {
+            continue;
+        }
+        let chain = chains.iter().find(|chain| chain.len() == members.len());
+        let whole = chain.is_some();
+        // Three pressures are no joints of a chain of six.
+        let of_joints = name::is_of_joints(&header.names[members[0].1]);
+        let longer = || {
+            chains
+                .iter()
+                .find(|chain| of_joints && chain.len() > members.len())
+        };
+        let Some(chain) = chain.or_else(longer) else {
+            continue;
+        };
+        let agrees = chain
+            .iter()
+            .zip(&members)
+            .all(|(joint, (_, i))| fits(model, *joint, &header.names[*i]));
+        let better = best
+            .as_ref()
+            .is_none_or(|(was_whole, count, _)| (whole, members.len()) > (*was_whole, *count));
+        if agrees && better {
+            let pairs = chain.iter().copied().zip(members.iter().map(|(_, i)| *i));
+            best = Some((whole, members.len(), pairs.collect()));
+        }
+    }
+    best.map(|(_, _, pairs)| pairs)
+}
+
+/// The unit of the angles that do not name it.
+fn angles(model: &RobotModel, header: &Header, guess: &mut Guess) {
+    let turning = guess
+        .joints
+        .iter()
+        .filter(|(j, _)| model.joint(*j).kind.turns());
+    let units: Vec<(Option<NamedUnit>, bool, f64)> = turning
+        .filter_map(|(_, column)| {
+            let unit = name::unit(column);
+            Some((
+                unit.unit,
+                unit.native,
+                header.largest(header.position(column)?),
+            ))
+        })
+        .collect();
+    if units.is_empty() {
+        return;
+    }
+    let in_names = |unit: AngleUnit| units.iter().any(|u| u.0 == Some(NamedUnit::Angle(unit)));
+    let largest = units.iter().map(|u| u.2).fold(0.0, f64::max);
+    let native = units.iter().all(|u| u.0.is_some() && u.1);
+    let (unit, how) = match (in_names(AngleUnit::Deg), in_names(AngleUnit::Rad)) {
+        // Each column says it itself.
+        (true, true) => (AngleUnit::Rad, AngleHow::Named),
+        (true, false) => (AngleUnit::Deg, AngleHow::Named),
+        (false, true) => (AngleUnit::Rad, AngleHow::Named),
+        _ if largest > TURN => (AngleUnit::Deg, AngleHow::Range { largest }),
+        _ => (AngleUnit::Rad, AngleHow::Range { largest }),
+    };
+    guess.map.angles = if native { AngleUnit::Rad } else { unit };
+    guess.facts.push(About::Angles { unit, how });
+}
+
+/// The unit of the lengths that do not name it.
+fn lengths(model: &RobotModel, header: &Header, guess: &mut Guess) {
+    let markers = guess.map.markers.values().flatten();
+    let bodies = guess.map.bodies.values().flat_map(|b| &b.position);
+    let columns: Vec<usize> = markers
+        .chain(bodies)
+        .filter_map(|name| header.position(name))
+        .collect();
+    if columns.is_empty() {
+        return;
+    }
+    let units: Vec<_> = columns
+        .iter()
+        .map(|i| name::unit(&header.names[*i]))
+        .collect();
+    let named = units.iter().find_map(|u| match u.unit {
+        Some(NamedUnit::Length(unit)) => Some(unit),
+        _ => None,
+    });
+    let extent = columns.iter().map(|i| header.span(*i)).fold(0.0, f64::max);
+    let reach = robot::reach(model).max(0.1);
+    let (unit, how) = match named {
+        Some(unit) => (unit, LengthHow::Named),
+        None => {
+            let unit = match extent / reach {
+                times if times > FAR => LengthUnit::Mm,
+                _ => LengthUnit::M,
+            };
+            (unit, LengthHow::Range { extent, reach })
+        }
+    };
+    let native = units.iter().all(|u| u.unit.is_some() && u.native);
+    guess.map.lengths = if native { LengthUnit::M } else { unit };
+    guess.facts.push(About::Lengths { unit, how });
+}

@@ -1,0 +1,254 @@
+//! Mistakes in tables, corrected in the profile: columns exchanged, negated, or read in another unit. The tables themselves are never changed.
+
+use calib_checks::structural::{Hypothesis, Scoped, UnitMistake};
+use calib_recording::{AngleUnit, ColumnMap, LengthUnit};
+use calib_urdf::{JointKind, RobotModel};
+
+use crate::error::InitError;
+use crate::fact::Mistake;
+use crate::header::header;
+use crate::name::{self, NamedUnit};
+use crate::session::Draft;
+use crate::source::Source;
+
+/// The mistake in words that a profile can name.
+#[must_use]
+pub fn mistake(model: &RobotModel, bodies: &[String], hypothesis: &Hypothesis) -> Mistake {
+    let joint = |j: calib_checks::structural::JointIndex| model.joints()[j.0].name.clone();
+    match *hypothesis {
+        Hypothesis::Sign { joint: j } => Mistake::Sign { joint: joint(j) },
+        Hypothesis::Exchange { first, second } => Mistake::Exchange {
+            first: joint(first),
+            second: joint(second),
+        },
+        Hypothesis::Unit { joint: j, mistake } => Mistake::Unit {
+            joint: Some(joint(j)),
+            unit: really(mistake),
+        },
+        Hypothesis::Units { mistake } => Mistake::Unit {
+            joint: None,
+            unit: really(mistake),
+        },
+        Hypothesis::TrackerUnit { mistake } => Mistake::TrackerUnit {
+            unit: really(mistake),
+        },
+        Hypothesis::Offset { joint: j, turns } => Mistake::Offset {
+            joint: joint(j),
+            degrees: turns.angle().to_degrees(),
+        },
+        Hypothesis::RowShift { rows } => Mistake::Rows { rows },
+        Hypothesis::Mirrored => Mistake::Mirrored,
+        Hypothesis::TrackerMoved | Hypothesis::TrackerAxes { .. } => Mistake::TrackerMoved,
+        Hypothesis::Remounted { body } => Mistake::Remounted {
+            body: bodies.get(body.0).cloned().unwrap_or_default(),
+        },
+        Hypothesis::Poses { .. } => Mistake::Poses,
+        _ => Mistake::Other,
+    }
+}
+
+/// The unit that the values really have.
+fn really(mistake: UnitMistake) -> &'static str {
+    match mistake {
+        UnitMistake::DegreesReadAsRadians => "deg",
+        UnitMistake::RadiansReadAsDegrees => "rad",
+        UnitMistake::MillimetersReadAsMeters => "mm",
+        UnitMistake::MetersReadAsMillimeters => "m",
+    }
+}
+
+/// The sources with a mistake corrected in their column maps; `None` where no map corrects it.
+///
+/// # Errors
+/// [`InitError::Recording`] where a file cannot be read by its new map.
+pub fn corrected(
+    model: &RobotModel,
+    sources: &[Source],
+    drafts: &[Draft],
+    scoped: &Scoped,
+) -> Result<Option<Vec<Source>>, InitError> {
+    let mut new = sources.to_vec();
+    for (r, draft) in drafts.iter().enumerate() {
+        if !scoped
+            .scope
+            .contains(calib_checks::structural::RecordingIndex(r))
+        {
+            continue;
+        }
+        let of_tracker = matches!(scoped.hypothesis, Hypothesis::TrackerUnit { .. });
+        let at = match draft.log {
+            Some(log) if !of_tracker => log,
+            _ => draft.source,
+        };
+        let Some(map) = new_map(model, &sources[at], &scoped.hypothesis) else {
+            return Ok(None);
+        };
+        new[at] = sources[at].with_columns(model, map)?;
+    }
+    Ok(Some(new))
+}
+
+fn new_map(model: &RobotModel, source: &Source, hypothesis: &Hypothesis) -> Option<ColumnMap> {
+    let joint = |j: calib_checks::structural::JointIndex| model.joints()[j.0].name.clone();
+    let mut map = source.columns.clone().unwrap_or_default();
+    match *hypothesis {
+        Hypothesis::Sign { joint: j } => {
+            let name = joint(j);
+            let column = column_of(source, &map, &name)?;
+            set(model, &mut map, &name, column);
+            match map.reversed.iter().position(|r| *r == name) {
+                Some(at) => {
+                    map.reversed.remove(at);
+                }
+                None => map.reversed.push(name),
+            }
+        }
+        Hypothesis::Exchange { first, second } => {
+            let (a, b) = (joint(first), joint(second));
+            let (of_a, of_b) = (column_of(source, &map, &a)?, column_of(source, &map, &b)?);
+            let kinds = [first, second].map(|j| model.joints()[j.0].kind.turns());
+            if kinds[0] != kinds[1] {
+                return None;
+            }
+            set(model, &mut map, &a, of_b);
+            set(model, &mut map, &b, of_a);
+        }
+        Hypothesis::Unit { joint: j, mistake } => {
+            let column = column_of(source, &map, &joint(j))?;
+            return renamed(source, &map, &[column], really(mistake));
+        }
+        Hypothesis::Units { mistake } => {
+            let is_one = |name: &String| {
+                let id = model.joint_id(name);
+                id.is_ok_and(|id| model.joint(id).kind.turns() == mistake.of_angles())
+            };
+            let names = source.recording.joints.iter().map(|s| &s.name);
+            let of = names
+                .filter(|n| is_one(n))
+                .map(|n| column_of(source, &map, n));
+            let columns: Vec<String> = of.collect::<Option<_>>()?;
+            let bare = columns.iter().all(|column| !name::unit(column).native);
+            if !(bare && mistake.of_angles()) {
+                return renamed(source, &map, &columns, really(mistake));
+            }
+            map.angles = match really(mistake) {
+                "deg" => AngleUnit::Deg,
+                _ => AngleUnit::Rad,
+            };
+        }
+        Hypothesis::TrackerUnit { mistake } => {
+            let columns = places(source, &map);
+            let bare = columns.iter().all(|column| !name::unit(column).native);
+            // One unit for all lengths of the map.
+            let alone = map
+                .prismatic
+                .values()
+                .all(|column| name::unit(column).native);
+            if !(bare && alone) {
+                return renamed(source, &map, &columns, really(mistake));
+            }
+            map.lengths = match really(mistake) {
+                "mm" => LengthUnit::Mm,
+                _ => LengthUnit::M,
+            };
+        }
+        _ => return None,
+    }
+    Some(map)
+}
+
+/// Columns of positions: those of the map, and those that the readers' own rules take.
+fn places(source: &Source, map: &ColumnMap) -> Vec<String> {
+    let mapped = map.markers.values().flatten();
+    let bodies = map.bodies.values().flat_map(|b| &b.position);
+    let mut columns: Vec<String> = mapped.chain(bodies).cloned().collect();
+    let of_joints: Vec<&String> = map.prismatic.values().collect();
+    let is_place = |column: &String| {
+        let unit = name::unit(column);
+        let letters = ['x', 'y', 'z'].into_iter();
+        unit.native
+            && matches!(unit.unit, Some(NamedUnit::Length(_)))
+            && !of_joints.contains(&column)
+            && letters
+                .filter(|l| name::coordinate(unit.stem, *l).is_some())
+                .count()
+                > 0
+    };
+    for name in header(&source.file.bytes).map_or_else(Vec::new, |table| table.names) {
+        if is_place(&name) && !columns.contains(&name) {
+            columns.push(name);
+        }
+    }
+    columns
+}
+
+/// The map with names of its own for these columns, which state the unit; the header line of the file is not read any more.
+fn renamed(source: &Source, map: &ColumnMap, columns: &[String], unit: &str) -> Option<ColumnMap> {
+    let table = header(&source.file.bytes)?;
+    if columns.is_empty() || map.decimal_comma {
+        return None;
+    }
+    let new = |name: &String| match columns.contains(name) {
+        true => format!("{}_{unit}", name::unit(name).stem),
+        false => name.clone(),
+    };
+    let mut renamed = map.clone();
+    let names = if map.names.is_empty() {
+        &table.names
+    } else {
+        &map.names
+    };
+    renamed.names = names.iter().map(new).collect();
+    renamed.skip_lines = table.line;
+    renamed.delimiter = Some(table.delimiter);
+    let (bare, moved): (Vec<_>, Vec<_>) = map
+        .joint_columns
+        .iter()
+        .cloned()
+        .partition(|column| !columns.contains(column));
+    renamed.joint_columns = bare;
+    renamed
+        .joints
+        .extend(moved.into_iter().map(|name| (name.clone(), name)));
+    let joints = renamed
+        .joints
+        .values_mut()
+        .chain(renamed.prismatic.values_mut());
+    let markers = renamed.markers.values_mut().flatten();
+    let bodies = renamed.bodies.values_mut().flat_map(|b| &mut b.position);
+    for column in joints.chain(markers).chain(bodies) {
+        *column = new(column);
+    }
+    Some(renamed)
+}
+
+/// The column of a joint, by the map or by its own name.
+fn column_of(source: &Source, map: &ColumnMap, joint: &str) -> Option<String> {
+    let mapped = map.joints.get(joint).or_else(|| map.prismatic.get(joint));
+    let own = map.joint_columns.iter().find(|c| *c == joint);
+    if let Some(column) = mapped.or(own) {
+        return Some(column.clone());
+    }
+    let table = header(&source.file.bytes)?;
+    let names = if map.names.is_empty() {
+        &table.names
+    } else {
+        &map.names
+    };
+    let named = |name: &&String| {
+        let unit = name::unit(name);
+        unit.stem == joint && matches!(unit.unit, Some(NamedUnit::Angle(_) | NamedUnit::Length(_)))
+    };
+    names.iter().find(named).cloned()
+}
+
+/// Gives a joint a column.
+fn set(model: &RobotModel, map: &mut ColumnMap, joint: &str, column: String) {
+    map.joint_columns.retain(|c| c != joint);
+    let kind = model.joint_id(joint).map(|id| model.joint(id).kind);
+    let maps = match kind {
+        Ok(JointKind::Prismatic { .. }) => &mut map.prismatic,
+        _ => &mut map.joints,
+    };
+    maps.insert(joint.to_owned(), column);
+}

@@ -1,0 +1,154 @@
+//! Why there is no profile.
+
+use calib_pipeline::PipelineError;
+use calib_pipeline::error::ExitCode;
+use calib_profile::ProfileError;
+use calib_urdf::ReadError;
+
+/// Why there is no profile.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum InitError {
+    /// The URDF.
+    #[error(transparent)]
+    Urdf(#[from] ReadError),
+    /// A recording cannot be read, and is no table with a header either.
+    #[error(transparent)]
+    Recording(#[from] calib_recording::Error),
+    /// A recording cannot be opened.
+    #[error("{file}: {source}\n  help: correct the path, or grant read permission")]
+    Unread {
+        /// The file.
+        file: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A recording does not fit the robot, or its clocks cannot be brought together.
+    #[error(transparent)]
+    Pipeline(#[from] PipelineError),
+    /// The profile that was made is not valid: a name that YAML or the robot refuses.
+    #[error(transparent)]
+    Profile(#[from] ProfileError),
+    /// The robot has nothing to calibrate.
+    #[error(
+        "{file}: no joint of this robot moves\n  help: give the URDF of the robot, with its revolute and prismatic joints"
+    )]
+    NothingMoves {
+        /// The URDF.
+        file: String,
+    },
+    /// A link that the robot does not have.
+    #[error("{unknown}\n  help: name the link that carries the markers: {}", .tips.join(", "))]
+    NoSuchLink {
+        /// What was asked for, with the nearest name.
+        unknown: calib_urdf::UnknownName,
+        /// Ends of chains.
+        tips: Vec<String>,
+    },
+    /// Columns, but none is a joint of the robot, and no robot log is given.
+    #[error(
+        "{file}: no column is a joint of this robot (columns: {}; joints: {})\n  help: give the robot's own log as another file, or name the columns as the joints: `{}_deg`",
+        listed(.columns), listed(.joints), .joints.first().map_or("joint", String::as_str)
+    )]
+    NoJoints {
+        /// The recording.
+        file: String,
+        /// What it has.
+        columns: Vec<String>,
+        /// Joints of the robot.
+        joints: Vec<String>,
+    },
+    /// A table of two sets of poses and no joints: a hand-eye problem.
+    #[error(
+        "{file}: no column is a joint of this robot, but `{first}` and `{second}` are poses\n  help: poses of a flange and of a tracked body give where both are fixed: `calib fit handeye {file} --robot {first} --measured {second}`; for a profile of the robot record its joints"
+    )]
+    HandEye {
+        /// The recording.
+        file: String,
+        /// Name of a body.
+        first: String,
+        /// Name of the other.
+        second: String,
+    },
+    /// Nothing of the tracker in a recording.
+    #[error("{file}: nothing was tracked (columns: {})\n  help: give the tracker's file too; markers need columns `<marker>.x_mm`, `.y_mm`, `.z_mm`", listed(.columns))]
+    NothingTracked {
+        /// The recording.
+        file: String,
+        /// What it has.
+        columns: Vec<String>,
+    },
+    /// Nothing is seen often enough to be a body.
+    #[error(
+        "{}: no marker and no body is seen in four poses or more\n  help: record at least ten poses that differ",
+        .files.join(", ")
+    )]
+    NothingSeen {
+        /// The recordings.
+        files: Vec<String>,
+    },
+    /// The robot stood still.
+    #[error(
+        "{}: no joint moves in any row, so that no link can be found\n  help: name the link that carries the markers: `--markers-on {tip}`; for a calibration record poses that differ",
+        .files.join(", ")
+    )]
+    NoMotion {
+        /// The recordings.
+        files: Vec<String>,
+        /// The end of the longest chain.
+        tip: String,
+    },
+    /// Two recordings are the same file.
+    #[error("{file} is given twice\n  help: give every recording once")]
+    Twice {
+        /// The file.
+        file: String,
+    },
+}
+
+/// At most eight names.
+fn listed(names: &[String]) -> String {
+    const MOST: usize = 8;
+    if names.is_empty() {
+        return "none".to_owned();
+    }
+    let mut shown: Vec<String> = names.iter().take(MOST).map(|n| format!("`{n}`")).collect();
+    if names.len() > MOST {
+        shown.push(format!("and {} more", names.len() - MOST));
+    }
+    shown.join(", ")
+}
+
+impl InitError {
+    /// The file that it is about; `None`: the error inside knows.
+    #[must_use]
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Self::NothingMoves { file }
+            | Self::Unread { file, .. }
+            | Self::NoJoints { file, .. }
+            | Self::HandEye { file, .. }
+            | Self::NothingTracked { file, .. }
+            | Self::Twice { file } => Some(file),
+            Self::NoMotion { files, .. } | Self::NothingSeen { files } => {
+                files.first().map(String::as_str)
+            }
+            _ => None,
+        }
+    }
+
+    /// The exit code of the program.
+    #[must_use]
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Pipeline(error) => error.exit_code(),
+            Self::Recording(_)
+            | Self::NoJoints { .. }
+            | Self::HandEye { .. }
+            | Self::NothingTracked { .. }
+            | Self::NothingSeen { .. }
+            | Self::NoMotion { .. } => ExitCode::Data,
+            _ => ExitCode::Usage,
+        }
+    }
+}

@@ -1,0 +1,430 @@
+//! What was found, as data. [`words`](crate::words) makes the sentences.
+
+use calib_recording::{AngleUnit, LengthUnit, TimeUnit};
+use serde::Serialize;
+
+/// What a fact is about: a part of the profile.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// The robot.
+    Robot,
+    /// The tracker and its noise.
+    Tracker,
+    /// A body, by name.
+    Body(String),
+    /// All recordings together.
+    Recordings,
+    /// A recording, by name.
+    Recording(String),
+    /// The limits of the verdict.
+    Limits,
+    /// The simulated recordings.
+    Simulate,
+}
+
+/// How the unit of angles was found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AngleHow {
+    /// The names of the columns say it.
+    Named,
+    /// The largest number.
+    Range {
+        /// In the unit of the file.
+        largest: f64,
+    },
+    /// The other unit fits the robot worse, so many times.
+    Motion {
+        /// Residual of the other unit over that of this one.
+        times: f64,
+    },
+}
+
+/// How the unit of lengths was found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LengthHow {
+    /// The names of the columns say it.
+    Named,
+    /// The extent of what was tracked against the reach of the robot.
+    Range {
+        /// In the unit of the file.
+        extent: f64,
+        /// m.
+        reach: f64,
+    },
+    /// The other unit fits the robot worse, so many times.
+    Motion {
+        /// Residual of the other unit over that of this one.
+        times: f64,
+    },
+}
+
+/// A mistake in the recordings that explains them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "mistake")]
+pub enum Mistake {
+    /// A joint counts the other way.
+    Sign {
+        /// Its name.
+        joint: String,
+    },
+    /// The columns of two joints are exchanged.
+    Exchange {
+        /// Name of one.
+        first: String,
+        /// Name of the other.
+        second: String,
+    },
+    /// The unit of a joint's column, or of all columns of its kind.
+    Unit {
+        /// The joint; all where absent.
+        joint: Option<String>,
+        /// The unit that the values really have.
+        unit: &'static str,
+    },
+    /// The unit of the tracker's lengths.
+    TrackerUnit {
+        /// The unit that the values really have.
+        unit: &'static str,
+    },
+    /// A zero that is off by a multiple of 90°.
+    Offset {
+        /// The joint.
+        joint: String,
+        /// What must be added, deg.
+        degrees: f64,
+    },
+    /// Joint values and tracker rows are paired off by some rows.
+    Rows {
+        /// How many.
+        rows: i8,
+    },
+    /// The tracker's frame is left-handed.
+    Mirrored,
+    /// The tracker moved before some recordings.
+    TrackerMoved,
+    /// The body moved on its link before some recordings.
+    Remounted {
+        /// The body.
+        body: String,
+    },
+    /// A convention of poses was misread.
+    Poses,
+    /// Any other: `calib check` names it.
+    Other,
+}
+
+/// Residuals of the registration of all recordings to the nominal robot, rms, m.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Residuals {
+    /// Of the recordings as they are.
+    pub none: f64,
+    /// After the correction.
+    pub best: f64,
+    /// After the best other correction.
+    pub next: Option<f64>,
+}
+
+/// Another link, and how much worse it explains a body's motion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rival {
+    /// The link.
+    pub link: String,
+    /// Its residual, rms, m.
+    pub rms: f64,
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "fact")]
+#[non_exhaustive]
+pub enum About {
+    /// Joints of the URDF.
+    Joints {
+        /// Those that move on their own.
+        moving: usize,
+        /// Those of them without position limits.
+        unlimited: Vec<String>,
+    },
+    /// The body is put on the end of a chain, since nothing was recorded.
+    TipOfChain {
+        /// The link.
+        link: String,
+        /// Joints that carry it.
+        joints: usize,
+        /// Ends of other chains.
+        others: Vec<String>,
+    },
+    /// The caller named the link.
+    LinkStated {
+        /// The link.
+        link: String,
+        /// Its residual, rms, m; `None` without recordings.
+        rms: Option<f64>,
+        /// A link that explains the motion better by more than the engine's ratio.
+        better: Option<Rival>,
+    },
+    /// The link that explains a body's motion.
+    Link {
+        /// The link.
+        link: String,
+        /// Residual of its registration alone, rms, m.
+        rms: f64,
+        /// The next best.
+        next: Option<Rival>,
+        /// Links that these recordings do not distinguish from it.
+        same: Vec<String>,
+    },
+    /// Nothing shows which link carries the body: the last one that recorded joints move is taken.
+    LinkUnknown {
+        /// The link.
+        link: String,
+    },
+    /// Nothing that the recordings moved carries the body.
+    Still {
+        /// The link.
+        link: String,
+        /// Residual, rms, m.
+        rms: f64,
+    },
+    /// Columns that have the joints' names.
+    JointsByName {
+        /// How many.
+        count: usize,
+    },
+    /// Numbered columns, paired with the joints of a chain in its order.
+    JointsByOrder {
+        /// Joint and column.
+        pairs: Vec<(String, String)>,
+    },
+    /// Joints that carry a body and have no column: taken to stand at 0.
+    JointsMissing {
+        /// Their names.
+        joints: Vec<String>,
+    },
+    /// The unit of the angles.
+    Angles {
+        /// The unit.
+        unit: AngleUnit,
+        /// How it was found.
+        how: AngleHow,
+    },
+    /// The unit of the lengths.
+    Lengths {
+        /// The unit.
+        unit: LengthUnit,
+        /// How it was found.
+        how: LengthHow,
+    },
+    /// The column of time.
+    Time {
+        /// The column.
+        column: String,
+        /// Its unit.
+        unit: TimeUnit,
+        /// The name says the unit.
+        named: bool,
+    },
+    /// Columns that nothing uses.
+    Ignored {
+        /// Their names.
+        columns: Vec<String>,
+    },
+    /// A marker that repeats another one in every row: left out.
+    Duplicate {
+        /// The marker.
+        marker: String,
+        /// The one that it repeats.
+        of: String,
+    },
+    /// Markers that are seen in too few rows: left out.
+    Seldom {
+        /// Their names.
+        markers: Vec<String>,
+    },
+    /// Markers that keep their distances are one body.
+    Rigid {
+        /// How many.
+        markers: usize,
+        /// Standard deviation of one coordinate about the body, m; `None` where nothing tells it.
+        sigma: Option<f64>,
+    },
+    /// Markers of one body that do not span a frame: only two of them are used.
+    Flat {
+        /// Markers that are not used.
+        left_out: Vec<String>,
+    },
+    /// A single marker, or two: points.
+    Points {
+        /// How many.
+        markers: usize,
+    },
+    /// A tracked body with six degrees of freedom.
+    Pose,
+    /// Noise of a marker coordinate, from what markers of one body do to their distances.
+    MarkerSigma {
+        /// m.
+        sigma: f64,
+        /// Rows that tell it.
+        rows: usize,
+    },
+    /// Noise of a body that never moved.
+    BodySigma {
+        /// Of a coordinate, m.
+        position: f64,
+        /// About an axis, rad.
+        orientation: f64,
+    },
+    /// The markers were calculated from a body: their distances do not show the noise.
+    Calculated,
+    /// Nothing shows the noise before a fit.
+    SigmaUnknown,
+    /// A recording that moves one or two joints.
+    Sweep {
+        /// Their names.
+        joints: Vec<String>,
+        /// Poses.
+        rows: usize,
+    },
+    /// Any other recording.
+    Static {
+        /// Poses.
+        rows: usize,
+        /// Joints that move.
+        moved: usize,
+    },
+    /// Held out because of its name.
+    ValidationByName {
+        /// The word in it.
+        word: &'static str,
+        /// Poses.
+        rows: usize,
+    },
+    /// Held out because it is the smallest of several.
+    ValidationSmallest {
+        /// Poses.
+        rows: usize,
+    },
+    /// No recording is held out: every pose is left out in turn.
+    LeftOutInTurn,
+    /// A stream in which the robot stood still now and then.
+    Holds {
+        /// How often.
+        holds: usize,
+    },
+    /// A stream of a motion.
+    Continuous,
+    /// The robot's own log, with a clock of its own.
+    Log {
+        /// The file.
+        file: String,
+        /// It is the only one, or shares most words with the name of the tracker's file; else paired by order.
+        named: bool,
+    },
+    /// A mistake in the recordings that the profile corrects.
+    Corrected {
+        /// What is wrong.
+        mistake: Mistake,
+        /// What it explains.
+        residuals: Residuals,
+        /// Other mistakes that these recordings do not distinguish from it.
+        equivalent: usize,
+    },
+    /// A mistake in the recordings that no profile can correct.
+    NotCorrected {
+        /// What is wrong.
+        mistake: Mistake,
+        /// What it explains.
+        residuals: Residuals,
+    },
+    /// No mistake stands out: signs, order, units and links agree with the robot.
+    Agrees {
+        /// Residual of the registration to the nominal robot, rms, m.
+        rms: f64,
+        /// Poses.
+        rows: usize,
+    },
+    /// Too few poses to test order, signs and units.
+    TooFew {
+        /// Poses.
+        rows: usize,
+    },
+    /// The recordings disagree with the robot, and no single mistake explains it.
+    Disagrees {
+        /// Residual, rms, m.
+        rms: f64,
+        /// What errors of a nominal robot explain, m.
+        limit: f64,
+    },
+    /// Limits from the noise.
+    Limits {
+        /// Noise of a coordinate, m.
+        sigma: f64,
+    },
+    /// No limits: the noise is not known.
+    NoLimits,
+    /// What is simulated and planned is invented.
+    Invented,
+}
+
+/// A fact, where it belongs, and whether a person must look at it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fact {
+    /// The part of the profile.
+    pub place: Place,
+    /// What was found.
+    #[serde(flatten)]
+    pub about: About,
+    /// It was guessed.
+    pub check: bool,
+}
+
+/// How many times worse the next best explanation must be before a guess counts as certain.
+pub const CERTAIN: f64 = 2.0;
+
+impl Fact {
+    /// A fact with the certainty that its values give it.
+    #[must_use]
+    pub fn new(place: Place, about: About) -> Self {
+        let check = is_guess(&about);
+        Self {
+            place,
+            about,
+            check,
+        }
+    }
+}
+
+fn is_guess(about: &About) -> bool {
+    match about {
+        About::Joints { unlimited, .. } => !unlimited.is_empty(),
+        About::LinkStated { better, .. } => better.is_some(),
+        About::Link {
+            rms, next, same, ..
+        } => {
+            let near = next.as_ref().is_some_and(|n| n.rms < CERTAIN * rms);
+            near || !same.is_empty()
+        }
+        About::Time { named, .. } => !named,
+        About::Log { named, .. } => !named,
+        About::TipOfChain { .. }
+        | About::LinkUnknown { .. }
+        | About::TooFew { .. }
+        | About::JointsByOrder { .. }
+        | About::JointsMissing { .. }
+        | About::Duplicate { .. }
+        | About::Seldom { .. }
+        | About::Flat { .. }
+        | About::ValidationSmallest { .. }
+        | About::Corrected { .. }
+        | About::NotCorrected { .. }
+        | About::Disagrees { .. }
+        | About::Limits { .. }
+        | About::NoLimits
+        | About::Invented => true,
+        // A unit by its range alone is confirmed by the registration or corrected by it.
+        _ => false,
+    }
+}

@@ -1,0 +1,145 @@
+//! The header of a delimited table, and the first of its numbers.
+
+use calib_recording::Delimiter;
+
+/// Rows that are looked at.
+const ROWS: usize = 400;
+/// Bytes that are looked at: a header of a thousand columns and its rows.
+const BYTES: usize = 8 << 20;
+
+/// A header line and columns of numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// Column names, without quotes and blanks around them.
+    pub names: Vec<String>,
+    /// `[column][row]`: the first rows; `None` where a cell is not a number.
+    pub columns: Vec<Vec<Option<f64>>>,
+    /// Numbers are written `1,5`.
+    pub decimal_comma: bool,
+    /// The line of the header, from 1.
+    pub line: u64,
+    /// What separates the cells.
+    pub delimiter: Delimiter,
+}
+
+impl Header {
+    /// The largest magnitude of a column; 0 without numbers.
+    #[must_use]
+    pub fn largest(&self, column: usize) -> f64 {
+        let numbers = self.columns[column].iter().flatten();
+        numbers.fold(0.0, |most, x| f64::max(most, x.abs()))
+    }
+
+    /// Largest minus smallest number of a column.
+    #[must_use]
+    pub fn span(&self, column: usize) -> f64 {
+        let numbers = || self.columns[column].iter().flatten().copied();
+        let high = numbers().fold(f64::NEG_INFINITY, f64::max);
+        let low = numbers().fold(f64::INFINITY, f64::min);
+        if high > low { high - low } else { 0.0 }
+    }
+
+    /// Whether a column has any number.
+    #[must_use]
+    pub fn has_numbers(&self, column: usize) -> bool {
+        self.columns[column].iter().any(Option::is_some)
+    }
+
+    /// The place of a column.
+    #[must_use]
+    pub fn position(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|n| n == name)
+    }
+}
+
+/// Reads the header line (the first that is neither blank nor a comment) and the first rows; `None` where there is no such table.
+#[must_use]
+pub fn header(bytes: &[u8]) -> Option<Header> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = &bytes[..bytes.len().min(BYTES)];
+    if bytes.contains(&0) {
+        return None;
+    }
+    let text = match std::str::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(e) => std::str::from_utf8(&bytes[..e.valid_up_to()]).ok()?,
+    };
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+    let (above, first) = lines.next()?;
+    let separator = separator(first);
+    let names: Vec<String> = cells(first, separator).map(str::to_owned).collect();
+    // Without a single name that is none of a number it is a table without header.
+    if names.len() < 2 || names.iter().all(|n| n.parse::<f64>().is_ok()) {
+        return None;
+    }
+    let rows: Vec<&str> = lines.take(ROWS).map(|(_, line)| line).collect();
+    let is_number = |cell: &str| cell.parse::<f64>().is_ok();
+    // `1,5` where something else than a comma separates.
+    let comma = |cell: &str| !is_number(cell) && is_number(&cell.replacen(',', ".", 1));
+    let decimal_comma =
+        separator != Some(',') && rows.iter().any(|row| cells(row, separator).any(comma));
+    let mut columns = vec![Vec::new(); names.len()];
+    for line in rows {
+        let mut row = cells(line, separator);
+        for column in &mut columns {
+            let number = row.next().and_then(|cell| match decimal_comma {
+                true => cell.replacen(',', ".", 1).parse::<f64>().ok(),
+                false => cell.parse::<f64>().ok(),
+            });
+            column.push(number.filter(|x| x.is_finite()));
+        }
+    }
+    Some(Header {
+        names,
+        columns,
+        decimal_comma,
+        line: above as u64 + 1,
+        delimiter: match separator {
+            Some(';') => Delimiter::Semicolon,
+            Some('\t') => Delimiter::Tab,
+            Some(_) => Delimiter::Comma,
+            None => Delimiter::Space,
+        },
+    })
+}
+
+/// What separates the cells of a line; `None`: blanks.
+fn separator(line: &str) -> Option<char> {
+    let count = |c: char| line.matches(c).count();
+    let most = [',', ';', '\t'].into_iter().max_by_key(|c| count(*c));
+    most.filter(|c| count(*c) > 0)
+}
+
+fn cells(line: &str, separator: Option<char>) -> Box<dyn Iterator<Item = &str> + '_> {
+    fn clean(cell: &str) -> &str {
+        cell.trim().trim_matches('"').trim()
+    }
+    match separator {
+        Some(separator) => Box::new(line.split(separator).map(clean)),
+        None => Box::new(line.split_whitespace().map(clean)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_header_is_found_and_numbers_are_no_header() {
+        let found =
+            header(b"\xef\xbb\xbf# note\n\nq 1;\"x\" ;y\n1;2.5;\n-3;a;4\n").expect("a table");
+        assert_eq!(found.names, ["q 1", "x", "y"]);
+        assert_eq!(found.columns[1], [Some(2.5), None]);
+        assert_eq!(found.span(0), 4.0);
+        assert_eq!((found.line, found.delimiter), (3, Delimiter::Semicolon));
+        let comma = header(b"a;b\n1,5;2\n").expect("a table");
+        assert!(comma.decimal_comma && comma.largest(0) == 1.5);
+        assert_eq!(header(b"1,2,3\n4,5,6\n"), None);
+        assert_eq!(header(b""), None);
+        assert_eq!(header(b"one\n"), None);
+        assert_eq!(header(b"a b\n1 2\n").expect("blanks").names, ["a", "b"]);
+    }
+}

@@ -1,0 +1,33 @@
+//! A proposal for programs.
+
+use calib_finding::{Finding, Severity};
+use serde_json::{Value, json};
+
+use crate::proposal::Proposal;
+use crate::words;
+
+/// The facts with their places and sentences, the file, and what its check found; an object.
+#[must_use]
+pub fn proposal(proposal: &Proposal, file: &str, findings: Option<&[Finding]>) -> Value {
+    let facts = proposal.facts.iter().map(|fact| {
+        let mut value = serde_json::to_value(fact).unwrap_or_default();
+        if let Some(object) = value.as_object_mut() {
+            object.insert("place".to_owned(), json!(words::place(&fact.place)));
+            object.insert("text".to_owned(), json!(words::sentence(&fact.about)));
+        }
+        value
+    });
+    let facts: Vec<Value> = facts.collect();
+    let errors = findings.map(|all| {
+        let errors = all.iter().filter(|f| f.severity == Severity::Error);
+        let of = |f: &Finding| json!({"id": f.id.to_string(), "text": f.text()});
+        errors.map(of).collect::<Vec<Value>>()
+    });
+    json!({
+        "profile": file,
+        "robot": proposal.robot,
+        "noise": proposal.noise,
+        "facts": facts,
+        "errors": errors,
+    })
+}

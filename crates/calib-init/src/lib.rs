@@ -1,0 +1,36 @@
+#![doc = include_str!("../README.md")]
+
+pub mod ask;
+pub mod bodies;
+pub mod columns;
+pub mod correct;
+mod error;
+pub mod fact;
+pub mod header;
+pub mod json;
+pub mod limits;
+pub mod links;
+pub mod name;
+pub mod proposal;
+mod propose;
+pub mod robot;
+pub mod session;
+pub mod skeleton;
+pub mod source;
+pub mod tables;
+pub mod terminal;
+pub mod words;
+pub mod write;
+mod yaml;
+
+pub use error::InitError;
+pub use fact::{About, Fact, Place};
+pub use nalgebra;
+pub use proposal::Proposal;
+pub use propose::{Request, propose};
+pub use source::File;
+
+/// The README's example is a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

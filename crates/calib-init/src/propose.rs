@@ -1,0 +1,378 @@
+//! From a URDF and files to a proposal.
+
+use calib_recording::Poses;
+use calib_urdf::{JointId, LinkId, RobotModel};
+
+use crate::ask::{apply_one, ask, next_correction};
+use crate::bodies::{self, Found};
+use crate::error::InitError;
+use crate::fact::{About, Fact, Place};
+use crate::limits;
+use crate::links::Scene;
+use crate::proposal::{Body, Noise, Proposal, Recording, Table};
+use crate::robot;
+use crate::session::{self, Draft, Use};
+use crate::skeleton;
+use crate::source::{File, Source};
+use crate::tables;
+
+/// What the caller knows.
+#[derive(Debug, Clone, Default)]
+pub struct Request {
+    /// Name of the robot; that of the URDF where absent.
+    pub name: Option<String>,
+    /// The URDF as messages name it.
+    pub urdf_shown: String,
+    /// The URDF, relative to the profile.
+    pub urdf_path: String,
+    /// The schema beside the profile, if there is one.
+    pub schema: Option<String>,
+    /// The link that carries the markers.
+    pub markers_on: Option<String>,
+    /// Where nothing was recorded: the folder of the recordings to be, relative to the profile.
+    pub folder: String,
+}
+
+/// Corrections that are tried one after the other: a table with more mistakes is one to look at.
+const CORRECTIONS: usize = 4;
+
+/// The profile of a robot.
+///
+/// # Errors
+/// [`InitError`] where the robot has no moving joint, a file has neither joints nor a log, nothing moves, or clocks cannot be brought together.
+pub fn propose(
+    model: &RobotModel,
+    request: &Request,
+    files: &[File],
+) -> Result<Proposal, InitError> {
+    let tips = robot::tips(model);
+    let Some(longest) = tips.first() else {
+        return Err(InitError::NothingMoves {
+            file: request.urdf_shown.clone(),
+        });
+    };
+    let stated = match &request.markers_on {
+        None => None,
+        Some(name) => Some(model.link_id(name).map_err(|unknown| {
+            InitError::NoSuchLink {
+                unknown,
+                tips: tips
+                    .iter()
+                    .map(|t| model.link(t.link).name.clone())
+                    .collect(),
+            }
+        })?),
+    };
+    let mut proposal = Proposal {
+        robot: robot_name(model, request),
+        urdf: request.urdf_path.clone(),
+        schema: request.schema.clone(),
+        noise: Noise::default(),
+        bodies: Vec::new(),
+        recordings: Vec::new(),
+        skeleton: None,
+        facts: vec![joints(model)],
+    };
+    if files.is_empty() {
+        without_recordings(model, request, stated, longest, &mut proposal);
+    } else {
+        with_recordings(model, files, stated, longest, &mut proposal)?;
+    }
+    let about = match proposal.noise.marker.or(proposal.noise.body.map(|b| b.0)) {
+        Some(sigma) => About::Limits { sigma },
+        None => About::NoLimits,
+    };
+    debug_assert_eq!(
+        limits::of(&proposal.noise).is_none(),
+        about == About::NoLimits
+    );
+    proposal.facts.push(Fact::new(Place::Limits, about));
+    Ok(proposal)
+}
+
+fn robot_name(model: &RobotModel, request: &Request) -> String {
+    let stated = request
+        .name
+        .clone()
+        .unwrap_or_else(|| model.name().to_owned());
+    let clean: String = stated
+        .chars()
+        .map(|c| {
+            if c.is_alphanumeric() || matches!(c, '-' | '_') {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect();
+    match clean.is_empty() {
+        true => "robot".to_owned(),
+        false => clean,
+    }
+}
+
+fn joints(model: &RobotModel) -> Fact {
+    let moving: Vec<JointId> = model.independent_joints().collect();
+    let unlimited = moving.iter().filter(|j| {
+        let joint = model.joint(**j);
+        // A joint that turns without end says so.
+        joint.limits.range().is_none()
+            && !matches!(joint.kind, calib_urdf::JointKind::Continuous { .. })
+    });
+    let unlimited: Vec<JointId> = unlimited.copied().collect();
+    let about = About::Joints {
+        moving: moving.len(),
+        unlimited: robot::names(model, &unlimited)
+            .iter()
+            .map(|n| (*n).to_owned())
+            .collect(),
+    };
+    Fact::new(Place::Robot, about)
+}
+
+/// A body at the end of the longest chain, and postures to record.
+fn without_recordings(
+    model: &RobotModel,
+    request: &Request,
+    stated: Option<LinkId>,
+    longest: &robot::Tip,
+    proposal: &mut Proposal,
+) {
+    const BODY: &str = "tool";
+    let link = stated.unwrap_or(longest.link);
+    let named = |link: LinkId| model.link(link).name.clone();
+    let about = match stated {
+        Some(link) => About::LinkStated {
+            link: named(link),
+            rms: None,
+            better: None,
+        },
+        None => About::TipOfChain {
+            link: named(link),
+            joints: longest.joints.len(),
+            others: robot::tips(model)
+                .iter()
+                .skip(1)
+                .map(|tip| named(tip.link))
+                .collect(),
+        },
+    };
+    proposal
+        .facts
+        .push(Fact::new(Place::Body(BODY.to_owned()), about));
+    let joints = robot::movers(model, link);
+    let skeleton = skeleton::skeleton(model, &joints);
+    proposal.bodies.push(Body {
+        name: BODY.to_owned(),
+        markers: (1..=4).map(|i| format!("{BODY}_{i}")).collect(),
+        link,
+    });
+    let uses = [
+        ("sweep", Use::Sweep(skeleton.sweep.clone())),
+        ("poses", Use::Static),
+        ("checks", Use::Validation),
+    ];
+    for (name, usage) in uses {
+        proposal.recordings.push(Recording {
+            name: name.to_owned(),
+            table: Table {
+                path: format!("{}/{name}.csv", request.folder),
+                columns: None,
+            },
+            log: None,
+            stream: None,
+            usage,
+            hold: Vec::new(),
+        });
+    }
+    proposal.skeleton = Some(skeleton);
+    proposal
+        .facts
+        .push(Fact::new(Place::Tracker, About::SigmaUnknown));
+    proposal
+        .facts
+        .push(Fact::new(Place::Simulate, About::Invented));
+}
+
+/// Everything from the files.
+fn with_recordings(
+    model: &RobotModel,
+    files: &[File],
+    stated: Option<LinkId>,
+    longest: &robot::Tip,
+    proposal: &mut Proposal,
+) -> Result<(), InitError> {
+    if let Some(twice) = files
+        .iter()
+        .enumerate()
+        .find(|(i, f)| files[..*i].iter().any(|o| o.path == f.path))
+    {
+        return Err(InitError::Twice {
+            file: twice.1.shown.clone(),
+        });
+    }
+    let read = files.iter().map(|file| Source::read(model, file));
+    let mut sources: Vec<Source> = read.collect::<Result<_, _>>()?;
+    let (mut drafts, of_files) = session::drafts(model, &sources)?;
+    let (mut found, mut of_bodies) = bodies::bodies(&sources);
+    if found.is_empty() {
+        return Err(InitError::NothingSeen {
+            files: sources.iter().map(|s| s.file.shown.clone()).collect(),
+        });
+    }
+    bodies::without_left_out(model, &mut sources, &of_bodies)?;
+    let start = stated.unwrap_or_else(|| last_recorded(model, &sources).unwrap_or(longest.link));
+    proposal.bodies = on_link(&found, start);
+    proposal.recordings = recordings(&drafts, &sources);
+    let mut poses = tables::tables(model, proposal, &drafts, &sources)?;
+    if stated.is_none() && poses.iter().all(|p| session::moved(model, p).is_empty()) {
+        return Err(InitError::NoMotion {
+            files: sources.iter().map(|s| s.file.shown.clone()).collect(),
+            tip: model.link(longest.link).name.clone(),
+        });
+    }
+    let mut corrections = Vec::new();
+    let scene = Scene {
+        model,
+        bodies: &found,
+        tables: &poses,
+    };
+    if let Some((scoped, residuals)) = scene.tracker_unit() {
+        let (fact, new) = apply_one(model, &sources, &drafts, &[], &scoped, (residuals, 0))?;
+        corrections.push(fact);
+        if let Some(new) = new {
+            sources = new;
+            (found, of_bodies) = bodies::bodies(&sources);
+            proposal.recordings = recordings(&drafts, &sources);
+            poses = tables::tables(model, proposal, &drafts, &sources)?;
+        }
+    }
+    let scene = Scene {
+        model,
+        bodies: &found,
+        tables: &poses,
+    };
+    let apart = scene.not_rigid();
+    found = bodies::split(found, &mut of_bodies, &apart);
+    proposal.bodies = on_link(&found, start);
+    let mut of_links = Vec::new();
+    for _ in 0..=CORRECTIONS {
+        let scene = Scene {
+            model,
+            bodies: &found,
+            tables: &poses,
+        };
+        let asked = ask(&scene, stated);
+        for (body, link) in &asked.assigned.on {
+            proposal.bodies[*body].link = *link;
+        }
+        of_links = asked.facts(&scene, stated);
+        let next = next_correction(model, &sources, &drafts, &found, &asked.assigned)?;
+        corrections.extend(next.facts);
+        let Some(new) = next.sources.filter(|_| corrections.len() <= CORRECTIONS) else {
+            break;
+        };
+        sources = new;
+        proposal.recordings = recordings(&drafts, &sources);
+        poses = tables::tables(model, proposal, &drafts, &sources)?;
+    }
+    for body in &proposal.bodies {
+        let place = Place::Body(body.name.clone());
+        if !of_links.iter().any(|fact| fact.place == place) {
+            let link = model.link(body.link).name.clone();
+            of_links.push(Fact::new(place, About::LinkUnknown { link }));
+        }
+    }
+    let of_uses = session::uses(model, &mut drafts, &poses);
+    proposal.recordings = recordings(&drafts, &sources);
+    let missing = missing(model, proposal, &poses);
+    proposal.noise = noise(&of_bodies);
+    proposal
+        .facts
+        .extend([of_files, of_uses, of_bodies, of_links, missing, corrections].concat());
+    Ok(())
+}
+
+/// The last link that recorded joints move.
+fn last_recorded(model: &RobotModel, sources: &[Source]) -> Option<LinkId> {
+    let names = sources
+        .iter()
+        .flat_map(|s| &s.recording.joints)
+        .map(|j| j.name.as_str());
+    let joints: Vec<JointId> = names.filter_map(|n| model.joint_id(n).ok()).collect();
+    let child = |j: &JointId| model.joint(*j).child;
+    let last = joints
+        .iter()
+        .max_by_key(|j| robot::movers(model, child(j)).len())?;
+    Some(robot::group(model, child(last)))
+}
+
+fn on_link(found: &[Found], link: LinkId) -> Vec<Body> {
+    let on = |body: &Found| Body {
+        name: body.name.clone(),
+        markers: body.markers.clone(),
+        link,
+    };
+    found.iter().map(on).collect()
+}
+
+fn recordings(drafts: &[Draft], sources: &[Source]) -> Vec<Recording> {
+    let table = |i: usize| Table {
+        path: sources[i].file.path.clone(),
+        columns: sources[i].columns.clone(),
+    };
+    let of = |draft: &Draft| Recording {
+        name: draft.name.clone(),
+        table: table(draft.source),
+        log: draft.log.map(table),
+        stream: draft.stream,
+        usage: draft.usage.clone(),
+        hold: Vec::new(),
+    };
+    drafts.iter().map(of).collect()
+}
+
+fn noise(facts: &[Fact]) -> Noise {
+    let mut noise = Noise::default();
+    for fact in facts {
+        match fact.about {
+            About::MarkerSigma { sigma, .. } => noise.marker = Some(sigma),
+            About::BodySigma {
+                position,
+                orientation,
+            } => noise.body = Some((position, orientation)),
+            _ => {}
+        }
+    }
+    noise
+}
+
+/// Joints that carry a body and have no column are held at 0, and said.
+fn missing(model: &RobotModel, proposal: &mut Proposal, tables: &[Poses]) -> Vec<Fact> {
+    let mut facts = Vec::new();
+    let carriers = proposal
+        .bodies
+        .iter()
+        .flat_map(|body| robot::movers(model, body.link));
+    let mut carriers: Vec<JointId> = carriers.collect();
+    carriers.sort_unstable();
+    carriers.dedup();
+    for (recording, poses) in proposal.recordings.iter_mut().zip(tables) {
+        let without = carriers
+            .iter()
+            .filter(|j| !poses.joints.contains_key(&model.joint(**j).name));
+        let without: Vec<JointId> = without.copied().collect();
+        if !without.is_empty() {
+            let joints = robot::names(model, &without)
+                .iter()
+                .map(|n| (*n).to_owned())
+                .collect();
+            facts.push(Fact::new(
+                Place::Recording(recording.name.clone()),
+                About::JointsMissing { joints },
+            ));
+        }
+        recording.hold = without;
+    }
+    facts
+}

@@ -1,0 +1,161 @@
+//! A file that was given: its bytes, its column map where it needs one, and what the reader makes of it.
+
+use calib_recording::{ColumnMap, ReadOptions, Recording, read_bytes};
+use calib_urdf::RobotModel;
+
+use crate::columns::{self, Guess};
+use crate::error::InitError;
+use crate::fact::About;
+use crate::header::header;
+
+/// A file as the caller has it.
+#[derive(Debug, Clone)]
+pub struct File {
+    /// As the caller named it, for messages and for the recording's name.
+    pub shown: String,
+    /// As the profile names it: relative to the profile.
+    pub path: String,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// The file.
+    pub file: File,
+    /// How to read it; `None`: by the readers' own rules.
+    pub columns: Option<ColumnMap>,
+    /// What it holds; joints that the robot does not have are left out.
+    pub recording: Recording,
+    /// What was found of its columns.
+    pub facts: Vec<About>,
+    /// Names of its columns or streams, for messages.
+    pub names: Vec<String>,
+}
+
+impl Source {
+    /// Reads a file: by the readers' own rules where these give joints of this robot or a tracker's data, else by a map of its columns.
+    ///
+    /// # Errors
+    /// [`InitError::Recording`] where neither reads it.
+    pub fn read(model: &RobotModel, file: &File) -> Result<Self, InitError> {
+        let own = read_bytes(&file.shown, &file.bytes, &ReadOptions::default());
+        let table = header(&file.bytes);
+        let guess = table.as_ref().map(|table| columns::guess(model, table));
+        match (own, guess) {
+            (Ok(recording), guess) if suffices(model, &recording, guess.as_ref()) => {
+                let count = recording.joints.len();
+                let mut facts = Vec::new();
+                if count > 0 {
+                    facts.push(About::JointsByName { count });
+                }
+                Ok(Self::new(model, file, None, recording, facts))
+            }
+            (_, Some(guess)) if !guess.joints.is_empty() || has_tracked(&guess.map) => {
+                let recording = mapped(file, &guess.map)?;
+                Ok(Self::new(
+                    model,
+                    file,
+                    Some(guess.map),
+                    recording,
+                    guess.facts,
+                ))
+            }
+            (own, _) => Ok(Self::new(model, file, None, own?, Vec::new())),
+        }
+    }
+
+    fn new(
+        model: &RobotModel,
+        file: &File,
+        columns: Option<ColumnMap>,
+        mut recording: Recording,
+        facts: Vec<About>,
+    ) -> Self {
+        let joints = recording.joints.iter().map(|s| &s.name);
+        let markers = recording.markers.iter().map(|s| &s.name);
+        let bodies = recording.bodies.iter().map(|s| &s.name);
+        let mut names: Vec<String> = joints.chain(markers).chain(bodies).cloned().collect();
+        if let (Some(_), Some(table)) = (&columns, header(&file.bytes)) {
+            names = table.names;
+        }
+        recording.joints.retain(|s| model.joint_id(&s.name).is_ok());
+        Self {
+            file: file.clone(),
+            columns,
+            recording,
+            facts,
+            names,
+        }
+    }
+
+    /// The same file by another map.
+    ///
+    /// # Errors
+    /// As [`Source::read`].
+    pub fn with_columns(&self, model: &RobotModel, columns: ColumnMap) -> Result<Self, InitError> {
+        let recording = mapped(&self.file, &columns)?;
+        let facts = self.facts.clone();
+        Ok(Self::new(
+            model,
+            &self.file,
+            Some(columns),
+            recording,
+            facts,
+        ))
+    }
+
+    /// It has joints of this robot.
+    #[must_use]
+    pub fn has_joints(&self) -> bool {
+        !self.recording.joints.is_empty()
+    }
+
+    /// It has markers or bodies.
+    #[must_use]
+    pub fn has_tracked(&self) -> bool {
+        !self.recording.markers.is_empty() || !self.recording.bodies.is_empty()
+    }
+
+    /// The file's name without folder and ending.
+    #[must_use]
+    pub fn stem(&self) -> &str {
+        let name = self
+            .file
+            .path
+            .rsplit(['/', '\\'])
+            .next()
+            .unwrap_or_default();
+        name.split_once('.').map_or(name, |(stem, _)| stem)
+    }
+}
+
+fn mapped(file: &File, map: &ColumnMap) -> Result<Recording, InitError> {
+    let options = ReadOptions {
+        columns: Some(map.clone()),
+        ..ReadOptions::default()
+    };
+    Ok(read_bytes(&file.shown, &file.bytes, &options)?)
+}
+
+fn has_tracked(map: &ColumnMap) -> bool {
+    !map.markers.is_empty() || !map.bodies.is_empty()
+}
+
+/// The readers' own rules find all that a map finds: every joint is one of the robot, and no fewer than a map would have.
+fn suffices(model: &RobotModel, recording: &Recording, guess: Option<&Guess>) -> bool {
+    let known = recording
+        .joints
+        .iter()
+        .filter(|s| model.joint_id(&s.name).is_ok())
+        .count();
+    let tracked = recording.markers.len() + recording.bodies.len();
+    let (joints, things) = guess.map_or((0, 0), |g| {
+        (g.joints.len(), g.map.markers.len() + g.map.bodies.len())
+    });
+    // A device's own format has its names in several lines, of which a map would see one.
+    let of_device = recording.meta.format != "csv";
+    let all_known = known == recording.joints.len();
+    all_known && (of_device || (known >= joints && tracked >= things)) && known + tracked > 0
+}

@@ -1,0 +1,57 @@
+//! What a person sees: what was found, what to check, what comes next.
+
+use std::fmt::Write as _;
+
+use calib_finding::{Finding, Severity};
+use calib_report::terminal::wrapped;
+
+use crate::fact::Fact;
+use crate::proposal::Proposal;
+use crate::words;
+
+/// The summary; `file`: the profile that was written, `findings`: what its check found.
+#[must_use]
+pub fn summary(proposal: &Proposal, file: &str, findings: Option<&[Finding]>) -> String {
+    let mut text = String::new();
+    let mut block = |title: &str, facts: &[&Fact]| {
+        if !facts.is_empty() {
+            let _ = writeln!(text, "\n{title}");
+        }
+        for (i, fact) in facts.iter().enumerate() {
+            // What several parts have in common is said once.
+            if facts[..i].iter().any(|f| f.about == fact.about) {
+                continue;
+            }
+            let same = facts.iter().filter(|f| f.about == fact.about).count() - 1;
+            let key = match same {
+                0 => words::place(&fact.place),
+                n => format!("{} and {n} more", words::place(&fact.place)),
+            };
+            let line = format!("{key}: {}", words::sentence(&fact.about));
+            text += &wrapped(&line, "  ", "    ");
+            if !text.ends_with('\n') {
+                text.push('\n');
+            }
+        }
+    };
+    let (to_check, found): (Vec<&Fact>, Vec<&Fact>) = proposal.facts.iter().partition(|f| f.check);
+    block("Found", &found);
+    block("To check (marked CHECK in the file)", &to_check);
+    let all = findings.unwrap_or_default();
+    let errors: Vec<&Finding> = all
+        .iter()
+        .filter(|f| f.severity == Severity::Error)
+        .collect();
+    if !errors.is_empty() {
+        text += "\nErrors that `calib check` finds\n";
+        for error in &errors {
+            let line = format!("{}: {}", error.id, error.text());
+            text += &wrapped(&line, "  ", "    ");
+            if !text.ends_with('\n') {
+                text.push('\n');
+            }
+        }
+    }
+    let next = words::next(file, proposal.skeleton.is_some(), errors.len());
+    format!("Wrote {file}\n{text}\n{next}\n")
+}

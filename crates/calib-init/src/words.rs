@@ -1,0 +1,398 @@
+//! Every sentence of a proposal: in the profile's comments and on the terminal.
+
+use calib_finding::{Unit, number};
+use calib_recording::{AngleUnit, TimeUnit};
+
+use crate::fact::{About, AngleHow, LengthHow, Mistake, Residuals, Rival};
+
+/// The first lines of a profile.
+pub const HEAD: &str = "Made by `calib init`. Comments state the evidence. Lines with CHECK are guesses: confirm or correct each one, then delete the comment.";
+
+/// Above what is free.
+pub const FREE: &str = "What may differ from the URDF. Add compliance or backlash if the report names them as missing effects.";
+
+/// A length, mm.
+fn mm(meters: f64) -> String {
+    number::plain(meters, Unit::Meter)
+}
+
+fn quoted(names: &[String]) -> String {
+    const MOST: usize = 6;
+    let mut shown: Vec<String> = names.iter().take(MOST).map(|n| format!("`{n}`")).collect();
+    if names.len() > MOST {
+        shown.push(format!("{} more", names.len() - MOST));
+    }
+    match shown.len() {
+        0 | 1 => shown.concat(),
+        n => format!("{} and {}", shown[..n - 1].join(", "), shown[n - 1]),
+    }
+}
+
+fn plural(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
+/// `3.4 times`.
+fn times(ratio: f64) -> String {
+    let digits = if ratio < 10.0 { 1 } else { 0 };
+    format!("{} times", number::fixed(ratio.min(9999.0), digits))
+}
+
+fn worse(rival: &Rival, rms: f64) -> String {
+    let ratio = rival.rms / rms.max(1e-9);
+    format!(
+        "`{}` leaves {}, {} as much",
+        rival.link,
+        mm(rival.rms),
+        times(ratio)
+    )
+}
+
+fn angle_unit(unit: AngleUnit) -> &'static str {
+    match unit {
+        AngleUnit::Rad => "rad",
+        AngleUnit::Deg => "deg",
+    }
+}
+
+/// The sentence of a fact, without the word CHECK.
+#[must_use]
+pub fn sentence(about: &About) -> String {
+    match about {
+        About::Joints { .. }
+        | About::TipOfChain { .. }
+        | About::LinkStated { .. }
+        | About::Link { .. }
+        | About::LinkUnknown { .. }
+        | About::Still { .. } => of_links(about),
+        About::JointsByName { .. }
+        | About::JointsByOrder { .. }
+        | About::JointsMissing { .. }
+        | About::Angles { .. }
+        | About::Lengths { .. }
+        | About::Time { .. }
+        | About::Ignored { .. } => of_columns(about),
+        About::Corrected {
+            mistake,
+            residuals,
+            equivalent,
+        } => corrected(mistake, residuals, *equivalent),
+        About::NotCorrected { mistake, residuals } => format!(
+            "{} It explains the recordings ({}), but no profile corrects it: correct the table, or see what `calib check` says.",
+            found(mistake),
+            improvement(residuals)
+        ),
+        About::Agrees { rms, rows } => format!(
+            "Order, signs and units of the joints agree with the nominal robot: {} fit it to {} rms, and no mistake explains them better.",
+            plural(*rows, "pose", "poses"),
+            mm(*rms)
+        ),
+        About::TooFew { rows } => format!(
+            "{} are too few to test the order, signs and units of the joints.",
+            plural(*rows, "pose", "poses")
+        ),
+        About::Disagrees { rms, limit } => format!(
+            "The recordings fit the nominal robot to {} rms only; errors of 1° and 10 mm explain {}, and no single mistake explains it. See what `calib check` says.",
+            mm(*rms),
+            mm(*limit)
+        ),
+        _ => of_session(about),
+    }
+}
+
+fn of_links(about: &About) -> String {
+    match about {
+        About::Joints { moving, unlimited } if unlimited.is_empty() => {
+            format!(
+                "The URDF has {}, all with limits.",
+                plural(*moving, "moving joint", "moving joints")
+            )
+        }
+        About::Joints { moving, unlimited } => format!(
+            "The URDF has {}. No limits are given for {}.",
+            plural(*moving, "moving joint", "moving joints"),
+            quoted(unlimited)
+        ),
+        About::TipOfChain {
+            link,
+            joints,
+            others,
+        } => {
+            let rest = match others.is_empty() {
+                true => String::new(),
+                false => format!(" Other ends of chains: {}.", quoted(others)),
+            };
+            format!(
+                "`{link}` is the end of the longest chain ({}). Name the link that carries the markers.{rest}",
+                plural(*joints, "joint", "joints")
+            )
+        }
+        About::LinkStated { link, rms, better } => {
+            let fit = rms.map_or_else(String::new, |rms| {
+                format!(", and explains the motion of this body to {} rms", mm(rms))
+            });
+            let better = better.as_ref().map_or_else(String::new, |b| {
+                format!(" `{}` explains it better: {} rms.", b.link, mm(b.rms))
+            });
+            format!("`{link}` was named on the command line{fit}.{better}")
+        }
+        About::Link {
+            link,
+            rms,
+            next,
+            same,
+        } => {
+            let next = next
+                .as_ref()
+                .map_or_else(String::new, |n| format!("; {}", worse(n, *rms)));
+            let same = match same.is_empty() {
+                true => String::new(),
+                false => format!(
+                    " These recordings do not distinguish {} from it.",
+                    quoted(same)
+                ),
+            };
+            format!("The body follows `{link}` to {} rms{next}.{same}", mm(*rms))
+        }
+        About::LinkUnknown { link } => format!(
+            "No pose shows this body together with moving joints. `{link}` is the last link that recorded joints move: name the link that carries it."
+        ),
+        About::Still { link, rms } => {
+            format!(
+                "The body stands still to {} rms: it is fixed to `{link}`, or stands beside the robot.",
+                mm(*rms)
+            )
+        }
+        _ => String::new(),
+    }
+}
+
+fn of_columns(about: &About) -> String {
+    match about {
+        About::JointsByName { count } => format!(
+            "{} the name of a joint.",
+            match count {
+                1 => "1 column has".to_owned(),
+                n => format!("{n} columns have"),
+            }
+        ),
+        About::JointsByOrder { pairs } => {
+            let pairs: Vec<String> = pairs
+                .iter()
+                .map(|(joint, column)| format!("{column} → {joint}"))
+                .collect();
+            format!(
+                "No column has the name of a joint. Numbered columns are paired with the joints in their order from the root: {}.",
+                pairs.join(", ")
+            )
+        }
+        About::JointsMissing { joints } => format!(
+            "{} {} no column and {} taken to stand at 0.",
+            quoted(joints),
+            if joints.len() == 1 { "has" } else { "have" },
+            if joints.len() == 1 { "is" } else { "are" }
+        ),
+        About::Angles { unit, how } => {
+            let unit = angle_unit(*unit);
+            match how {
+                AngleHow::Named => {
+                    format!("Angles are in {unit}: the names of the columns say so.")
+                }
+                AngleHow::Range { largest } => {
+                    let largest = number::fixed(*largest, 2);
+                    format!("Angles are in {unit}: the largest is {largest}.")
+                }
+                AngleHow::Motion { times: t } => {
+                    format!(
+                        "Angles are in {unit}: the other unit leaves {} the residual.",
+                        times(*t)
+                    )
+                }
+            }
+        }
+        About::Lengths { unit, how } => {
+            let unit = unit.name();
+            match how {
+                LengthHow::Named => {
+                    format!("Lengths are in {unit}: the names of the columns say so.")
+                }
+                LengthHow::Range { extent, reach } => format!(
+                    "Lengths are in {unit}: the markers spread over {} {unit}, and the robot reaches {} m.",
+                    number::fixed(*extent, 2),
+                    number::fixed(*reach, 2)
+                ),
+                LengthHow::Motion { times: t } => {
+                    format!(
+                        "Lengths are in {unit}: the other unit leaves {} the residual.",
+                        times(*t)
+                    )
+                }
+            }
+        }
+        About::Time {
+            column,
+            unit,
+            named,
+        } => {
+            let unit = match unit {
+                TimeUnit::S => "s",
+                TimeUnit::Ms => "ms",
+                TimeUnit::Us => "us",
+                TimeUnit::Ns => "ns",
+            };
+            let how = if *named { "" } else { ", by its numbers" };
+            format!("`{column}` is the time in {unit}{how}.")
+        }
+        About::Ignored { columns } => format!("Not used: {}.", quoted(columns)),
+        _ => String::new(),
+    }
+}
+
+fn of_session(about: &About) -> String {
+    match about {
+        About::Duplicate { marker, of } => {
+            format!("`{marker}` repeats `{of}` in every row and is left out.")
+        }
+        About::Seldom { markers } => {
+            format!("Seen in fewer than four rows and left out: {}.", quoted(markers))
+        }
+        About::Rigid { markers, sigma } => {
+            let to = sigma.map_or_else(String::new, |s| format!(" to {} per coordinate", mm(s)));
+            format!("{markers} markers keep their distances{to}: one body.")
+        }
+        About::Flat { left_out } => format!(
+            "These markers keep their distances but lie on a line or at one point, so they give no orientation. Left out: {}.",
+            quoted(left_out)
+        ),
+        About::Points { markers: 1 } => "One marker: a point, which shows no rotation about itself.".to_owned(),
+        About::Points { markers } => format!("{markers} markers: points, which show no rotation about their line."),
+        About::Pose => "A tracked body with six degrees of freedom.".to_owned(),
+        About::MarkerSigma { sigma, rows } => format!(
+            "The markers scatter about their bodies by {} per coordinate ({}).",
+            mm(*sigma),
+            plural(*rows, "row", "rows")
+        ),
+        About::BodySigma { position, orientation } => format!(
+            "A body that stands still scatters by {} and {}.",
+            mm(*position),
+            number::plain(*orientation, Unit::Radian)
+        ),
+        About::Calculated => "The markers were calculated from a fitted body, so their distances do not show the noise: it is estimated by the fit.".to_owned(),
+        About::SigmaUnknown => "Nothing shows the noise of the tracker before the fit: it is estimated. State it if you know it: `marker_sigma_mm`, or `body_sigma_mm` and `body_sigma_deg`.".to_owned(),
+        About::Sweep { joints, rows } => format!(
+            "Only {} {}: a sweep of {}.",
+            quoted(joints),
+            if joints.len() == 1 { "moves" } else { "move" },
+            plural(*rows, "pose", "poses")
+        ),
+        About::Static { rows, moved } => format!(
+            "{} with {}.",
+            plural(*rows, "pose", "poses"),
+            plural(*moved, "moving joint", "moving joints")
+        ),
+        About::ValidationByName { word, rows } => format!(
+            "Held out because of `{word}` in its name: {}.",
+            plural(*rows, "pose", "poses")
+        ),
+        About::ValidationSmallest { rows } => format!(
+            "Held out to verify the calibration because it is the smallest recording: {}. Use `static` to fit it too.",
+            plural(*rows, "pose", "poses")
+        ),
+        About::LeftOutInTurn => "No recording is held out: the report leaves every pose out in turn. Separate poses, recorded on another day, tell more.".to_owned(),
+        About::Holds { holds } => format!("A stream in which the robot holds {}: each gives one pose.", plural(*holds, "time", "times")),
+        About::Continuous => "A stream of a motion: rows are taken from it.".to_owned(),
+        About::Log { file, named: true } => format!("The joints are in the robot's own log `{file}`, with a clock of its own."),
+        About::Log { file, named: false } => format!("The joints are in the robot's own log `{file}`, with a clock of its own. The names of the files do not tell which log belongs to which recording: they are paired in their order."),
+        About::Limits { sigma } => format!(
+            "The largest errors that you accept. Proposed: 5 and 14 times the noise of {}; your task decides.",
+            mm(*sigma)
+        ),
+        About::NoLimits => "State the largest errors that you accept; without limits the verdict is `not_evaluated`.".to_owned(),
+        About::Invented => "Mounts, errors and noise of the simulation are invented: put in what you expect. `calib simulate` writes these recordings, `calib plan` proposes better ones.".to_owned(),
+        _ => String::new(),
+    }
+}
+
+/// What is wrong, as a sentence.
+fn found(mistake: &Mistake) -> String {
+    match mistake {
+        Mistake::Sign { joint } => format!("Joint `{joint}` counts against the axis of the URDF."),
+        Mistake::Exchange { first, second } => {
+            format!("The columns of `{first}` and `{second}` are exchanged.")
+        }
+        Mistake::Unit {
+            joint: Some(joint),
+            unit,
+        } => format!("The column of `{joint}` is in {unit}."),
+        Mistake::Unit { joint: None, unit } => format!("The joint columns are in {unit}."),
+        Mistake::TrackerUnit { unit } => format!("The tracker's lengths are in {unit}."),
+        Mistake::Offset { joint, degrees } => format!(
+            "The zero of `{joint}` is off: {} must be added.",
+            number::plain(degrees.to_radians(), Unit::Radian)
+        ),
+        Mistake::Rows { rows } => format!(
+            "Joint values and tracker rows are paired {} off.",
+            plural(rows.unsigned_abs().into(), "row", "rows")
+        ),
+        Mistake::Mirrored => "The tracker's frame is left-handed.".to_owned(),
+        Mistake::TrackerMoved => {
+            "The tracker moved, or its axes changed, between recordings.".to_owned()
+        }
+        Mistake::Remounted { body } => {
+            format!("`{body}` moved on its link between recordings.")
+        }
+        Mistake::Poses => "The convention of the tracked poses was misread.".to_owned(),
+        Mistake::Other => "A mistake in the recordings stands out.".to_owned(),
+    }
+}
+
+fn improvement(residuals: &Residuals) -> String {
+    let next = residuals.next.map_or_else(String::new, |next| {
+        format!(", the next best explanation leaves {}", mm(next))
+    });
+    format!(
+        "{} rms without, {} with it{next}",
+        mm(residuals.none),
+        mm(residuals.best)
+    )
+}
+
+fn corrected(mistake: &Mistake, residuals: &Residuals, equivalent: usize) -> String {
+    let others = match equivalent {
+        0 => String::new(),
+        n => format!(
+            " These recordings do not distinguish {} from it.",
+            plural(n, "other correction", "other corrections")
+        ),
+    };
+    format!(
+        "{} Corrected here ({}).{others}",
+        found(mistake),
+        improvement(residuals)
+    )
+}
+
+/// What to do next.
+#[must_use]
+pub fn next(file: &str, simulated: bool, errors: usize) -> String {
+    match (simulated, errors) {
+        (true, _) => format!("Next: calib plan {file}"),
+        (false, 0) => format!("Next: calib run {file}"),
+        (false, _) => format!("Next: correct the errors, then calib check {file}"),
+    }
+}
+
+/// Where a fact belongs, as a key of the profile.
+#[must_use]
+pub fn place(place: &crate::fact::Place) -> String {
+    use crate::fact::Place;
+    match place {
+        Place::Robot => "robot".to_owned(),
+        Place::Tracker => "tracker".to_owned(),
+        Place::Body(name) => format!("bodies.{name}"),
+        Place::Recordings => "recordings".to_owned(),
+        Place::Recording(name) => format!("recordings.{name}"),
+        Place::Limits => "solve.limits".to_owned(),
+        Place::Simulate => "simulate".to_owned(),
+    }
+}

@@ -1,0 +1,315 @@
+//! The profile as text. What the program reads stands in the lines, what a person should know in comments above them.
+
+use calib_recording::ColumnMap;
+use calib_report::terminal::wrapped;
+use calib_urdf::{JointId, RobotModel};
+
+use crate::fact::{Fact, Place};
+use crate::limits;
+use crate::proposal::{Body, Proposal, Recording};
+use crate::session::{Stream, Use};
+use crate::words;
+use crate::yaml;
+
+/// Markers of a simulated body, mm: no three on a line, no symmetry.
+const MARKERS_MM: [[i32; 3]; 4] = [[0, 0, 0], [80, 0, 0], [20, 60, 0], [45, 20, 40]];
+/// Noise that a simulation assumes where none is known, mm: an optical tracker in a room.
+const SIMULATED_MM: f64 = 0.2;
+
+/// The text of the profile.
+#[must_use]
+pub fn profile(model: &RobotModel, proposal: &Proposal) -> String {
+    let mut page = Page {
+        model,
+        proposal,
+        text: String::new(),
+    };
+    page.head();
+    page.bodies();
+    page.recordings();
+    page.solve();
+    if proposal.skeleton.is_some() {
+        page.plan();
+        page.simulate();
+    }
+    page.text
+}
+
+struct Page<'a> {
+    model: &'a RobotModel,
+    proposal: &'a Proposal,
+    text: String,
+}
+
+impl Page<'_> {
+    fn line(&mut self, line: &str) {
+        self.text += line;
+        self.text.push('\n');
+    }
+
+    /// The facts about a part, as comments.
+    fn comments(&mut self, indent: &str, place: &Place) {
+        let facts: Vec<&Fact> = self
+            .proposal
+            .facts
+            .iter()
+            .filter(|f| f.place == *place)
+            .collect();
+        for fact in facts {
+            let mark = if fact.check { "CHECK: " } else { "" };
+            let text = format!("{mark}{}", words::sentence(&fact.about));
+            self.comment(indent, &text);
+        }
+    }
+
+    fn comment(&mut self, indent: &str, text: &str) {
+        let (first, rest) = (format!("{indent}# "), format!("{indent}#   "));
+        let text = wrapped(text, &first, &rest);
+        self.text += text.trim_end();
+        self.text.push('\n');
+    }
+
+    fn head(&mut self) {
+        let proposal = self.proposal;
+        if let Some(schema) = &proposal.schema {
+            self.line(&format!("# yaml-language-server: $schema={schema}"));
+        }
+        self.comment("", words::HEAD);
+        self.line("calib: 1");
+        self.comments("", &Place::Robot);
+        let (name, urdf) = (yaml::text(&proposal.robot), yaml::text(&proposal.urdf));
+        self.line(&format!("robot: {{name: {name}, urdf: {urdf}}}"));
+        self.line("");
+        self.comments("", &Place::Tracker);
+        let mut keys = vec!["frame: tracker".to_owned()];
+        if let Some(sigma) = proposal.noise.marker {
+            keys.push(format!(
+                "marker_sigma_mm: {}",
+                yaml::two_digits(sigma * 1e3)
+            ));
+        }
+        if let Some((position, orientation)) = proposal.noise.body {
+            keys.push(format!(
+                "body_sigma_mm: {}",
+                yaml::two_digits(position * 1e3)
+            ));
+            let degrees = orientation.to_degrees();
+            keys.push(format!("body_sigma_deg: {}", yaml::two_digits(degrees)));
+        }
+        self.line(&format!("tracker: {{{}}}", keys.join(", ")));
+    }
+
+    fn bodies(&mut self) {
+        self.line("");
+        self.line("bodies:");
+        for body in &self.proposal.bodies {
+            self.comments("  ", &Place::Body(body.name.clone()));
+            let link = yaml::text(&self.model.link(body.link).name);
+            let what = match body.markers.is_empty() {
+                true => "pose: true".to_owned(),
+                false => format!("markers: {}", yaml::list(&body.markers)),
+            };
+            let name = yaml::text(&body.name);
+            self.line(&format!("  {name}: {{link: {link}, {what}}}"));
+        }
+    }
+
+    fn recordings(&mut self) {
+        self.line("");
+        self.comments("", &Place::Recordings);
+        self.line("recordings:");
+        let mut known: Vec<(&ColumnMap, String)> = Vec::new();
+        for recording in &self.proposal.recordings {
+            self.recording(recording, &mut known);
+        }
+    }
+
+    fn recording<'p>(
+        &mut self,
+        recording: &'p Recording,
+        known: &mut Vec<(&'p ColumnMap, String)>,
+    ) {
+        self.comments("  ", &Place::Recording(recording.name.clone()));
+        self.line(&format!("  {}:", yaml::text(&recording.name)));
+        self.line(&format!("    file: {}", yaml::text(&recording.table.path)));
+        match &recording.usage {
+            Use::Sweep(ranges) => {
+                self.line("    use: sweep");
+                let ranges = self.ranges(ranges);
+                self.line(&format!("    joints: {ranges}"));
+            }
+            Use::Static => self.line("    use: static"),
+            Use::Validation => self.line("    use: validation"),
+        }
+        if !recording.hold.is_empty() {
+            let at_zero = recording
+                .hold
+                .iter()
+                .map(|j| format!("{}: 0", self.key(*j)));
+            let at_zero: Vec<String> = at_zero.collect();
+            self.line(&format!("    hold: {{{}}}", at_zero.join(", ")));
+        }
+        if let Some(columns) = &recording.table.columns {
+            self.columns("    ", columns, known);
+        }
+        if let Some(log) = &recording.log {
+            self.line("    robot_log:");
+            self.line(&format!("      file: {}", yaml::text(&log.path)));
+            if let Some(columns) = &log.columns {
+                self.columns("      ", columns, known);
+            }
+        }
+        match recording.stream {
+            Some(Stream::Settle) => self.line("    timing: {poses: settle}"),
+            Some(Stream::Continuous) => self.line("    timing: {poses: continuous}"),
+            None => {}
+        }
+    }
+
+    /// A column map, or the name of an equal one above.
+    fn columns<'p>(
+        &mut self,
+        indent: &str,
+        columns: &'p ColumnMap,
+        known: &mut Vec<(&'p ColumnMap, String)>,
+    ) {
+        if let Some((_, name)) = known.iter().find(|(other, _)| *other == columns) {
+            self.line(&format!("{indent}columns: *{name}"));
+            return;
+        }
+        let name = match known.len() {
+            0 => "columns".to_owned(),
+            n => format!("columns_{}", n + 1),
+        };
+        let all = self.proposal.recordings.iter();
+        let maps = all.flat_map(|r| {
+            [
+                r.table.columns.as_ref(),
+                r.log.as_ref().and_then(|l| l.columns.as_ref()),
+            ]
+        });
+        let again = maps.flatten().filter(|other| *other == columns).count() > 1;
+        let anchor = if again {
+            format!(" &{name}")
+        } else {
+            String::new()
+        };
+        self.line(&format!("{indent}columns:{anchor}"));
+        self.text += &yaml::columns(columns, &format!("{indent}  "));
+        known.push((columns, name));
+    }
+
+    fn solve(&mut self) {
+        self.line("");
+        self.line("solve:");
+        self.comment("  ", words::FREE);
+        self.line("  free: [bodies, tracker, joint_offsets, joint_axes]");
+        self.comments("  ", &Place::Limits);
+        match limits::of(&self.proposal.noise) {
+            Some(limits) => {
+                let (rms, most) = (
+                    yaml::two_digits(limits.rms * 1e3),
+                    yaml::two_digits(limits.most * 1e3),
+                );
+                self.line(&format!(
+                    "  limits: {{held_out_rms_mm: {rms}, held_out_max_mm: {most}}}"
+                ));
+            }
+            None => self.line("  # limits: {held_out_rms_mm: 1}"),
+        }
+    }
+
+    /// `elbow_deg`, `lift_mm`.
+    fn key(&self, joint: JointId) -> String {
+        let joint = self.model.joint(joint);
+        let unit = if joint.kind.turns() { "deg" } else { "mm" };
+        yaml::text(&format!("{}_{unit}", joint.name))
+    }
+
+    fn value(&self, joint: JointId, value: f64) -> String {
+        match self.model.joint(joint).kind.turns() {
+            true => yaml::number(value.to_degrees(), 1),
+            false => yaml::number(value * 1e3, 1),
+        }
+    }
+
+    /// `{elbow_deg: [-90, 90]}`.
+    fn ranges(&self, ranges: &[(JointId, (f64, f64))]) -> String {
+        let of = |(joint, (low, high)): &(JointId, (f64, f64))| {
+            format!(
+                "{}: [{}, {}]",
+                self.key(*joint),
+                self.value(*joint, *low),
+                self.value(*joint, *high)
+            )
+        };
+        let all: Vec<String> = ranges.iter().map(of).collect();
+        format!("{{{}}}", all.join(", "))
+    }
+
+    /// Ranges for joints without limits; the others have those of the URDF.
+    fn plan(&mut self) {
+        let Some(skeleton) = &self.proposal.skeleton else {
+            return;
+        };
+        let open = |(joint, _): &&(JointId, _)| self.model.joint(*joint).limits.range().is_none();
+        let open: Vec<_> = skeleton.random.iter().filter(open).copied().collect();
+        if open.is_empty() {
+            return;
+        }
+        self.line("");
+        self.line("plan:");
+        let ranges = self.ranges(&open);
+        self.line(&format!("  joints: {ranges}"));
+    }
+
+    fn simulate(&mut self) {
+        let proposal = self.proposal;
+        let Some(skeleton) = &proposal.skeleton else {
+            return;
+        };
+        self.line("");
+        self.comments("", &Place::Simulate);
+        self.line("simulate:");
+        self.line("  seed: 1");
+        self.line("  tracker_from_root: {xyz_mm: [2000, 500, 0], rpy_deg: [0, 0, 150]}");
+        self.line("  mounts:");
+        for body in &proposal.bodies {
+            self.mount(body);
+        }
+        self.line("  errors: {joint_offset_deg: 0.3, axis_mm: 0.5, axis_deg: 0.1, mount_mm: 3, mount_deg: 2}");
+        let marker = proposal.noise.marker.map_or(SIMULATED_MM, |m| m * 1e3);
+        let noise = yaml::two_digits(marker);
+        self.line(&format!("  noise: {{marker_mm: {noise}, joint_deg: 0.01}}"));
+        self.line("  recordings:");
+        self.line("    sweep:");
+        self.line("      grid:");
+        for (joint, (low, high)) in &skeleton.sweep {
+            let (key, low, high) = (
+                self.key(*joint),
+                self.value(*joint, *low),
+                self.value(*joint, *high),
+            );
+            self.line(&format!(
+                "        - {{joint: {key}, from: {low}, to: {high}, poses: 6}}"
+            ));
+        }
+        let random = self.ranges(&skeleton.random);
+        for (name, poses) in [("poses", 40), ("checks", 12)] {
+            self.line(&format!("    {name}:"));
+            self.line(&format!("      random: {random}"));
+            self.line(&format!("      poses: {poses}"));
+        }
+    }
+
+    fn mount(&mut self, body: &Body) {
+        let name = yaml::text(&body.name);
+        self.line(&format!("    {name}:"));
+        self.line("      xyz_mm: [30, 20, 40]");
+        let of = |(name, at): (&String, &[i32; 3])| {
+            format!("{}: [{}, {}, {}]", yaml::text(name), at[0], at[1], at[2])
+        };
+        let markers: Vec<String> = body.markers.iter().zip(&MARKERS_MM).map(of).collect();
+        self.line(&format!("      markers_mm: {{{}}}", markers.join(", ")));
+    }
+}

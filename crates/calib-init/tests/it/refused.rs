@@ -1,0 +1,115 @@
+//! What is refused, and with what remedy; and what the URDF alone gives.
+
+use calib_init::{InitError, Request, propose, tables, write};
+use calib_urdf::RobotModel;
+
+use crate::lab::{
+    Design, Kind, arm, file, files, recordings, request, text, with_cells, with_names,
+};
+
+fn refused(given: &[calib_init::File]) -> String {
+    let refused = propose(&arm(), &request(), given);
+    let text = refused
+        .err()
+        .map_or_else(|| "nothing".to_owned(), |e| e.to_string());
+    assert!(text.contains("help:") || text.contains("line"), "{text}");
+    text
+}
+
+#[test]
+fn bad_input_is_named_with_a_remedy() {
+    let hand = [("hand", "flange", Kind::Markers(3))];
+    let good = recordings(&hand, Design::Random, 1);
+    let table = text(&good["poses"]);
+    // Columns that are joints of no robot here.
+    let other = ["pump", "fan", "lamp", "door", "bell", "horn"];
+    let other = with_names(&table, |name| match name.strip_prefix("joint_") {
+        Some(number) => other[number[..1].parse::<usize>().expect("a number") - 1].to_owned(),
+        None => name.to_owned(),
+    });
+    let said = refused(&[file("other", other)]);
+    assert!(said.contains("no column is a joint"), "{said}");
+    // One recording in which nothing moves.
+    let still = with_cells(&table, |name, cell| match name.starts_with("joint") {
+        true => "10".to_owned(),
+        false => cell.to_owned(),
+    });
+    let said = refused(&[file("still", still.clone())]);
+    assert!(
+        said.contains("no joint moves") && said.contains("--markers-on link_6"),
+        "{said}"
+    );
+    // The caller knows: no refusal.
+    let stated = Request {
+        markers_on: Some("flange".to_owned()),
+        ..request()
+    };
+    assert!(propose(&arm(), &stated, &[file("still", still)]).is_ok());
+    let two = text(&good["poses"].select(&[0, 1]));
+    assert!(refused(&[file("two", two)]).contains("four poses or more"));
+    // Joints alone, and the same file twice.
+    let joints = "pose,joint_1_deg,joint_2_deg\n0,1,2\n1,3,4\n";
+    assert!(refused(&[file("joints", joints)]).contains("nothing was tracked"));
+    let twice = files(&good);
+    assert!(refused(&[twice[0].clone(), twice[0].clone()]).contains("twice"));
+    assert!(propose(&arm(), &request(), &[file("empty", "")]).is_err());
+    // A link that is none.
+    let wrong = Request {
+        markers_on: Some("flansh".to_owned()),
+        ..request()
+    };
+    let said = propose(&arm(), &wrong, &[])
+        .err()
+        .map(|e| e.to_string())
+        .unwrap_or_default();
+    assert!(said.contains("did you mean `flange`?"), "{said}");
+    // Nothing to calibrate.
+    let fixed = RobotModel::from_urdf_text(
+        "<robot name=\"stone\"><link name=\"a\"/></robot>",
+        "stone.urdf",
+    )
+    .expect("a tree");
+    assert!(matches!(
+        propose(&fixed, &request(), &[]),
+        Err(InitError::NothingMoves { .. })
+    ));
+}
+
+#[test]
+fn flange_poses_without_joints_are_a_hand_eye_problem() {
+    let table = "flange_x,flange_y,flange_z,flange_qx,flange_qy,flange_qz,flange_qw,meas_x,meas_y,meas_z,meas_qx,meas_qy,meas_qz,meas_qw
+1,2,3,0,0,0,1,1,2,3,0,0,0,1
+1.1,2,3,0,0,0,1,1,2.1,3,0,0,0,1
+";
+    let said = refused(&[file("pairs", table)]);
+    assert!(
+        said.contains("calib fit handeye pairs.csv --robot flange --measured meas"),
+        "{said}"
+    );
+}
+
+#[test]
+fn from_the_urdf_alone_the_profile_can_be_simulated() {
+    let model = arm();
+    for stated in [None, Some("link_4".to_owned())] {
+        let asked = Request {
+            markers_on: stated.clone(),
+            ..request()
+        };
+        let proposal = propose(&model, &asked, &[]).unwrap_or_else(|e| panic!("{e}"));
+        let text = write::profile(&model, &proposal);
+        let link = stated.as_deref().unwrap_or("link_6");
+        assert!(text.contains(&format!("link: {link},")), "{text}");
+        assert_eq!(
+            text.contains("CHECK: `link_6` is the end"),
+            stated.is_none(),
+            "{text}"
+        );
+        let robot =
+            tables::robot_profile(&model, &proposal).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let simulated = calib_sim::simulate(&robot.profile, &model, None).expect("a section");
+        let names: Vec<&String> = simulated.recordings.keys().collect();
+        assert_eq!(names, ["checks", "poses", "sweep"]);
+        assert_eq!(simulated.recordings["poses"].len(), 40);
+    }
+}

@@ -1,0 +1,338 @@
+//! `calib init`: the profile that it writes runs, on simulated robots and on those of other laboratories.
+
+use crate::scratch;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use scratch::{Scratch, root};
+use serde_json::Value;
+
+/// What was written, and what a run of it, unchanged, ended with.
+struct Written {
+    json: Value,
+    code: i32,
+    seconds: f64,
+    run: i32,
+    held_out_mm: Option<f64>,
+    dir: Scratch,
+}
+
+impl Written {
+    fn link(&self, body: &str) -> String {
+        let place = format!("bodies.{body}");
+        let facts = self.json["facts"].as_array().expect("a list");
+        let of = |f: &&Value| f["place"] == place.as_str() && f["link"].is_string();
+        let fact = facts
+            .iter()
+            .find(of)
+            .unwrap_or_else(|| panic!("no link of {body}: {facts:?}"));
+        fact["link"].as_str().expect("a name").to_owned()
+    }
+
+    fn has(&self, fact: &str) -> bool {
+        let facts = self.json["facts"].as_array().expect("a list");
+        facts.iter().any(|f| f["fact"] == fact)
+    }
+
+    fn to_check(&self) -> usize {
+        let facts = self.json["facts"].as_array().expect("a list");
+        facts.iter().filter(|f| f["check"] == true).count()
+    }
+}
+
+impl Written {
+    /// A row of the table of the book's page.
+    fn row(&self, name: &str, bodies: &[(&str, &str)]) -> String {
+        let links: Vec<String> = bodies.iter().map(|(body, _)| self.link(body)).collect();
+        let held = self
+            .held_out_mm
+            .map_or("-".to_owned(), |mm| format!("{mm:.2}"));
+        format!(
+            "| {name} | 0 | {} | {} | {:.1} | {held} |",
+            self.to_check(),
+            links.join(", "),
+            self.seconds
+        )
+    }
+}
+
+/// `calib init URDF FILES --out robots/it.yaml`, then a run of what it wrote.
+fn written(dir: Scratch, urdf: &str, files: &[&str]) -> Written {
+    let start = Instant::now();
+    let mut call = vec!["init", urdf];
+    call.extend(files);
+    call.extend(["--out", "robots/it.yaml", "--json"]);
+    let made = dir.calib_with(&call);
+    let seconds = start.elapsed().as_secs_f64();
+    let json = serde_json::from_str(&made.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}{}", made.stdout, made.stderr));
+    let ran = dir.calib_with(&["run", "robots/it.yaml", "--out", "out"]);
+    assert!(
+        ran.code < 2,
+        "{}{}\n{}",
+        ran.stdout,
+        ran.stderr,
+        dir.read("robots/it.yaml")
+    );
+    let report = dir.json("out/report.json");
+    let rms = report["verification"]["held_out"]["calibrated"]["rms_m"].as_f64();
+    Written {
+        json,
+        code: made.code,
+        seconds,
+        run: ran.code,
+        held_out_mm: rms.map(|rms| rms * 1e3),
+        dir,
+    }
+}
+
+#[test]
+fn the_export_of_the_tutorial_needs_no_line_of_a_profile() {
+    let mut dir = Scratch::new();
+    for name in [
+        "arm.urdf",
+        "2026-05-fit-vicon.csv",
+        "2026-05-fit-robot.csv",
+        "2026-05-check-vicon.csv",
+        "2026-05-check-robot.csv",
+    ] {
+        let bytes = std::fs::read(root().join("book/src/tutorial").join(name)).expect("committed");
+        dir = dir.file(name, bytes);
+    }
+    let made = written(
+        dir,
+        "arm.urdf",
+        &[
+            "2026-05-fit-vicon.csv",
+            "2026-05-fit-robot.csv",
+            "2026-05-check-vicon.csv",
+            "2026-05-check-robot.csv",
+        ],
+    );
+    assert_eq!(made.code, 0, "{}", made.json);
+    assert_eq!(made.link("Plate"), "link_6");
+    assert!(
+        made.held_out_mm.is_some_and(|mm| mm < 0.6),
+        "{:?}",
+        made.held_out_mm
+    );
+    println!(
+        "{}",
+        made.row("the tutorial's arm, two clocks", &[("Plate", "")])
+    );
+    // Nothing is written over.
+    let again = made
+        .dir
+        .calib_with(&["init", "arm.urdf", "--out", "robots/it.yaml"]);
+    assert_eq!(again.code, 7);
+    assert!(again.stderr.contains("exists already"), "{}", again.stderr);
+}
+
+#[test]
+fn the_shipped_robots_are_found_again_from_their_tables() {
+    for (robot, urdf, files, links) in [
+        (
+            "ripley",
+            "robots/ripley/r17.urdf",
+            ["base_sweep", "wrist_sweep", "arm_poses", "checks"],
+            [
+                ("linkM", "upper_arm"),
+                ("gripM", "gripper"),
+                ("table", "table"),
+            ]
+            .as_slice(),
+        ),
+        (
+            "justin",
+            "robots/justin/justin.urdf",
+            ["head_sweep", "hand_sweep", "arm_poses", "torso_tests"],
+            [("heT", "head"), ("haT", "hand")].as_slice(),
+        ),
+    ] {
+        let files = files.map(|f| format!("robots/{robot}/{f}.csv"));
+        let files: Vec<&str> = files.iter().map(String::as_str).collect();
+        let made = written(Scratch::new().brief(robot), urdf, &files);
+        assert_eq!(made.code, 0, "{robot}: {}", made.json);
+        let model = std::fs::read_to_string(root().join(urdf)).expect("committed");
+        for (body, link) in links {
+            assert!(
+                rigid(&model, &made.link(body), link),
+                "{robot} {body}: {}",
+                made.link(body)
+            );
+        }
+        assert!(made.json["errors"].as_array().is_some_and(Vec::is_empty));
+        println!("{}", made.row(&format!("`{robot}`, shipped"), links));
+    }
+}
+
+/// Two links between which no joint moves.
+fn rigid(urdf: &str, a: &str, b: &str) -> bool {
+    let model = calib_urdf::RobotModel::from_urdf_text(urdf, "robot.urdf").expect("a robot");
+    let group = |name: &str| calib_init::robot::group(&model, model.link_id(name).expect("a link"));
+    group(a) == group(b)
+}
+
+#[test]
+fn from_a_urdf_alone_to_a_plan_and_a_run() {
+    let urdf = std::fs::read(root().join("robots/ripley/r17.urdf")).expect("committed");
+    let dir = Scratch::new().file("r17.urdf", urdf);
+    let made = dir.calib(["init", "r17.urdf", "--markers-on", "gripper"]);
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    let profile = "robots/ripley.yaml";
+    assert!(
+        made.stdout.starts_with(&format!("Wrote {profile}\n")),
+        "{}",
+        made.stdout
+    );
+    let plan = dir.calib([
+        "plan",
+        profile,
+        "--poses",
+        "8",
+        "--candidates",
+        "128",
+        "--out",
+        "plan",
+    ]);
+    assert_eq!(plan.code, 0, "{}", plan.stderr);
+    let simulated = dir.calib(["simulate", profile, "--out", "robots/ripley"]);
+    assert_eq!(simulated.code, 0, "{}", simulated.stderr);
+    let ran = dir.calib(["run", profile, "--out", "out"]);
+    assert!(ran.code < 2, "{}{}", ran.stdout, ran.stderr);
+}
+
+#[test]
+fn bad_calls_are_refused_and_write_nothing() {
+    let urdf = std::fs::read(root().join("book/src/tutorial/arm.urdf")).expect("committed");
+    let dir = Scratch::new()
+        .file("arm.urdf", urdf)
+        .file("empty.csv", "")
+        .file("joints.csv", "pose,joint_1_deg\n0,1\n1,2\n");
+    for (call, code, said) in [
+        (["init", "no.urdf"].as_slice(), 2, "no.urdf"),
+        (&["init", "arm.urdf", "no.csv"], 2, "no.csv"),
+        (&["init", "arm.urdf", "empty.csv"], 3, "empty"),
+        (
+            &["init", "arm.urdf", "joints.csv"],
+            3,
+            "nothing was tracked",
+        ),
+        (&["init", "empty.csv"], 2, "empty.csv"),
+        (
+            &["init", "arm.urdf", "--markers-on", "flansh"],
+            2,
+            "did you mean `flange`?",
+        ),
+    ] {
+        let ran = dir.calib_with(call);
+        assert_eq!(ran.code, code, "{call:?}: {}", ran.stderr);
+        assert!(ran.stderr.contains(said), "{call:?}: {}", ran.stderr);
+    }
+    assert!(!dir.path("robots").exists(), "nothing is written");
+}
+
+/// Folder of the measurements of other laboratories.
+fn data() -> Option<PathBuf> {
+    skipped_tests::real_data("tiago_frozen")?
+        .parent()
+        .map(Into::into)
+}
+
+/// A robot of another laboratory: URDF, files, and a link of each body's rigid group.
+struct Real {
+    name: &'static str,
+    urdf: &'static str,
+    files: &'static [&'static str],
+    links: &'static [(&'static str, &'static str)],
+}
+
+const REAL: [Real; 3] = [
+    Real {
+        name: "tiago_frozen",
+        urdf: "tiago_qualisys/tiago_48_schunk.urdf",
+        files: &["tiago_frozen/train.csv", "tiago_frozen/validation.csv"],
+        links: &[("body", "wrist_ft_tool_link")],
+    },
+    Real {
+        name: "tiago_qualisys",
+        urdf: "tiago_qualisys/tiago_48_schunk.urdf",
+        files: &["tiago_qualisys/qualysis_base_hand_calibration.csv"],
+        links: &[("body", "wrist_ft_tool_link")],
+    },
+    Real {
+        name: "agile_justin",
+        urdf: "agile_justin/agile_justin_nominal.urdf",
+        files: &["agile_justin/postures.csv"],
+        links: &[
+            ("right_marker", "link_right_6"),
+            ("left_marker", "link_left_6"),
+        ],
+    },
+];
+
+/// Writes and runs the profiles of all real robots; of long tables every n-th posture.
+fn real_robots(every: usize) {
+    let Some(data) = data() else { return };
+    for real in &REAL {
+        let read = |path: &str| std::fs::read(data.join(path)).expect("part of the data");
+        let mut dir = Scratch::new().file("robot.urdf", read(real.urdf));
+        let mut names = Vec::new();
+        for file in real.files {
+            let name = file.rsplit('/').next().expect("a file");
+            let text = String::from_utf8(read(file)).expect("a table is text");
+            let every = if text.lines().count() > 100 { every } else { 1 };
+            let rows = text.lines().enumerate();
+            let kept = rows.filter(|(row, _)| *row == 0 || row % every == 0);
+            let kept: String = kept.map(|(_, line)| format!("{line}\n")).collect();
+            dir = dir.file(name, kept);
+            names.push(name);
+        }
+        let made = written(dir, "robot.urdf", &names);
+        let model = String::from_utf8(read(real.urdf)).expect("text");
+        for (body, link) in real.links {
+            assert!(
+                rigid(&model, &made.link(body), link),
+                "{}: {body} on {}",
+                real.name,
+                made.link(body)
+            );
+        }
+        println!("{}", made.row(&format!("`{}`", real.name), real.links));
+        assert!(made.run < 2);
+        if real.name == "tiago_qualisys" {
+            assert!(made.has("duplicate"), "the fourth marker repeats the third");
+        }
+    }
+}
+
+#[test]
+fn real_robots_run_without_an_edit() {
+    real_robots(6);
+}
+
+/// With the other rows of the book's table: `cargo test -p calib-cli --test suite init:: -- --include-ignored --nocapture`.
+#[test]
+#[ignore = "study: a run of 350 postures"]
+fn study_of_real_robots_with_all_postures() {
+    real_robots(1);
+}
+
+/// Poses of a flange and of a tracked body, and no joints: the command that is named solves it.
+#[test]
+fn pairs_of_poses_lead_to_the_hand_eye_solver() {
+    let Some(data) = data() else { return };
+    let table = std::fs::read(data.join("ur10_handeye/ur10_axzb.csv")).expect("part of the data");
+    let urdf = std::fs::read(root().join("book/src/tutorial/arm.urdf")).expect("committed");
+    let dir = Scratch::new()
+        .file("arm.urdf", urdf)
+        .file("pairs.csv", table);
+    let refused = dir.calib(["init", "arm.urdf", "pairs.csv"]);
+    assert_eq!(refused.code, 3);
+    let named = "calib fit handeye pairs.csv --robot flange --measured meas";
+    assert!(refused.stderr.contains(named), "{}", refused.stderr);
+    let call: Vec<&str> = named.split(' ').skip(1).collect();
+    let solved = dir.calib_with(&call);
+    assert_eq!(solved.code, 0, "{}{}", solved.stdout, solved.stderr);
+}
