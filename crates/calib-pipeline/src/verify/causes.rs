@@ -34,6 +34,8 @@ pub struct Causes {
     pub change: Option<Finding>,
     /// The same, as the scan found it.
     pub changed: Option<Change>,
+    /// All that the scan for changes found.
+    pub scan: Option<ChangeScan>,
     /// Findings from before the fit that other causes explain.
     pub explained: Vec<Finding>,
 }
@@ -43,6 +45,7 @@ impl Causes {
     fn with_change_of(mut self, scan: Option<&ChangeScan>) -> Self {
         let told = self.change.as_ref().and(scan);
         self.changed = told.and_then(ChangeScan::significant).cloned();
+        self.scan = scan.cloned();
         self
     }
 
@@ -309,6 +312,7 @@ impl Outcome<'_> {
             }),
             explained,
             changed: None,
+            scan: None,
         }
         .with_change_of(scan)
     }
