@@ -32,7 +32,8 @@ const LAYERS: &[(&str, u8)] = &[
     ("calib-fit", 5),
     ("calib-plan", 6),
     ("calib-study", 6),
-    ("calib-cli", 7),
+    ("calib-twin", 7),
+    ("calib-cli", 8),
 ];
 
 fn root() -> PathBuf {

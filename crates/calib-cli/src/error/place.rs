@@ -8,6 +8,7 @@ use calib_files::FileError;
 use calib_pipeline::PipelineError;
 use calib_plan::PlanError;
 use calib_recording::At;
+use calib_twin::TwinError;
 use serde::Serialize;
 
 use super::CliError;
@@ -50,8 +51,14 @@ impl CliError {
     #[must_use]
     pub fn id(&self) -> &'static str {
         match self {
-            Self::Pipeline(error) | Self::Plan(PlanError::Pipeline(error)) => of_pipeline(error),
-            Self::Plan(_) | Self::NotASigma { .. } => "plan",
+            Self::Pipeline(error)
+            | Self::Plan(PlanError::Pipeline(error))
+            | Self::Twin(
+                TwinError::Pipeline(error) | TwinError::Plan(PlanError::Pipeline(error)),
+            ) => of_pipeline(error),
+            Self::Plan(_) | Self::NotASigma { .. } | Self::Twin(TwinError::Plan(_)) => "plan",
+            Self::Twin(TwinError::State(error)) => of_file(error),
+            Self::Twin(_) => "twin",
             Self::Apply(error) => of_apply(error),
             Self::Drift(_) => "drift",
             Self::Fit(_) => "fit",
@@ -73,9 +80,16 @@ impl CliError {
     #[must_use]
     pub fn place(&self) -> Option<Place> {
         Some(match self {
-            Self::Pipeline(error) | Self::Plan(PlanError::Pipeline(error)) => {
+            Self::Pipeline(error)
+            | Self::Plan(PlanError::Pipeline(error))
+            | Self::Twin(
+                TwinError::Pipeline(error) | TwinError::Plan(PlanError::Pipeline(error)),
+            ) => {
                 return place_of_pipeline(error);
             }
+            Self::Twin(TwinError::State(error)) => place_of_file(error)?,
+            Self::Twin(TwinError::Plan(error)) => Place::of(error.file()?.to_owned()),
+            Self::Twin(error) => Place::of(error.file()?.to_owned()),
             Self::Plan(error) => Place::of(error.file()?.to_owned()),
             Self::Apply(ApplyError::Read(error)) => place_of_urdf(error)?,
             Self::Apply(ApplyError::File(error)) | Self::File(error) => place_of_file(error)?,
