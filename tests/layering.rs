@@ -163,7 +163,7 @@ fn the_rule_finds_what_it_is_for() {
     let upward = "[target.'cfg(unix)'.dev-dependencies]\nx = { package = \"calib-cli\", path = \"../calib-cli\" }\n";
     assert_eq!(
         faults("calib-core", 2, upward),
-        ["calib-core (layer 2) depends on calib-cli (layer 7)"]
+        ["calib-core (layer 2) depends on calib-cli (layer 8)"]
     );
     let table = "[build-dependencies.calib-pipeline]\nworkspace = true\n";
     assert_eq!(

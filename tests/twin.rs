@@ -142,8 +142,8 @@ fn results_have_the_twin_of_their_recordings_and_changed_recordings_have_none() 
     let ran = dir.calib(twin);
     assert_eq!(ran.code, 3, "{}", ran.stderr);
     assert!(
-        ran.stderr.contains("`poses.csv` is not the file"),
+        ran.stdout.contains("`poses.csv` is not the file"),
         "{}",
-        ran.stderr
+        ran.stdout
     );
 }

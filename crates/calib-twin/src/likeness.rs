@@ -230,7 +230,7 @@ mod tests {
         let mut rng = rand_chacha::ChaCha12Rng::seed_from_u64(3);
         let mut flagged = [0; 2];
         for _ in 0..600 {
-            for (count, shift) in flagged.iter_mut().zip([0.0, 8.0]) {
+            for (count, shift) in flagged.iter_mut().zip([0.0, 60.0]) {
                 let trials: Vec<Likeness> = (0..60).map(|_| drawn(&mut rng, 0.0)).collect();
                 let trials: Vec<&Likeness> = trials.iter().collect();
                 let found = resemblance(&drawn(&mut rng, shift), &trials);

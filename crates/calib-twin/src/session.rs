@@ -1,19 +1,14 @@
 //! A session: postures, gaps, noise and freed parameters, from recordings that exist or would exist.
 
-use std::collections::BTreeMap;
-
 use calib_pipeline::PipelineError;
 use calib_pipeline::estimated::{Estimated, estimated};
 use calib_pipeline::formulate::formulation::MlFit;
-use calib_pipeline::formulate::kinematics::Calibration;
 use calib_pipeline::formulate::ml::calibration_at;
 use calib_pipeline::prepare::inputs::Inputs;
 use calib_pipeline::run::RunOptions;
 use calib_pipeline::verify::causes::{Causes, causes};
 use calib_pipeline::verify::residuals::left_out;
 use calib_profile::{BodyKind, Method, Usage};
-use calib_urdf::{JointId, LinkId};
-use nalgebra::{Isometry3, Point3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
 
@@ -22,7 +17,7 @@ use crate::likeness::Likeness;
 use crate::noise::Noise;
 use crate::note::Note;
 use crate::quantity::{Off, errors};
-use crate::truth::{About, Draws};
+use crate::truth::{About, Draws, Truth};
 
 /// Postures at which positions are compared, at most.
 const PLACES: usize = 12;
@@ -50,15 +45,6 @@ pub struct Session {
     pub notes: Vec<Note>,
     options: RunOptions,
     draws: Draws,
-}
-
-/// A true robot.
-#[derive(Debug, Clone)]
-pub struct Truth {
-    /// Geometry, effects, mounts, place.
-    pub robot: Calibration,
-    /// Parameters by name.
-    pub values: BTreeMap<String, f64>,
 }
 
 impl Session {
@@ -137,7 +123,7 @@ impl Session {
             // A session has a fit: see `new`.
             return Truth {
                 robot: self.own.solved.robot.clone(),
-                values: BTreeMap::new(),
+                values: std::collections::BTreeMap::new(),
             };
         };
         let values = self.draws.draw(rng);
@@ -153,62 +139,6 @@ impl Session {
     pub fn calibrate(&self, inputs: Inputs) -> Result<Estimated, PipelineError> {
         estimated(inputs, Vec::new(), &self.options, None, &mut |_| {})
     }
-}
-
-impl Truth {
-    fn of(own: &Estimated, fit: &MlFit, robot: Calibration, values: &calib_core::Values) -> Self {
-        let parameters = fit.solution.model.problem().parameters().iter();
-        let named = parameters.zip(&values.0);
-        let mut truth = Self {
-            values: named.map(|(p, v)| (p.name.clone(), *v)).collect(),
-            robot,
-        };
-        // Templates that are given are no parameters.
-        for (name, track) in &own.checked.tracks {
-            if let (Some(template), Some(mount)) = (&track.template, truth.robot.mounts.get(name)) {
-                let points = truth.robot.points.entry(name.clone()).or_default();
-                for (marker, point) in template.names.iter().zip(&template.points) {
-                    points.entry(marker.clone()).or_insert(mount * point);
-                }
-            }
-        }
-        truth
-    }
-
-    /// A frame as seen from the tracker, joints at zero: a link or a body by its name, else the tracker itself.
-    #[must_use]
-    pub fn frame(&self, inputs: &Inputs, name: &str) -> Isometry3<f64> {
-        let model = self.robot.urdf_model();
-        let links = model.forward_kinematics(&model.zero_positions());
-        let link = |link: LinkId| self.robot.tracker_from_root * links[link.index()];
-        if let Some(body) = inputs.robot.profile.bodies.get(name)
-            && let Some(mount) = self.robot.mounts.get(name)
-        {
-            return link(body.link) * mount;
-        }
-        match model.link_id(name) {
-            Ok(id) => link(id),
-            Err(_) => Isometry3::identity(),
-        }
-    }
-}
-
-/// Whether a joint moves a link.
-#[must_use]
-pub fn is_moved(inputs: &Inputs, link: LinkId) -> bool {
-    let model = &inputs.robot.model;
-    let moves = |joint: &JointId| model.joint(*joint).kind.axis().is_some();
-    model.chain_to_root(link).iter().any(moves)
-}
-
-/// Where the origin of a body, or the first marker of one without a frame, is on its link.
-#[must_use]
-pub fn tracked_point(robot: &Calibration, body: &str, framed: bool) -> Option<Point3<f64>> {
-    if framed {
-        let mount = robot.mounts.get(body)?;
-        return Some(mount.translation.vector.into());
-    }
-    robot.points.get(body)?.values().next().copied()
 }
 
 /// Postures of the validation, else of all recordings, evenly over their rows.

@@ -19,8 +19,9 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::fault::Fault;
-use crate::session::{Session, is_moved};
+use crate::session::Session;
 use crate::trial::Injected;
+use crate::truth::is_moved;
 
 /// Standard deviations of a jump that a scan asks for.
 const ASKED: f64 = 6.0;

@@ -208,7 +208,8 @@ fn spec(usage: Usage) -> RecordingSpec {
 /// # Errors
 /// [`TwinError::NoProfile`] where it is not beside the folder or was changed, [`TwinError::Changed`] for other recordings.
 pub fn profile_of(given: &Path) -> Result<PathBuf, TwinError> {
-    if !report_path(given).extension().is_some_and(|e| e == "json") {
+    let extension = report_path(given).extension().map(ToOwned::to_owned);
+    if extension.is_none_or(|e| e != "json") {
         return Ok(given.to_path_buf());
     }
     let report = read_report(given)?;

@@ -233,7 +233,13 @@ pub(crate) fn checked(twin: &Twin) -> Option<String> {
     let sum = |of: &dyn Fn(&Power) -> u32| twin.powers.iter().map(of).sum::<u32>();
     let (tried, named, noticed) = (sum(&|p| p.tried), sum(&|p| p.named), sum(&|p| p.noticed));
     (tried > 0).then(|| {
-        format!("of {tried} trials with an effect of that size, {noticed} noticed something and {named} named it")
+        let by = match twin.size_factor {
+            Some([factor, low, high]) => format!(
+                "; the sizes are those of the tests times {factor:.2} ({low:.2} to {high:.2})"
+            ),
+            None => "; too few to correct the sizes".to_owned(),
+        };
+        format!("of {tried} trials with an effect of about that size, {noticed} noticed something and {named} named it{by}")
     })
 }
 

@@ -8,9 +8,16 @@
 //! Coefficients that physics does not allow are mirrored at their limit. Over both, an interval of 95 % that follows from prior and data holds in
 //! 95 % of the trials: this is what a twin checks.
 
+use std::collections::BTreeMap;
+
 use calib_core::{Model, Values};
 use calib_geometry::decompose;
-use nalgebra::{DMatrix, DVector};
+use calib_pipeline::estimated::Estimated;
+use calib_pipeline::formulate::formulation::MlFit;
+use calib_pipeline::formulate::kinematics::Calibration;
+use calib_pipeline::prepare::inputs::Inputs;
+use calib_urdf::{JointId, LinkId};
+use nalgebra::{DMatrix, DVector, Isometry3, Point3};
 use rand::Rng;
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -93,4 +100,69 @@ fn root_of(covariance: &DMatrix<f64>) -> DMatrix<f64> {
         root.column_mut(k).scale_mut(value.max(0.0).sqrt());
     }
     root
+}
+
+/// A true robot.
+#[derive(Debug, Clone)]
+pub struct Truth {
+    /// Geometry, effects, mounts, place.
+    pub robot: Calibration,
+    /// Parameters by name.
+    pub values: BTreeMap<String, f64>,
+}
+
+impl Truth {
+    pub(crate) fn of(own: &Estimated, fit: &MlFit, robot: Calibration, values: &Values) -> Self {
+        let parameters = fit.solution.model.problem().parameters().iter();
+        let named = parameters.zip(&values.0);
+        let mut truth = Self {
+            values: named.map(|(p, v)| (p.name.clone(), *v)).collect(),
+            robot,
+        };
+        // Templates that are given are no parameters.
+        for (name, track) in &own.checked.tracks {
+            if let (Some(template), Some(mount)) = (&track.template, truth.robot.mounts.get(name)) {
+                let points = truth.robot.points.entry(name.clone()).or_default();
+                for (marker, point) in template.names.iter().zip(&template.points) {
+                    points.entry(marker.clone()).or_insert(mount * point);
+                }
+            }
+        }
+        truth
+    }
+
+    /// A frame as seen from the tracker, joints at zero: a link or a body by its name, else the tracker itself.
+    #[must_use]
+    pub fn frame(&self, inputs: &Inputs, name: &str) -> Isometry3<f64> {
+        let model = self.robot.urdf_model();
+        let links = model.forward_kinematics(&model.zero_positions());
+        let link = |link: LinkId| self.robot.tracker_from_root * links[link.index()];
+        if let Some(body) = inputs.robot.profile.bodies.get(name)
+            && let Some(mount) = self.robot.mounts.get(name)
+        {
+            return link(body.link) * mount;
+        }
+        match model.link_id(name) {
+            Ok(id) => link(id),
+            Err(_) => Isometry3::identity(),
+        }
+    }
+}
+
+/// Whether a joint moves a link.
+#[must_use]
+pub fn is_moved(inputs: &Inputs, link: LinkId) -> bool {
+    let model = &inputs.robot.model;
+    let moves = |joint: &JointId| model.joint(*joint).kind.axis().is_some();
+    model.chain_to_root(link).iter().any(moves)
+}
+
+/// Where the origin of a body, or the first marker of one without a frame, is on its link.
+#[must_use]
+pub fn tracked_point(robot: &Calibration, body: &str, framed: bool) -> Option<Point3<f64>> {
+    if framed {
+        let mount = robot.mounts.get(body)?;
+        return Some(mount.translation.vector.into());
+    }
+    robot.points.get(body)?.values().next().copied()
 }

@@ -14,7 +14,7 @@ use crate::error::TwinError;
 use crate::fault::Fault;
 use crate::likeness::{Resemblance, resemblance};
 use crate::note::Note;
-use crate::power::{Power, effects, powers, verify};
+use crate::power::{Power, TRIED, correct, effects, factor, powers, verify};
 use crate::session::Session;
 use crate::slip::{self, SlipPower};
 use crate::source::Source;
@@ -89,6 +89,9 @@ pub struct Twin {
     pub promises: Vec<Promise>,
     /// How large effects must be to be found.
     pub powers: Vec<Power>,
+    /// What the sizes of effects that follow from the tests were multiplied by, with its 95 % interval: from trials that have effects; null:
+    /// too few trials, and the sizes are those of the tests.
+    pub size_factor: Option<[f64; 3]>,
     /// How far bodies must slip to be found.
     pub slips: Vec<SlipPower>,
     /// σ of the tool against the number of postures.
@@ -147,6 +150,10 @@ pub fn twin(
     ));
     let injected = pool.install(|| run.injected(&faults))?;
     verify(&mut powers, &injected);
+    let size_factor = factor(&powers, &injected);
+    if let Some([factor, ..]) = size_factor {
+        correct(&mut powers, factor);
+    }
     let state = run
         .state
         .into_inner()
@@ -178,6 +185,7 @@ pub fn twin(
         resemblance: (source == Source::Recordings).then(|| resemblance(&session.likeness, &likes)),
         promises: promises(&session.promised, &done),
         powers,
+        size_factor,
         slips: of_slips.collect(),
         curve: curve(session, options.seed, options.sigma),
         notes,
@@ -262,7 +270,7 @@ impl Run<'_> {
     }
 }
 
-/// Trials that have one effect at its 80 % size, the effects taking turns.
+/// Trials that have one effect at about its 80 % size, the effects taking turns.
 fn with_effect(session: &Session, powers: &[Power], count: u64) -> Vec<Planned> {
     let known = effects(&session.rows.robot.model);
     let sized: Vec<(&Power, f64)> = powers.iter().filter_map(|p| Some((p, p.size()?))).collect();
@@ -271,6 +279,7 @@ fn with_effect(session: &Session, powers: &[Power], count: u64) -> Vec<Planned> 
         // Evenly over the list where it is longer than there are trials.
         let place = if count < n { k * n / count } else { k % n };
         let (power, size) = sized[place as usize];
+        let size = size * TRIED[k as usize % TRIED.len()];
         let fault = known.get(&power.name)?.fault(size);
         Some((k, fault, power.name.clone(), size))
     });

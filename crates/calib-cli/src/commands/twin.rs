@@ -19,6 +19,7 @@ use crate::terminal::{Console, Counted, emit};
 #[derive(Debug, Args)]
 pub struct TwinArguments {
     /// The robot's profile, or a folder of results of `calib run`
+    #[arg(value_name = "PROFILE")]
     of: PathBuf,
     /// Trials without faults
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..=100_000))]
