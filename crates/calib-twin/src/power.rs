@@ -331,7 +331,7 @@ mod tests {
                 }
             };
             let trials: Vec<Injected> = (0..60).map(one).collect();
-            let [_, low, high] = factor(&[power.clone()], &trials).expect("both");
+            let [_, low, high] = factor(std::slice::from_ref(&power), &trials).expect("both");
             held += u32::from(low <= real && real <= high);
         }
         // 190 of 200 expected; 99.9 % are above 180.

@@ -2,6 +2,7 @@
 
 use calib_twin::fault::Fault;
 use calib_twin::replay::Replay;
+use calib_twin::summary::Promise;
 use calib_twin::{About, Options, Session, Source, Twin, twin};
 use rayon::prelude::*;
 
@@ -48,10 +49,8 @@ fn promised_sigma_is_kept_on_random_robots() {
         let found = made(&session, trials);
         let observed: Vec<_> = found.promises.iter().filter(|p| p.is_observed()).collect();
         let ratios: Vec<f64> = observed.iter().map(|p| p.ratio).collect();
-        let of = |is: fn(&calib_twin::summary::Promise) -> bool| {
-            observed.iter().filter(|p| is(p)).count()
-        };
-        let (own, out) = (of(|p| p.is_kept()), of(|p| p.is_broken()));
+        let of = |is: fn(&Promise) -> bool| observed.iter().filter(|p| is(p)).count();
+        let (own, out) = (of(Promise::is_kept), of(Promise::is_broken));
         let coverage = observed.iter().map(|p| p.coverage).sum::<f64>();
         let low = ratios.iter().copied().fold(f64::INFINITY, f64::min);
         let high = ratios.iter().copied().fold(0.0, f64::max);
