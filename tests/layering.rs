@@ -33,7 +33,8 @@ const LAYERS: &[(&str, u8)] = &[
     ("calib-init", 6),
     ("calib-plan", 6),
     ("calib-study", 6),
-    ("calib-cli", 7),
+    ("calib-twin", 7),
+    ("calib-cli", 8),
 ];
 
 fn root() -> PathBuf {
@@ -163,7 +164,7 @@ fn the_rule_finds_what_it_is_for() {
     let upward = "[target.'cfg(unix)'.dev-dependencies]\nx = { package = \"calib-cli\", path = \"../calib-cli\" }\n";
     assert_eq!(
         faults("calib-core", 2, upward),
-        ["calib-core (layer 2) depends on calib-cli (layer 7)"]
+        ["calib-core (layer 2) depends on calib-cli (layer 8)"]
     );
     let table = "[build-dependencies.calib-pipeline]\nworkspace = true\n";
     assert_eq!(

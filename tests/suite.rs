@@ -42,6 +42,7 @@ mod third_robot;
 mod tolerance;
 mod truth;
 mod tutorial;
+mod twin;
 mod urdf_out;
 mod verdict;
 mod view;

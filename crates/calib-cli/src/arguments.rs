@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands::{
     apply, check, completions, convert, diff, drift, fit, history, init, man, plan, plugins,
-    record, revert, run, schema, simulate, study, view,
+    record, revert, run, schema, simulate, study, twin, view,
 };
 use crate::terminal::Console;
 
@@ -37,6 +37,8 @@ pub enum Command {
     Check(check::Check),
     /// Choose the postures to record next, and say what they will tell
     Plan(plan::PlanPostures),
+    /// Repeat a session with known truth: what it promises, what it reaches, what it would not notice
+    Twin(twin::TwinArguments),
     /// Simulate recordings with known truth for a profile
     Simulate(simulate::Simulate),
     /// Run one estimator on one table, without a profile

@@ -13,6 +13,7 @@ use calib_plan::PlanError;
 use calib_plugin::NewProjectError;
 use calib_study::StudyError;
 use calib_study::cases::CaseError;
+use calib_twin::TwinError;
 
 use crate::commands::record::error::RecordError;
 use crate::commands::view::error::ViewError;
@@ -38,6 +39,9 @@ pub enum CliError {
     /// Of `calib plan`.
     #[error(transparent)]
     Plan(#[from] PlanError),
+    /// Of `calib twin`.
+    #[error(transparent)]
+    Twin(#[from] TwinError),
     /// A σ that is asked for is none.
     #[error("{sigma} is not a σ\n  help: give a number above 0, in mm: `--sigma-mm 0.1`")]
     NotASigma {
@@ -133,6 +137,7 @@ impl CliError {
             Self::Pipeline(error) => error.exit_code(),
             Self::Plan(error) => error.exit_code(),
             Self::Init(error) => error.exit_code(),
+            Self::Twin(error) => error.exit_code(),
             Self::Apply(error) => of_apply(error),
             Self::Drift(error) if error.is_refusal() => ExitCode::NotObservable,
             Self::Drift(DriftError::Unwritable(_)) | Self::Report(_) | Self::Stdout(_) => {
@@ -169,7 +174,10 @@ impl CliError {
         match self {
             Self::Pipeline(error)
             | Self::Plan(PlanError::Pipeline(error))
-            | Self::Init(InitError::Pipeline(error)) => Some(error.remedy()),
+            | Self::Init(InitError::Pipeline(error))
+            | Self::Twin(
+                TwinError::Pipeline(error) | TwinError::Plan(PlanError::Pipeline(error)),
+            ) => Some(error.remedy()),
             Self::Apply(ApplyError::Read(_)) => {
                 Some("correct it there, or export the nominal URDF again")
             }

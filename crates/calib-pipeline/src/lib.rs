@@ -14,6 +14,7 @@
 pub mod check;
 pub mod error;
 pub mod estimate;
+pub mod estimated;
 pub mod formulate;
 pub mod options;
 pub mod output;

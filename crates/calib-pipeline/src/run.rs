@@ -5,15 +5,11 @@ use std::path::Path;
 
 pub use crate::options::{Plugins, RunOptions};
 use calib_files::OutputFile;
-use calib_profile::Method;
 use calib_report::Report;
 
 use crate::error::{ExitCode, PipelineError};
-use crate::formulate::by_closed_forms::{paper_assumptions, paper_result};
-use crate::formulate::by_likelihood::likelihood;
-use crate::formulate::checked::check_data;
-use crate::formulate::from_origins::origins;
-use crate::formulate::solved::{Solved, nominal};
+use crate::estimated::{Estimated, estimated};
+use crate::formulate::solved::Solved;
 use crate::formulate::without_effects::refitted;
 use crate::output::assemble::assemble;
 use crate::output::evidence::Evidence;
@@ -73,18 +69,15 @@ pub fn run_on(
     let mut of_shapes = Vec::new();
     let (solids, meshes) = shapes::solids(&inputs.robot, &mut of_shapes);
     inputs.digests.extend(meshes);
-    let mut checked = check_data(&mut inputs, of_shapes, options.force)?;
-    progress("estimate origins");
-    let nominal = nominal(&inputs, &checked.start);
-    let origins = origins(&inputs, &mut checked, &nominal)?;
-    let method = options.method(&inputs.robot.profile);
-    let solved = match method {
-        Method::Paper => {
-            checked.findings.push(paper_assumptions());
-            paper_result(&inputs, &checked.tracks, &checked.start, &origins, &nominal)
-        }
-        Method::Ml => likelihood(&mut inputs, &mut checked, chosen.as_ref(), progress)?,
-    };
+    let estimated = estimated(inputs, of_shapes, options, chosen.as_ref(), progress)?;
+    let Estimated {
+        inputs,
+        mut checked,
+        nominal,
+        origins,
+        method,
+        solved,
+    } = estimated;
     progress("verify");
     let refitted = refitted(&inputs, &checked, &solved)?;
     let verified = verified(&inputs, &checked, &nominal, &solved, refitted.as_ref());

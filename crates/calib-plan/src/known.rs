@@ -53,17 +53,8 @@ impl Known {
     /// [`PipelineError`] for a recording that exists and cannot be read.
     pub fn of(mut robot: RobotProfile, plugins: Plugins) -> Result<Self, PipelineError> {
         let mut notes = Vec::new();
-        let folder = robot.folder.clone();
-        let recordings = robot.profile.recordings.iter();
-        let missing = recordings.filter(|(_, spec)| !folder.join(&spec.file).is_file());
-        let missing: Vec<String> = missing.map(|(name, _)| name.clone()).collect();
-        for name in &missing {
-            robot.profile.recordings.remove(name);
-        }
+        let missing = without_missing(&mut robot);
         let exist = &robot.profile.recordings;
-        for contact in robot.profile.contacts.values_mut() {
-            contact.recordings.retain(|name| exist.contains_key(name));
-        }
         let any_fitted = exist.values().any(|r| r.usage != Usage::Validation);
         if !missing.is_empty() {
             notes.push(Note::NotRecordedYet {
@@ -157,6 +148,22 @@ impl Known {
             robot,
         }
     }
+}
+
+/// Takes the recordings whose files do not exist out of a profile, and what was touched in them; their names.
+pub fn without_missing(robot: &mut RobotProfile) -> Vec<String> {
+    let folder = robot.folder.clone();
+    let recordings = robot.profile.recordings.iter();
+    let missing = recordings.filter(|(_, spec)| !folder.join(&spec.file).is_file());
+    let missing: Vec<String> = missing.map(|(name, _)| name.clone()).collect();
+    for name in &missing {
+        robot.profile.recordings.remove(name);
+    }
+    let exist = &robot.profile.recordings;
+    for contact in robot.profile.contacts.values_mut() {
+        contact.recordings.retain(|name| exist.contains_key(name));
+    }
+    missing
 }
 
 /// A body that nobody has recorded: its markers, and where it is on its link.

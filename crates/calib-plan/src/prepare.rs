@@ -96,7 +96,6 @@ pub struct Prepared<'a> {
 /// # Errors
 /// As [`plan`](crate::plan::plan).
 pub fn prepare<'a>(known: &'a Known, options: &'a Options) -> Result<Prepared<'a>, PlanError> {
-    let model = &known.robot.model;
     let spec = &known.robot.profile.plan;
     let file = || known.robot.file.clone();
     let joints = known.joint_box()?;
@@ -104,13 +103,8 @@ pub fn prepare<'a>(known: &'a Known, options: &'a Options) -> Result<Prepared<'a
         return Err(PlanError::NoPlace { file: file() });
     }
     let mut notes = known.notes.clone();
-    let (solids, unread) = collision_solids(&known.robot);
-    let for_pairs = joints.postures(PAIR_POSTURES, options.seed ^ SEED_PAIRS);
-    let scene = Scene::new(model, &solids, spec, &for_pairs);
-    notes.extend(of_scene(known, &joints, &scene, unread));
-    let moves = |link: LinkId| joints.moved.iter().any(|m| model.carries(m.joint, link));
-    let sight = Sight::new(spec, known.subjects(&moves), known.start.tracker_from_root);
-    let feasible = Feasible::new(model, &joints, scene, sight);
+    let (feasible, unread) = known.feasible(&joints, options.seed);
+    notes.extend(of_scene(known, &joints, &feasible.scene, unread));
     let (candidates, counts) = feasible.all(joints.postures(options.candidates, options.seed));
     if candidates.is_empty() {
         let counts = Box::new(counts);
@@ -188,6 +182,20 @@ fn criterion(options: &Options, basis: &Basis, linear: &Linear, b: &DMatrix<f64>
 }
 
 impl Known {
+    /// What decides whether a posture is possible and what is seen in it, and the links of which a shape could not be read.
+    #[must_use]
+    pub fn feasible(&self, joints: &JointBox, seed: u32) -> (Feasible<'_>, Vec<String>) {
+        let model = &self.robot.model;
+        let spec = &self.robot.profile.plan;
+        let (solids, unread) = collision_solids(&self.robot);
+        let for_pairs = joints.postures(PAIR_POSTURES, seed ^ SEED_PAIRS);
+        let scene = Scene::new(model, &solids, spec, &for_pairs);
+        let moves = |link: LinkId| joints.moved.iter().any(|m| model.carries(m.joint, link));
+        let place = self.start.tracker_from_root;
+        let sight = Sight::new(spec, self.subjects(&moves), place);
+        (Feasible::new(model, joints, scene, sight), unread)
+    }
+
     /// What planned postures move: the joints between the root and a body.
     ///
     /// # Errors

@@ -209,6 +209,29 @@ pub fn read(text: &str, name: &str, model: &RobotModel) -> Result<PlanFile, Plan
     Ok(file)
 }
 
+impl PlanFile {
+    /// Joint positions of the postures that are recorded, and of those to validate with, by joint index; joints that the plan does not name
+    /// stand as in `base`.
+    #[must_use]
+    pub fn positions(&self, model: &RobotModel, base: &[f64]) -> [Vec<Vec<f64>>; 2] {
+        let of = |joints: &BTreeMap<String, f64>| {
+            let mut q = base.to_vec();
+            for (key, value) in joints {
+                let named = key.rsplit_once('_').map(|k| model.joint_id(k.0));
+                if let Some(Ok(id)) = named {
+                    q[id.index()] = value / shown(model.joint(id).kind.turns()).0;
+                }
+            }
+            q
+        };
+        let recorded = self.postures.iter().filter(|p| p.why != Why::Detour);
+        [
+            recorded.map(|p| of(&p.joints)).collect(),
+            self.held_out.iter().map(of).collect(),
+        ]
+    }
+}
+
 /// Reads a list of postures: a table with joint columns. Joints that it does not name are where the others stand.
 ///
 /// # Errors

@@ -20,6 +20,7 @@ pub mod run;
 pub mod schema;
 pub mod simulate;
 pub mod study;
+pub mod twin;
 pub mod view;
 
 use calib_pipeline::ExitCode;
@@ -36,6 +37,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
         Command::Init(options) => init::run(console, options),
         Command::Check(options) => check::run(console.color, options),
         Command::Plan(options) => plan::run(console, options),
+        Command::Twin(options) => twin::run(console, options),
         Command::Simulate(options) => simulate::run(console, options),
         Command::Fit(options) => fit::run(options),
         Command::Apply(options) => apply::run(options),

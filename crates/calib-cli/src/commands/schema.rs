@@ -36,6 +36,8 @@ enum SchemaOf {
     Scene,
     /// The robot's model
     Model,
+    /// twin.json
+    Twin,
     /// Parameters of estimators, readers and report writers, by kind and name
     Parameters,
 }
@@ -50,6 +52,7 @@ pub fn run(options: &Schema) -> Result<ExitCode, CliError> {
         SchemaOf::Report => calib_report::report_schema(),
         SchemaOf::Scene => calib_report::scene_schema(),
         SchemaOf::Model => calib_report::model_schema(),
+        SchemaOf::Twin => calib_twin::write::json_schema(),
         SchemaOf::Parameters => estimators(options)?.parameter_schemas(),
     };
     emit(&(calib_report::json::pretty(&schema) + "\n"))?;

@@ -9,6 +9,7 @@ use calib_init::InitError;
 use calib_pipeline::PipelineError;
 use calib_plan::PlanError;
 use calib_recording::At;
+use calib_twin::TwinError;
 use serde::Serialize;
 
 use super::CliError;
@@ -53,11 +54,16 @@ impl CliError {
         match self {
             Self::Pipeline(error)
             | Self::Plan(PlanError::Pipeline(error))
-            | Self::Init(InitError::Pipeline(error)) => of_pipeline(error),
+            | Self::Init(InitError::Pipeline(error))
+            | Self::Twin(
+                TwinError::Pipeline(error) | TwinError::Plan(PlanError::Pipeline(error)),
+            ) => of_pipeline(error),
             Self::Init(InitError::Urdf(_)) => "urdf",
             Self::Init(InitError::Recording(_)) => "recording",
             Self::Init(_) => "init",
-            Self::Plan(_) | Self::NotASigma { .. } => "plan",
+            Self::Plan(_) | Self::NotASigma { .. } | Self::Twin(TwinError::Plan(_)) => "plan",
+            Self::Twin(TwinError::State(error)) => of_file(error),
+            Self::Twin(_) => "twin",
             Self::Apply(error) => of_apply(error),
             Self::Drift(_) => "drift",
             Self::Fit(_) => "fit",
@@ -81,12 +87,18 @@ impl CliError {
         Some(match self {
             Self::Pipeline(error)
             | Self::Plan(PlanError::Pipeline(error))
-            | Self::Init(InitError::Pipeline(error)) => {
+            | Self::Init(InitError::Pipeline(error))
+            | Self::Twin(
+                TwinError::Pipeline(error) | TwinError::Plan(PlanError::Pipeline(error)),
+            ) => {
                 return place_of_pipeline(error);
             }
             Self::Init(InitError::Urdf(error)) => place_of_urdf(error)?,
             Self::Init(InitError::Recording(error)) => place_of_recording(error),
             Self::Init(error) => Place::of(error.file()?.to_owned()),
+            Self::Twin(TwinError::State(error)) => place_of_file(error)?,
+            Self::Twin(TwinError::Plan(error)) => Place::of(error.file()?.to_owned()),
+            Self::Twin(error) => Place::of(error.file()?.to_owned()),
             Self::Plan(error) => Place::of(error.file()?.to_owned()),
             Self::Apply(ApplyError::Read(error)) => place_of_urdf(error)?,
             Self::Apply(ApplyError::File(error)) | Self::File(error) => place_of_file(error)?,

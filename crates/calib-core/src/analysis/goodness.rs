@@ -70,7 +70,7 @@ impl ScoreTest {
     /// Chance would show one as large in less than 1 of 1000 analyses.
     #[must_use]
     pub fn is_significant(&self) -> bool {
-        self.p_corrected < SIGNIFICANT
+        self.p_corrected < GoodnessOfFit::SIGNIFICANT
     }
 
     /// Physics allows a coefficient of this sign.
@@ -96,10 +96,12 @@ pub struct GoodnessOfFit {
     pub missing: Vec<ScoreTest>,
 }
 
-/// An effect counts as missing when chance would show one as large in less than 1 of 1000 analyses…
-const SIGNIFICANT: f64 = 1e-3;
-/// …and when it explains this share of χ²: smaller ones are real but do not matter.
-const RELEVANT: f64 = 0.02;
+impl GoodnessOfFit {
+    /// An effect counts as missing when chance would show one as large in less than 1 of 1000 analyses…
+    pub const SIGNIFICANT: f64 = 1e-3;
+    /// …and when it explains this share of χ²: smaller ones are real but do not matter.
+    pub const RELEVANT: f64 = 0.02;
+}
 
 /// What is regressed on.
 #[derive(Clone)]
@@ -169,7 +171,9 @@ impl Solution {
             .map(|d| d.sf(self.chi2_stated));
         let missing = tests
             .iter()
-            .filter(|t| t.is_significant() && t.explains > RELEVANT && t.is_possible())
+            .filter(|t| {
+                t.is_significant() && t.explains > GoodnessOfFit::RELEVANT && t.is_possible()
+            })
             .cloned()
             .collect();
         Some(GoodnessOfFit {

@@ -41,7 +41,8 @@ impl Solved {
 }
 
 /// The robot as in the nominal URDF, with the bodies placed by closed forms.
-pub(crate) fn nominal(inputs: &Inputs, start: &Start) -> Calibration {
+#[must_use]
+pub fn nominal(inputs: &Inputs, start: &Start) -> Calibration {
     let mut robot = Calibration::nominal(
         &inputs.robot.model,
         &inputs.robot.profile.load,

@@ -18,7 +18,8 @@ use crate::prepare::tracks::BodyTrack;
 use crate::verify::tracker_noise::TrackerNoise;
 
 /// Indicated joint positions of a sample as a prediction's configuration, loads included.
-pub(crate) fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configuration {
+#[must_use]
+pub fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configuration {
     let model = &inputs.robot.model;
     let mut at = Configuration::zero();
     // Every joint in the middle of its backlash.
@@ -46,7 +47,8 @@ pub(crate) fn configuration(inputs: &Inputs, fit: &MlFit, q: &[f64]) -> Configur
 }
 
 /// The link that the longest chain of joints carries a body on.
-pub(crate) fn tool_link(inputs: &Inputs) -> Option<LinkId> {
+#[must_use]
+pub fn tool_link(inputs: &Inputs) -> Option<LinkId> {
     let model = &inputs.robot.model;
     inputs
         .robot

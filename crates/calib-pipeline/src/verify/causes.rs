@@ -36,6 +36,8 @@ pub struct Causes {
     pub changed: Option<Change>,
     /// The joint whose scatter looked like a change.
     pub scatter: Option<Finding>,
+    /// All that the scan for changes found.
+    pub scan: Option<ChangeScan>,
     /// Findings from before the fit that other causes explain.
     pub explained: Vec<Finding>,
 }
@@ -45,6 +47,7 @@ impl Causes {
     fn with_change_of(mut self, scan: Option<&ChangeScan>) -> Self {
         let told = self.change.as_ref().and(scan);
         self.changed = told.and_then(ChangeScan::significant).cloned();
+        self.scan = scan.cloned();
         self
     }
 

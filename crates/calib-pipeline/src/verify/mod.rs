@@ -1,6 +1,6 @@
 //! What a solution is worth: held-out errors, loops, residuals, accuracy over the workspace.
 
-pub(crate) mod accuracy;
+pub mod accuracy;
 mod applied;
 pub mod causes;
 pub mod changes;

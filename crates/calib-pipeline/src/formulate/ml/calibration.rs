@@ -20,7 +20,8 @@ pub(crate) fn calibration(
 }
 
 /// The robot that any values of the parameters describe.
-pub(crate) fn calibration_at(
+#[must_use]
+pub fn calibration_at(
     formulation: &Formulation,
     solved: &calib_core::Model,
     values: &calib_core::Values,

@@ -26,7 +26,8 @@ mod masses;
 mod starts;
 mod widths;
 
-pub(crate) use calibration::{calibration, calibration_at};
+pub(crate) use calibration::calibration;
+pub use calibration::calibration_at;
 pub(crate) use joints::{moves, used_joints};
 
 /// States the problem of a profile.

@@ -1,0 +1,124 @@
+//! `calib twin`.
+
+use std::path::{Path, PathBuf};
+
+use calib_files::{ResultsFolder, input};
+use calib_pipeline::ExitCode;
+use calib_pipeline::prepare::inputs::RobotProfile;
+use calib_pipeline::prepare::load::load_robot;
+use calib_plan::PlanError;
+use calib_plan::write::{PlanFile, read};
+use calib_twin::{About, Options, profile_of, session, terminal, twin, write};
+use clap::{Args, ValueEnum};
+
+use super::plugin_options::PluginOptions;
+use crate::error::CliError;
+use crate::terminal::{Console, Counted, emit};
+
+/// Arguments of `calib twin`.
+#[derive(Debug, Args)]
+pub struct TwinArguments {
+    /// The robot's profile, or a folder of results of `calib run`
+    #[arg(value_name = "PROFILE")]
+    of: PathBuf,
+    /// Trials without faults
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    trials: u64,
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Postures of `calib plan` in place of a session that was recorded
+    #[arg(long)]
+    plan: Option<PathBuf>,
+    /// Where true robots are drawn [default: found where something is recorded, else prior]
+    #[arg(long, value_enum)]
+    truth: Option<TruthName>,
+    /// How many postures this σ of the tool's position needs, mm
+    #[arg(long)]
+    sigma_mm: Option<f64>,
+    /// Multiply the noise of the trials: what a better tracker would give, or what a wrong noise looks like
+    #[arg(long, default_value_t = 1.0)]
+    noise_times: f64,
+    /// Number of threads [default: one for each processor]
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Folder to write to; an interrupted twin continues there [default: results/NAME-twin]
+    #[arg(short, long)]
+    out: Option<PathBuf>,
+    /// Start over instead of continuing
+    #[arg(long)]
+    restart: bool,
+    /// Which plugins are loaded
+    #[command(flatten)]
+    plugins: PluginOptions,
+}
+
+/// Where true robots are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum TruthName {
+    /// About the robot that was found, as far as it is known
+    Found,
+    /// From the priors of the profile
+    Prior,
+}
+
+/// Largest plan, bytes.
+const LARGEST: u64 = 64 << 20;
+
+/// Makes the trials, and writes the files.
+pub fn run(console: &Console, options: &TwinArguments) -> Result<ExitCode, CliError> {
+    let positive = |value: &f64| *value > 0.0 && value.is_finite();
+    for value in options.sigma_mm.iter().chain([&options.noise_times]) {
+        if !positive(value) {
+            return Err(CliError::NotASigma { sigma: *value });
+        }
+    }
+    let profile = profile_of(&options.of)?;
+    let robot = load_robot(&profile)?;
+    let out = options
+        .out
+        .clone()
+        .unwrap_or_else(|| default_folder(&profile));
+    let folder = ResultsFolder::open(&out)?;
+    let plan = options.plan.as_ref().map(|path| planned(path, &robot));
+    let about = options.truth.map(|truth| match truth {
+        TruthName::Found => About::Found,
+        TruthName::Prior => About::Prior,
+    });
+    let plugins = options.plugins.plugins();
+    let (session, source) = session(robot, plan.transpose()?.as_ref(), plugins, about)?;
+    let asked = Options {
+        trials: options.trials,
+        seed: options.seed,
+        noise: options.noise_times,
+        sigma: options.sigma_mm.map(|mm| mm * 1e-3),
+        threads: options.threads,
+        out: Some(out.clone()),
+        resume: !options.restart,
+    };
+    let bar = Counted::new(console, "trials");
+    let found = twin(&session, source, &asked, &|done, total| bar.at(done, total))?;
+    bar.end();
+    folder.write(&write::files(&found)?)?;
+    emit(&match (console.json, console.quiet) {
+        (true, _) => write::json(&found)?,
+        (false, true) => terminal::line(&found),
+        (false, false) => terminal::summary(&found, &out.display().to_string()),
+    })?;
+    Ok(ExitCode::Accepted)
+}
+
+fn planned(path: &Path, robot: &RobotProfile) -> Result<PlanFile, CliError> {
+    let shown = path.display().to_string();
+    let text = input::read_text(path, LARGEST).map_err(|e| PlanError::NotJoints {
+        file: shown.clone(),
+        why: e.to_string(),
+    })?;
+    Ok(read(&text, &shown, &robot.model)?)
+}
+
+fn default_folder(profile: &Path) -> PathBuf {
+    let name = profile.file_stem().map(std::ffi::OsStr::to_string_lossy);
+    let name = name.unwrap_or("profile".into());
+    PathBuf::from("results").join(format!("{name}-twin"))
+}

@@ -1,0 +1,37 @@
+//! What a twin assumes, and what it leaves out: facts; [`crate::words`] makes the sentences.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// One assumption or limit of a twin.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "id", rename_all = "snake_case")]
+pub enum Note {
+    /// Rows of motions are taken as postures: that the clocks go together is not tried again.
+    StreamsAsRows {
+        /// Their recordings.
+        recordings: Vec<String>,
+    },
+    /// Measurements that the fit rejected are gaps.
+    RejectedAreGaps {
+        /// How many.
+        count: usize,
+    },
+    /// Nothing is recorded: one draw of the profile's `simulate` section stands for the recordings.
+    FromSimulation,
+    /// The postures are those of a plan, with the stated noise.
+    FromPlan {
+        /// How many are fitted.
+        postures: usize,
+    },
+    /// Origins whose sweeps are not recorded are left out.
+    OriginsWithoutSweep {
+        /// Their names.
+        origins: Vec<String>,
+    },
+    /// The noise is not that of the session.
+    NoiseScaled {
+        /// Percent of what was found.
+        percent: u32,
+    },
+}

@@ -1,0 +1,6 @@
+//! The public interface of the crate.
+
+mod replays;
+mod robots;
+mod studies;
+mod twins;
