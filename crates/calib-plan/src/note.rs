@@ -50,6 +50,11 @@ pub enum Note {
         /// The first link of each and the second.
         pairs: Vec<[String; 2]>,
     },
+    /// Pairs of links with one part between them that are nearer than the clearance in nearly all postures: they are kept from touching only.
+    PairsAlwaysClose {
+        /// The first link of each and the second.
+        pairs: Vec<[String; 2]>,
+    },
     /// No cameras are stated: every marker counts as seen.
     EverythingSeen,
     /// Sides that markers face were stated, but no cameras.

@@ -229,15 +229,20 @@ fn of_scene(known: &Known, joints: &JointBox, scene: &Scene, unread: Vec<String>
     if !unread.is_empty() {
         notes.push(Note::ShapeUnread { links: unread });
     }
+    let name = |part: usize| {
+        let of = scene.capsules.iter().find(|c| c.body == part);
+        of.map_or_else(String::new, |c| model.link(c.link).name.clone())
+    };
+    let named = |pairs: &[(usize, usize)]| -> Vec<[String; 2]> {
+        pairs.iter().map(|(a, b)| [name(*a), name(*b)]).collect()
+    };
     if !scene.always.is_empty() {
-        let name = |part: usize| {
-            let of = scene.capsules.iter().find(|c| c.body == part);
-            of.map_or_else(String::new, |c| model.link(c.link).name.clone())
-        };
-        let pairs = scene.always.iter().map(|(a, b)| [name(*a), name(*b)]);
-        notes.push(Note::PairsNotCompared {
-            pairs: pairs.collect(),
-        });
+        let pairs = named(&scene.always);
+        notes.push(Note::PairsNotCompared { pairs });
+    }
+    if !scene.close.is_empty() {
+        let pairs = named(&scene.close);
+        notes.push(Note::PairsAlwaysClose { pairs });
     }
     if spec.cameras.is_empty() {
         notes.push(Note::EverythingSeen);

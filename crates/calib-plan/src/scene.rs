@@ -40,6 +40,8 @@ pub struct Scene {
     pub pairs: Vec<(usize, usize)>,
     /// Pairs that touch in nearly all postures, so that their capsules tell nothing: not compared.
     pub always: Vec<(usize, usize)>,
+    /// Pairs of parts with one part between them that are nearer than the clearance in nearly all postures: they may be, but must not touch.
+    pub close: Vec<(usize, usize)>,
     /// Distance that is kept, m.
     pub clearance: f64,
     keep_outs: BTreeMap<String, KeepOut>,
@@ -91,30 +93,45 @@ impl Scene {
             capsules: all,
             pairs,
             always: Vec::new(),
+            close: Vec::new(),
             keep_outs: spec.keep_outs.clone(),
             ground: spec.ground,
             clearance: spec.clearance,
             root: body[model.root().index()],
         };
-        scene.skip_those_that_touch_always(model, postures);
+        // Next but one in the chain: how near they are is of the robot's making.
+        let next = |a: usize, b: usize| neighbors.contains(&(a.min(b), a.max(b)));
+        let beyond = |(a, b): (usize, usize)| body.iter().any(|c| next(a, *c) && next(*c, b));
+        scene.skip_those_that_touch_always(model, postures, &beyond);
         scene
     }
 
-    fn skip_those_that_touch_always(&mut self, model: &RobotModel, postures: &[Vec<f64>]) {
-        let mut touching = vec![0_usize; self.pairs.len()];
+    fn skip_those_that_touch_always(
+        &mut self,
+        model: &RobotModel,
+        postures: &[Vec<f64>],
+        next_but_one: &dyn Fn((usize, usize)) -> bool,
+    ) {
+        let mut touching = vec![[0_usize; 2]; self.pairs.len()];
         for q in postures {
             let placed = self.placed(&model.forward_kinematics(q));
-            for (count, pair) in touching.iter_mut().zip(&self.pairs) {
-                *count += usize::from(self.near(&placed, *pair, 0.0).is_some());
+            for (counts, pair) in touching.iter_mut().zip(&self.pairs) {
+                for (count, clearance) in counts.iter_mut().zip([0.0, self.clearance]) {
+                    *count += usize::from(self.near(&placed, *pair, clearance).is_some());
+                }
             }
         }
         let limit = ALWAYS * postures.len() as f64;
+        let mostly = |count: usize| !postures.is_empty() && count as f64 > limit;
         let pairs = std::mem::take(&mut self.pairs);
-        for (pair, count) in pairs.into_iter().zip(touching) {
-            if !postures.is_empty() && count as f64 > limit {
+        for (pair, [touch, close]) in pairs.into_iter().zip(touching) {
+            if mostly(touch) {
                 self.always.push(pair);
-            } else {
-                self.pairs.push(pair);
+                continue;
+            }
+            self.pairs.push(pair);
+            if mostly(close) && next_but_one(pair) {
+                self.close.push(pair);
             }
         }
     }
@@ -145,11 +162,21 @@ impl Scene {
         let touching = self
             .pairs
             .iter()
-            .find_map(|pair| self.near(placed, *pair, self.clearance));
+            .find_map(|pair| self.near(placed, *pair, self.clearance - self.allowed(*pair)));
         touching.map(|(a, b)| Contact::Links(a, b))
     }
 
-    /// Distance of the robot to what it must not touch and of its parts to each other, m; below 0 where they overlap.
+    /// By how much less than the clearance a pair of parts may be apart, m.
+    fn allowed(&self, pair: (usize, usize)) -> f64 {
+        if self.close.contains(&pair) {
+            self.clearance
+        } else {
+            0.0
+        }
+    }
+
+    /// Distance of the robot to what it must not touch and of its parts to each other, m, the clearance more for those that are always close; below 0
+    /// where others overlap.
     #[must_use]
     pub fn nearest(&self, placed: &[Capsule]) -> f64 {
         let mut least = f64::INFINITY;
@@ -165,7 +192,8 @@ impl Scene {
             for (j, second) in self.capsules.iter().enumerate().skip(i + 1) {
                 let (a, b) = (first.body.min(second.body), first.body.max(second.body));
                 if self.pairs.contains(&(a, b)) {
-                    least = least.min(placed[i].distance(&placed[j]));
+                    let distance = placed[i].distance(&placed[j]);
+                    least = least.min(distance + self.allowed((a, b)));
                 }
             }
         }

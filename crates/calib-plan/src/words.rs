@@ -146,6 +146,11 @@ pub fn efficiency_of(goal: Goal) -> &'static str {
     }
 }
 
+fn of_pairs(pairs: &[[String; 2]]) -> String {
+    let of = |[a, b]: &[String; 2]| format!("`{a}` with `{b}`");
+    pairs.iter().map(of).collect::<Vec<_>>().join(", ")
+}
+
 /// A note as a sentence, with what to do.
 #[must_use]
 pub fn note(note: &Note) -> String {
@@ -183,14 +188,14 @@ pub fn note(note: &Note) -> String {
             "Some shapes could not be read, and collisions with them are not checked: {}.",
             names(links)
         ),
-        Note::PairsNotCompared { pairs } => {
-            let of = |p: &[String; 2]| format!("`{}` with `{}`", p[0], p[1]);
-            let all: Vec<String> = pairs.iter().map(of).collect();
-            format!(
-                "Not compared, because their capsules overlap in nearly all postures: {}. Watch them in the first run.",
-                all.join(", ")
-            )
-        }
+        Note::PairsNotCompared { pairs } => format!(
+            "Not compared, because their capsules overlap in nearly all postures: {}. Watch them in the first run.",
+            of_pairs(pairs)
+        ),
+        Note::PairsAlwaysClose { pairs } => format!(
+            "Nearer than the clearance in nearly all postures, and kept from touching only: {}.",
+            of_pairs(pairs)
+        ),
         Note::EverythingSeen => {
             "No cameras are stated: every marker counts as seen. State `plan.cameras` where markers can be hidden.".to_owned()
         }

@@ -228,6 +228,33 @@ fn nothing_touches_by_points_sampled_on_the_capsules() {
     assert!(looked > 200, "{looked}");
 }
 
+/// A clearance that the links of an arm never have from each other is no reason to refuse every posture.
+#[test]
+fn links_that_are_always_close_are_kept_from_touching() {
+    let known = six(Seen::Markers(4), "plan:\n  clearance_mm: 90\n");
+    let options = few(10);
+    let prepared = prepare(&known, &options).unwrap_or_else(|e| panic!("{e}"));
+    let (scene, model) = (&prepared.feasible.scene, &known.robot.model);
+    assert!(!scene.close.is_empty());
+    let says = |n: &calib_plan::Note| matches!(n, calib_plan::Note::PairsAlwaysClose { .. });
+    assert!(prepared.notes.iter().any(says));
+    for candidate in &prepared.candidates {
+        let placed = scene.placed(&model.forward_kinematics(&candidate.q));
+        for (i, a) in scene.capsules.iter().enumerate() {
+            for (j, b) in scene.capsules.iter().enumerate().skip(i + 1) {
+                let pair = (a.body.min(b.body), a.body.max(b.body));
+                let least = if scene.close.contains(&pair) {
+                    0.0
+                } else {
+                    0.09
+                };
+                let compared = scene.pairs.contains(&pair);
+                assert!(!compared || placed[i].distance(&placed[j]) >= least);
+            }
+        }
+    }
+}
+
 /// No point of the robot moves further than the sum over the joints of their move times the way to the farthest point that they carry.
 #[test]
 fn no_point_moves_further_than_the_levers_say() {
