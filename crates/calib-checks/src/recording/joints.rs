@@ -99,7 +99,7 @@ pub(super) fn limits(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
         let inside = |q: f64| !outside(q + TAU) || !outside(q - TAU);
         let wraps =
             turns && rows.len() >= WRAPPED && q.iter().flatten().all(|&q| !outside(q) || inside(q));
-        let kind = if wraps { "wraps" } else { "" };
+        let kind = if wraps { "wraps" } else { "beyond" };
         findings.push(
             Finding::of_kind(catalog::JOINT_OUTSIDE_LIMITS, kind, Subject::joint(joint))
                 .with("rows", Fact::count(rows.len()))

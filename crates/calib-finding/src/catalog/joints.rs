@@ -72,7 +72,7 @@ super::topic! {
     }
     /// A joint has values beyond its limits.
     JOINT_OUTSIDE_LIMITS = "joint-outside-limits" {
-        "": Error,
+        "beyond": Error,
             "{rows:row} outside the limits {low} to {high}; the worst value is {worst}.",
             "Check the joint's name, sign and zero, or correct the limits in the URDF.";
         "wraps": Error,
