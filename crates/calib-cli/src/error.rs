@@ -48,6 +48,14 @@ pub enum CliError {
         /// What was given.
         sigma: f64,
     },
+    /// A factor of the noise that is none.
+    #[error(
+        "the noise cannot be multiplied by {factor}\n  help: give a number above 0: `--noise-times 2`"
+    )]
+    NotANoiseFactor {
+        /// What was given.
+        factor: f64,
+    },
     /// Estimators of plugins are tried in studies of estimators.
     #[error(
         "--plugin is for the studies of estimators\n  help: calib study cor|aor --plugin PLUGIN; plugins of a profile are named in it"
@@ -156,6 +164,7 @@ impl CliError {
             Self::Capture(CaptureError::Source(_)) => ExitCode::Data,
             Self::Capture(CaptureError::Table(_)) => ExitCode::NotWritten,
             Self::NotASigma { .. }
+            | Self::NotANoiseFactor { .. }
             | Self::Simulation { .. }
             | Self::Json { .. }
             | Self::Fit(_)

@@ -182,27 +182,15 @@ impl Known {
     ) -> Result<Inputs, PipelineError> {
         let model = &self.robot.model;
         let mut robot = self.robot.clone();
-        let spec = |usage: Usage| RecordingSpec {
-            file: "planned".to_owned(),
-            usage,
-            ranges: BTreeMap::new(),
-            hold: BTreeMap::new(),
-            group: None,
-            reader: None,
-            reader_parameters: BTreeMap::new(),
-            columns: None,
-            robot_log: None,
-            timing: None,
-        };
         let recorded = std::mem::take(&mut robot.profile.recordings);
         robot
             .profile
             .recordings
-            .insert(PLANNED.to_owned(), spec(Usage::Static));
+            .insert(PLANNED.to_owned(), planned_recording(Usage::Static));
         robot
             .profile
             .recordings
-            .insert(TASK.to_owned(), spec(Usage::Validation));
+            .insert(TASK.to_owned(), planned_recording(Usage::Validation));
         robot.profile.plugins.clear();
         let postures: Vec<&Vec<f64>> = planned.iter().map(|c| &c.q).collect();
         let mut table = joint_table(model, &postures);
@@ -277,6 +265,23 @@ fn tool(inputs: &Inputs, formulation: &Formulation) -> Option<Target> {
 fn link_pose(model: &RobotModel, q: &[f64], link: usize) -> Isometry3<f64> {
     let id = model.link_ids().nth(link);
     id.map_or_else(Isometry3::identity, |id| model.root_from_link(q, id))
+}
+
+/// How a profile states a recording that exists only in a plan.
+#[must_use]
+pub fn planned_recording(usage: Usage) -> RecordingSpec {
+    RecordingSpec {
+        file: "planned".to_owned(),
+        usage,
+        ranges: BTreeMap::new(),
+        hold: BTreeMap::new(),
+        group: None,
+        reader: None,
+        reader_parameters: BTreeMap::new(),
+        columns: None,
+        robot_log: None,
+        timing: None,
+    }
 }
 
 /// A table of joint positions.

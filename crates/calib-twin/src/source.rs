@@ -12,9 +12,9 @@ use calib_pipeline::prepare::inputs::{Inputs, RobotProfile};
 use calib_pipeline::prepare::load::{load_recordings, load_robot, of_tables};
 use calib_plan::Known;
 use calib_plan::known::without_missing;
-use calib_plan::linear::joint_table;
+use calib_plan::linear::{joint_table, planned_recording};
 use calib_plan::write::PlanFile;
-use calib_profile::{RecordingSpec, Usage};
+use calib_profile::Usage;
 use calib_report::{read_report, report_path};
 use nalgebra::{Isometry3, Point3};
 use schemars::JsonSchema;
@@ -131,7 +131,7 @@ fn planned(
         robot
             .profile
             .recordings
-            .insert((*name).to_owned(), spec(usage));
+            .insert((*name).to_owned(), planned_recording(usage));
         let q: Vec<&Vec<f64>> = seen.iter().map(|c| &c.q).collect();
         let mut table = joint_table(&robot.model, &q);
         for (i, subject) in feasible.sight.subjects.iter().enumerate() {
@@ -186,21 +186,6 @@ fn planned(
         .retain(|name, _| existing.contains_key(name));
     without_sweep(&mut inputs.robot, &mut notes);
     Ok((inputs, noise, notes))
-}
-
-fn spec(usage: Usage) -> RecordingSpec {
-    RecordingSpec {
-        file: "planned".to_owned(),
-        usage,
-        ranges: BTreeMap::new(),
-        hold: BTreeMap::new(),
-        group: None,
-        reader: None,
-        reader_parameters: BTreeMap::new(),
-        columns: None,
-        robot_log: None,
-        timing: None,
-    }
 }
 
 /// The profile that was given, or the one that a folder of results was made from.

@@ -10,7 +10,6 @@ use calib_report::terminal::wrapped;
 use crate::likeness::LEAST_TRIALS;
 use crate::power::Power;
 use crate::quantity::Quantity;
-use crate::source::Source;
 use crate::summary::Promise;
 use crate::twin::Twin;
 use crate::words;
@@ -273,10 +272,11 @@ pub(crate) fn postures(twin: &Twin) -> Option<String> {
 /// One line: for `--quiet`.
 #[must_use]
 pub fn line(twin: &Twin) -> String {
-    let differs = twin.resemblance.as_ref().is_some_and(|r| r.differs);
-    let like = match (twin.source, differs) {
-        (Source::Recordings, true) => "does not resemble the recording",
-        _ => "resembles the session",
+    let like = match twin.resemblance.as_ref().map(|r| (r.p_value, r.differs)) {
+        None => "of a session not recorded yet",
+        Some((None, _)) => "resemblance not tested",
+        Some((Some(_), true)) => "does not resemble the recording",
+        Some((Some(_), false)) => "resembles the recording",
     };
     let of = observed(twin);
     let kept = of.iter().filter(|p| p.is_kept()).count();

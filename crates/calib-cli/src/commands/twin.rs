@@ -68,10 +68,13 @@ const LARGEST: u64 = 64 << 20;
 /// Makes the trials, and writes the files.
 pub fn run(console: &Console, options: &TwinArguments) -> Result<ExitCode, CliError> {
     let positive = |value: &f64| *value > 0.0 && value.is_finite();
-    for value in options.sigma_mm.iter().chain([&options.noise_times]) {
-        if !positive(value) {
-            return Err(CliError::NotASigma { sigma: *value });
-        }
+    if let Some(sigma) = options.sigma_mm.filter(|v| !positive(v)) {
+        return Err(CliError::NotASigma { sigma });
+    }
+    if !positive(&options.noise_times) {
+        return Err(CliError::NotANoiseFactor {
+            factor: options.noise_times,
+        });
     }
     let profile = profile_of(&options.of)?;
     let robot = load_robot(&profile)?;

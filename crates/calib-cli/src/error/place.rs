@@ -63,7 +63,7 @@ impl CliError {
             Self::Init(_) => "init",
             Self::Plan(_) | Self::NotASigma { .. } | Self::Twin(TwinError::Plan(_)) => "plan",
             Self::Twin(TwinError::State(error)) => of_file(error),
-            Self::Twin(_) => "twin",
+            Self::Twin(_) | Self::NotANoiseFactor { .. } => "twin",
             Self::Apply(error) => of_apply(error),
             Self::Drift(_) => "drift",
             Self::Fit(_) => "fit",
