@@ -37,10 +37,13 @@ super::topic! {
     /// A joint stops off its readings by more than the others.
     JOINT_SCATTERS = "joint-scatters" {
         "rows": Warning,
-            "Joint `{joint}` deviates from its readings by {sigma} (σ), differently in each row and more than the other joints. That explains what would else look like a change while recording.",
+            "Joint `{joint}` deviates from its readings by {sigma} (σ), differently in each row and more than the other joints. That explains what else looks like a change while recording or like a missing effect.",
             "Check the encoder, the coupling and the brake of this joint, and record a row only when the joint is at rest. If it does scatter like this, state `solve: {noise: {model: joint_each}}`.";
         "stops": Warning,
-            "Joint `{joint}` deviates from its readings by {sigma} (σ), differently at each stop and more than the other joints. That explains what would else look like a change while recording.",
+            "Joint `{joint}` deviates from its readings by {sigma} (σ), differently at each stop and more than the other joints. That explains what else looks like a change while recording or like a missing effect.",
             "Check the encoder, the coupling and the brake of this joint, and look for effects of its gear. In the poses to come, let the joint stop often and from both sides.";
+        "readings": Warning,
+            "The readings of joint `{joint}` scatter by {sigma} (σ) while the tracker sees the joint at rest.",
+            "Check the encoder, its cable and the program that records it, or record the mean of the readings of each rest. Until then, state `solve: {noise: {model: joint_each}}`.";
     }
 }

@@ -1,20 +1,16 @@
 //! What made the residuals: missing effects, a change while recording, or what was suspected before the fit. Each is stated only
 //! where it explains something beside the others.
 
-use calib_core::{
-    Change, ChangeScan, Contest, EffectKind, GoodnessOfFit, Moved, ScoreTest, Suspect,
-};
-use calib_finding::{Fact, Finding, catalog};
+use calib_core::{Change, ChangeScan, Contest, GoodnessOfFit, Moved, ScoreTest, Suspect};
+use calib_finding::Finding;
 
 use super::elimination::{Asked, Held, eliminated};
 use crate::formulate::formulation::MlFit;
 use crate::prepare::inputs::Inputs;
 use crate::verify::changes::{self, Beside};
+use crate::verify::scatter::beside_scatter;
+use crate::verify::suspects::{RELEVANT, SIGNIFICANT, suspected_before};
 
-/// Chance of one false cause in so many analyses, as of the tests themselves.
-const SIGNIFICANT: f64 = 1e-3;
-/// Share of what the other causes leave of χ²: smaller effects are real but do not matter.
-const RELEVANT: f64 = 0.02;
 /// A cause that was found at a lower level of noise than that of the fit shows less here: it must keep this part of it beside others.
 const KEPT: f64 = 0.9;
 
@@ -34,7 +30,7 @@ pub struct Causes {
     pub change: Option<Finding>,
     /// The same, as the scan found it.
     pub changed: Option<Change>,
-    /// The joint whose scatter looked like a change.
+    /// The joint whose scatter looked like a change or a missing effect; none where something did change.
     pub scatter: Option<Finding>,
     /// All that the scan for changes found.
     pub scan: Option<ChangeScan>,
@@ -80,11 +76,19 @@ impl Cause<'_> {
 #[must_use]
 pub fn causes(inputs: &Inputs, fit: &MlFit, before: &[Finding]) -> Causes {
     let (scan, goodness) = rayon::join(|| changes::scan(fit), || fit.solution.goodness_of_fit());
-    let scatter = |scan: &ChangeScan| changes::scatter(inputs, fit, scan);
-    Causes {
-        scatter: scan.as_ref().and_then(scatter),
-        ..those_that_hold(inputs, fit, before, scan, goodness)
-    }
+    let beside = beside_scatter(inputs, fit, before, goodness);
+    let open: Vec<Finding> = before
+        .iter()
+        .filter(|finding| !beside.explained.contains(finding))
+        .cloned()
+        .collect();
+    let of_scan = scan.as_ref().and_then(|s| s.scatter);
+    let of_scan = of_scan.and_then(|scatter| changes::scatter(inputs, fit, scatter));
+    let steady = scan.as_ref().is_none_or(|s| s.significant().is_none());
+    let mut causes = those_that_hold(inputs, fit, &open, scan, beside.goodness);
+    causes.scatter = beside.finding.or(of_scan).filter(|_| steady);
+    causes.explained.extend(beside.explained);
+    causes
 }
 
 fn those_that_hold(
@@ -230,43 +234,6 @@ fn suspected<'a>(
         tested,
         contest,
     })
-}
-
-/// A suspicion from before the fit as a cause: its name and its column.
-fn suspected_before<'a>(
-    inputs: &Inputs,
-    fit: &MlFit,
-    finding: &Finding,
-    goodness: &'a GoodnessOfFit,
-) -> Option<(String, Suspect<'a>)> {
-    // Of the tests: mistakes of a whole row or of a whole coupling have no size, and a clock that was corrected no effect.
-    finding.facts.get("effect")?;
-    let word = |key: &str| finding.facts.get(key).and_then(Fact::word);
-    let tested = |name: String| {
-        let test = goodness.tests.iter().find(|t| t.name == name)?;
-        Some((name, Suspect::Tested(&test.name)))
-    };
-    match finding.id {
-        id if id == catalog::JOINT_GAIN => tested(format!("{}.gain", word("joint")?)),
-        id if id == catalog::CLOCK_LAG => tested(format!("{}.clock_offset", word("recording")?)),
-        id if id == catalog::JOINT_COUPLING => {
-            let model = &inputs.robot.model;
-            let (joint, other) = (word("joint")?, word("other")?);
-            let code = format!("{joint}.coupling.{other}");
-            let (joint, other) = (model.joint_id(joint).ok()?, model.joint_id(other).ok()?);
-            let reading = |(recording, row): &(String, usize)| {
-                let q = inputs.recordings[recording].q[*row].as_ref();
-                q.map_or(0.0, |q| model.position(q, other))
-            };
-            let suspect = Suspect::Effect {
-                joint: fit.formulation.joints[joint.index()]?,
-                kind: EffectKind::Coupling,
-                values: fit.formulation.samples.iter().map(reading).collect(),
-            };
-            Some((code, suspect))
-        }
-        _ => None,
-    }
 }
 
 /// What holds, as findings.

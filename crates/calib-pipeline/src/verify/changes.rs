@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use calib_core::{Change, ChangeScan, ChangeSettings, GoodnessOfFit, Moved};
+use calib_core::{Change, ChangeScan, ChangeSettings, GoodnessOfFit, Moved, Scatter};
 use calib_core::{EdgeId, FrameId};
 use calib_finding::{About, Fact, Finding, Severity, Subject, catalog};
 use calib_profile::Usage;
@@ -76,13 +76,9 @@ pub fn finding(inputs: &Inputs, fit: &MlFit, scan: &ChangeScan, beside: Beside) 
     })
 }
 
-/// The joint whose scatter looked like a change; none where something did change.
+/// The joint that scatters.
 #[must_use]
-pub fn scatter(inputs: &Inputs, fit: &MlFit, scan: &ChangeScan) -> Option<Finding> {
-    let scatter = scan.scatter?;
-    if scan.significant().is_some() {
-        return None;
-    }
+pub fn scatter(inputs: &Inputs, fit: &MlFit, scatter: Scatter) -> Option<Finding> {
     let names = Names { inputs, fit };
     let joint = names.joint(scatter.joint)?;
     let kind = if scatter.by_stop { "stops" } else { "rows" };

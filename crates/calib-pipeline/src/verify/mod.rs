@@ -16,8 +16,11 @@ pub mod known;
 pub mod left_out;
 pub(crate) mod motions;
 pub mod moved;
+pub mod readings;
 pub mod residuals;
 pub mod robot_changes;
+mod scatter;
+mod suspects;
 pub(crate) mod tracker_noise;
 
 use std::collections::BTreeMap;

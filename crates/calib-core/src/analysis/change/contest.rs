@@ -82,6 +82,13 @@ impl Contest {
         (score.max(0.0), full.saturating_sub(rank))
     }
 
+    /// The coefficient of a cause of one column, alone: one step towards the better model, as of the tests. NaN where nothing is known of it.
+    #[must_use]
+    pub fn estimate(&self, one: usize) -> f64 {
+        let column = self.columns[one].start;
+        -self.u[column] / self.information[(column, column)]
+    }
+
     /// T of equation (3) that chance exceeds with this probability where a cause of `directions` columns is absent.
     #[must_use]
     pub fn threshold(&self, probability: f64, directions: usize) -> f64 {
@@ -124,7 +131,7 @@ impl Contest {
 }
 
 /// The columns of a suspect.
-enum Columns {
+pub(super) enum Columns {
     /// Its number among the effects.
     Effect(usize),
     /// Columns among those of all changes, by how much it holds in each sample.
@@ -146,8 +153,19 @@ impl Solution {
             .map(|_| self.with_all());
         let at = all.as_ref().unwrap_or(self);
         let changes = Candidates::new(at);
-        let used = at.used_samples();
-        let tested = self.candidates();
+        let (effects, columns) = at.columns_of(suspects, &changes, &self.candidates(), borders)?;
+        at.summed(&changes, &effects, &columns)
+    }
+
+    /// The columns of suspects; `tested`: the effects that suspects name.
+    pub(super) fn columns_of(
+        &self,
+        suspects: &[Suspect<'_>],
+        changes: &Candidates,
+        tested: &[Candidate],
+        borders: &[usize],
+    ) -> Option<(Vec<Candidate>, Vec<Columns>)> {
+        let used = self.used_samples();
         let mut effects: Vec<Candidate> = Vec::new();
         let mut columns = Vec::new();
         for suspect in suspects {
@@ -155,13 +173,8 @@ impl Solution {
                 Suspect::Change(change) => {
                     let own = changes.list.iter().position(|c| c.moved == change.moved)?;
                     let own = &changes.list[own];
-                    let holds = holds(
-                        change,
-                        own.pattern,
-                        borders,
-                        &used,
-                        self.model.problem.samples,
-                    );
+                    let samples = self.model.problem.samples;
+                    let holds = holds(change, own.pattern, borders, &used, samples);
                     Columns::Change(own.columns.clone(), holds)
                 }
                 Suspect::Tested(name) => {
@@ -178,7 +191,7 @@ impl Solution {
                 }
             });
         }
-        at.summed(&changes, &effects, &columns)
+        Some((effects, columns))
     }
 
     /// The same solution with the observations that were rejected.
@@ -201,16 +214,8 @@ impl Solution {
     ) -> Option<Contest> {
         let model = &self.model;
         let n = model.free();
-        let mut ranges: Vec<Range<usize>> = Vec::new();
-        let mut width = 0;
-        for own in columns {
-            let count = match own {
-                Columns::Effect(_) => 1,
-                Columns::Change(of, _) => of.len(),
-            };
-            ranges.push(width..width + count);
-            width += count;
-        }
+        let ranges = side_by_side(columns);
+        let width = ranges.last().map_or(0, |r| r.end);
         let (mut h, mut g) = (DMatrix::zeros(n, n), DVector::zeros(n));
         let mut e = DMatrix::zeros(n, width);
         let (mut own, mut u) = (DMatrix::zeros(width, width), DVector::zeros(width));
@@ -220,7 +225,7 @@ impl Solution {
         let inner = work.clone();
         let samples = self.looked_at().samples;
         self.each_numbered_sample(effects, &samples, &mut work, |number, s, alpha| {
-            let b = self.side_by_side(changes, columns, &ranges, (number, s, alpha), &inner);
+            let b = self.columns_at(changes, columns, &ranges, (number, s, alpha), &inner);
             let transposed = s.a.transpose();
             h.gemm(1.0, &transposed, &s.a, 1.0);
             g.gemv(1.0, &transposed, &s.w, 1.0);
@@ -241,14 +246,7 @@ impl Solution {
         u += e.tr_mul(&step);
         let raw: Vec<f64> = own.diagonal().iter().copied().collect();
         let mut information = own - e.tr_mul(&(&c * &e));
-        for (range, of) in ranges.iter().zip(columns) {
-            if let Columns::Change(own, _) = of {
-                let place = changes.list.iter().position(|c| c.columns == *own)?;
-                for i in range.clone() {
-                    information[(i, i)] += changes.prior(place);
-                }
-            }
-        }
+        add_priors(&mut information, changes, columns, &ranges)?;
         (cost.is_finite() && cost > 0.0 && rows > 0.0).then_some(Contest {
             columns: ranges,
             u,
@@ -261,7 +259,7 @@ impl Solution {
     }
 
     /// B̃ of one sample.
-    fn side_by_side(
+    pub(super) fn columns_at(
         &self,
         changes: &Candidates,
         columns: &[Columns],
@@ -286,6 +284,38 @@ impl Solution {
         }
         out
     }
+}
+
+/// The places of columns side by side.
+pub(super) fn side_by_side(columns: &[Columns]) -> Vec<Range<usize>> {
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for own in columns {
+        let first = ranges.last().map_or(0, |r| r.end);
+        let count = match own {
+            Columns::Effect(_) => 1,
+            Columns::Change(of, _) => of.len(),
+        };
+        ranges.push(first..first + count);
+    }
+    ranges
+}
+
+/// P of equation (1): what is known of the size of changes.
+pub(super) fn add_priors(
+    information: &mut DMatrix<f64>,
+    changes: &Candidates,
+    columns: &[Columns],
+    ranges: &[Range<usize>],
+) -> Option<()> {
+    for (range, of) in ranges.iter().zip(columns) {
+        if let Columns::Change(own, _) = of {
+            let place = changes.list.iter().position(|c| c.columns == *own)?;
+            for i in range.clone() {
+                information[(i, i)] += changes.prior(place);
+            }
+        }
+    }
+    Some(())
 }
 
 /// How much a change holds in each sample.

@@ -35,7 +35,7 @@ use crate::graph::ids::{EdgeId, FrameId};
 use chance::Chance;
 use columns::{Candidates, Pattern};
 use levels::{Best, Levels};
-pub use scatter::Scatter;
+pub use scatter::{BesideScatter, Left, Scatter};
 use sums::{Design, LEAST, SIMULATED};
 
 /// What may have moved.

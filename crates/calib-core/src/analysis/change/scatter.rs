@@ -1,23 +1,27 @@
-//! Does a joint that scatters explain what a scan took for changes?
+//! Does a joint that scatters explain what looks like changes or like missing effects?
 //!
-//! The scan knows one σ for all joints. Where one of them stops off its reading by more than the others, a stretch of rows in which it
-//! stopped on one side by chance looks like a step. The errors of that joint, one draw in every row or in every stop, are
-//! beside the change then, G their columns:
+//! Scans and tests know one σ for all joints. Where one of them stops off its reading by more than the others, a stretch of rows in which it
+//! stopped on one side by chance looks like a step, and its readings, which err with it, seem to come from the side that they err to: like backlash.
+//! The errors of that joint, one draw in every row or in every stop, are beside the change or the effect then, G their columns:
 //!
 //! ```text
 //! 2 ln L(τ) = −ν ln(F − Uᵀ (K + τ⁻²)⁻¹ U) − ln|I + τ² K| − Σ ln|V| − ln|H|,   K = Σ G̃ᵀG̃ − Eᵀ C E,   E = Σ Aᵀ G̃       (1)
-//! T' = max 2 ln L(with the change) − max 2 ln L(without)                                                       (2)
+//! T' = max 2 ln L(with what is suspected) − max 2 ln L(without)                                                (2)
 //! ```
 //!
 //! each over τ, over the joint that scatters or none, and over the noise of all joints as it was found and a tenth of it. U, F, ν, V, H
-//! and C as in the scan; with a joint that scatters 2 ln L is lowered by 10, as so many are tried. What remains of T is what the change explains beside
-//! the best of them. Where a change alone explains clearly more than any joint's scatter alone, nothing is taken from it.
+//! and C as in the scan; with a joint that scatters 2 ln L is lowered by 10, as so many are tried. What remains of T is what the suspect explains beside
+//! the best of them. Where a change alone, or all missing effects together, explain clearly more than any joint's scatter alone, nothing is taken from
+//! them.
+
+use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::columns::Candidates;
-use super::contest::holds;
+use super::contest::{Suspect, add_priors, side_by_side};
 use super::{Change, ChangeScan};
 use crate::analysis::looked_at::looked_at;
 use crate::analysis::solution::Solution;
@@ -30,8 +34,8 @@ use crate::solve::whitened::{covariance_of, whitened};
 
 /// Samples that are looked at: (1) costs their cube.
 const SAMPLES: usize = 240;
-/// Changes that are looked at, most significant first.
-const CHANGES: usize = 8;
+/// Changes, or missing effects, that are looked at, most significant first.
+const SUSPECTS: usize = 8;
 /// Fewer stops are no scatter: one draw more is a step.
 const STOPS: usize = 6;
 /// Scatters that are tried, rad.
@@ -44,7 +48,7 @@ const AT_REST: f64 = 2e-3;
 const SHOWN: f64 = 10.0;
 /// So many draws must be seen to be larger than half of their σ, as two of three are: one or two of them are a step.
 const DRAWS: usize = 4;
-/// A change alone that explains more than a joint's scatter alone by this much is no scatter: twice the log-likelihood ratio of 20 : 1.
+/// What alone explains more than a joint's scatter alone by this much is no scatter: twice the log-likelihood ratio of 20 : 1.
 const DISTINCT: f64 = 6.0;
 /// The noise of all joints beside one that scatters, as a share of the one that was found with it.
 const OTHERS: f64 = 0.1;
@@ -59,8 +63,38 @@ pub struct Scatter {
     pub by_stop: bool,
     /// Standard deviation of the draws, rad or m.
     pub sigma: f64,
-    /// By how much 2 ln L is larger with it, without any change, beyond what is expected of the best of so many.
+    /// By how much 2 ln L is larger with it, without what was suspected, beyond what is expected of the best of so many.
     pub score: f64,
+}
+
+/// Suspects beside a joint that scatters.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct BesideScatter {
+    /// The joint that scatters.
+    pub scatter: Scatter,
+    /// What is left of each suspect, in their order; of those beyond the eighth nothing is known.
+    pub left: Vec<Left>,
+}
+
+/// What a suspect explains.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Left {
+    /// 2 ln of the likelihood ratio alone.
+    pub score: f64,
+    /// The part of it that is left beside the scatter, 0 to 1.
+    pub part: f64,
+}
+
+impl Left {
+    /// Whether chance would leave as much to an effect that is absent with less than this probability.
+    #[must_use]
+    pub fn is_significant(&self, probability: f64) -> bool {
+        // χ² of one degree of freedom, as T is for many rows.
+        let threshold = ChiSquared::new(1.0).map(|d| d.inverse_cdf(1.0 - probability));
+        threshold.is_ok_and(|threshold| self.score * self.part > threshold)
+    }
 }
 
 /// One sample in whitened form.
@@ -68,8 +102,8 @@ struct Sample {
     a: DMatrix<f64>,
     /// Columns of the joints, in the order of [`Level::joints`].
     joints: DMatrix<f64>,
-    /// Columns of the changes.
-    changes: DMatrix<f64>,
+    /// Columns of the suspects.
+    suspects: DMatrix<f64>,
 }
 
 /// Sums that do not depend on the joint that scatters, at one level of the noise of all joints.
@@ -80,12 +114,12 @@ struct Level {
     /// Whitened residuals at the minimum.
     residuals: Vec<DVector<f64>>,
     joints: Vec<EdgeId>,
-    /// First column of each change, and one past the last.
-    starts: Vec<usize>,
-    /// C, C E of the changes.
+    /// Columns of each suspect.
+    ranges: Vec<Range<usize>>,
+    /// C, C E of the suspects.
     covariance: DMatrix<f64>,
     ce: DMatrix<f64>,
-    /// U and I of all changes.
+    /// U and I of all suspects.
     u: DVector<f64>,
     information: DMatrix<f64>,
     cost: f64,
@@ -93,11 +127,41 @@ struct Level {
     log_det: f64,
 }
 
-/// −2 ln L without a change, and with each.
+/// −2 ln L without a suspect, with each, and with all.
 #[derive(Clone)]
 struct Fits {
     without: f64,
     with: Vec<f64>,
+    all: f64,
+}
+
+/// Suspects beside the scatter of one joint.
+struct Compared {
+    /// Where no joint scatters.
+    alone: Fits,
+    /// The least of each, over the joints that may scatter.
+    least: Fits,
+    /// The scatter that explains most.
+    best: Option<Scatter>,
+}
+
+impl Compared {
+    /// Whether the scatter explains as much as what gains `by` alone.
+    fn explains(&self, by: f64) -> bool {
+        self.best
+            .is_some_and(|best| best.score + SHOWN + DISTINCT >= by)
+    }
+
+    /// What is left of one suspect.
+    fn left(&self, k: usize) -> Left {
+        let score = self.alone.without - self.alone.with[k];
+        let part = (self.least.without - self.least.with[k]) / score;
+        let part = match score > 0.0 && part.is_finite() {
+            true => part.clamp(0.0, 1.0),
+            false => 1.0,
+        };
+        Left { score, part }
+    }
 }
 
 impl Solution {
@@ -105,21 +169,65 @@ impl Solution {
     pub(super) fn beside_scatter(&self, mut scan: ChangeScan, borders: &[usize]) -> ChangeScan {
         let least = scan.threshold;
         let significant = scan.changes.iter().filter(|c| c.excess > least);
-        let list: Vec<Change> = significant.take(CHANGES).cloned().collect();
-        if list.is_empty() {
+        let list: Vec<Change> = significant.take(SUSPECTS).cloned().collect();
+        let suspects: Vec<Suspect<'_>> = list.iter().map(Suspect::Change).collect();
+        let Some(found) = self.compared(&suspects, borders) else {
+            return scan;
+        };
+        let alone_by = found
+            .alone
+            .with
+            .iter()
+            .map(|with| found.alone.without - with);
+        if !found.explains(alone_by.fold(0.0, f64::max)) {
             return scan;
         }
-        let of = |solution: &Self| Level::new(solution, &list, borders);
+        for (k, change) in scan.changes.iter_mut().take(list.len()).enumerate() {
+            let quantile = change.score - change.excess;
+            change.score *= found.left(k).part;
+            change.excess = change.score - quantile;
+        }
+        let order = |a: &Change, b: &Change| {
+            let by_excess = b.excess.total_cmp(&a.excess);
+            by_excess.then(a.moved.cmp(&b.moved))
+        };
+        scan.changes.sort_by(order);
+        scan.scatter = found.best;
+        scan
+    }
+
+    /// What suspects explain beside a joint that scatters; `None` where no joint does, or where all of them together explain clearly more than
+    /// that. `borders`: the first sample of every recording but the first.
+    #[must_use]
+    pub fn suspects_beside_scatter(
+        &self,
+        suspects: &[Suspect<'_>],
+        borders: &[usize],
+    ) -> Option<BesideScatter> {
+        let suspects = &suspects[..suspects.len().min(SUSPECTS)];
+        let found = self.compared(suspects, borders)?;
+        if !found.explains(found.alone.without - found.alone.all) {
+            return None;
+        }
+        Some(BesideScatter {
+            scatter: found.best?,
+            left: (0..suspects.len()).map(|k| found.left(k)).collect(),
+        })
+    }
+
+    /// Sets suspects beside the scatter of each joint. `None` where there is nothing to compare.
+    fn compared(&self, suspects: &[Suspect<'_>], borders: &[usize]) -> Option<Compared> {
+        if suspects.is_empty() {
+            return None;
+        }
+        let of = |solution: &Self| Level::new(solution, suspects, borders);
         let lower = self.with_pose_noise_times(OTHERS);
         let levels: Vec<Level> = [Some(self), lower.as_ref()]
             .into_iter()
             .flatten()
             .filter_map(of)
             .collect();
-        let Some(first) = levels.first() else {
-            return scan;
-        };
-        let alone = first.without_scatter();
+        let alone = levels.first()?.without_scatter();
         let mut cases: Vec<(usize, usize, Vec<usize>, bool)> = Vec::new();
         for (l, level) in levels.iter().enumerate() {
             for (j, joint) in level.joints.iter().enumerate() {
@@ -156,31 +264,12 @@ impl Solution {
                 best = Some(scatter);
             }
             least.without = least.without.min(fits.without + SHOWN);
+            least.all = least.all.min(fits.all + SHOWN);
             for (least, own) in least.with.iter_mut().zip(&fits.with) {
                 *least = least.min(own + SHOWN);
             }
         }
-        let alone_by = alone.with.iter().map(|with| alone.without - with);
-        let of_change = alone_by.fold(0.0, f64::max);
-        if best.is_none_or(|scatter| scatter.score + SHOWN + DISTINCT < of_change) {
-            return scan;
-        }
-        for (k, change) in scan.changes.iter_mut().take(list.len()).enumerate() {
-            let before = alone.without - alone.with[k];
-            let part = (least.without - least.with[k]) / before;
-            if before > 0.0 && part.is_finite() {
-                let quantile = change.score - change.excess;
-                change.score *= part.clamp(0.0, 1.0);
-                change.excess = change.score - quantile;
-            }
-        }
-        let order = |a: &Change, b: &Change| {
-            let by_excess = b.excess.total_cmp(&a.excess);
-            by_excess.then(a.moved.cmp(&b.moved))
-        };
-        scan.changes.sort_by(order);
-        scan.scatter = best;
-        scan
+        Some(Compared { alone, least, best })
     }
 
     /// 1 of joints that turn.
@@ -219,25 +308,17 @@ fn count(groups: &[usize]) -> usize {
 }
 
 impl Level {
-    fn new(solution: &Solution, changes: &[Change], borders: &[usize]) -> Option<Self> {
+    fn new(solution: &Solution, suspects: &[Suspect<'_>], borders: &[usize]) -> Option<Self> {
         let model = &solution.model;
         let candidates = Candidates::new(solution);
         let used = solution.used_samples();
-        let of_change = |change: &Change| {
-            let number = candidates
-                .list
-                .iter()
-                .position(|c| c.moved == change.moved)?;
-            let own = &candidates.list[number];
-            let holds = holds(change, own.pattern, borders, &used, model.problem.samples);
-            Some((own.columns.clone(), holds, candidates.prior(number)))
+        let tested = match suspects.iter().any(|s| matches!(s, Suspect::Tested(_))) {
+            true => solution.candidates(),
+            false => Vec::new(),
         };
-        let parts: Vec<_> = changes.iter().map(of_change).collect::<Option<_>>()?;
-        let mut starts = vec![0];
-        for (columns, ..) in &parts {
-            starts.push(starts[starts.len() - 1] + columns.len());
-        }
-        let width = starts[parts.len()];
+        let (effects, columns) = solution.columns_of(suspects, &candidates, &tested, borders)?;
+        let ranges = side_by_side(&columns);
+        let width = ranges.last().map_or(0, |r| r.end);
         let (joints, places) = candidates.joint_columns();
         let n = model.free();
         let (mut h, mut g) = (DMatrix::zeros(n, n), DVector::zeros(n));
@@ -247,7 +328,7 @@ impl Level {
             samples: Vec::new(),
             residuals: Vec::new(),
             joints,
-            starts,
+            ranges,
             covariance: DMatrix::zeros(0, 0),
             ce: DMatrix::zeros(0, 0),
             u: DVector::zeros(width),
@@ -264,11 +345,11 @@ impl Level {
                 continue;
             };
             let all = candidates.whitened(solution, sample, &rows, &work);
-            let mut b = DMatrix::zeros(rows.w.len(), width);
-            for (k, (columns, holds, _)) in parts.iter().enumerate() {
-                let part = all.columns_range(columns.clone()) * holds[sample];
-                b.columns_mut(out.starts[k], columns.len()).copy_from(&part);
-            }
+            let own_rows =
+                solution.effect_rows(&effects, sample, &rows.blocks, rows.w.len(), &work);
+            let tested = &rows.l_inverse * own_rows;
+            let at = (sample, &rows, &tested);
+            let b = solution.columns_at(&candidates, &columns, &out.ranges, at, &work);
             h.gemm_tr(1.0, &rows.a, &rows.a, 1.0);
             g.gemv_tr(1.0, &rows.a, &rows.w, 1.0);
             e.gemm_tr(1.0, &rows.a, &b, 1.0);
@@ -281,7 +362,7 @@ impl Level {
             out.samples.push(Sample {
                 a: rows.a,
                 joints: all.select_columns(&places),
-                changes: b,
+                suspects: b,
             });
         }
         let mut system = NormalEquations::of(&h, &g);
@@ -292,15 +373,11 @@ impl Level {
         out.cost += system.prior + gradient.dot(&step);
         for (w, sample) in out.residuals.iter_mut().zip(&out.samples) {
             w.gemv(1.0, &sample.a, &step, 1.0);
-            out.u.gemv_tr(1.0, &sample.changes, w, 1.0);
+            out.u.gemv_tr(1.0, &sample.suspects, w, 1.0);
         }
         out.ce = &out.covariance * &e;
         out.information = own - e.tr_mul(&out.ce);
-        for (k, (_, _, prior)) in parts.iter().enumerate() {
-            for i in out.starts[k]..out.starts[k + 1] {
-                out.information[(i, i)] += prior;
-            }
-        }
+        add_priors(&mut out.information, &candidates, &columns, &out.ranges)?;
         let parameters = model.columns.iter().map(|p| &model.problem.parameters[*p]);
         let priors = parameters.filter(|p| p.prior_sigma.is_some()).count();
         out.freedom = (out.freedom + priors as f64 - n as f64).max(1.0);
@@ -322,20 +399,23 @@ impl Level {
         self.fits(0.0, 0.0, &self.u, &self.information)
     }
 
-    /// Given what the scatter explains, and U and I of the changes beside it.
+    /// Given what the scatter explains, and U and I of the suspects beside it.
     fn fits(&self, gain: f64, log_det: f64, u: &DVector<f64>, information: &DMatrix<f64>) -> Fits {
-        let with = self.starts.windows(2).map(|range| {
-            let (first, width) = (range[0], range[1] - range[0]);
+        let of = |range: Range<usize>| {
+            let (first, width) = (range.start, range.len());
             let own = information
                 .view((first, first), (width, width))
                 .into_owned();
             let u = u.rows(first, width).into_owned();
             let more = Cholesky::new(own).map_or(0.0, |factor| u.dot(&factor.solve(&u)));
             self.surprise(gain + more, log_det)
-        });
+        };
+        let with: Vec<f64> = self.ranges.iter().cloned().map(of).collect();
         Fits {
             without: self.surprise(gain, log_det),
-            with: with.collect(),
+            // Where suspects imitate each other their information has no factor; together they explain no less than one.
+            all: with.iter().copied().fold(of(0..u.len()), f64::min),
+            with,
         }
     }
 
@@ -351,7 +431,7 @@ impl Level {
             e.column_mut(group).gemv_tr(1.0, &sample.a, &own, 1.0);
             u[group] += own.dot(w);
             diagonal[group] += own.norm_squared();
-            let beside = sample.changes.tr_mul(&own);
+            let beside = sample.suspects.tr_mul(&own);
             for c in 0..width {
                 cross[(group, c)] += beside[c];
             }
