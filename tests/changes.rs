@@ -158,6 +158,9 @@ fn scattered(joint: &str, sigma_deg: f64) -> Scratch {
 
 #[test]
 fn a_joint_that_scatters_is_named_and_no_change() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     for (joint, sigma) in [("elbow", 0.2), ("shoulder", 0.2)] {
         let (_, report) = run(&scattered(joint, sigma));
         let change = finding(&report, "changed-while-recording");
@@ -238,6 +241,9 @@ fn a_tracker_that_is_bumped_is_named_with_its_row() {
 /// The tracker stood elsewhere while some recordings were made: the motion is between two of them, never at the first row of all.
 #[test]
 fn a_tracker_that_moved_between_recordings_is_said_with_both() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     const FIRST: &str = "robots/ripley/a_first.csv";
     let whole = Scratch::new().robot("ripley").read(POSES);
     let lines: Vec<&str> = whole.lines().collect();

@@ -126,6 +126,9 @@ pub(crate) fn number<'a>(drift: &'a Value, name: &str) -> &'a Value {
 
 #[test]
 fn a_longer_forearm_is_found_and_the_rest_is_not() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let dir = Scratch::new().brief("ripley");
     let dir = session(dir, "old", 1, Since::default());
     let dir = session(dir, "same", 2, Since::default());
@@ -205,6 +208,9 @@ fn reports_that_cannot_be_compared() {
 /// A month: calibrated, applied, calibrated again from the changed URDF, twice, the second time with an encoder's zero moved.
 #[test]
 fn months_from_the_applied_urdf() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let urdf = "robots/ripley/r17.urdf";
     let dir = Scratch::new().brief("ripley");
     let nominal = dir.read(urdf);

@@ -359,6 +359,9 @@ fn revert_in_place_and_elsewhere() {
 
 #[test]
 fn record() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let port = free_port();
     let stop = Arc::new(AtomicBool::new(false));
     let sender = still_body(port, 0, stop.clone());

@@ -30,6 +30,9 @@ pub fn without_solve(profile: &str) -> String {
 
 #[test]
 fn compliance_is_chosen_where_the_profile_does_not_free_it() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let dir = Scratch::new().robot("justin").edit(
         "robots/justin.yaml",
         "free: [bodies, tracker, joint_offsets, joint_axes, compliance]",
@@ -85,6 +88,9 @@ fn compliance_is_chosen_where_the_profile_does_not_free_it() {
 
 #[test]
 fn nothing_to_choose_is_the_run_of_the_profile() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let dir = Scratch::new().robot("ripley");
     let plain = dir.calib(["run", "robots/ripley.yaml", "--out", "plain"]);
     let chosen = dir.calib(["run", "robots/ripley.yaml", "--select", "--out", "chosen"]);

@@ -91,6 +91,9 @@ fn clock(report: &Value) -> Value {
 
 #[test]
 fn a_motion_with_two_clocks_gives_offset_drift_and_the_truth() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let robot = ripley();
     let plan = plan(&robot, Motion::Continuous, 60.0);
     let streams = simulate_streams(&robot.profile, &robot.model, &plan, SEED).expect("a section");

@@ -50,6 +50,9 @@ fn subjects(table: &str) -> Vec<Vec<String>> {
 /// The book's pages are outputs of the studies as they are now: the same parts, methods and scenes, on the page and in the long tables.
 #[test]
 fn the_books_pages_have_the_shape_of_the_studies() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     for study in ["cor", "aor", "justin", "ripley"] {
         let dir = Scratch::new().robot("justin").robot("ripley");
         let printed = dir
@@ -90,6 +93,9 @@ fn the_books_pages_have_the_shape_of_the_studies() {
 /// Threads and interruptions change nothing, and the likelihood is nearer to the truth than the two steps.
 #[test]
 fn a_case_study_continues_where_it_stopped() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let dir = Scratch::new().robot("ripley");
     let run = |more: &[&str]| {
         let mut words = vec!["study", "ripley", "--json"];

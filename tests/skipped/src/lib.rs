@@ -1,5 +1,5 @@
 //! Tests that need something that is not part of the project (measurements of other laboratories, a browser, a
-//! compiler) and that cannot run without it.
+//! compiler) and that cannot run without it, and tests of many trials, which run where they are asked for.
 //!
 //! Rust's test harness knows no third outcome: such a test returns early and counts as passed. Here it is counted as
 //! skipped as well:
@@ -29,6 +29,9 @@ pub const NO_BROWSER: &str = "no Chromium";
 /// Why a test was skipped where a format's reference checker is missing.
 pub const NO_CHECKER: &str = "no reference checkers of output formats (CALIB_CHECKERS)";
 
+/// Why a test of many trials was skipped where `CALIB_TESTS` is not `all`.
+pub const NOT_THOROUGH: &str = "of many trials (CALIB_TESTS=all)";
+
 /// Files of runs that printed no summary are removed after a day.
 const STALE: Duration = Duration::from_secs(24 * 3600);
 
@@ -42,6 +45,17 @@ pub fn skip(reason: &str) {
     let test = std::thread::current().name().unwrap_or("?").to_owned();
     println!("skipped: {reason}");
     record(&run_file(&program), &binary, &test, reason).expect("target/skipped is writable");
+}
+
+/// Whether tests of many trials run, those with more than some 6 s of processor time: where `CALIB_TESTS` is `all`, as it is where it is decided what
+/// lands. They are counted as skipped elsewhere.
+#[must_use]
+pub fn thorough() -> bool {
+    let all = std::env::var_os("CALIB_TESTS").is_some_and(|asked| asked == "all");
+    if !all {
+        skip(NOT_THOROUGH);
+    }
+    all
 }
 
 /// A file or folder of measurements of other laboratories; `None`, counted as skipped, where it is not there.

@@ -146,6 +146,9 @@ fn judge(info: &EstimatorInfo, (markers, arc, mm, degrees): Scene, trials: u64) 
 
 #[test]
 fn the_line_is_where_its_covariance_says() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     study(200);
 }
 

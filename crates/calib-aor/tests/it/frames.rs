@@ -133,6 +133,9 @@ fn cell(design: Design, every: Option<usize>, trials: u64) -> (f64, usize, usize
 /// too small by a third (d² of 13.6) is ten of them away.
 #[test]
 fn the_uncertainty_is_true_with_and_without_gross_errors() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let cells: Vec<_> = DESIGNS
         .into_iter()
         .flat_map(|design| [(design, None), (design, Some(5))])

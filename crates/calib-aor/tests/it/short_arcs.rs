@@ -268,6 +268,9 @@ fn unknown_angles_cost_what_their_noise_says() {
 /// A body that slides without a turn is not given an axis: at most one in a thousand is `ok`, and few are `weak`.
 #[test]
 fn a_body_that_slides_has_no_axis() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     const TRIALS: u64 = 1500;
     let hinge = Hinge::slanted();
     let places = hinge.layout(MARKERS, 0.1);
@@ -298,6 +301,9 @@ fn a_body_that_slides_has_no_axis() {
 /// A marker that rests in its noise is not given an axis, though a circle through the cloud leaves less than the noise.
 #[test]
 fn a_marker_that_rests_has_no_axis() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     const TRIALS: u64 = 2000;
     let hinge = Hinge::slanted();
     for (id, markers) in [

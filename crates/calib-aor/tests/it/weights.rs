@@ -298,6 +298,9 @@ fn frames_weigh_their_samples() {
 
 #[test]
 fn frames_reach_what_the_good_samples_allow() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     const TRIALS: u64 = 100;
     let weights: Vec<f64> = (0..36)
         .map(|k| if (k + k / 6) % 2 == 0 { 1.0 } else { 0.04 })

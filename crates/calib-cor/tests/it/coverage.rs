@@ -100,6 +100,9 @@ fn ratio(cell: &Cell, id: &str, kind: InputKind, trials: u64) -> (f64, u64) {
 
 #[test]
 fn covariances_are_not_too_small() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     const TRIALS: u64 = 100;
     /// Of fewer answers those that look best have been picked by the tests of observability.
     const ENOUGH: u64 = 50;

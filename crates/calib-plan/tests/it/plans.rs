@@ -399,6 +399,9 @@ fn the_same_question_has_the_same_answer() {
 
 #[test]
 fn a_sigma_that_is_asked_for_is_reached_by_the_fewest_postures_or_refused() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let known = six(Seen::Markers(4), "");
     let mut options = Options {
         sigma: Some(0.12e-3),

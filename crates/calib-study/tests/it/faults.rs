@@ -47,6 +47,9 @@ fn the_result_does_not_depend_on_the_number_of_threads_nor_on_an_interruption() 
 
 #[test]
 fn good_data_are_accepted_and_never_wrong_without_a_warning() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let mut result = part(&[Fault::None], 1);
     // Six poses do not determine a robot: what is refused there is refused with reason.
     result.results.retain(|r| r.cell.design != Design::Six);
@@ -83,6 +86,9 @@ fn a_fault_is_never_accepted_as_a_wrong_result() {
 /// 40 mm and 5°, in every design with two recordings and with every body: one cause, named, or named beside what is not distinguishable.
 #[test]
 fn a_tracker_or_a_body_that_moved_before_the_last_recording_is_named() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let result = part(&[Fault::TrackerMoved, Fault::Remounted], 1);
     let unnamed: Vec<_> = result
         .results
@@ -96,6 +102,9 @@ fn a_tracker_or_a_body_that_moved_before_the_last_recording_is_named() {
 /// Half a percent to five percent of the samples are off by 10 to 100 mm. Six poses do not determine a robot.
 #[test]
 fn gross_samples_are_called_by_their_name() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let result = part(&[Fault::Outliers], 1);
     let enough = result
         .results
@@ -116,6 +125,9 @@ fn gross_samples_are_called_by_their_name() {
 /// Where a test that knows the fault would name it, the program does, from 20 poses on.
 #[test]
 fn effects_and_changes_that_the_recordings_show_are_named() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let result = part(&[Fault::Compliance, Fault::Bump], 1);
     let shown = |r: &&CaseResult| r.evidence.zip(r.needed).is_some_and(|(e, n)| e >= n);
     let many = [Design::Random, Design::Both, Design::Stream];
