@@ -217,6 +217,9 @@ fn a_mount_that_only_the_last_rows_see_is_judged_by_them() {
 
 #[test]
 fn a_tracker_that_is_bumped_is_named_with_its_row() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let dir = Scratch::new().robot("ripley");
     let header = dir.read(POSES);
     let header = header

@@ -171,6 +171,9 @@ fn a_declared_clock_is_believed_and_an_undeclared_one_is_not() {
 
 #[test]
 fn the_log_of_another_motion_is_refused() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let robot = ripley();
     let plan = plan(&robot, Motion::Continuous, 30.0);
     let mut streams =
@@ -295,6 +298,9 @@ fn bag(streams: &Streams) -> Vec<u8> {
 
 #[test]
 fn a_bag_with_joints_and_bodies_in_motion_gives_the_truth() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let robot = load_robot(&root().join("robots/justin.yaml")).expect("shipped");
     let ranges = [
         ("torso_0", -60.0, 60.0),

@@ -155,6 +155,9 @@ fn equal_weights_change_nothing() {
 /// Half of the rows are five times noisier: with weights the error is that of the good rows and a little better, and the covariance is true.
 #[test]
 fn weights_reach_what_the_good_rows_allow() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     const TRIALS: u64 = 200;
     let weights: Vec<f64> = (0..36)
         .map(|k| if k % 2 == 0 { 1.0 } else { 0.04 })

@@ -239,6 +239,9 @@ fn a_joint_that_scatters_is_no_change() {
 
 #[test]
 fn a_change_is_named_with_its_row() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let n = 10;
     for design in [Design::Random(40), Design::Random(100)] {
         let body = found(0..n, design, Event::Slip(TWO), |h| Moved::Body(h.body));

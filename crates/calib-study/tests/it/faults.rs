@@ -162,6 +162,9 @@ fn effects_and_changes_that_the_recordings_show_are_named() {
 /// 3° and 20 mm off, as the profile says: what would raise a residual of decimeters is named all the same.
 #[test]
 fn mistakes_in_one_recording_are_named_on_a_robot_that_is_far_off() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let result = part(&[Fault::SignInOne, Fault::ExchangeInOne], 1);
     let far = result.results.iter();
     let far: Vec<&CaseResult> = far
@@ -176,6 +179,9 @@ fn mistakes_in_one_recording_are_named_on_a_robot_that_is_far_off() {
 /// Six poses of one marker, and robots that are 3° and 20 mm off: what is not named is judged by its likelihood.
 #[test]
 fn mistakes_of_few_poses_and_of_robots_that_are_far_off_are_named() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let result = part(&[Fault::Exchange, Fault::WrongLink], 2);
     let seen = |r: &&CaseResult| r.moved_m.is_some_and(|moved| moved > 2e-5);
     let asked = |r: &&CaseResult| {

@@ -223,6 +223,9 @@ fn find<'a>(result: &'a StudyResult, scene: &str, method: &str) -> &'a Cell {
 /// distinguished from 1 at three errors; HSE's 0.3 is distinguished from 1 without it.
 #[test]
 fn efficiencies_are_sane() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let scenes = [
         "grid/hand//n63/r100mm/s1mm/0deg",
         "grid/hand//n63/r250mm/s1mm/1deg",
