@@ -42,7 +42,7 @@ pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError>
         filling,
         chosen: by_information,
         information: _,
-    } = choice(prepared, poses);
+    } = choice(prepared, poses, |q, count, taken| q.choose(count, taken));
     let efficiency = certificate(prepared, &filling, &by_information);
     let mut notes = prepared.notes.clone();
     let chosen: Vec<usize> = by_information.iter().chain(&filling).copied().collect();
@@ -142,7 +142,11 @@ fn pairs_of(poses: usize) -> usize {
 }
 
 /// The choice for a plan of so many postures, those from both sides left out.
-pub(crate) fn choice(prepared: &Prepared<'_>, poses: usize) -> Choice {
+pub(crate) fn choice(
+    prepared: &Prepared<'_>,
+    poses: usize,
+    choose: impl Fn(&Question<'_>, usize, &[usize]) -> Vec<usize>,
+) -> Choice {
     // The sequence begins with postures that fill the space, however many of it are possible.
     let filling: Vec<usize> = (0..poses.div_ceil(FILLING)).collect();
     let with_filling = beside(prepared, &filling);
@@ -152,7 +156,7 @@ pub(crate) fn choice(prepared: &Prepared<'_>, poses: usize) -> Choice {
         criterion: &prepared.criterion,
     };
     let count = poses - filling.len() - 2 * pairs_of(poses);
-    let chosen = question.choose(count, &filling);
+    let chosen = choose(&question, count, &filling);
     let information = question.information(&chosen);
     Choice {
         filling,

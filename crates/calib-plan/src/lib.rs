@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod basis;
+mod bound;
 pub mod candidates;
 pub mod compose;
 pub mod design;

@@ -31,7 +31,7 @@ impl Follow<'_> {
                 before: &before,
                 criterion: &self.prepared.criterion,
             };
-            let best = *question.choose(1, &taken).first()?;
+            let best = *question.quick(1, &taken).first()?;
             self.offered = Some(Next {
                 candidate: self.prepared.candidates[best].clone(),
                 why: Why::Information,
@@ -109,7 +109,7 @@ impl Follow<'_> {
             before: &before,
             criterion: &prepared.criterion,
         };
-        let chosen = question.choose(count, &taken).into_iter().map(|i| Next {
+        let chosen = question.quick(count, &taken).into_iter().map(|i| Next {
             candidate: prepared.candidates[i].clone(),
             why: Why::Information,
             blocked: false,
