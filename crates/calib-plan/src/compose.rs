@@ -42,7 +42,7 @@ pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError>
         filling,
         chosen: by_information,
         information: _,
-    } = choice(prepared, poses, |q, count, taken| q.choose(count, taken));
+    } = choice(prepared, poses, Effort::Full);
     let efficiency = certificate(prepared, &filling, &by_information);
     let mut notes = prepared.notes.clone();
     let chosen: Vec<usize> = by_information.iter().chain(&filling).copied().collect();
@@ -141,12 +141,17 @@ fn pairs_of(poses: usize) -> usize {
     (poses / PAIR_EVERY).max(usize::from(poses >= 12))
 }
 
+/// How well postures are chosen: for a list that is recorded, or to know how many it takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Effort {
+    /// From both starts.
+    Full,
+    /// From the greedy choice.
+    Quick,
+}
+
 /// The choice for a plan of so many postures, those from both sides left out.
-pub(crate) fn choice(
-    prepared: &Prepared<'_>,
-    poses: usize,
-    choose: impl Fn(&Question<'_>, usize, &[usize]) -> Vec<usize>,
-) -> Choice {
+pub(crate) fn choice(prepared: &Prepared<'_>, poses: usize, effort: Effort) -> Choice {
     // The sequence begins with postures that fill the space, however many of it are possible.
     let filling: Vec<usize> = (0..poses.div_ceil(FILLING)).collect();
     let with_filling = beside(prepared, &filling);
@@ -156,7 +161,10 @@ pub(crate) fn choice(
         criterion: &prepared.criterion,
     };
     let count = poses - filling.len() - 2 * pairs_of(poses);
-    let chosen = choose(&question, count, &filling);
+    let chosen = match effort {
+        Effort::Full => question.choose(count, &filling),
+        Effort::Quick => question.quick(count, &filling),
+    };
     let information = question.information(&chosen);
     Choice {
         filling,

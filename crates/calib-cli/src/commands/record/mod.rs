@@ -81,9 +81,9 @@ pub struct Record {
     /// Stop after this long, s
     #[arg(long)]
     pub(super) seconds: Option<f64>,
-    /// Which plugins are loaded: a recording needs none
+    /// Which plugins are loaded, for readers of the recordings that a plan counts on
     #[command(flatten)]
-    _plugins: PluginOptions,
+    pub(super) plugins: PluginOptions,
 }
 
 /// Records.

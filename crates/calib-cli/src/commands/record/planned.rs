@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use calib_capture::{Held, Outcome, Planner, Progress, Screen, Step, Survey, asked_is_reached};
-use calib_pipeline::options::Plugins;
 use calib_pipeline::prepare::load::RobotProfile;
 use calib_plan::candidates::Candidate;
 use calib_plan::follow::{Follow, Next, Reached, options};
@@ -51,14 +50,16 @@ impl Planned {
             return Err(RecordError::PlanMovesHeld { recording, joint }.into());
         }
         let mut before = robot.clone();
-        if out_path(robot, spec, asked) == robot.folder.join(&spec.file) {
+        // A file that does not exist counts nowhere.
+        let own = robot.folder.join(&spec.file).canonicalize().ok();
+        if own.is_some() && own == out_path(robot, spec, asked).canonicalize().ok() {
             // It counts as it is recorded, posture by posture.
             before.profile.recordings.remove(&recording);
             for contact in before.profile.contacts.values_mut() {
                 contact.recordings.retain(|name| *name != recording);
             }
         }
-        let known = Known::of(before, Plugins::Refused)?;
+        let known = Known::of(before, asked.plugins.plugins())?;
         Ok(Self {
             options: options(&file, &known, asked.sigma_mm.map(|mm| mm * 1e-3)),
             validates: spec.usage == Usage::Validation,
