@@ -20,7 +20,7 @@ pub(crate) fn free_port() -> u16 {
     socket.local_addr().expect("bound").port()
 }
 
-fn start(dir: &Scratch, arguments: &[&str]) -> Child {
+pub(crate) fn start(dir: &Scratch, arguments: &[&str]) -> Child {
     Command::new(env!("CARGO_BIN_EXE_calib"))
         .args(arguments)
         .current_dir(dir.path(""))
@@ -31,7 +31,7 @@ fn start(dir: &Scratch, arguments: &[&str]) -> Child {
         .expect("the program starts")
 }
 
-fn datagram(frame: u64, ts: f64, bodies: &[(u32, Isometry3<f64>)]) -> Vec<u8> {
+pub(crate) fn datagram(frame: u64, ts: f64, bodies: &[(u32, Isometry3<f64>)]) -> Vec<u8> {
     let mut text = format!("fr {frame}\r\nts {ts:.6}\r\n6d {} ", bodies.len());
     for (id, pose) in bodies {
         let p = pose.translation.vector * 1000.0;
@@ -44,7 +44,7 @@ fn datagram(frame: u64, ts: f64, bodies: &[(u32, Isometry3<f64>)]) -> Vec<u8> {
 }
 
 /// Rows of the file that are whole, without comments and header.
-fn rows(path: &Path) -> Vec<String> {
+pub(crate) fn rows(path: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(path).unwrap_or_default();
     let whole = &text[..text.rfind('\n').map_or(0, |i| i + 1)];
     let lines = whole.lines().filter(|l| !l.starts_with('#')).skip(1);

@@ -28,6 +28,7 @@ mod plan;
 mod plugins;
 mod real_robots;
 mod record;
+mod record_plan;
 mod robots;
 mod scratch;
 mod screens;

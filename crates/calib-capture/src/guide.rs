@@ -2,11 +2,27 @@
 
 use crate::{JointColumn, Unit};
 
-/// One pose of the sweep.
-#[derive(Clone, Debug, PartialEq)]
+/// One requested pose.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Step {
     /// Value of each guided joint, rad or m.
     pub targets: Vec<f64>,
+    /// It is only on the way to the next one: nothing is recorded.
+    pub through: bool,
+    /// The straight motion to it may touch something.
+    pub blocked: bool,
+    /// Bodies that need not be seen in it: places in [`crate::Plan::moved`].
+    pub unseen: Vec<usize>,
+}
+
+impl Step {
+    /// A pose that is recorded, and that everything that moves is seen in.
+    pub fn at(targets: Vec<f64>) -> Self {
+        Self {
+            targets,
+            ..Self::default()
+        }
+    }
 }
 
 /// A sweep: its joints, their ranges, its poses.
@@ -21,17 +37,25 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// `waist 40.0°, shoulder -80.0°`.
+    /// `waist 40.0°, shoulder -80.25°`.
     pub fn shown(&self, step: &Step, columns: &[JointColumn]) -> String {
-        let texts: Vec<String> = self
-            .joints
-            .iter()
-            .zip(&step.targets)
-            .filter_map(|(&joint, &target)| {
-                let column = columns.get(joint)?;
-                Some(format!("{} {}", column.name, column.unit.shown(target)))
-            })
-            .collect();
+        let all: Vec<usize> = (0..self.joints.len()).collect();
+        self.shown_of(step, &all, columns)
+    }
+
+    /// The same of some of the guided joints.
+    pub(crate) fn shown_of(
+        &self,
+        step: &Step,
+        places: &[usize],
+        columns: &[JointColumn],
+    ) -> String {
+        let of = |&place: &usize| {
+            let column = columns.get(*self.joints.get(place)?)?;
+            let target = step.targets.get(place)?;
+            Some(format!("{} {}", column.name, column.unit.asked(*target)))
+        };
+        let texts: Vec<String> = places.iter().filter_map(of).collect();
         texts.join(", ")
     }
 
@@ -78,9 +102,7 @@ pub fn grid(ranges: &[(f64, f64)], poses: usize) -> Vec<Step> {
         1 => (low + high) / 2.0,
         _ => low + (high - low) * i as f64 / (poses - 1) as f64,
     };
-    let mut steps = vec![Step {
-        targets: Vec::new(),
-    }];
+    let mut steps = vec![Step::default()];
     for &range in ranges {
         steps = steps
             .iter()
@@ -90,7 +112,7 @@ pub fn grid(ranges: &[(f64, f64)], poses: usize) -> Vec<Step> {
                     let i = if row % 2 == 0 { i } else { poses - 1 - i };
                     let mut targets = step.targets.clone();
                     targets.push(value(range, i));
-                    Step { targets }
+                    Step::at(targets)
                 })
             })
             .collect();

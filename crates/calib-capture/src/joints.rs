@@ -15,6 +15,16 @@ pub enum Unit {
 }
 
 impl Unit {
+    /// The position that is asked for: hundredths, where it has any, `40.0°` or `39.96°`.
+    pub fn asked(self, value: f64) -> String {
+        let (number, unit) = match self {
+            Unit::Angle => (format!("{:.2}", value.to_degrees()), "°"),
+            Unit::Length => (format!("{:.2}", value * 1e3), " mm"),
+        };
+        let number = number.strip_suffix('0').unwrap_or(&number);
+        format!("{number}{unit}")
+    }
+
     /// The value as a person reads it, `40.0°` or `120.0 mm`.
     pub fn shown(self, value: f64) -> String {
         match self {

@@ -3,7 +3,8 @@
 //! ```text
 //! socket ── Source ──► Frame ── Order ──► Session ──► Table      a row per frame while a pose is held
 //!                                          ▲    │
-//!                     joint values ────────┘    └──► Screen      next pose, lost bodies, progress
+//!                     joint values ────────┘    ├──► Screen      next pose, lost bodies, progress
+//!                                               └◄─► Planner     which pose is next, where a plan decides it
 //! ```
 //!
 //! A frame has two times: that of the device, and that of its arrival. Both are written (`t_s`,
@@ -26,6 +27,7 @@
 //! right body.
 
 pub mod dtrack;
+mod follow;
 mod frame;
 mod guide;
 mod joints;
@@ -38,6 +40,7 @@ mod survey;
 mod table;
 pub mod vrpn;
 
+pub use follow::{Held, Outcome, Planner, Progress, asked_is_reached};
 pub use frame::Frame;
 pub use guide::{Guide, Step, grid};
 pub use joints::{JointColumn, JointListener, JointSource, Unit, parse_joints};

@@ -1,11 +1,13 @@
 //! The file that grows while it is recorded: whole rows, on the disk every second.
 
-use calib_recording::{ReadOptions, WRITTEN_LIVE, read_bytes};
+use calib_recording::{Filled, ReadOptions, Recording, WRITTEN_LIVE, read_bytes};
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
 use calib_files::{FileError, input};
+
+use crate::Held;
 
 /// Rows wait at most this long for the disk, s.
 const EVERY: f64 = 1.0;
@@ -68,6 +70,8 @@ pub struct Table {
     pub last_time: Option<f64>,
     /// Holds that the file has already.
     pub held: Vec<String>,
+    /// What they say, in the same order.
+    pub holds: Vec<Held>,
 }
 
 impl Table {
@@ -100,6 +104,7 @@ impl Table {
             rows: 0,
             last_time: None,
             held: Vec::new(),
+            holds: Vec::new(),
         })
     }
 
@@ -147,7 +152,7 @@ impl Table {
                 "its poses are `{of_file}`, this recording asks for `{poses}`"
             )));
         }
-        let (mut rows, mut last_time, mut held) = (0, None, Vec::new());
+        let (mut rows, mut last_time, mut held, mut holds) = (0, None, Vec::new(), Vec::new());
         if lines.next().is_some() {
             let recording = read_bytes(&shown, text.as_bytes(), &ReadOptions::default())
                 .map_err(|e| other(e.to_string()))?;
@@ -155,6 +160,7 @@ impl Table {
                 rows = timeline.len() as u64;
                 last_time = timeline.t.as_ref().and_then(|t| t.last().copied());
                 held = timeline.labels.get("hold").cloned().unwrap_or_default();
+                holds = of_holds(&recording, &held);
                 held.retain(|name| !name.is_empty());
                 held.dedup();
             }
@@ -169,6 +175,7 @@ impl Table {
             rows,
             last_time,
             held,
+            holds,
         })
     }
 
@@ -256,6 +263,38 @@ impl Drop for Table {
     fn drop(&mut self) {
         let _ = self.flush();
     }
+}
+
+/// What each hold of a recording says; `labels`: the hold of each row, empty between holds.
+fn of_holds(recording: &Recording, labels: &[String]) -> Vec<Held> {
+    let rows: Vec<usize> = (0..labels.len()).collect();
+    let holds = rows.chunk_by(|a, b| labels[*a] == labels[*b]);
+    let named = holds.filter(|hold| !labels[hold[0]].is_empty());
+    let of = |hold: &[usize]| {
+        let mean = |q: &[Option<f64>]| {
+            let values: Vec<f64> = hold.iter().filter_map(|row| q[*row]).collect();
+            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+        };
+        let mostly = |seen: &dyn Fn(usize) -> bool| {
+            2 * hold.iter().filter(|row| seen(**row)).count() >= hold.len()
+        };
+        let joints = recording.joints.iter();
+        let bodies = recording.bodies.iter();
+        let bodies = bodies.filter(|b| mostly(&|row| b.tracker_from_body[row].is_some()));
+        let markers = recording.markers.iter();
+        let markers =
+            markers.filter(|m| mostly(&|row| m.samples[row].point(Filled::Exclude).is_some()));
+        Held {
+            joints: joints
+                .filter_map(|j| Some((j.name.clone(), mean(&j.q)?)))
+                .collect(),
+            seen: bodies
+                .map(|b| b.name.clone())
+                .chain(markers.map(|m| m.name.clone()))
+                .collect(),
+        }
+    };
+    named.map(of).collect()
 }
 
 fn short(text: &str) -> String {

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::joints::JointBox;
 use crate::scene::{Contact, Scene, rigid_parts};
-use crate::sight::{Seen, Sight, normalize};
+use crate::sight::{Seen, Sight, normal};
 
 /// A posture that is possible and seen.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,22 +76,30 @@ impl<'a> Feasible<'a> {
     /// # Errors
     /// The contact; `None` for a posture in which nothing is seen.
     pub fn candidate(&self, q: Vec<f64>) -> Result<Candidate, Option<Contact>> {
-        let root_from_link = self.model.forward_kinematics(&q);
-        let placed = self.scene.placed(&root_from_link);
+        let placed = self.scene.placed(&self.model.forward_kinematics(&q));
         if let Some(contact) = self.scene.contact(&placed) {
             return Err(Some(contact));
         }
-        let scene = (&self.scene, self.parts.as_slice());
-        let seen = self.sight.seen(scene, &placed, &root_from_link);
+        let seen = self.looked_at(&q);
         if !self.sight.measures(&seen) {
             return Err(None);
         }
         Ok(Candidate { q, seen })
     }
 
-    /// Those of some postures that are possible, and what removed the others.
+    /// What should be seen of a posture, possible or not.
     #[must_use]
-    pub fn all(&self, postures: Vec<Vec<f64>>) -> (Vec<Candidate>, Counts) {
+    pub fn looked_at(&self, q: &[f64]) -> Vec<Seen> {
+        let root_from_link = self.model.forward_kinematics(q);
+        let placed = self.scene.placed(&root_from_link);
+        let scene = (&self.scene, self.parts.as_slice());
+        self.sight.seen(scene, &placed, &root_from_link)
+    }
+
+    /// Those of some postures that are possible, and what removed the others. Covariances of markers are stated relative to these postures
+    /// from then on.
+    #[must_use]
+    pub fn all(&mut self, postures: Vec<Vec<f64>>) -> (Vec<Candidate>, Counts) {
         let mut counts = Counts {
             tried: postures.len(),
             ..Counts::default()
@@ -120,14 +128,16 @@ impl<'a> Feasible<'a> {
         let worst = pairs.into_iter().max_by_key(|(_, count)| *count);
         counts.worst_pair = worst.map(|((a, b), _)| [name(a), name(b)]);
         counts.feasible = kept.len();
-        let mut seen: Vec<Vec<Seen>> = kept
+        let factor = normal(kept.iter().flat_map(|c| &c.seen));
+        for shape in kept
             .iter_mut()
-            .map(|c| std::mem::take(&mut c.seen))
-            .collect();
-        normalize(&mut seen);
-        for (candidate, seen) in kept.iter_mut().zip(seen) {
-            candidate.seen = seen;
+            .flat_map(|c| &mut c.seen)
+            .flatten()
+            .flatten()
+        {
+            *shape *= factor;
         }
+        self.sight.scale *= factor;
         (kept, counts)
     }
 

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use crate::candidates::Candidate;
 use crate::design::Question;
 use crate::error::PlanError;
-use crate::list::{Plan, Posture, Why};
+use crate::list::{Asked, Plan, Posture, Why};
 use crate::note::Note;
 use crate::order::{Ways, detour};
 use crate::prepare::Prepared;
@@ -15,11 +15,14 @@ const FILLING: usize = 4;
 /// Postures per pair from both sides.
 const PAIR_EVERY: usize = 18;
 /// Postures in the order of information, before the order of the way: a list that is stopped early is then still good.
-const BY_INFORMATION: usize = 24;
+pub(crate) const BY_INFORMATION: usize = 24;
 /// Joints go back so far to come from the other side, rad and m: more than any backlash.
 const BACK: (f64, f64) = (0.14, 0.02);
 /// Detours are looked for among so many candidates.
 const DETOURS: usize = 300;
+
+/// A posture of a list: why it is there, and the place of the one that it repeats.
+pub(crate) type Listed = (Candidate, Why, Option<usize>);
 
 /// A plan of so many postures.
 ///
@@ -39,21 +42,25 @@ pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError>
         filling,
         chosen: by_information,
         information: _,
-    } = choice(prepared, poses);
+    } = choice(prepared, poses, Effort::Full);
     let efficiency = certificate(prepared, &filling, &by_information);
     let mut notes = prepared.notes.clone();
     let chosen: Vec<usize> = by_information.iter().chain(&filling).copied().collect();
-    let order = in_order(prepared, &chosen);
-    let of = |i: usize| prepared.candidates[i].clone();
-    let mut list: Vec<(Candidate, Why, Option<usize>)> = order
-        .iter()
-        .map(|&i| {
+    let of = |i: &usize| prepared.candidates[*i].clone();
+    let postures: Vec<Candidate> = chosen.iter().map(of).collect();
+    let rows: Vec<_> = chosen.iter().map(|i| prepared.rows[*i].clone()).collect();
+    let first = (BY_INFORMATION, None);
+    let order = in_order(prepared, (&postures, &rows), &prepared.before, first);
+    let mut list: Vec<Listed> = order
+        .into_iter()
+        .map(|k| {
+            let i = chosen[k];
             let why = if filling.contains(&i) {
                 Why::SpaceFilling
             } else {
                 Why::Information
             };
-            (of(i), why, None)
+            (postures[k].clone(), why, None)
         })
         .collect();
     // First the ways around, so that it is known from where each posture is approached.
@@ -101,6 +108,12 @@ pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError>
         robot: prepared.known.robot.profile.robot.clone(),
         goal: prepared.options.goal,
         joints: prepared.joints.clone(),
+        asked: Asked {
+            sigma: prepared.options.sigma,
+            of: prepared.options.of.clone(),
+            seed: prepared.options.seed,
+            task: prepared.options.task.clone().unwrap_or_default(),
+        },
         postures: postures.collect(),
         held_out: prepared.held_out(held_out),
         counts: prepared.counts.clone(),
@@ -128,8 +141,17 @@ fn pairs_of(poses: usize) -> usize {
     (poses / PAIR_EVERY).max(usize::from(poses >= 12))
 }
 
+/// How well postures are chosen: for a list that is recorded, or to know how many it takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Effort {
+    /// From both starts.
+    Full,
+    /// From the greedy choice.
+    Quick,
+}
+
 /// The choice for a plan of so many postures, those from both sides left out.
-pub(crate) fn choice(prepared: &Prepared<'_>, poses: usize) -> Choice {
+pub(crate) fn choice(prepared: &Prepared<'_>, poses: usize, effort: Effort) -> Choice {
     // The sequence begins with postures that fill the space, however many of it are possible.
     let filling: Vec<usize> = (0..poses.div_ceil(FILLING)).collect();
     let with_filling = beside(prepared, &filling);
@@ -139,7 +161,10 @@ pub(crate) fn choice(prepared: &Prepared<'_>, poses: usize) -> Choice {
         criterion: &prepared.criterion,
     };
     let count = poses - filling.len() - 2 * pairs_of(poses);
-    let chosen = question.choose(count, &filling);
+    let chosen = match effort {
+        Effort::Full => question.choose(count, &filling),
+        Effort::Quick => question.quick(count, &filling),
+    };
     let information = question.information(&chosen);
     Choice {
         filling,
@@ -167,31 +192,38 @@ fn certificate(prepared: &Prepared<'_>, filling: &[usize], chosen: &[usize]) -> 
     question.certificate(chosen).unwrap_or(0.0)
 }
 
-/// The first by information, one after the other; the rest by a short way.
-fn in_order(prepared: &Prepared<'_>, chosen: &[usize]) -> Vec<usize> {
-    let rows: Vec<_> = chosen.iter().map(|i| prepared.rows[*i].clone()).collect();
+/// Places of some postures in their order: the first `count` by information beside what is known `before`, the rest by a short way from there,
+/// or from where the robot is.
+pub(crate) fn in_order(
+    prepared: &Prepared<'_>,
+    (chosen, rows): (&[Candidate], &[DMatrix<f64>]),
+    before: &DMatrix<f64>,
+    (count, at): (usize, Option<&[f64]>),
+) -> Vec<usize> {
     let question = Question {
-        rows: &rows,
-        before: &prepared.before,
+        rows,
+        before,
         criterion: &prepared.criterion,
     };
-    let first = question.greedy(BY_INFORMATION.min(chosen.len()));
+    let first = question.greedy(count.min(chosen.len()));
     let rest: Vec<usize> = (0..chosen.len()).filter(|i| !first.contains(i)).collect();
-    let postures: Vec<&[f64]> = chosen
-        .iter()
-        .map(|i| prepared.candidates[*i].q.as_slice())
-        .collect();
+    // Of the motions between postures, only those of the rest are compared.
+    let from = match first.last() {
+        Some(last) => Some(chosen[*last].q.as_slice()),
+        None => at,
+    };
+    let of_rest = rest.iter().map(|i| chosen[*i].q.as_slice());
+    let postures: Vec<&[f64]> = from.into_iter().chain(of_rest).collect();
     let ways = Ways::new(&prepared.feasible, &prepared.joints, &postures);
-    let rest = ways.shortest(first.last().copied(), &rest);
-    first.into_iter().chain(rest).map(|k| chosen[k]).collect()
+    let begin = usize::from(from.is_some());
+    let places: Vec<usize> = (begin..postures.len()).collect();
+    let way = ways.shortest(from.map(|_| 0), &places);
+    let rest = way.into_iter().map(|place| rest[place - begin]);
+    first.into_iter().chain(rest).collect()
 }
 
 /// Adds earlier postures again, every joint coming from the other side; how many.
-fn both_sides(
-    prepared: &Prepared<'_>,
-    list: &mut Vec<(Candidate, Why, Option<usize>)>,
-    pairs: usize,
-) -> usize {
+fn both_sides(prepared: &Prepared<'_>, list: &mut Vec<Listed>, pairs: usize) -> usize {
     let mut found = 0;
     for k in 1..list.len() {
         if found == pairs {
@@ -222,12 +254,8 @@ fn both_sides(
 }
 
 /// Puts postures on the way where the straight motion is blocked; places in the list of those that stay blocked.
-fn with_detours(
-    prepared: &Prepared<'_>,
-    list: &mut Vec<(Candidate, Why, Option<usize>)>,
-) -> Vec<usize> {
-    let (mut out, mut blocked): (Vec<(Candidate, Why, Option<usize>)>, _) =
-        (Vec::new(), Vec::new());
+pub(crate) fn with_detours(prepared: &Prepared<'_>, list: &mut Vec<Listed>) -> Vec<usize> {
+    let (mut out, mut blocked): (Vec<Listed>, _) = (Vec::new(), Vec::new());
     // Where each posture of the list went.
     let mut place = Vec::new();
     for mut next in std::mem::take(list) {

@@ -87,6 +87,74 @@ pub enum PlanError {
         /// Why.
         why: String,
     },
+    /// A file is no plan of this robot.
+    #[error("{file}: {why}\n  help: give the `plan.yaml` that `calib plan` wrote for this robot")]
+    NotAPlan {
+        /// The file.
+        file: String,
+        /// Why.
+        why: String,
+    },
+    /// A plan was made for another robot.
+    #[error(
+        "{file}: the plan is for `{planned}`, {profile} describes `{robot}`\n  help: give the plan of this robot: `calib plan {profile}`"
+    )]
+    OtherRobot {
+        /// The plan.
+        file: String,
+        /// Its robot.
+        planned: String,
+        /// The profile.
+        profile: String,
+        /// The profile's robot.
+        robot: String,
+    },
+    /// A profile has no recording for the postures of a plan.
+    #[error(
+        "{profile}: no recording has `use: static` or `use: validation`, where the postures of a plan belong\n  help: add one: `recordings: {{poses: {{file: poses.csv, use: static}}}}`"
+    )]
+    NoRecording {
+        /// The profile.
+        profile: String,
+    },
+    /// Postures of a plan are outside the ranges that hold now.
+    #[error(
+        "{file}: a posture is outside the range that joint `{joint}` has now\n  help: plan again: `calib plan {profile}`"
+    )]
+    OutsideRanges {
+        /// The plan.
+        file: String,
+        /// The profile.
+        profile: String,
+        /// The joint.
+        joint: String,
+    },
+    /// Postures of a plan are not possible now.
+    #[error(
+        "{file}: {} of {} postures are no longer possible: {}\n  help: plan again: `calib plan {profile}`", counts.tried - counts.feasible, counts.tried, words::removed(counts)
+    )]
+    Impossible {
+        /// The plan.
+        file: String,
+        /// The profile.
+        profile: String,
+        /// What removed how many.
+        counts: Box<Counts>,
+    },
+    /// A plan was made of something else than is there now.
+    #[error(
+        "{file}: the plan expects {}, its postures now reach {}: the profile, the robot or the recordings have changed since\n  help: plan again: `calib plan {profile}`. Where the recording itself was part of the plan, record into another file with `--out`.", words::sigma_of(*then), words::sigma_of(*now)
+    )]
+    Outdated {
+        /// The plan.
+        file: String,
+        /// The profile.
+        profile: String,
+        /// σ that the plan states, m; `None`: not determined.
+        then: Option<f64>,
+        /// σ now, m.
+        now: Option<f64>,
+    },
     /// The σ that was asked for is not reached.
     #[error(
         "{file}: σ of {asked} is not reached with {most} postures: {reached}\n  help: ask for more, reduce the tracker's noise, or move markers further apart (`calib plan --poses {most}` shows what remains)"
@@ -130,10 +198,16 @@ impl PlanError {
             Self::NoPosture { file, .. }
             | Self::TooFew { file, .. }
             | Self::NoRange { file, .. }
+            | Self::NoRecording { profile: file }
             | Self::NoPlace { file }
             | Self::OutOfReach { file, .. }
             | Self::BoxOutOfReach { file, .. }
             | Self::NotJoints { file, .. }
+            | Self::NotAPlan { file, .. }
+            | Self::OtherRobot { file, .. }
+            | Self::OutsideRanges { file, .. }
+            | Self::Impossible { file, .. }
+            | Self::Outdated { file, .. }
             | Self::NotReached { file, .. }
             | Self::NothingFree { file }
             | Self::Table { file, .. } => Some(file),
@@ -146,7 +220,13 @@ impl PlanError {
         match self {
             Self::Pipeline(error) => error.exit_code(),
             Self::NotReached { .. } => ExitCode::VerdictFail,
-            Self::OutOfReach { .. } | Self::NotJoints { .. } => ExitCode::Data,
+            Self::OutOfReach { .. }
+            | Self::NotJoints { .. }
+            | Self::NotAPlan { .. }
+            | Self::OtherRobot { .. }
+            | Self::OutsideRanges { .. }
+            | Self::Impossible { .. }
+            | Self::Outdated { .. } => ExitCode::Data,
             Self::Table { .. } => ExitCode::NotWritten,
             _ => ExitCode::Usage,
         }

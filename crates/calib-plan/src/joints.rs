@@ -133,12 +133,17 @@ impl JointBox {
     /// A posture inside the ranges.
     #[must_use]
     pub fn holds(&self, q: &[f64]) -> bool {
-        let inside = |m: &Moved| (m.low - 1e-3..=m.high + 1e-3).contains(&q[m.joint.index()]);
-        self.moved.iter().all(inside)
+        self.moved.iter().all(|m| m.holds(q[m.joint.index()]))
     }
 }
 
 impl Moved {
+    /// A position inside the range, to 0.06° or 1 mm.
+    #[must_use]
+    pub fn holds(&self, q: f64) -> bool {
+        (self.low - 1e-3..=self.high + 1e-3).contains(&q)
+    }
+
     /// The nearest position that is written, inside the range.
     #[must_use]
     pub fn rounded(&self, q: f64) -> f64 {

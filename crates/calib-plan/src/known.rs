@@ -1,6 +1,6 @@
 //! What is known before the first planned posture: from the profile, and from the recordings that exist.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::rigid_body::Template;
 use calib_core::Settings;
@@ -39,6 +39,8 @@ pub struct Known {
     pub still: Vec<(JointId, f64)>,
     /// Whether it is known where the robot stands before the tracker.
     pub placed: bool,
+    /// Bodies and markers that will not be recorded, though they can be seen.
+    pub unrecorded: BTreeSet<String>,
     /// What was assumed.
     pub notes: Vec<Note>,
 }
@@ -102,6 +104,7 @@ impl Known {
             noise: levels.map(|(g, n)| (g.name.clone(), n.sigma)).collect(),
             still,
             placed: true,
+            unrecorded: BTreeSet::new(),
             notes,
             tracks: checked.tracks,
             start: checked.start,
@@ -138,6 +141,7 @@ impl Known {
         }
         Self {
             placed: place.is_some(),
+            unrecorded: BTreeSet::new(),
             inputs: None,
             tracks,
             start,

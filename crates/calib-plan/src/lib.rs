@@ -1,10 +1,12 @@
 #![doc = include_str!("../README.md")]
 
 pub mod basis;
+mod bound;
 pub mod candidates;
 pub mod compose;
 pub mod design;
 mod error;
+pub mod follow;
 pub mod joints;
 pub mod known;
 pub mod linear;
@@ -22,6 +24,7 @@ mod words;
 pub mod write;
 
 pub use error::PlanError;
+pub use follow::Follow;
 pub use known::Known;
 pub use list::{Goal, Plan};
 pub use nalgebra;

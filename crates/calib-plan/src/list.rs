@@ -50,6 +50,19 @@ pub struct Posture {
     pub sigma: Option<f64>,
 }
 
+/// What a plan was asked for beside its goal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Asked {
+    /// σ of the task, m; `None`: a number of postures.
+    pub sigma: Option<f64>,
+    /// Wanted parameters, by a part of their names.
+    pub of: Vec<String>,
+    /// Seed of the candidates.
+    pub seed: u32,
+    /// Task postures that were given, by joint index.
+    pub task: Vec<Vec<f64>>,
+}
+
 /// A plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
@@ -59,6 +72,8 @@ pub struct Plan {
     pub goal: Goal,
     /// Moved joints, and what every other joint stands at.
     pub joints: JointBox,
+    /// What was asked for.
+    pub asked: Asked,
     /// Postures in the order in which they are taken.
     pub postures: Vec<Posture>,
     /// Independent postures to validate with.

@@ -1,7 +1,7 @@
 //! A plan: which postures, in which order, and what they will tell.
 
 use crate::basis::sigma;
-use crate::compose::{choice, compose};
+use crate::compose::{Effort, choice, compose};
 use crate::error::PlanError;
 use crate::known::Known;
 use crate::list::Plan;
@@ -38,7 +38,7 @@ fn for_sigma(prepared: &Prepared<'_>, asked: f64) -> Result<Plan, PlanError> {
     };
     // Without an order and postures from both sides, to begin near the number.
     let without_order = |count: usize| {
-        let m = choice(prepared, count).information;
+        let m = choice(prepared, count, Effort::Quick).information;
         sigma(&m, &prepared.b)
     };
     let reaches = |sigma: Option<f64>| sigma.is_some_and(|s| s <= asked);

@@ -62,6 +62,7 @@ const SEED_PAIRS: u32 = 0x9a12;
 const PAIR_POSTURES: usize = 256;
 
 /// Everything that the choice needs, prepared once.
+#[derive(Debug)]
 pub struct Prepared<'a> {
     /// What is known.
     pub known: &'a Known,
@@ -77,6 +78,8 @@ pub struct Prepared<'a> {
     pub counts: Counts,
     /// Task postures.
     pub task: Vec<Vec<f64>>,
+    /// Names of the free parameters.
+    pub names: Vec<String>,
     /// Directions that can be known.
     pub basis: Basis,
     /// Rows of the candidates in the basis.
@@ -103,7 +106,7 @@ pub fn prepare<'a>(known: &'a Known, options: &'a Options) -> Result<Prepared<'a
         return Err(PlanError::NoPlace { file: file() });
     }
     let mut notes = known.notes.clone();
-    let (feasible, unread) = known.feasible(&joints, options.seed);
+    let (mut feasible, unread) = known.feasible(&joints, options.seed);
     notes.extend(of_scene(known, &joints, &feasible.scene, unread));
     let (candidates, counts) = feasible.all(joints.postures(options.candidates, options.seed));
     if candidates.is_empty() {
@@ -143,6 +146,7 @@ pub fn prepare<'a>(known: &'a Known, options: &'a Options) -> Result<Prepared<'a
         candidates,
         counts,
         task,
+        names: linear.names,
         basis,
         rows,
         before,
@@ -192,7 +196,8 @@ impl Known {
         let scene = Scene::new(model, &solids, spec, &for_pairs);
         let moves = |link: LinkId| joints.moved.iter().any(|m| model.carries(m.joint, link));
         let place = self.start.tracker_from_root;
-        let sight = Sight::new(spec, self.subjects(&moves), place);
+        let mut sight = Sight::new(spec, self.subjects(&moves), place);
+        sight.unrecorded = self.unrecorded.clone();
         (Feasible::new(model, joints, scene, sight), unread)
     }
 
@@ -329,6 +334,39 @@ impl Prepared<'_> {
         let all = self.joints.postures(1 << 13, seed).into_iter();
         let seen = all.filter(|q| inside(q) && self.feasible.candidate(q.clone()).is_ok());
         seen.take(count).collect()
+    }
+
+    /// Rows of some postures in the basis.
+    ///
+    /// # Errors
+    /// [`PlanError::Pipeline`] where the problem cannot be stated.
+    pub fn rows_of(&self, postures: &[Candidate]) -> Result<Vec<DMatrix<f64>>, PlanError> {
+        if postures.is_empty() {
+            return Ok(Vec::new());
+        }
+        let subjects = &self.feasible.sight.subjects;
+        let linear = self.known.linearize(postures, subjects, &self.task)?;
+        // What no posture of these shows may be no parameter of theirs.
+        let place = |name: &String| linear.names.iter().position(|n| n == name);
+        let places: Vec<Option<usize>> = self.names.iter().map(place).collect();
+        let rows = linear.planned.iter().map(|y| {
+            let columns = places.iter().map(|place| match place {
+                Some(place) => y.column(*place).into_owned(),
+                None => nalgebra::DVector::zeros(y.nrows()),
+            });
+            let columns: Vec<_> = columns.collect();
+            compressed(&self.basis.of(&DMatrix::from_columns(&columns)))
+        });
+        Ok(rows.collect())
+    }
+
+    /// The joint of a posture that is outside its range.
+    #[must_use]
+    pub fn outside(&self, q: &[f64]) -> String {
+        let mut moved = self.joints.moved.iter();
+        let out = moved.find(|m| !m.holds(q[m.joint.index()]));
+        let model = &self.known.robot.model;
+        out.map_or_else(String::new, |m| model.joint(m.joint).name.clone())
     }
 
     /// σ of the task and of the parameters after postures in this order, with the sides from which joints come.

@@ -8,7 +8,7 @@
 //!
 //! (2) is a triangulation with equal angular noise; its trace over all markers that are seen is on average that of the stated σ.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_profile::{Camera, Facing, PlanSpec};
 use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
@@ -33,6 +33,14 @@ pub struct Subject {
     pub moves: bool,
 }
 
+impl Subject {
+    /// The name under which it is recorded.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.marker.as_deref().unwrap_or(&self.body)
+    }
+}
+
 /// The tracker's eyes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sight {
@@ -40,6 +48,10 @@ pub struct Sight {
     pub tracker_from_root: Isometry3<f64>,
     /// Everything that can be seen.
     pub subjects: Vec<Subject>,
+    /// Factor of equation (2) that brings the mean trace of the candidates to that of the stated σ.
+    pub scale: f64,
+    /// Bodies and markers that are not recorded: they count as hidden.
+    pub unrecorded: BTreeSet<String>,
     cameras: Vec<Camera>,
     least: usize,
 }
@@ -54,6 +66,8 @@ impl Sight {
         Self {
             tracker_from_root,
             subjects,
+            scale: 1.0,
+            unrecorded: BTreeSet::new(),
             cameras: spec.cameras.values().cloned().collect(),
             least: spec.min_cameras,
         }
@@ -75,6 +89,9 @@ impl Sight {
     ) -> Vec<Seen> {
         let root_from_tracker = self.tracker_from_root.inverse();
         let of = |subject: &Subject| {
+            if self.unrecorded.contains(subject.name()) {
+                return None;
+            }
             if self.cameras.is_empty() {
                 return Some(None);
             }
@@ -92,7 +109,8 @@ impl Sight {
                     information += across(&(in_tracker - camera.at));
                 }
             }
-            (count >= self.least).then(|| information.try_inverse())
+            let shape = || information.try_inverse().map(|m| m * self.scale);
+            (count >= self.least).then(shape)
         };
         self.subjects.iter().map(of).collect()
     }
@@ -100,6 +118,12 @@ impl Sight {
     /// Whether what is seen is a measurement of a moving body: its pose, or as many of its markers as span it.
     #[must_use]
     pub fn measures(&self, seen: &[Seen]) -> bool {
+        !self.measured(seen).is_empty()
+    }
+
+    /// Moving bodies that are measured.
+    #[must_use]
+    pub fn measured(&self, seen: &[Seen]) -> BTreeSet<String> {
         /// Markers that span a body.
         const SPAN: usize = 3;
         let mut of_body: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
@@ -108,22 +132,21 @@ impl Sight {
             *all += 1;
             *visible += usize::from(seen.is_some());
         }
-        let mut counts = of_body.values();
-        counts.any(|(all, visible)| *visible >= SPAN.min(*all))
+        let enough = |(_, (all, visible)): &(&str, (usize, usize))| *visible >= SPAN.min(*all);
+        let measured = of_body.into_iter().filter(enough);
+        measured.map(|(body, _)| body.to_owned()).collect()
     }
 }
 
-/// Covariance shapes whose mean trace over everything that is seen is 3.
-pub fn normalize(all: &mut [Vec<Seen>]) {
-    let shapes = || all.iter().flatten().flatten().flatten();
-    let (sum, count) = shapes().fold((0.0, 0), |(s, n), m| (s + m.trace(), n + 1));
+/// The factor by which the mean trace of covariance shapes is 3.
+#[must_use]
+pub fn normal<'s>(all: impl Iterator<Item = &'s Seen>) -> f64 {
+    let shapes = all.flatten().flatten();
+    let (sum, count) = shapes.fold((0.0, 0), |(s, n), m| (s + m.trace(), n + 1));
     if count == 0 || sum <= 0.0 {
-        return;
+        return 1.0;
     }
-    let factor = 3.0 * f64::from(count) / sum;
-    for shape in all.iter_mut().flatten().flatten().flatten() {
-        *shape *= factor;
-    }
+    3.0 * f64::from(count) / sum
 }
 
 /// (1 − d dᵀ)/ρ²; with 1e-3 along the sight, so that one camera gives a covariance, if a long one.

@@ -17,6 +17,15 @@ pub fn length(meters: Option<f64>) -> String {
     }
 }
 
+/// A σ with its unit; what is not determined says so.
+#[must_use]
+pub fn sigma_of(meters: Option<f64>) -> String {
+    match meters {
+        Some(m) => format!("a σ of {} mm", millimeters(m)),
+        None => "no σ (not determined)".to_owned(),
+    }
+}
+
 /// Three significant digits of a length, mm.
 #[must_use]
 pub fn millimeters(meters: f64) -> String {

@@ -1,10 +1,10 @@
 //! The files of a plan, and how they are read back.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_files::OutputFile;
 use calib_recording::{Poses, ReadOptions, WriteOptions};
-use calib_urdf::RobotModel;
+use calib_urdf::{JointId, RobotModel};
 use serde::{Deserialize, Serialize};
 
 use crate::candidates::Counts;
@@ -18,6 +18,9 @@ use crate::page::page;
 /// What is wrong with a table that cannot be written.
 const RENAME: &str = "rename the joint in the URDF";
 
+/// Version of `plan.yaml`.
+const VERSION: u32 = 1;
+
 /// A plan as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanFile {
@@ -27,6 +30,9 @@ pub struct PlanFile {
     pub robot: String,
     /// What the postures are good at.
     pub goal: Goal,
+    /// What else was asked for.
+    #[serde(default)]
+    pub asked: AskedLine,
     /// σ of the task before and after, mm; absent: not determined.
     pub sigma_before_mm: Option<f64>,
     /// As `sigma_before_mm`.
@@ -37,6 +43,31 @@ pub struct PlanFile {
     pub postures: Vec<PostureLine>,
     /// To validate with.
     pub held_out: Vec<BTreeMap<String, f64>>,
+}
+
+/// What was asked for, as it is written.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct AskedLine {
+    /// σ of the task, mm; absent: a number of postures.
+    pub sigma_mm: Option<f64>,
+    /// Wanted parameters, by a part of their names.
+    pub of: Vec<String>,
+    /// Seed of the candidates.
+    pub seed: u32,
+    /// Task postures that were given, `<joint>_deg` or `<joint>_mm`.
+    pub task: Vec<BTreeMap<String, f64>>,
+}
+
+impl Default for AskedLine {
+    fn default() -> Self {
+        Self {
+            sigma_mm: None,
+            of: Vec::new(),
+            seed: 1,
+            task: Vec::new(),
+        }
+    }
 }
 
 /// A posture as it is written.
@@ -72,9 +103,17 @@ impl Plan {
         let mm = |s: Option<f64>| s.map(|s| rounded(s * 1e3, 6));
         let postures = self.postures.iter().enumerate();
         PlanFile {
-            calib_plan: 1,
+            calib_plan: VERSION,
             robot: self.robot.clone(),
             goal: self.goal,
+            asked: AskedLine {
+                sigma_mm: mm(self.asked.sigma),
+                of: self.asked.of.clone(),
+                seed: self.asked.seed,
+                task: (self.asked.task.iter())
+                    .map(|q| by_name(model, &self.joints, q))
+                    .collect(),
+            },
             sigma_before_mm: mm(self.sigma_before),
             sigma_after_mm: mm(self.sigma),
             efficiency_at_least: rounded(self.efficiency, 4),
@@ -188,13 +227,19 @@ impl Plan {
 /// Reads a plan.
 ///
 /// # Errors
-/// [`PlanError::NotJoints`] where the file is none, or names joints that the robot does not have.
+/// [`PlanError::NotAPlan`] where the file is none, or names joints that the robot does not have.
 pub fn read(text: &str, name: &str, model: &RobotModel) -> Result<PlanFile, PlanError> {
-    let wrong = |why: String| PlanError::NotJoints {
+    let wrong = |why: String| PlanError::NotAPlan {
         file: name.to_owned(),
         why,
     };
     let file: PlanFile = serde_saphyr::from_str(text).map_err(|e| wrong(e.to_string()))?;
+    if file.calib_plan != VERSION {
+        return Err(wrong(format!(
+            "its version is {}, this program reads {VERSION}",
+            file.calib_plan
+        )));
+    }
     let joint = |key: &str| key.rsplit_once('_').map(|k| k.0.to_owned());
     let all = file.postures.iter().flat_map(|p| p.joints.keys());
     for key in all.chain(file.held_out.iter().flat_map(BTreeMap::keys)) {
@@ -214,21 +259,38 @@ impl PlanFile {
     /// stand as in `base`.
     #[must_use]
     pub fn positions(&self, model: &RobotModel, base: &[f64]) -> [Vec<Vec<f64>>; 2] {
-        let of = |joints: &BTreeMap<String, f64>| {
-            let mut q = base.to_vec();
-            for (key, value) in joints {
-                let named = key.rsplit_once('_').map(|k| model.joint_id(k.0));
-                if let Some(Ok(id)) = named {
-                    q[id.index()] = value / shown(model.joint(id).kind.turns()).0;
-                }
-            }
-            q
-        };
+        let of = |joints| self.at(model, base, joints);
         let recorded = self.postures.iter().filter(|p| p.why != Why::Detour);
         [
             recorded.map(|p| of(&p.joints)).collect(),
             self.held_out.iter().map(of).collect(),
         ]
+    }
+
+    /// Joint positions of one of its postures, by joint index.
+    #[must_use]
+    pub fn at(&self, model: &RobotModel, base: &[f64], joints: &BTreeMap<String, f64>) -> Vec<f64> {
+        let mut q = base.to_vec();
+        for (key, value) in joints {
+            let named = key.rsplit_once('_').map(|k| model.joint_id(k.0));
+            if let Some(Ok(id)) = named {
+                q[id.index()] = value / shown(model.joint(id).kind.turns()).0;
+            }
+        }
+        q
+    }
+
+    /// Joints that it moves.
+    #[must_use]
+    pub fn joints(&self, model: &RobotModel) -> Vec<JointId> {
+        let all = self.postures.iter().map(|p| &p.joints);
+        let named: BTreeSet<&String> = all.chain(&self.held_out).flat_map(BTreeMap::keys).collect();
+        let names = named.into_iter().filter_map(|key| key.rsplit_once('_'));
+        let ids: BTreeSet<JointId> = names.filter_map(|k| model.joint_id(k.0).ok()).collect();
+        model
+            .independent_joints()
+            .filter(|id| ids.contains(id))
+            .collect()
     }
 }
 

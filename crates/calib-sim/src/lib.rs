@@ -96,6 +96,43 @@ pub fn simulate(
     simulate_again(profile, model, seed, 0)
 }
 
+/// The robot of [`simulate`] in given postures (joint positions by joint index, rad or m, by recording); recordings that are not named are those
+/// of the section.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_postures(
+    profile: &Profile,
+    model: &RobotModel,
+    seed: Option<u64>,
+    postures: &BTreeMap<String, Vec<Vec<f64>>>,
+) -> Result<Simulated, SimError> {
+    /// Streams of their own, that no recording of a section has.
+    const GIVEN: u64 = 1 << 16;
+    let plan = profile.simulate.as_ref().ok_or(SimError::NoSection)?;
+    let mut simulated = simulate(profile, model, seed)?;
+    let seed = seed.unwrap_or(plan.seed);
+    let robot = TrueRobot::draw(profile, plan, model, seed);
+    let tracker = Tracker {
+        profile,
+        plan,
+        robot: &robot,
+    };
+    for (index, (name, q)) in postures.iter().enumerate() {
+        let mut rng = stream(seed, GIVEN + index as u64);
+        let commanded = Commanded {
+            q: q.clone(),
+            groups: Vec::new(),
+        };
+        let protocol = plan.recordings.get(name);
+        let all: Vec<String> = profile.bodies.keys().cloned().collect();
+        let bodies = protocol.map_or(&all, |protocol| &protocol.bodies);
+        let poses = measure(&tracker, model, &commanded, bodies, &mut rng);
+        simulated.recordings.insert(name.clone(), poses);
+    }
+    Ok(simulated)
+}
+
 /// The robot of [`simulate`] recorded once more: the same robot, mounts and tracker, other random poses and other noise. Repetition 0 is
 /// [`simulate`].
 ///

@@ -121,7 +121,7 @@ fn planned(
     let recorded = std::mem::take(&mut robot.profile.recordings);
     let usages = [Usage::Static, Usage::Validation];
     let mut tables = BTreeMap::new();
-    let (feasible, _) = known.feasible(&joints, 1);
+    let (mut feasible, _) = known.feasible(&joints, 1);
     let mut shapes = BTreeMap::new();
     for ((name, usage), postures) in PLANNED.iter().zip(usages).zip([fitted, held_out]) {
         let (seen, _) = feasible.all(postures);

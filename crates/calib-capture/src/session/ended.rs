@@ -9,6 +9,8 @@ pub enum Key {
     There,
     /// Skip this pose.
     Skip,
+    /// Record the next best pose instead of this one.
+    Instead,
     /// Count this pose with what is seen of it.
     Keep,
     /// Record the last pose again.
@@ -26,6 +28,8 @@ pub enum Key {
 pub enum Ended {
     /// All poses were held.
     Finished,
+    /// What was asked for is reached.
+    Reached,
     /// The operator ended it.
     Quit,
     /// The program was interrupted.
@@ -45,7 +49,10 @@ pub enum Ended {
 impl Ended {
     /// Whether it ended as intended.
     pub fn is_good(&self) -> bool {
-        matches!(self, Ended::Finished | Ended::Quit | Ended::TimeIsOver)
+        matches!(
+            self,
+            Ended::Finished | Ended::Reached | Ended::Quit | Ended::TimeIsOver
+        )
     }
 }
 
@@ -53,6 +60,7 @@ impl std::fmt::Display for Ended {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Ended::Finished => f.write_str("all poses recorded"),
+            Ended::Reached => f.write_str("what was asked for is reached"),
             Ended::Quit => f.write_str("stopped by the operator"),
             Ended::Interrupted => f.write_str("interrupted"),
             Ended::TimeIsOver => f.write_str("the time limit was reached"),

@@ -1,7 +1,7 @@
 //! The pose that is being held: its rows wait until the whole hold is good, so that no part of one is in the file.
 
 use super::plan::{Moved, Plan};
-use crate::Frame;
+use crate::{Frame, Held};
 
 /// A frame's row, but for the number of its hold.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +28,8 @@ pub(super) struct Hold {
     seen: Vec<u64>,
     /// Frames in which each moved body was seen.
     moved: Vec<u64>,
+    /// Sum and number of the values of each joint column.
+    joints: Vec<(f64, u64)>,
 }
 
 /// A moved body must be seen in this share of a hold: its median is then of the pose, whatever the rest shows.
@@ -35,8 +37,12 @@ const ENOUGH: f64 = 0.5;
 
 impl Hold {
     /// Takes a frame.
-    pub(super) fn take(&mut self, plan: &Plan, frame: &Frame, row: Row) {
+    pub(super) fn take(&mut self, plan: &Plan, frame: &Frame, joints: &[Option<f64>], row: Row) {
         self.rows.push(row);
+        self.joints.resize(joints.len(), (0.0, 0));
+        for (sum, q) in self.joints.iter_mut().zip(joints) {
+            *sum = q.map_or(*sum, |q| (sum.0 + q, sum.1 + 1));
+        }
         self.seen.resize(plan.watched.len(), 0);
         self.moved.resize(plan.moved.len(), 0);
         for (watched, seen) in plan.watched.iter().zip(&mut self.seen) {
@@ -47,13 +53,30 @@ impl Hold {
         }
     }
 
-    /// Moved bodies that were not seen often enough.
-    pub(super) fn lost<'p>(&self, plan: &'p Plan) -> Vec<&'p Moved> {
-        let frames = self.rows.len() as f64;
-        let each = plan.moved.iter().zip(&self.moved);
-        each.filter(|(_, seen)| (**seen as f64) < ENOUGH * frames)
-            .map(|(moved, _)| moved)
+    /// Moved bodies that were not seen often enough, but for those that need not be seen.
+    pub(super) fn lost<'p>(&self, plan: &'p Plan, unseen: &[usize]) -> Vec<&'p Moved> {
+        let each = plan.moved.iter().zip(&self.moved).enumerate();
+        each.filter(|(place, (_, seen))| !unseen.contains(place) && !self.is_enough(**seen))
+            .map(|(_, (moved, _))| moved)
             .collect()
+    }
+
+    fn is_enough(&self, seen: u64) -> bool {
+        seen as f64 >= ENOUGH * self.rows.len() as f64
+    }
+
+    /// What the hold says, by name.
+    pub(super) fn held(&self, plan: &Plan) -> Held {
+        let joints = plan.columns.iter().zip(&self.joints);
+        let means = joints.filter(|(_, (_, count))| *count > 0);
+        let seen = plan.watched.iter().zip(&self.seen);
+        let seen = seen.filter(|(_, seen)| self.is_enough(**seen));
+        Held {
+            joints: means
+                .map(|(column, (sum, count))| (column.name.clone(), sum / *count as f64))
+                .collect(),
+            seen: seen.map(|(watched, _)| watched.name.clone()).collect(),
+        }
     }
 
     /// Share of the frames without each body or marker that was lost in some.

@@ -1,6 +1,7 @@
 //! A recording being made: which pose is next, whether it is held, which rows are written.
 
 mod ended;
+mod follow;
 mod hold;
 mod plan;
 mod record;
@@ -16,8 +17,8 @@ use std::collections::BTreeSet;
 
 use crate::table::Mark;
 use crate::{
-    Arrival, Frame, JointListener, JointSource, Order, Screen, Step, StillSettings, Stillness,
-    Table, TableError, Unit,
+    Arrival, Frame, JointListener, JointSource, Order, Planner, Screen, Step, StillSettings,
+    Stillness, Table, TableError, Unit,
 };
 use hold::Hold;
 use waits::Waits;
@@ -54,8 +55,10 @@ struct Last {
 
 /// A recording being made.
 #[derive(Debug)]
-pub struct Session {
+pub struct Session<'a> {
     plan: Plan,
+    /// Decides which poses are still to come, where it is not the guide.
+    planner: Option<Box<dyn Planner + 'a>>,
     table: Table,
     order: Order,
     still: Stillness,
@@ -79,9 +82,16 @@ pub struct Session {
     rate: Option<f64>,
     restarted: bool,
     too_old: u64,
+    /// Targets of the pose that was held or passed last.
+    before: Option<Vec<f64>>,
+    /// Since when a body is hidden in this pose, s, and whether that was said.
+    hidden_since: Option<f64>,
+    said_hidden: bool,
+    /// What was asked of a planned recording is reached.
+    reached: bool,
 }
 
-impl Session {
+impl Session<'_> {
     /// A session that writes to `table`; poses that the table already holds are not requested again.
     pub fn new(plan: Plan, table: Table) -> Self {
         let numbers: BTreeSet<u64> = table.held.iter().filter_map(|h| h.parse().ok()).collect();
@@ -93,6 +103,7 @@ impl Session {
             free: numbers.last().copied().unwrap_or(0),
             phase: Phase::Settling,
             plan,
+            planner: None,
             table,
             order: Order::default(),
             still: Stillness::new(StillSettings::default()),
@@ -110,6 +121,10 @@ impl Session {
             rate: None,
             restarted: false,
             too_old: 0,
+            before: None,
+            hidden_since: None,
+            said_hidden: false,
+            reached: false,
         };
         session.step = session.next_missing(0);
         session.phase = session.first_phase();
@@ -117,7 +132,7 @@ impl Session {
     }
 
     fn is_guided(&self) -> bool {
-        !self.plan.guide.steps.is_empty()
+        self.planner.is_some() || !self.plan.guide.steps.is_empty()
     }
 
     fn first_phase(&self) -> Phase {
@@ -136,8 +151,11 @@ impl Session {
             .unwrap_or(steps)
     }
 
-    /// Requested poses that the file does not have, counted from 1.
+    /// Requested poses of the guide that the file does not have, counted from 1.
     pub fn missing(&self) -> Vec<usize> {
+        if self.planner.is_some() {
+            return Vec::new();
+        }
         let steps = 0..self.plan.guide.steps.len();
         steps
             .filter(|s| !self.done.contains(s))
@@ -147,7 +165,7 @@ impl Session {
 
     /// Number of the hold that comes next.
     fn number(&self) -> u64 {
-        if self.is_guided() {
+        if self.is_guided() && self.planner.is_none() {
             self.step as u64 + 1
         } else {
             self.free + 1
@@ -161,31 +179,7 @@ impl Session {
 
     /// Whether all poses were held.
     pub fn is_finished(&self) -> bool {
-        self.is_guided() && self.step >= self.plan.guide.steps.len()
-    }
-
-    /// Announces the next pose.
-    pub fn announce(&self, screen: &mut dyn Screen) {
-        let guide = &self.plan.guide;
-        if let Some(step) = self.step() {
-            let how = match self.plan.joints {
-                JointSource::Targets => "move there, then press Enter",
-                JointSource::Udp(_) => "move there and hold still",
-            };
-            screen.line(&format!(
-                "pose {}/{}: {}; {how}",
-                self.step + 1,
-                guide.steps.len(),
-                guide.shown(step, &self.plan.columns)
-            ));
-        } else if self.plan.continuous {
-            screen.line("Every frame is recorded: move the robot slowly through its range.");
-        } else if guide.steps.is_empty() && self.held == 0 {
-            screen.line(&format!(
-                "Free poses: hold each pose for {:.1} s.",
-                self.plan.hold
-            ));
-        }
+        self.is_guided() && (self.reached || self.step >= self.plan.guide.steps.len())
     }
 
     /// A datagram or report that could not be used.
@@ -202,7 +196,9 @@ impl Session {
     /// When the file cannot be written.
     pub fn key(&mut self, key: Key, screen: &mut dyn Screen) -> Result<(), TableError> {
         match (key, self.phase) {
+            (Key::There, Phase::Going) if self.is_passing() => self.pass(screen),
             (Key::There, Phase::Going) => self.phase = Phase::Settling,
+            (Key::Instead, _) => self.instead(screen)?,
             (Key::Keep, Phase::Settling | Phase::Holding(_)) if self.is_guided() => {
                 self.as_it_is = true;
                 screen.line("  this pose counts with what is seen of it");
@@ -211,11 +207,19 @@ impl Session {
             (Key::Skip, _) if self.is_guided() => {
                 screen.line("  skipped");
                 self.give_up_hold()?;
+                if let Some(planner) = &mut self.planner {
+                    planner.skipped();
+                }
                 self.next(screen);
             }
             _ => {}
         }
         Ok(())
+    }
+
+    /// Whether the requested pose is only on the way.
+    fn is_passing(&self) -> bool {
+        self.step().is_some_and(|step| step.through)
     }
 
     /// Takes the pose that was held last out of the file, and asks for it again.
@@ -234,6 +238,10 @@ impl Session {
         self.done.remove(&last.step);
         self.free = self.free.saturating_sub(1);
         self.step = last.step;
+        if let Some(planner) = &mut self.planner {
+            planner.forget();
+        }
+        self.follow();
         self.as_it_is = false;
         self.phase = self.first_phase();
         self.announce(screen);
@@ -254,13 +262,19 @@ impl Session {
 
     fn next(&mut self, screen: &mut dyn Screen) {
         self.as_it_is = false;
-        self.phase = if self.is_guided() {
+        (self.hidden_since, self.said_hidden) = (None, false);
+        self.phase = if self.planner.is_some() {
+            self.follow();
+            Phase::Going
+        } else if self.is_guided() {
             self.step = self.next_missing(self.step + 1);
             Phase::Going
         } else {
             Phase::Leaving
         };
-        self.announce(screen);
+        if !self.reached {
+            self.announce(screen);
+        }
     }
 
     /// Value of a column now, rad or m.
@@ -347,7 +361,9 @@ impl Session {
         match self.phase {
             Phase::Holding(since) => {
                 let row = self.row(frame, t, host, listener);
-                self.hold.take(&self.plan, frame, row);
+                let at = 0..self.plan.columns.len();
+                let joints: Vec<_> = at.map(|c| self.joint(c, host, listener)).collect();
+                self.hold.take(&self.plan, frame, &joints, row);
                 if host - since >= self.plan.hold {
                     self.end_hold(host - since, host, screen)?;
                 }
@@ -372,7 +388,7 @@ impl Session {
         host: f64,
         screen: &mut dyn Screen,
     ) -> Result<(), TableError> {
-        let lost = self.hold.lost(&self.plan);
+        let lost = self.hold.lost(&self.plan, self.unseen());
         if !lost.is_empty() && !self.as_it_is {
             let names: Vec<&str> = lost.iter().map(|moved| moved.name.as_str()).collect();
             screen.line(&format!(
@@ -385,6 +401,7 @@ impl Session {
         self.report_pose(lasted, screen);
         let number = self.number();
         let before = self.table.mark()?;
+        let held = self.hold.held(&self.plan);
         for row in std::mem::take(&mut self.hold).rows {
             self.table.row(&row.text(Some(number)), host)?;
         }
@@ -395,11 +412,13 @@ impl Session {
             before,
         });
         self.held += 1;
-        if self.is_guided() {
+        self.before = self.step().map(|step| step.targets.clone());
+        if self.is_guided() && self.planner.is_none() {
             self.done.insert(self.step);
         } else {
             self.free = number;
         }
+        self.planned_on(held, screen);
         self.next(screen);
         Ok(())
     }
@@ -416,12 +435,18 @@ impl Session {
         }
     }
 
-    /// Moved bodies that are hidden in this frame.
+    /// Moved bodies that need not be seen in the requested pose.
+    fn unseen(&self) -> &[usize] {
+        self.step().map_or(&[], |step| &step.unseen)
+    }
+
+    /// Moved bodies that are hidden in this frame and should not be.
     fn hidden(&self, frame: &Frame) -> Vec<String> {
-        let moved = self.plan.moved.iter();
+        let unseen = self.unseen();
+        let moved = self.plan.moved.iter().enumerate();
         moved
-            .filter(|moved| !moved.is_in(&self.plan, frame))
-            .map(|moved| moved.name.clone())
+            .filter(|(place, moved)| !unseen.contains(place) && !moved.is_in(&self.plan, frame))
+            .map(|(_, moved)| moved.name.clone())
             .collect()
     }
 
@@ -436,12 +461,18 @@ impl Session {
             return Ok(());
         }
         match self.phase {
+            Phase::Going if self.is_there(host, listener) && self.is_passing() => {
+                self.pass(screen);
+            }
             Phase::Going if self.is_there(host, listener) => self.phase = Phase::Settling,
             Phase::Leaving if quiet.is_none() => self.phase = Phase::Settling,
             _ => {}
         }
         let measured = matches!(self.plan.joints, JointSource::Udp(_));
         let hidden = self.hidden(frame);
+        if self.phase == Phase::Settling {
+            self.say_hidden(&hidden, host, screen);
+        }
         match (self.phase, quiet) {
             // The measured joints have left the target: the robot was only passing.
             (Phase::Holding(_) | Phase::Settling, _)

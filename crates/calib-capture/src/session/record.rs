@@ -5,7 +5,7 @@ use crate::{Input, JointListener, JointSource, Screen, Source};
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
-impl Session {
+impl Session<'_> {
     /// Records until the session ends; then all rows are on disk.
     ///
     /// `clock` is the monotonic time of this computer, s; `keys` the operator's input.
@@ -65,6 +65,9 @@ impl Session {
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => keys_open = false,
                 }
+            }
+            if self.reached {
+                return Ok(Ended::Reached);
             }
             if self.is_finished() {
                 return Ok(Ended::Finished);

@@ -5,7 +5,7 @@ use super::{Session, WatchedKind};
 use crate::{Frame, JointListener};
 use std::fmt::Write as _;
 
-impl Session {
+impl Session<'_> {
     pub(super) fn row(
         &mut self,
         frame: &Frame,

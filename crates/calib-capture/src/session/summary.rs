@@ -2,7 +2,7 @@
 
 use super::{Phase, Session};
 use crate::guide::shown_range;
-use crate::{Order, Screen};
+use crate::{JointSource, Order, Screen};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -27,7 +27,34 @@ pub struct Summary {
     pub covered: BTreeMap<String, (f64, f64)>,
 }
 
-impl Session {
+impl Session<'_> {
+    /// Announces the next pose.
+    pub fn announce(&self, screen: &mut dyn Screen) {
+        let guide = &self.plan.guide;
+        if let Some(step) = self.step() {
+            let how = match (self.plan.joints, step.through) {
+                (JointSource::Targets, _) => "move there, then press Enter",
+                (JointSource::Udp(_), false) => "move there and hold still",
+                (JointSource::Udp(_), true) => "move through it",
+            };
+            let pose = match step.through {
+                true => "on the way, not recorded".to_owned(),
+                false => format!("pose {}/{}", self.number(), self.listed()),
+            };
+            screen.line(&format!("{pose}: {}; {how}", self.motion()));
+            if step.blocked {
+                screen.line("  The straight motion may touch something: move there by hand or with a motion planner.");
+            }
+        } else if self.plan.continuous {
+            screen.line("Every frame is recorded: move the robot slowly through its range.");
+        } else if guide.steps.is_empty() && self.held == 0 {
+            screen.line(&format!(
+                "Free poses: hold each pose for {:.1} s.",
+                self.plan.hold
+            ));
+        }
+    }
+
     pub(super) fn report_pose(&self, held: f64, screen: &mut dyn Screen) {
         let rows = self.hold.rows.len();
         let mut text = format!(
@@ -42,10 +69,10 @@ impl Session {
 
     /// The current state in one line, at this time of this computer, s.
     pub fn status(&self, now: f64) -> String {
-        let mut text = match self.plan.guide.steps.len() {
+        let mut text = match self.listed() {
             _ if self.plan.continuous => format!("{} rows", self.table.rows),
             0 => format!("pose {}", self.number()),
-            n => format!("pose {}/{n}", (self.step + 1).min(n)),
+            n => format!("pose {}/{n}", self.number().min(n as u64)),
         };
         let doing = match (&self.waits, self.phase) {
             (_, Phase::Holding(since)) => {
@@ -91,7 +118,7 @@ impl Session {
         Summary {
             rows: self.table.rows,
             poses: self.held,
-            in_file: if self.is_guided() {
+            in_file: if self.is_guided() && self.planner.is_none() {
                 self.done.len()
             } else {
                 self.free as usize
@@ -112,7 +139,7 @@ impl Session {
     pub fn report(&self, screen: &mut dyn Screen) {
         let summary = self.summary();
         let rows = summary.rows;
-        let of = match self.plan.guide.steps.len() {
+        let of = match self.listed() {
             0 => String::new(),
             n => format!(" of {n}"),
         };
@@ -122,6 +149,12 @@ impl Session {
             screen.line(&format!(
                 "{rows} rows and {}{of} poses in the file, {} of them from this session",
                 summary.in_file, summary.poses
+            ));
+        }
+        let to_come = self.listed().saturating_sub(summary.in_file);
+        if self.planner.is_some() && to_come > 0 && !self.reached {
+            screen.line(&format!(
+                "{to_come} poses of the plan are still to come. Repeat the command with `--append` to record them."
             ));
         }
         if !summary.missing.is_empty() {

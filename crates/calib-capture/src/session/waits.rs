@@ -56,7 +56,7 @@ impl std::fmt::Display for Waits {
     }
 }
 
-impl Session {
+impl Session<'_> {
     /// Why nothing is held now.
     pub(super) fn waiting(
         &self,

@@ -73,7 +73,7 @@ fn plan(name: &str) -> Plan {
 }
 
 /// A session of the plan for a body of that name, which writes to `path`.
-fn session(path: &std::path::Path, name: &str) -> Session {
+fn session(path: &std::path::Path, name: &str) -> Session<'static> {
     let plan = plan(name);
     let table = Table::create(path, &[], &plan.header()).expect("made");
     Session::new(plan, table)

@@ -1,5 +1,6 @@
 //! Tests of calib-capture through its public interface: with senders of our own on this computer's own network.
 
+mod follow;
 mod fuzz_seeds;
 mod loopback;
 mod order;

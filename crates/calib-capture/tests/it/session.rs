@@ -1,14 +1,14 @@
 //! A guided sweep without a network: frames and keys in, rows and lines out.
 
 use calib_capture::{
-    Frame, Guide, JointColumn, JointListener, JointSource, Key, Lines, Moved, Plan, Session, Table,
-    Unit, Watched, WatchedKind, grid,
+    Frame, Guide, JointColumn, JointListener, JointSource, Key, Lines, Moved, Plan, Screen,
+    Session, Table, Unit, Watched, WatchedKind, grid,
 };
 use calib_recording::{Filled, ReadOptions, Recording, read_path};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
-fn plan(joints: JointSource, poses: usize) -> Plan {
+pub(crate) fn plan(joints: JointSource, poses: usize) -> Plan {
     let ranges = vec![(-0.5, 0.5)];
     let column = |name: &str, fixed| JointColumn {
         name: name.into(),
@@ -56,23 +56,36 @@ fn at(waist: f64) -> Isometry3<f64> {
     )
 }
 
+/// Keeps what the operator reads.
+#[derive(Default)]
+pub(crate) struct Said(pub(crate) String);
+
+impl Screen for Said {
+    fn line(&mut self, text: &str) {
+        self.0 += text;
+        self.0.push('\n');
+    }
+
+    fn status(&mut self, _text: &str, _now: f64) {}
+}
+
 /// A robot under a tracker of 100 Hz.
-struct Scene {
-    session: Session,
-    screen: Lines<Vec<u8>>,
+pub(crate) struct Scene {
+    pub(crate) session: Session<'static>,
+    pub(crate) said: Said,
     listener: Option<JointListener>,
     number: u64,
     waist: f64,
 }
 
 impl Scene {
-    fn new(path: &Path, plan: Plan) -> Scene {
+    pub(crate) fn new(path: &Path, plan: Plan) -> Scene {
         let table = Table::create(path, &["test".to_string()], &plan.header()).expect("made");
         let listener = matches!(plan.joints, JointSource::Udp(_))
             .then(|| JointListener::open(0).expect("a free port"));
         Scene {
             session: Session::new(plan, table),
-            screen: Lines::new(Vec::new()),
+            said: Said::default(),
             listener,
             number: 0,
             waist: -0.5,
@@ -83,15 +96,15 @@ impl Scene {
         1000.0 + self.number as f64 * 0.01
     }
 
-    fn key(&mut self, key: Key) {
-        self.session.key(key, &mut self.screen).expect("written");
+    pub(crate) fn key(&mut self, key: Key) {
+        self.session.key(key, &mut self.said).expect("written");
     }
 
     fn frame(&mut self, with_tip: bool) {
         self.frame_of(true, with_tip);
     }
 
-    fn frame_of(&mut self, with_hand: bool, with_tip: bool) {
+    pub(crate) fn frame_of(&mut self, with_hand: bool, with_tip: bool) {
         let now = self.now();
         if let Some(listener) = &mut self.listener {
             listener.datagram(format!("waist_rad={}", self.waist).as_bytes(), now);
@@ -109,23 +122,23 @@ impl Scene {
         }
         self.number += 1;
         self.session
-            .frame(&frame, now, self.listener.as_ref(), &mut self.screen)
+            .frame(&frame, now, self.listener.as_ref(), &mut self.said)
             .expect("written");
     }
 
-    fn go(&mut self, to: f64) {
+    pub(crate) fn go(&mut self, to: f64) {
         while (to - self.waist).abs() > 1e-9 {
             self.waist += (to - self.waist).clamp(-0.01, 0.01);
             self.frame(true);
         }
     }
 
-    fn stay(&mut self, frames: usize) {
+    pub(crate) fn stay(&mut self, frames: usize) {
         (0..frames).for_each(|i| self.frame(i % 4 != 0));
     }
 }
 
-fn read(path: &Path) -> Recording {
+pub(crate) fn read(path: &Path) -> Recording {
     read_path(path, &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -151,7 +164,7 @@ fn a_guided_sweep_with_commanded_joints() {
     scene.go(0.5);
     scene.stay(120);
     assert!(scene.session.is_finished());
-    scene.session.report(&mut scene.screen);
+    scene.session.report(&mut scene.said);
     drop(scene.session);
     let recording = read(&path);
     let timeline = &recording.timelines[0];
@@ -456,7 +469,7 @@ fn the_status_says_what_a_pose_waits_for() {
         let listener = scene.listener.as_ref();
         scene
             .session
-            .frame(&frame, now, listener, &mut scene.screen)
+            .frame(&frame, now, listener, &mut scene.said)
             .expect("written");
     };
     silent(&mut scene, "hello");

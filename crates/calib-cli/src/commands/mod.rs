@@ -12,6 +12,7 @@ pub mod init;
 pub mod man;
 mod names;
 pub mod plan;
+mod plan_file;
 mod plugin_options;
 pub mod plugins;
 pub mod record;

@@ -1,13 +1,17 @@
 //! `calib simulate`.
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use calib_files::{OutputFile, ResultsFolder};
 use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::load::{RobotProfile, load_robot};
+use calib_plan::PlanError;
+use calib_profile::{RecordingSpec, Usage};
 use calib_recording::WriteOptions;
 use clap::Args;
 
+use super::plan_file::plan_of;
 use super::plugin_options::PluginOptions;
 use crate::error::CliError;
 use crate::terminal::{Console, emit_paths};
@@ -20,6 +24,9 @@ pub struct Simulate {
     /// Seed of the random numbers [default: the profile's]
     #[arg(long)]
     seed: Option<u64>,
+    /// `plan.yaml` of `calib plan`: its postures in recordings with `use: static`, its held-out ones in those with `use: validation`
+    #[arg(long)]
+    plan: Option<PathBuf>,
     /// Folder to write to
     #[arg(short, long)]
     out: PathBuf,
@@ -32,18 +39,26 @@ pub struct Simulate {
 pub fn run(console: &Console, options: &Simulate) -> Result<ExitCode, CliError> {
     let robot = load_robot(&options.profile)?;
     let folder = ResultsFolder::open(&options.out)?;
-    let files = simulate(&robot, options.seed)?;
+    let postures = match &options.plan {
+        Some(path) => postures(&robot, path)?,
+        None => BTreeMap::new(),
+    };
+    let files = simulate(&robot, options.seed, &postures)?;
     emit_paths(console.json, &folder.write(&files)?)?;
     Ok(ExitCode::Accepted)
 }
 
 /// The files of a simulation: every recording under its profile path's file name, and `truth.json`.
-fn simulate(robot: &RobotProfile, seed: Option<u64>) -> Result<Vec<OutputFile>, CliError> {
-    let simulated = calib_sim::simulate(&robot.profile, &robot.model, seed).map_err(|source| {
-        CliError::Simulation {
-            file: robot.file.clone(),
-            source: Box::new(source),
-        }
+fn simulate(
+    robot: &RobotProfile,
+    seed: Option<u64>,
+    postures: &BTreeMap<String, Vec<Vec<f64>>>,
+) -> Result<Vec<OutputFile>, CliError> {
+    let (profile, model) = (&robot.profile, &robot.model);
+    let simulated = calib_sim::simulate_postures(profile, model, seed, postures);
+    let simulated = simulated.map_err(|source| CliError::Simulation {
+        file: robot.file.clone(),
+        source: Box::new(source),
     })?;
     let mut files = Vec::new();
     for (name, poses) in &simulated.recordings {
@@ -76,6 +91,31 @@ fn simulate(robot: &RobotProfile, seed: Option<u64>) -> Result<Vec<OutputFile>, 
     truth.push('\n');
     files.push(OutputFile::text("truth.json", truth));
     Ok(files)
+}
+
+/// The postures of a plan by recording.
+fn postures(
+    robot: &RobotProfile,
+    path: &Path,
+) -> Result<BTreeMap<String, Vec<Vec<f64>>>, CliError> {
+    let plan = plan_of(path, robot)?;
+    let mut base = robot.model.zero_positions();
+    for (joint, value) in &robot.profile.plan.hold {
+        base[joint.index()] = *value;
+    }
+    let [fitted, held_out] = plan.positions(&robot.model, &base);
+    let recordings = robot.profile.recordings.iter();
+    let of = |(name, spec): (&String, &RecordingSpec)| match spec.usage {
+        Usage::Static => Some((name.clone(), fitted.clone())),
+        Usage::Validation => Some((name.clone(), held_out.clone())),
+        Usage::Sweep => None,
+    };
+    let postures: BTreeMap<String, Vec<Vec<f64>>> = recordings.filter_map(of).collect();
+    if postures.is_empty() {
+        let profile = robot.file.clone();
+        return Err(PlanError::NoRecording { profile }.into());
+    }
+    Ok(postures)
 }
 
 fn file_name(robot: &RobotProfile, recording: &str) -> String {

@@ -2,15 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use calib_files::{ResultsFolder, input};
+use calib_files::ResultsFolder;
 use calib_pipeline::ExitCode;
-use calib_pipeline::prepare::inputs::RobotProfile;
 use calib_pipeline::prepare::load::load_robot;
-use calib_plan::PlanError;
-use calib_plan::write::{PlanFile, read};
 use calib_twin::{About, Options, profile_of, session, terminal, twin, write};
 use clap::{Args, ValueEnum};
 
+use super::plan_file::plan_of;
 use super::plugin_options::PluginOptions;
 use crate::error::CliError;
 use crate::terminal::{Console, Counted, emit};
@@ -62,9 +60,6 @@ enum TruthName {
     Prior,
 }
 
-/// Largest plan, bytes.
-const LARGEST: u64 = 64 << 20;
-
 /// Makes the trials, and writes the files.
 pub fn run(console: &Console, options: &TwinArguments) -> Result<ExitCode, CliError> {
     let positive = |value: &f64| *value > 0.0 && value.is_finite();
@@ -83,7 +78,7 @@ pub fn run(console: &Console, options: &TwinArguments) -> Result<ExitCode, CliEr
         .clone()
         .unwrap_or_else(|| default_folder(&profile));
     let folder = ResultsFolder::open(&out)?;
-    let plan = options.plan.as_ref().map(|path| planned(path, &robot));
+    let plan = options.plan.as_ref().map(|path| plan_of(path, &robot));
     let about = options.truth.map(|truth| match truth {
         TruthName::Found => About::Found,
         TruthName::Prior => About::Prior,
@@ -109,15 +104,6 @@ pub fn run(console: &Console, options: &TwinArguments) -> Result<ExitCode, CliEr
         (false, false) => terminal::summary(&found, &out.display().to_string()),
     })?;
     Ok(ExitCode::Accepted)
-}
-
-fn planned(path: &Path, robot: &RobotProfile) -> Result<PlanFile, CliError> {
-    let shown = path.display().to_string();
-    let text = input::read_text(path, LARGEST).map_err(|e| PlanError::NotJoints {
-        file: shown.clone(),
-        why: e.to_string(),
-    })?;
-    Ok(read(&text, &shown, &robot.model)?)
 }
 
 fn default_folder(profile: &Path) -> PathBuf {

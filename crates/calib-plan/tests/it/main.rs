@@ -1,6 +1,7 @@
 //! Designs, candidates, orders and whole plans.
 
 mod design;
+mod follow;
 mod plans;
 mod reached;
 mod robots;

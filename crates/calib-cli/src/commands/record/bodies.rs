@@ -1,10 +1,10 @@
 //! Bodies and markers: the profile's names and the tracker's, and what the swept joints move.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_capture::{Moved, Screen, Survey, Watched, WatchedKind, map_names};
 use calib_pipeline::prepare::load::RobotProfile;
-use calib_profile::{Body, BodyKind, RecordingSpec};
+use calib_profile::{Body, BodyKind};
 use calib_urdf::{JointId, LinkId, RobotModel};
 
 use super::RecordError;
@@ -61,11 +61,15 @@ pub(super) fn watched(
     Ok(watched)
 }
 
-/// Recorded bodies that the swept joints move.
-pub(super) fn moved(robot: &RobotProfile, spec: &RecordingSpec, watched: &[Watched]) -> Vec<Moved> {
+/// Recorded bodies that the guided joints move.
+pub(super) fn moved(
+    robot: &RobotProfile,
+    guided: &BTreeSet<JointId>,
+    watched: &[Watched],
+) -> Vec<Moved> {
     let of_body = |(name, body): (&String, &Body)| {
         let mut joints = joints_to(&robot.model, body.link);
-        if !joints.any(|joint| spec.ranges.contains_key(&joint)) {
+        if !joints.any(|joint| guided.contains(&robot.model.joint(joint).law.source)) {
             return None;
         }
         let parts = watched.iter().enumerate();
@@ -80,6 +84,17 @@ pub(super) fn moved(robot: &RobotProfile, spec: &RecordingSpec, watched: &[Watch
         })
     };
     robot.profile.bodies.iter().filter_map(of_body).collect()
+}
+
+/// Bodies and markers of the profile that are not recorded.
+pub(super) fn unrecorded(robot: &RobotProfile, watched: &[Watched]) -> BTreeSet<String> {
+    let of_body = |(name, body): (&String, &Body)| match &body.kind {
+        BodyKind::Pose => vec![name.clone()],
+        BodyKind::Markers { names, .. } => names.clone(),
+    };
+    let all = robot.profile.bodies.iter().flat_map(of_body);
+    all.filter(|name| !watched.iter().any(|w| w.name == *name))
+        .collect()
 }
 
 /// Joints that move a recorded body, in the order of the file.

@@ -37,6 +37,44 @@ pub enum RecordError {
         /// The recordings of the profile.
         known: Vec<String>,
     },
+    /// The recording is no place for the postures of a plan.
+    #[error(
+        "recording `{recording}` is a sweep or a motion, and a plan has single postures\n  help: choose a recording with `use: static` for its postures, one with `use: validation` for its held-out ones"
+    )]
+    PlanInSweep {
+        /// The recording.
+        recording: String,
+    },
+    /// The profile says that a joint stands still which the plan moves.
+    #[error(
+        "the plan moves joint `{joint}`, recording `{recording}` holds it\n  help: take `{joint}` out of `hold` of the recording, or plan with `plan: {{hold: …}}`"
+    )]
+    PlanMovesHeld {
+        /// The recording.
+        recording: String,
+        /// The joint.
+        joint: String,
+    },
+    /// The robot does not send joints that the plan moves.
+    #[error(
+        "{plan} moves {}, the robot sends {}\n  help: let it send all joints of the plan, or leave out `--joints` and move to the stated positions", missing.join(", "), sent.join(", ")
+    )]
+    PlanJointsNotSent {
+        /// The plan.
+        plan: String,
+        /// Joints that are not sent.
+        missing: Vec<String>,
+        /// Joints that are.
+        sent: Vec<String>,
+    },
+    /// No body that the plan moves is recorded.
+    #[error(
+        "{plan}: none of the recorded bodies is moved by its joints\n  help: map one that they move: `--map`"
+    )]
+    PlanMovesNothing {
+        /// The plan.
+        plan: String,
+    },
     /// `--poses` gives no poses, or too many.
     #[error(
         "--poses {poses} makes {count} poses\n  help: give from 1 to some dozens for each joint"

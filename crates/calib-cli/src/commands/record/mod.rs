@@ -3,6 +3,8 @@
 mod bodies;
 pub mod error;
 mod plan;
+mod planned;
+mod rules;
 
 use std::io::{BufRead as _, IsTerminal as _};
 use std::path::PathBuf;
@@ -21,8 +23,11 @@ use clap::Args;
 use super::plugin_options::PluginOptions;
 use crate::error::CliError;
 use crate::terminal::{Console, emit_paths, say_stage};
+use bodies::unrecorded;
 use error::RecordError;
-use plan::{assumed_zero, guide_ranges, is_continuous, plan};
+use plan::{assumed_zero, plan};
+use planned::{Guided, Planned};
+use rules::is_continuous;
 
 /// How long the tracker is listened to before the columns are decided, s.
 const SURVEY: f64 = 1.0;
@@ -39,6 +44,13 @@ pub struct Record {
     /// Recording of the profile; required if it has several
     #[arg(long)]
     pub(super) recording: Option<String>,
+    /// `plan.yaml` of `calib plan`: guides to its postures (a recording with `use: validation`: to its held-out ones), and chooses those
+    /// to come again from what was recorded
+    #[arg(long, conflicts_with = "poses")]
+    pub(super) plan: Option<PathBuf>,
+    /// Stop where the σ of the tool's position is this, mm [default: what the plan was asked for]
+    #[arg(long, requires = "plan")]
+    pub(super) sigma_mm: Option<f64>,
     /// The CSV to write, which must not exist [default: the recording's file]
     #[arg(short, long)]
     pub(super) out: Option<PathBuf>,
@@ -69,9 +81,9 @@ pub struct Record {
     /// Stop after this long, s
     #[arg(long)]
     pub(super) seconds: Option<f64>,
-    /// Which plugins are loaded: a recording needs none
+    /// Which plugins are loaded, for readers of the recordings that a plan counts on
     #[command(flatten)]
-    _plugins: PluginOptions,
+    pub(super) plugins: PluginOptions,
 }
 
 /// Records.
@@ -117,7 +129,7 @@ fn record(
     let address: Address = options.source.parse().map_err(RecordError::Source)?;
     let joints: JointSource = options.joints.parse().map_err(RecordError::Joints)?;
     // Joint values come from the poses that are asked for, from the robot, or from its own log.
-    let asks = !guide_ranges(robot, spec).is_empty() && !is_continuous(spec);
+    let asks = options.plan.is_some() || !spec.ranges.is_empty() && !is_continuous(spec);
     let logs = is_continuous(spec) && spec.robot_log.is_some();
     if !asks && !logs && joints == JointSource::Targets {
         let recording = name.to_owned();
@@ -127,27 +139,28 @@ fn record(
         let path = out_path(robot, spec, options).display().to_string();
         return Err(CaptureError::from(TableError::Exists { path }).into());
     }
+    if let Some(sigma) = options.sigma_mm.filter(|s| !(*s > 0.0 && s.is_finite())) {
+        return Err(CliError::NotASigma { sigma });
+    }
+    let planned = match &options.plan {
+        Some(path) => Some(Planned::read(path, robot, (name, spec), options)?),
+        None => None,
+    };
+    let follow = planned.as_ref().map(Planned::follow).transpose()?;
     let clock = clock();
     let mut source = Source::open(&address).map_err(CaptureError::from)?;
     let mut listener = listener(joints)?;
+    let values = match joints {
+        JointSource::Targets if logs => "in the robot's own log".to_string(),
+        JointSource::Targets => "the requested poses (commanded, not measured)".to_string(),
+        JointSource::Udp(port) => format!("from the robot, UDP port {port}"),
+    };
     screen.line(&format!(
-        "recording `{name}` from {address}; joint values: {}",
-        match joints {
-            JointSource::Targets if logs => "in the robot's own log".to_string(),
-            JointSource::Targets => "the requested poses (commanded, not measured)".to_string(),
-            JointSource::Udp(port) => format!("from the robot, UDP port {port}"),
-        }
+        "recording `{name}` from {address}; joint values: {values}"
     ));
-    let heard = survey(
-        &mut source,
-        &mut listener,
-        &clock,
-        SURVEY,
-        options
-            .seconds
-            .map_or(options.patience, |s| s.min(options.patience)),
-        screen,
-    )?;
+    let seconds = options.seconds.unwrap_or(f64::INFINITY);
+    let patience = seconds.min(options.patience);
+    let heard = survey(&mut source, &mut listener, &clock, SURVEY, patience, screen)?;
     let heard = match heard {
         Ok(heard) => heard,
         Err(ended) => {
@@ -155,18 +168,42 @@ fn record(
             return Ok((ExitCode::Data, None));
         }
     };
-    let plan = plan(robot, spec, options, (joints, &heard), screen)?;
+    if let (Some(planned), JointSource::Udp(_)) = (&planned, joints) {
+        planned.is_heard(&heard)?;
+    }
+    let asked = (spec, planned.as_ref());
+    let plan = plan(robot, asked, options, (joints, &heard), screen)?;
     let path = out_path(robot, spec, options);
-    let header = plan.header();
     let table = if options.append && path.exists() {
-        Table::append(&path, &header, plan.guide.poses(&plan.columns).as_deref())
+        let poses = poses(&plan, planned.is_some());
+        Table::append(&path, &plan.header(), poses.as_deref())
     } else {
         let comments = comments(robot, (name, spec), &address, joints, &plan);
-        Table::create(&path, &comments, &header)
+        let poses = poses(&plan, planned.is_some()).map(|poses| format!("{POSES}{poses}"));
+        let comments: Vec<String> = comments.into_iter().chain(poses).collect();
+        Table::create(&path, &comments, &plan.header())
     };
     let table = table.map_err(CaptureError::from)?;
+    // Bodies that the tracker does not send tell nothing, whatever the plan says.
+    let missing = unrecorded(robot, &plan.watched);
+    let fewer = planned.as_ref().filter(|_| !missing.is_empty());
+    let fewer = fewer.map(|planned| planned.without(missing));
+    let follow = match &fewer {
+        Some(fewer) => Some(fewer.follow()?),
+        None => follow,
+    };
+    let guided = follow.zip(planned.as_ref());
+    let guided =
+        guided.map(|(follow, planned)| Guided::new(follow, &plan, (planned, &table.holds)));
     let mut session = Session::new(plan, table);
-    let keys = keys();
+    if let Some((guided, planned)) = guided.zip(planned.as_ref()) {
+        let reached = planned.begins(&guided, spec, screen)?;
+        if reached {
+            return Ok((ExitCode::Accepted, Some(path)));
+        }
+        session = session.following(Box::new(guided));
+    }
+    let (keys, clock) = (keys(), clock);
     let ended = session.record(&mut source, &mut listener, &keys, &clock, screen)?;
     screen.line(&format!("ended: {ended}"));
     session.report(screen);
@@ -176,6 +213,13 @@ fn record(
         ExitCode::Data
     };
     Ok((code, Some(path)))
+}
+
+/// What the file says of its poses: another list is another recording.
+fn poses(plan: &Plan, planned: bool) -> Option<String> {
+    let of_plan = || "those of a plan".to_owned();
+    let of_guide = plan.guide.poses(&plan.columns);
+    if planned { Some(of_plan()) } else { of_guide }
 }
 
 /// The recording that is made: the named one, or the only one.
@@ -235,9 +279,6 @@ fn comments(
         "t_s: the tracker's clock; host_s: this computer's clock when the frame arrived, s since 1970".to_string(),
         "hold: the pose, counted from 1".to_string(),
     ];
-    if let Some(poses) = plan.guide.poses(&plan.columns) {
-        comments.push(format!("{POSES}{poses}"));
-    }
     let zero = assumed_zero(robot, spec, &plan.columns, &plan.watched);
     if !zero.is_empty() {
         comments.push(format!("joints taken as 0: {}", zero.join(", ")));

@@ -4,37 +4,49 @@ use calib_capture::{
     Guide, JointColumn, JointSource, Plan, Screen, Survey, Unit, Watched, grid, parse_joints,
 };
 use calib_pipeline::prepare::load::RobotProfile;
-use calib_profile::{RecordingSpec, TimedPoses};
+use calib_profile::RecordingSpec;
+use calib_urdf::JointId;
 
 use super::bodies::{joints_of, moved, watched};
+use super::planned::Planned;
+use super::rules::{NEAR, is_continuous};
 use super::{Record, RecordError};
 
-/// How near a measured joint must come to its target: 1°, 2 mm.
-const NEAR: (f64, f64) = (0.017_453_292_519_943_295, 2e-3);
 /// More poses than this are a typo in `--poses`: nobody records them.
 const MOST_POSES: usize = 100_000;
 
 /// Columns, poses and bodies.
 pub(super) fn plan(
     robot: &RobotProfile,
-    spec: &RecordingSpec,
+    (spec, planned): (&RecordingSpec, Option<&Planned>),
     options: &Record,
     (joints, heard): (JointSource, &Survey),
     screen: &mut dyn Screen,
 ) -> Result<Plan, RecordError> {
-    let (swept, ranges): (Vec<JointColumn>, Vec<(f64, f64)>) =
-        guide_ranges(robot, spec).into_iter().unzip();
-    let poses = checked(options, swept.len())?;
+    let (guided, ranges): (Vec<JointId>, Vec<(f64, f64)>) = match planned {
+        // In the order in which a person reads them: along the chain.
+        Some(planned) => {
+            let ranges = planned.ranges();
+            planned.joints.iter().map(|id| (*id, ranges[id])).unzip()
+        }
+        None => spec.ranges.iter().map(|(id, range)| (*id, *range)).unzip(),
+    };
+    let poses = checked(options, guided.len())?;
     let continuous = is_continuous(spec);
     let guide = Guide {
-        joints: (0..swept.len()).collect(),
-        steps: if continuous {
+        joints: (0..guided.len()).collect(),
+        steps: if continuous || planned.is_some() {
             Vec::new()
         } else {
             grid(&ranges, poses)
         },
         ranges,
     };
+    let named = |id: &JointId| {
+        let joint = robot.model.joint(*id);
+        column(&joint.name, joint.kind.turns(), None)
+    };
+    let swept = guided.iter().map(named).collect();
     let columns = columns(robot, spec, (swept, &options.at), heard, screen)?;
     let unheard: Vec<&str> = columns
         .iter()
@@ -48,8 +60,13 @@ pub(super) fn plan(
         ));
     }
     let watched = watched(robot, &options.map, heard, screen)?;
-    let moved = moved(robot, spec, &watched);
-    if moved.is_empty() && !spec.ranges.is_empty() {
+    let moved = moved(robot, &guided.iter().copied().collect(), &watched);
+    if moved.is_empty() && !guided.is_empty() {
+        if let Some(planned) = planned {
+            return Err(RecordError::PlanMovesNothing {
+                plan: planned.name.clone(),
+            });
+        }
         screen.line(
             "The swept joints move none of the recorded bodies. Map one that they move (`--map`).",
         );
@@ -73,12 +90,6 @@ pub(super) fn plan(
         patience: options.patience,
         longest: options.seconds,
     })
-}
-
-/// Whether a motion is recorded instead of poses.
-pub(super) fn is_continuous(spec: &RecordingSpec) -> bool {
-    spec.timing
-        .is_some_and(|timing| timing.poses == TimedPoses::Continuous)
 }
 
 /// Joints that move a recorded body, without a column and without a value in the profile: they are taken as 0.
@@ -156,20 +167,6 @@ fn columns(
         }
     }
     Ok(columns)
-}
-
-/// Swept joints with unit and range, rad or m.
-pub(super) fn guide_ranges(
-    robot: &RobotProfile,
-    spec: &RecordingSpec,
-) -> Vec<(JointColumn, (f64, f64))> {
-    spec.ranges
-        .iter()
-        .map(|(&id, &range)| {
-            let joint = robot.model.joint(id);
-            (column(&joint.name, joint.kind.turns(), None), range)
-        })
-        .collect()
 }
 
 fn column(name: &str, turns: bool, fixed: Option<f64>) -> JointColumn {
