@@ -40,6 +40,12 @@ if command -v npm >/dev/null && (cd "$folder" && npm install --no-audit --no-fun
     && program axe "node \"$folder/axe.js\" \"$browser\""
 fi
 
-for checker in urdf sdf gltf mcap html axe; do
+# A Python with MuJoCo, which reads MJCF.
+if command -v python3 >/dev/null && python3 -m venv "$folder/python" >>"$folder/install.log" 2>&1 \
+  && "$folder/python/bin/pip" install -q mujoco==4.0.0 >>"$folder/install.log" 2>&1; then
+  program mujoco "\"$folder/python/bin/python\""
+fi
+
+for checker in urdf sdf gltf mcap html axe mujoco; do
   [ -x "$folder/$checker" ] && echo "$checker" || echo "no checker of $checker here"
 done

@@ -4,7 +4,7 @@
     predict.py MODEL.json TABLE.csv      compares with a table of 6-DoF bodies: rms distance in mm
     predict.py MODEL.json joint=deg …    prints where the bodies are, m in the tracker's frame
 
-The equations are those at the top of crates/calib-report/src/robot_model.rs. Joints are taken in the middle of their backlash.
+The equations are those at the top of crates/calib-model/src/file.rs. Joints are taken in the middle of their backlash.
 """
 import csv, json, math, sys
 

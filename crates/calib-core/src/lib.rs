@@ -166,11 +166,13 @@ pub use analysis::untested::{MovedPoint, Moves, OpenCause, OpenError, OpenErrors
 pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
 pub use analysis::weigh::{NoiseCandidate, NoiseChoice, NoiseLevel, Weighed};
 pub use analysis::widths::{Widened, WidthEstimate, WidthKind};
-pub use graph::axis::Axis;
+pub use calib_model::axis::Axis;
+pub use calib_model::effect::{self, EFFECTS, Effect, EffectKind, JointState};
+pub use calib_model::motion::JointMotion;
+pub use calib_model::unit::{DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA, Unit};
 pub use graph::baseline::Baseline;
 pub use graph::chart::Chart;
 pub use graph::edge::{Candidate, Edge, EdgeKind, Joint, JointEffect, Role, Share, UnknownPose};
-pub use graph::effect::{self, EFFECTS, Effect, EffectKind, JointState};
 pub use graph::error::Error;
 pub use graph::ids::{EdgeId, FrameId, GroupId, MeasurementId, ParameterId, PointId};
 pub use graph::measurement::{
@@ -181,9 +183,7 @@ pub use graph::parameter::{Parameter, ParameterKind};
 pub use graph::problem::{
     NoiseGroup, NoiseKind, NoiseModel, OpenStart, OwnNoise, Point, Problem, StartChange,
 };
-pub use graph::unit::{DEFAULT_ROTATION_SIGMA, DEFAULT_TRANSLATION_SIGMA, Unit};
 pub use model::derived::{Configuration, DerivedPoint, DerivedPose, Target};
-pub use model::joint::JointMotion;
 pub use model::layout::Model;
 pub use model::values::Values;
 pub use model::walk::MIN_JOINT_RANGE;

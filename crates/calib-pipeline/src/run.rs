@@ -96,12 +96,6 @@ pub fn run_on(
     };
     let view = view(&inputs, tracks, &shown, solids);
     let alone = refitted.map(|robot| patch_urdf(&inputs, &robot, &BTreeMap::new()));
-    let robots = Robots {
-        urdf: &urdf,
-        alone: alone.transpose()?,
-        model: &model_file(&inputs, &solved),
-        robot,
-    };
     let mut report = assemble(&Evidence {
         inputs: &inputs,
         tracks,
@@ -120,6 +114,12 @@ pub fn run_on(
         arguments: options.arguments(),
     });
     let scene = scene(&inputs, tracks, &solved, &report);
+    let robots = Robots {
+        urdf: &urdf,
+        alone: alone.transpose()?,
+        model: &model_file(&inputs, &solved, &scene),
+        robot,
+    };
     let written = written(&inputs, &verified.residuals, (&scene, &view), &robots)?;
     report.outputs = listed(&inputs, &written);
     let files = files(&inputs, &report, &scene, written, &view)?;

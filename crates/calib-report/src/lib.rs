@@ -47,7 +47,6 @@ mod report;
 mod residuals;
 mod results;
 mod robot_change;
-pub mod robot_model;
 pub mod scene;
 mod schema;
 mod sections;

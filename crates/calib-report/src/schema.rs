@@ -1,5 +1,5 @@
-use crate::robot_model::RobotModelFile;
 use crate::{Report, Scene};
+use calib_model::file::RobotModelFile;
 use serde_json::Value;
 
 /// JSON Schema (draft 2020-12) of `report.json`, from the same structs.

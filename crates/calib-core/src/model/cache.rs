@@ -7,9 +7,9 @@ use nalgebra::Vector6;
 use crate::graph::axis::Axis;
 use crate::graph::edge::{EdgeKind, Joint};
 use crate::graph::problem::Problem;
-use crate::model::joint::JointMotion;
 use crate::model::pose::Pose;
 use crate::model::values::{Values, coordinates};
+use calib_model::motion::JointMotion;
 
 /// Where a path is evaluated: parameters' values, and what follows from them for all samples.
 #[derive(Debug, Clone, Copy)]

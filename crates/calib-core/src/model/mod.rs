@@ -6,6 +6,7 @@ pub(crate) mod joint;
 pub(crate) mod layout;
 pub(crate) mod null_space;
 pub(crate) mod path;
-pub(crate) mod pose;
 pub(crate) mod values;
 pub(crate) mod walk;
+
+pub(crate) use calib_model::pose;

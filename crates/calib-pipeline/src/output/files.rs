@@ -1,7 +1,7 @@
 //! The files of a run.
 
 use calib_files::OutputFile;
-use calib_report::robot_model::RobotModelFile;
+use calib_model::file::RobotModelFile;
 use calib_report::{Output, Report, ResidualRow};
 
 use crate::error::PipelineError;

@@ -6,11 +6,13 @@ use calib_core::EffectKind;
 use calib_core::effect::{Drives, Source};
 use calib_geometry::decompose::symmetric_eigen;
 use calib_geometry::se3;
-use calib_profile::Usage;
-use calib_report::robot_model::{
-    ModelBody, ModelEffect, ModelJoint, ModelLink, ModelMimic, ModelMotion, ModelNumber,
-    ModelPoint, ModelPose, ModelUncertainty, RobotModelFile,
+use calib_model::file::{
+    Input, ModelBody, ModelEffect, ModelJoint, ModelLink, ModelMimic, ModelMotion, ModelNumber,
+    ModelPoint, ModelPose, ModelUncertainty, ModelValidity, RobotModelFile,
 };
+use calib_profile::Usage;
+use calib_report::Scene;
+use calib_report::scene::SceneVerdict;
 use calib_urdf::{Joint, JointId, JointKind, RobotModel};
 use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
 
@@ -29,7 +31,7 @@ pub fn model_name(urdf: &str) -> String {
 
 /// The robot that a run found.
 #[must_use]
-pub fn model_file(inputs: &Inputs, solved: &Solved) -> RobotModelFile {
+pub fn model_file(inputs: &Inputs, solved: &Solved, scene: &Scene) -> RobotModelFile {
     let robot = &solved.robot;
     let profile = &inputs.robot.profile;
     let model = &robot.model;
@@ -56,16 +58,30 @@ pub fn model_file(inputs: &Inputs, solved: &Solved) -> RobotModelFile {
         bodies: bodies(inputs, robot),
         points: points.collect(),
         uncertainty: solved.fit.as_ref().map(|fit| uncertainty(inputs, fit)),
+        validity: scene.verdict.as_ref().map(validity),
         written_by: format!("calib {}", env!("CARGO_PKG_VERSION")),
         inputs: inputs
             .digests
             .iter()
-            .map(|d| calib_report::Input {
+            .map(|d| Input {
                 path: d.path.clone(),
                 sha256: d.sha256.clone(),
             })
             .collect(),
         ..RobotModelFile::default()
+    }
+}
+
+/// What a model was shown to be good for, as the scene has it.
+fn validity(of: &SceneVerdict) -> ModelValidity {
+    let verdict = serde_json::to_value(of.verdict).ok();
+    let verdict = verdict.as_ref().and_then(serde_json::Value::as_str);
+    ModelValidity {
+        verdict: verdict.unwrap_or_default().to_owned(),
+        position_error_m: of.position_error_m,
+        interval_m: of.interval_m,
+        scope: of.scope.clone(),
+        not_for: of.not_for.clone(),
     }
 }
 

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use calib_core::Configuration;
+use calib_model::file::{ModelMotion, ModelNumber, ModelPose, RobotModelFile};
 use calib_pipeline::formulate::kinematics::joint_state;
 use calib_pipeline::options::Plugins;
 use calib_pipeline::prepare::conditions::Conditions;
 use calib_pipeline::prepare::load::load_recordings;
 use calib_pipeline::prepare::load::load_robot;
 use calib_pipeline::run::{RunOptions, RunOutput, run_on};
-use calib_report::robot_model::{ModelMotion, ModelNumber, ModelPose, RobotModelFile};
 use nalgebra::{DMatrix, Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 fn isometry(pose: &ModelPose) -> Isometry3<f64> {

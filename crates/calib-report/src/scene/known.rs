@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use calib_model::file::{ModelMimic, ModelMotion};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::robot_model::{ModelMimic, ModelMotion};
 use crate::{Component, Input, Report, Status, Verdict};
 
 /// What a calibration is worth.

@@ -10,8 +10,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::graph::axis::Axis;
-use crate::graph::unit::Unit;
+use crate::axis::Axis;
+use crate::unit::Unit;
 
 pub mod backlash;
 pub mod clock_offset;
@@ -119,6 +119,25 @@ pub struct JointState {
     pub other: f64,
     /// Regressor that the caller supplies.
     pub given: f64,
+}
+
+/// Sine and cosine of an angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SinCos {
+    /// Sine.
+    pub sin: f64,
+    /// Cosine.
+    pub cos: f64,
+}
+
+impl SinCos {
+    /// Of an angle, rad.
+    #[inline]
+    #[must_use]
+    pub fn of(angle: f64) -> Self {
+        let (sin, cos) = angle.sin_cos();
+        Self { sin, cos }
+    }
 }
 
 /// What a regressor depends on.
@@ -357,6 +376,18 @@ impl Effect {
     }
 }
 
+/// Terms that [`EffectKind::of_angles`] gives: those of the reading, then those of the motor's angle.
+pub const HARMONICS: [EffectKind; 8] = [
+    EffectKind::EccentricityCos,
+    EffectKind::EccentricitySin,
+    EffectKind::Eccentricity2Cos,
+    EffectKind::Eccentricity2Sin,
+    EffectKind::MotorCos,
+    EffectKind::MotorSin,
+    EffectKind::Motor2Cos,
+    EffectKind::Motor2Sin,
+];
+
 impl EffectKind {
     /// Every term of the table.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -411,8 +442,30 @@ impl EffectKind {
         (term.source != Source::Constant).then(|| states.iter().map(term.regressor).collect())
     }
 
+    /// F of equation (1) from sines that several terms share; `None` for terms of another kind.
+    ///
+    /// ```text
+    /// cos 2q − 1 = −2 sin² q,   sin 2q = 2 sin q cos q
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn of_angles(self, reading: &SinCos, motor: &SinCos) -> Option<f64> {
+        Some(match self {
+            Self::EccentricityCos => reading.cos - 1.0,
+            Self::EccentricitySin => reading.sin,
+            Self::Eccentricity2Cos => -2.0 * reading.sin * reading.sin,
+            Self::Eccentricity2Sin => 2.0 * reading.sin * reading.cos,
+            Self::MotorCos => motor.cos - 1.0,
+            Self::MotorSin => motor.sin,
+            Self::Motor2Cos => -2.0 * motor.sin * motor.sin,
+            Self::Motor2Sin => 2.0 * motor.sin * motor.cos,
+            _ => return None,
+        })
+    }
+
     /// F of equation (1) from the reading alone; `None` where it needs more.
-    pub(crate) fn of_reading(self, q: f64) -> Option<f64> {
+    #[must_use]
+    pub fn of_reading(self, q: f64) -> Option<f64> {
         let term = self.term();
         let state = JointState {
             q,
@@ -425,6 +478,27 @@ impl EffectKind {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shared_sines_give_the_regressors() {
+        for k in -40..40 {
+            let q = 0.37 * f64::from(k);
+            let motor = 51.3 * q;
+            let state = JointState {
+                q,
+                motor,
+                ..JointState::default()
+            };
+            let of = |kind: EffectKind| kind.of_angles(&SinCos::of(q), &SinCos::of(motor));
+            let shared: Vec<EffectKind> = EffectKind::all().filter(|k| of(*k).is_some()).collect();
+            assert_eq!(shared, HARMONICS);
+            for kind in shared {
+                let expected = (kind.term().regressor)(&state);
+                let own = of(kind).expect("shared");
+                assert!((own - expected).abs() < 1e-13, "{kind:?} at {q}");
+            }
+        }
+    }
 
     #[test]
     fn every_term_is_listed_once_and_every_name_is_its_own() {

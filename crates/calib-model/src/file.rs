@@ -15,13 +15,36 @@
 
 use std::collections::BTreeMap;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{FormatVersion, Input};
+/// Version of the format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(transparent)]
+pub struct FormatVersion(pub u32);
+
+/// The version that is written, and the only one that is read.
+pub const VERSION: u32 = 1;
+
+impl Default for FormatVersion {
+    fn default() -> Self {
+        Self(VERSION)
+    }
+}
+
+/// A file that the result comes from.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Input {
+    /// Relative to the profile.
+    pub path: String,
+    /// Of its bytes, 64 hexadecimal digits.
+    pub sha256: String,
+}
 
 /// The calibrated robot. SI; quaternions x, y, z, w.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RobotModelFile {
     /// Version of this format.
     pub calib_model: FormatVersion,
@@ -49,14 +72,50 @@ pub struct RobotModelFile {
     pub points: BTreeMap<String, ModelPoint>,
     /// Uncertainty of all of these numbers; null with the closed forms.
     pub uncertainty: Option<ModelUncertainty>,
+    /// Sign of every load that an effect depends on.
+    #[serde(default)]
+    pub loads: ModelLoads,
+    /// Position of every joint where the harmonic effects and gains are 0, rad or m: zero offsets are what is wrong there.
+    #[serde(default)]
+    pub reference_position: f64,
+    /// What the model was shown to be good for; null where nothing was predicted.
+    #[serde(default)]
+    pub validity: Option<ModelValidity>,
     /// Name and version of the program.
     pub written_by: String,
     /// All files that the result comes from.
     pub inputs: Vec<Input>,
 }
 
+/// Sign of loads.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum ModelLoads {
+    /// What gravity exerts on the joint: minus the torque that the joint holds, and that a sensor in it reads.
+    #[default]
+    Exerted,
+}
+
+/// What a model was shown to be good for. The range of each joint is its `fitted_range`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ModelValidity {
+    /// As in report.json.
+    pub verdict: String,
+    /// Position error to expect on a new pose, rms, m; null where none was predicted.
+    pub position_error_m: Option<f64>,
+    /// Ends of its 95 % interval, m.
+    pub interval_m: Option<[f64; 2]>,
+    /// What the result was shown to be good for, in sentences.
+    pub scope: Vec<String>,
+    /// What it was not shown to be good for, in sentences.
+    pub not_for: Vec<String>,
+}
+
 /// A pose, `outer_from_inner`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelPose {
     /// Origin, m.
     pub xyz_m: [f64; 3],
@@ -74,7 +133,8 @@ impl Default for ModelPose {
 }
 
 /// A link.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelLink {
     /// Its name.
     pub name: String,
@@ -85,7 +145,8 @@ pub struct ModelLink {
 }
 
 /// How a joint moves.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum ModelMotion {
     /// It does not.
@@ -98,7 +159,8 @@ pub enum ModelMotion {
 }
 
 /// A joint.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelJoint {
     /// Its name.
     pub name: String,
@@ -110,7 +172,7 @@ pub struct ModelJoint {
     pub motion: ModelMotion,
     /// `parent_from_joint`, calibrated, without the zero offset.
     pub parent_from_joint: ModelPose,
-    /// The same as in the nominal URDF: loads are computed with it.
+    /// The same in the nominal URDF: loads are computed with it, and a controller without calibration moves by it.
     pub load_origin: ModelPose,
     /// Axis in the joint's frame; null for a fixed joint.
     pub axis: Option<[f64; 3]>,
@@ -125,7 +187,8 @@ pub struct ModelJoint {
 }
 
 /// A joint that follows another.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelMimic {
     /// The other.
     pub joint: String,
@@ -136,9 +199,10 @@ pub struct ModelMimic {
 }
 
 /// One term of equation (2).
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelEffect {
-    /// Which: `zero_offset`, `gain`, `eccentricity_cos`, … `coupling`.
+    /// Which: `offset`, `gain`, `eccentricity_cos`, … `coupling`.
     pub kind: String,
     /// F · c in symbols.
     pub formula: String,
@@ -159,7 +223,8 @@ pub struct ModelEffect {
 }
 
 /// A tracking body.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelBody {
     /// The link that it is fixed to.
     pub link: String,
@@ -170,7 +235,8 @@ pub struct ModelBody {
 }
 
 /// A point of the robot.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelPoint {
     /// The link that it is fixed to.
     pub link: String,
@@ -179,7 +245,8 @@ pub struct ModelPoint {
 }
 
 /// Covariance C = R Rᵀ of the numbers of a model.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelUncertainty {
     /// What each row of R is the uncertainty of.
     pub numbers: Vec<ModelNumber>,
@@ -188,7 +255,8 @@ pub struct ModelUncertainty {
 }
 
 /// A number of a model that is uncertain. Poses T change by T · exp([ω; v]).
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelNumber {
     /// What it belongs to: `joint`, `tracker`, `body`, `marker` (body/marker), `point`, `link`.
     pub of: String,

@@ -4,43 +4,59 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Vector3, Vector6};
 
 use calib_geometry::so3;
 
+/// A pose, `outer_from_inner`: p ↦ r p + t.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Pose {
+pub struct Pose {
+    /// Rotation matrix.
     pub r: Matrix3<f64>,
+    /// Translation, m.
     pub t: Vector3<f64>,
 }
 
 impl Pose {
-    pub(crate) fn identity() -> Self {
+    /// No motion.
+    #[inline]
+    #[must_use]
+    pub fn identity() -> Self {
         Self {
             r: Matrix3::identity(),
             t: Vector3::zeros(),
         }
     }
 
-    pub(crate) fn of(x: &Isometry3<f64>) -> Self {
+    /// From an isometry.
+    #[inline]
+    #[must_use]
+    pub fn of(x: &Isometry3<f64>) -> Self {
         Self {
             r: *x.rotation.to_rotation_matrix().matrix(),
             t: x.translation.vector,
         }
     }
 
-    pub(crate) fn isometry(&self) -> Isometry3<f64> {
+    /// As an isometry; exact where `r` is a rotation.
+    #[must_use]
+    pub fn isometry(&self) -> Isometry3<f64> {
         Isometry3::from_parts(
             Translation3::from(self.t),
             so3::quaternion_of(&Rotation3::from_matrix_unchecked(self.r)),
         )
     }
 
+    /// `a_from_c` from `a_from_b` (this) and `b_from_c`.
     #[inline]
-    pub(crate) fn then(&self, rhs: &Self) -> Self {
+    #[must_use]
+    pub fn then(&self, rhs: &Self) -> Self {
         Self {
             r: self.r * rhs.r,
             t: self.t + self.r * rhs.t,
         }
     }
 
-    pub(crate) fn inverse(&self) -> Self {
+    /// `inner_from_outer`.
+    #[inline]
+    #[must_use]
+    pub fn inverse(&self) -> Self {
         let rt = self.r.transpose();
         Self {
             r: rt,
@@ -49,13 +65,16 @@ impl Pose {
     }
 
     /// Itself, or its inverse.
-    pub(crate) fn oriented(self, inverse: bool) -> Self {
+    #[inline]
+    #[must_use]
+    pub fn oriented(self, inverse: bool) -> Self {
         if inverse { self.inverse() } else { self }
     }
 
     /// Ad(self⁻¹) [ω; v] = [Rᵀω; Rᵀ(v + ω × t)]
     #[inline]
-    pub(crate) fn pull_back(&self, xi: &Vector6<f64>) -> Vector6<f64> {
+    #[must_use]
+    pub fn pull_back(&self, xi: &Vector6<f64>) -> Vector6<f64> {
         let omega = Vector3::new(xi[0], xi[1], xi[2]);
         let v = Vector3::new(xi[3], xi[4], xi[5]) + omega.cross(&self.t);
         let (a, b) = (self.r.tr_mul(&omega), self.r.tr_mul(&v));
@@ -64,13 +83,16 @@ impl Pose {
 
     /// [`Pose::pull_back`] of a twist with ω = 0: [0; Rᵀv]
     #[inline]
-    pub(crate) fn pull_back_translation(&self, xi: &Vector6<f64>) -> Vector6<f64> {
+    #[must_use]
+    pub fn pull_back_translation(&self, xi: &Vector6<f64>) -> Vector6<f64> {
         let b = self.r.tr_mul(&Vector3::new(xi[3], xi[4], xi[5]));
         Vector6::new(0.0, 0.0, 0.0, b.x, b.y, b.z)
     }
 
     /// Ad(self) [ω; v] = [Rω; t × Rω + Rv]
-    pub(crate) fn push_forward(&self, xi: &Vector6<f64>) -> Vector6<f64> {
+    #[inline]
+    #[must_use]
+    pub fn push_forward(&self, xi: &Vector6<f64>) -> Vector6<f64> {
         let omega = self.r * Vector3::new(xi[0], xi[1], xi[2]);
         let v = self.r * Vector3::new(xi[3], xi[4], xi[5]) + self.t.cross(&omega);
         Vector6::new(omega.x, omega.y, omega.z, v.x, v.y, v.z)

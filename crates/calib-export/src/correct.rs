@@ -1,0 +1,214 @@
+//! `calib correct`: the program that brings the tool to where the nominal model has it.
+
+use std::path::Path;
+
+use calib_model::{Aim, Approach, Correction, Options, Outcome, Pose, Under};
+
+use crate::error::ExportError;
+use crate::read::Robot;
+use crate::table::{Csv, program};
+
+/// What is corrected.
+#[derive(Debug, Clone, Default)]
+pub struct CorrectOptions {
+    /// The link that is to be right; `None`: the last one.
+    pub tool: Option<String>,
+    /// Only its position.
+    pub position_only: bool,
+    /// Bound on the change of a joint, rad and m; `None`: that of [`Options::default`].
+    pub largest_rad: Option<f64>,
+    /// The same of sliding joints.
+    pub largest_m: Option<f64>,
+}
+
+/// A corrected program.
+#[derive(Debug, Clone)]
+pub struct Corrected {
+    /// CSV: the joints of the robot, what became of each row, and the tool's error by the model before and after, mm.
+    pub csv: String,
+    /// Rows with a position.
+    pub rows: usize,
+    /// Rows whose tool stands where it is wanted.
+    pub reached: usize,
+    /// Of them, outside of the fitted range.
+    pub outside: usize,
+    /// Rows whose tool comes nearer only.
+    pub nearer: usize,
+    /// Rows that keep their position: refused.
+    pub refused: usize,
+    /// Tool error by the model, rms and largest over rows with a position, m: before and after.
+    pub before_m: [f64; 2],
+    /// After.
+    pub after_m: [f64; 2],
+    /// Joints that the table has no column for: they counted as 0.
+    pub absent: Vec<String>,
+    /// The rows have poses of the tool: these are reached by the command.
+    pub cartesian: bool,
+}
+
+/// Corrects a table of joint positions. Where the table has poses of the tool (`<link>.x_m` …, in the root's frame), the commands
+/// reach those, from the row's joints or, where it has none, from the row before.
+///
+/// # Errors
+/// [`ExportError`].
+pub fn correct(
+    robot: &Robot,
+    table: &Path,
+    options: &CorrectOptions,
+) -> Result<Corrected, ExportError> {
+    let model = &robot.model;
+    let program = program(table, model)?;
+    let tool = robot.tool(options.tool.as_deref())?;
+    let wanted = program.poses.get(&model.links()[tool.index()]);
+    let without_joints = program.absent.len() == model.joints().len();
+    let (mut work, mut approach) = (model.work(), Approach::new(model));
+    let mut out = Corrected::of(&program.absent, wanted.is_some());
+    let mut csv = Csv::default();
+    header(&mut csv, robot);
+    let mut command = vec![0.0; model.joints().len()];
+    for (k, q) in program.q.iter().enumerate() {
+        let wrong = |source| ExportError::Row {
+            file: program.file.clone(),
+            line: program.lines[k],
+            source,
+        };
+        let target: Option<Option<&Pose>> = wanted.map(|poses| poses[k].as_ref());
+        csv.cell(&program.lines[k].to_string());
+        let (Some(q), false) = (q, target == Some(None)) else {
+            lost(&mut csv, robot);
+            continue;
+        };
+        let seed = if without_joints {
+            command.clone()
+        } else {
+            q.clone()
+        };
+        approach.update(model, &seed).map_err(wrong)?;
+        let under = Under {
+            approach: approach.directions(),
+            held: None,
+        };
+        let done = match target.flatten() {
+            None => {
+                let with = options.within(Options::default());
+                model.correct(&seed, tool, &with, &under, &mut work, &mut command)
+            }
+            Some(pose) => {
+                let with = options.within(Options::inverse());
+                let out = (&mut work, &mut command[..]);
+                model.ik(pose, &seed, tool, &with, &under, out)
+            }
+        };
+        let done = done.map_err(wrong)?;
+        out.count(&done);
+        line(&mut csv, robot, &command, &done);
+    }
+    out.finish();
+    out.csv = csv.text();
+    Ok(out)
+}
+
+impl CorrectOptions {
+    fn within(&self, default: Options) -> Options {
+        Options {
+            aim: match self.position_only {
+                true => Aim::Position,
+                false => default.aim,
+            },
+            largest_rad: self.largest_rad.unwrap_or(default.largest_rad),
+            largest_m: self.largest_m.unwrap_or(default.largest_m),
+            ..default
+        }
+    }
+}
+
+impl Corrected {
+    fn of(absent: &[String], cartesian: bool) -> Self {
+        Self {
+            csv: String::new(),
+            rows: 0,
+            reached: 0,
+            outside: 0,
+            nearer: 0,
+            refused: 0,
+            before_m: [0.0; 2],
+            after_m: [0.0; 2],
+            absent: absent.to_vec(),
+            cartesian,
+        }
+    }
+
+    fn count(&mut self, done: &Correction) {
+        self.rows += 1;
+        match done.outcome {
+            Outcome::Reached => self.reached += 1,
+            Outcome::OutOfScope(_) => {
+                self.reached += 1;
+                self.outside += 1;
+            }
+            Outcome::Nearer => self.nearer += 1,
+            _ => self.refused += 1,
+        }
+        let sums = [
+            (&mut self.before_m, done.before_m),
+            (&mut self.after_m, done.after_m),
+        ];
+        for (sum, error) in sums {
+            sum[0] += error * error;
+            sum[1] = sum[1].max(error);
+        }
+    }
+
+    fn finish(&mut self) {
+        for sum in [&mut self.before_m, &mut self.after_m] {
+            sum[0] = (sum[0] / self.rows.max(1) as f64).sqrt();
+        }
+    }
+}
+
+/// Name and decimals of a joint's column: nine in degrees are 2e-11 rad.
+fn columns(robot: &Robot) -> impl Iterator<Item = (String, bool)> + '_ {
+    robot.model.joints().iter().map(|j| {
+        let unit = if j.prismatic { "m" } else { "deg" };
+        (format!("{}_{unit}", j.name), j.prismatic)
+    })
+}
+
+fn header(csv: &mut Csv, robot: &Robot) {
+    csv.cell("line");
+    columns(robot).for_each(|(name, _)| csv.cell(&name));
+    [
+        "outcome",
+        "before_mm",
+        "after_mm",
+        "before_mrad",
+        "after_mrad",
+    ]
+    .iter()
+    .for_each(|name| csv.cell(name));
+    csv.end();
+}
+
+fn line(csv: &mut Csv, robot: &Robot, command: &[f64], done: &Correction) {
+    for (q, (_, prismatic)) in command.iter().zip(columns(robot)) {
+        csv.number(Some(if prismatic { *q } else { q.to_degrees() }), 9);
+    }
+    let joint = |i: usize| &robot.model.joints()[i].name;
+    csv.cell(&match done.outcome {
+        Outcome::Reached => "reached".to_owned(),
+        Outcome::OutOfScope(i) => format!("outside:{}", joint(i)),
+        Outcome::Nearer => "nearer".to_owned(),
+        Outcome::BeyondLimits(i) => format!("refused:limits:{}", joint(i)),
+        _ => "refused".to_owned(),
+    });
+    let errors = [done.before_m, done.after_m, done.before_rad, done.after_rad];
+    errors.iter().for_each(|x| csv.number(Some(1e3 * x), 6));
+    csv.end();
+}
+
+fn lost(csv: &mut Csv, robot: &Robot) {
+    columns(robot).for_each(|_| csv.cell(""));
+    csv.cell("lost");
+    (0..4).for_each(|_| csv.cell(""));
+    csv.end();
+}

@@ -1,0 +1,35 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # What is computed
+//!
+//! Poses, covariances and commands are those of [`calib_model`]. A format without joint effects holds the geometry alone, or one that
+//! was refitted to predict best alone; what that costs is measured against the model itself:
+//!
+//! ```text
+//! cost = rms over postures of |t_format(q) − t_model(q)|                                          (1)
+//! urdf-best: argmin over origins of Σ |log(tool_model(q)⁻¹ tool_urdf(q))|² + small ridge           (2)
+//! ```
+//!
+//! with postures drawn from the fitted range of every joint (fixed seed), or those of a table; the cost of (2) is of postures that
+//! were not fitted.
+
+mod best;
+mod correct;
+mod cost;
+mod dh;
+mod error;
+mod geometric;
+mod poe;
+mod predict;
+mod read;
+mod table;
+mod target;
+mod xml;
+
+pub use correct::{CorrectOptions, Corrected, correct};
+pub use cost::Cost;
+pub use error::ExportError;
+pub use predict::{Frame, PredictOptions, Predicted, predict};
+pub use read::{Robot, robot};
+pub use table::region;
+pub use target::{Exported, Target, export};

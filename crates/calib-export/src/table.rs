@@ -1,0 +1,168 @@
+//! Tables of joint positions: in, with their lines; out, as CSV.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use calib_model::{Model, Pose};
+use calib_recording::{Filled, JointUnit, Poses, ReadOptions, read_path};
+
+use crate::error::ExportError;
+use crate::read::Robot;
+
+/// Joint positions by row, in the order of [`Model::joints`].
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Program {
+    /// Name of the file, for messages.
+    pub file: String,
+    /// Line of each row, from 1.
+    pub lines: Vec<u64>,
+    /// rad or m; `None` where a joint of the row was lost.
+    pub q: Vec<Option<Vec<f64>>>,
+    /// Torques that the joints hold, N m or N; empty where the table has none.
+    pub held: Vec<Option<Vec<f64>>>,
+    /// Poses that the table has, by name and row.
+    pub poses: BTreeMap<String, Vec<Option<Pose>>>,
+    /// Joints of the robot that the table has no column for: they count as 0.
+    pub absent: Vec<String>,
+}
+
+/// Reads a table of joint positions in any format that `calib` reads.
+pub(crate) fn program(path: &Path, model: &Model) -> Result<Program, ExportError> {
+    let file = path.display().to_string();
+    let recording = read_path(path, &ReadOptions::default())?;
+    let poses = recording
+        .poses(Filled::Include)
+        .map_err(|source| ExportError::NotOneTable {
+            file: file.clone(),
+            source,
+        })?;
+    let n = poses.rows.len();
+    fits(&file, &poses, model)?;
+    let column = |name: &str| poses.joints.get(name);
+    let row = |k: usize| -> Option<Vec<f64>> {
+        let joints = model.joints().iter();
+        joints
+            .map(|j| column(&j.name).map_or(Some(0.0), |c| c[k]))
+            .collect()
+    };
+    let torques = |k: usize| -> Option<Vec<f64>> {
+        let joints = model.joints().iter();
+        joints
+            .map(|j| poses.torques.get(&j.name).map_or(Some(0.0), |c| c[k]))
+            .collect()
+    };
+    let with_torques = !poses.torques.is_empty();
+    let absent = model.joints().iter().filter(|j| column(&j.name).is_none());
+    Ok(Program {
+        q: (0..n).map(row).collect(),
+        held: if with_torques {
+            (0..n).map(torques).collect()
+        } else {
+            Vec::new()
+        },
+        absent: absent.map(|j| j.name.clone()).collect(),
+        poses: poses
+            .bodies
+            .iter()
+            .map(|(name, rows)| {
+                let rows = rows.iter().map(|p| p.as_ref().map(Pose::of));
+                (name.clone(), rows.collect())
+            })
+            .collect(),
+        lines: poses.rows,
+        file,
+    })
+}
+
+/// The postures of a table, without rows that lost a joint.
+///
+/// # Errors
+/// [`ExportError`].
+pub fn region(path: &Path, robot: &Robot) -> Result<Vec<Vec<f64>>, ExportError> {
+    let program = program(path, &robot.model)?;
+    Ok(program.q.into_iter().flatten().collect())
+}
+
+/// Columns of joints are the robot's, in its units.
+fn fits(file: &str, poses: &Poses, model: &Model) -> Result<(), ExportError> {
+    let wrong = |found: &str, what: String, remedy: String| ExportError::Column {
+        file: file.to_owned(),
+        found: found.to_owned(),
+        what,
+        remedy,
+    };
+    let own = || {
+        model
+            .joints()
+            .iter()
+            .map(|j| j.name.as_str())
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    for (name, unit) in &poses.joint_units {
+        let Some(joint) = model.joints().iter().find(|j| j.name == *name) else {
+            let what = "is not a joint that this robot moves".to_owned();
+            return Err(wrong(name, what, format!("it has {}", own())));
+        };
+        if joint.prismatic != (*unit == JointUnit::Length) {
+            let (is, expected) = match joint.prismatic {
+                true => ("an angle", "a length: `_m` or `_mm`"),
+                false => ("a length", "an angle: `_deg` or `_rad`"),
+            };
+            let what = format!("is {is} in the table");
+            return Err(wrong(name, what, format!("give this joint as {expected}")));
+        }
+    }
+    let some = model
+        .joints()
+        .iter()
+        .any(|j| poses.joints.contains_key(&j.name));
+    let poses_given = poses.bodies.keys().any(|b| model.links().contains(b));
+    if !some && !poses_given {
+        let what = "has no column of a joint".to_owned();
+        let first = model.joints().first().map_or("joint", |j| j.name.as_str());
+        let remedy = format!(
+            "name the columns after the joints, as `{first}_deg`: {}",
+            own()
+        );
+        return Err(wrong("the table", what, remedy));
+    }
+    Ok(())
+}
+
+/// Lines of a CSV that is written column by column.
+#[derive(Debug, Default)]
+pub(crate) struct Csv {
+    text: String,
+    begun: bool,
+}
+
+impl Csv {
+    /// Another cell of the line.
+    pub(crate) fn cell(&mut self, text: &str) {
+        if self.begun {
+            self.text.push(',');
+        }
+        self.begun = true;
+        self.text.push_str(text);
+    }
+
+    /// A number with this many decimals; an empty cell where there is none.
+    pub(crate) fn number(&mut self, x: Option<f64>, decimals: usize) {
+        // −0 is 0.
+        let text = x.map(|x| format!("{:.decimals$}", if x == 0.0 { 0.0 } else { x }));
+        let text = text.unwrap_or_default();
+        let zero = text.starts_with('-') && text[1..].chars().all(|c| c == '0' || c == '.');
+        self.cell(if zero { &text[1..] } else { &text });
+    }
+
+    /// The line ends.
+    pub(crate) fn end(&mut self) {
+        self.text.push('\n');
+        self.begun = false;
+    }
+
+    pub(crate) fn text(self) -> String {
+        self.text
+    }
+}

@@ -1,0 +1,9 @@
+//! Predictions, corrections and exports of robots by chance.
+
+mod exports;
+mod tables;
+
+/// Robots by chance.
+#[path = "../../../calib-model/tests/it/common.rs"]
+#[allow(dead_code)]
+mod common;

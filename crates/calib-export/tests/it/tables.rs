@@ -1,0 +1,188 @@
+//! `predict` and `correct` on tables.
+
+use std::path::PathBuf;
+
+use calib_export::{CorrectOptions, ExportError, Frame, PredictOptions, Robot, correct, predict};
+use calib_model::{Approach, Place, Under};
+
+const ARM: &str = include_str!("../../../calib-model/tests/it/arm.model.json");
+
+fn arm() -> Robot {
+    Robot::from_json(ARM.as_bytes()).expect("a model")
+}
+
+fn table(folder: &tempfile::TempDir, text: &str) -> PathBuf {
+    let path = folder.path().join("program.csv");
+    std::fs::write(&path, text).expect("written");
+    path
+}
+
+/// Cells of a CSV by column and row.
+fn cells(csv: &str) -> Vec<Vec<&str>> {
+    csv.lines().map(|l| l.split(',').collect()).collect()
+}
+
+#[test]
+fn rows_are_predicted_in_their_order_with_their_lines() {
+    let robot = arm();
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = "# a program\nshoulder_deg,elbow_deg\n10,20\n10,-20\n,5\n100,130\n";
+    let path = table(&folder, text);
+    let options = PredictOptions {
+        frame: Frame::Tracker,
+        ..PredictOptions::default()
+    };
+    let done = predict(&robot, &path, &options).expect("predicted");
+    let rows = cells(&done.csv);
+    assert_eq!(
+        rows[0][..5],
+        [
+            "line",
+            "scope",
+            "marker_plate.x_m",
+            "marker_plate.y_m",
+            "marker_plate.z_m"
+        ]
+    );
+    let at = |name: &str| rows[0].iter().position(|c| *c == name).expect("a column");
+    assert_eq!((done.rows, done.outside), (3, 1));
+    let column: Vec<&str> = rows[1..].iter().map(|r| r[0]).collect();
+    assert_eq!(column, ["3", "4", "5", "6"]);
+    let scopes: Vec<&str> = rows[1..].iter().map(|r| r[1]).collect();
+    assert_eq!(scopes, ["inside", "inside", "lost", "outside:shoulder"]);
+    assert!(rows.iter().all(|r| r.len() == rows[0].len()));
+    // The library, with the memory of the rows before.
+    let mut work = robot.model.work();
+    let mut approach = Approach::new(&robot.model);
+    for (row, deg) in [(1, [10.0, 20.0]), (2, [10.0, -20.0_f64])] {
+        let q = deg.map(f64::to_radians);
+        approach.update(&robot.model, &q).expect("finite");
+        let under = Under {
+            approach: approach.directions(),
+            held: None,
+        };
+        robot.model.forward(&q, &under, &mut work).expect("poses");
+        let body = robot.model.place("marker_plate").expect("a body");
+        let pose = robot.model.tracker_from(body, &work).expect("a place");
+        for (k, name) in ["marker_plate.x_m", "marker_plate.y_m", "marker_plate.z_m"]
+            .iter()
+            .enumerate()
+        {
+            let seen: f64 = rows[row][at(name)].parse().expect("a number");
+            assert!((seen - pose.t[k]).abs() < 1e-9);
+        }
+        let sigma: f64 = rows[row][at("tip.sigma_x_m")].parse().expect("a number");
+        assert!(sigma > 1e-5 && sigma < 1e-2);
+    }
+    assert_eq!(approach.directions(), [0.0, -1.0]);
+}
+
+#[test]
+fn columns_that_are_not_the_robots_are_refused() {
+    let robot = arm();
+    let folder = tempfile::tempdir().expect("a folder");
+    let of = |text: &str| {
+        let error = predict(&robot, &table(&folder, text), &PredictOptions::default());
+        error.expect_err(text).to_string()
+    };
+    assert!(of("wrist_deg\n1\n").contains("wrist is not a joint that this robot moves"));
+    assert!(of("elbow_mm\n1\n").contains("elbow is a length in the table"));
+    let named = PredictOptions {
+        of: vec!["hand".to_owned()],
+        ..PredictOptions::default()
+    };
+    let path = table(&folder, "elbow_deg\n1\n");
+    let error = predict(&robot, &path, &named).expect_err("no hand");
+    assert!(matches!(error, ExportError::Name { .. }), "{error}");
+    // A joint without a column counts as 0, and that is said.
+    let done = predict(&robot, &path, &PredictOptions::default()).expect("predicted");
+    assert_eq!(done.absent, ["shoulder"]);
+    let without = PredictOptions {
+        torques: true,
+        ..PredictOptions::default()
+    };
+    assert!(predict(&robot, &path, &without).is_err());
+}
+
+#[test]
+fn a_corrected_program_brings_the_tool_to_where_the_nominal_model_has_it() {
+    let mut r = crate::common::rng(5);
+    let file = crate::common::robot(&mut r, 6, false, crate::common::Effects::All);
+    let robot = Robot {
+        model: calib_model::Model::new(&file).expect("a model"),
+        file,
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let names: Vec<String> = (0..6).map(|i| format!("joint_{i}_deg")).collect();
+    let mut text = names.join(",") + "\n";
+    let mut rows = Vec::new();
+    for _ in 0..20 {
+        let q = crate::common::posture(&mut r, 6);
+        let deg: Vec<String> = q.iter().map(|q| q.to_degrees().to_string()).collect();
+        text += &(deg.join(",") + "\n");
+        rows.push(q);
+    }
+    let path = table(&folder, &text);
+    let done = correct(&robot, &path, &CorrectOptions::default()).expect("corrected");
+    assert_eq!(done.rows, 20);
+    assert!(
+        done.reached >= 17 && done.reached + done.nearer + done.refused == 20,
+        "{done:?}"
+    );
+    assert!(done.before_m[0] > 1e-3);
+    let cells = cells(&done.csv);
+    let mut work = robot.model.work();
+    let mut approach = Approach::new(&robot.model);
+    let tool = Place::from(robot.model.last_link());
+    for (row, q) in cells[1..].iter().zip(&rows) {
+        approach.update(&robot.model, q).expect("finite");
+        if row[7] != "reached" {
+            continue;
+        }
+        let command: Vec<f64> = row[1..7]
+            .iter()
+            .map(|c| c.parse::<f64>().expect("a number").to_radians())
+            .collect();
+        robot.model.forward_nominal(q, &mut work).expect("poses");
+        let wanted = robot.model.root_from(tool, &work).expect("a place");
+        let under = Under {
+            approach: approach.directions(),
+            held: None,
+        };
+        robot
+            .model
+            .forward(&command, &under, &mut work)
+            .expect("poses");
+        let there = robot.model.root_from(tool, &work).expect("a place");
+        assert!(
+            (wanted.t - there.t).norm() < 2e-9,
+            "{}",
+            (wanted.t - there.t).norm()
+        );
+    }
+    // Targets in space: the same poses as a table of them, from the uncorrected joints.
+    let mut text = format!(
+        "{},link_6.x_m,link_6.y_m,link_6.z_m,link_6.qx,link_6.qy,link_6.qz,link_6.qw\n",
+        names.join(",")
+    );
+    for q in &rows {
+        robot.model.forward_nominal(q, &mut work).expect("poses");
+        let pose = robot
+            .model
+            .root_from(tool, &work)
+            .expect("a place")
+            .isometry();
+        let q: Vec<f64> = q.iter().map(|q| q.to_degrees()).collect();
+        let (t, w) = (pose.translation.vector, pose.rotation.coords);
+        let numbers: Vec<String> = q
+            .iter()
+            .chain(t.iter())
+            .chain(w.iter())
+            .map(f64::to_string)
+            .collect();
+        text += &(numbers.join(",") + "\n");
+    }
+    let done =
+        correct(&robot, &table(&folder, &text), &CorrectOptions::default()).expect("corrected");
+    assert!(done.cartesian && done.reached >= 17, "{done:?}");
+}

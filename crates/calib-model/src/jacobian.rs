@@ -1,0 +1,155 @@
+//! How poses follow the readings.
+//!
+//! ```text
+//! root_from_link(q + dq) = root_from_link(q) · exp(J dq),   J_k = Σ_i s_i ∂φ_i/∂q_k + Σ_n w_in ∂θ_in/∂q_k              (1)
+//! s_i: twist of the link per unit of motion of joint i,   w_in: per unit of rotation across its axis
+//! ```
+//!
+//! ∂φ/∂q and ∂θ/∂q are differences: effects are small against the reading, so their error is far below any tracker. The jump of
+//! backlash with the sign of the load has no derivative and is left out.
+
+use calib_geometry::so3;
+use nalgebra::{Vector3, Vector6};
+
+use crate::axis::Axis;
+use crate::error::ModelError;
+use crate::forward::{Under, Work};
+use crate::model::{LinkId, Model};
+
+/// Rad or m: truncation (harmonics of a motor have periods of some mrad) and rounding are both below 1e-7 of an effect.
+const STEP: f64 = 1e-6;
+
+impl Model {
+    /// Jacobian of a link: 6 × [`Model::joints`] by columns into `out`, twists `[ω; v]` in the link's frame, all effects included. The
+    /// pose of the posture is in `work` afterwards.
+    ///
+    /// # Errors
+    /// As [`Model::forward`], and [`ModelError::Length`] of `out`.
+    pub fn jacobian(
+        &self,
+        q: &[f64],
+        link: LinkId,
+        under: &Under,
+        work: &mut Work,
+        out: &mut [f64],
+    ) -> Result<(), ModelError> {
+        self.ready(q, under, work)?;
+        self.known(link)?;
+        if out.len() != 6 * q.len() {
+            return Err(ModelError::Length {
+                what: "out",
+                found: out.len(),
+                expected: 6 * q.len(),
+            });
+        }
+        self.slopes(link, &self.movers[link.0], (q, under, true), work);
+        self.motions(q, under, work);
+        self.poses(work);
+        self.columns_of(link, &self.movers[link.0], work);
+        for (column, out) in work.jacobian.iter().zip(out.chunks_exact_mut(6)) {
+            out.copy_from_slice(column.as_slice());
+        }
+        Ok(())
+    }
+
+    pub(crate) fn known(&self, link: LinkId) -> Result<(), ModelError> {
+        let known = link.0 < self.links.len();
+        known.then_some(()).ok_or(ModelError::ForeignWork)
+    }
+
+    /// ∂φ/∂q and ∂θ/∂q of the joints that lead to a link, by these entries of q; differences to both sides, or to one in half the time.
+    pub(crate) fn slopes(
+        &self,
+        link: LinkId,
+        entries: &[usize],
+        (q, under, both): (&[f64], &Under, bool),
+        work: &mut Work,
+    ) {
+        let mut tried = std::mem::take(&mut work.q);
+        tried.copy_from_slice(q);
+        let width = if both { 2.0 * STEP } else { STEP };
+        if !both {
+            self.smooth_motions(&tried, under, work);
+            entries
+                .iter()
+                .for_each(|k| self.begin_slopes(link, *k, width, work));
+        }
+        for &k in entries {
+            if both {
+                tried[k] = q[k] - STEP;
+                self.smooth_motions(&tried, under, work);
+                self.begin_slopes(link, k, width, work);
+            }
+            tried[k] = q[k] + STEP;
+            self.smooth_motions(&tried, under, work);
+            for &i in &self.chains[link.0] {
+                let at = i * self.moved.len() + k;
+                work.phi_slope[at] += work.phi[i] / width;
+                work.theta_slope[at] += work.theta[i] / width;
+            }
+            tried[k] = q[k];
+        }
+        work.q = tried;
+    }
+
+    /// The lower ends of differences.
+    fn begin_slopes(&self, link: LinkId, k: usize, width: f64, work: &mut Work) {
+        for &i in &self.chains[link.0] {
+            let at = i * self.moved.len() + k;
+            work.phi_slope[at] = -work.phi[i] / width;
+            work.theta_slope[at] = -work.theta[i] / width;
+        }
+    }
+
+    /// Equation (1), with the poses and slopes of `work`.
+    pub(crate) fn columns_of(&self, link: LinkId, entries: &[usize], work: &mut Work) {
+        let dof = self.moved.len();
+        work.jacobian.fill(Vector6::zeros());
+        for &i in &self.chains[link.0] {
+            let Some(about) = self.about_twist(i, link, work) else {
+                continue;
+            };
+            let yields = self.joints[i].yields;
+            for &k in entries {
+                let at = i * dof + k;
+                let mut column = about * work.phi_slope[at];
+                if yields {
+                    column += self.across_twist(i, &work.theta_slope[at], link, work);
+                }
+                work.jacobian[k] += column;
+            }
+        }
+    }
+
+    /// s of equation (1); `None` for a fixed joint.
+    pub(crate) fn about_twist(&self, i: usize, link: LinkId, work: &Work) -> Option<Vector6<f64>> {
+        let at = &work.at[link.0];
+        let frame = &work.frame[i];
+        Some(match self.joints[i].axis? {
+            Axis::Revolute(a) => {
+                let omega = frame.r * a.into_inner();
+                stacked(&at.r, &omega, &omega.cross(&(at.t - frame.t)))
+            }
+            Axis::Prismatic(a) => stacked(&at.r, &Vector3::zeros(), &(frame.r * a.into_inner())),
+        })
+    }
+
+    /// Twist of a link by a change of θ of a joint: Exp(θ + dθ) = Exp(θ) Exp(Jr(θ) dθ).
+    pub(crate) fn across_twist(
+        &self,
+        i: usize,
+        change: &Vector3<f64>,
+        link: LinkId,
+        work: &Work,
+    ) -> Vector6<f64> {
+        let (at, child) = (&work.at[link.0], &work.at[i + 1]);
+        let omega = child.r * (so3::right_jacobian(&work.theta[i]) * change);
+        stacked(&at.r, &omega, &omega.cross(&(at.t - child.t)))
+    }
+}
+
+/// A twist in the root's axes, at a link's origin, in the link's axes.
+fn stacked(r: &nalgebra::Matrix3<f64>, omega: &Vector3<f64>, v: &Vector3<f64>) -> Vector6<f64> {
+    let (omega, v) = (r.tr_mul(omega), r.tr_mul(v));
+    Vector6::new(omega.x, omega.y, omega.z, v.x, v.y, v.z)
+}

@@ -1,0 +1,201 @@
+//! A joint of the file with its effects.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Unit, Vector3};
+
+use super::{Names, UNIT, finite, pose, value};
+use crate::axis::Axis;
+use crate::effect::{Drives, EFFECTS, EffectKind, HARMONICS, Source, Term};
+use crate::error::ModelError;
+use crate::file::{ModelEffect, ModelJoint, ModelMotion};
+use crate::model::{Joint, JointTerm};
+
+fn unit(place: &str, v: [f64; 3]) -> Result<Unit<Vector3<f64>>, ModelError> {
+    let v = Vector3::from(v);
+    let norm = v.norm();
+    if norm.is_nan() || (norm - 1.0).abs() >= UNIT {
+        return Err(value(place.to_owned(), norm, "a vector of length 1"));
+    }
+    // One that is a unit vector to rounding stays as it was fitted, to the bit.
+    Ok(match (norm - 1.0).abs() < 1e-12 {
+        true => Unit::new_unchecked(v),
+        false => Unit::new_normalize(v),
+    })
+}
+
+/// The term that a file names. Those of a recording (clock offset) and of a caller are no part of a robot.
+fn term(kind: &str) -> Option<&'static Term> {
+    let mut terms = EFFECTS.iter().flat_map(|e| e.terms);
+    terms.find(|t| t.name == kind && !matches!(t.source, Source::Velocity | Source::Caller))
+}
+
+/// The coordinate axis that a turning joint turns about, and its sign.
+fn coordinate(axis: &Axis) -> Option<(usize, f64)> {
+    let Axis::Revolute(a) = axis else {
+        return None;
+    };
+    let k = a.iamax();
+    (a[k].abs() == 1.0 && a.norm() == 1.0).then(|| (k, a[k]))
+}
+
+/// The joint with all names resolved; `entries`: places in q by joint.
+pub(super) fn joint(
+    i: usize,
+    j: &ModelJoint,
+    names: &Names,
+    entries: &BTreeMap<usize, usize>,
+) -> Result<Joint, ModelError> {
+    let place = |what: &str| format!("joints[{i}].{what}");
+    let (source, multiplier, offset) = match &j.mimic {
+        None => (i, 1.0, 0.0),
+        Some(m) => {
+            finite(&place("mimic"), &[m.multiplier, m.offset])?;
+            (
+                names.joint(&place("mimic.joint"), &m.joint)?,
+                m.multiplier,
+                m.offset,
+            )
+        }
+    };
+    let moves = j.motion != ModelMotion::Fixed;
+    let axis = match (j.axis, moves) {
+        (Some(a), true) => Some(unit(&place("axis"), a)?),
+        (None, true) => return Err(value(place("axis"), "null", "a vector of length 1")),
+        (_, false) => None,
+    };
+    let axis = axis.map(|a| match j.motion {
+        ModelMotion::Prismatic => Axis::Prismatic(a),
+        _ => Axis::Revolute(a),
+    });
+    let entry = match (moves, entries.get(&source)) {
+        (false, _) => 0,
+        (true, Some(entry)) => *entry,
+        (true, None) => {
+            let found = j.mimic.as_ref().map_or("", |m| m.joint.as_str());
+            return Err(value(
+                place("mimic.joint"),
+                found,
+                "a joint that moves by itself",
+            ));
+        }
+    };
+    let mut out = Joint {
+        parent: names.link(&place("parent"), &j.parent)?,
+        origin: pose(&place("parent_from_joint"), &j.parent_from_joint)?,
+        nominal: pose(&place("load_origin"), &j.load_origin)?,
+        axis,
+        across: axis.map_or([Vector3::zeros(); 2], |a| a.across()),
+        source: entry,
+        multiplier,
+        offset,
+        own: moves && j.mimic.is_none(),
+        gear_ratio: 0.0,
+        friction: 0.0,
+        terms: Vec::new(),
+        harmonics: [0.0; 8],
+        direct: Vec::new(),
+        coordinate: axis.and_then(|a| coordinate(&a)),
+        yields: false,
+        turns: false,
+        geared: false,
+        moment: Vector3::zeros(),
+        mass: 0.0,
+        carried: 0.0,
+    };
+    for (k, effect) in j.effects.iter().enumerate() {
+        let place = |what: &str| format!("joints[{i}].effects[{k}].{what}");
+        let Some(axis) = axis else {
+            return Err(value(
+                place("kind"),
+                &effect.kind,
+                "none: the joint is fixed",
+            ));
+        };
+        let term = joint_term(&place, effect, axis, names)?;
+        if let Some(other) = term.other
+            && !entries.contains_key(&other)
+        {
+            let found = effect.other.clone().unwrap_or_default();
+            return Err(value(place("other"), found, "a joint that moves by itself"));
+        }
+        // Both are of the joint; its effects repeat them.
+        out.gear_ratio = effect.gear_ratio.unwrap_or(out.gear_ratio);
+        out.friction = effect.friction.unwrap_or(out.friction);
+        out.across = match term.across {
+            Some((n, about)) => {
+                let mut across = out.across;
+                across[n] = about;
+                across
+            }
+            None => out.across,
+        };
+        out.yields |= term.across.is_some();
+        match HARMONICS.iter().position(|k| *k == term.term.kind) {
+            Some(k) => {
+                out.harmonics[k] += term.value;
+                out.geared |= term.term.source == Source::Motor;
+                out.turns |= term.term.source == Source::Reading;
+            }
+            None => out.direct.push(term),
+        }
+        out.terms.push(term);
+    }
+    Ok(out)
+}
+
+fn joint_term(
+    place: &dyn Fn(&str) -> String,
+    effect: &ModelEffect,
+    axis: Axis,
+    names: &Names,
+) -> Result<JointTerm, ModelError> {
+    let known = term(&effect.kind);
+    let term = known.ok_or_else(|| value(place("kind"), &effect.kind, "an effect of version 1"))?;
+    finite(&place("value"), &[effect.value])?;
+    for (what, x) in [
+        ("gear_ratio", effect.gear_ratio),
+        ("friction", effect.friction),
+    ] {
+        finite(&place(what), &[x.unwrap_or(0.0)])?;
+    }
+    if !term.kind.effect().applies_to(&axis) {
+        return Err(value(
+            place("kind"),
+            &effect.kind,
+            "an effect of sliding joints",
+        ));
+    }
+    let across = match (term.drives, effect.about) {
+        (Drives::About, None) => None,
+        (Drives::Across(n), Some(about)) => Some((n, unit(&place("about"), about)?.into_inner())),
+        (Drives::About, Some(_)) => {
+            return Err(value(
+                place("about"),
+                "a vector",
+                "null: this effect is about the axis",
+            ));
+        }
+        (Drives::Across(_), None) => {
+            return Err(value(
+                place("about"),
+                "null",
+                "the axis across that it is about",
+            ));
+        }
+    };
+    let other = match (term.kind, &effect.other) {
+        (EffectKind::Coupling, Some(name)) => Some(names.joint(&place("other"), name)?),
+        (EffectKind::Coupling, None) => {
+            return Err(value(place("other"), "null", "the joint that it follows"));
+        }
+        _ => None,
+    };
+    Ok(JointTerm {
+        term,
+        value: effect.value,
+        across,
+        other,
+        jumps: term.kind == EffectKind::FlankBacklash,
+    })
+}
