@@ -46,3 +46,4 @@ mod twin;
 mod urdf_out;
 mod verdict;
 mod view;
+mod work;
