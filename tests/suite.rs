@@ -47,3 +47,4 @@ mod twin;
 mod urdf_out;
 mod verdict;
 mod view;
+mod work;

@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    apply, check, completions, convert, diff, drift, fit, history, init, man, plan, plugins,
-    record, revert, run, schema, simulate, study, twin, view,
+    apply, check, completions, convert, correct, diff, drift, export, fit, history, init, man,
+    plan, plugins, predict, record, revert, run, schema, simulate, study, twin, view,
 };
 use crate::terminal::Console;
 
@@ -43,6 +43,12 @@ pub enum Command {
     Simulate(simulate::Simulate),
     /// Run one estimator on one table, without a profile
     Fit(fit::FitCommand),
+    /// Predict poses of a table of joint positions by a calibrated model, with their uncertainty
+    Predict(predict::Predict),
+    /// Correct a program of joint positions or poses, so that the tool stands where the nominal model has it
+    Correct(correct::Correct),
+    /// Write a calibrated model in the format of another program, and say what that costs
+    Export(export::Export),
     /// Write a calibration into your own URDF, xacro or kinematics YAML
     Apply(apply::Apply),
     /// Compare two robots: URDFs, xacros or kinematics YAMLs

@@ -5,6 +5,7 @@ pub mod place;
 use calib_apply::ApplyError;
 use calib_capture::{CaptureError, SourceError};
 use calib_drift::DriftError;
+use calib_export::ExportError;
 use calib_files::FileError;
 use calib_fit::FitError;
 use calib_init::InitError;
@@ -30,6 +31,15 @@ pub enum CliError {
     /// Of `calib drift`.
     #[error(transparent)]
     Drift(#[from] DriftError),
+    /// Of `calib predict`, `correct` and `export`.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+    /// A bound on corrections is none.
+    #[error("{bound} is not a bound\n  help: give a number above 0, as `--largest-deg 3`")]
+    NotABound {
+        /// What was given.
+        bound: f64,
+    },
     /// Of `calib fit`.
     #[error(transparent)]
     Fit(#[from] FitError),
@@ -146,6 +156,8 @@ impl CliError {
             Self::Plan(error) => error.exit_code(),
             Self::Init(error) => error.exit_code(),
             Self::Twin(error) => error.exit_code(),
+            Self::Export(ExportError::Name { .. } | ExportError::Unfit { .. }) => ExitCode::Usage,
+            Self::Export(_) => ExitCode::Data,
             Self::Apply(error) => of_apply(error),
             Self::Drift(error) if error.is_refusal() => ExitCode::NotObservable,
             Self::Drift(DriftError::Unwritable(_)) | Self::Report(_) | Self::Stdout(_) => {
@@ -165,6 +177,7 @@ impl CliError {
             Self::Capture(CaptureError::Table(_)) => ExitCode::NotWritten,
             Self::NotASigma { .. }
             | Self::NotANoiseFactor { .. }
+            | Self::NotABound { .. }
             | Self::Simulation { .. }
             | Self::Json { .. }
             | Self::Fit(_)

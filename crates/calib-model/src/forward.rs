@@ -1,7 +1,7 @@
 //! Loads, joint motions and poses: equations (1) to (3) of the crate.
 
 use calib_geometry::so3;
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 use crate::axis::Axis;
 use crate::effect::{HARMONICS, JointState, SinCos};
@@ -470,35 +470,4 @@ fn swing(theta: &Vector3<f64>) -> Matrix3<f64> {
         b * y * z + a * x,
         1.0 - b * (x * x + y * y),
     )
-}
-
-impl Pose {
-    /// R | t by rows: the upper three rows of a homogeneous matrix.
-    #[must_use]
-    pub fn rows(&self) -> [f64; 12] {
-        let mut out = [0.0; 12];
-        for (i, row) in out.chunks_exact_mut(4).enumerate() {
-            for (k, x) in row.iter_mut().take(3).enumerate() {
-                *x = self.r[(i, k)];
-            }
-            row[3] = self.t[i];
-        }
-        out
-    }
-
-    /// From the same twelve numbers; the rotation is taken as it is.
-    #[must_use]
-    pub fn from_rows(rows: &[f64; 12]) -> Self {
-        let x = |i: usize, k: usize| rows[4 * i + k];
-        Self {
-            r: nalgebra::Matrix3::from_fn(x),
-            t: Vector3::from_fn(|i, _| x(i, 3)),
-        }
-    }
-}
-
-impl From<Isometry3<f64>> for Pose {
-    fn from(pose: Isometry3<f64>) -> Self {
-        Self::of(&pose)
-    }
 }

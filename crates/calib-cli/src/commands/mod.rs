@@ -4,8 +4,10 @@ pub mod apply;
 pub mod check;
 pub mod completions;
 pub mod convert;
+pub mod correct;
 pub mod diff;
 pub mod drift;
+pub mod export;
 pub mod fit;
 pub mod history;
 pub mod init;
@@ -15,6 +17,7 @@ pub mod plan;
 mod plan_file;
 mod plugin_options;
 pub mod plugins;
+pub mod predict;
 pub mod record;
 pub mod revert;
 pub mod run;
@@ -41,6 +44,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
         Command::Twin(options) => twin::run(console, options),
         Command::Simulate(options) => simulate::run(console, options),
         Command::Fit(options) => fit::run(options),
+        Command::Predict(options) => predict::run(console, options),
+        Command::Correct(options) => correct::run(console, options),
+        Command::Export(options) => export::run(console, options),
         Command::Apply(options) => apply::run(options),
         Command::Diff(options) => diff::run(options),
         Command::Drift(options) => drift::run(options),

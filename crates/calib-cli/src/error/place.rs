@@ -4,6 +4,7 @@ use std::path::Path;
 
 use calib_apply::ApplyError;
 use calib_drift::DriftError;
+use calib_export::ExportError;
 use calib_files::FileError;
 use calib_init::InitError;
 use calib_pipeline::PipelineError;
@@ -66,6 +67,9 @@ impl CliError {
             Self::Twin(_) | Self::NotANoiseFactor { .. } => "twin",
             Self::Apply(error) => of_apply(error),
             Self::Drift(_) => "drift",
+            Self::Export(ExportError::Table(_)) => "recording",
+            Self::Export(_) => "model",
+            Self::NotABound { .. } => "correct",
             Self::Fit(_) => "fit",
             Self::File(error) => of_file(error),
             Self::Recording(_) => "recording",
@@ -103,6 +107,14 @@ impl CliError {
             Self::Apply(ApplyError::Read(error)) => place_of_urdf(error)?,
             Self::Apply(ApplyError::File(error)) | Self::File(error) => place_of_file(error)?,
             Self::Drift(DriftError::Report(error)) => Place::path(error.path()),
+            Self::Export(ExportError::Table(error)) => place_of_recording(error),
+            Self::Export(error) => {
+                let (file, line) = error.place()?;
+                Place {
+                    line,
+                    ..Place::of(file)
+                }
+            }
             Self::Apply(ApplyError::Report(error)) => Place::path(error.path()),
             Self::Recording(error) => place_of_recording(error),
             Self::Table { file, .. } | Self::Simulation { file, .. } => Place::of(file.clone()),

@@ -59,15 +59,7 @@ pub(super) fn joint(
         }
     };
     let moves = j.motion != ModelMotion::Fixed;
-    let axis = match (j.axis, moves) {
-        (Some(a), true) => Some(unit(&place("axis"), a)?),
-        (None, true) => return Err(value(place("axis"), "null", "a vector of length 1")),
-        (_, false) => None,
-    };
-    let axis = axis.map(|a| match j.motion {
-        ModelMotion::Prismatic => Axis::Prismatic(a),
-        _ => Axis::Revolute(a),
-    });
+    let axis = axis_of(&place, j, moves)?;
     let entry = match (moves, entries.get(&source)) {
         (false, _) => 0,
         (true, Some(entry)) => *entry,
@@ -142,6 +134,23 @@ pub(super) fn joint(
         out.terms.push(term);
     }
     Ok(out)
+}
+
+/// The axis of a joint that moves.
+fn axis_of(
+    place: &dyn Fn(&str) -> String,
+    j: &ModelJoint,
+    moves: bool,
+) -> Result<Option<Axis>, ModelError> {
+    let axis = match (j.axis, moves) {
+        (Some(a), true) => unit(&place("axis"), a)?,
+        (None, true) => return Err(value(place("axis"), "null", "a vector of length 1")),
+        (_, false) => return Ok(None),
+    };
+    Ok(Some(match j.motion {
+        ModelMotion::Prismatic => Axis::Prismatic(axis),
+        _ => Axis::Revolute(axis),
+    }))
 }
 
 fn joint_term(

@@ -1,0 +1,88 @@
+//! `calib correct`.
+
+use std::path::PathBuf;
+
+use calib_export::{CorrectOptions, Corrected, correct, robot};
+use calib_pipeline::ExitCode;
+use clap::Args;
+
+use super::predict::{say_absent, write};
+use crate::error::CliError;
+use crate::terminal::{Console, say};
+
+/// Arguments of `calib correct`.
+#[derive(Debug, Args)]
+pub struct Correct {
+    /// `<robot>.calibrated.model.json`
+    model: PathBuf,
+    /// Table of joint positions, or of poses of the tool in the root's frame (`<link>.x_m` …)
+    program: PathBuf,
+    /// Link that is to stand where the nominal model has it [default: the last one]
+    #[arg(long)]
+    tool: Option<String>,
+    /// Only the position of the link is to be right: for arms of fewer than six joints
+    #[arg(long)]
+    position_only: bool,
+    /// Largest change of a turning joint, deg [default: 5.7; 90 for poses]
+    #[arg(long, value_name = "DEG")]
+    largest_deg: Option<f64>,
+    /// Largest change of a sliding joint, mm [default: 50; 1000 for poses]
+    #[arg(long, value_name = "MM")]
+    largest_mm: Option<f64>,
+    /// The CSV to write; it must not exist [default: standard output]
+    #[arg(short, long, value_name = "FILE.csv")]
+    out: Option<PathBuf>,
+}
+
+/// Corrects a program.
+pub fn run(console: &Console, options: &Correct) -> Result<ExitCode, CliError> {
+    for bound in [options.largest_deg, options.largest_mm]
+        .into_iter()
+        .flatten()
+    {
+        if !(bound > 0.0 && bound.is_finite()) {
+            return Err(CliError::NotABound { bound });
+        }
+    }
+    let robot = robot(&options.model)?;
+    let with = CorrectOptions {
+        tool: options.tool.clone(),
+        position_only: options.position_only,
+        largest_rad: options.largest_deg.map(f64::to_radians),
+        largest_m: options.largest_mm.map(|mm| 1e-3 * mm),
+    };
+    let done = correct(&robot, &options.program, &with)?;
+    if !console.quiet {
+        if !done.cartesian || done.absent.len() < robot.model.joints().len() {
+            say_absent(&done.absent);
+        }
+        say(&summary(&done));
+    }
+    write(console, options.out.as_ref(), &done.csv)?;
+    Ok(match done.refused {
+        0 => ExitCode::Accepted,
+        _ => ExitCode::VerdictFail,
+    })
+}
+
+/// One line of what became of the program.
+fn summary(done: &Corrected) -> String {
+    let mm = |m: f64| format!("{:.3}", 1e3 * m);
+    let mut text = format!(
+        "calib: {} of {} rows reached; tool error by the model {} mm rms before, {} mm after",
+        done.reached,
+        done.rows,
+        mm(done.before_m[0]),
+        mm(done.after_m[0])
+    );
+    for (count, what) in [
+        (done.outside, "outside of the fitted range"),
+        (done.nearer, "nearer only"),
+        (done.refused, "refused: they keep their position"),
+    ] {
+        if count > 0 {
+            text.push_str(&format!("; {count} {what}"));
+        }
+    }
+    text
+}

@@ -1,0 +1,96 @@
+//! `calib predict`.
+
+use std::path::PathBuf;
+
+use calib_export::{Frame, PredictOptions, predict, robot};
+use calib_files::{OutputFile, folder_of, write_new};
+use calib_pipeline::ExitCode;
+use clap::{Args, ValueEnum};
+
+use crate::error::CliError;
+use crate::terminal::{Console, emit, emit_written, say};
+
+/// Arguments of `calib predict`.
+#[derive(Debug, Args)]
+pub struct Predict {
+    /// `<robot>.calibrated.model.json`
+    model: PathBuf,
+    /// Table of joint positions, in any format that `calib` reads
+    table: PathBuf,
+    /// Links, bodies or points [default: all bodies and points]
+    #[arg(long, value_delimiter = ',')]
+    of: Vec<String>,
+    /// Frame that the poses are given in
+    #[arg(long = "in", value_enum, default_value_t = In::Root)]
+    frame: In,
+    /// The rows are no sequence: every joint stands in the middle of its backlash
+    #[arg(long)]
+    unordered: bool,
+    /// The torques of the table load the joints, in place of gravity
+    #[arg(long)]
+    torques: bool,
+    /// The CSV to write; it must not exist [default: standard output]
+    #[arg(short, long, value_name = "FILE.csv")]
+    out: Option<PathBuf>,
+}
+
+/// Frames of poses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum In {
+    /// The robot's root link
+    Root,
+    /// The tracker
+    Tracker,
+}
+
+/// Predicts the poses of a table.
+pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
+    let robot = robot(&options.model)?;
+    let with = PredictOptions {
+        of: options.of.clone(),
+        frame: match options.frame {
+            In::Root => Frame::Root,
+            In::Tracker => Frame::Tracker,
+        },
+        unordered: options.unordered,
+        torques: options.torques,
+    };
+    let done = predict(&robot, &options.table, &with)?;
+    if !console.quiet {
+        say_absent(&done.absent);
+        if done.outside > 0 {
+            say(&format!(
+                "calib: {} of {} rows are outside of the range that was fitted: nothing was verified there",
+                done.outside, done.rows
+            ));
+        }
+    }
+    write(console, options.out.as_ref(), &done.csv)
+}
+
+/// Joints without a column.
+pub(super) fn say_absent(absent: &[String]) {
+    if !absent.is_empty() {
+        say(&format!(
+            "calib: joints without a column count as 0: {}",
+            absent.join(", ")
+        ));
+    }
+}
+
+/// A result to its file, or to standard output.
+pub(super) fn write(
+    console: &Console,
+    out: Option<&PathBuf>,
+    text: &str,
+) -> Result<ExitCode, CliError> {
+    match out {
+        None => emit(text)?,
+        Some(path) => {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            write_new(folder_of(path), &[OutputFile::text(name, text)])?;
+            emit_written(console, path);
+        }
+    }
+    Ok(ExitCode::Accepted)
+}
