@@ -19,8 +19,10 @@ use scratch::Scratch;
 /// σ of one marker coordinate, m.
 const MARKER: f64 = 5e-5;
 
-/// Three joints with an upper and a lower arm, and a wrist of three: origin in the link before, axis, mass and its center.
-const JOINTS: [([f64; 3], [f64; 3], f64, [f64; 3]); 6] = [
+/// Origin in the link before, m, axis, mass, kg, and its center, m.
+type Row = ([f64; 3], [f64; 3], f64, [f64; 3]);
+/// Three joints with an upper and a lower arm, and a wrist of three.
+const JOINTS: [Row; 6] = [
     ([0.0, 0.0, 0.3], [0.0, 0.0, 1.0], 6.0, [0.02, 0.0, 0.1]),
     ([0.05, 0.0, 0.1], [0.0, 1.0, 0.0], 8.0, [0.0, 0.0, 0.25]),
     ([0.0, 0.0, 0.5], [0.0, 1.0, 0.0], 5.0, [0.2, 0.0, 0.03]),
