@@ -1,4 +1,4 @@
-//! Joints: enough of them, in the right unit, inside their limits, over the range asked for.
+//! Joints: enough of them, in the right unit and with enough digits, inside their limits, over the range asked for.
 
 use super::Expectations;
 use crate::statistics::range;
@@ -14,6 +14,21 @@ const OVER_LIMIT: f64 = 2e-3;
 const WRAPPED: usize = 3;
 /// Part of the asked range that must be covered. Grids of ten steps end half a step early.
 const COVERED: f64 = 0.9;
+/// Steps that programs round angles to, rad, largest first: 1°, 0.01 rad, 0.5°, 0.1°, 0.001 rad, 0.05°. Finer ones hide behind encoders.
+const ROUNDED: [f64; 6] = [
+    1.0,
+    0.572_957_795_130_823_2,
+    0.5,
+    0.1,
+    0.057_295_779_513_082_32,
+    0.05,
+];
+/// The same of lengths, m.
+const ROUNDED_LENGTH: [f64; 3] = [1e-3, 5e-4, 1e-4];
+/// Different readings that show their last digit.
+const READINGS: usize = 12;
+/// Part of readings that are whole fives of the last digit: a fifth by chance, nearly all of postures that were asked for in round numbers.
+const FIVES: f64 = 0.5;
 /// Revolute joints turn at most this often to either side; more is degrees taken for radians.
 const MAX_TURNS: f64 = 1.5;
 
@@ -36,6 +51,7 @@ pub(super) fn too_few(poses: &Poses, expected: &Expectations) -> Option<Finding>
 pub(super) fn units(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (joint, q) in &poses.joints {
+        findings.extend(rounded(poses, joint, q));
         if poses.joint_units.get(joint) == Some(&JointUnit::Length) {
             continue;
         }
@@ -71,6 +87,35 @@ pub(super) fn units(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
         }
     }
     findings
+}
+
+/// Readings that were rounded when they were written.
+fn rounded(poses: &Poses, joint: &str, q: &[Option<f64>]) -> Option<Finding> {
+    /// Part of a step: what is left of decimals that were read in another unit.
+    const EXACT: f64 = 1e-5;
+    let unit = unit(poses, joint);
+    let steps: Vec<f64> = match unit {
+        Unit::Meter => ROUNDED_LENGTH.to_vec(),
+        _ => ROUNDED.iter().map(|step| step.to_radians()).collect(),
+    };
+    let is_whole = |x: f64| (x - x.round()).abs() < EXACT;
+    let all = |step: f64| q.iter().flatten().all(|q| is_whole(q / step));
+    let step = steps.into_iter().find(|step| all(*step))?;
+    let mut readings: Vec<i64> = q
+        .iter()
+        .flatten()
+        .map(|q| (q / step).round() as i64)
+        .collect();
+    readings.sort_unstable();
+    readings.dedup();
+    let fives = readings.iter().filter(|k| *k % 5 == 0).count();
+    let shown = readings.len() >= READINGS && (fives as f64) < FIVES * readings.len() as f64;
+    shown.then(|| {
+        Finding::new(catalog::JOINT_ROUNDED, Subject::joint(joint))
+            .with("step", Fact::number(step, unit))
+            // Equally likely within half a step.
+            .with("sigma", Fact::number(step / 12f64.sqrt(), unit))
+    })
 }
 
 pub(super) fn limits(poses: &Poses, expected: &Expectations) -> Vec<Finding> {

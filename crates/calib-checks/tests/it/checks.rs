@@ -367,6 +367,16 @@ pub fn faults() -> Vec<(&'static str, &'static str, bool, Fault)> {
                 *joint(r, "roll") = copy;
             },
         ),
+        (
+            "joint-rounded",
+            "a joint in tenths of a degree",
+            true,
+            |r, _| {
+                for q in joint(r, "waist").iter_mut().flatten() {
+                    *q = ((q.to_degrees() * 10.0).round() / 10.0).to_radians();
+                }
+            },
+        ),
         ("coverage", "half of the range", false, |r, _| {
             let kept: Vec<usize> = (0..36).filter(|&i| r.q[i][0] > 0.0).collect();
             r.poses = r.poses.select(&kept);

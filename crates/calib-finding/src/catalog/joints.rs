@@ -100,6 +100,12 @@ super::topic! {
             "The joint equals `{other}` in all {rows:row}.",
             "Check the export: one column was written twice. A mimic joint need not be recorded.";
     }
+    /// Readings with too few digits.
+    JOINT_ROUNDED = "joint-rounded" {
+        "": Info,
+            "Every reading of this joint is a multiple of {step}. If they were rounded when they were written, each is off by {sigma} (σ).",
+            "If these are measured positions, write them with three decimals of a degree or more, or five of a radian. If they are positions that were asked for, nothing is wrong.";
+    }
     /// Joints with readings that never change.
     JOINTS_STOOD_STILL = "joints-stood-still" {
         "": Info,
