@@ -199,6 +199,9 @@ fn quaternions_with_w_first() {
 
 #[test]
 fn a_recording_with_y_up() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let said = |dir: Scratch| dir.edit(PROFILE, "frame: vicon,", "frame: vicon, up_axis: +Z,");
     let clean = findings(&said(ripley()), PROFILE);
     assert!(clean.is_empty(), "{clean:#?}");

@@ -41,6 +41,9 @@ fn code(dir: &Scratch, line: &str) -> i32 {
 #[cfg(target_os = "linux")]
 #[test]
 fn lost_output_is_an_error_and_a_lost_reader_is_none() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let dir = Scratch::new().brief("ripley");
     let commands = [
         "calib schema",

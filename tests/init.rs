@@ -131,6 +131,9 @@ fn the_export_of_the_tutorial_needs_no_line_of_a_profile() {
 
 #[test]
 fn the_shipped_robots_are_found_again_from_their_tables() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     for (robot, urdf, files, links) in [
         (
             "ripley",
@@ -309,6 +312,9 @@ fn real_robots(every: usize) {
 
 #[test]
 fn real_robots_run_without_an_edit() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     real_robots(6);
 }
 

@@ -198,6 +198,9 @@ const RUN: &[&str] = &[
 
 #[test]
 fn run_in_a_fresh_and_in_a_used_folder() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     // The used folder holds an earlier run of another method.
     let fresh = || Scratch::new().brief("ripley");
     let old = &finished("ripley", "ml").dir;

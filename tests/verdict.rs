@@ -149,6 +149,9 @@ fn a_sweep_that_is_rejected_as_a_whole_is_not_a_quiet_line() {
 /// Without a validation recording every fitted pose is predicted from the others: a warning, and the limits apply.
 #[test]
 fn without_validation_poses_are_left_out_in_turn() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let profile = ripley().read(PROFILE);
     let stated = profile.split("simulate:").next().unwrap_or_default();
     let dir = ripley().file(PROFILE, stated).edit(PROFILE, VALIDATION, "");

@@ -47,7 +47,7 @@ pub fn skip(reason: &str) {
     record(&run_file(&program), &binary, &test, reason).expect("target/skipped is writable");
 }
 
-/// Whether tests of many trials run, those with more than some 4 s of processor time: where `CALIB_TESTS` is `all`, as it is where it is decided what
+/// Whether tests of many trials run, those with more than some 3 s of processor time: where `CALIB_TESTS` is `all`, as it is where it is decided what
 /// lands. They are counted as skipped elsewhere.
 #[must_use]
 pub fn thorough() -> bool {
