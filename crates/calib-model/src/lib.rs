@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Equation (2) is evaluated by [`effect`] and [`motion`], which the solver uses too. [`Model`] is read from
-//! `<robot>.calibrated.model.json` ([`file`]); it never changes. What changes from call to call is a [`Work`], one for each thread:
+//! `<robot>.calibrated.model.json` ([`mod@file`]); it never changes. What changes from call to call is a [`Work`], one for each thread:
 //! after it was made, no call allocates. Positions `q` are in the order of [`Model::joints`], rad or m, as the controller reads them.
 //! Twists are `[ω; v]` in the frame of the link that is asked for; lengths m, angles rad.
 //!
