@@ -93,6 +93,46 @@ fn the_header_declares_what_the_library_exports() {
     assert_eq!(exported, defined);
 }
 
+/// Compiles a program with the library; `false`, counted as skipped, where there is no compiler.
+fn compiled(
+    (compiler, arguments): (&str, &[&str]),
+    source: &Path,
+    archive: &Path,
+    program: &Path,
+) -> bool {
+    let mut command = Command::new(compiler);
+    command
+        .args(arguments)
+        .args(["-Wall", "-Wextra", "-Werror", "-O1", "-I"])
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("include"))
+        .arg(source)
+        .args(["-x", "none"])
+        .arg(archive)
+        .args(["-lm", "-lpthread", "-ldl", "-o"])
+        .arg(program);
+    let Some(built) = output(&mut command, "no C compiler") else {
+        return false;
+    };
+    let said = String::from_utf8_lossy(&built.stderr);
+    assert!(built.status.success(), "{said}");
+    true
+}
+
+/// Under valgrind, where it is installed.
+fn runs_clean(program: &Path, model: &Path) {
+    let mut command = Command::new("valgrind");
+    command.args([
+        "--error-exitcode=9",
+        "--leak-check=full",
+        "--show-leak-kinds=all",
+        "-q",
+    ]);
+    if let Some(checked) = output(command.arg(program).arg(model), "no valgrind") {
+        let said = String::from_utf8_lossy(&checked.stderr).into_owned();
+        assert!(checked.status.success() && said.is_empty(), "{said}");
+    }
+}
+
 #[test]
 fn the_example_compiles_without_a_warning_and_runs_clean() {
     let Some(archive) = library(".a") else {
@@ -107,26 +147,10 @@ fn the_example_compiles_without_a_warning_and_runs_clean() {
         ("c++", &["-x", "c++", "-std=c++17"][..]),
     ] {
         let program = folder.path().join(compiler);
-        let mut command = Command::new(compiler);
-        command
-            .args(arguments)
-            .args(["-Wall", "-Wextra", "-Werror", "-O1", "-I"]);
-        command
-            .arg(here.join("include"))
-            .arg(here.join("../../examples/c/arm.c"));
-        command
-            .args(["-x", "none"])
-            .arg(&archive)
-            .args(["-lm", "-lpthread", "-ldl", "-o"])
-            .arg(&program);
-        let Some(built) = output(&mut command, "no C compiler") else {
+        let source = here.join("../../examples/c/arm.c");
+        if !compiled((compiler, arguments), &source, &archive, &program) {
             return;
-        };
-        assert!(
-            built.status.success(),
-            "{}",
-            String::from_utf8_lossy(&built.stderr)
-        );
+        }
         let ran = Command::new(&program)
             .arg(&model)
             .output()
@@ -147,16 +171,24 @@ fn the_example_compiles_without_a_warning_and_runs_clean() {
         .expect("it starts");
     assert_eq!(refused.status.code(), Some(3));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("line 1, column"));
-    let mut command = Command::new("valgrind");
-    command.args([
-        "--error-exitcode=9",
-        "--leak-check=full",
-        "--show-leak-kinds=all",
-        "-q",
-    ]);
-    let Some(checked) = output(command.arg(&program).arg(&model), "no valgrind") else {
-        return;
+    runs_clean(&program, &model);
+}
+
+/// The header promises both.
+#[test]
+fn what_is_refused_leaves_outputs_and_memory_as_they_were() {
+    let Some(archive) = library(".a") else {
+        return skipped_tests::skip("no static library of calib-model was built");
     };
-    let said = String::from_utf8_lossy(&checked.stderr).into_owned();
-    assert!(checked.status.success() && said.is_empty(), "{said}");
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = tempfile::tempdir().expect("a folder");
+    let program = folder.path().join("refused");
+    let source = here.join("tests/refused.c");
+    if compiled(("cc", &["-std=c11"]), &source, &archive, &program) {
+        let model = here.join("tests/it/arm.model.json");
+        let ran = Command::new(&program).arg(&model).output();
+        let ran = ran.expect("it starts");
+        assert!(ran.status.success(), "{ran:?}");
+        runs_clean(&program, &model);
+    }
 }

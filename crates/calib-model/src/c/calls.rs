@@ -249,6 +249,18 @@ unsafe fn corrected(done: &Correction, out: *mut CCorrection) -> c_int {
     code
 }
 
+/// A copy of a caller's positions in the memory of the thread, which has to get it back: inputs and outputs may be one array, and an output is not
+/// written where a call is refused.
+unsafe fn caller(work: &mut Work, q: *const f64, n: usize) -> Result<Vec<f64>, ModelError> {
+    let given = unsafe { given::numbers(q, n) }?;
+    if work.caller.len() != n {
+        return Err(ModelError::ForeignWork);
+    }
+    let mut kept = std::mem::take(&mut work.caller);
+    kept.copy_from_slice(given);
+    Ok(kept)
+}
+
 /// The command that brings a link to where the nominal model has it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn calib_model_correct(
@@ -264,21 +276,17 @@ pub unsafe extern "C" fn calib_model_correct(
     guarded(|| {
         let call = unsafe { Call::of(model, work, held) }?;
         let n = call.model.joints().len();
-        // The two may be one array.
-        let desired = unsafe { given::room(q_command, n) }?;
-        unsafe { given::numbers(q_desired, n) }?;
-        unsafe { std::ptr::copy(q_desired, q_command, n) };
-        if call.work.caller.len() != n {
-            return Err(ModelError::ForeignWork);
-        }
-        let mut kept = std::mem::take(&mut call.work.caller);
-        kept.copy_from_slice(desired);
+        let mut kept = unsafe { caller(call.work, q_desired, n) }?;
+        // Only now: the two may be one array.
+        let room = unsafe { given::room(q_command, n) };
         let with = unsafe { options(with, Options::default()) };
         let under = call.under();
-        let done = call
-            .model
-            .correct(&kept, LinkId(link), &with, &under, call.work, desired);
-        call.work.caller = kept;
+        let done = room.and_then(|out| {
+            let link = LinkId(link);
+            call.model
+                .correct(&kept, link, &with, &under, call.work, out)
+        });
+        std::mem::swap(&mut call.work.caller, &mut kept);
         Ok(unsafe { corrected(&done?, correction) })
     })
 }
@@ -301,22 +309,17 @@ pub unsafe extern "C" fn calib_model_ik(
         let n = call.model.joints().len();
         let mut wanted = [0.0; 12];
         wanted.copy_from_slice(unsafe { given::numbers(pose, 12) }?);
-        unsafe { given::numbers(seed, n) }?;
-        let out = unsafe { given::room(q, n) }?;
-        unsafe { std::ptr::copy(seed, q, n) };
-        if call.work.caller.len() != n {
-            return Err(ModelError::ForeignWork);
-        }
-        let mut kept = std::mem::take(&mut call.work.caller);
-        kept.copy_from_slice(out);
+        let mut kept = unsafe { caller(call.work, seed, n) }?;
+        let room = unsafe { given::room(q, n) };
         let with = unsafe { options(with, Options::inverse()) };
         let under = call.under();
         let wanted = Pose::from_rows(&wanted);
         let link = LinkId(link);
-        let done = call
-            .model
-            .ik(&wanted, &kept, link, &with, &under, (call.work, out));
-        call.work.caller = kept;
+        let done = room.and_then(|out| {
+            let work = (&mut *call.work, out);
+            call.model.ik(&wanted, &kept, link, &with, &under, work)
+        });
+        std::mem::swap(&mut call.work.caller, &mut kept);
         Ok(unsafe { corrected(&done?, correction) })
     })
 }

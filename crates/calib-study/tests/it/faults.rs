@@ -216,3 +216,25 @@ fn tables_count_every_case_once() {
         "`just studies` regenerates the page"
     );
 }
+
+/// One error for each of ten poses is as good as any smooth effect of the reading.
+#[test]
+fn an_eccentric_gear_in_few_poses_is_no_joint_that_scatters() {
+    if !skipped_tests::thorough() {
+        return;
+    }
+    let options = FaultOptions {
+        cases: 3,
+        seed: 137,
+        only: vec![Fault::Eccentricity],
+        ..FaultOptions::default()
+    };
+    let found = run_faults(&options, &|_, _| {}).expect("a study").results;
+    let few = |r: &&CaseResult| [Design::Few, Design::Six].contains(&r.cell.design);
+    for case in found.iter().filter(few) {
+        let scatters = case.findings.contains("joint-scatters");
+        assert!(!scatters, "{:?} {}", case.cell, case.number);
+    }
+    let named = found.iter().filter(|r| r.outcome == Outcome::Named);
+    assert!(named.count() >= 60, "of {}", found.len());
+}
