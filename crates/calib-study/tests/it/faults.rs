@@ -219,7 +219,7 @@ fn tables_count_every_case_once() {
 
 /// One error for each of ten poses is as good as any smooth effect of the reading.
 #[test]
-fn an_eccentric_gear_in_few_poses_is_no_joint_that_scatters() {
+fn few_poses_of_an_eccentric_gear_are_not_called_scatter() {
     if !skipped_tests::thorough() {
         return;
     }
