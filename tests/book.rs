@@ -304,7 +304,7 @@ fn has_python() -> bool {
 }
 
 /// Every `$ calib …` of every `console` block runs, page by page in one folder, and ends with the code that the block
-/// names (`console,exit=4`), 0 if none. Commands of cargo and git stand in the blocks for the reader and are not run, except
+/// names (`console,exit=4`), 0 if none. Commands of cargo, git and rustup stand in the blocks for the reader and are not run, except
 /// `cargo run --release --`, which is `calib`. Python is run where it is installed.
 #[test]
 fn every_command_of_the_book_runs() {
@@ -324,7 +324,7 @@ fn every_command_of_the_book_runs() {
                     continue;
                 };
                 let command = command.replace("cargo run --release -- ", "calib ");
-                if ["cargo ", "git ", "just "]
+                if ["cargo ", "git ", "just ", "rustup "]
                     .iter()
                     .any(|c| command.starts_with(c))
                 {

@@ -171,7 +171,7 @@ fn quoted_commands_run() {
 }
 
 #[test]
-fn one_line_all_tables_and_colors() {
+fn one_line_and_all_tables() {
     let dir = ripley();
     let quiet = dir.calib(["run", PROFILE, "-o", "out", "-q"]).expect(0);
     assert_eq!(quiet.stdout.lines().count(), 1, "{}", quiet.stdout);
@@ -181,6 +181,18 @@ fn one_line_all_tables_and_colors() {
     assert!(full.stdout.lines().count() > ROWS, "{}", full.stdout);
     assert!(full.stdout.ends_with("ACCEPTED\nreport: out/report.html\n"));
     insta::assert_snapshot!("screens_full", crate::shown::rounded_text(&full.stdout));
+    let wide = dir.calib_in(&["run", PROFILE, "-o", "out"], &[("COLUMNS", "100")]);
+    let longest = wide.stdout.lines().map(|l| l.chars().count()).max();
+    assert!(
+        (81..=100).contains(&longest.unwrap_or(0)),
+        "{}",
+        wide.stdout
+    );
+}
+
+#[test]
+fn colors_are_as_asked_for() {
+    let dir = Scratch::new().brief("ripley");
     let colored = |arguments: &[&str], variables: &[(&str, &str)]| {
         let all = [&["run", PROFILE, "-o", "out", "-q"], arguments].concat();
         dir.calib_in(&all, variables).stdout.contains('\u{1b}')
@@ -191,13 +203,6 @@ fn one_line_all_tables_and_colors() {
     assert!(!colored(&[], &[("CLICOLOR_FORCE", "0")]));
     assert!(!colored(&[], &[("CLICOLOR_FORCE", "1"), ("NO_COLOR", "1")]));
     assert!(!colored(&["--color", "never"], &[("CLICOLOR_FORCE", "1")]));
-    let wide = dir.calib_in(&["run", PROFILE, "-o", "out"], &[("COLUMNS", "100")]);
-    let longest = wide.stdout.lines().map(|l| l.chars().count()).max();
-    assert!(
-        (81..=100).contains(&longest.unwrap_or(0)),
-        "{}",
-        wide.stdout
-    );
 }
 
 /// What the profile says of the measurement stands beside the verdict.

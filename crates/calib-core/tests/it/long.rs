@@ -158,6 +158,13 @@ fn a_slip_is_found_at_its_sample() {
     assert!(change.first.abs_diff(at) <= 1, "{} for {at}", change.first);
     let length = Vector3::new(change.jump[3], change.jump[4], change.jump[5]).norm();
     assert!((length / (3.0 * SIGMA) - 1.0).abs() < 0.1, "{length}");
+}
+
+#[test]
+fn nothing_moved_in_a_long_recording() {
+    if !skipped_tests::thorough() {
+        return;
+    }
     let clean = case(3, Has::default());
     let scan = fit(&clean).changes(&ChangeSettings::default());
     assert_eq!(scan.expect("evaluable").significant(), None);
