@@ -4,7 +4,7 @@ use calib_geometry::so3;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::axis::Axis;
-use crate::effect::{HARMONICS, JointState, SinCos};
+use crate::effect::{HARMONICS, JointState, OF_STATE, SinCos};
 use crate::error::ModelError;
 use crate::model::{Joint, JointTerm, LinkId, Model, Place};
 use crate::motion::JointMotion;
@@ -178,24 +178,24 @@ impl Model {
 
     /// Equations (1) and (2): states, φ and θ of all joints.
     pub(crate) fn motions(&self, q: &[f64], under: &Under, work: &mut Work) {
-        self.motions_with(q, under, work, |_| true);
+        self.motions_with((q, 0), under, work, |_| true);
     }
 
-    /// The same without the terms that jump.
-    pub(crate) fn smooth_motions(&self, q: &[f64], under: &Under, work: &mut Work) {
-        self.motions_with(q, under, work, |t| !t.jumps);
+    /// The same without the terms that jump; the nominal poses before the joint `from` are as they were.
+    pub(crate) fn smooth_motions(&self, q: &[f64], from: usize, under: &Under, work: &mut Work) {
+        self.motions_with((q, from), under, work, |t| !t.jumps);
     }
 
     #[inline]
     fn motions_with(
         &self,
-        q: &[f64],
+        (q, from): (&[f64], usize),
         under: &Under,
         work: &mut Work,
         wanted: impl Fn(&JointTerm) -> bool,
     ) {
         if self.loaded {
-            self.nominal_poses(q, work);
+            self.nominal_poses_from(from, q, work);
             self.moments(work);
         }
         for (i, joint) in self.joints.iter().enumerate() {
@@ -217,6 +217,9 @@ impl Model {
                     phi += c * kind.of_angles(&reading, &motor).unwrap_or(0.0);
                 }
             }
+            for (kind, c) in OF_STATE.iter().zip(&joint.of_state) {
+                phi += c * kind.of_state(&state).unwrap_or(0.0);
+            }
             for t in joint.direct.iter().filter(|t| wanted(t)) {
                 let amount = t.value * self.regressor(t, &state, q);
                 match t.across {
@@ -236,8 +239,11 @@ impl Model {
             None => (t.term.regressor)(s),
             Some(other) => {
                 let other = &self.joints[other];
-                let other = other.multiplier * q[other.source] + other.offset;
-                (t.term.regressor)(&JointState { other, ..*s })
+                let state = JointState {
+                    other: other.multiplier * q[other.source] + other.offset,
+                    ..JointState::default()
+                };
+                (t.term.regressor)(&state)
             }
         }
     }
@@ -307,7 +313,12 @@ impl Model {
 
     /// Equation (3) of the nominal geometry, without effects.
     pub(crate) fn nominal_poses(&self, q: &[f64], work: &mut Work) {
-        for (i, joint) in self.joints.iter().enumerate() {
+        self.nominal_poses_from(0, q, work);
+    }
+
+    /// The same of this joint and those after it: the ones before it are as they were.
+    fn nominal_poses_from(&self, from: usize, q: &[f64], work: &mut Work) {
+        for (i, joint) in self.joints.iter().enumerate().skip(from) {
             let frame = then(&work.nominal[joint.parent], &joint.nominal);
             work.nominal_frame[i] = frame;
             work.nominal[i + 1] = match joint.axis {

@@ -9,12 +9,12 @@
 //! backlash with the sign of the load has no derivative and is left out.
 
 use calib_geometry::so3;
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3, Vector6};
 
 use crate::axis::Axis;
 use crate::error::ModelError;
 use crate::forward::{Under, Work};
-use crate::model::{LinkId, Model};
+use crate::model::{Joint, LinkId, Model};
 
 /// Rad or m: truncation (harmonics of a motor have periods of some mrad) and rounding are both below 1e-7 of an effect.
 const STEP: f64 = 1e-6;
@@ -68,26 +68,34 @@ impl Model {
         let mut tried = std::mem::take(&mut work.q);
         tried.copy_from_slice(q);
         let width = if both { 2.0 * STEP } else { STEP };
+        // Nominal poses before this joint are those of `tried`.
+        let mut known = 0;
         if !both {
-            self.smooth_motions(&tried, under, work);
+            self.smooth_motions(&tried, 0, under, work);
+            known = self.joints.len();
             entries
                 .iter()
                 .for_each(|k| self.begin_slopes(link, *k, width, work));
         }
-        for &k in entries {
+        // From the tool to the root: what one entry leaves moved is behind the next.
+        for &k in entries.iter().rev() {
+            let moves = |j: &Joint| j.axis.is_some() && j.source == k;
+            let first = self.joints.iter().position(moves).unwrap_or(0);
+            known = known.min(first);
             if both {
                 tried[k] = q[k] - STEP;
-                self.smooth_motions(&tried, under, work);
+                self.smooth_motions(&tried, known, under, work);
                 self.begin_slopes(link, k, width, work);
             }
             tried[k] = q[k] + STEP;
-            self.smooth_motions(&tried, under, work);
+            self.smooth_motions(&tried, known, under, work);
             for &i in &self.chains[link.0] {
                 let at = i * self.moved.len() + k;
                 work.phi_slope[at] += work.phi[i] / width;
                 work.theta_slope[at] += work.theta[i] / width;
             }
             tried[k] = q[k];
+            known = first;
         }
         work.q = tried;
     }
@@ -109,12 +117,12 @@ impl Model {
             let Some(about) = self.about_twist(i, link, work) else {
                 continue;
             };
-            let yields = self.joints[i].yields;
+            let across = self.joints[i].yields.then(|| Across::of(i, link, work));
             for &k in entries {
                 let at = i * dof + k;
                 let mut column = about * work.phi_slope[at];
-                if yields {
-                    column += self.across_twist(i, &work.theta_slope[at], link, work);
+                if let Some(across) = &across {
+                    column += across.twist(&work.theta_slope[at]);
                 }
                 work.jacobian[k] += column;
             }
@@ -133,23 +141,35 @@ impl Model {
             Axis::Prismatic(a) => stacked(&at.r, &Vector3::zeros(), &(frame.r * a.into_inner())),
         })
     }
+}
 
-    /// Twist of a link by a change of θ of a joint: Exp(θ + dθ) = Exp(θ) Exp(Jr(θ) dθ).
-    pub(crate) fn across_twist(
-        &self,
-        i: usize,
-        change: &Vector3<f64>,
-        link: LinkId,
-        work: &Work,
-    ) -> Vector6<f64> {
+/// How a link follows θ of a joint: Exp(θ + dθ) = Exp(θ) Exp(Jr(θ) dθ).
+pub(crate) struct Across {
+    /// link_from_child Jr(θ)
+    turn: Matrix3<f64>,
+    /// From the child to the link, in the link's axes, m.
+    lever: Vector3<f64>,
+}
+
+impl Across {
+    pub(crate) fn of(i: usize, link: LinkId, work: &Work) -> Self {
         let (at, child) = (&work.at[link.0], &work.at[i + 1]);
-        let omega = child.r * (so3::right_jacobian(&work.theta[i]) * change);
-        stacked(&at.r, &omega, &omega.cross(&(at.t - child.t)))
+        Self {
+            turn: at.r.tr_mul(&child.r) * so3::right_jacobian(&work.theta[i]),
+            lever: at.r.tr_mul(&(at.t - child.t)),
+        }
+    }
+
+    /// Twist `[ω; v]` of the link per change of θ, in its axes.
+    pub(crate) fn twist(&self, change: &Vector3<f64>) -> Vector6<f64> {
+        let omega = self.turn * change;
+        let v = omega.cross(&self.lever);
+        Vector6::new(omega.x, omega.y, omega.z, v.x, v.y, v.z)
     }
 }
 
 /// A twist in the root's axes, at a link's origin, in the link's axes.
-fn stacked(r: &nalgebra::Matrix3<f64>, omega: &Vector3<f64>, v: &Vector3<f64>) -> Vector6<f64> {
+fn stacked(r: &Matrix3<f64>, omega: &Vector3<f64>, v: &Vector3<f64>) -> Vector6<f64> {
     let (omega, v) = (r.tr_mul(omega), r.tr_mul(v));
     Vector6::new(omega.x, omega.y, omega.z, v.x, v.y, v.z)
 }

@@ -97,6 +97,8 @@ pub(crate) struct Joint {
     pub terms: Vec<JointTerm>,
     /// Those of [`crate::effect::HARMONICS`] by their coefficients.
     pub harmonics: [f64; 8],
+    /// Those of [`crate::effect::OF_STATE`].
+    pub of_state: [f64; 4],
     /// The others.
     pub direct: Vec<JointTerm>,
     /// Which coordinate axis it turns about, and its sign; `None`: another one, or it slides.

@@ -12,6 +12,7 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 use crate::effect::{JointState, Source};
 use crate::error::ModelError;
 use crate::forward::{Under, Work};
+use crate::jacobian::Across;
 use crate::model::{LinkId, Model, Number, Place};
 use crate::pose::Pose;
 
@@ -142,7 +143,7 @@ impl Model {
                 let f = self.regressor(term, &work.state[i], q);
                 let twist = match term.across {
                     None => self.about_twist(i, id, work)? * f,
-                    Some((_, e)) => self.across_twist(i, &(e * f), id, work),
+                    Some((_, e)) => Across::of(i, id, work).twist(&(e * f)),
                 };
                 Some(offset.pull_back(&twist))
             }
@@ -166,7 +167,7 @@ impl Model {
                         let e = &self.joints[i].across;
                         let change =
                             e[0] * (lateral[0] * across[0]) + e[1] * (lateral[1] * across[1]);
-                        sum += self.across_twist(i, &change, id, work);
+                        sum += Across::of(i, id, work).twist(&change);
                     }
                 }
                 Some(offset.pull_back(&sum))

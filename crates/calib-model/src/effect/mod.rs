@@ -388,6 +388,14 @@ pub const HARMONICS: [EffectKind; 8] = [
     EffectKind::Motor2Sin,
 ];
 
+/// Terms that [`EffectKind::of_state`] gives.
+pub const OF_STATE: [EffectKind; 4] = [
+    EffectKind::ZeroOffset,
+    EffectKind::Gain,
+    EffectKind::TorqueCompliance,
+    EffectKind::Backlash,
+];
+
 impl EffectKind {
     /// Every term of the table.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -459,6 +467,19 @@ impl EffectKind {
             Self::MotorSin => motor.sin,
             Self::Motor2Cos => -2.0 * motor.sin * motor.sin,
             Self::Motor2Sin => 2.0 * motor.sin * motor.cos,
+            _ => return None,
+        })
+    }
+
+    /// F of equation (1) where it is 1 or a number of the state; `None` for terms of another kind.
+    #[inline]
+    #[must_use]
+    pub fn of_state(self, s: &JointState) -> Option<f64> {
+        Some(match self {
+            Self::ZeroOffset => 1.0,
+            Self::Gain => s.q,
+            Self::TorqueCompliance => s.torque,
+            Self::Backlash => -s.approach,
             _ => return None,
         })
     }

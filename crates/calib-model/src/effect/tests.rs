@@ -24,6 +24,28 @@ fn shared_sines_give_the_regressors() {
 }
 
 #[test]
+fn numbers_of_the_state_are_the_regressors() {
+    let state = JointState {
+        q: 0.3,
+        velocity: 0.7,
+        torque: -4.0,
+        across: [5.0, 6.0],
+        approach: -1.0,
+        motor: 31.0,
+        friction: 0.5,
+        other: 0.9,
+        given: 1.7,
+    };
+    let shared: Vec<EffectKind> = EffectKind::all()
+        .filter(|k| k.of_state(&state).is_some())
+        .collect();
+    assert_eq!(shared, OF_STATE);
+    for kind in shared {
+        assert_eq!(kind.of_state(&state), Some((kind.term().regressor)(&state)));
+    }
+}
+
+#[test]
 fn every_term_is_listed_once_and_every_name_is_its_own() {
     let kinds: Vec<EffectKind> = EffectKind::all().collect();
     for (i, kind) in kinds.iter().enumerate() {

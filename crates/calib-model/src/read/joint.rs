@@ -6,7 +6,7 @@ use nalgebra::{Unit, Vector3};
 
 use super::{Names, UNIT, finite, pose, value};
 use crate::axis::Axis;
-use crate::effect::{Drives, EFFECTS, EffectKind, HARMONICS, Source, Term};
+use crate::effect::{Drives, EFFECTS, EffectKind, HARMONICS, OF_STATE, Source, Term};
 use crate::error::ModelError;
 use crate::file::{ModelEffect, ModelJoint, ModelMotion};
 use crate::model::{Joint, JointTerm};
@@ -86,6 +86,7 @@ pub(super) fn joint(
         friction: 0.0,
         terms: Vec::new(),
         harmonics: [0.0; 8],
+        of_state: [0.0; 4],
         direct: Vec::new(),
         coordinate: axis.and_then(|a| coordinate(&a)),
         yields: false,
@@ -123,13 +124,15 @@ pub(super) fn joint(
             None => out.across,
         };
         out.yields |= term.across.is_some();
-        match HARMONICS.iter().position(|k| *k == term.term.kind) {
-            Some(k) => {
-                out.harmonics[k] += term.value;
-                out.geared |= term.term.source == Source::Motor;
-                out.turns |= term.term.source == Source::Reading;
-            }
-            None => out.direct.push(term),
+        let among = |kinds: &[EffectKind]| kinds.iter().position(|k| *k == term.term.kind);
+        if let Some(k) = among(&HARMONICS) {
+            out.harmonics[k] += term.value;
+            out.geared |= term.term.source == Source::Motor;
+            out.turns |= term.term.source == Source::Reading;
+        } else if let Some(k) = among(&OF_STATE) {
+            out.of_state[k] += term.value;
+        } else {
+            out.direct.push(term);
         }
         out.terms.push(term);
     }
