@@ -25,6 +25,7 @@ mod loads;
 mod month;
 mod outputs;
 mod plan;
+mod plugin_effects;
 mod plugins;
 mod real_robots;
 mod record;

@@ -26,6 +26,16 @@ pub enum ExportError {
         /// Where and why.
         source: ModelError,
     },
+    /// A plugin computes an effect of the robot.
+    #[error(
+        "{file}: {source}\n  help: `calib predict` and `calib correct` take the plugin with `--plugin`; other formats cannot hold its effect"
+    )]
+    Plugin {
+        /// The file.
+        file: String,
+        /// Which effect of which plugin.
+        source: ModelError,
+    },
     /// The table cannot be read.
     #[error(transparent)]
     Table(#[from] calib_recording::Error),
@@ -85,6 +95,7 @@ impl ExportError {
     pub fn place(&self) -> Option<(&str, Option<u64>)> {
         match self {
             Self::Open { file, .. }
+            | Self::Plugin { file, .. }
             | Self::NotOneTable { file, .. }
             | Self::Column { file, .. } => Some((file, None)),
             Self::Model { file, source } => match source {

@@ -233,11 +233,11 @@ impl Model {
     /// F of a term.
     pub(crate) fn regressor(&self, t: &JointTerm, s: &JointState, q: &[f64]) -> f64 {
         match t.other {
-            None => (t.term.regressor)(s),
+            None => t.term.regressor.at(s),
             Some(other) => {
                 let other = &self.joints[other];
                 let other = other.multiplier * q[other.source] + other.offset;
-                (t.term.regressor)(&JointState { other, ..*s })
+                t.term.regressor.at(&JointState { other, ..*s })
             }
         }
     }
