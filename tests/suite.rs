@@ -5,6 +5,7 @@ mod apply;
 mod bad_input;
 mod blind;
 mod book;
+mod cell;
 mod changes;
 mod clocks;
 mod contacts;
