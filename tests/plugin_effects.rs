@@ -63,7 +63,7 @@ fn prediction_errors(model: &RobotModelFile, predicted: &str, recorded: &str) ->
         let head: Vec<&str> = lines.next().expect("a heading").split(',').collect();
         let row = |line: &str| {
             let cells = line.split(',').map(|c| c.parse().unwrap_or(f64::NAN));
-            head.iter().map(|h| h.to_string()).zip(cells).collect()
+            head.iter().map(ToString::to_string).zip(cells).collect()
         };
         lines.map(row).collect()
     };

@@ -39,9 +39,12 @@ pub fn robot_with(path: &Path, outside: FindOutside<'_>) -> Result<Robot, Export
     })?;
     let read = RobotModelFile::from_json(&bytes);
     let read = read.and_then(|read| Robot::of(read, outside));
-    read.map_err(|source| match source {
-        ModelError::Plugin { .. } => ExportError::Plugin { file, source },
-        source => ExportError::Model { file, source },
+    read.map_err(|source| {
+        let source = Box::new(source);
+        match *source {
+            ModelError::Plugin { .. } => ExportError::Plugin { file, source },
+            _ => ExportError::Model { file, source },
+        }
     })
 }
 
