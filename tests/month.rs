@@ -103,7 +103,7 @@ fn without_times(text: String) -> String {
 fn with_markers(text: String) -> String {
     without_times(text)
         .replace("tool: {link: gripper, pose: true}", "tool: {link: gripper, markers: [t1, t2, t3, t4]}")
-        .replace("body_sigma_mm: 0.1, body_sigma_deg: 0.02", "marker_sigma_mm: 0.2")
+        .replace("body_sigma_mm: 0.1, body_sigma_deg: 0.02", "body_sigma_mm: 0.1, body_sigma_deg: 0.02, marker_sigma_mm: 0.4")
         .replace(
             "    tool: {",
             "    tool: {markers_mm: {t1: [0, 0, 0], t2: [72, 0, 0], t3: [25, 58, 0], t4: [48, 30, -40]}, ",
