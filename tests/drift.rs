@@ -15,7 +15,7 @@ pub(crate) struct Since {
 }
 
 /// The robot as it really is: the nominal URDF with errors of a real arm's size.
-fn true_robot(urdf: &str, since: Since) -> String {
+pub(crate) fn true_robot(urdf: &str, since: Since) -> String {
     let moved = |text: &str, joint: &str, from: &str, to: String| {
         let at = text
             .find(&format!("<joint name=\"{joint}\""))

@@ -13,7 +13,7 @@ use scratch::Scratch;
 use serde_json::Value;
 
 /// σ of one marker coordinate, m.
-const MARKER: f64 = 1e-4;
+pub(crate) const MARKER: f64 = 1e-4;
 
 /// Three joints; the shoulder stands `shift` m off its place along x.
 fn urdf(shift: f64) -> String {
@@ -32,8 +32,8 @@ fn urdf(shift: f64) -> String {
     )
 }
 
-/// What the true joint turns more than its encoder says, from the direction it came and the torque that it holds.
-type Effect = fn(joint: usize, approach: f64, torque: f64) -> f64;
+/// What the true joint turns more than its encoder says, from the direction it came, the torque that it holds and the reading.
+pub(crate) type Effect = fn(joint: usize, approach: f64, torque: f64, q: f64) -> f64;
 
 /// Markers of foot and hand, joint readings and torques over random postures, in the order of recording.
 fn recording(arm: &RobotModel, effect: Effect, n: usize, seed: u64) -> String {
@@ -68,7 +68,7 @@ fn recording(arm: &RobotModel, effect: Effect, n: usize, seed: u64) -> String {
         let mut true_q = q.to_vec();
         for k in 0..3 {
             let approach = before.map_or(0.0, |b| (q[k] - b[k]).signum());
-            true_q[k] += effect(k + 1, approach, torque[k]);
+            true_q[k] += effect(k + 1, approach, torque[k], q[k]);
         }
         before = Some(q);
         let cells: Vec<String> = q
@@ -100,7 +100,7 @@ fn recording(arm: &RobotModel, effect: Effect, n: usize, seed: u64) -> String {
     text
 }
 
-const PROFILE: &str = r#"calib: 1
+pub(crate) const PROFILE: &str = r#"calib: 1
 robot: {name: arm, urdf: arm/arm.urdf}
 tracker: {frame: lab, marker_sigma_mm: 0.1}
 bodies:
@@ -114,7 +114,7 @@ solve:
   limits: {held_out_rms_mm: 0.3}
 "#;
 
-fn laboratory(profile: &str, shift: f64, effect: Effect) -> Scratch {
+pub(crate) fn laboratory(profile: &str, shift: f64, effect: Effect) -> Scratch {
     let arm = RobotModel::from_urdf_text(&urdf(shift), "true").expect("a robot");
     Scratch::new()
         .file("arm/arm.urdf", urdf(0.0))
@@ -123,12 +123,12 @@ fn laboratory(profile: &str, shift: f64, effect: Effect) -> Scratch {
         .file("arm/checks.csv", recording(&arm, effect, 30, 2))
 }
 
-fn parameter<'a>(report: &'a Value, name: &str) -> Option<&'a Value> {
+pub(crate) fn parameter<'a>(report: &'a Value, name: &str) -> Option<&'a Value> {
     let all = report["parameters"].as_array()?;
     all.iter().find(|p| p["name"] == name)
 }
 
-fn number(v: &Value) -> f64 {
+pub(crate) fn number(v: &Value) -> f64 {
     v.as_f64().expect("a number")
 }
 
@@ -143,7 +143,7 @@ const BACKLASH: f64 = 0.002;
 #[test]
 fn backlash_is_found_and_taken_out_of_the_prediction() {
     // It stays behind: short of where it goes.
-    let effect: Effect = |joint, approach, _| {
+    let effect: Effect = |joint, approach, _, _| {
         if joint == 2 {
             -BACKLASH * approach
         } else {
@@ -186,7 +186,7 @@ const SOFT: f64 = 1e-4;
 #[test]
 fn compliance_follows_measured_torques_where_the_urdf_has_no_masses() {
     // It gives way to the load, which is minus what the drive holds.
-    let effect: Effect = |joint, _, torque| if joint == 2 { -SOFT * torque } else { 0.0 };
+    let effect: Effect = |joint, _, torque, _| if joint == 2 { -SOFT * torque } else { 0.0 };
     let freed = PROFILE
         .replace("joint_axes]", "joint_axes, compliance]")
         .replace("solve:\n", "solve:\n  load: measured\n");
@@ -208,7 +208,7 @@ fn compliance_follows_measured_torques_where_the_urdf_has_no_masses() {
 
 #[test]
 fn an_origin_stays_inside_its_housing_and_the_report_says_that_the_data_disagree() {
-    let none: Effect = |_, _, _| 0.0;
+    let none: Effect = |_, _, _, _| 0.0;
     // The shoulder is 2 mm off; its housing leaves 1 mm.
     let limited = PROFILE.replace(
         "solve:\n",

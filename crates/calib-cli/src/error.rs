@@ -34,6 +34,20 @@ pub enum CliError {
     /// Of `calib predict`, `correct` and `export`.
     #[error(transparent)]
     Export(#[from] ExportError),
+    /// Another plugin than the one that the run used.
+    #[error(
+        "joint {joint}: its effect `{effect}` was found with the plugin {needed}; the one that is loaded is {found}\n  help: give the file that the run used, or run the calibration again with this one"
+    )]
+    OtherPlugin {
+        /// The effect.
+        effect: String,
+        /// The joint.
+        joint: String,
+        /// Name, version and hash of the one that the run used.
+        needed: String,
+        /// The same of the one that is loaded.
+        found: String,
+    },
     /// A bound on corrections is none.
     #[error("{bound} is not a bound\n  help: give a number above 0, as `--largest-deg 3`")]
     NotABound {
@@ -178,6 +192,7 @@ impl CliError {
             Self::NotASigma { .. }
             | Self::NotANoiseFactor { .. }
             | Self::NotABound { .. }
+            | Self::OtherPlugin { .. }
             | Self::Simulation { .. }
             | Self::Json { .. }
             | Self::Fit(_)

@@ -35,6 +35,7 @@
 //! | question | answer |
 //! |---|---|
 //! | did it converge, and how good is it | [`Solution::status`], `chi2`, `chi2_stated`, `degrees_of_freedom` |
+//! | are the readings radians at all | [`Problem::unlikely_units`]: ask before you solve |
 //! | how noisy are markers, bodies, joints | [`Solution::noise`] (REML where [`NoiseGroup::estimate`] is set) |
 //! | which rows were left out, and why | [`Solution::rejected`]; exchanged labels: [`relabel()`] before solving |
 //! | what cannot be known, in words | [`Solution::observability`], [`ParameterEstimate::class`] and `data_share` |
@@ -166,6 +167,7 @@ pub use analysis::untested::{MovedPoint, Moves, OpenCause, OpenError, OpenErrors
 pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
 pub use analysis::weigh::{NoiseCandidate, NoiseChoice, NoiseLevel, Weighed};
 pub use analysis::widths::{Widened, WidthEstimate, WidthKind};
+pub use calib_geometry::plausible::Unlikely;
 pub use calib_model::axis::Axis;
 pub use calib_model::effect::{self, EFFECTS, Effect, EffectKind, JointState};
 pub use calib_model::motion::JointMotion;

@@ -1,5 +1,6 @@
 //! Settings of all estimators in one flat struct, and which of them an estimator uses.
 
+use calib_geometry::plausible::{Unlikely, unlikely_radians};
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 use crate::{
@@ -208,6 +209,20 @@ impl Options {
     pub fn with_weights(mut self, weights: Vec<f64>) -> Self {
         self.weights = weights;
         self
+    }
+
+    /// Why the joint angles are hardly rad; `None` where they may well be, or where there are none. Ask before you run an estimator that
+    /// takes them: degrees give a hinge that is wrong, not an error.
+    ///
+    /// ```
+    /// use calib_estimator::Options;
+    ///
+    /// assert!(Options::default().with_angles(vec![-90.0, 0.0, 45.0]).unlikely_angles().is_some());
+    /// assert!(Options::default().with_angles(vec![-1.57, 0.0, 0.79]).unlikely_angles().is_none());
+    /// ```
+    #[must_use]
+    pub fn unlikely_angles(&self) -> Option<Unlikely> {
+        unlikely_radians(&self.angles)
     }
 
     /// With the joint angle of each row, rad.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use calib_model::{Aim, Approach, Correction, Options, Outcome, Pose, Under};
+use calib_model::{Aim, Approach, Correction, ModelError, Options, Outcome, Pose, Under};
 
 use crate::error::ExportError;
 use crate::read::Robot;
@@ -67,10 +67,10 @@ pub fn correct(
     header(&mut csv, robot);
     let mut command = vec![0.0; model.joints().len()];
     for (k, q) in program.q.iter().enumerate() {
-        let wrong = |source| ExportError::Row {
+        let wrong = |source: ModelError| ExportError::Row {
             file: program.file.clone(),
             line: program.lines[k],
-            source,
+            source: Box::new(source),
         };
         let target: Option<Option<&Pose>> = wanted.map(|poses| poses[k].as_ref());
         csv.cell(&program.lines[k].to_string());

@@ -24,7 +24,17 @@ pub enum ExportError {
         /// The file.
         file: String,
         /// Where and why.
-        source: ModelError,
+        source: Box<ModelError>,
+    },
+    /// A plugin computes an effect of the robot.
+    #[error(
+        "{file}: {source}\n  help: `calib predict` and `calib correct` take the plugin with `--plugin`; other formats cannot hold its effect"
+    )]
+    Plugin {
+        /// The file.
+        file: String,
+        /// Which effect of which plugin.
+        source: Box<ModelError>,
     },
     /// The table cannot be read.
     #[error(transparent)]
@@ -65,7 +75,7 @@ pub enum ExportError {
         /// From 1.
         line: u64,
         /// Why.
-        source: ModelError,
+        source: Box<ModelError>,
     },
     /// A target that cannot hold this robot.
     #[error("{target} cannot hold this robot: {reason}\n  help: {remedy}")]
@@ -85,9 +95,10 @@ impl ExportError {
     pub fn place(&self) -> Option<(&str, Option<u64>)> {
         match self {
             Self::Open { file, .. }
+            | Self::Plugin { file, .. }
             | Self::NotOneTable { file, .. }
             | Self::Column { file, .. } => Some((file, None)),
-            Self::Model { file, source } => match source {
+            Self::Model { file, source } => match &**source {
                 ModelError::Syntax { line, .. } => Some((file, Some(*line as u64))),
                 _ => Some((file, None)),
             },

@@ -30,6 +30,6 @@ pub use correct::{CorrectOptions, Corrected, correct};
 pub use cost::Cost;
 pub use error::ExportError;
 pub use predict::{Frame, PredictOptions, Predicted, predict};
-pub use read::{Robot, robot};
+pub use read::{Robot, robot, robot_with};
 pub use table::region;
 pub use target::{Exported, Target, export};

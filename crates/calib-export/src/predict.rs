@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use calib_model::{Approach, Place, Scope, Under};
+use calib_model::{Approach, ModelError, Place, Scope, Under};
 use nalgebra::{Matrix3, Matrix6};
 
 use crate::error::ExportError;
@@ -80,10 +80,10 @@ pub fn predict(
         work: robot.model.work(),
     };
     for k in 0..program.q.len() {
-        let wrong = |source| ExportError::Row {
+        let wrong = |source: ModelError| ExportError::Row {
             file: program.file.clone(),
             line: program.lines[k],
-            source,
+            source: Box::new(source),
         };
         let scope = rows.row(k, &places, &mut csv).map_err(wrong)?;
         out.rows += usize::from(scope.is_some());
@@ -150,7 +150,7 @@ impl Rows<'_> {
         k: usize,
         places: &[(String, Place)],
         csv: &mut Csv,
-    ) -> Result<Option<Scope>, calib_model::ModelError> {
+    ) -> Result<Option<Scope>, ModelError> {
         let model = &self.robot.model;
         let sigma = model.has_uncertainty();
         csv.cell(&self.program.lines[k].to_string());

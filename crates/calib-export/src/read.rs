@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use calib_model::file::RobotModelFile;
-use calib_model::{LinkId, Model, ModelError, Place};
+use calib_model::{FindOutside, LinkId, Model, ModelError, Place};
 
 use crate::error::ExportError;
 
@@ -24,12 +24,28 @@ pub struct Robot {
 /// # Errors
 /// [`ExportError::Open`], [`ExportError::Model`].
 pub fn robot(path: &Path) -> Result<Robot, ExportError> {
+    robot_with(path, &|_, _| None)
+}
+
+/// The same with the effects that plugins compute: `outside` gives what computes an effect of the file.
+///
+/// # Errors
+/// As [`robot`].
+pub fn robot_with(path: &Path, outside: FindOutside<'_>) -> Result<Robot, ExportError> {
     let file = path.display().to_string();
     let bytes = calib_files::input::read(path, LARGEST).map_err(|source| ExportError::Open {
         file: file.clone(),
         source,
     })?;
-    Robot::from_json(&bytes).map_err(|source| ExportError::Model { file, source })
+    let read = RobotModelFile::from_json(&bytes);
+    let read = read.and_then(|read| Robot::of(read, outside));
+    read.map_err(|source| {
+        let source = Box::new(source);
+        match *source {
+            ModelError::Plugin { .. } => ExportError::Plugin { file, source },
+            _ => ExportError::Model { file, source },
+        }
+    })
 }
 
 impl Robot {
@@ -38,8 +54,12 @@ impl Robot {
     /// # Errors
     /// [`ModelError`] with its place.
     pub fn from_json(bytes: &[u8]) -> Result<Self, ModelError> {
-        let file = RobotModelFile::from_json(bytes)?;
-        let model = Model::new(&file)?;
+        Self::of(RobotModelFile::from_json(bytes)?, &|_, _| None)
+    }
+
+    /// From the contents of a model file, with the effects that plugins compute.
+    fn of(file: RobotModelFile, outside: FindOutside<'_>) -> Result<Self, ModelError> {
+        let model = Model::with_outside(&file, outside)?;
         Ok(Self { file, model })
     }
 

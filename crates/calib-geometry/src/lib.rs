@@ -13,6 +13,7 @@
 //! * [`mod@line`]: lines in space and screw axes of motions.
 //! * [`mean`]: the chordal mean of rotations and the sign-free mean of axes.
 //! * [`decompose`]: the singular value and eigenvalue decompositions used for estimation.
+//! * [`plausible`]: whether readings can be radians or meters.
 //! * [`registration`]: the rigid motion between two corresponding point sets.
 //! * [`row_qr`]: the triangular factor of tall matrices, row by row.
 //! * [`statistics`]: medians and quantiles, each under the name of its definition.
@@ -23,6 +24,7 @@
 pub mod decompose;
 pub mod line;
 pub mod mean;
+pub mod plausible;
 pub mod registration;
 pub mod row_qr;
 pub mod se3;

@@ -32,6 +32,20 @@ pub enum ModelError {
         /// What should.
         expected: &'static str,
     },
+    /// An effect that a plugin computes.
+    #[error(
+        "joint {joint}: its effect `{effect}` is computed by the plugin `{plugin}` {version}, which is not loaded; without it no pose of this robot is known"
+    )]
+    Plugin {
+        /// The joint.
+        joint: String,
+        /// The effect.
+        effect: String,
+        /// The plugin.
+        plugin: String,
+        /// Its version.
+        version: String,
+    },
     /// A name that is not in the model.
     #[error("{kind} {name} is not in the model; it has {known}")]
     Name {

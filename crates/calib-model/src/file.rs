@@ -6,7 +6,7 @@
 //!                                joint_from_child = translation by axis φ       sliding joints
 //! F: 1, q, cos q − 1, sin q, cos 2q − 1, sin 2q, the same of n q and 2 n q (n: gear ratio), the load,
 //!    −(direction of approach), the sign of the load or −(direction of approach) where |load| ≤ friction,
-//!    −(direction of approach) |load|, another joint's q                                                        (2)
+//!    −(direction of approach) |load|, another joint's q, or what a plugin computes                             (2)
 //! load about the axis = axis · Σ (moment_k − mass_k o) × g   over the links that the joint carries           (3)
 //! ```
 //!
@@ -220,6 +220,23 @@ pub struct ModelEffect {
     /// Load that friction holds, N m or N, for effects of the loaded flank and of friction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<f64>,
+    /// Who computes F, where it is no formula of this format: without that plugin the robot cannot be evaluated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plugin: Option<ModelPlugin>,
+}
+
+/// A plugin that computes an effect.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ModelPlugin {
+    /// What it calls itself.
+    pub name: String,
+    /// Its own version.
+    pub version: String,
+    /// Of its file, 64 hexadecimal digits; null: linked into the program.
+    pub sha256: Option<String>,
+    /// Parameters of the effect as the profile gives them.
+    pub parameters: BTreeMap<String, serde_json::Value>,
 }
 
 /// A tracking body.

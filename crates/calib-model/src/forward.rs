@@ -236,14 +236,14 @@ impl Model {
     /// F of a term.
     pub(crate) fn regressor(&self, t: &JointTerm, s: &JointState, q: &[f64]) -> f64 {
         match t.other {
-            None => (t.term.regressor)(s),
+            None => t.term.regressor.at(s),
             Some(other) => {
                 let other = &self.joints[other];
                 let state = JointState {
                     other: other.multiplier * q[other.source] + other.offset,
                     ..JointState::default()
                 };
-                (t.term.regressor)(&state)
+                t.term.regressor.at(&state)
             }
         }
     }

@@ -3,8 +3,9 @@
 use nalgebra::Vector3;
 
 use crate::axis::Axis;
-use crate::effect::Term;
+use crate::effect::{Outside, Term};
 use crate::error::ModelError;
+use crate::file::{ModelEffect, ModelJoint};
 use crate::pose::Pose;
 
 /// Index of a link: 0 is the root, i + 1 the child of joint i.
@@ -36,6 +37,9 @@ impl From<LinkId> for Place {
         Self::Link(link)
     }
 }
+
+/// Gives what computes an effect of a joint that a plugin computes; `None` where that plugin is not there.
+pub type FindOutside<'a> = &'a dyn Fn(&ModelJoint, &ModelEffect) -> Option<&'static Outside>;
 
 /// A joint that the controller moves.
 #[derive(Debug, Clone, PartialEq)]

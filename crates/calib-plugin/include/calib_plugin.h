@@ -1,12 +1,13 @@
 /* calib_plugin.h: the plugin contract, version 1.
  *
- * A plugin is a shared library that exports one constant, `calib_plugin_entry`. It offers estimators, readers and
- * report writers, each under a kind (`calib.cor/1`, `calib.aor/1`, `calib.reader/1`, `calib.report/1`) and a name.
+ * A plugin is a shared library that exports one constant, `calib_plugin_entry`. It offers estimators, readers,
+ * report writers and joint effects, each under a kind (`calib.cor/1`, `calib.aor/1`, `calib.reader/1`,
+ * `calib.report/1`, `calib.effect/1`) and a name.
  *
  *     load        the host reads abi_major, abi_minor and struct_size: no code of the plugin has run
  *     describe()  what is offered, with parameters; does no work
  *     find()      the function table of one offer
- *     fit() / read() / write()
+ *     fit() / read() / write() / regressors()
  *
  * Units: m, rad, s, N·m. Rotations: 3 x 3, row-major, `a_from_b`: its columns are the axes of b in a.
  * Text: UTF-8, ends with a zero byte, at most 65535 bytes; files are bytes with a size.
@@ -73,6 +74,7 @@ enum {
 #define CALIB_KIND_AOR "calib.aor/1"
 #define CALIB_KIND_READER "calib.reader/1"
 #define CALIB_KIND_REPORT "calib.report/1"
+#define CALIB_KIND_EFFECT "calib.effect/1"
 
 enum { CALIB_BOOL = 1, CALIB_INTEGER = 2, CALIB_NUMBER = 3, CALIB_TEXT = 4 };
 
@@ -341,6 +343,58 @@ typedef struct calib_report_1 {
      * [after find(); any thread, also concurrently; the host owns the arguments until the function returns] */
     calib_status (*write)(const calib_call *call, const calib_report_input *report, const calib_files_sink *sink);
 } calib_report_1;
+
+/* ---- calib.effect/1 ------------------------------------------------------------------------------------------- */
+
+/* An effect of a joint: the joint stands at reading + coefficient * regressor (rad or m). The fit estimates the
+ * coefficient with all others; a profile names the effect for a joint. */
+
+/* What the regressor depends on. The host gives nothing else. */
+enum {
+    CALIB_ON_READING = 1,
+    CALIB_ON_MOTOR = 2,   /* The motor's angle; the profile must state the gear ratio. */
+    CALIB_ON_LOAD = 3,    /* What gravity exerts about (along) the axis. */
+    CALIB_ON_APPROACH = 4 /* The direction that the joint came from. */
+};
+
+/* What the coefficient measures. */
+enum {
+    CALIB_POSITION = 1,  /* rad, m at a sliding joint. */
+    CALIB_RATIO = 2,     /* 1. */
+    CALIB_COMPLIANCE = 3 /* rad/(N·m), m/N at a sliding joint. */
+};
+
+/* States of one joint, one per sample. Arrays that the effect does not depend on are NULL. */
+typedef struct calib_joint_states {
+    uint32_t struct_size;
+    int32_t prismatic;        /* 1: the joint slides. */
+    size_t samples;
+    const double *readings;   /* rad, m at a sliding joint; never NULL. */
+    const double *motor_rad;  /* CALIB_ON_MOTOR: gear ratio times reading. */
+    const double *loads;      /* CALIB_ON_LOAD: N·m, N at a sliding joint; minus what the joint holds. */
+    const double *approaches; /* CALIB_ON_APPROACH: +1 from below, -1 from above, 0 not known. */
+} calib_joint_states;
+
+typedef struct calib_effect_sink {
+    uint32_t struct_size;
+    uint32_t reserved;
+    void *context;
+    /* Gives the regressors, one finite number per sample; once. CALIB_OK, or CALIB_FAILED when the host refuses them.
+     * [while regressors() runs; the thread of regressors(); the host copies everything] */
+    calib_status (*result)(void *context, const double *regressors, size_t count);
+} calib_effect_sink;
+
+typedef struct calib_effect_1 {
+    uint32_t struct_size;
+    int32_t depends_on;    /* CALIB_ON_READING, ... */
+    int32_t coefficient;   /* CALIB_POSITION, ... */
+    int32_t revolute_only; /* 1: for turning joints only. */
+    double prior_sigma;    /* Standard deviation of the coefficient on an ordinary joint before any data, > 0. */
+    /* The regressor at each state. It is a function of that state alone: not of other samples, their number or order,
+     * and not of earlier calls. It has no jumps in the reading: poses are differentiated by it.
+     * [after find(); any thread, also concurrently; the host owns the arguments until the function returns] */
+    calib_status (*regressors)(const calib_call *call, const calib_joint_states *states, const calib_effect_sink *sink);
+} calib_effect_1;
 
 /* ---- Help for authors ----------------------------------------------------------------------------------------- */
 

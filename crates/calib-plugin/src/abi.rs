@@ -346,6 +346,48 @@ pub struct Report1 {
         Option<unsafe extern "C" fn(*const Call, *const ReportInput, *const FilesSink) -> Status>,
 }
 
+/// `calib_joint_states`.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[allow(missing_docs)]
+pub struct JointStates {
+    pub struct_size: u32,
+    pub prismatic: i32,
+    pub samples: usize,
+    pub readings: *const f64,
+    pub motor_rad: *const f64,
+    pub loads: *const f64,
+    pub approaches: *const f64,
+}
+
+/// `calib_effect_sink`.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[allow(missing_docs)]
+pub struct EffectSink {
+    pub struct_size: u32,
+    pub reserved: u32,
+    pub context: *mut c_void,
+    pub result: Option<unsafe extern "C" fn(*mut c_void, *const f64, usize) -> Status>,
+}
+
+/// `regressors` of [`Effect1`].
+pub type Regressors =
+    unsafe extern "C" fn(*const Call, *const JointStates, *const EffectSink) -> Status;
+
+/// `calib_effect_1`.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[allow(missing_docs)]
+pub struct Effect1 {
+    pub struct_size: u32,
+    pub depends_on: i32,
+    pub coefficient: i32,
+    pub revolute_only: i32,
+    pub prior_sigma: f64,
+    pub regressors: Option<Regressors>,
+}
+
 /// `size_of::<T>()` as the `struct_size` of the contract.
 #[must_use]
 pub const fn size<T>() -> u32 {

@@ -1,9 +1,10 @@
-//! The four kinds as traits. Built-in code, plugins written in Rust and loaded plugins all implement them: a plugin
+//! The kinds as traits. Built-in code, plugins written in Rust and loaded plugins all implement them: a plugin
 //! is a built-in with a border around it.
 
 use crate::{
     answer::{Answer, AorFit, CorFit, Failure},
     call::Call,
+    effect::{EffectTerm, JointStates},
     motion::Motion,
     offer::Offer,
     streams::{ReportFile, ReportInput, Source, Streams},
@@ -55,6 +56,19 @@ pub trait ReportWriter: Send + Sync {
     /// # Errors
     /// [`Failure`].
     fn write(&self, report: &ReportInput<'_>, call: &Call<'_>) -> Result<Vec<ReportFile>, Failure>;
+}
+
+/// An effect of a joint, `calib.effect/1`: a regressor F whose coefficient the fit estimates.
+pub trait JointEffect: Send + Sync {
+    /// Its description; does no work.
+    fn offer(&self) -> Offer;
+    /// What is stated of its coefficient; does no work.
+    fn term(&self) -> EffectTerm;
+    /// F at each state: a function of that state alone, without jumps in the reading.
+    ///
+    /// # Errors
+    /// [`Failure`].
+    fn regressors(&self, states: &JointStates<'_>, call: &Call<'_>) -> Result<Vec<f64>, Failure>;
 }
 
 /// A description and a function: how existing functions enter a registry without a type of their own.

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! The contract is `include/calib_plugin.h` (C11, C++17), version 1; [`abi`] is the same in Rust. One set of traits
-//! ([`Cor`], [`Aor`], [`Reader`], [`ReportWriter`]) stands on both sides: a built-in implements it, an author
+//! ([`Cor`], [`Aor`], [`Reader`], [`ReportWriter`], [`JointEffect`]) stands on both sides: a built-in implements it, an author
 //! implements it and writes [`export!`], and a loaded library is an object that implements it by calling across. So a
 //! profile names all of them the same way, through one [`Registry`] for each kind.
 //!
@@ -44,6 +44,7 @@ pub mod abi;
 mod answer;
 pub mod author;
 mod call;
+mod effect;
 mod kinds;
 mod motion;
 mod offer;
@@ -51,7 +52,8 @@ mod streams;
 
 pub use answer::{Answer, AorFit, AxisLine, CorFit, Failure};
 pub use call::Call;
-pub use kinds::{Aor, ByFn, Cor, Reader, ReportWriter};
+pub use effect::{Coefficient, DependsOn, EffectTerm, JointStates};
+pub use kinds::{Aor, ByFn, Cor, JointEffect, Reader, ReportWriter};
 pub use motion::{BodyPose, Motion, MotionData, Shape};
 pub use offer::{Kind, Offer, Parameter, Value};
 pub use streams::{

@@ -31,7 +31,7 @@ impl Language {
     }
 }
 
-/// The kind with this short name: `center`, `axis`, `reader` or `report`.
+/// The kind with this short name: `center`, `axis`, `reader`, `report` or `effect`.
 ///
 /// # Errors
 /// [`NewProjectError::Kind`].
@@ -41,6 +41,7 @@ pub fn kind_from_name(name: &str) -> Result<Kind, NewProjectError> {
         "axis" => Ok(Kind::Aor),
         "reader" => Ok(Kind::Reader),
         "report" => Ok(Kind::Report),
+        "effect" => Ok(Kind::Effect),
         other => Err(NewProjectError::Kind {
             got: other.to_string(),
         }),
@@ -57,7 +58,7 @@ pub enum NewProjectError {
         got: String,
     },
     /// Not a kind there is a template for.
-    #[error("unknown kind `{got}`, expected one of `center`, `axis`, `reader`, `report`")]
+    #[error("unknown kind `{got}`, expected one of `center`, `axis`, `reader`, `report`, `effect`")]
     Kind {
         /// What was asked for.
         got: String,
@@ -82,6 +83,7 @@ const AUTHOR_SIDE: &[(&str, &str)] = &[
     ("author/aor.rs", include_str!("author/aor.rs")),
     ("author/border.rs", include_str!("author/border.rs")),
     ("author/cor.rs", include_str!("author/cor.rs")),
+    ("author/effect.rs", include_str!("author/effect.rs")),
     ("author/estimator.rs", include_str!("author/estimator.rs")),
     ("author/exported.rs", include_str!("author/exported.rs")),
     ("author/mod.rs", include_str!("author/mod.rs")),
@@ -89,6 +91,7 @@ const AUTHOR_SIDE: &[(&str, &str)] = &[
     ("author/reader.rs", include_str!("author/reader.rs")),
     ("author/report.rs", include_str!("author/report.rs")),
     ("call.rs", include_str!("call.rs")),
+    ("effect.rs", include_str!("effect.rs")),
     ("kinds.rs", include_str!("kinds.rs")),
     (
         "lib.rs",
@@ -159,6 +162,12 @@ fn template(kind: Kind) -> Template {
             c: include_str!("../templates/c/report.c.in"),
             c_test: include_str!("../templates/c/test.report.c.in"),
             used: "outputs:\n  reports: {@OFFER@: {}}",
+        },
+        Kind::Effect => Template {
+            rust: include_str!("../templates/rust/effect.rs.in"),
+            c: include_str!("../templates/c/effect.c.in"),
+            c_test: include_str!("../templates/c/test.effect.c.in"),
+            used: "solve:\n  joints:\n    elbow: {effects: {@OFFER@: {order: 3}}}     # beside its other keys",
         },
     }
 }

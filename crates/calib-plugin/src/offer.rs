@@ -11,11 +11,19 @@ pub enum Kind {
     Reader,
     /// Files from a report.
     Report,
+    /// An effect of a joint.
+    Effect,
 }
 
 impl Kind {
     /// All, in the order they are listed in.
-    pub const ALL: [Self; 4] = [Self::Cor, Self::Aor, Self::Reader, Self::Report];
+    pub const ALL: [Self; 5] = [
+        Self::Cor,
+        Self::Aor,
+        Self::Reader,
+        Self::Report,
+        Self::Effect,
+    ];
 
     /// The id with its revision.
     #[must_use]
@@ -25,6 +33,7 @@ impl Kind {
             Self::Aor => "calib.aor/1",
             Self::Reader => "calib.reader/1",
             Self::Report => "calib.report/1",
+            Self::Effect => "calib.effect/1",
         }
     }
 
@@ -42,6 +51,7 @@ impl Kind {
             Self::Aor => "axis estimator",
             Self::Reader => "reader",
             Self::Report => "report writer",
+            Self::Effect => "joint effect",
         }
     }
 }
@@ -160,7 +170,7 @@ impl Parameter {
     }
 }
 
-/// One estimator, reader or report writer.
+/// One estimator, reader, report writer or joint effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Offer {
     /// What it is.
@@ -171,7 +181,7 @@ pub struct Offer {
     pub summary: String,
     /// Publication or document; may be empty.
     pub source: String,
-    /// The data an estimator takes; empty for readers and report writers.
+    /// The data an estimator takes; empty for all other kinds.
     pub shapes: Vec<crate::motion::Shape>,
     /// Its parameters, in the order of the values in a call.
     pub parameters: Vec<Parameter>,

@@ -5,8 +5,9 @@ use std::{collections::BTreeMap, fmt, path::PathBuf, sync::Arc};
 use crate::{
     answer::{Answer, AorFit, CorFit, Failure},
     call::Call,
+    effect::{EffectTerm, JointStates},
     host::{Control, Host, LoadedPlugin, PluginError, SearchPath},
-    kinds::{Aor, Cor, Reader, ReportWriter},
+    kinds::{Aor, Cor, JointEffect, Reader, ReportWriter},
     motion::{Motion, Shape},
     offer::{Kind, Offer, Value},
     parameters,
@@ -75,11 +76,7 @@ impl<T: ?Sized> fmt::Debug for Entry<T> {
 impl Entry<dyn Cor> {
     /// A center estimator from `origin`.
     pub fn cor(it: impl Cor + 'static, origin: Origin) -> Self {
-        Self {
-            offer: Arc::new(it.offer()),
-            origin: Arc::new(origin),
-            it: Arc::new(it),
-        }
+        Self::of(it.offer(), origin, Arc::new(it))
     }
 
     /// A center estimator of the program.
@@ -91,11 +88,7 @@ impl Entry<dyn Cor> {
 impl Entry<dyn Aor> {
     /// An axis estimator from `origin`.
     pub fn aor(it: impl Aor + 'static, origin: Origin) -> Self {
-        Self {
-            offer: Arc::new(it.offer()),
-            origin: Arc::new(origin),
-            it: Arc::new(it),
-        }
+        Self::of(it.offer(), origin, Arc::new(it))
     }
 
     /// An axis estimator of the program.
@@ -107,11 +100,7 @@ impl Entry<dyn Aor> {
 impl Entry<dyn Reader> {
     /// A reader from `origin`.
     pub fn reader(it: impl Reader + 'static, origin: Origin) -> Self {
-        Self {
-            offer: Arc::new(it.offer()),
-            origin: Arc::new(origin),
-            it: Arc::new(it),
-        }
+        Self::of(it.offer(), origin, Arc::new(it))
     }
 
     /// A reader of the program.
@@ -129,11 +118,7 @@ impl Entry<dyn Reader> {
 impl Entry<dyn ReportWriter> {
     /// A report writer from `origin`.
     pub fn report(it: impl ReportWriter + 'static, origin: Origin) -> Self {
-        Self {
-            offer: Arc::new(it.offer()),
-            origin: Arc::new(origin),
-            it: Arc::new(it),
-        }
+        Self::of(it.offer(), origin, Arc::new(it))
     }
 
     /// A report writer of the program.
@@ -142,7 +127,28 @@ impl Entry<dyn ReportWriter> {
     }
 }
 
+impl Entry<dyn JointEffect> {
+    /// A joint effect from `origin`.
+    pub fn effect(it: impl JointEffect + 'static, origin: Origin) -> Self {
+        Self::of(it.offer(), origin, Arc::new(it))
+    }
+
+    /// What is stated of its coefficient.
+    #[must_use]
+    pub fn term(&self) -> EffectTerm {
+        self.it.term()
+    }
+}
+
 impl<T: ?Sized> Entry<T> {
+    fn of(offer: Offer, origin: Origin, it: Arc<T>) -> Self {
+        Self {
+            offer: Arc::new(offer),
+            origin: Arc::new(origin),
+            it,
+        }
+    }
+
     /// Its description.
     #[must_use]
     pub fn offer(&self) -> &Offer {
@@ -318,6 +324,25 @@ impl Bound<dyn ReportWriter> {
     }
 }
 
+impl Bound<dyn JointEffect> {
+    /// The regressor at each state, all finite.
+    ///
+    /// # Errors
+    /// [`PluginError`]: failures, and regressors that break the contract.
+    pub fn regressors(
+        &self,
+        states: &JointStates<'_>,
+        control: &Control<'_>,
+    ) -> Result<Vec<f64>, PluginError> {
+        self.call(control, |it, call| {
+            verify::states(states).map_err(Failure::BadInput)?;
+            let values = it.regressors(states, call)?;
+            verify::regressors(&values, states.samples()).map_err(Failure::Contract)?;
+            Ok(values)
+        })
+    }
+}
+
 /// All of one kind, by name.
 pub struct Registry<T: ?Sized> {
     kind: Kind,
@@ -397,6 +422,8 @@ pub struct Tables {
     pub reader: Registry<dyn Reader>,
     /// Report writers.
     pub report: Registry<dyn ReportWriter>,
+    /// Joint effects.
+    pub effect: Registry<dyn JointEffect>,
 }
 
 impl Default for Tables {
@@ -406,6 +433,7 @@ impl Default for Tables {
             aor: Registry::new(Kind::Aor),
             reader: Registry::new(Kind::Reader),
             report: Registry::new(Kind::Report),
+            effect: Registry::new(Kind::Effect),
         }
     }
 }
@@ -431,7 +459,11 @@ impl Tables {
         plugin
             .reports()
             .iter()
-            .try_for_each(|entry| self.report.register(entry.clone()))
+            .try_for_each(|entry| self.report.register(entry.clone()))?;
+        plugin
+            .effects()
+            .iter()
+            .try_for_each(|entry| self.effect.register(entry.clone()))
     }
 
     /// Adds what the plugins of these names or paths offer, as a user names them. None is loaded where `CALIB_NO_PLUGINS` is set.
@@ -454,6 +486,7 @@ impl Tables {
         list.extend(self.aor.iter().map(|e| (e.offer(), e.origin())));
         list.extend(self.reader.iter().map(|e| (e.offer(), e.origin())));
         list.extend(self.report.iter().map(|e| (e.offer(), e.origin())));
+        list.extend(self.effect.iter().map(|e| (e.offer(), e.origin())));
         list
     }
 }

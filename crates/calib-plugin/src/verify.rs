@@ -2,6 +2,7 @@
 
 use crate::{
     answer::{AorFit, AxisLine, CorFit},
+    effect::JointStates,
     motion::Motion,
     streams::ReportFile,
 };
@@ -219,6 +220,28 @@ pub(crate) fn motion(motion: &Motion<'_>) -> Verified {
         ));
     }
     Ok(())
+}
+
+/// States of a joint: sizes first, because a plugin trusts them.
+pub(crate) fn states(states: &JointStates<'_>) -> Verified {
+    for (what, values) in [
+        ("readings", states.readings),
+        ("motor_rad", states.motor_rad),
+        ("loads", states.loads),
+        ("approaches", states.approaches),
+    ] {
+        length(what, values.len(), states.samples(), "samples")?;
+        finite(what, values)?;
+    }
+    Ok(())
+}
+
+/// Regressors of a joint effect.
+pub(crate) fn regressors(values: &[f64], samples: usize) -> Verified {
+    if values.len() != samples {
+        return Err(format!("{} regressors for {samples} samples", values.len()));
+    }
+    finite("regressors", values)
 }
 
 /// The files of a report: relative paths that stay inside their folder, each once.

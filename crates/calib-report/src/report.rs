@@ -124,7 +124,7 @@ pub struct Report {
     pub findings: Vec<Finding>,
     /// Files that were read.
     pub inputs: Vec<Input>,
-    /// Estimators, readers and report writers that the profile named or that were found for it.
+    /// Estimators, readers, report writers and joint effects that the profile named or that were found for it.
     #[serde(default)]
     pub components: Vec<Component>,
     /// Files that were written.

@@ -102,7 +102,7 @@ impl TrueRobot {
                 (EffectKind::ZeroOffset, *offset),
                 (EffectKind::TorqueCompliance, compliance),
             ];
-            let amounts = effects.map(|(kind, c)| (kind, c * (kind.term().regressor)(&state)));
+            let amounts = effects.map(|(kind, c)| (kind, c * kind.term().regressor.at(&state)));
             // Only joints that rotate have offsets (see `draw`).
             if let Some(axis) = self.model.joint(*id).kind.axis() {
                 let motion = JointMotion::new(Axis::Revolute(axis), state.q, amounts);

@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use calib_export::{CorrectOptions, Corrected, correct, robot};
+use calib_export::{CorrectOptions, Corrected, correct};
 use calib_pipeline::ExitCode;
 use clap::Args;
 
+use super::plugin_options::Evaluated;
 use super::predict::{say_absent, write};
 use crate::error::CliError;
 use crate::terminal::{Console, say};
@@ -29,6 +30,9 @@ pub struct Correct {
     /// Largest change of a sliding joint, mm [default: 50; 1000 for poses]
     #[arg(long, value_name = "MM")]
     largest_mm: Option<f64>,
+    /// Plugin that computes an effect of the robot, by name or path; can be given several times
+    #[arg(long, value_name = "PLUGIN")]
+    plugin: Vec<String>,
     /// The CSV to write; it must not exist [default: standard output]
     #[arg(short, long, value_name = "FILE.csv")]
     out: Option<PathBuf>,
@@ -44,14 +48,16 @@ pub fn run(console: &Console, options: &Correct) -> Result<ExitCode, CliError> {
             return Err(CliError::NotABound { bound });
         }
     }
-    let robot = robot(&options.model)?;
+    let with_plugins = Evaluated::read(&options.model, &options.plugin)?;
+    let robot = &with_plugins.robot;
     let with = CorrectOptions {
         tool: options.tool.clone(),
         position_only: options.position_only,
         largest_rad: options.largest_deg.map(f64::to_radians),
         largest_m: options.largest_mm.map(|mm| 1e-3 * mm),
     };
-    let done = correct(&robot, &options.program, &with)?;
+    let done = correct(robot, &options.program, &with)?;
+    with_plugins.evaluated()?;
     if !console.quiet {
         if !done.cartesian || done.absent.len() < robot.model.joints().len() {
             say_absent(&done.absent);

@@ -34,7 +34,7 @@ enum Plugins {
     New {
         /// Name of the plugin: lower-case letters, digits, hyphens
         name: String,
-        /// What it offers: center, axis, reader or report
+        /// What it offers: center, axis, reader, report or effect
         #[arg(long, default_value = "center")]
         kind: String,
         /// Language: rust or c

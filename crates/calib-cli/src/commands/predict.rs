@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
-use calib_export::{Frame, PredictOptions, predict, robot};
+use calib_export::{Frame, PredictOptions, predict};
 use calib_files::{OutputFile, folder_of, write_new};
 use calib_pipeline::ExitCode;
 use clap::{Args, ValueEnum};
 
+use super::plugin_options::Evaluated;
 use crate::error::CliError;
 use crate::terminal::{Console, emit, emit_written, say};
 
@@ -29,6 +30,9 @@ pub struct Predict {
     /// The torques of the table load the joints, in place of gravity
     #[arg(long)]
     torques: bool,
+    /// Plugin that computes an effect of the robot, by name or path; can be given several times
+    #[arg(long, value_name = "PLUGIN")]
+    plugin: Vec<String>,
     /// The CSV to write; it must not exist [default: standard output]
     #[arg(short, long, value_name = "FILE.csv")]
     out: Option<PathBuf>,
@@ -45,7 +49,7 @@ enum In {
 
 /// Predicts the poses of a table.
 pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
-    let robot = robot(&options.model)?;
+    let robot = Evaluated::read(&options.model, &options.plugin)?;
     let with = PredictOptions {
         of: options.of.clone(),
         frame: match options.frame {
@@ -55,7 +59,8 @@ pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
         unordered: options.unordered,
         torques: options.torques,
     };
-    let done = predict(&robot, &options.table, &with)?;
+    let done = predict(&robot.robot, &options.table, &with)?;
+    robot.evaluated()?;
     if !console.quiet {
         say_absent(&done.absent);
         if done.outside > 0 {

@@ -38,7 +38,7 @@ enum SchemaOf {
     Model,
     /// twin.json
     Twin,
-    /// Parameters of estimators, readers and report writers, by kind and name
+    /// Parameters of estimators, readers, report writers and joint effects, by kind and name
     Parameters,
 }
 

@@ -70,6 +70,7 @@ impl CliError {
             Self::Export(ExportError::Table(_)) => "recording",
             Self::Export(_) => "model",
             Self::NotABound { .. } => "correct",
+            Self::OtherPlugin { .. } => "plugin",
             Self::Fit(_) => "fit",
             Self::File(error) => of_file(error),
             Self::Recording(_) => "recording",

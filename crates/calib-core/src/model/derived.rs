@@ -29,7 +29,9 @@ use crate::model::path::{CompiledPath, Derivatives, PathBuffer, Step};
 pub struct Configuration {
     /// Reading per joint edge.
     pub q: BTreeMap<EdgeId, f64>,
-    /// Torque, velocity, approach direction, … per joint edge and effect.
+    /// What the regressors of a joint edge depend on.
+    pub states: BTreeMap<EdgeId, JointState>,
+    /// Regressors per joint edge and effect, where they are not those of its state.
     pub regressors: BTreeMap<(EdgeId, EffectKind), f64>,
     /// Shares of a regressor per joint edge and effect, in the order of [`JointEffect::shares`].
     pub shares: BTreeMap<(EdgeId, EffectKind), Vec<f64>>,
@@ -49,14 +51,11 @@ impl Configuration {
         self
     }
 
-    /// With the reading of one joint and the regressors of all its effects.
+    /// With the reading of one joint and what the regressors of all its effects depend on.
     #[must_use]
     pub fn at(mut self, joint: EdgeId, state: &JointState) -> Self {
         self.q.insert(joint, state.q);
-        for kind in EffectKind::all() {
-            let value = (kind.term().regressor)(state);
-            self.regressors.insert((joint, kind), value);
-        }
+        self.states.insert(joint, *state);
         self
     }
 
@@ -413,9 +412,10 @@ fn at_configuration(
         joint.q = vec![q];
         for f in &mut joint.effects {
             if f.values.is_some() {
-                let own = f.kind.of_reading(q);
-                let given = || at.regressors.get(&(id, f.kind)).copied().unwrap_or(0.0);
-                let value = own.unwrap_or_else(given);
+                let given = at.regressors.get(&(id, f.kind)).copied();
+                let own = || f.kind.of_reading(q);
+                let of_state = || Some(f.kind.term().regressor.at(at.states.get(&id)?));
+                let value = given.or_else(own).or_else(of_state).unwrap_or(0.0);
                 f.values = Some(vec![value]);
             }
             let given = at.shares.get(&(id, f.kind));

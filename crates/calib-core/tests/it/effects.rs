@@ -52,7 +52,7 @@ fn recover(effect: &Effect, motion: Axis) {
         .map(|(sample, state)| {
             let amounts = truth
                 .iter()
-                .map(|(_, term, c)| (term.kind, c * (term.regressor)(state)));
+                .map(|(_, term, c)| (term.kind, c * term.regressor.at(state)));
             let a_from_b = JointMotion::new(motion, state.q, amounts).joint_from_child();
             let pose = base_from_a * a_from_b * jitter(&mut r, NOISE, NOISE);
             PoseObservation { sample, pose }
@@ -269,7 +269,7 @@ fn with_confounders(effect: &Effect, seed: u64) -> Vec<f64> {
         .map(|(sample, state)| {
             let amounts = sizes
                 .iter()
-                .map(|(_, term, c)| (term.kind, c * (term.regressor)(state)));
+                .map(|(_, term, c)| (term.kind, c * term.regressor.at(state)));
             let moved = JointMotion::new(motion, state.q, amounts).joint_from_child();
             let pose = moved * jitter(&mut r, SIGMA, SIGMA);
             PoseObservation { sample, pose }

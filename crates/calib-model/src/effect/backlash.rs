@@ -5,7 +5,8 @@
 //! ```
 
 use super::{
-    Drives, Effect, EffectKind, JointState, Prior, PriorKey, ProfileKeys, Quantity, Source, Term,
+    Drives, Effect, EffectKind, JointState, Prior, PriorKey, ProfileKeys, Quantity, Regressor,
+    Source, Term,
 };
 
 /// Approached from both sides: otherwise backlash and zero offset are one number.
@@ -45,7 +46,7 @@ pub static EFFECT: Effect = Effect {
         quantity: Quantity::Position,
         drives: Drives::About,
         source: Source::Approach,
-        regressor: |s| -s.approach,
+        regressor: Regressor::Formula(|s| -s.approach),
     }],
     ..Effect::PLAIN
 };

@@ -1,6 +1,6 @@
 //! Clock offset: the tracker's time is not the encoders' time, so a moving joint is read early or late.
 
-use super::{Drives, Effect, EffectKind, Quantity, Source, Term};
+use super::{Drives, Effect, EffectKind, Quantity, Regressor, Source, Term};
 
 /// F = joint velocity; one coefficient for all joints of a recording.
 pub static EFFECT: Effect = Effect {
@@ -14,7 +14,7 @@ pub static EFFECT: Effect = Effect {
         quantity: Quantity::Time,
         drives: Drives::About,
         source: Source::Velocity,
-        regressor: |s| s.velocity,
+        regressor: Regressor::Formula(|s| s.velocity),
     }],
     ..Effect::PLAIN
 };

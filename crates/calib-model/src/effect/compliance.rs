@@ -5,7 +5,8 @@
 //! ```
 
 use super::{
-    Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Source, Term, loaded,
+    Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Regressor, Source, Term,
+    loaded,
 };
 
 /// Prior of compliances, shared by those across the axis.
@@ -35,7 +36,7 @@ pub static EFFECT: Effect = Effect {
         quantity: Quantity::Compliance,
         drives: Drives::About,
         source: Source::Load,
-        regressor: |s| s.torque,
+        regressor: Regressor::Formula(|s| s.torque),
     }],
     ..Effect::PLAIN
 };

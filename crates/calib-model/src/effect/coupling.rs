@@ -1,6 +1,8 @@
 //! Coupling: the joint also moves by a share of another joint's motion (belt, parallelogram).
 
-use super::{Confounded, Drives, Effect, EffectKind, Prior, Quantity, Source, Term, gain};
+use super::{
+    Confounded, Drives, Effect, EffectKind, Prior, Quantity, Regressor, Source, Term, gain,
+};
 
 /// F = the other joint's reading. Freed by `solve.joints.<joint>.coupled_to`.
 pub static EFFECT: Effect = Effect {
@@ -22,7 +24,7 @@ pub static EFFECT: Effect = Effect {
         quantity: Quantity::Ratio,
         drives: Drives::About,
         source: Source::OtherJoint,
-        regressor: |s| s.other,
+        regressor: Regressor::Formula(|s| s.other),
     }],
     ..Effect::PLAIN
 };

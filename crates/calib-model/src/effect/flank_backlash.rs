@@ -6,7 +6,8 @@
 //! ```
 
 use super::{
-    Drives, Effect, EffectKind, JointState, Prior, PriorKey, ProfileKeys, Quantity, Source, Term,
+    Drives, Effect, EffectKind, JointState, Prior, PriorKey, ProfileKeys, Quantity, Regressor,
+    Source, Term,
 };
 
 /// f of equation (1).
@@ -61,7 +62,7 @@ pub static EFFECT: Effect = Effect {
         quantity: Quantity::Position,
         drives: Drives::About,
         source: Source::Friction,
-        regressor: flank,
+        regressor: Regressor::Formula(flank),
     }],
     ..Effect::PLAIN
 };

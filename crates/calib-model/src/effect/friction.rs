@@ -7,8 +7,8 @@
 //! f is the friction per load (its coefficient) over the stiffness. With one load in all samples it is backlash.
 
 use super::{
-    Drives, Effect, EffectKind, JointState, Prior, PriorKey, ProfileKeys, Quantity, Source, Term,
-    loaded,
+    Drives, Effect, EffectKind, JointState, Prior, PriorKey, ProfileKeys, Quantity, Regressor,
+    Source, Term, loaded,
 };
 
 /// Approached from both sides under load: otherwise it is compliance.
@@ -46,7 +46,7 @@ pub static EFFECT: Effect = Effect {
         quantity: Quantity::Compliance,
         drives: Drives::About,
         source: Source::Friction,
-        regressor: |s| -s.approach * s.torque.abs(),
+        regressor: Regressor::Formula(|s| -s.approach * s.torque.abs()),
     }],
     ..Effect::PLAIN
 };

@@ -1,7 +1,7 @@
 //! Lateral compliance: the joint's bearing yields under the torques across its axis.
 
 use super::{
-    Drives, Effect, EffectKind, Prior, ProfileKeys, Quantity, Source, Term, compliance,
+    Drives, Effect, EffectKind, Prior, ProfileKeys, Quantity, Regressor, Source, Term, compliance,
     loaded_across,
 };
 
@@ -29,7 +29,7 @@ pub static EFFECT: Effect = Effect {
             quantity: Quantity::LateralCompliance,
             drives: Drives::Across(0),
             source: Source::Load,
-            regressor: |s| s.across[0],
+            regressor: Regressor::Formula(|s| s.across[0]),
         },
         Term {
             kind: EffectKind::Lateral2,
@@ -39,7 +39,7 @@ pub static EFFECT: Effect = Effect {
             quantity: Quantity::LateralCompliance,
             drives: Drives::Across(1),
             source: Source::Load,
-            regressor: |s| s.across[1],
+            regressor: Regressor::Formula(|s| s.across[1]),
         },
     ],
     ..Effect::PLAIN

@@ -27,8 +27,10 @@ pub mod motor_eccentricity;
 pub mod motor_eccentricity_2;
 pub mod offset;
 pub mod other;
+mod outside;
 mod prior;
 
+pub use outside::{Outside, Regressor, Stated};
 pub use prior::{Prior, PriorKey};
 
 /// All joint effects, in the order in which their parameters are created.
@@ -96,6 +98,9 @@ pub enum EffectKind {
     ClockOffset,
     /// F = whatever the caller supplies.
     Other,
+    /// F of a plugin; a file of ours names it by its plugin, never so.
+    #[serde(skip)]
+    Outside(&'static Outside),
 }
 
 /// All that a regressor may depend on, at one joint and one sample. What is not known is 0.
@@ -224,7 +229,7 @@ pub struct Term {
     /// What the regressor depends on.
     pub source: Source,
     /// F of equation (1).
-    pub regressor: fn(&JointState) -> f64,
+    pub regressor: Regressor,
 }
 
 /// Where a profile frees an effect.
@@ -299,7 +304,7 @@ impl Term {
             quantity,
             drives: Drives::About,
             source: Source::Reading,
-            regressor,
+            regressor: Regressor::Formula(regressor),
         }
     }
 }
@@ -361,10 +366,10 @@ impl PartialOrd for Effect {
 }
 
 impl Ord for Effect {
-    /// By place in the table.
+    /// By place in the table; what is not in it by its name.
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
         let place = |of: &Self| EFFECTS.iter().position(|e| e.id == of.id);
-        place(self).cmp(&place(other))
+        (place(self), self.id).cmp(&(place(other), other.id))
     }
 }
 
@@ -404,6 +409,10 @@ impl EffectKind {
 
     /// The effect and its term.
     fn entry(self) -> (&'static Effect, &'static Term) {
+        if let Self::Outside(outside) = self {
+            let effect = outside.effect();
+            return (effect, &effect.terms[0]);
+        }
         EFFECTS
             .iter()
             .find_map(|e| Some((*e, e.terms.iter().find(|t| t.kind == self)?)))
@@ -447,7 +456,8 @@ impl EffectKind {
     #[must_use]
     pub fn regressors(self, states: &[JointState]) -> Option<Vec<f64>> {
         let term = self.term();
-        (term.source != Source::Constant).then(|| states.iter().map(term.regressor).collect())
+        (term.source != Source::Constant)
+            .then(|| states.iter().map(|s| term.regressor.at(s)).collect())
     }
 
     /// F of equation (1) from sines that several terms share; `None` for terms of another kind.
@@ -492,7 +502,7 @@ impl EffectKind {
             q,
             ..JointState::default()
         };
-        matches!(term.source, Source::Constant | Source::Reading).then(|| (term.regressor)(&state))
+        matches!(term.source, Source::Constant | Source::Reading).then(|| term.regressor.at(&state))
     }
 }
 

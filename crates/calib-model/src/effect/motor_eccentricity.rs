@@ -3,7 +3,8 @@
 //! Readings at steps of whole motor turns cannot tell it from the zero offset; the observability analysis says so.
 
 use super::{
-    Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Source, Term, geared,
+    Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Regressor, Source, Term,
+    geared,
 };
 
 static PRIOR: PriorKey = PriorKey::deg(
@@ -36,7 +37,7 @@ pub static EFFECT: Effect = Effect {
             quantity: Quantity::Position,
             drives: Drives::About,
             source: Source::Motor,
-            regressor: |s| s.motor.cos() - 1.0,
+            regressor: Regressor::Formula(|s| s.motor.cos() - 1.0),
         },
         Term {
             kind: EffectKind::MotorSin,
@@ -46,7 +47,7 @@ pub static EFFECT: Effect = Effect {
             quantity: Quantity::Position,
             drives: Drives::About,
             source: Source::Motor,
-            regressor: |s| s.motor.sin(),
+            regressor: Regressor::Formula(|s| s.motor.sin()),
         },
     ],
     ..Effect::PLAIN

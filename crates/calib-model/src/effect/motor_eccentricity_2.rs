@@ -1,7 +1,8 @@
 //! Second harmonic of the gear train at the motor: twice per motor turn, as the wave generator of a strain-wave drive errs.
 
 use super::{
-    Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Source, Term, geared,
+    Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Regressor, Source, Term,
+    geared,
 };
 
 static PRIOR: PriorKey = PriorKey::deg(
@@ -34,7 +35,7 @@ pub static EFFECT: Effect = Effect {
             quantity: Quantity::Position,
             drives: Drives::About,
             source: Source::Motor,
-            regressor: |s| (2.0 * s.motor).cos() - 1.0,
+            regressor: Regressor::Formula(|s| (2.0 * s.motor).cos() - 1.0),
         },
         Term {
             kind: EffectKind::Motor2Sin,
@@ -44,7 +45,7 @@ pub static EFFECT: Effect = Effect {
             quantity: Quantity::Position,
             drives: Drives::About,
             source: Source::Motor,
-            regressor: |s| (2.0 * s.motor).sin(),
+            regressor: Regressor::Formula(|s| (2.0 * s.motor).sin()),
         },
     ],
     ..Effect::PLAIN

@@ -1,7 +1,8 @@
 //! Zero offset: the encoder's zero is not where the URDF draws it.
 
 use super::{
-    Confounded, Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Source, Term,
+    Confounded, Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Regressor,
+    Source, Term,
 };
 
 /// F = 1.
@@ -31,7 +32,7 @@ pub static EFFECT: Effect = Effect {
         quantity: Quantity::Position,
         drives: Drives::About,
         source: Source::Constant,
-        regressor: |_| 1.0,
+        regressor: Regressor::Formula(|_| 1.0),
     }],
     ..Effect::PLAIN
 };

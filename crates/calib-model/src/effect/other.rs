@@ -1,6 +1,6 @@
 //! Any other effect, by a regressor that the caller supplies.
 
-use super::{Drives, Effect, EffectKind, Quantity, Source, Term};
+use super::{Drives, Effect, EffectKind, Quantity, Regressor, Source, Term};
 
 /// F = whatever the caller supplies.
 pub static EFFECT: Effect = Effect {
@@ -15,7 +15,7 @@ pub static EFFECT: Effect = Effect {
         quantity: Quantity::Ratio,
         drives: Drives::About,
         source: Source::Caller,
-        regressor: |s| s.given,
+        regressor: Regressor::Formula(|s| s.given),
     }],
     ..Effect::PLAIN
 };

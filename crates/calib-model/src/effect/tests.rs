@@ -16,7 +16,7 @@ fn shared_sines_give_the_regressors() {
         let shared: Vec<EffectKind> = EffectKind::all().filter(|k| of(*k).is_some()).collect();
         assert_eq!(shared, HARMONICS);
         for kind in shared {
-            let expected = (kind.term().regressor)(&state);
+            let expected = kind.term().regressor.at(&state);
             let own = of(kind).expect("shared");
             assert!((own - expected).abs() < 1e-13, "{kind:?} at {q}");
         }
@@ -41,7 +41,7 @@ fn numbers_of_the_state_are_the_regressors() {
         .collect();
     assert_eq!(shared, OF_STATE);
     for kind in shared {
-        assert_eq!(kind.of_state(&state), Some((kind.term().regressor)(&state)));
+        assert_eq!(kind.of_state(&state), Some(kind.term().regressor.at(&state)));
     }
 }
 

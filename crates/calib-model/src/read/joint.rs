@@ -9,7 +9,7 @@ use crate::axis::Axis;
 use crate::effect::{Drives, EFFECTS, EffectKind, HARMONICS, OF_STATE, Source, Term};
 use crate::error::ModelError;
 use crate::file::{ModelEffect, ModelJoint, ModelMotion};
-use crate::model::{Joint, JointTerm};
+use crate::model::{FindOutside, Joint, JointTerm};
 
 fn unit(place: &str, v: [f64; 3]) -> Result<Unit<Vector3<f64>>, ModelError> {
     let v = Vector3::from(v);
@@ -30,6 +30,24 @@ fn term(kind: &str) -> Option<&'static Term> {
     terms.find(|t| t.name == kind && !matches!(t.source, Source::Velocity | Source::Caller))
 }
 
+/// The term that an effect of a joint names, in the table or outside of it.
+fn known(
+    joint: &ModelJoint,
+    effect: &ModelEffect,
+    outside: FindOutside<'_>,
+) -> Result<Option<&'static Term>, ModelError> {
+    let Some(plugin) = &effect.plugin else {
+        return Ok(term(&effect.kind));
+    };
+    let found = outside(joint, effect).ok_or_else(|| ModelError::Plugin {
+        joint: joint.name.clone(),
+        effect: effect.kind.clone(),
+        plugin: plugin.name.clone(),
+        version: plugin.version.clone(),
+    })?;
+    Ok(Some(EffectKind::Outside(found).term()))
+}
+
 /// The coordinate axis that a turning joint turns about, and its sign.
 fn coordinate(axis: &Axis) -> Option<(usize, f64)> {
     let Axis::Revolute(a) = axis else {
@@ -45,6 +63,7 @@ pub(super) fn joint(
     j: &ModelJoint,
     names: &Names,
     entries: &BTreeMap<usize, usize>,
+    outside: FindOutside<'_>,
 ) -> Result<Joint, ModelError> {
     let place = |what: &str| format!("joints[{i}].{what}");
     let (source, multiplier, offset) = match &j.mimic {
@@ -105,7 +124,8 @@ pub(super) fn joint(
                 "none: the joint is fixed",
             ));
         };
-        let term = joint_term(&place, effect, axis, names)?;
+        let known = known(j, effect, outside)?;
+        let term = joint_term(&place, effect, known, axis, names)?;
         if let Some(other) = term.other
             && !entries.contains_key(&other)
         {
@@ -159,10 +179,10 @@ fn axis_of(
 fn joint_term(
     place: &dyn Fn(&str) -> String,
     effect: &ModelEffect,
+    known: Option<&'static Term>,
     axis: Axis,
     names: &Names,
 ) -> Result<JointTerm, ModelError> {
-    let known = term(&effect.kind);
     let term = known.ok_or_else(|| value(place("kind"), &effect.kind, "an effect of version 1"))?;
     finite(&place("value"), &[effect.value])?;
     for (what, x) in [

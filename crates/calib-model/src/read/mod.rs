@@ -10,7 +10,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use crate::effect::Source;
 use crate::error::ModelError;
 use crate::file::{FormatVersion, ModelMotion, ModelNumber, ModelPose, RobotModelFile, VERSION};
-use crate::model::{Fixed, Joint, JointInfo, JointTerm, Model, Number};
+use crate::model::{FindOutside, Fixed, Joint, JointInfo, JointTerm, Model, Number};
 use crate::pose::Pose;
 
 /// Unit vectors and quaternions of a file may be off by this, m/m: they are normalized.
@@ -71,8 +71,19 @@ impl Model {
     /// From the contents of a file.
     ///
     /// # Errors
-    /// [`ModelError::Value`] with its place.
+    /// [`ModelError::Value`] with its place; [`ModelError::Plugin`] where a plugin computes an effect.
     pub fn new(file: &RobotModelFile) -> Result<Self, ModelError> {
+        Self::with_outside(file, &|_, _| None)
+    }
+
+    /// The same with the effects that plugins compute: `outside` gives what computes an effect of a joint of the file.
+    ///
+    /// # Errors
+    /// [`ModelError::Value`] with its place; [`ModelError::Plugin`] where `outside` gives nothing.
+    pub fn with_outside(
+        file: &RobotModelFile,
+        outside: FindOutside<'_>,
+    ) -> Result<Self, ModelError> {
         finite("gravity_m_s2", &file.gravity_m_s2)?;
         if file.approach_threshold.is_nan() || file.approach_threshold < 0.0 {
             let place = "approach_threshold".to_owned();
@@ -101,7 +112,7 @@ impl Model {
             root: Vec::new(),
             columns: 0,
         };
-        model.add_joints(file, &names)?;
+        model.add_joints(file, &names, outside)?;
         model.add_masses(file, &names)?;
         model.add_fixed(file, &names)?;
         model.add_movers();
@@ -109,7 +120,12 @@ impl Model {
         Ok(model)
     }
 
-    fn add_joints(&mut self, file: &RobotModelFile, names: &Names) -> Result<(), ModelError> {
+    fn add_joints(
+        &mut self,
+        file: &RobotModelFile,
+        names: &Names,
+        outside: FindOutside<'_>,
+    ) -> Result<(), ModelError> {
         let mut entries = BTreeMap::new();
         for (i, j) in file.joints.iter().enumerate() {
             if j.motion == ModelMotion::Fixed || j.mimic.is_some() {
@@ -131,7 +147,7 @@ impl Model {
             });
         }
         for (i, j) in file.joints.iter().enumerate() {
-            let joint = joint::joint(i, j, names, &entries)?;
+            let joint = joint::joint(i, j, names, &entries, outside)?;
             let mut chain = self.chains[joint.parent].clone();
             chain.push(i);
             self.chains.push(chain);

@@ -168,6 +168,7 @@ fn effects(
                     .then(|| before[before.len() - 1].clone()),
                 gear_ratio: (term.source == Source::Motor).then_some(50.0),
                 friction: (term.source == Source::Friction).then_some(3.0),
+                plugin: None,
             });
         }
     }

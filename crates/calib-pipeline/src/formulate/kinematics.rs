@@ -120,13 +120,13 @@ impl Calibration {
         let effects = &self.effects[joint.index()];
         let state = joint_state(&self.model, joint, q, loads, under);
         let own = effects.coefficients.iter();
-        let own = own.map(|(kind, c)| (*kind, c * (kind.term().regressor)(&state)));
+        let own = own.map(|(kind, c)| (*kind, c * kind.term().regressor.at(&state)));
         let coupled = effects.coupling.iter().map(|(other, c)| {
             let other = q.get(*other).copied().unwrap_or(0.0);
             let regressor = EffectKind::Coupling.term().regressor;
             (
                 EffectKind::Coupling,
-                c * regressor(&JointState { other, ..state }),
+                c * regressor.at(&JointState { other, ..state }),
             )
         });
         JointMotion::new(axis, state.q, own.chain(coupled)).joint_from_child()

@@ -86,7 +86,9 @@ fn edge(formulation: &Formulation, joint: JointId) -> Option<&Joint> {
 pub(crate) fn everything(inputs: &Inputs, open: &[JointId]) -> Solve {
     let model = &inputs.robot.model;
     let mut solve = inputs.robot.profile.solve.clone();
-    solve.free.insert(Free::Masses);
+    if !plugins_by_load(&solve) {
+        solve.free.insert(Free::Masses);
+    }
     for &joint in open {
         let slides = matches!(model.joint(joint).kind, JointKind::Prismatic { .. });
         let moved = model.joint(joint).kind != JointKind::Fixed;
@@ -295,10 +297,17 @@ pub(crate) fn with_parts(inputs: &Inputs, added: &[RobotPart]) -> Solve {
         }
     }
     let with_masses = added.iter().any(|part| part.what == What::Masses);
-    if with_masses && yields(&solve) {
+    if with_masses && yields(&solve) && !plugins_by_load(&solve) {
         solve.free.insert(Free::Masses);
     }
     solve
+}
+
+/// Whether a plugin computes an effect of the load: how it follows masses is not known, so that they cannot be free.
+fn plugins_by_load(solve: &Solve) -> bool {
+    let outside = solve.joints.values().flat_map(|e| &e.outside);
+    let mut terms = outside.flat_map(|free| free.effect.terms);
+    terms.any(|term| term.source == Source::Load)
 }
 
 /// Whether something yields to a load: a profile may free masses only there.
@@ -367,6 +376,11 @@ pub(crate) fn yaml(solve: &Solve, model: &RobotModel) -> String {
             let others = exception.coupled_to.iter();
             let others: Vec<String> = others.map(|o| quoted(&model.joint(*o).name)).collect();
             keys.push(format!("coupled_to: [{}]", others.join(", ")));
+        }
+        if !exception.effects.is_empty() {
+            // JSON is YAML.
+            let effects = serde_json::to_string(&exception.effects).unwrap_or_default();
+            keys.push(format!("effects: {effects}"));
         }
         let name = quoted(&model.joint(*joint).name);
         text += &format!("    {name}: {{{}}}\n", keys.join(", "));

@@ -55,6 +55,7 @@ fn without_effects(inputs: &Inputs) -> Inputs {
     });
     for exception in profile.solve.joints.values_mut() {
         exception.coupled_to.clear();
+        exception.outside.clear();
         if let Some(free) = &mut exception.free {
             free.retain(|free| !matches!(free, JointFree::Effect(effect) if !effect.geometric));
         }

@@ -200,11 +200,12 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
          # across, which turn with the joint. A compliance above 0 gives way.\n\
          # approach: +1 where the joint came from below, -1 from above; backlash is half of the clearance.\n\
          # n: gear_ratio of the joint; friction: what it holds, N m.\n\
-         # Version 1 had torque and approach of the other sign.\n\
+         # Version 1 had torque and approach of the other sign.\n{}\
          calib_effects: 2\n{}joints:\n",
         sum(Drives::About),
         sum(Drives::Across(0)),
         sum(Drives::Across(1)),
+        plugins_comment(robot),
         loads_yaml(inputs, robot),
     );
     for joint in beyond {
@@ -225,6 +226,7 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
                 }
             }
         }
+        text.push_str(&plugins_yaml(e));
         text.push_str(&drive_yaml(robot, joint, e));
         if !e.coupling.is_empty() {
             text.push_str("    coupling:\n");
@@ -234,6 +236,36 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
         }
     }
     Some(text)
+}
+
+/// Coefficients of the effects that plugins compute.
+fn plugins_yaml(effects: &JointEffects) -> String {
+    let mut text = String::new();
+    for (kind, value) in &effects.coefficients {
+        if matches!(kind, EffectKind::Outside(_)) {
+            let start = if text.is_empty() {
+                "    plugin_effects:\n"
+            } else {
+                ""
+            };
+            let _ = writeln!(text, "{start}      {}: {value:e}", kind.term().name);
+        }
+    }
+    text
+}
+
+/// What the coefficients of plugins belong to.
+fn plugins_comment(robot: &Calibration) -> &'static str {
+    let of_joint = |e: &JointEffects| {
+        let mut kinds = e.coefficients.keys();
+        kinds.any(|kind| matches!(kind, EffectKind::Outside(_)))
+    };
+    match robot.effects.iter().any(of_joint) {
+        true => {
+            "# plugin_effects: phi has each of them times the regressor of the plugin that the profile names as well; SI.\n"
+        }
+        false => "",
+    }
 }
 
 /// What the formulas of a joint's effects need of its drive.

@@ -130,6 +130,7 @@ pub(crate) fn listed(inputs: &Inputs, written: &[(OutputFile, String)]) -> Vec<O
     written.chain(own).collect()
 }
 
+/// All files; none where a plugin failed to compute what they rest on.
 pub(crate) fn files(
     inputs: &Inputs,
     report: &Report,
@@ -137,6 +138,7 @@ pub(crate) fn files(
     written: Vec<(OutputFile, String)>,
     view: &calib_report::view3d::View3d,
 ) -> Result<Vec<OutputFile>, PipelineError> {
+    inputs.estimators.evaluated()?;
     let outputs = &inputs.robot.profile.outputs;
     let mut files = vec![
         OutputFile::text("report.md", calib_report::markdown::markdown(report)),

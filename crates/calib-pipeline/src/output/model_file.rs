@@ -8,8 +8,9 @@ use calib_geometry::decompose::symmetric_eigen;
 use calib_geometry::se3;
 use calib_model::file::{
     Input, ModelBody, ModelEffect, ModelJoint, ModelLink, ModelMimic, ModelMotion, ModelNumber,
-    ModelPoint, ModelPose, ModelUncertainty, ModelValidity, RobotModelFile,
+    ModelPlugin, ModelPoint, ModelPose, ModelUncertainty, ModelValidity, RobotModelFile,
 };
+use calib_plugin::Origin;
 use calib_profile::Usage;
 use calib_report::Scene;
 use calib_report::scene::SceneVerdict;
@@ -122,7 +123,7 @@ fn joint(inputs: &Inputs, robot: &Calibration, id: JointId) -> ModelJoint {
         limits: j.limits.range().map(|(low, high)| [low, high]),
         mimic: mimic(model, j),
         fitted_range: fitted_range(inputs, id),
-        effects: effects(robot, id),
+        effects: effects(inputs, robot, id),
     }
 }
 
@@ -151,7 +152,7 @@ pub(super) fn mimic(model: &RobotModel, joint: &Joint) -> Option<ModelMimic> {
     })
 }
 
-fn effects(robot: &Calibration, id: JointId) -> Vec<ModelEffect> {
+fn effects(inputs: &Inputs, robot: &Calibration, id: JointId) -> Vec<ModelEffect> {
     let Some(axis) = motion_axis(&robot.model, id) else {
         return Vec::new();
     };
@@ -171,6 +172,7 @@ fn effects(robot: &Calibration, id: JointId) -> Vec<ModelEffect> {
             other: other.map(|o| robot.model.joints()[o].name.clone()),
             gear_ratio: (term.source == Source::Motor).then_some(drive.gear_ratio),
             friction: (term.source == Source::Friction).then_some(drive.friction),
+            plugin: plugin(inputs, id, kind),
         }
     };
     let of = &robot.effects[id.index()];
@@ -180,6 +182,33 @@ fn effects(robot: &Calibration, id: JointId) -> Vec<ModelEffect> {
     let coupled = of.coupling.iter();
     let coupled = coupled.map(|(other, c)| entry(EffectKind::Coupling, *c, Some(*other)));
     own.chain(coupled).collect()
+}
+
+/// The plugin that computes an effect of a joint.
+fn plugin(inputs: &Inputs, id: JointId, kind: EffectKind) -> Option<ModelPlugin> {
+    let name = matches!(kind, EffectKind::Outside(_)).then(|| kind.term().name)?;
+    let profile = &inputs.robot.profile;
+    let parameters = profile.solve.joints.get(&id)?.effects.get(name)?;
+    let parameters = parameters.iter().filter_map(|(name, value)| {
+        let value = serde_json::to_value(value).ok()?;
+        Some((name.clone(), value))
+    });
+    let entry = inputs.estimators.tables.effect.get(name).ok()?;
+    let Origin::Plugin {
+        plugin,
+        version,
+        sha256,
+        ..
+    } = entry.origin()
+    else {
+        return None;
+    };
+    Some(ModelPlugin {
+        name: plugin.clone(),
+        version: version.clone(),
+        sha256: sha256.clone(),
+        parameters: parameters.collect(),
+    })
 }
 
 /// Smallest and largest reading of the fitted rows, where the joint moved.

@@ -146,7 +146,10 @@ fn no_masses(inputs: &Inputs) -> Option<Finding> {
         JointFree::Effect(effect) => Some(*effect),
         _ => None,
     });
-    let needed = freed.chain(own).any(by_gravity) || !profile.load.stiffness.is_empty();
+    let outside = profile.solve.joints.values().flat_map(|j| &j.outside);
+    let outside = outside.map(|free| free.effect);
+    let needed =
+        freed.chain(own).chain(outside).any(by_gravity) || !profile.load.stiffness.is_empty();
     let kind = match profile.load.total_mass {
         Some(_) => "stated",
         None => "assumed",

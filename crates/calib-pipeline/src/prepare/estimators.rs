@@ -9,13 +9,14 @@ use calib_cor::{InputKind, Pose, Shape as CorShape};
 use calib_estimator::{Estimate, EstimatorInfo, OptionId, Outcome, parameter};
 use calib_plugin::{
     Answer, AorFit, AxisLine, ByFn, Call, Control, CorFit, Entry, Failure, Host, Kind, Motion,
-    MotionData, Offer, SearchPath, Shape, Tables, Value,
+    MotionData, Offer, PluginError, SearchPath, Shape, Tables, Value,
 };
 use calib_profile::Profile;
 use nalgebra::{Matrix3, Point3, SMatrix, Vector3};
 
 use crate::error::PipelineError;
 use crate::options::Plugins;
+use crate::prepare::plugin_effect::PluginEffect;
 use crate::prepare::readers;
 
 /// A center that was estimated.
@@ -42,6 +43,8 @@ pub struct AxisFit {
 pub struct Estimators {
     /// The tables, built-in first.
     pub tables: Tables,
+    /// Effects of joints that plugins compute for this profile.
+    pub effects: Vec<PluginEffect>,
 }
 
 impl std::fmt::Debug for Estimators {
@@ -69,7 +72,10 @@ impl Estimators {
         for writer in readers::built_in_reports() {
             tables.report.register(writer)?;
         }
-        Ok(Self { tables })
+        Ok(Self {
+            tables,
+            effects: Vec::new(),
+        })
     }
 
     /// With the plugins that a profile names, found beside it and on the search path.
@@ -105,6 +111,14 @@ impl Estimators {
         let mut estimators = Self::built_in()?;
         estimators.tables.add_named(plugins)?;
         Ok(estimators)
+    }
+
+    /// Whether every regressor that a plugin was asked for is there.
+    ///
+    /// # Errors
+    /// What the first call that failed ended with: results after it are not to be used.
+    pub fn evaluated(&self) -> Result<(), PluginError> {
+        self.effects.iter().try_for_each(PluginEffect::evaluated)
     }
 
     /// Finds a center; `Ok(Err(reason))` when the data do not determine one.
@@ -186,6 +200,7 @@ impl Estimators {
             Kind::Aor.id(): of(&self.tables.aor),
             Kind::Reader.id(): of(&self.tables.reader),
             Kind::Report.id(): of(&self.tables.report),
+            Kind::Effect.id(): of(&self.tables.effect),
         })
     }
 }

@@ -15,7 +15,7 @@ use crate::prepare::estimators::{Estimators, values};
 use crate::prepare::robot::urdf_warnings;
 use crate::prepare::rows::prepare;
 use crate::prepare::timelines::with_robot_log;
-use crate::prepare::{named, readers};
+use crate::prepare::{effects, named, readers};
 
 pub use crate::prepare::excluded::Excluded;
 pub use crate::prepare::inputs::{Digest, Inputs, Loaded, RobotProfile};
@@ -25,9 +25,10 @@ pub use crate::prepare::robot::load_robot;
 ///
 /// # Errors
 /// [`PipelineError`] with file, place and remedy.
-pub fn load_recordings(robot: RobotProfile, plugins: Plugins) -> Result<Inputs, PipelineError> {
-    let estimators = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
+pub fn load_recordings(mut robot: RobotProfile, plugins: Plugins) -> Result<Inputs, PipelineError> {
+    let mut estimators = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
     named::check(&robot.profile, &estimators.tables)?;
+    effects::resolve(&mut robot, &mut estimators)?;
     let mut recordings = BTreeMap::new();
     let mut findings = urdf_warnings(&robot);
     let mut digests = robot.digests.clone();
@@ -82,6 +83,7 @@ pub fn load_recordings(robot: RobotProfile, plugins: Plugins) -> Result<Inputs, 
         estimators: Arc::new(estimators),
     };
     inputs.exclude(excluded);
+    effects::evaluate(&inputs)?;
     Ok(inputs)
 }
 
@@ -153,12 +155,13 @@ fn check_joint_names(
 /// # Errors
 /// [`PipelineError`] for a recording of the profile that is missing, and as [`load_recordings`] for tables that do not fit the robot.
 pub fn of_tables(
-    robot: RobotProfile,
+    mut robot: RobotProfile,
     mut tables: BTreeMap<String, Poses>,
     plugins: Plugins,
 ) -> Result<Inputs, PipelineError> {
-    let estimators = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
+    let mut estimators = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
     named::check(&robot.profile, &estimators.tables)?;
+    effects::resolve(&mut robot, &mut estimators)?;
     let mut recordings = BTreeMap::new();
     let mut findings = Vec::new();
     for (name, spec) in &robot.profile.recordings {
@@ -174,7 +177,7 @@ pub fn of_tables(
         let loaded = prepare(&robot, name, spec, poses, meta, &mut findings)?;
         recordings.insert(name.clone(), loaded);
     }
-    Ok(Inputs {
+    let inputs = Inputs {
         excluded: Vec::new(),
         taken_out: BTreeSet::new(),
         digests: robot.digests.clone(),
@@ -182,7 +185,9 @@ pub fn of_tables(
         recordings,
         findings,
         estimators: Arc::new(estimators),
-    })
+    };
+    effects::evaluate(&inputs)?;
+    Ok(inputs)
 }
 
 /// Reads one file with the profile's reader, or with that of a plugin which recognizes it: a built-in one directly, a plugin's across the

@@ -1,4 +1,4 @@
-//! Estimators, readers and report writers that a profile names: whether they are there and take what they would be given, and whose code
+//! Estimators, readers, report writers and joint effects that a profile names: whether they are there and take what they would be given, and whose code
 //! they are. Asked before a file is opened, so that `calib check` refuses what `calib run` would.
 
 use std::collections::BTreeMap;
@@ -45,6 +45,11 @@ pub(crate) fn check(profile: &Profile, tables: &Tables) -> Result<(), PipelineEr
             tables.reader.get(reader)?;
         }
     }
+    for exception in profile.solve.joints.values() {
+        for (name, parameters) in &exception.effects {
+            tables.effect.get(name)?.with(&values(parameters))?;
+        }
+    }
     for (writer, parameters) in &profile.outputs.reports {
         tables.report.get(writer)?.with(&values(parameters))?;
     }
@@ -64,7 +69,7 @@ pub(crate) fn plugins_find_origins(inputs: &Inputs) -> bool {
     })
 }
 
-/// Everything that the profile's origins, recordings and outputs used, by kind and name.
+/// Everything that the profile's origins, recordings, joints and outputs used, by kind and name.
 pub(crate) fn components(inputs: &Inputs) -> Vec<Component> {
     let (profile, tables) = (&inputs.robot.profile, &inputs.estimators.tables);
     let mut used = Used::default();
@@ -80,6 +85,12 @@ pub(crate) fn components(inputs: &Inputs) -> Vec<Component> {
     for (name, spec) in &profile.recordings {
         let log = spec.robot_log.as_ref().and_then(|log| log.reader.as_ref());
         used.add(log.and_then(|id| tables.reader.get(id).ok()), name);
+    }
+    for (joint, exception) in &profile.solve.joints {
+        let joint = &inputs.robot.model.joint(*joint).name;
+        for name in exception.effects.keys() {
+            used.add(tables.effect.get(name).ok(), joint);
+        }
     }
     for name in profile.outputs.reports.keys() {
         used.add(tables.report.get(name).ok(), name);

@@ -7,6 +7,7 @@ use std::{
 
 use crate::{
     abi,
+    effect::EffectTerm,
     offer::{Kind, Offer, Value},
 };
 
@@ -16,6 +17,7 @@ enum Table {
     Aor(Box<abi::Aor1>),
     Reader(Box<abi::Reader1>),
     Report(Box<abi::Report1>),
+    Effect(Box<abi::Effect1>),
 }
 
 impl Table {
@@ -25,6 +27,7 @@ impl Table {
             Self::Aor(table) => std::ptr::from_ref(&**table).cast(),
             Self::Reader(table) => std::ptr::from_ref(&**table).cast(),
             Self::Report(table) => std::ptr::from_ref(&**table).cast(),
+            Self::Effect(table) => std::ptr::from_ref(&**table).cast(),
         }
     }
 }
@@ -95,6 +98,23 @@ impl Item {
         Self {
             offer,
             table: Table::Report(Box::new(table)),
+        }
+    }
+
+    /// A joint effect.
+    #[must_use]
+    pub fn effect(offer: Offer, term: EffectTerm, regressors: abi::Regressors) -> Self {
+        let table = abi::Effect1 {
+            struct_size: abi::size::<abi::Effect1>(),
+            depends_on: term.depends_on as i32,
+            coefficient: term.coefficient as i32,
+            revolute_only: i32::from(term.revolute_only),
+            prior_sigma: term.prior_sigma,
+            regressors: Some(regressors),
+        };
+        Self {
+            offer,
+            table: Table::Effect(Box::new(table)),
         }
     }
 }

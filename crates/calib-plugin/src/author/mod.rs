@@ -6,6 +6,7 @@
 mod aor;
 mod border;
 mod cor;
+mod effect;
 mod estimator;
 mod exported;
 mod motion;
@@ -14,13 +15,14 @@ mod report;
 
 pub use aor::fit as fit_aor;
 pub use cor::fit as fit_cor;
+pub use effect::regressors;
 pub use exported::{Exported, Item, describe, find};
 pub use reader::{read, recognizes};
 pub use report::write;
 
 /// Makes a shared library's crate a plugin: exports the one symbol of the contract.
 ///
-/// Each kind (`cor`, `aor`, `reader`, `report`) lists expressions that implement its trait. They are constants or
+/// Each kind (`cor`, `aor`, `reader`, `report`, `effect`) lists expressions that implement its trait. They are constants or
 /// unit structs: a plugin keeps no state between calls.
 ///
 /// ```no_run
@@ -152,5 +154,17 @@ macro_rules! entry {
             unsafe { $crate::author::write(&$offer, offer, call, report, sink) }
         }
         $crate::author::Item::report(offer().clone(), write)
+    }};
+    (@effect $offer:expr) => {{
+        $crate::entry!(@offer JointEffect $offer);
+        unsafe extern "C" fn regressors(
+            call: *const $crate::abi::Call,
+            states: *const $crate::abi::JointStates,
+            sink: *const $crate::abi::EffectSink,
+        ) -> $crate::abi::Status {
+            // SAFETY: the host keeps the contract of `calib_effect_1::regressors`.
+            unsafe { $crate::author::regressors(&$offer, offer, call, states, sink) }
+        }
+        $crate::author::Item::effect(offer().clone(), $crate::JointEffect::term(&$offer), regressors)
     }};
 }

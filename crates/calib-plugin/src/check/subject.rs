@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::{
     answer::{Answer, AorFit, CorFit},
+    effect::{DependsOn, EffectTerm, JointStates},
     host::{Control, LoadedPlugin, PluginError},
-    kinds::{Aor, Cor, Reader, ReportWriter},
+    kinds::{Aor, Cor, JointEffect, Reader, ReportWriter},
     motion::MotionData,
     offer::{Offer, Value},
     registry::Bound,
@@ -16,6 +17,8 @@ use crate::{
 pub(super) enum Input {
     Motion(Box<MotionData>),
     Bytes(Vec<u8>),
+    /// Readings of a turning joint, rad; all else follows from them.
+    Readings(Vec<f64>),
 }
 
 #[derive(Debug)]
@@ -24,6 +27,7 @@ pub(super) enum Reply {
     Aor(Box<Answer<AorFit>>),
     Streams(Streams),
     Files(Vec<ReportFile>),
+    Regressors(Vec<f64>),
     /// Refused, with a reason.
     Refused(String),
 }
@@ -33,6 +37,7 @@ enum Callable {
     Aor(Bound<dyn Aor>),
     Reader(Bound<dyn Reader>),
     Report(Bound<dyn ReportWriter>),
+    Effect(Bound<dyn JointEffect>),
 }
 
 pub(super) struct Subject {
@@ -86,17 +91,25 @@ impl Subject {
                 entry.with(&examples(entry.offer())).map(Callable::Report),
             );
         }
+        for entry in plugin.effects() {
+            push(
+                entry.offer(),
+                entry.with(&examples(entry.offer())).map(Callable::Effect),
+            );
+        }
         out
     }
 
     pub(super) fn call(&self, input: &Input, control: &Control<'_>) -> Result<Reply, PluginError> {
         let nothing = MotionData::points(&[]);
-        let (motion, bytes): (&MotionData, &[u8]) = match input {
-            Input::Motion(motion) => (motion, &[]),
-            Input::Bytes(bytes) => (&nothing, bytes),
+        let (motion, bytes, readings): (&MotionData, &[u8], &[f64]) = match input {
+            Input::Motion(motion) => (motion, &[], &[]),
+            Input::Bytes(bytes) => (&nothing, bytes, &[]),
+            Input::Readings(readings) => (&nothing, &[], readings),
         };
         Ok(match &self.callable {
             Callable::Cor(it) => Reply::Cor(Box::new(it.fit(&motion.view(), control)?)),
+            Callable::Effect(it) => Reply::Regressors(regressors(it, readings, control)?),
             Callable::Aor(it) => Reply::Aor(Box::new(it.fit(&motion.view(), control)?)),
             Callable::Reader(it) => {
                 // Its own business: here it must only return.
@@ -118,4 +131,34 @@ impl Subject {
             )?),
         })
     }
+}
+
+/// Turns of the motor per turn of the joint, and the largest load of gravity, N·m: those of an ordinary joint.
+const MOTOR: (f64, f64) = (100.0, 20.0);
+
+/// The regressors at these readings, with a motor, a load and a direction of approach that follow from them.
+fn regressors(
+    it: &Bound<dyn JointEffect>,
+    readings: &[f64],
+    control: &Control<'_>,
+) -> Result<Vec<f64>, PluginError> {
+    let EffectTerm { depends_on, .. } = it.entry().term();
+    let of = |on: DependsOn, f: fn(f64) -> f64| -> Vec<f64> {
+        let wanted = readings.iter().filter(|_| depends_on == on);
+        wanted.map(|q| f(*q)).collect()
+    };
+    let motor_rad = of(DependsOn::Motor, |q| MOTOR.0 * q);
+    let loads = of(DependsOn::Load, |q| MOTOR.1 * q.cos());
+    let approaches = of(DependsOn::Approach, |q| match q.rem_euclid(0.3) {
+        x if x < 0.1 => 0.0,
+        x if x < 0.2 => 1.0,
+        _ => -1.0,
+    });
+    let states = JointStates {
+        motor_rad: &motor_rad,
+        loads: &loads,
+        approaches: &approaches,
+        ..JointStates::of_readings(readings)
+    };
+    it.regressors(&states, control)
 }

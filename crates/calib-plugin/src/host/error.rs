@@ -124,7 +124,7 @@ pub enum PluginError {
         known: Vec<String>,
     },
     /// Nobody offers such a thing.
-    #[error("unknown {} `{name}`, expected one of {}", kind.word(), offers(known))]
+    #[error("unknown {} `{name}`, {}", kind.word(), expected(known))]
     Unknown {
         /// What was sought.
         kind: Kind,
@@ -163,6 +163,16 @@ pub enum PluginError {
         /// What is wrong.
         problem: ParameterError,
     },
+    /// A joint that cannot have an effect.
+    #[error("{of}: not for the joint `{joint}`: {why}")]
+    Joint {
+        /// The effect.
+        of: String,
+        /// The joint.
+        joint: String,
+        /// Why.
+        why: &'static str,
+    },
     /// Data that it does not take.
     #[error("{of} takes {}, got {got}", takes.join(" or "))]
     Shape {
@@ -192,6 +202,7 @@ impl PluginError {
             Self::Parameter { .. }
             | Self::Unknown { .. }
             | Self::BadPin { .. }
+            | Self::Joint { .. }
             | Self::Shape { .. }
             | Self::Call {
                 failure: Failure::BadParameter(_),
@@ -216,6 +227,15 @@ impl PluginError {
             }
         )
     }
+}
+
+/// What a name could have been.
+fn expected(known: &[String]) -> String {
+    if known.is_empty() {
+        return "and no plugin that is loaded offers one: name the plugin that does under `plugins`"
+            .into();
+    }
+    format!("expected one of {}", offers(known))
 }
 
 fn offers(names: &[String]) -> String {

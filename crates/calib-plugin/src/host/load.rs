@@ -8,6 +8,7 @@ use std::{
 
 use super::{
     describe::{self, Description},
+    effect::{self, LoadedEffect},
     error::{PluginError, chain},
     estimator::Loaded,
     pin,
@@ -18,7 +19,7 @@ use super::{
 };
 use crate::{
     abi,
-    kinds::{Aor, Cor, Reader, ReportWriter},
+    kinds::{Aor, Cor, JointEffect, Reader, ReportWriter},
     offer::{Kind, Offer},
     registry::{Entry, Origin},
 };
@@ -47,6 +48,7 @@ pub struct LoadedPlugin {
     aor: Vec<Entry<dyn Aor>>,
     reader: Vec<Entry<dyn Reader>>,
     report: Vec<Entry<dyn ReportWriter>>,
+    effect: Vec<Entry<dyn JointEffect>>,
 }
 
 impl Host {
@@ -194,6 +196,7 @@ unsafe fn from_entry(
         aor: Vec::new(),
         reader: Vec::new(),
         report: Vec::new(),
+        effect: Vec::new(),
     };
     for offer in plugin.description.offers.clone() {
         // Kind and name were texts of the plugin, without zero bytes.
@@ -257,6 +260,17 @@ impl LoadedPlugin {
                 self.report
                     .push(Entry::report(LoadedReport { offer, write }, origin));
             }
+            Kind::Effect => {
+                let raw: abi::Effect1 =
+                    unsafe { sized("calib_effect_1", found, size_to!(abi::Effect1, regressors)) }
+                        .map_err(table)?;
+                let it = LoadedEffect {
+                    offer,
+                    term: effect::term(&raw).map_err(table)?,
+                    regressors: raw.regressors.ok_or_else(|| missing("regressors"))?,
+                };
+                self.effect.push(Entry::effect(it, origin));
+            }
         }
         Ok(())
     }
@@ -283,6 +297,12 @@ impl LoadedPlugin {
     #[must_use]
     pub fn reports(&self) -> &[Entry<dyn ReportWriter>] {
         &self.report
+    }
+
+    /// Its joint effects.
+    #[must_use]
+    pub fn effects(&self) -> &[Entry<dyn JointEffect>] {
+        &self.effect
     }
 
     /// The center estimator of this name.
@@ -327,6 +347,17 @@ impl LoadedPlugin {
             .iter()
             .find(|e| e.offer().name == name)
             .ok_or_else(|| self.none(Kind::Report, name))
+    }
+
+    /// The joint effect of this name.
+    ///
+    /// # Errors
+    /// [`PluginError::NotOffered`].
+    pub fn effect(&self, name: &str) -> Result<&Entry<dyn JointEffect>, PluginError> {
+        self.effect
+            .iter()
+            .find(|e| e.offer().name == name)
+            .ok_or_else(|| self.none(Kind::Effect, name))
     }
 
     fn none(&self, kind: Kind, name: &str) -> PluginError {

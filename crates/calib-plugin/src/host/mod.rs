@@ -5,6 +5,7 @@ mod aor;
 mod call;
 mod cor;
 mod describe;
+mod effect;
 mod error;
 mod estimator;
 mod load;

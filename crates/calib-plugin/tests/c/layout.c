@@ -56,11 +56,20 @@ int main(void) {
     S(calib_files_sink); F(calib_files_sink, struct_size); F(calib_files_sink, reserved);
     F(calib_files_sink, context); F(calib_files_sink, file);
     S(calib_report_1); F(calib_report_1, struct_size); F(calib_report_1, reserved); F(calib_report_1, write);
+    S(calib_joint_states); F(calib_joint_states, struct_size); F(calib_joint_states, prismatic);
+    F(calib_joint_states, samples); F(calib_joint_states, readings); F(calib_joint_states, motor_rad);
+    F(calib_joint_states, loads); F(calib_joint_states, approaches);
+    S(calib_effect_sink); F(calib_effect_sink, struct_size); F(calib_effect_sink, reserved);
+    F(calib_effect_sink, context); F(calib_effect_sink, result);
+    S(calib_effect_1); F(calib_effect_1, struct_size); F(calib_effect_1, depends_on); F(calib_effect_1, coefficient);
+    F(calib_effect_1, revolute_only); F(calib_effect_1, prior_sigma); F(calib_effect_1, regressors);
     printf("major %u %u\n", CALIB_ABI_MAJOR, CALIB_ABI_MINOR);
     printf("status %d %d\n", CALIB_OK, CALIB_PANICKED);
     printf("types %d %d\n", CALIB_BOOL, CALIB_TEXT);
     printf("shapes %d %d\n", CALIB_POINTS, CALIB_TWO_BODIES);
     printf("masks %d %d\n", CALIB_LOST, CALIB_FILLED);
     printf("units %d %d\n", CALIB_ANGLE, CALIB_LENGTH);
+    printf("depends_on %d %d\n", CALIB_ON_READING, CALIB_ON_APPROACH);
+    printf("coefficients %d %d\n", CALIB_POSITION, CALIB_COMPLIANCE);
     return 0;
 }

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, process::Command};
 
-use calib_plugin::abi;
+use calib_plugin::{Coefficient, DependsOn, abi};
 
 use crate::bed::{Bed, compiler, file, include};
 
@@ -65,6 +65,13 @@ fn rust() -> BTreeMap<String, (usize, usize)> {
         }
         calib_files_sink = abi::FilesSink { struct_size, reserved, context, file }
         calib_report_1 = abi::Report1 { struct_size, reserved, write }
+        calib_joint_states = abi::JointStates {
+            struct_size, prismatic, samples, readings, motor_rad, loads, approaches,
+        }
+        calib_effect_sink = abi::EffectSink { struct_size, reserved, context, result }
+        calib_effect_1 = abi::Effect1 {
+            struct_size, depends_on, coefficient, revolute_only, prior_sigma, regressors,
+        }
     };
     let pair = |a: i32, b: i32| (a as usize, b as usize);
     table.insert("major".into(), (abi::MAJOR as usize, abi::MINOR as usize));
@@ -79,6 +86,14 @@ fn rust() -> BTreeMap<String, (usize, usize)> {
     );
     table.insert("masks".into(), (abi::LOST.into(), abi::FILLED.into()));
     table.insert("units".into(), pair(abi::ANGLE, abi::LENGTH));
+    table.insert(
+        "depends_on".into(),
+        pair(DependsOn::Reading as i32, DependsOn::Approach as i32),
+    );
+    table.insert(
+        "coefficients".into(),
+        pair(Coefficient::Position as i32, Coefficient::Compliance as i32),
+    );
     table
 }
 
@@ -142,7 +157,7 @@ fn c_and_rust_agree_on_every_field() {
         .lines()
         .filter_map(|line| line.strip_prefix("typedef struct ")?.strip_suffix(" {"))
         .collect();
-    assert_eq!(structs.len(), 19);
+    assert_eq!(structs.len(), 22);
     for name in structs {
         let fields = c
             .keys()

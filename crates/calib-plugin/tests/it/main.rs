@@ -8,6 +8,7 @@ mod book;
 mod border;
 mod check;
 mod compatible;
+mod effect;
 mod layout;
 mod new_project;
 mod parameters;

@@ -120,7 +120,7 @@ fn runs(command: &mut Command, folder: &Path) -> Option<()> {
 fn rust_projects_of_every_kind_are_complete() {
     let folder = tempfile::tempdir().unwrap();
     let mut author_side = false;
-    for name in ["axis", "reader", "report"] {
+    for name in ["axis", "reader", "report", "effect"] {
         let kind = kind_from_name(name).unwrap();
         let project = new_project(&format!("my-{name}"), kind, Language::Rust, folder.path());
         let project = project.unwrap();
@@ -171,7 +171,7 @@ fn rust_projects_of_every_kind_are_complete() {
 #[test]
 fn c_projects_of_every_kind_are_complete() {
     let folder = tempfile::tempdir().unwrap();
-    for name in ["center", "axis", "reader", "report"] {
+    for name in ["center", "axis", "reader", "report", "effect"] {
         let kind = kind_from_name(name).unwrap();
         let project = new_project(&format!("my-{name}"), kind, Language::C, folder.path()).unwrap();
         if name == "center" {

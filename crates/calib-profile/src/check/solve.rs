@@ -91,6 +91,8 @@ impl Checker<'_> {
             within_m: raw.within_mm.map(|w| w * MM),
             within_rad: raw.within_deg.map(|w| w * DEG),
             coupled_to,
+            effects: raw.effects.clone(),
+            outside: Vec::new(),
         }
     }
 

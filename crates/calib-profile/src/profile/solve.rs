@@ -1,6 +1,6 @@
 //! What is estimated, with priors, noise levels and limits of the verdict.
 
-use super::{Free, JointFree, Load, Method, StartFrom};
+use super::{Free, JointFree, Load, Method, ParameterValue, StartFrom};
 use crate::raw::{ANGLE, POSITION};
 use calib_core::EFFECTS;
 use calib_core::NoiseModel;
@@ -47,6 +47,10 @@ pub struct JointException {
     pub within_rad: Option<f64>,
     /// Joints whose motion it follows by an unknown share.
     pub coupled_to: Vec<JointId>,
+    /// Effects of plugins that it has, by name, with their parameters.
+    pub effects: BTreeMap<String, BTreeMap<String, ParameterValue>>,
+    /// The same ready to be estimated: empty until the plugins are loaded.
+    pub outside: Vec<FreeEffect>,
 }
 
 /// How much of a joint origin is free.
@@ -65,7 +69,7 @@ pub enum OriginFreeSet {
 pub struct JointFreeSet {
     /// Its origin.
     pub origin: OriginFreeSet,
-    /// Effects, in the order of the table.
+    /// Effects, in the order of the table, then those of plugins.
     pub effects: Vec<FreeEffect>,
     /// Joints whose motion it follows.
     pub coupled_to: Vec<JointId>,
@@ -133,12 +137,13 @@ impl Solve {
                 within: own_within.filter(|_| effect.geometric),
             }
         });
+        let outside = exception.outside.into_iter();
         let width = |own: Option<f64>, key: &'static PriorKey| {
             own.is_none().then(|| self.prior.shared(key))
         };
         JointFreeSet {
             origin,
-            effects: effects.collect(),
+            effects: effects.chain(outside).collect(),
             coupled_to: exception.coupled_to,
             position_sigma: exception.sigma_m.unwrap_or(self.prior.position),
             angle_sigma: exception.sigma_rad.unwrap_or(self.prior.angle),

@@ -1,6 +1,6 @@
 //! What is estimated, with priors, noise levels and limits of the verdict.
 
-use super::{RawFree, RawJointFree, RawPrior};
+use super::{RawFree, RawJointFree, RawPrior, RawValue};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -49,6 +49,9 @@ pub struct RawJointSolve {
     /// The joint also turns by an unknown share of these joints' angles (belt or parallelogram coupling).
     #[serde(default)]
     pub coupled_to: Vec<String>,
+    /// Effects of plugins that this joint has, by name, each with its parameters (see `calib plugins`); their coefficients are estimated.
+    #[serde(default)]
+    pub effects: BTreeMap<String, BTreeMap<String, RawValue>>,
 }
 
 /// Where the load of a joint comes from.

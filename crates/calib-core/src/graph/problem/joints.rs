@@ -1,5 +1,7 @@
 //! Joints and their effects.
 
+use calib_geometry::plausible::{Unlikely, unlikely_meters, unlikely_radians};
+
 use crate::graph::axis::Axis;
 use crate::graph::edge::{Candidate, EdgeKind, Joint, JointEffect, Share};
 use crate::graph::effect::{EffectKind, JointState, Source};
@@ -44,6 +46,34 @@ impl Problem {
             Some(EdgeKind::Joint(j)) => Some(j),
             _ => None,
         }
+    }
+
+    /// Joints whose readings are hardly rad (m): degrees, most of all. It is for a person to judge, so nothing is refused.
+    ///
+    /// ```
+    /// use calib_core::{Axis, Problem};
+    /// use nalgebra::Vector3;
+    ///
+    /// let mut problem = Problem::new(3);
+    /// let (base, link) = (problem.frame("base"), problem.frame("link"));
+    /// problem.joint("elbow", base, link, Axis::Revolute(Vector3::z_axis()), vec![-90.0, 0.0, 45.0]);
+    /// assert_eq!(problem.unlikely_units().len(), 1);
+    /// ```
+    #[must_use]
+    pub fn unlikely_units(&self) -> Vec<(EdgeId, Unlikely)> {
+        let edges = self.edges.iter().enumerate();
+        edges
+            .filter_map(|(e, edge)| {
+                let EdgeKind::Joint(joint) = &edge.kind else {
+                    return None;
+                };
+                let why = match joint.axis {
+                    Axis::Revolute(_) => unlikely_radians(&joint.q),
+                    Axis::Prismatic(_) => unlikely_meters(&joint.q),
+                };
+                Some((EdgeId::of(e), why?))
+            })
+            .collect()
     }
 
     /// Frees a term whose regressor follows from the reading (zero offset, gain, eccentricity). The parameter is

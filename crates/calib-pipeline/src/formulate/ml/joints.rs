@@ -203,6 +203,12 @@ fn add_effects(
             }
         }
     }
+    for outside in free.effects.iter().filter(|f| !EFFECTS.contains(&f.effect)) {
+        for term in outside.effect.terms {
+            problem.free_effect_at(edge, term.kind, &states, outside.sigma);
+            loaded |= term.source != Source::Reading;
+        }
+    }
     let coupling = EffectKind::Coupling;
     let slides = !model.joint(joint).kind.turns();
     for other in &free.coupled_to {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_core::effect::{Source, Term};
-use calib_core::{EFFECTS, EdgeId, JointState, OpenStart, StartChange};
+use calib_core::{EFFECTS, EdgeId, EdgeKind, EffectKind, JointState, OpenStart, StartChange};
 use calib_urdf::{JointId, RobotModel};
 
 use super::joints::Row;
@@ -51,6 +51,7 @@ fn of_joint(
             .collect();
         let terms = EFFECTS.iter().flat_map(|effect| effect.terms);
         let changes: Vec<StartChange> = terms
+            .chain(outside_terms(formulation, edge))
             .filter(|term| matches!(term.source, Source::Approach | Source::Friction))
             .filter_map(|term| change(term, &states))
             .collect();
@@ -63,10 +64,20 @@ fn of_joint(
     starts.filter_map(start).collect()
 }
 
+/// Terms of a joint's effects that plugins compute.
+fn outside_terms(formulation: &Formulation, edge: EdgeId) -> Vec<&'static Term> {
+    let EdgeKind::Joint(joint) = &formulation.problem.edges()[edge.index()].kind else {
+        return Vec::new();
+    };
+    let kinds = joint.effects.iter().map(|effect| effect.kind);
+    let outside = kinds.filter(|kind| matches!(kind, EffectKind::Outside(_)));
+    outside.map(EffectKind::term).collect()
+}
+
 /// What the side does to a term; `None` where it does nothing.
 fn change(term: &Term, states: &[JointState]) -> Option<StartChange> {
     let from =
-        |state: &JointState, approach: f64| (term.regressor)(&JointState { approach, ..*state });
+        |state: &JointState, approach: f64| term.regressor.at(&JointState { approach, ..*state });
     let by: Vec<f64> = states
         .iter()
         .map(|state| (from(state, 1.0) - from(state, -1.0)) / 2.0)
