@@ -6,10 +6,10 @@
 //! ```
 //!
 //! Arrays are C-contiguous `float64`, SI (m, rad, s); a lost sample is a row of NaN. The interpreter is released while a library computes.
-//! A long computation runs in a thread of its own and the caller's thread asks for signals meanwhile ([`background`]). Errors are one
-//! exception, `calib.CalibError`, with the text that the program prints ([`error`]).
+//! A long computation runs in a thread of its own and the caller's thread asks for signals meanwhile (`background.rs`). Errors are one
+//! exception, `calib.CalibError`, with the text that the program prints (`error.rs`).
 //!
-//! It does **not** know: what a result means, and how it is shown. Python code that is registered as an estimator or reader ([`plugins`]) runs
+//! It does **not** know: what a result means, and how it is shown. Python code that is registered as an estimator or reader (`plugins.rs`) runs
 //! in this process with the user's rights.
 
 // The macros of pyo3 write functions of the C border; nothing here does.
@@ -40,5 +40,5 @@ mod _native {
     #[pymodule_export]
     use crate::recording::read;
     #[pymodule_export]
-    use crate::run::{main, run};
+    use crate::run::{figures, main, run};
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use calib_recording::{JointUnit, MarkerSample, ReadOptions, Recording};
+use calib_report::Finding;
 use nalgebra::Isometry3;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -35,7 +36,7 @@ pub(crate) fn plain<'py>(py: Python<'py>, recording: &Recording) -> PyResult<Bou
     plain.set_item("comments", &meta.comments)?;
     plain.set_item("conversions", &meta.conversions)?;
     plain.set_item("up_axis", &meta.up_axis)?;
-    let findings: Vec<String> = meta.findings.iter().map(|f| f.text()).collect();
+    let findings: Vec<String> = meta.findings.iter().map(Finding::text).collect();
     plain.set_item("findings", findings)?;
     plain.set_item("timelines", timelines(py, recording)?)?;
     let numbers = |values: &[Option<f64>]| -> Vec<f64> {

@@ -7,6 +7,8 @@ use calib_cli::CliError;
 use calib_files::{OutputFile, ResultsFolder};
 use calib_pipeline::run::{Plugins, RunOptions, run as run_profile};
 use calib_profile::Method;
+use calib_report::plots::plots;
+use calib_report::{Report, picture};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
@@ -78,6 +80,21 @@ pub(crate) fn run<'py>(
         Ok::<_, CliError>((output.exit as u8, output.files))
     })?;
     Ok((exit, named(py, &files)?))
+}
+
+/// The figures of a report by their ids: title, description and SVG.
+#[pyfunction]
+pub(crate) fn figures(
+    py: Python<'_>,
+    report_json: &[u8],
+) -> PyResult<Vec<(String, String, String, String)>> {
+    let report: Report = serde_json::from_slice(report_json)
+        .map_err(|e| misused(py, &format!("report.json: {e}")))?;
+    let drawn = plots(&report).into_iter().map(|plot| {
+        let svg = picture(&plot);
+        (plot.id, plot.title, plot.description, svg)
+    });
+    Ok(drawn.collect())
 }
 
 /// Files by their names.

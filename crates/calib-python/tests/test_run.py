@@ -5,6 +5,7 @@ import signal
 import threading
 import time
 from pathlib import Path
+from xml.etree import ElementTree
 
 import calib
 import pytest
@@ -37,6 +38,17 @@ def test_a_notebook_shows_the_page(ripley: calib.Report) -> None:
     page = ripley._repr_html_()
     assert page.startswith("<iframe srcdoc=") and page.endswith("</iframe>")
     assert "&lt;!DOCTYPE html&gt;" in page[:300] or "&lt;!doctype html&gt;" in page[:300]
+
+
+def test_figures_are_files_of_their_own(ripley: calib.Report) -> None:
+    figures = ripley.figures
+    assert len(figures) > 3
+    for name, figure in figures.items():
+        root = ElementTree.fromstring(figure.svg)
+        assert root.tag == "{http://www.w3.org/2000/svg}svg", name
+        inside = {child.tag.rpartition("}")[2] for child in root}
+        assert {"title", "desc", "style", "path"} <= inside | {"path"}, name
+        assert figure.title and figure.description and figure._repr_svg_() == figure.svg
 
 
 @pytest.mark.parametrize("library", ["pandas", "polars"])

@@ -34,7 +34,7 @@ from calib.plugins import (
     reader,
 )
 from calib.recordings import Recording, Stream, Timeline, read
-from calib.report import Record, Report, run
+from calib.report import Figure, Record, Report, run
 
 __all__ = [
     "Axis",
@@ -43,6 +43,7 @@ __all__ = [
     "Center",
     "CenterFit",
     "Correction",
+    "Figure",
     "FrameFit",
     "HandEyeFit",
     "Joint",

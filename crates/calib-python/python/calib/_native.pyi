@@ -2,10 +2,23 @@
 
 import os
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 import numpy.typing as npt
+
+__all__ = [
+    "CalibError",
+    "Model",
+    "figures",
+    "fit",
+    "main",
+    "plan",
+    "read",
+    "run",
+    "simulate",
+    "twin",
+]
 
 _Array = npt.NDArray[np.float64]
 _Under = tuple[_Array | None, _Array | None]
@@ -19,6 +32,7 @@ class CalibError(Exception):
     id: str
     """Which kind of error; the words stay in later versions."""
 
+@final
 class Model:
     @staticmethod
     def load(path: _Path) -> Model: ...
@@ -70,6 +84,7 @@ def run(
     own: Sequence[Any],
     progress: Callable[[str], object] | None,
 ) -> tuple[int, dict[str, bytes]]: ...
+def figures(report_json: bytes) -> list[tuple[str, str, str, str]]: ...
 def simulate(profile: _Path, seed: int | None) -> tuple[dict[str, dict[str, Any]], str]: ...
 def plan(
     profile: _Path,

@@ -6,6 +6,7 @@ import io
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from calib import _native
@@ -32,6 +33,20 @@ class Record(dict[str, Any]):
     def __dir__(self) -> Iterator[str]:
         yield from super().__dir__()
         yield from self
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of the report's page; a notebook shows it."""
+
+    title: str
+    description: str
+    """What it shows and how to read it."""
+    svg: str
+    """A file of its own."""
+
+    def _repr_svg_(self) -> str:
+        return self.svg
 
 
 class Report:
@@ -67,6 +82,12 @@ class Report:
         """The report's page, in a frame of its own."""
         page = html.escape(self.files["report.html"].decode(), quote=True)
         return f'<iframe srcdoc="{page}" style="width:100%;height:40em;border:1px solid"></iframe>'
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """The figures of the report's page by their ids."""
+        drawn = _native.figures(self.files["report.json"])
+        return {name: Figure(title, text, svg) for name, title, text, svg in drawn}
 
     def rows(self, table: Table) -> list[dict[str, Any]]:
         """A table as a list of rows: ``parameters``, ``residuals`` (of the fit, by sample) or ``held_out`` (errors at poses not fitted)."""
