@@ -34,6 +34,14 @@ studies:
     cargo run --release -q -p calib-cli -- study faults --trials 2 --seed 131 --out target/studies
     mkdir -p book/src/studies && cp target/studies/*.md target/studies/*-tables.csv book/src/studies/
 
+# Tests of the Python package, in a virtual environment
+python:
+    crates/calib-python/check target/python
+
+# The wheel, as a user's `pip install .` builds it (all dependencies once more, with other features)
+wheel:
+    pip wheel . --no-deps --wheel-dir dist
+
 # Review changed snapshots
 snapshots:
     cargo insta review --workspace

@@ -139,6 +139,8 @@ const KEPT: &[(&str, &str)] = &[
     ("crates/calib-plugin/", "the description"),
     ("plugins/column-reader-c/", "the description"),
     ("book/src/plugins/", "the description"),
+    // The name of a parameter of ROS.
+    ("examples/ros2/", "robot description"),
 ];
 
 fn root() -> PathBuf {

@@ -37,6 +37,7 @@ const LAYERS: &[(&str, u8)] = &[
     ("calib-study", 6),
     ("calib-twin", 7),
     ("calib-cli", 8),
+    ("calib-python", 9),
 ];
 
 fn root() -> PathBuf {

@@ -1,6 +1,7 @@
 //! How the program ends when a command failed: on standard error for people, with `--json` on standard output for programs.
 
 use std::error::Error;
+use std::ffi::OsString;
 
 use calib_pipeline::ExitCode;
 
@@ -12,20 +13,27 @@ use crate::terminal::{emit, say};
 /// Says why a command failed; returns the exit code.
 pub fn failed(arguments: &Arguments, error: &CliError) -> u8 {
     let code = error.exit_code() as u8;
-    let said = with_causes(error);
     if arguments.console.json && !matches!(error, CliError::Stdout(_)) {
+        let said = with_causes(error);
         let remedy = error.remedy_of(&said);
         return emit_error((error.id(), &said), error.place(), remedy.as_deref(), code);
     }
-    say(&format!("error: {said}"));
-    if let (Some(remedy), false) = (error.remedy(), said.contains("\n  help: ")) {
-        say(&format!("  help: {remedy}"));
-    }
+    say(&format!("error: {}", self::said(error)));
     code
 }
 
+/// An error as the program says it: what failed, what caused it, and the remedy on a line of its own.
+#[must_use]
+pub fn said(error: &CliError) -> String {
+    let said = with_causes(error);
+    match error.remedy() {
+        Some(remedy) if !said.contains("\n  help: ") => format!("{said}\n  help: {remedy}"),
+        _ => said,
+    }
+}
+
 /// Help, the version, or a wrong call; returns the exit code.
-pub fn misused(error: &clap::Error) -> u8 {
+pub fn misused(error: &clap::Error, arguments: &[OsString]) -> u8 {
     let text = error.render();
     let usage = ExitCode::Usage as u8;
     if !error.use_stderr() {
@@ -42,7 +50,7 @@ pub fn misused(error: &clap::Error) -> u8 {
             }
         };
     }
-    if std::env::args_os().any(|argument| argument == "--json") {
+    if arguments.iter().any(|argument| argument == "--json") {
         let plain = text.to_string();
         let said = plain.trim().trim_start_matches("error: ");
         return emit_error(("usage", said), None, None, usage);

@@ -14,8 +14,8 @@ use crate::answer::{Answer, answer, doubt, matrix, pose_text, pose_value};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
 use crate::road::{Command, Data, Road, Wish};
-use crate::table::{it_has, no_table, read_poses};
-use crate::{FrameRequest, data, noise, usage};
+use crate::table::{it_has, no_table};
+use crate::{FrameRequest, data, usage};
 
 fn command() -> Command<FrameEstimate> {
     Command {
@@ -39,8 +39,9 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
     if request.list {
         return Ok(command.list());
     }
-    let file = request.file.as_deref().ok_or_else(no_table)?;
-    let poses = read_poses(file, &ReadOptions::default())?;
+    let measured = request.file.as_ref().ok_or_else(no_table)?;
+    let file = measured.name();
+    let poses = measured.poses(&ReadOptions::default())?;
     let (proximal_letter, proximal) = axis_of(&request.proximal)?;
     let (distal_letter, distal) = axis_of(&request.distal)?;
     let column = |joint: &str| {
@@ -54,7 +55,7 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
     };
     let body = body_of(file, request.body.as_deref(), &poses.bodies)?;
     let (a, b) = (column(proximal)?, column(distal)?);
-    let weights = noise::weights(request.weights.as_deref(), poses.rows.len())?;
+    let weights = measured.weights(request.weights.as_deref(), poses.rows.len())?;
     let (samples, rows): (Vec<FrameSample>, Vec<u64>) = a
         .iter()
         .zip(b)

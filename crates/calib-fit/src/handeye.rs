@@ -2,7 +2,6 @@
 
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write as _;
-use std::path::Path;
 
 use calib_estimator::{Input, Kind, Options, Verdict};
 use calib_handeye::{Correction, HandEye};
@@ -15,8 +14,9 @@ use crate::HandEyeRequest;
 use crate::answer::{Answer, answer, doubt, freedom, matrix, pose_text, pose_value};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
+use crate::measured::Measured;
 use crate::road::{Command, Data, Road, Wish};
-use crate::table::{no_table, read_poses};
+use crate::table::no_table;
 
 fn command() -> Command<HandEye> {
     Command {
@@ -42,12 +42,13 @@ pub fn handeye(request: &HandEyeRequest) -> Result<Answer, FitError> {
     if request.list {
         return Ok(command.list());
     }
-    let file = request.file.as_deref().ok_or_else(no_table)?;
+    let table = request.file.as_ref().ok_or_else(no_table)?;
+    let file = table.name();
     let PosePairs {
         rows,
         robot,
         measured,
-    } = pose_pairs(file, &request.robot, &request.measured)?;
+    } = pose_pairs(table, &request.robot, &request.measured)?;
     let measured: Vec<Isometry3<f64>> = match request.inverted {
         true => measured.iter().map(Isometry3::inverse).collect(),
         false => measured,
@@ -89,7 +90,8 @@ struct PosePairs {
 }
 
 /// The rows in which both poses are known.
-fn pose_pairs(file: &Path, robot: &str, measured: &str) -> Result<PosePairs, FitError> {
+fn pose_pairs(table: &Measured, robot: &str, measured: &str) -> Result<PosePairs, FitError> {
+    let file = table.name();
     let columns = |prefix: &str| BodyColumns {
         position: ["x", "y", "z"].map(|a| format!("{prefix}_{a}")),
         quaternion_xyzw: Some(["qx", "qy", "qz", "qw"].map(|a| format!("{prefix}_{a}"))),
@@ -103,7 +105,8 @@ fn pose_pairs(file: &Path, robot: &str, measured: &str) -> Result<PosePairs, Fit
         .into(),
         ..ColumnMap::default()
     };
-    let own = read_poses(file, &ReadOptions::default())
+    let own = table
+        .poses(&ReadOptions::default())
         .ok()
         .filter(|p| p.bodies.contains_key(robot) && p.bodies.contains_key(measured));
     let poses = match own {
@@ -113,7 +116,7 @@ fn pose_pairs(file: &Path, robot: &str, measured: &str) -> Result<PosePairs, Fit
                 columns: Some(map),
                 ..ReadOptions::default()
             };
-            read_poses(file, &options).map_err(|error| FitError::Data {
+            table.poses(&options).map_err(|error| FitError::Data {
                 file: file.display().to_string(),
                 finding: format!("does not hold two poses per row, `{robot}` and `{measured}`: {error}"),
                 remedy: "name the columns <prefix>_x, _y, _z, _qx, _qy, _qz, _qw and give the prefixes with --robot and --measured".to_owned(),

@@ -10,6 +10,7 @@ mod cor;
 mod error;
 mod frame;
 mod handeye;
+mod measured;
 mod noise;
 mod plugin;
 mod road;
@@ -19,6 +20,7 @@ pub use aor::aor;
 pub use cor::cor;
 pub use frame::frame;
 pub use handeye::handeye;
+pub use measured::{Held, Measured};
 
 use std::path::{Path, PathBuf};
 
@@ -31,7 +33,7 @@ pub use error::FitError;
 #[derive(Debug, Clone, Default)]
 pub struct TableRequest {
     /// The table.
-    pub file: Option<PathBuf>,
+    pub file: Option<Measured>,
     /// Estimator id; the kind of data decides when not given.
     pub estimator: Option<String>,
     /// All estimators that take the data.
@@ -74,7 +76,7 @@ pub struct TableRequest {
 #[derive(Debug, Clone, Default)]
 pub struct FrameRequest {
     /// The table: poses of one body and two joint columns.
-    pub file: Option<PathBuf>,
+    pub file: Option<Measured>,
     /// `z=pan`.
     pub proximal: String,
     /// `x=tilt`.
@@ -99,7 +101,7 @@ pub struct FrameRequest {
 #[derive(Debug, Clone, Default)]
 pub struct HandEyeRequest {
     /// The table: two poses per row.
-    pub file: Option<PathBuf>,
+    pub file: Option<Measured>,
     /// Prefix of the columns of the robot's pose `base_from_flange`, or the name of a body.
     pub robot: String,
     /// Prefix of the columns of the measured pose `tracker_from_body`, or the name of a body.

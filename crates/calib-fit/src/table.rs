@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use calib_checks::rigid_body::{Template, body_poses, rigid_groups};
 use calib_cor::Pose;
-use calib_recording::{Filled, Poses, ReadOptions, read_path};
+use calib_recording::{Poses, ReadOptions};
 use nalgebra::{Isometry3, Matrix3, Point3};
 
 use crate::error::FitError;
@@ -35,11 +35,10 @@ pub(crate) struct Table {
 
 impl Table {
     pub fn read(request: &TableRequest) -> Result<Self, FitError> {
-        let Some(file) = &request.file else {
-            return Err(no_table());
-        };
-        let mut poses = read_poses(file, &ReadOptions::default())?;
-        let mut weights = noise::weights(request.weights.as_deref(), poses.rows.len())?;
+        let measured = request.file.as_ref().ok_or_else(no_table)?;
+        let file = measured.name();
+        let mut poses = measured.poses(&ReadOptions::default())?;
+        let mut weights = measured.weights(request.weights.as_deref(), poses.rows.len())?;
         let angles = match &request.joint {
             Some(joint) => keep_rows_with(file, &mut poses, &mut weights, joint)?,
             None => Vec::new(),
@@ -105,7 +104,7 @@ impl Table {
         };
         let covariances = noise::covariances(request, &markers, &poses.rows)?;
         Ok(Self {
-            file: file.clone(),
+            file: file.to_path_buf(),
             rows: poses.rows,
             markers,
             origin_only,
@@ -228,13 +227,6 @@ pub(crate) fn it_has<'a>(names: impl Iterator<Item = &'a String>) -> String {
     } else {
         format!("it has {}", names.join(", "))
     }
-}
-
-pub(crate) fn read_poses(file: &Path, options: &ReadOptions) -> Result<Poses, FitError> {
-    let recording = read_path(file, options)?;
-    recording
-        .poses(Filled::Exclude)
-        .map_err(|e| data(file, e.to_string(), "give one table"))
 }
 
 fn as_poses(track: &[Option<Isometry3<f64>>]) -> Vec<Option<Pose>> {

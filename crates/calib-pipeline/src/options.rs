@@ -1,5 +1,6 @@
 //! How to run.
 
+use calib_plugin::OwnEntries;
 use calib_profile::{Method, Profile};
 
 /// How to run.
@@ -15,6 +16,8 @@ pub struct RunOptions {
     pub select: bool,
     /// Which plugins of the profile are loaded.
     pub plugins: Plugins,
+    /// Estimators and readers of the calling program.
+    pub own: OwnEntries,
 }
 
 /// Which plugins of a profile are loaded. The variable `CALIB_NO_PLUGINS`, set to anything, is [`Plugins::Refused`].

@@ -21,8 +21,8 @@ use crate::output::scene::scene;
 use crate::output::shapes;
 use crate::output::view::{Shown, view};
 use crate::prepare::inputs::Inputs;
-use crate::prepare::load::load_recordings;
-use crate::prepare::robot::load_robot;
+use crate::prepare::load::load_recordings_with;
+use crate::prepare::robot::load_robot_with;
 use crate::select::selected;
 use crate::verify::verified;
 
@@ -49,9 +49,9 @@ pub fn run(
     progress: &mut dyn FnMut(&str),
 ) -> Result<RunOutput, PipelineError> {
     progress("read profile and robot");
-    let robot = load_robot(profile)?;
+    let robot = load_robot_with(profile, &options.own)?;
     progress("read recordings");
-    let inputs = load_recordings(robot, options.plugins)?;
+    let inputs = load_recordings_with(robot, options.plugins, &options.own)?;
     run_on(inputs, options, progress)
 }
 

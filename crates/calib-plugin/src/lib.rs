@@ -70,6 +70,8 @@ mod listing;
 #[cfg(feature = "host")]
 mod new_project;
 #[cfg(feature = "host")]
+mod own;
+#[cfg(feature = "host")]
 mod parameters;
 #[cfg(feature = "host")]
 mod registry;
@@ -82,6 +84,8 @@ pub use host::{
 };
 #[cfg(feature = "host")]
 pub use new_project::{Language, NewProjectError, kind_from_name, new_project};
+#[cfg(feature = "host")]
+pub use own::OwnEntries;
 #[cfg(feature = "host")]
 pub use parameters::{ParameterError, schema, typed, validate};
 #[cfg(feature = "host")]

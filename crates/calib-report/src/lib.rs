@@ -95,6 +95,7 @@ pub use selection::{
     ModelPart, NestedSelection, PartKind, Selection, SelectionOutcome, SelectionStep,
 };
 pub use standardized::{Standardized, Tails};
+pub use svg::picture;
 pub use verdict::{
     Agreement, Compared, Effect, Goodness, ImplausibleChange, Improvement, Judgment, Orientation,
     Part, Predicted, Prediction, Reason, ReasonId, RejectedPart, Share, SingleJoint, Solver,

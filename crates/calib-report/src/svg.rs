@@ -19,8 +19,21 @@ const WIDTH: f64 = 440.0;
 /// Color classes of the values of a map, light to dark.
 const STEPS: usize = 5;
 
-/// The plot as an `<svg>` element with title and description.
+/// The plot as an `<svg>` element with title and description, for a page that has the styles.
 pub(crate) fn svg(plot: &Plot) -> String {
+    element(plot, "", "")
+}
+
+/// The plot as an SVG file of its own, with the styles of the report's page.
+#[must_use]
+pub fn picture(plot: &Plot) -> String {
+    let style = include_str!("../templates/report.css");
+    let style = format!("<style>\n{}</style>", escape(style));
+    element(plot, "xmlns=\"http://www.w3.org/2000/svg\" ", &style) + "\n"
+}
+
+/// The element with further attributes, and with what stands before its content.
+fn element(plot: &Plot, attributes: &str, style: &str) -> String {
     let mut body = Body(String::new());
     let height = match &plot.kind {
         PlotKind::Rows { axis, rows } => kinds::draw_rows(&mut body, axis, rows),
@@ -41,7 +54,7 @@ pub(crate) fn svg(plot: &Plot) -> String {
         PlotKind::Map { value, panels } => map::draw_map(&mut body, value, panels),
     };
     format!(
-        "<svg role=\"img\" viewBox=\"0 0 {WIDTH} {height}\" aria-labelledby=\"{id}-t {id}-d\"><title id=\"{id}-t\">{}</title><desc id=\"{id}-d\">{}</desc>{}</svg>",
+        "<svg {attributes}role=\"img\" viewBox=\"0 0 {WIDTH} {height}\" aria-labelledby=\"{id}-t {id}-d\"><title id=\"{id}-t\">{}</title><desc id=\"{id}-d\">{}</desc>{style}{}</svg>",
         escape(&plot.title),
         escape(&plot.description),
         body.0,

@@ -210,7 +210,7 @@ pub fn run(options: &FitCommand) -> Result<ExitCode, CliError> {
 impl FitFrame {
     fn request(&self) -> fit::FrameRequest {
         fit::FrameRequest {
-            file: self.file.clone(),
+            file: self.file.clone().map(Into::into),
             proximal: self.proximal.clone().unwrap_or_default(),
             distal: self.distal.clone().unwrap_or_default(),
             body: self.body.clone(),
@@ -227,7 +227,7 @@ impl FitFrame {
 impl FitHandEye {
     fn request(&self) -> fit::HandEyeRequest {
         fit::HandEyeRequest {
-            file: self.file.clone(),
+            file: self.file.clone().map(Into::into),
             robot: self.robot.clone(),
             measured: self.measured.clone(),
             inverted: self.inverted,
@@ -244,7 +244,7 @@ impl FitHandEye {
 impl FitTable {
     fn request(&self) -> fit::TableRequest {
         fit::TableRequest {
-            file: self.file.clone(),
+            file: self.file.clone().map(Into::into),
             estimator: self.estimator.clone(),
             all: self.all,
             list: self.list,

@@ -91,6 +91,7 @@ pub fn run(console: &Console, options: &Run) -> Result<ExitCode, CliError> {
         strict: options.strict,
         select: options.select,
         plugins: options.plugins.plugins(),
+        ..RunOptions::default()
     };
     let out = options
         .out

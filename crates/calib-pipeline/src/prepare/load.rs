@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use calib_files::input;
+use calib_plugin::OwnEntries;
 use calib_profile::{Profile, RecordingSpec, RobotLog};
 use calib_recording::{ColumnMap, Filled, Meta, Poses, ReadOptions, Recording};
 use calib_urdf::sha256_hex;
@@ -25,8 +26,21 @@ pub use crate::prepare::robot::load_robot;
 ///
 /// # Errors
 /// [`PipelineError`] with file, place and remedy.
-pub fn load_recordings(mut robot: RobotProfile, plugins: Plugins) -> Result<Inputs, PipelineError> {
+pub fn load_recordings(robot: RobotProfile, plugins: Plugins) -> Result<Inputs, PipelineError> {
+    load_recordings_with(robot, plugins, &OwnEntries::default())
+}
+
+/// [`load_recordings`] with estimators and readers of the calling program.
+///
+/// # Errors
+/// As [`load_recordings`], and [`PipelineError::Plugin`] for a name that is taken.
+pub fn load_recordings_with(
+    mut robot: RobotProfile,
+    plugins: Plugins,
+    own: &OwnEntries,
+) -> Result<Inputs, PipelineError> {
     let mut estimators = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
+    estimators.tables.add_own(own)?;
     named::check(&robot.profile, &estimators.tables)?;
     effects::resolve(&mut robot, &mut estimators)?;
     let mut recordings = BTreeMap::new();

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use calib_files::input;
 use calib_finding::{About, Fact, Finding, catalog};
+use calib_plugin::OwnEntries;
 use calib_profile::{Profile, ProfileError};
 use calib_urdf::{Problem, ReadError, ReadProblem, RobotModel, sha256_hex};
 
@@ -20,6 +21,17 @@ const LARGEST_TEXT: u64 = 64 << 20;
 /// # Errors
 /// [`PipelineError`] with file, place and remedy.
 pub fn load_robot(profile_path: &Path) -> Result<RobotProfile, PipelineError> {
+    load_robot_with(profile_path, &OwnEntries::default())
+}
+
+/// [`load_robot`] for a profile that may name estimators of the calling program.
+///
+/// # Errors
+/// As [`load_robot`].
+pub fn load_robot_with(
+    profile_path: &Path,
+    own: &OwnEntries,
+) -> Result<RobotProfile, PipelineError> {
     let shown = profile_path.display().to_string();
     let text = read_text(profile_path, &NamedBy::Caller)?;
     let raw = calib_profile::parse(&text, &shown)?;
@@ -33,7 +45,10 @@ pub fn load_robot(profile_path: &Path) -> Result<RobotProfile, PipelineError> {
     let urdf_text = read_text(&urdf_path, &named_by)?;
     let model = RobotModel::from_urdf_text(&urdf_text, &urdf_path.display().to_string())?;
     let profile = calib_profile::check(&raw, &text, &shown, &model)?;
-    known_estimators(&profile, &text, &shown)?;
+    // What plugins and the calling program offer is known when the recordings are read.
+    if profile.plugins.is_empty() && own.is_empty() {
+        known_estimators(&profile, &text, &shown)?;
+    }
     limits_of_moved_joints(&profile, &model, &urdf_path)?;
     let file = profile_path
         .file_name()
@@ -113,10 +128,6 @@ pub(crate) fn urdf_warnings(robot: &RobotProfile) -> Vec<Finding> {
 
 /// A profile does not know the estimators; their names are checked here, at their place in the profile.
 fn known_estimators(profile: &Profile, text: &str, shown: &str) -> Result<(), PipelineError> {
-    if !profile.plugins.is_empty() {
-        // What plugins offer is known when they are loaded.
-        return Ok(());
-    }
     let centers: Vec<&str> = calib_cor::estimators().iter().map(|e| e.id).collect();
     let axes: Vec<&str> = calib_aor::estimators().iter().map(|e| e.id).collect();
     for (name, origin) in &profile.origins {

@@ -177,6 +177,7 @@ fn one_robot(
             strict: false,
             select: false,
             plugins: options.plugins,
+            ..RunOptions::default()
         };
         let calibrated = |simulated: &Simulated| {
             let tables = simulated.recordings.clone();
