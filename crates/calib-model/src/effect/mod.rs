@@ -29,9 +29,11 @@ pub mod offset;
 pub mod other;
 mod outside;
 mod prior;
+mod shared;
 
 pub use outside::{Outside, Regressor, Stated};
 pub use prior::{Prior, PriorKey};
+pub use shared::{HARMONICS, OF_STATE, SinCos};
 
 /// All joint effects, in the order in which their parameters are created.
 pub static EFFECTS: &[&Effect] = &[
@@ -124,25 +126,6 @@ pub struct JointState {
     pub other: f64,
     /// Regressor that the caller supplies.
     pub given: f64,
-}
-
-/// Sine and cosine of an angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SinCos {
-    /// Sine.
-    pub sin: f64,
-    /// Cosine.
-    pub cos: f64,
-}
-
-impl SinCos {
-    /// Of an angle, rad.
-    #[inline]
-    #[must_use]
-    pub fn of(angle: f64) -> Self {
-        let (sin, cos) = angle.sin_cos();
-        Self { sin, cos }
-    }
 }
 
 /// What a regressor depends on.
@@ -381,26 +364,6 @@ impl Effect {
     }
 }
 
-/// Terms that [`EffectKind::of_angles`] gives: those of the reading, then those of the motor's angle.
-pub const HARMONICS: [EffectKind; 8] = [
-    EffectKind::EccentricityCos,
-    EffectKind::EccentricitySin,
-    EffectKind::Eccentricity2Cos,
-    EffectKind::Eccentricity2Sin,
-    EffectKind::MotorCos,
-    EffectKind::MotorSin,
-    EffectKind::Motor2Cos,
-    EffectKind::Motor2Sin,
-];
-
-/// Terms that [`EffectKind::of_state`] gives.
-pub const OF_STATE: [EffectKind; 4] = [
-    EffectKind::ZeroOffset,
-    EffectKind::Gain,
-    EffectKind::TorqueCompliance,
-    EffectKind::Backlash,
-];
-
 impl EffectKind {
     /// Every term of the table.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -458,40 +421,6 @@ impl EffectKind {
         let term = self.term();
         (term.source != Source::Constant)
             .then(|| states.iter().map(|s| term.regressor.at(s)).collect())
-    }
-
-    /// F of equation (1) from sines that several terms share; `None` for terms of another kind.
-    ///
-    /// ```text
-    /// cos 2q − 1 = −2 sin² q,   sin 2q = 2 sin q cos q
-    /// ```
-    #[inline]
-    #[must_use]
-    pub fn of_angles(self, reading: &SinCos, motor: &SinCos) -> Option<f64> {
-        Some(match self {
-            Self::EccentricityCos => reading.cos - 1.0,
-            Self::EccentricitySin => reading.sin,
-            Self::Eccentricity2Cos => -2.0 * reading.sin * reading.sin,
-            Self::Eccentricity2Sin => 2.0 * reading.sin * reading.cos,
-            Self::MotorCos => motor.cos - 1.0,
-            Self::MotorSin => motor.sin,
-            Self::Motor2Cos => -2.0 * motor.sin * motor.sin,
-            Self::Motor2Sin => 2.0 * motor.sin * motor.cos,
-            _ => return None,
-        })
-    }
-
-    /// F of equation (1) where it is 1 or a number of the state; `None` for terms of another kind.
-    #[inline]
-    #[must_use]
-    pub fn of_state(self, s: &JointState) -> Option<f64> {
-        Some(match self {
-            Self::ZeroOffset => 1.0,
-            Self::Gain => s.q,
-            Self::TorqueCompliance => s.torque,
-            Self::Backlash => -s.approach,
-            _ => return None,
-        })
     }
 
     /// F of equation (1) from the reading alone; `None` where it needs more.

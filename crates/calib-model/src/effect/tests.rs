@@ -41,7 +41,10 @@ fn numbers_of_the_state_are_the_regressors() {
         .collect();
     assert_eq!(shared, OF_STATE);
     for kind in shared {
-        assert_eq!(kind.of_state(&state), Some(kind.term().regressor.at(&state)));
+        assert_eq!(
+            kind.of_state(&state),
+            Some(kind.term().regressor.at(&state))
+        );
     }
 }
 
