@@ -290,6 +290,19 @@ impl Term {
             regressor: Regressor::Formula(regressor),
         }
     }
+
+    /// An angle by the angle of the motor, which adds to the motion about the axis; its class is its name.
+    pub(crate) const fn of_motor(
+        kind: EffectKind,
+        name: &'static str,
+        formula: &'static str,
+        regressor: fn(&JointState) -> f64,
+    ) -> Self {
+        Self {
+            source: Source::Motor,
+            ..Self::of_reading(kind, name, formula, Quantity::Position, regressor)
+        }
+    }
 }
 
 impl Effect {
@@ -307,6 +320,14 @@ impl Effect {
         testable: Some(always),
         confounded: Confounded::Nothing,
         terms: &[],
+    };
+
+    /// The same of what errs with the motor's angle: of a joint that turns and whose gear ratio is known.
+    pub(crate) const GEARED: Self = Self {
+        revolute_only: true,
+        estimable: geared,
+        testable: Some(geared),
+        ..Self::PLAIN
     };
 }
 

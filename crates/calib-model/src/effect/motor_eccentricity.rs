@@ -2,10 +2,7 @@
 //!
 //! Readings at steps of whole motor turns cannot tell it from the zero offset; the observability analysis says so.
 
-use super::{
-    Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Regressor, Source, Term,
-    geared,
-};
+use super::{Effect, EffectKind, Prior, PriorKey, ProfileKeys, Term};
 
 static PRIOR: PriorKey = PriorKey::deg(
     "motor_eccentricity_deg",
@@ -25,30 +22,19 @@ pub static EFFECT: Effect = Effect {
         own_text: "Eccentricity at the motor, once per motor turn; needs `robot.gear_ratio`.",
     }),
     prior: Some(Prior::of(&PRIOR)),
-    revolute_only: true,
-    estimable: geared,
-    testable: Some(geared),
     terms: &[
-        Term {
-            kind: EffectKind::MotorCos,
-            name: "motor_eccentricity_cos",
-            class: "motor_eccentricity_cos",
-            formula: "motor_eccentricity_cos*(cos n q - 1)",
-            quantity: Quantity::Position,
-            drives: Drives::About,
-            source: Source::Motor,
-            regressor: Regressor::Formula(|s| s.motor.cos() - 1.0),
-        },
-        Term {
-            kind: EffectKind::MotorSin,
-            name: "motor_eccentricity_sin",
-            class: "motor_eccentricity_sin",
-            formula: "motor_eccentricity_sin*sin n q",
-            quantity: Quantity::Position,
-            drives: Drives::About,
-            source: Source::Motor,
-            regressor: Regressor::Formula(|s| s.motor.sin()),
-        },
+        Term::of_motor(
+            EffectKind::MotorCos,
+            "motor_eccentricity_cos",
+            "motor_eccentricity_cos*(cos n q - 1)",
+            |s| s.motor.cos() - 1.0,
+        ),
+        Term::of_motor(
+            EffectKind::MotorSin,
+            "motor_eccentricity_sin",
+            "motor_eccentricity_sin*sin n q",
+            |s| s.motor.sin(),
+        ),
     ],
-    ..Effect::PLAIN
+    ..Effect::GEARED
 };

@@ -1,9 +1,6 @@
 //! Second harmonic of the gear train at the motor: twice per motor turn, as the wave generator of a strain-wave drive errs.
 
-use super::{
-    Drives, Effect, EffectKind, Prior, PriorKey, ProfileKeys, Quantity, Regressor, Source, Term,
-    geared,
-};
+use super::{Effect, EffectKind, Prior, PriorKey, ProfileKeys, Term};
 
 static PRIOR: PriorKey = PriorKey::deg(
     "motor_eccentricity_2_deg",
@@ -23,30 +20,19 @@ pub static EFFECT: Effect = Effect {
         own_text: "Second harmonic of eccentricity at the motor, twice per motor turn; needs `robot.gear_ratio`.",
     }),
     prior: Some(Prior::of(&PRIOR)),
-    revolute_only: true,
-    estimable: geared,
-    testable: Some(geared),
     terms: &[
-        Term {
-            kind: EffectKind::Motor2Cos,
-            name: "motor_eccentricity_2_cos",
-            class: "motor_eccentricity_2_cos",
-            formula: "motor_eccentricity_2_cos*(cos 2 n q - 1)",
-            quantity: Quantity::Position,
-            drives: Drives::About,
-            source: Source::Motor,
-            regressor: Regressor::Formula(|s| (2.0 * s.motor).cos() - 1.0),
-        },
-        Term {
-            kind: EffectKind::Motor2Sin,
-            name: "motor_eccentricity_2_sin",
-            class: "motor_eccentricity_2_sin",
-            formula: "motor_eccentricity_2_sin*sin 2 n q",
-            quantity: Quantity::Position,
-            drives: Drives::About,
-            source: Source::Motor,
-            regressor: Regressor::Formula(|s| (2.0 * s.motor).sin()),
-        },
+        Term::of_motor(
+            EffectKind::Motor2Cos,
+            "motor_eccentricity_2_cos",
+            "motor_eccentricity_2_cos*(cos 2 n q - 1)",
+            |s| (2.0 * s.motor).cos() - 1.0,
+        ),
+        Term::of_motor(
+            EffectKind::Motor2Sin,
+            "motor_eccentricity_2_sin",
+            "motor_eccentricity_2_sin*sin 2 n q",
+            |s| (2.0 * s.motor).sin(),
+        ),
     ],
-    ..Effect::PLAIN
+    ..Effect::GEARED
 };
