@@ -5,14 +5,13 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
 use super::Options;
-use super::chain::{Chain, Motion, Pose, Walk};
+use super::chain::{Motion, Pose, Walk};
 use super::channels::mounts;
 use super::data::{Data, Measured};
 use super::ids::{JointIndex, LinkIndex, RecordingIndex, SampleIndex};
 use super::scan::{Fit, Scan};
+use super::whitened::{JointNoise, Tall, Whitened};
 
-/// Noise of a prismatic joint in m where a revolute one has it in rad: 0.01 mm beside 0.01°.
-const PRISMATIC_NOISE: f64 = 0.06;
 /// A marker is never known better (m): keeps the priors effective on noise-free data.
 const LEAST_SIGMA: f64 = 3e-5;
 /// Ridge relative to the largest diagonal entry: the mount and the registration share directions.
@@ -94,15 +93,10 @@ impl<'a> Model<'a> {
     /// [`sums`](Self::sums) for several ratios: the rows are the same.
     pub(crate) fn sums_of<const N: usize>(&self, lambdas: [f64; N]) -> [Sums; N] {
         let width = self.columns() + 1;
-        let mut out = lambdas.map(|lambda| Whitened {
-            lambda,
-            tall: Tall::new(width, width - 1 - self.tests.len()),
-            sums: Sums {
-                gram: DMatrix::zeros(width, width),
-                log_det: 0.0,
-                observations: 0.0,
-            },
-        });
+        let first = width - 1 - self.tests.len();
+        let mut white = Tall::new(width, first);
+        let mut out = lambdas.map(|lambda| Whitened::new(lambda, width, first));
+        let mut observations = 0.0;
         let links: Vec<LinkIndex> = self.scan.data.bodies.iter().map(|b| b.link).collect();
         let mut walk = Walk::new(&self.scan.data.chain, &links);
         for i in 0..self.scan.data.readings.len() {
@@ -121,14 +115,20 @@ impl<'a> Model<'a> {
                     .for_each(|d| d.1.rows_mut(3 * s, 3).scale_mut(self.share(k)));
             }
             let measured = 3.0 * seen.iter().map(|&k| self.share(k).powi(2)).sum::<f64>();
-            for whitened in &mut out {
-                whitened.add(&self.scan.data.chain, &block, &by_reading);
-                whitened.sums.observations += measured;
+            observations += measured;
+            let noise = JointNoise::of(&self.scan.data.chain, &block, by_reading);
+            if noise.is_narrow() {
+                white.push(&block);
+                out.iter_mut().for_each(|w| w.subtract(&noise));
+            } else {
+                out.iter_mut().for_each(|w| w.add(&block, &noise));
             }
         }
-        out.map(|mut whitened| {
-            whitened.tall.flush(&mut whitened.sums.gram);
-            whitened.sums
+        let white = white.gram();
+        out.map(|whitened| Sums {
+            gram: &white + whitened.added.gram() - whitened.subtracted.gram(),
+            log_det: whitened.log_det,
+            observations,
         })
     }
 
@@ -199,87 +199,6 @@ impl<'a> Model<'a> {
     }
 }
 
-/// Sums with one ratio of joint noise, as they grow.
-struct Whitened {
-    lambda: f64,
-    tall: Tall,
-    sums: Sums,
-}
-
-impl Whitened {
-    /// Adds the rows of one instant.
-    fn add(&mut self, chain: &Chain, block: &DMatrix<f64>, by_reading: &[(usize, DVector<f64>)]) {
-        let n = block.nrows();
-        let mut v = DMatrix::identity(n, n);
-        for (j, d) in by_reading {
-            v.ger(self.lambda * noise_weight(chain, *j), d, d, 1.0);
-        }
-        let cholesky = (self.lambda > 0.0).then(|| Cholesky::new(v)).flatten();
-        let Some(cholesky) = cholesky else {
-            self.tall.push(block, &mut self.sums.gram);
-            return;
-        };
-        let l = cholesky.l_dirty();
-        let logs = l.diagonal().iter().map(|x| x.ln()).sum::<f64>();
-        self.sums.log_det += 2.0 * logs;
-        let mut inverse = DMatrix::identity(n, n);
-        l.solve_lower_triangular_mut(&mut inverse);
-        // A product has a fast kernel, the solution of a triangular system has none.
-        self.tall.push(&(inverse * block), &mut self.sums.gram);
-    }
-}
-
-/// Rows that wait to be multiplied: one product of many rows is several times as fast as many of few.
-struct Tall {
-    rows: DMatrix<f64>,
-    filled: usize,
-    /// Columns before those of the tests.
-    first: usize,
-}
-
-impl Tall {
-    /// Rows at a time: with a hundred columns they stay in the cache.
-    const ROWS: usize = 128;
-
-    fn new(width: usize, first: usize) -> Self {
-        Self {
-            rows: DMatrix::zeros(Self::ROWS, width),
-            filled: 0,
-            first,
-        }
-    }
-
-    fn push(&mut self, block: &DMatrix<f64>, gram: &mut DMatrix<f64>) {
-        for first in (0..block.nrows()).step_by(Self::ROWS) {
-            let count = Self::ROWS.min(block.nrows() - first);
-            if self.filled + count > Self::ROWS {
-                self.flush(gram);
-            }
-            let mut to = self.rows.rows_mut(self.filled, count);
-            to.copy_from(&block.rows(first, count));
-            self.filled += count;
-        }
-    }
-
-    fn flush(&mut self, gram: &mut DMatrix<f64>) {
-        let rows = self.rows.rows(0, self.filled);
-        let (first, last) = (self.first, rows.ncols() - 1);
-        // The product of a transpose has no fast kernel.
-        let transposed = rows.columns(0, first).transpose();
-        gram.rows_mut(0, first).gemm(1.0, &transposed, &rows, 1.0);
-        // Tests are scored one by one.
-        let residual = rows.column(last);
-        for test in first..=last {
-            let own = rows.column(test);
-            gram[(test, last)] += own.dot(&residual);
-            if test < last {
-                gram[(test, test)] += own.norm_squared();
-            }
-        }
-        self.filled = 0;
-    }
-}
-
 fn set(block: &mut DMatrix<f64>, row: usize, column: usize, value: &nalgebra::Matrix3<f64>) {
     block.fixed_view_mut::<3, 3>(row, column).copy_from(value);
 }
@@ -290,13 +209,6 @@ fn motion_column(motion: Motion, frame: &Pose, p: &Vector3<f64>) -> Vector3<f64>
         Motion::Fixed => Vector3::zeros(),
         Motion::Revolute(axis) => (frame.r * axis.into_inner()).cross(&(p - frame.t)),
         Motion::Prismatic(axis) => frame.r * axis.into_inner(),
-    }
-}
-
-fn noise_weight(chain: &Chain, joint: usize) -> f64 {
-    match chain.joints()[joint].motion {
-        Motion::Prismatic(_) => PRISMATIC_NOISE * PRISMATIC_NOISE,
-        _ => 1.0,
     }
 }
 

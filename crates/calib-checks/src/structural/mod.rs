@@ -78,6 +78,7 @@ mod screen;
 mod special;
 mod thinning;
 mod twin;
+mod whitened;
 
 pub use apply::{apply, apply_all};
 pub use chain::{Chain, ChainError, ChainJoint, Motion};

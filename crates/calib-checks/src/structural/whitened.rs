@@ -1,0 +1,238 @@
+//! Sums of rows with joint noise: rows of one instant err together where a joint does.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::chain::{Chain, Motion};
+
+/// Noise of a prismatic joint in m where a revolute one has it in rad: 0.01 mm beside 0.01°.
+const PRISMATIC_NOISE: f64 = 0.06;
+
+/// D of the rows of one instant, its columns weighted, and Dᵀ of all columns.
+pub(super) struct JointNoise {
+    d: DMatrix<f64>,
+    /// DᵀD
+    gram: DMatrix<f64>,
+    /// Dᵀ block
+    of_block: DMatrix<f64>,
+}
+
+impl JointNoise {
+    pub(super) fn of(
+        chain: &Chain,
+        block: &DMatrix<f64>,
+        by_reading: Vec<(usize, DVector<f64>)>,
+    ) -> Self {
+        let columns: Vec<DVector<f64>> = by_reading
+            .into_iter()
+            .map(|(j, d)| d * noise_weight(chain, j).sqrt())
+            .collect();
+        let mut d = DMatrix::zeros(block.nrows(), columns.len());
+        for (k, column) in columns.iter().enumerate() {
+            d.set_column(k, column);
+        }
+        // Products with a transpose have no fast kernel.
+        let transposed = d.transpose();
+        Self {
+            gram: &transposed * &d,
+            of_block: &transposed * block,
+            d,
+        }
+    }
+
+    /// Fewer joints than coordinates.
+    pub(super) fn is_narrow(&self) -> bool {
+        self.d.ncols() < self.d.nrows()
+    }
+}
+
+/// Sums with one ratio of joint noise, as they grow.
+///
+/// ```text
+/// V = 1 + λ D Dᵀ = L Lᵀ,   V⁻¹ = L⁻ᵀ L⁻¹ = 1 − Cᵀ C,   C = M⁻¹ Dᵀ,   M Mᵀ = 1/λ + DᵀD
+/// ln |V| = 2 Σ ln L_ii = 2 Σ ln M_ii + J ln λ
+/// ```
+pub(super) struct Whitened {
+    lambda: f64,
+    /// Rows L⁻¹ A.
+    pub added: Tall,
+    /// Rows C A.
+    pub subtracted: Tall,
+    pub log_det: f64,
+}
+
+impl Whitened {
+    pub(super) fn new(lambda: f64, width: usize, first: usize) -> Self {
+        Self {
+            lambda,
+            added: Tall::new(width, first),
+            subtracted: Tall::new(width, first),
+            log_det: 0.0,
+        }
+    }
+
+    /// Adds the rows of one instant.
+    pub(super) fn add(&mut self, block: &DMatrix<f64>, noise: &JointNoise) {
+        let n = block.nrows();
+        let mut v = DMatrix::identity(n, n);
+        v.gemm(self.lambda, &noise.d, &noise.d.transpose(), 1.0);
+        match (self.lambda > 0.0).then(|| inverse_root(v)).flatten() {
+            Some((root, log_det)) => {
+                self.log_det += log_det;
+                self.added.push(&(root * block));
+            }
+            None => self.added.push(block),
+        }
+    }
+
+    /// Takes from the rows of one instant, counted as they are, what joint noise explains.
+    pub(super) fn subtract(&mut self, noise: &JointNoise) {
+        if self.lambda <= 0.0 {
+            return;
+        }
+        let joints = noise.gram.nrows();
+        let mut m = noise.gram.clone();
+        (0..joints).for_each(|k| m[(k, k)] += 1.0 / self.lambda);
+        if let Some((root, log_det)) = inverse_root(m) {
+            self.log_det += log_det + joints as f64 * self.lambda.ln();
+            self.subtracted.push(&(root * &noise.of_block));
+        }
+    }
+}
+
+/// The inverse of the lower triangular root of a matrix, and the logarithm of its determinant.
+fn inverse_root(of: DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
+    let n = of.nrows();
+    let cholesky = Cholesky::new(of)?;
+    let l = cholesky.l_dirty();
+    let log_det = 2.0 * l.diagonal().iter().map(|x| x.ln()).sum::<f64>();
+    let mut inverse = DMatrix::identity(n, n);
+    l.solve_lower_triangular_mut(&mut inverse);
+    // A product has a fast kernel, the solution of a triangular system has none.
+    Some((inverse, log_det))
+}
+
+/// Rows that wait to be multiplied: one product of many rows is several times as fast as many of few.
+pub(super) struct Tall {
+    rows: DMatrix<f64>,
+    filled: usize,
+    /// Columns before those of the tests.
+    first: usize,
+    gram: DMatrix<f64>,
+}
+
+impl Tall {
+    /// Rows at a time: with a hundred columns they stay in the cache.
+    const ROWS: usize = 128;
+
+    pub(super) fn new(width: usize, first: usize) -> Self {
+        Self {
+            rows: DMatrix::zeros(Self::ROWS, width),
+            filled: 0,
+            first,
+            gram: DMatrix::zeros(width, width),
+        }
+    }
+
+    pub(super) fn push(&mut self, block: &DMatrix<f64>) {
+        for first in (0..block.nrows()).step_by(Self::ROWS) {
+            let count = Self::ROWS.min(block.nrows() - first);
+            if self.filled + count > Self::ROWS {
+                self.flush();
+            }
+            let mut to = self.rows.rows_mut(self.filled, count);
+            to.copy_from(&block.rows(first, count));
+            self.filled += count;
+        }
+    }
+
+    /// The products of the columns of all rows.
+    pub(super) fn gram(mut self) -> DMatrix<f64> {
+        if self.filled > 0 {
+            self.flush();
+        }
+        let half = self.first / 2;
+        for (i, k) in (0..half).flat_map(|i| (half..self.first).map(move |k| (i, k))) {
+            self.gram[(k, i)] = self.gram[(i, k)];
+        }
+        self.gram
+    }
+
+    fn flush(&mut self) {
+        let rows = self.rows.rows(0, self.filled);
+        let (first, last) = (self.first, rows.ncols() - 1);
+        // The product of a transpose has no fast kernel.
+        let transposed = rows.columns(0, first).transpose();
+        // Of the products of the first columns with each other, those of the later half with the earlier one are the earlier ones'.
+        let half = first / 2;
+        let mut upper = self.gram.rows_mut(0, half);
+        upper.gemm(1.0, &transposed.rows(0, half), &rows, 1.0);
+        let mut lower = self
+            .gram
+            .view_mut((half, half), (first - half, last + 1 - half));
+        let (left, right) = (
+            transposed.rows(half, first - half),
+            rows.columns(half, last + 1 - half),
+        );
+        lower.gemm(1.0, &left, &right, 1.0);
+        // Tests are scored one by one.
+        let residual = rows.column(last);
+        for test in first..=last {
+            let own = rows.column(test);
+            self.gram[(test, last)] += own.dot(&residual);
+            if test < last {
+                self.gram[(test, test)] += own.norm_squared();
+            }
+        }
+        self.filled = 0;
+    }
+}
+
+fn noise_weight(chain: &Chain, joint: usize) -> f64 {
+    match chain.joints()[joint].motion {
+        Motion::Prismatic(_) => PRISMATIC_NOISE * PRISMATIC_NOISE,
+        _ => 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Products by the inverse of V itself, for more and for fewer coordinates than joints.
+    #[test]
+    fn both_ways_are_the_inverse_of_the_covariance() {
+        let (width, first, lambda) = (9, 6, 0.7);
+        for (rows, joints) in [(12, 4), (3, 5), (4, 4), (6, 0)] {
+            let of = |i: usize, k: usize, a: f64| (a * (1 + i * 7 + k * 3) as f64).sin();
+            let block = DMatrix::from_fn(rows, width, |i, k| of(i, k, 1.3));
+            let d = DMatrix::from_fn(rows, joints, |i, k| of(i, k, 0.7));
+            let noise = JointNoise {
+                gram: d.tr_mul(&d),
+                of_block: d.tr_mul(&block),
+                d: d.clone(),
+            };
+            let mut whitened = Whitened::new(lambda, width, first);
+            let mut white = Tall::new(width, first);
+            if noise.is_narrow() {
+                white.push(&block);
+                whitened.subtract(&noise);
+            } else {
+                whitened.add(&block, &noise);
+            }
+            let log_det = whitened.log_det;
+            let gram = white.gram() + whitened.added.gram() - whitened.subtracted.gram();
+            let v = DMatrix::identity(rows, rows) + &d * d.transpose() * lambda;
+            assert!((log_det - v.determinant().ln()).abs() < 1e-12);
+            let expected = block.tr_mul(&(v.try_inverse().expect("regular") * &block));
+            let last = width - 1;
+            for (i, k) in (0..width).flat_map(|i| (0..width).map(move |k| (i, k))) {
+                // Of two tests there is no product, and what is symmetric is there once.
+                let there = i < first || k == last || (k == i && i < last);
+                if there {
+                    let off = gram[(i, k)] - expected[(i, k)];
+                    assert!(off.abs() < 1e-12, "{rows} {joints} {i} {k} {off:e}");
+                }
+            }
+        }
+    }
+}
