@@ -150,6 +150,7 @@ impl DataCheck {
                 catalog::VIRTUAL_POINTS,
                 catalog::MANY_LOST,
                 catalog::MISSING_MARKER,
+                catalog::MISSING_BODY,
             ],
             Self::RigidBodies => &[
                 catalog::NOT_RIGID,

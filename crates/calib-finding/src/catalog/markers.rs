@@ -49,4 +49,13 @@ super::topic! {
             "The recording has no column for marker {markers:code}; it has {known}.",
             "[[Did you mean {nearest:code}? ]]Correct the marker's name in the profile.";
     }
+    /// A recording lacks the body whose sweep it is, or has none of the profile's bodies.
+    MISSING_BODY = "missing-body" {
+        "swept": Error,
+            "The recording is the sweep of this body and has no column of it; it has {known}.",
+            "[[Did you mean {nearest:code}? ]]Correct the names in the profile, or map those of the recording with `names`.";
+        "all": Error,
+            "The recording has no column of {bodies:code}; it has {known}.",
+            "[[Did you mean {nearest:code}? ]]Correct the names in the profile, or map those of the recording with `names`.";
+    }
 }

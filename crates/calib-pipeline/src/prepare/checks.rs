@@ -13,6 +13,7 @@ use calib_urdf::JointId;
 
 use crate::prepare::conditions::missing_torques;
 use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::untracked::missing_bodies;
 
 /// Fewest rows of a recording that a fit can use: a sphere has four unknowns, and one row must check it.
 const MIN_POSES: usize = 5;
@@ -23,6 +24,8 @@ pub fn check(inputs: &Inputs) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (name, loaded) in &inputs.recordings {
         let tracked = without_coordinates(inputs, loaded);
+        let missing = missing_bodies(inputs, loaded).into_iter();
+        findings.extend(missing.map(|finding| finding.in_recording(name)));
         for mut finding in checks(&tracked, &expectations(inputs, loaded)) {
             let same = |earlier: &&mut Finding| {
                 earlier.id == catalog::MISSING_MARKER

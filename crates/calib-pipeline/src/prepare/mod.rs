@@ -24,3 +24,4 @@ pub mod stopped;
 pub mod streams;
 pub mod timelines;
 pub mod tracks;
+mod untracked;

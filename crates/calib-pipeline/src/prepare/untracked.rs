@@ -1,0 +1,73 @@
+//! Bodies that a recording has to show and does not name: its rows would count for nothing, without a word.
+
+use calib_finding::{Fact, Finding, Subject, catalog, nearest_word};
+use calib_profile::{Body, BodyKind, Contact};
+
+use crate::prepare::inputs::{Inputs, Loaded};
+
+/// What the profile asks of a recording and none of its columns is named like.
+///
+/// A recording may lack a body, as cameras do not see all of them from everywhere. It must show the body whose sweep it is, and it must show some
+/// body where it shows anything at all.
+pub(super) fn missing_bodies(inputs: &Inputs, loaded: &Loaded) -> Vec<Finding> {
+    let profile = &inputs.robot.profile;
+    let poses = &loaded.poses;
+    let columns = || poses.markers.keys().chain(poses.bodies.keys());
+    if columns().next().is_none() {
+        return Vec::new();
+    }
+    let has = |name: &String| columns().any(|column| column == name);
+    let contacts = profile.contacts.values().filter_map(Contact::coordinates);
+    let touched = contacts
+        .into_iter()
+        .any(|column| poses.markers.contains_key(column));
+    let shown = |name: &String, body: &Body| names(name, body).any(has);
+    let known: Vec<&str> = columns().map(String::as_str).collect();
+    // A column of another body is not what was meant.
+    let all = || {
+        profile
+            .bodies
+            .iter()
+            .flat_map(|(name, body)| names(name, body))
+    };
+    let free: Vec<&str> = known
+        .iter()
+        .copied()
+        .filter(|column| !all().any(|name| name == column))
+        .collect();
+    let near = |name: &String, body: &Body| {
+        let first = names(name, body).next()?;
+        let longer = || free.iter().copied().find(|c| c.ends_with(first.as_str()));
+        nearest_word(first, free.iter().copied()).or_else(longer)
+    };
+    let finding = |kind, subject, bodies: &[(&String, &Body)]| {
+        let near: Vec<&str> = bodies.iter().filter_map(|(n, b)| near(n, b)).collect();
+        Finding::of_kind(catalog::MISSING_BODY, kind, subject)
+            .with(
+                "bodies",
+                Fact::names(bodies.iter().map(|(name, _)| name.as_str())),
+            )
+            .with("known", Fact::names(known.iter().copied()))
+            .with_some("nearest", (!near.is_empty()).then(|| Fact::names(near)))
+    };
+    let bodies: Vec<(&String, &Body)> = profile.bodies.iter().collect();
+    if !bodies.is_empty() && !touched && !bodies.iter().any(|(name, body)| shown(name, body)) {
+        return vec![finding("all", Subject::default(), &bodies)];
+    }
+    let swept = bodies.iter().filter(|(name, body)| {
+        let mut origins = profile.origins.values();
+        origins.any(|origin| origin.sweep == loaded.name && origin.body == **name)
+            && !shown(name, body)
+    });
+    swept
+        .map(|&(name, body)| finding("swept", Subject::body(name), &[(name, body)]))
+        .collect()
+}
+
+/// What columns of a body are named.
+fn names<'a>(name: &'a String, body: &'a Body) -> Box<dyn Iterator<Item = &'a String> + 'a> {
+    match &body.kind {
+        BodyKind::Markers { names, .. } => Box::new(names.iter()),
+        BodyKind::Pose => Box::new(std::iter::once(name)),
+    }
+}
