@@ -13,7 +13,7 @@ use nalgebra::{Cholesky, Matrix6, Vector6};
 
 use crate::error::ModelError;
 use crate::forward::{Under, Work};
-use crate::model::{LinkId, Model, Scope};
+use crate::model::{LinkId, Model, Place, Scope};
 use crate::pose::Pose;
 use crate::read::rotation_between;
 
@@ -23,7 +23,7 @@ pub enum Aim {
     /// Position and orientation.
     #[default]
     Pose,
-    /// Position of the link's origin only: for arms of fewer than six joints.
+    /// Position of the tool's origin only: for arms of fewer than six joints.
     Position,
 }
 
@@ -116,34 +116,34 @@ pub struct Correction {
 }
 
 impl Model {
-    /// The command at which the link stands where the nominal model has it at `q_desired` (both rad or m, as [`Model::joints`]).
-    /// Joints that do not move the link keep their positions.
+    /// The command at which the tool, a link or what is fixed to one, stands where the nominal model has it at `q_desired` (both rad or m, as
+    /// [`Model::joints`]). Joints that do not move the tool keep their positions. A body or point is where it was found on its link.
     ///
     /// # Errors
     /// As [`Model::forward`], and [`ModelError::Length`] of `q_command`.
     pub fn correct(
         &self,
         q_desired: &[f64],
-        link: LinkId,
+        tool: impl Into<Place>,
         options: &Options,
         under: &Under,
         work: &mut Work,
         q_command: &mut [f64],
     ) -> Result<Correction, ModelError> {
         self.ready(q_desired, under, work)?;
-        self.known(link)?;
+        let tool = self.tool(tool.into())?;
         self.nominal_poses(q_desired, work);
-        let wanted = work.nominal[link.0];
+        let wanted = tool.at(&work.nominal);
         self.approach_pose(
             q_desired,
-            (link, &wanted),
+            (tool, &wanted),
             options,
             under,
             (work, q_command),
         )
     }
 
-    /// The position at which the link stands at `wanted` (`root_from_link`), near `seed`. Options: [`Options::inverse`].
+    /// The position at which the tool stands at `wanted` (`root_from_tool`), near `seed`. Options: [`Options::inverse`].
     ///
     /// # Errors
     /// As [`Model::correct`].
@@ -151,13 +151,13 @@ impl Model {
         &self,
         wanted: &Pose,
         seed: &[f64],
-        link: LinkId,
+        tool: impl Into<Place>,
         options: &Options,
         under: &Under,
         (work, q): (&mut Work, &mut [f64]),
     ) -> Result<Correction, ModelError> {
         self.ready(seed, under, work)?;
-        self.known(link)?;
+        let tool = self.tool(tool.into())?;
         let numbers = wanted.rows();
         if let Some(index) = numbers.iter().position(|x| !x.is_finite()) {
             return Err(ModelError::NotFinite {
@@ -165,17 +165,26 @@ impl Model {
                 index,
             });
         }
-        self.approach_pose(seed, (link, wanted), options, under, (work, q))
+        self.approach_pose(seed, (tool, wanted), options, under, (work, q))
+    }
+
+    fn tool(&self, place: Place) -> Result<Tool, ModelError> {
+        let (link, offset) = self.fixed(place).ok_or(ModelError::ForeignWork)?;
+        Ok(Tool {
+            link: LinkId(link),
+            link_from_tool: (!matches!(place, Place::Link(_))).then_some(offset),
+        })
     }
 
     fn approach_pose(
         &self,
         start: &[f64],
-        (link, wanted): (LinkId, &Pose),
+        (tool, wanted): (Tool, &Pose),
         options: &Options,
         under: &Under,
         (work, q): (&mut Work, &mut [f64]),
     ) -> Result<Correction, ModelError> {
+        let link = tool.link;
         if q.len() != start.len() {
             return Err(ModelError::Length {
                 what: "q_command",
@@ -185,12 +194,17 @@ impl Model {
         }
         q.copy_from_slice(start);
         self.slopes(link, &self.leading[link.0], (start, under, false), work);
-        let mut error = self.error_at(q, (link, wanted), options, under, work);
+        let mut error = self.error_at(q, (tool, wanted), options, under, work);
         let before = error;
         let mut best = error;
         let mut iterations = 0;
         while iterations < options.iterations && !error.within(options) {
             self.columns_of(link, &self.leading[link.0], work);
+            if let Some(offset) = &tool.link_from_tool {
+                for k in &self.leading[link.0] {
+                    work.jacobian[*k] = offset.pull_back(&work.jacobian[*k]);
+                }
+            }
             let found = self.step(start, (link, &error), options, (work, q));
             iterations += 1;
             if !found {
@@ -198,7 +212,7 @@ impl Model {
             }
             // The tried position is in work.q.
             let tried = std::mem::take(&mut work.q);
-            let next = self.error_at(&tried, (link, wanted), options, under, work);
+            let next = self.error_at(&tried, (tool, wanted), options, under, work);
             let nearer = next.weighed.norm() < best.weighed.norm();
             if nearer {
                 q.copy_from_slice(&tried);
@@ -239,21 +253,21 @@ impl Model {
         })
     }
 
-    /// How far the link is from where it is wanted; its pose is in `work` then.
+    /// How far the tool is from where it is wanted; the poses of the links are in `work` then.
     fn error_at(
         &self,
         q: &[f64],
-        (link, wanted): (LinkId, &Pose),
+        (tool, wanted): (Tool, &Pose),
         options: &Options,
         under: &Under,
         work: &mut Work,
     ) -> ToolError {
         self.motions(q, under, work);
         self.poses(work);
-        let at = &work.at[link.0];
+        let at = tool.at(&work.at);
         let v = at.r.tr_mul(&(wanted.t - at.t));
         let omega = match options.aim {
-            Aim::Pose => rotation_between(at, wanted),
+            Aim::Pose => rotation_between(&at, wanted),
             Aim::Position => nalgebra::Vector3::zeros(),
         };
         let l = options.lever_m;
@@ -300,6 +314,24 @@ impl Model {
             let inside = |k: usize| (tried[k] - start[k]).abs() <= bound(k);
             movers.iter().all(|k| inside(*k))
         })
+    }
+}
+
+/// What is brought to where it is wanted.
+#[derive(Debug, Clone, Copy)]
+struct Tool {
+    link: LinkId,
+    /// `None`: the link itself.
+    link_from_tool: Option<Pose>,
+}
+
+impl Tool {
+    /// root_from_tool, from those of all links.
+    fn at(&self, links: &[Pose]) -> Pose {
+        let link = &links[self.link.0];
+        self.link_from_tool
+            .as_ref()
+            .map_or(*link, |offset| link.then(offset))
     }
 }
 
