@@ -51,6 +51,12 @@ pub(crate) fn rename(from: &Path, to: &Path) -> Result<()> {
     fs::rename(from, to)
 }
 
+/// A second name, which nothing may have.
+pub(crate) fn hard_link(file: &Path, name: &Path) -> Result<()> {
+    fault()?;
+    fs::hard_link(file, name)
+}
+
 pub(crate) fn remove_file(path: &Path) -> Result<()> {
     fault()?;
     fs::remove_file(path)

@@ -116,10 +116,15 @@ pub fn start(path: &Path, bytes: &[u8]) -> Result<File, FileError> {
     make_folder(folder)?;
     clean(folder);
     Staged::file(folder, bytes)
-        .and_then(|staged| staged.place(path))
+        .and_then(|staged| staged.place_new(path))
         .and_then(|file| file.ok_or_else(|| Error::from(ErrorKind::NotFound)))
         .and_then(|file| disk::sync_folder(folder).map(|()| file))
-        .map_err(FileError::write(path))
+        .map_err(|error| match error.kind() {
+            ErrorKind::AlreadyExists => FileError::Exists {
+                path: path.to_path_buf(),
+            },
+            _ => FileError::write(path)(error),
+        })
 }
 
 /// Opens a regular file that grows, locked while it is open; the bytes after the first `whole` are cut off.

@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
-use std::io::{ErrorKind, Result};
+use std::io::{Error, ErrorKind, Result};
 use std::path::{Path, PathBuf};
 
 use crate::disk;
@@ -10,6 +10,9 @@ use crate::name::{is_part, part};
 
 /// Something that is being written. It is locked while its writer lives, and removed when it is dropped before it was put
 /// in its place; what a killed writer left is not locked, and [`clean`] removes it.
+///
+/// Nothing can be created and locked in one call, so another program's [`clean`] may come between the two. It removes only
+/// under its own lock; whoever creates waits for that lock, and starts over under another name if the file is gone by then.
 #[derive(Debug)]
 pub(crate) struct Staged {
     path: PathBuf,
@@ -22,9 +25,10 @@ pub(crate) struct Staged {
 impl Staged {
     /// Writes a file into the folder under a name of its own.
     pub(crate) fn file(folder: &Path, bytes: &[u8]) -> Result<Self> {
-        let (path, mut file) = unique(folder, disk::create_new)?;
-        // Where the system has no locks, nothing is cleaned either.
-        let _ = file.try_lock();
+        let (path, mut file) = unique(folder, |path| {
+            let file = disk::create_new(path)?;
+            locked(path, &file).map(|()| file)
+        })?;
         let mut staged = Self {
             path,
             is_folder: false,
@@ -38,11 +42,15 @@ impl Staged {
 
     /// Makes an empty folder in the folder.
     pub(crate) fn folder(parent: &Path) -> Result<Self> {
-        let (path, ()) = unique(parent, disk::create_dir)?;
-        let held = File::open(&path).ok();
-        if let Some(file) = &held {
-            let _ = file.try_lock();
-        }
+        let (path, held) = unique(parent, |path| {
+            disk::create_dir(path)?;
+            match File::open(path) {
+                Ok(file) => locked(path, &file).map(|()| Some(file)),
+                Err(error) if error.kind() == ErrorKind::NotFound => Err(taken()),
+                // Windows does not open a folder; there it is not cleaned either.
+                Err(_) => Ok(None),
+            }
+        })?;
         Ok(Self {
             path,
             is_folder: true,
@@ -61,6 +69,25 @@ impl Staged {
         self.placed = true;
         Ok(self.held.take())
     }
+
+    /// Gives it its place, where nothing may be: of several writers at once, one does. The open file is returned.
+    ///
+    /// # Errors
+    /// [`ErrorKind::AlreadyExists`] where something is there.
+    pub(crate) fn place_new(self, to: &Path) -> Result<Option<File>> {
+        match disk::hard_link(&self.path, to) {
+            Ok(()) => {
+                let mut staged = self;
+                disk::remove_file(&staged.path)?;
+                staged.placed = true;
+                Ok(staged.held.take())
+            }
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(error),
+            // A file system without links.
+            Err(_) if disk::is_there(to) => Err(taken()),
+            Err(_) => self.place(to),
+        }
+    }
 }
 
 impl Drop for Staged {
@@ -75,7 +102,22 @@ impl Drop for Staged {
     }
 }
 
-/// Makes something under a random name.
+fn taken() -> Error {
+    Error::from(ErrorKind::AlreadyExists)
+}
+
+/// Locks what was just created; [`ErrorKind::AlreadyExists`] if it was removed before.
+fn locked(path: &Path, file: &File) -> Result<()> {
+    // Only `clean` locks such a file besides, and not for long. Where the system has no locks, nothing is cleaned.
+    let _ = file.lock();
+    // The name is random: if it is there, it is this file.
+    match disk::is_there(path) {
+        true => Ok(()),
+        false => Err(taken()),
+    }
+}
+
+/// Makes something under a random name, another one as long as `make` says that it is taken.
 fn unique<T>(folder: &Path, make: impl Fn(&Path) -> Result<T>) -> Result<(PathBuf, T)> {
     loop {
         // Seeded by the system for each table: not from the clock, and different in every process.
@@ -105,8 +147,11 @@ pub(crate) fn clean(folder: &Path) {
         if !(kind.is_file() || kind.is_dir()) {
             continue;
         }
-        let free = crate::input::open(&path).is_ok_and(|file| file.try_lock().is_ok());
-        if free {
+        let Ok(file) = crate::input::open(&path) else {
+            continue;
+        };
+        // The lock is held until the file is gone.
+        if file.try_lock().is_ok() {
             let _ = match kind.is_dir() {
                 true => disk::remove_tree(&path),
                 false => disk::remove_file(&path),

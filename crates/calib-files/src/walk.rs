@@ -146,6 +146,8 @@ fn single_files_survive_every_fault() {
         let path = folder.join("a.csv");
         let text = "t_s,a\n";
         if fs::read_to_string(&path).is_ok_and(|there| there == text) {
+            // As the next call in the folder does.
+            crate::staged::clean(folder);
             return Ok(());
         }
         start(&path, text.as_bytes()).map(drop)

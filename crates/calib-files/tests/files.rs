@@ -3,8 +3,8 @@
 use std::fs;
 
 use calib_files::{
-    FileError, MANIFEST, OutputFile, ResultsFolder, StateFile, input, replace, write_new,
-    write_results,
+    FileError, MANIFEST, OutputFile, ResultsFolder, StateFile, input, new_folder, replace, start,
+    write_new, write_results,
 };
 
 #[test]
@@ -156,4 +156,46 @@ fn only_regular_files_are_read_and_none_beyond_its_limit() {
     let error = input::read(&file, 4).expect_err("too many");
     assert_eq!(error.kind(), std::io::ErrorKind::FileTooLarge);
     assert!(input::read(folder.path(), 10).is_err());
+}
+
+/// Every writer removes what killed writers left; none may take a living writer's file for that.
+#[test]
+fn many_writers_in_one_folder_do_not_disturb_each_other() {
+    let dir = tempfile::tempdir().expect("a folder");
+    std::thread::scope(|scope| {
+        for writer in 0..8 {
+            let folder = dir.path();
+            scope.spawn(move || {
+                for i in 0..60 {
+                    let name = format!("{writer}-{i}");
+                    start(&folder.join(&name), b"t_s,a\n").expect("a file that grows");
+                    let file = [OutputFile::text("x", "y")];
+                    new_folder(&folder.join(name + "-folder"), &file).expect("a folder");
+                }
+            });
+        }
+    });
+    let left = std::fs::read_dir(dir.path()).expect("a folder").count();
+    assert_eq!(left, 8 * 60 * 2, "files and folders");
+}
+
+#[test]
+fn of_several_that_start_one_file_one_does() {
+    let dir = tempfile::tempdir().expect("a folder");
+    for round in 0..40 {
+        let path = dir.path().join(format!("{round}.csv"));
+        let started = std::thread::scope(|scope| {
+            let all: Vec<_> = (0..6)
+                .map(|_| scope.spawn(|| start(&path, b"t_s\n")))
+                .collect();
+            all.into_iter()
+                .map(|one| one.join().expect("no panic"))
+                .collect::<Vec<_>>()
+        });
+        let refused = started
+            .iter()
+            .filter(|s| matches!(s, Err(FileError::Exists { .. })))
+            .count();
+        assert_eq!(refused, 5, "{started:?}");
+    }
 }
