@@ -141,7 +141,7 @@ pub enum CliError {
     View(#[from] ViewError),
     /// A plugin project cannot be made.
     #[error(
-        "{0}\n  help: calib plugins new NAME --kind center|axis|reader|report --lang rust|c --out FOLDER"
+        "{0}\n  help: calib plugins new NAME --kind center|axis|reader|report|effect --lang rust|c --out FOLDER"
     )]
     NewPlugin(NewProjectError),
     /// What a command printed is lost.

@@ -106,7 +106,12 @@ fn checked(json: bool, plugin: &str) -> Result<ExitCode, CliError> {
     if conformance.passed() {
         return Ok(ExitCode::Accepted);
     }
-    if !json {
+    let loaded = conformance.rows.len() > 1;
+    if !json && loaded {
+        say(
+            "  help: the contract is `calib plugins header`; what each test asks is in the manual, under `plugins`",
+        );
+    } else if !json {
         say(
             "  help: give the library's file with its folder (`./libname.so`), or a name on CALIB_PLUGIN_PATH; the contract is `calib plugins header`",
         );

@@ -2,6 +2,7 @@
 
 use calib_checks::rigid_body::NotABody;
 use calib_finding::{Finding, Severity};
+use calib_plugin::PluginError;
 use calib_recording::NotOneTable;
 use calib_urdf::{JointKind, UnknownName};
 
@@ -131,6 +132,9 @@ pub enum DataProblem {
         /// What the recordings have instead.
         seen: Box<SeenInstead>,
     },
+    /// A reader of a plugin does not understand the file.
+    #[error("{0}")]
+    Unread(Box<PluginError>),
     /// Markers that make no body.
     #[error("body `{body}`: {why}")]
     NotABody {
@@ -199,6 +203,7 @@ impl DataProblem {
                 let near = did_you_mean(meant.as_ref());
                 return format!("{near}correct the name, or state where `{spot}` is under `at_mm`");
             }
+            Self::Unread(_) => "correct the file, or name another `reader` for the recording",
             Self::NotABody { .. } => {
                 "mount at least three markers that span a plane, and check their names"
             }

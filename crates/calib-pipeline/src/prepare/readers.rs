@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use calib_plugin::{
     BodyPose, BodyTrack, ByFn, Call, Control, Entry, Failure, JointTrack, JointUnit, Kind,
-    MarkerSample, MarkerTrack, Offer, ReportFile, ReportInput, Source, Streams, Timeline,
-    TorqueTrack, Value,
+    MarkerSample, MarkerTrack, Offer, Origin, PluginError, ReportFile, ReportInput, Source,
+    Streams, Timeline, TorqueTrack, Value,
 };
 use calib_recording::readers::Reader;
 use calib_recording::{
@@ -13,7 +13,7 @@ use calib_recording::{
 };
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Vector3};
 
-use crate::error::PipelineError;
+use crate::error::{DataProblem, PipelineError};
 
 /// A built-in reader as an entry of the table.
 #[must_use]
@@ -44,7 +44,18 @@ pub fn read(
     bytes: &[u8],
 ) -> Result<Recording, PipelineError> {
     let source = Source { name: shown, bytes };
-    let streams = entry.with(parameters)?.read(&source, &Control::default())?;
+    let streams = entry.with(parameters)?.read(&source, &Control::default());
+    let streams = streams.map_err(|error| match (&error, entry.origin()) {
+        // A reader of the program names the file itself.
+        (
+            PluginError::Call {
+                failure: Failure::BadInput(_),
+                ..
+            },
+            Origin::Plugin { .. },
+        ) => PipelineError::data(shown, DataProblem::Unread(Box::new(error))),
+        _ => error.into(),
+    })?;
     Ok(recording(streams, shown, &entry.offer().name))
 }
 

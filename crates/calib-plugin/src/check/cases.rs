@@ -1,6 +1,7 @@
 //! Inputs for each kind, and what must come of them.
 
 use super::{
+    effects,
     motions::{self, CENTER, DIRECTION, POINT},
     subject::{Input, Reply, Subject},
 };
@@ -173,32 +174,21 @@ impl Cases {
         }
     }
 
-    /// A regressor is a function of one state: the same there and back, and without jumps where the direction of approach stays.
+    /// A regressor is a function of one state: the same there and back.
     fn effect(huge: usize) -> Self {
-        /// Steps of the readings, rad: from −3 to 3.
-        const STEPS: i32 = 600;
-        let grid = (-STEPS / 2..=STEPS / 2).map(|k| 0.01 * f64::from(k));
-        let there: Vec<f64> = grid.flat_map(|q| [q + 0.005, q + 0.005 + NEAR]).collect();
+        let there = effects::readings();
         let back: Vec<f64> = there.iter().rev().copied().collect();
-        let readings = |name: &str, readings: Vec<f64>, judge: Judge| Case {
-            name: name.into(),
-            input: Input::Readings(readings),
-            judge,
-        };
-        let golden = vec![
-            readings(
-                "the same states there and back",
-                [there.clone(), back].concat(),
-                Box::new(|reply| mirrored(regressors(reply)?)),
-            ),
-            readings(
-                "states that are near each other",
-                there,
-                Box::new(|reply| smooth(regressors(reply)?)),
-            ),
-        ];
-        let degenerate = [("no sample", Vec::new()), ("one sample", vec![0.3])]
-            .map(|(name, q)| readings(name, q, Box::new(|reply| regressors(reply).map(drop))));
+        let golden = vec![Case {
+            name: "the same states there and back".into(),
+            input: Input::Readings([there, back].concat()),
+            judge: Box::new(|reply| effects::mirrored(effects::regressors(reply)?)),
+        }];
+        let degenerate =
+            [("no sample", Vec::new()), ("one sample", vec![0.3])].map(|(name, q)| Case {
+                name: name.into(),
+                input: Input::Readings(q),
+                judge: Box::new(|reply| effects::regressors(reply).map(drop)),
+            });
         let many = (0..huge).map(|k| 1e-5 * k as f64).collect();
         Self {
             golden,
@@ -242,52 +232,7 @@ impl Cases {
     }
 }
 
-/// Readings that are so near have nearly the same regressor, rad.
-const NEAR: f64 = 1e-6;
-/// Largest slope, in the range of the regressor per rad: that of the second harmonic of a motor of 500 turns is 1000.
-const STEEPEST: f64 = 3e3;
-
-fn regressors(reply: &Reply) -> Result<&[f64], String> {
-    match reply {
-        Reply::Regressors(values) => Ok(values),
-        other => Err(text(other)),
-    }
-}
-
-fn mirrored(values: &[f64]) -> Result<(), String> {
-    let back = values.iter().rev();
-    match values
-        .iter()
-        .zip(back)
-        .position(|(a, b)| a.to_bits() != b.to_bits())
-    {
-        None => Ok(()),
-        Some(i) => Err(format!(
-            "the regressor of one state is {} at one place and {} at another",
-            values[i],
-            values[values.len() - 1 - i]
-        )),
-    }
-}
-
-fn smooth(values: &[f64]) -> Result<(), String> {
-    let (low, high) = values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(*v), h.max(*v))
-        });
-    let most = STEEPEST * NEAR * (high - low);
-    let jump = |pair: &&[f64]| (pair[1] - pair[0]).abs() > most;
-    match values.chunks_exact(2).find(jump) {
-        None => Ok(()),
-        Some(pair) => Err(format!(
-            "the regressor jumps from {} to {} within {NEAR:e} rad",
-            pair[0], pair[1]
-        )),
-    }
-}
-
-fn text(reply: &Reply) -> String {
+pub(super) fn text(reply: &Reply) -> String {
     let none = match reply {
         Reply::Refused(reason) => return format!("refused: {reason}"),
         Reply::Cor(answer) => match &**answer {

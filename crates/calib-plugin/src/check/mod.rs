@@ -10,6 +10,7 @@
 //! process, as other parts of a program would do.
 
 mod cases;
+mod effects;
 mod memory;
 mod motions;
 mod subject;
@@ -20,9 +21,10 @@ use std::{fmt, sync::Arc, time::Duration};
 use crate::{
     answer::Failure,
     host::{Cancel, Control, Host, LoadedPlugin, PluginError},
+    offer::Kind,
 };
 use cases::Cases;
-use subject::{Reply, Subject};
+use subject::{Input, Reply, Subject};
 
 /// Threads of the concurrent test, and calls of each.
 const THREADS: (usize, usize) = (8, 20);
@@ -246,6 +248,14 @@ fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits)
         table.skip(title, "the rest", "a call did not return");
         return;
     }
+    if subject.offer.kind == Kind::Effect {
+        let ask = |input: Input| {
+            let reply = watch::call(subject, &input, &Cancel::new(), limits.call);
+            reply.map_err(|late| late.to_string())?
+        };
+        table.note(title, "of one state alone", effects::alone(&ask));
+        table.note(title, "without jumps", effects::smooth(&ask));
+    }
     let Some(usual) = cases
         .golden
         .first()
@@ -262,8 +272,8 @@ fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits)
     let hangs = stopped.is_err();
     table.note(title, "stops when cancelled", stopped);
     if hangs {
-        table.skip(title, "huge input", "a call did not stop");
-        table.skip(title, "memory", "a call did not stop");
+        table.skip(title, "huge input", "the call before it failed");
+        table.skip(title, "memory", "the call before it failed");
         return;
     }
     let huge = watch::call(subject, &cases.huge, &Cancel::new(), limits.call)
@@ -305,6 +315,22 @@ fn check_cases(
     hangs
 }
 
+/// Where two answers begin to differ: an array of regressors fills a screen.
+fn difference(first: &str, second: &str) -> String {
+    /// Characters that are shown of each.
+    const SHOWN: usize = 120;
+    let mut both = first.chars().zip(second.chars());
+    let place = both.position(|(a, b)| a != b).unwrap_or(0);
+    let from = place.saturating_sub(SHOWN / 3);
+    let part = |text: &str| -> String { text.chars().skip(from).take(SHOWN).collect() };
+    let before = if from > 0 { "…" } else { "" };
+    format!(
+        "first {before}{}, then {before}{}",
+        part(first),
+        part(second)
+    )
+}
+
 /// The same call gives the same answer, one after the other and in eight threads at once.
 fn check_repeats(table: &mut Conformance, title: &str, answer: &(impl Fn() -> String + Sync)) {
     let first = answer();
@@ -312,7 +338,7 @@ fn check_repeats(table: &mut Conformance, title: &str, answer: &(impl Fn() -> St
         if second == first {
             Ok(())
         } else {
-            Err(format!("first {first}, then {second}"))
+            Err(difference(&first, &second))
         }
     };
     table.note(

@@ -19,6 +19,10 @@ pub(super) enum Input {
     Bytes(Vec<u8>),
     /// Readings of a turning joint, rad; all else follows from them.
     Readings(Vec<f64>),
+    /// The same, with one load and from one side.
+    Held(Vec<f64>),
+    /// The same as [`Self::Readings`], in a call for each.
+    OneByOne(Vec<f64>),
 }
 
 #[derive(Debug)]
@@ -105,11 +109,20 @@ impl Subject {
         let (motion, bytes, readings): (&MotionData, &[u8], &[f64]) = match input {
             Input::Motion(motion) => (motion, &[], &[]),
             Input::Bytes(bytes) => (&nothing, bytes, &[]),
-            Input::Readings(readings) => (&nothing, &[], readings),
+            Input::Readings(readings) | Input::Held(readings) | Input::OneByOne(readings) => {
+                (&nothing, &[], readings)
+            }
         };
         Ok(match &self.callable {
             Callable::Cor(it) => Reply::Cor(Box::new(it.fit(&motion.view(), control)?)),
-            Callable::Effect(it) => Reply::Regressors(regressors(it, readings, control)?),
+            Callable::Effect(it) => Reply::Regressors(match input {
+                Input::OneByOne(_) => {
+                    let one = |q: &f64| regressors(it, &[*q], false, control);
+                    let all: Result<Vec<_>, _> = readings.iter().map(one).collect();
+                    all?.concat()
+                }
+                _ => regressors(it, readings, matches!(input, Input::Held(_)), control)?,
+            }),
             Callable::Aor(it) => Reply::Aor(Box::new(it.fit(&motion.view(), control)?)),
             Callable::Reader(it) => {
                 // Its own business: here it must only return.
@@ -136,20 +149,25 @@ impl Subject {
 /// Turns of the motor per turn of the joint, and the largest load of gravity, N·m: those of an ordinary joint.
 const MOTOR: (f64, f64) = (100.0, 20.0);
 
-/// The regressors at these readings, with a motor, a load and a direction of approach that follow from them.
+/// The regressors at these readings, with a motor, and with a load and a direction of approach that follow from them or are `held`.
 fn regressors(
     it: &Bound<dyn JointEffect>,
     readings: &[f64],
+    held: bool,
     control: &Control<'_>,
 ) -> Result<Vec<f64>, PluginError> {
     let EffectTerm { depends_on, .. } = it.entry().term();
-    let of = |on: DependsOn, f: fn(f64) -> f64| -> Vec<f64> {
+    let of = |on: DependsOn, f: &dyn Fn(f64) -> f64| -> Vec<f64> {
         let wanted = readings.iter().filter(|_| depends_on == on);
         wanted.map(|q| f(*q)).collect()
     };
-    let motor_rad = of(DependsOn::Motor, |q| MOTOR.0 * q);
-    let loads = of(DependsOn::Load, |q| MOTOR.1 * q.cos());
-    let approaches = of(DependsOn::Approach, |q| match q.rem_euclid(0.3) {
+    let motor_rad = of(DependsOn::Motor, &|q| MOTOR.0 * q);
+    let loads = of(DependsOn::Load, &|q| match held {
+        true => MOTOR.1,
+        false => MOTOR.1 * q.cos(),
+    });
+    let approaches = of(DependsOn::Approach, &|q| match q.rem_euclid(0.3) {
+        _ if held => 1.0,
         x if x < 0.1 => 0.0,
         x if x < 0.2 => 1.0,
         _ => -1.0,

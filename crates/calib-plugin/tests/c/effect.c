@@ -30,6 +30,18 @@ static calib_status regressors(const calib_call *call, const calib_joint_states 
     for (size_t s = 1; s < count; ++s) f[s] += 1e-3 * f[s - 1];
 #elif defined(JUMPS)
     for (size_t s = 0; s < count; ++s) f[s] = floor(states->readings[s] * 100 - 0.50005) > 0;
+#elif defined(STEPS_ONCE)
+    for (size_t s = 0; s < count; ++s) f[s] = states->readings[s] > 0.5;
+#elif defined(WRAPS)
+    for (size_t s = 0; s < count; ++s) f[s] = remainder(states->readings[s] - 1, 6.283185307179586);
+#elif defined(LESS_THE_MEAN)
+    double mean = 0;
+    for (size_t s = 0; s < count; ++s) mean += states->readings[s] / (double)count;
+    for (size_t s = 0; s < count; ++s) f[s] = states->readings[s] - mean;
+#elif defined(STEEP)
+    for (size_t s = 0; s < count; ++s) f[s] = tanh(200 * states->readings[s]);
+#elif defined(BY_SIGN_OF_LOAD)
+    for (size_t s = 0; s < count; ++s) f[s] = states->loads[s] > 0 ? 1 : -1;
 #elif defined(ON_MOTOR)
     for (size_t s = 0; s < count; ++s) f[s] = sin(states->motor_rad[s]);
 #elif defined(ON_LOAD)
@@ -46,7 +58,7 @@ static const calib_effect_1 table = {
     .depends_on = 9,
 #elif defined(ON_MOTOR)
     .depends_on = CALIB_ON_MOTOR,
-#elif defined(ON_LOAD)
+#elif defined(ON_LOAD) || defined(BY_SIGN_OF_LOAD)
     .depends_on = CALIB_ON_LOAD,
 #elif defined(ON_APPROACH)
     .depends_on = CALIB_ON_APPROACH,

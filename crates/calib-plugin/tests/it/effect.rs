@@ -79,7 +79,12 @@ fn the_check_finds_effects_that_are_no_function_of_one_state() {
         ("ON_APPROACH", ""),
         ("NOT_A_NUMBER", "golden cases"),
         ("BY_ORDER", "golden cases"),
-        ("JUMPS", "golden cases"),
+        ("JUMPS", "without jumps"),
+        ("STEPS_ONCE", "without jumps"),
+        ("WRAPS", "without jumps"),
+        ("STEEP", ""),
+        ("BY_SIGN_OF_LOAD", ""),
+        ("LESS_THE_MEAN", "of one state alone"),
     ] {
         if bed.build("tests/c/effect.c", deed, &[deed]).is_none() {
             return;
