@@ -1,7 +1,7 @@
 //! Bodies that a recording has to show and does not name: its rows would count for nothing, without a word.
 
 use calib_finding::{Fact, Finding, Subject, catalog, nearest_word};
-use calib_profile::{Body, BodyKind, Contact};
+use calib_profile::{Body, BodyKind, Contact, Usage};
 
 use crate::prepare::inputs::{Inputs, Loaded};
 
@@ -16,7 +16,7 @@ pub(super) fn missing_bodies(inputs: &Inputs, loaded: &Loaded) -> Vec<Finding> {
     if columns().next().is_none() {
         return Vec::new();
     }
-    let has = |name: &String| columns().any(|column| column == name);
+    let has = |name: &String| has_column(loaded, name);
     let contacts = profile.contacts.values().filter_map(Contact::coordinates);
     let touched = contacts
         .into_iter()
@@ -50,7 +50,13 @@ pub(super) fn missing_bodies(inputs: &Inputs, loaded: &Loaded) -> Vec<Finding> {
             .with("known", Fact::names(known.iter().copied()))
             .with_some("nearest", (!near.is_empty()).then(|| Fact::names(near)))
     };
-    let bodies: Vec<(&String, &Body)> = profile.bodies.iter().collect();
+    // What no fitted recording shows is named with its cause where its tracks are needed.
+    let fitted = |r: &&Loaded| r.spec.usage != Usage::Validation;
+    let elsewhere = |(name, body): &(&String, &Body)| {
+        let mut others = inputs.recordings.values().filter(fitted);
+        others.any(|r| names(name, body).any(|n| has_column(r, n)))
+    };
+    let bodies: Vec<(&String, &Body)> = profile.bodies.iter().filter(elsewhere).collect();
     if !bodies.is_empty() && !touched && !bodies.iter().any(|(name, body)| shown(name, body)) {
         return vec![finding("all", Subject::default(), &bodies)];
     }
@@ -62,6 +68,10 @@ pub(super) fn missing_bodies(inputs: &Inputs, loaded: &Loaded) -> Vec<Finding> {
     swept
         .map(|&(name, body)| finding("swept", Subject::body(name), &[(name, body)]))
         .collect()
+}
+
+fn has_column(of: &Loaded, name: &String) -> bool {
+    of.poses.markers.contains_key(name) || of.poses.bodies.contains_key(name)
 }
 
 /// What columns of a body are named.

@@ -3,7 +3,7 @@
 use super::{
     effects,
     motions::{self, CENTER, DIRECTION, POINT},
-    subject::{Input, Reply, Subject},
+    subject::{Input, Reply, Subject, text},
 };
 use crate::{
     answer::{Answer, AorFit, CorFit},
@@ -230,25 +230,6 @@ impl Cases {
             huge: Input::Bytes(long),
         }
     }
-}
-
-pub(super) fn text(reply: &Reply) -> String {
-    let none = match reply {
-        Reply::Refused(reason) => return format!("refused: {reason}"),
-        Reply::Cor(answer) => match &**answer {
-            Answer::NotObservable(reason) => Some(reason),
-            Answer::Found(_) => None,
-        },
-        Reply::Aor(answer) => match &**answer {
-            Answer::NotObservable(reason) => Some(reason),
-            Answer::Found(_) => None,
-        },
-        _ => None,
-    };
-    none.map_or_else(
-        || format!("answered {reply:?}"),
-        |reason| format!("not observable: {reason}"),
-    )
 }
 
 /// The center that was found.

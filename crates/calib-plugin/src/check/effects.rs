@@ -1,9 +1,6 @@
 //! What a regressor has to be: a function of one state alone, without jumps in the reading.
 
-use super::{
-    cases::text,
-    subject::{Input, Reply},
-};
+use super::subject::{Input, Reply, text};
 
 /// Steps of the readings, and their width, rad: from −4 to 4, which no period and no number of turns divides.
 const STEPS: i32 = 800;

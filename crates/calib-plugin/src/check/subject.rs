@@ -36,6 +36,26 @@ pub(super) enum Reply {
     Refused(String),
 }
 
+/// What came instead of what was expected.
+pub(super) fn text(reply: &Reply) -> String {
+    let none = match reply {
+        Reply::Refused(reason) => return format!("refused: {reason}"),
+        Reply::Cor(answer) => match &**answer {
+            Answer::NotObservable(reason) => Some(reason),
+            Answer::Found(_) => None,
+        },
+        Reply::Aor(answer) => match &**answer {
+            Answer::NotObservable(reason) => Some(reason),
+            Answer::Found(_) => None,
+        },
+        _ => None,
+    };
+    none.map_or_else(
+        || format!("answered {reply:?}"),
+        |reason| format!("not observable: {reason}"),
+    )
+}
+
 enum Callable {
     Cor(Bound<dyn Cor>),
     Aor(Bound<dyn Aor>),
