@@ -320,6 +320,16 @@ fn the_commands_use_what_a_run_wrote() {
             "claw is not a link",
         ),
         (
+            ["export", model, "--to=ur", "--quiet"],
+            2,
+            "of the six joints of a UR arm",
+        ),
+        (
+            ["export", model, "--to=dh", "--tool=claw"],
+            2,
+            "claw is not a link or point",
+        ),
+        (
             ["correct", model, table, "--largest-deg=0"],
             2,
             "0 is not a bound",

@@ -170,7 +170,9 @@ impl CliError {
             Self::Plan(error) => error.exit_code(),
             Self::Init(error) => error.exit_code(),
             Self::Twin(error) => error.exit_code(),
-            Self::Export(ExportError::Name { .. } | ExportError::Unfit { .. }) => ExitCode::Usage,
+            Self::Export(
+                ExportError::Name { .. } | ExportError::Tool { .. } | ExportError::Unfit { .. },
+            ) => ExitCode::Usage,
             Self::Export(_) => ExitCode::Data,
             Self::Apply(error) => of_apply(error),
             Self::Drift(error) if error.is_refusal() => ExitCode::NotObservable,

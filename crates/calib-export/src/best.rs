@@ -16,9 +16,9 @@ use crate::geometric::{evaluated, isometry, pose};
 /// l of equation (1), m: a rotation of the tool counts as the motion of a point as far away.
 const LEVER: f64 = 0.1;
 /// ρ of equation (1): a correction of 1 cm (0.1 rad) costs as little as 10 µm at the tool.
-const RIDGE: f64 = 1e-4;
+pub(crate) const RIDGE: f64 = 1e-4;
 /// The residuals are nearly linear in corrections of millimeters: the third step is below rounding.
-const STEPS: usize = 4;
+pub(crate) const STEPS: usize = 4;
 
 /// The file with origins of the chain to a link refitted to where the tool should be at postures.
 pub(crate) fn refitted(
@@ -85,14 +85,14 @@ pub(crate) fn chain(file: &RobotModelFile, link: LinkId) -> Vec<usize> {
     chain
 }
 
-fn weighed(twist: &Vector6<f64>) -> Vector6<f64> {
+pub(crate) fn weighed(twist: &Vector6<f64>) -> Vector6<f64> {
     let mut out = *twist;
     out.fixed_rows_mut::<3>(0).scale_mut(LEVER);
     out
 }
 
 /// [ω; v] of a small motion.
-fn twist(of: &Pose) -> Vector6<f64> {
+pub(crate) fn twist(of: &Pose) -> Vector6<f64> {
     let omega = of.isometry().rotation.scaled_axis();
     Vector6::new(omega.x, omega.y, omega.z, of.t.x, of.t.y, of.t.z)
 }

@@ -11,7 +11,7 @@ use crate::table::{Csv, program};
 /// What is corrected.
 #[derive(Debug, Clone, Default)]
 pub struct CorrectOptions {
-    /// The link that is to be right; `None`: the last one.
+    /// The link or point that is to be right; `None`: the last link.
     pub tool: Option<String>,
     /// Only its position.
     pub position_only: bool,
@@ -46,7 +46,7 @@ pub struct Corrected {
     pub cartesian: bool,
 }
 
-/// Corrects a table of joint positions. Where the table has poses of the tool (`<link>.x_m` …, in the root's frame), the commands
+/// Corrects a table of joint positions. Where the table has poses of the tool (`<tool>.x_m` …, in the root's frame), the commands
 /// reach those, from the row's joints or, where it has none, from the row before.
 ///
 /// # Errors
@@ -59,7 +59,8 @@ pub fn correct(
     let model = &robot.model;
     let program = program(table, model)?;
     let tool = robot.tool(options.tool.as_deref())?;
-    let wanted = program.poses.get(&model.links()[tool.index()]);
+    let last = &model.links()[model.last_link().index()];
+    let wanted = program.poses.get(options.tool.as_ref().unwrap_or(last));
     let without_joints = program.absent.len() == model.joints().len();
     let (mut work, mut approach) = (model.work(), Approach::new(model));
     let mut out = Corrected::of(&program.absent, wanted.is_some());

@@ -40,6 +40,24 @@ pub(crate) fn postures(model: &Model, n: usize, seed: u64) -> Vec<Vec<f64>> {
         .collect()
 }
 
+/// Postures wherever an arm can be, no matter what was recorded: its kind shows there. Sliding joints stay.
+pub(crate) fn anywhere(model: &Model, n: usize, seed: u64) -> Vec<Vec<f64>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let one = |prismatic: bool, q: f64| if prismatic { 0.0 } else { q };
+    let joints = model.joints();
+    (0..n)
+        .map(|_| {
+            joints
+                .iter()
+                .map(|j| one(j.prismatic, rng.random_range(-ANYWHERE..ANYWHERE)))
+                .collect()
+        })
+        .collect()
+}
+
+/// Most of the range of an arm's joints, rad.
+const ANYWHERE: f64 = 2.0;
+
 /// Where the model has a link at postures.
 pub(crate) fn truth(model: &Model, link: LinkId, postures: &[Vec<f64>]) -> Vec<Pose> {
     let mut work = model.work();

@@ -54,10 +54,11 @@ pub(crate) struct Table {
 }
 
 /// An axis in the root at positions 0.
-struct Line {
-    joint: usize,
-    point: Point3<f64>,
-    direction: Vector3<f64>,
+#[derive(Debug)]
+pub(crate) struct Line {
+    pub joint: usize,
+    pub point: Point3<f64>,
+    pub direction: Vector3<f64>,
 }
 
 /// The table of the joints of a chain; `hayati`: β for nearly parallel axes.
@@ -91,7 +92,7 @@ pub(crate) fn table(file: &RobotModelFile, chain: &[usize], hayati: bool) -> Tab
 }
 
 /// Axes of the joints that move, with mimics at their own zero; and root_from_tool there.
-fn lines(file: &RobotModelFile, chain: &[usize]) -> (Vec<Line>, Isometry3<f64>) {
+pub(crate) fn lines(file: &RobotModelFile, chain: &[usize]) -> (Vec<Line>, Isometry3<f64>) {
     let mut at = Isometry3::identity();
     let mut lines = Vec::new();
     for &i in chain {

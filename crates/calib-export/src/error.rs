@@ -67,6 +67,14 @@ pub enum ExportError {
         /// What there is.
         known: String,
     },
+    /// A tool that the robot does not have.
+    #[error("{name} is not a link or point of this robot\n  help: it has {known}")]
+    Tool {
+        /// As given.
+        name: String,
+        /// What there is.
+        known: String,
+    },
     /// A row cannot be computed.
     #[error("{file}: line {line}: {source}\n  help: correct the row, or remove it")]
     Row {
@@ -77,6 +85,11 @@ pub enum ExportError {
         /// Why.
         source: Box<ModelError>,
     },
+    /// Too few postures to fit and to state an error of.
+    #[error(
+        "the region has fewer than two postures\n  help: give a table of the postures where the robot is used; every second one is kept for the error"
+    )]
+    Region,
     /// A target that cannot hold this robot.
     #[error("{target} cannot hold this robot: {reason}\n  help: {remedy}")]
     Unfit {
@@ -103,7 +116,11 @@ impl ExportError {
                 _ => Some((file, None)),
             },
             Self::Row { file, line, .. } => Some((file, Some(*line))),
-            Self::Table(_) | Self::Name { .. } | Self::Unfit { .. } => None,
+            Self::Table(_)
+            | Self::Name { .. }
+            | Self::Tool { .. }
+            | Self::Region
+            | Self::Unfit { .. } => None,
         }
     }
 }

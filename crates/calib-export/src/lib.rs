@@ -8,28 +8,34 @@
 //! ```text
 //! cost = rms over postures of |t_format(q) − t_model(q)|                                          (1)
 //! urdf-best: argmin over origins of Σ |log(tool_model(q)⁻¹ tool_urdf(q))|² + small ridge           (2)
+//! opw: the same over the numbers of an arm with a spherical wrist                                   (3)
 //! ```
 //!
-//! with postures drawn from the fitted range of every joint (fixed seed), or those of a table; the cost of (2) is of postures that
-//! were not fitted.
+//! with postures drawn from the fitted range of every joint (fixed seed), or those of a table; the cost of (2) and (3) is of postures
+//! that were not fitted.
 
 mod best;
 mod correct;
 mod cost;
 mod dh;
 mod error;
+mod export;
 mod geometric;
+mod opw;
 mod poe;
 mod predict;
 mod read;
 mod table;
 mod target;
+mod ur;
 mod xml;
+mod yaml;
 
 pub use correct::{CorrectOptions, Corrected, correct};
 pub use cost::Cost;
 pub use error::ExportError;
+pub use export::{Exported, export};
 pub use predict::{Frame, PredictOptions, Predicted, predict};
 pub use read::{Robot, robot, robot_with};
 pub use table::region;
-pub use target::{Exported, Target, export};
+pub use target::Target;

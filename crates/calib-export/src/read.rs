@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use calib_model::file::RobotModelFile;
+use calib_model::file::{ModelJoint, ModelLink, ModelPose, RobotModelFile};
 use calib_model::{FindOutside, LinkId, Model, ModelError, Place};
 
 use crate::error::ExportError;
@@ -75,14 +75,57 @@ impl Robot {
         })
     }
 
-    /// The link that is named, or the last one.
-    pub(crate) fn tool(&self, name: Option<&str>) -> Result<LinkId, ExportError> {
+    /// The link or point that is named, or the last link. A body is no tool: tables name its poses in the tracker.
+    pub(crate) fn tool(&self, name: Option<&str>) -> Result<Place, ExportError> {
         let Some(name) = name else {
-            return Ok(self.model.last_link());
+            return Ok(self.model.last_link().into());
         };
-        self.model.link(name).map_err(|_| ExportError::Name {
-            name: name.to_owned(),
-            known: self.model.links().join(", "),
-        })
+        let found = self.model.place(name);
+        found
+            .filter(|place| !matches!(place, Place::Body(_)))
+            .ok_or_else(|| {
+                let links = self.model.links().iter().map(String::as_str);
+                ExportError::Tool {
+                    name: name.to_owned(),
+                    known: links
+                        .chain(self.model.points())
+                        .collect::<Vec<_>>()
+                        .join(", "),
+                }
+            })
+    }
+
+    /// The same robot with a point of it as a link, fixed to the one that carries it.
+    ///
+    /// # Errors
+    /// What is in the way.
+    pub(crate) fn with_link(&self, point: &str) -> Result<(Self, LinkId), String> {
+        let mut file = self.file.clone();
+        let Some(at) = file.points.get(point).cloned() else {
+            return Err(format!("it has no point {point}"));
+        };
+        let joint = format!("{point}_fixed");
+        if file.joints.iter().any(|j| j.name == joint) {
+            return Err(format!("it has a joint {joint} already"));
+        }
+        let origin = ModelPose {
+            xyz_m: at.xyz_m,
+            ..ModelPose::default()
+        };
+        file.joints.push(ModelJoint {
+            name: joint,
+            parent: at.link,
+            child: point.to_owned(),
+            parent_from_joint: origin,
+            load_origin: origin,
+            ..ModelJoint::default()
+        });
+        file.links.push(ModelLink {
+            name: point.to_owned(),
+            ..ModelLink::default()
+        });
+        let robot = Self::of(file, &|_, _| None).map_err(|e| e.to_string())?;
+        let link = robot.model.link(point).map_err(|e| e.to_string())?;
+        Ok((robot, link))
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use calib_model::{Model, Pose};
+use calib_model::{Model, Place, Pose};
 use calib_recording::{Filled, JointUnit, Poses, ReadOptions, read_path};
 
 use crate::error::ExportError;
@@ -117,7 +117,12 @@ fn fits(file: &str, poses: &Poses, model: &Model) -> Result<(), ExportError> {
         .joints()
         .iter()
         .any(|j| poses.joints.contains_key(&j.name));
-    let poses_given = poses.bodies.keys().any(|b| model.links().contains(b));
+    let tool = |name: &str| {
+        model
+            .place(name)
+            .is_some_and(|p| !matches!(p, Place::Body(_)))
+    };
+    let poses_given = poses.bodies.keys().any(|b| tool(b));
     if !some && !poses_given {
         let what = "has no column of a joint".to_owned();
         let first = model.joints().first().map_or("joint", |j| j.name.as_str());

@@ -1,10 +1,10 @@
-//! The geometry as URDF, MJCF and SDF.
+//! The geometry as URDF, MJCF and SDF. Numbers have the digits that a reader needs to get the same ones back.
 
 use std::fmt::Write as _;
 
 use calib_model::file::{ModelJoint, ModelMotion, ModelPose, RobotModelFile};
+use calib_urdf::decimal::{decimal, decimals, tidy_angle};
 use calib_urdf::rpy::rpy_from_rotation;
-use nalgebra::Vector3;
 
 use crate::geometric::isometry;
 
@@ -23,28 +23,10 @@ pub(crate) fn comment(lines: &[String]) -> String {
     format!("<!--\n{lines}-->\n")
 }
 
-/// Numbers with this many decimals, 0 without a sign.
-fn numbers(of: &[f64], decimals: usize) -> String {
-    let one = |x: &f64| {
-        let text = format!("{x:.decimals$}");
-        let text = text.trim_end_matches('0').trim_end_matches('.');
-        if text == "-0" {
-            "0".to_owned()
-        } else {
-            text.to_owned()
-        }
-    };
-    of.iter().map(one).collect::<Vec<_>>().join(" ")
-}
-
-/// Numbers of a URDF end at nine decimals: below any tracker.
-const URDF: usize = 9;
-/// Quaternions and matrices at twelve.
-const FINE: usize = 12;
-
-fn rpy(pose: &ModelPose) -> [f64; 3] {
+/// Roll, pitch, yaw of a pose, rad.
+pub(crate) fn rpy(pose: &ModelPose) -> [f64; 3] {
     let of = rpy_from_rotation(&isometry(pose).rotation);
-    [of[0], of[1], of[2]]
+    [of[0], of[1], of[2]].map(tidy_angle)
 }
 
 /// Center of mass of a link, m; `None` where it weighs nothing.
@@ -71,8 +53,8 @@ pub(crate) fn urdf(file: &RobotModelFile, notes: &[String]) -> String {
                 let _ = writeln!(out, "  <link name=\"{name}\"/>");
             }
             Some((mass, at)) => {
-                let at = numbers(&at, URDF);
-                let mass = numbers(&[mass], URDF);
+                let at = decimals(&at);
+                let mass = decimal(mass);
                 let _ = writeln!(
                     out,
                     "  <link name=\"{name}\">\n    <inertial>\n      <origin xyz=\"{at}\"/>\n      <mass value=\"{mass}\"/>\n      \
@@ -101,17 +83,17 @@ fn urdf_joint(joint: &ModelJoint, out: &mut String) {
         escaped(&joint.parent),
         escaped(&joint.child),
     );
-    let (xyz, rpy) = (numbers(&origin.xyz_m, URDF), numbers(&rpy(origin), URDF));
+    let (xyz, rpy) = (decimals(&origin.xyz_m), decimals(&rpy(origin)));
     let _ = writeln!(
         out,
         "  <joint name=\"{name}\" type=\"{kind}\">\n    <parent link=\"{parent}\"/>\n    <child link=\"{child}\"/>\n    \
          <origin xyz=\"{xyz}\" rpy=\"{rpy}\"/>"
     );
     if let Some(axis) = joint.axis.filter(|_| joint.motion != ModelMotion::Fixed) {
-        let _ = writeln!(out, "    <axis xyz=\"{}\"/>", numbers(&axis, FINE));
+        let _ = writeln!(out, "    <axis xyz=\"{}\"/>", decimals(&axis));
     }
     if let Some([low, high]) = joint.limits.filter(|_| joint.motion != ModelMotion::Fixed) {
-        let (low, high) = (numbers(&[low], URDF), numbers(&[high], URDF));
+        let (low, high) = (decimal(low), decimal(high));
         let _ = writeln!(
             out,
             "    <limit lower=\"{low}\" upper=\"{high}\" effort=\"0\" velocity=\"0\"/>"
@@ -132,7 +114,7 @@ fn urdf_joint(joint: &ModelJoint, out: &mut String) {
 /// MJCF: bodies inside each other.
 pub(crate) fn mjcf(file: &RobotModelFile, notes: &[String]) -> String {
     let mut out = comment(notes);
-    let gravity = numbers(&file.gravity_m_s2, FINE);
+    let gravity = decimals(&file.gravity_m_s2);
     let _ = writeln!(
         out,
         "<mujoco model=\"{}\">\n  <compiler angle=\"radian\" autolimits=\"true\" boundmass=\"1e-6\" boundinertia=\"1e-9\"/>\n  \
@@ -171,7 +153,7 @@ fn mjcf_body(
     let pad = "  ".repeat(depth);
     let origin = by.map_or_else(ModelPose::default, |j| j.parent_from_joint);
     let [x, y, z, w] = origin.quat_xyzw;
-    let (at, turn) = (numbers(&origin.xyz_m, FINE), numbers(&[w, x, y, z], FINE));
+    let (at, turn) = (decimals(&origin.xyz_m), decimals(&[w, x, y, z]));
     let _ = writeln!(
         out,
         "{pad}<body name=\"{}\" pos=\"{at}\" quat=\"{turn}\">",
@@ -186,18 +168,18 @@ fn mjcf_body(
         if let (Some(kind), Some(axis)) = (kind, joint.axis) {
             let range = joint.limits.filter(|[low, high]| low < high);
             let range = range.map_or_else(String::new, |limits| {
-                format!(" range=\"{}\"", numbers(&limits, FINE))
+                format!(" range=\"{}\"", decimals(&limits))
             });
             let _ = writeln!(
                 out,
                 "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{}\"{range}/>",
                 escaped(&joint.name),
-                numbers(&axis, FINE)
+                decimals(&axis)
             );
         }
     }
     if let Some((mass, at)) = center(file, link) {
-        let (mass, at) = (numbers(&[mass], FINE), numbers(&at, FINE));
+        let (mass, at) = (decimal(mass), decimals(&at));
         let _ = writeln!(
             out,
             "{pad}  <inertial pos=\"{at}\" mass=\"{mass}\" diaginertia=\"1e-9 1e-9 1e-9\"/>"
@@ -231,20 +213,16 @@ pub(crate) fn sdf(file: &RobotModelFile, notes: &[String]) -> String {
             escaped(&joint.child),
         );
         let origin = &joint.parent_from_joint;
-        let (xyz, rpy) = (numbers(&origin.xyz_m, FINE), numbers(&rpy(origin), FINE));
+        let (xyz, rpy) = (decimals(&origin.xyz_m), decimals(&rpy(origin)));
         let _ = writeln!(
             out,
             "    <joint name=\"{name}\" type=\"{kind}\">\n      <pose relative_to=\"{parent}\">{xyz} {rpy}</pose>\n      \
              <parent>{parent}</parent>\n      <child>{child}</child>"
         );
         if let Some(axis) = joint.axis.filter(|_| joint.motion != ModelMotion::Fixed) {
-            let _ = writeln!(
-                out,
-                "      <axis>\n        <xyz>{}</xyz>",
-                numbers(&axis, FINE)
-            );
+            let _ = writeln!(out, "      <axis>\n        <xyz>{}</xyz>", decimals(&axis));
             if let Some([low, high]) = joint.limits {
-                let (low, high) = (numbers(&[low], FINE), numbers(&[high], FINE));
+                let (low, high) = (decimal(low), decimal(high));
                 let _ = writeln!(
                     out,
                     "        <limit>\n          <lower>{low}</lower>\n          <upper>{high}</upper>\n        </limit>"
@@ -257,7 +235,7 @@ pub(crate) fn sdf(file: &RobotModelFile, notes: &[String]) -> String {
             "    </joint>\n    <link name=\"{child}\">\n      <pose relative_to=\"{name}\">0 0 0 0 0 0</pose>"
         );
         if let Some((mass, at)) = center(file, &joint.child) {
-            let (mass, at) = (numbers(&[mass], FINE), numbers(&at, FINE));
+            let (mass, at) = (decimal(mass), decimals(&at));
             let _ = writeln!(
                 out,
                 "      <inertial>\n        <pose>{at} 0 0 0</pose>\n        <mass>{mass}</mass>\n      </inertial>"
@@ -267,20 +245,4 @@ pub(crate) fn sdf(file: &RobotModelFile, notes: &[String]) -> String {
     }
     out.push_str("  </model>\n</sdf>\n");
     out
-}
-
-/// Twelve numbers of a pose by rows.
-pub(crate) fn rows(of: &nalgebra::Isometry3<f64>) -> String {
-    let rows = calib_model::Pose::of(of).rows();
-    numbers(&rows, FINE).replace(' ', ", ")
-}
-
-/// A vector.
-pub(crate) fn vector(of: &Vector3<f64>) -> String {
-    numbers(of.as_slice(), FINE).replace(' ', ", ")
-}
-
-/// A number.
-pub(crate) fn number(of: f64) -> String {
-    numbers(&[of], FINE)
 }

@@ -16,12 +16,12 @@ use crate::terminal::{Console, say};
 pub struct Correct {
     /// `<robot>.calibrated.model.json`
     model: PathBuf,
-    /// Table of joint positions, or of poses of the tool in the root's frame (`<link>.x_m` …)
+    /// Table of joint positions, or of poses of the tool in the root's frame (`<tool>.x_m` …)
     program: PathBuf,
-    /// Link that is to stand where the nominal model has it [default: the last one]
+    /// Link or point that is to stand where the nominal model has it [default: the last link]
     #[arg(long)]
     tool: Option<String>,
-    /// Only the position of the link is to be right: for arms of fewer than six joints
+    /// Only the position of the tool is to be right: for arms of fewer than six joints
     #[arg(long)]
     position_only: bool,
     /// Largest change of a turning joint, deg [default: 5.7; 90 for poses]

@@ -1,5 +1,6 @@
 //! Predictions, corrections and exports of robots by chance.
 
+mod arms;
 mod exports;
 mod tables;
 

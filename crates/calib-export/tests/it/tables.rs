@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use calib_export::{CorrectOptions, ExportError, Frame, PredictOptions, Robot, correct, predict};
-use calib_model::{Approach, Place, Under};
+use calib_model::{Approach, Under};
 
 const ARM: &str = include_str!("../../../calib-model/tests/it/arm.model.json");
 
@@ -106,6 +106,20 @@ fn columns_that_are_not_the_robots_are_refused() {
 
 #[test]
 fn a_corrected_program_brings_the_tool_to_where_the_nominal_model_has_it() {
+    corrected(None);
+}
+
+#[test]
+fn a_point_is_corrected_as_a_link_is() {
+    corrected(Some("tip"));
+}
+
+fn corrected(named: Option<&str>) {
+    let options = CorrectOptions {
+        tool: named.map(str::to_owned),
+        ..CorrectOptions::default()
+    };
+    let name = named.unwrap_or("link_6");
     let mut r = crate::common::rng(5);
     let file = crate::common::robot(&mut r, 6, false, crate::common::Effects::All);
     let robot = Robot {
@@ -123,7 +137,7 @@ fn a_corrected_program_brings_the_tool_to_where_the_nominal_model_has_it() {
         rows.push(q);
     }
     let path = table(&folder, &text);
-    let done = correct(&robot, &path, &CorrectOptions::default()).expect("corrected");
+    let done = correct(&robot, &path, &options).expect("corrected");
     assert_eq!(done.rows, 20);
     assert!(
         done.reached >= 17 && done.reached + done.nearer + done.refused == 20,
@@ -133,7 +147,7 @@ fn a_corrected_program_brings_the_tool_to_where_the_nominal_model_has_it() {
     let cells = cells(&done.csv);
     let mut work = robot.model.work();
     let mut approach = Approach::new(&robot.model);
-    let tool = Place::from(robot.model.last_link());
+    let tool = robot.model.place(name).expect("a link or point");
     for (row, q) in cells[1..].iter().zip(&rows) {
         approach.update(&robot.model, q).expect("finite");
         if row[7] != "reached" {
@@ -162,7 +176,7 @@ fn a_corrected_program_brings_the_tool_to_where_the_nominal_model_has_it() {
     }
     // Targets in space: the same poses as a table of them, from the uncorrected joints.
     let mut text = format!(
-        "{},link_6.x_m,link_6.y_m,link_6.z_m,link_6.qx,link_6.qy,link_6.qz,link_6.qw\n",
+        "{},{name}.x_m,{name}.y_m,{name}.z_m,{name}.qx,{name}.qy,{name}.qz,{name}.qw\n",
         names.join(",")
     );
     for q in &rows {
@@ -182,7 +196,6 @@ fn a_corrected_program_brings_the_tool_to_where_the_nominal_model_has_it() {
             .collect();
         text += &(numbers.join(",") + "\n");
     }
-    let done =
-        correct(&robot, &table(&folder, &text), &CorrectOptions::default()).expect("corrected");
+    let done = correct(&robot, &table(&folder, &text), &options).expect("corrected");
     assert!(done.cartesian && done.reached >= 17, "{done:?}");
 }
