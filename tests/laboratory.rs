@@ -402,12 +402,15 @@ fn a_recording_whose_names_are_none_of_the_profile_is_refused() {
         assert_eq!(missing["facts"]["kind"], kind, "{missing}");
         assert!(ran.stdout.contains("q_"), "{}", ran.stdout);
         // As the remedy says, for one tracker's names.
-        let map: Vec<String> = ["table_1", "table_2", "table_3", "table_4"]
-            .into_iter()
-            .chain(["linkM_1", "linkM_2", "linkM_3", "linkM_4"])
-            .chain(["gripM_1", "gripM_2", "gripM_3", "gripM_4", "haT", "heT"])
-            .map(|name| format!("{name}: q_{name}"))
-            .collect();
+        let map: Vec<String> = match robot {
+            "ripley" => ["table", "linkM", "gripM"]
+                .iter()
+                .flat_map(|body| (1..=4).map(move |k| format!("{body}_{k}: q_{body}_{k}")))
+                .collect(),
+            _ => ["haT", "heT"]
+                .map(|body| format!("{body}: q_{body}"))
+                .into(),
+        };
         let profile_text = dir.read(&profile) + &format!("\nnames: {{{}}}\n", map.join(", "));
         let dir = dir.file(&profile, profile_text);
         let ran = dir.calib(["check", &profile]);
