@@ -1,6 +1,6 @@
 //! The `kinematics` of `ur_description`: origins of the six joints of a UR arm.
 //!
-//! `ur_description` puts the joints directly on each other and turns each about z; it has no number for any other joint. What stands
+//! `ur_description` puts the joints directly on each other and turns each about z; it has no entry for other joints. What stands
 //! between its root and its tool besides the six is what the nominal URDF has.
 
 use calib_model::file::{ModelJoint, ModelMotion, ModelPose, RobotModelFile};

@@ -236,6 +236,32 @@ fn all_mistakes_are_named_at_once() {
 }
 
 #[test]
+fn what_nobody_states_is_estimated() {
+    let asked = |solve: &str| checked(&format!("{PROFILE}solve: {{{solve}}}\n"));
+    for (solve, missing) in [
+        (
+            "free: [joint_offsets]",
+            &["`tracker` is not free", "`bodies` is not free"][..],
+        ),
+        ("free: [bodies, joint_offsets]", &["`tracker` is not free"]),
+        ("free: [tracker, joint_offsets]", &["the mount of `"]),
+    ] {
+        let said = asked(solve).expect_err(solve);
+        assert!(missing.iter().all(|part| said.contains(part)), "{said}");
+        assert_eq!(said.matches("solve.free`").count(), missing.len(), "{said}");
+    }
+    for solve in [
+        "free: [bodies, tracker, joint_offsets]",
+        // The nominal robot is looked at, and closed forms do not ask.
+        "free: []",
+        "method: paper, free: [joint_offsets]",
+    ] {
+        let said = asked(solve).err().unwrap_or_default();
+        assert!(!said.contains("is not free"), "{said}");
+    }
+}
+
+#[test]
 fn joints_that_do_not_move_are_held_unless_the_profile_says_otherwise() {
     let text = format!("{PROFILE}solve: {{joints: {{rail: {{free: [offset], sigma_mm: 3}}}}}}\n");
     let profile = checked(&text).expect("a good profile");

@@ -49,11 +49,14 @@ super::topic! {
             "The recording has no column for marker {markers:code}; it has {known}.",
             "[[Did you mean {nearest:code}? ]]Correct the marker's name in the profile.";
     }
-    /// A recording lacks the body whose sweep it is, or has none of the profile's bodies.
+    /// A recording lacks the body whose sweep it is, has none of the profile's bodies, or has one under another name.
     MISSING_BODY = "missing-body" {
         "swept": Error,
             "The recording is the sweep of this body and has no column of it; it has {known}.",
             "[[Did you mean {nearest:code}? ]]Correct the names in the profile, or map those of the recording with `names`.";
+        "renamed": Warning,
+            "The recording has no column of this body, and has {nearest:code}.",
+            "If that is the body, map its names with `names`, or correct those in the profile.";
         "all": Error,
             "The recording has no column of {bodies:code}; it has {known}.",
             "[[Did you mean {nearest:code}? ]]Correct the names in the profile, or map those of the recording with `names`.";

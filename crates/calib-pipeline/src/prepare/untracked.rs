@@ -1,7 +1,7 @@
 //! Bodies that a recording has to show and does not name: its rows would count for nothing, without a word.
 
 use calib_finding::{Fact, Finding, Subject, catalog, nearest_word};
-use calib_profile::{Body, BodyKind, Contact, Usage};
+use calib_profile::{Body, BodyKind, Usage};
 
 use crate::prepare::inputs::{Inputs, Loaded};
 
@@ -17,10 +17,8 @@ pub(super) fn missing_bodies(inputs: &Inputs, loaded: &Loaded) -> Vec<Finding> {
         return Vec::new();
     }
     let has = |name: &String| has_column(loaded, name);
-    let contacts = profile.contacts.values().filter_map(Contact::coordinates);
-    let touched = contacts
-        .into_iter()
-        .any(|column| poses.markers.contains_key(column));
+    let mut contacts = profile.contacts.values();
+    let touched = contacts.any(|contact| contact.recordings.contains(&loaded.name));
     let shown = |name: &String, body: &Body| names(name, body).any(has);
     let known: Vec<&str> = columns().map(String::as_str).collect();
     // A column of another body is not what was meant.
@@ -60,14 +58,38 @@ pub(super) fn missing_bodies(inputs: &Inputs, loaded: &Loaded) -> Vec<Finding> {
     if !bodies.is_empty() && !touched && !bodies.iter().any(|(name, body)| shown(name, body)) {
         return vec![finding("all", Subject::default(), &bodies)];
     }
-    let swept = bodies.iter().filter(|(name, body)| {
+    let is_swept = |name: &String| {
         let mut origins = profile.origins.values();
-        origins.any(|origin| origin.sweep == loaded.name && origin.body == **name)
-            && !shown(name, body)
-    });
-    swept
-        .map(|&(name, body)| finding("swept", Subject::body(name), &[(name, body)]))
+        origins.any(|origin| origin.sweep == loaded.name && origin.body == *name)
+    };
+    let missing = bodies.iter().filter(|(name, body)| !shown(name, body));
+    missing
+        .filter_map(|&(name, body)| {
+            let kind = match () {
+                () if is_swept(name) => "swept",
+                () if renamed(names(name, body), &free) => "renamed",
+                () => return None,
+            };
+            Some(finding(kind, Subject::body(name), &[(name, body)]))
+        })
         .collect()
+}
+
+/// Whether all these names are there with one and the same text before or behind them, as trackers put that of a subject or a session.
+fn renamed<'a>(names: impl Iterator<Item = &'a String>, free: &[&str]) -> bool {
+    let names: Vec<&String> = names.collect();
+    let has = |before: &str, behind: &str| {
+        let there = |name: &&String| free.contains(&format!("{before}{name}{behind}").as_str());
+        names.iter().all(there)
+    };
+    let Some(first) = names.first() else {
+        return false;
+    };
+    free.iter().any(|column| {
+        let before = column.strip_suffix(first.as_str());
+        let behind = column.strip_prefix(first.as_str());
+        before.is_some_and(|before| has(before, "")) || behind.is_some_and(|behind| has("", behind))
+    })
 }
 
 fn has_column(of: &Loaded, name: &String) -> bool {

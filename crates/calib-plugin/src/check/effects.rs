@@ -2,10 +2,10 @@
 
 use super::subject::{Input, Reply, text};
 
-/// Steps of the readings, and their width, rad: from −4 to 4, which no period and no number of turns divides.
+/// Steps of the readings, and their width, rad: from −4 to 4. The width is not a round number, so that a jump at one lies inside a step.
 const STEPS: i32 = 800;
 const STEP: f64 = 0.010_03;
-/// Steps with the largest changes, in each of which a jump is looked for.
+/// Steps with the largest changes; each is searched for a jump.
 const LARGEST: usize = 40;
 /// Readings that are so near have nearly the same regressor, rad.
 const NEAR: f64 = 1e-7;

@@ -4,7 +4,7 @@ use super::*;
 use crate::profile::{JointException, Limits, Noise, Prior, Solve};
 use crate::raw::{
     ANGLE, MASS, MASS_CENTER, POSITION, PRIOR_KEYS, RawFree, RawJointFree, RawJointSolve,
-    RawLimits, RawNoiseModel, RawPrior, RawSolve,
+    RawLimits, RawMethod, RawNoiseModel, RawPrior, RawSolve,
 };
 use calib_core::NoiseModel;
 use calib_core::effect::{Effect, PriorKey, Source};
@@ -21,6 +21,7 @@ impl Checker<'_> {
             joints.insert(joint, exception);
         }
         self.masses_load_something(raw);
+        self.what_nobody_states_is_free(raw);
         let prior = self.prior(&raw.prior);
         if let Some(sigma) = raw.noise.joint_deg {
             self.not_negative(&["solve", "noise", "joint_deg"], sigma);
@@ -40,6 +41,31 @@ impl Checker<'_> {
             load: raw.load,
             robust: raw.robust,
             limits,
+        }
+    }
+
+    /// The pose of the tracker, and a mount that is not stated, come from the nominal robot where they are not estimated: held there, its
+    /// errors would count as those of what is estimated, with a small σ.
+    fn what_nobody_states_is_free(&mut self, raw: &RawSolve) {
+        if raw.method != RawMethod::Ml || raw.free.is_empty() || self.raw.bodies.is_empty() {
+            return;
+        }
+        let free = |what| raw.free.contains(&what);
+        if !free(RawFree::Tracker) {
+            self.key_problem(
+                &["solve", "free"],
+                "`tracker` is not free: its pose would be held where the nominal robot puts it",
+                "add `tracker` to `solve.free`",
+            );
+        }
+        let mut bodies = self.raw.bodies.iter();
+        let unstated = bodies.find(|(_, body)| body.mount.is_none());
+        if let (Some((name, _)), false) = (unstated, free(RawFree::Bodies)) {
+            self.key_problem(
+                &["solve", "free"],
+                format!("`bodies` is not free: the mount of `{name}` would be held where the nominal robot puts it"),
+                "add `bodies` to `solve.free`, or state the body's `mount`",
+            );
         }
     }
 
