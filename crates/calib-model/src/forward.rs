@@ -4,10 +4,10 @@ use calib_geometry::so3;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::axis::Axis;
+use crate::effect::flank_backlash::flank;
 use crate::effect::{HARMONICS, JointState, OF_STATE, SinCos};
 use crate::error::ModelError;
-use crate::model::{Joint, JointTerm, LinkId, Model, Place};
-use crate::motion::JointMotion;
+use crate::model::{JointTerm, LinkId, Model, Place};
 use crate::pose::Pose;
 
 /// What readings alone do not say. The default: every joint in the middle of its backlash, loaded by gravity.
@@ -25,11 +25,8 @@ pub struct Under<'a> {
 pub struct Work {
     /// `root_from_link` by link.
     pub(crate) at: Vec<Pose>,
-    /// `root_from_joint` by joint, before its motion.
-    pub(crate) frame: Vec<Pose>,
     /// The same of the nominal geometry.
     pub(crate) nominal: Vec<Pose>,
-    pub(crate) nominal_frame: Vec<Pose>,
     /// First moment of everything that hangs on a link, in the root's frame.
     pub(crate) moment: Vec<Vector3<f64>>,
     pub(crate) state: Vec<JointState>,
@@ -58,9 +55,7 @@ impl Work {
         let (n, dof) = (model.joints.len(), model.moved.len());
         Self {
             at: vec![Pose::identity(); n + 1],
-            frame: vec![Pose::identity(); n],
             nominal: vec![Pose::identity(); n + 1],
-            nominal_frame: vec![Pose::identity(); n],
             moment: vec![Vector3::zeros(); n + 1],
             state: vec![JointState::default(); n],
             reading: vec![ZERO; n],
@@ -178,21 +173,20 @@ impl Model {
 
     /// Equations (1) and (2): states, φ and θ of all joints.
     pub(crate) fn motions(&self, q: &[f64], under: &Under, work: &mut Work) {
-        self.motions_with((q, 0), under, work, |_| true);
+        self.motions_with::<true>((q, 0), under, work);
     }
 
     /// The same without the terms that jump; the nominal poses before the joint `from` are as they were.
     pub(crate) fn smooth_motions(&self, q: &[f64], from: usize, under: &Under, work: &mut Work) {
-        self.motions_with((q, from), under, work, |t| !t.jumps);
+        self.motions_with::<false>((q, from), under, work);
     }
 
     #[inline]
-    fn motions_with(
+    fn motions_with<const JUMPS: bool>(
         &self,
         (q, from): (&[f64], usize),
         under: &Under,
         work: &mut Work,
-        wanted: impl Fn(&JointTerm) -> bool,
     ) {
         if self.loaded {
             self.nominal_poses_from(from, q, work);
@@ -220,7 +214,17 @@ impl Model {
             for (kind, c) in OF_STATE.iter().zip(&joint.of_state) {
                 phi += c * kind.of_state(&state).unwrap_or(0.0);
             }
-            for t in joint.direct.iter().filter(|t| wanted(t)) {
+            for (other, c) in &joint.couplings {
+                phi += c * self.reading(*other, q);
+            }
+            if joint.yields {
+                let tilt = |k: usize| joint.across[k] * (joint.lateral[k] * state.across[k]);
+                theta = tilt(0) + tilt(1);
+            }
+            if JUMPS && joint.flank != 0.0 {
+                phi += joint.flank * flank(&state);
+            }
+            for t in &joint.direct {
                 let amount = t.value * self.regressor(t, &state, q);
                 match t.across {
                     None => phi += amount,
@@ -238,9 +242,8 @@ impl Model {
         match t.other {
             None => t.term.regressor.at(s),
             Some(other) => {
-                let other = &self.joints[other];
                 let state = JointState {
-                    other: other.multiplier * q[other.source] + other.offset,
+                    other: self.reading(other, q),
                     ..JointState::default()
                 };
                 t.term.regressor.at(&state)
@@ -248,10 +251,17 @@ impl Model {
         }
     }
 
+    /// Of a joint, rad or m.
+    #[inline]
+    fn reading(&self, i: usize, q: &[f64]) -> f64 {
+        let joint = &self.joints[i];
+        joint.multiplier * q[joint.source] + joint.offset
+    }
+
     /// What the effects of a joint depend on; loads from the moments of the nominal posture.
     fn state(&self, i: usize, q: &[f64], under: &Under, work: &Work) -> JointState {
         let joint = &self.joints[i];
-        let reading = joint.multiplier * q[joint.source] + joint.offset;
+        let reading = self.reading(i, q);
         let mut state = JointState {
             q: reading,
             motor: joint.gear_ratio * reading,
@@ -274,10 +284,10 @@ impl Model {
         state
     }
 
-    /// Torque about the origin of a joint, and force, of gravity on everything that it carries; N m and N, root's axes.
+    /// Torque about the origin of a joint's child, and force, of gravity on everything that it carries; N m and N, root's axes.
     fn load(&self, i: usize, work: &Work) -> (Vector3<f64>, Vector3<f64>) {
         let mass = self.joints[i].carried;
-        let moment = work.moment[i + 1] - work.nominal_frame[i].t * mass;
+        let moment = work.moment[i + 1] - work.nominal[i + 1].t * mass;
         (moment.cross(&self.gravity), self.gravity * mass)
     }
 
@@ -290,18 +300,17 @@ impl Model {
         work: &Work,
     ) -> (f64, [f64; 2]) {
         let joint = &self.joints[i];
+        // The motion leaves the axis where it is.
+        let r = &work.nominal[i + 1].r;
         match joint.axis {
             None => (0.0, [0.0; 2]),
-            Some(Axis::Prismatic(a)) => {
-                let axis = work.nominal_frame[i].r * a.into_inner();
-                (axis.dot(force), [0.0; 2])
-            }
+            Some(Axis::Prismatic(a)) => ((r * a.into_inner()).dot(force), [0.0; 2]),
             Some(Axis::Revolute(a)) => {
-                let axis = work.nominal_frame[i].r * a.into_inner();
+                let axis = r * a.into_inner();
                 // e · Rᵀ torque
                 let across = match joint.yields {
                     true => {
-                        let torque = work.nominal[i + 1].r.tr_mul(torque);
+                        let torque = r.tr_mul(torque);
                         joint.across.map(|e| e.dot(&torque))
                     }
                     false => [0.0; 2],
@@ -319,20 +328,16 @@ impl Model {
     /// The same of this joint and those after it: the ones before it are as they were.
     fn nominal_poses_from(&self, from: usize, q: &[f64], work: &mut Work) {
         for (i, joint) in self.joints.iter().enumerate().skip(from) {
-            let frame = then(&work.nominal[joint.parent], &joint.nominal);
-            work.nominal_frame[i] = frame;
-            work.nominal[i + 1] = match joint.axis {
-                None => frame,
-                Some(axis) => {
-                    let reading = joint.multiplier * q[joint.source] + joint.offset;
-                    let turned = match axis {
-                        Axis::Revolute(_) => SinCos::of(reading),
-                        Axis::Prismatic(_) => ZERO,
-                    };
-                    work.reading[i] = turned;
-                    moved(&frame, joint, axis, reading, &turned)
-                }
-            };
+            let mut by = 0.0;
+            if joint.axis.is_some() {
+                by = self.reading(i, q);
+                work.reading[i] = match joint.axis {
+                    Some(Axis::Revolute(_)) => SinCos::of(by),
+                    _ => ZERO,
+                };
+            }
+            let local = joint.nominal.moved(joint.axis, by, &work.reading[i]);
+            work.nominal[i + 1] = then(&work.nominal[joint.parent], &local);
         }
     }
 
@@ -352,26 +357,19 @@ impl Model {
     /// Equation (3).
     pub(crate) fn poses(&self, work: &mut Work) {
         for (i, joint) in self.joints.iter().enumerate() {
-            let frame = then(&work.at[joint.parent], &joint.origin);
-            work.frame[i] = frame;
-            work.at[i + 1] = match joint.axis {
-                None => frame,
-                Some(axis) => {
-                    let phi = work.phi[i];
-                    let turned = match axis {
-                        Axis::Revolute(_) if self.loaded => {
-                            turned_on(&work.reading[i], phi - work.state[i].q, phi)
-                        }
-                        Axis::Revolute(_) => SinCos::of(phi),
-                        Axis::Prismatic(_) => ZERO,
-                    };
-                    let mut at = moved(&frame, joint, axis, phi, &turned);
-                    if joint.yields {
-                        at.r = product(&at.r, &swing(&work.theta[i]));
-                    }
-                    at
+            let phi = work.phi[i];
+            let turned = match joint.axis {
+                Some(Axis::Revolute(_)) if self.loaded => {
+                    turned_on(&work.reading[i], phi - work.state[i].q, phi)
                 }
+                Some(Axis::Revolute(_)) => SinCos::of(phi),
+                _ => ZERO,
             };
+            let mut local = joint.origin.moved(joint.axis, phi, &turned);
+            if joint.yields {
+                local.r = product(&local.r, &swing(&work.theta[i]));
+            }
+            work.at[i + 1] = then(&work.at[joint.parent], &local);
         }
     }
 }
@@ -422,37 +420,6 @@ fn then(a: &Pose, b: &Pose) -> Pose {
 
 /// Of an angle of 0.
 const ZERO: SinCos = SinCos { sin: 0.0, cos: 1.0 };
-
-/// `root_from_child` of a joint without θ: its motion is a rotation or a translation alone.
-#[inline]
-fn moved(frame: &Pose, joint: &Joint, axis: Axis, by: f64, turned: &SinCos) -> Pose {
-    let Some((k, sign)) = joint.coordinate else {
-        let own = JointMotion::turned(axis, by, (turned.sin, turned.cos)).screw_motion(false);
-        return match axis {
-            Axis::Revolute(_) => Pose {
-                r: product(&frame.r, &own.r),
-                t: frame.t,
-            },
-            Axis::Prismatic(_) => Pose {
-                r: frame.r,
-                t: frame.t + frame.r * own.t,
-            },
-        };
-    };
-    // A rotation about a coordinate axis mixes the two other columns.
-    let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-    let (sin, cos) = (sign * turned.sin, turned.cos);
-    let mut columns = frame.r.data.0;
-    let (x, y) = (columns[i], columns[j]);
-    for n in 0..3 {
-        columns[i][n] = cos * x[n] + sin * y[n];
-        columns[j][n] = cos * y[n] - sin * x[n];
-    }
-    Pose {
-        r: Matrix3::from_data(nalgebra::ArrayStorage(columns)),
-        t: frame.t,
-    }
-}
 
 /// Exp(θ). What yields, yields by millirad: its series is exact to rounding there.
 ///

@@ -132,13 +132,11 @@ impl Model {
     /// s of equation (1); `None` for a fixed joint.
     pub(crate) fn about_twist(&self, i: usize, link: LinkId, work: &Work) -> Option<Vector6<f64>> {
         let at = &work.at[link.0];
-        let frame = &work.frame[i];
-        Some(match self.joints[i].axis? {
-            Axis::Revolute(a) => {
-                let omega = frame.r * a.into_inner();
-                stacked(&at.r, &omega, &omega.cross(&(at.t - frame.t)))
-            }
-            Axis::Prismatic(a) => stacked(&at.r, &Vector3::zeros(), &(frame.r * a.into_inner())),
+        let joint = &self.joints[i];
+        let axis = work.at[joint.parent].r * joint.origin.axis;
+        Some(match joint.axis? {
+            Axis::Revolute(_) => stacked(&at.r, &axis, &axis.cross(&(at.t - work.at[i + 1].t))),
+            Axis::Prismatic(_) => stacked(&at.r, &Vector3::zeros(), &axis),
         })
     }
 }

@@ -47,6 +47,7 @@ mod forward;
 mod jacobian;
 mod model;
 pub mod motion;
+mod origin;
 pub mod pose;
 mod read;
 mod spread;

@@ -6,6 +6,7 @@ use crate::axis::Axis;
 use crate::effect::{Outside, Term};
 use crate::error::ModelError;
 use crate::file::{ModelEffect, ModelJoint};
+use crate::origin::Origin;
 use crate::pose::Pose;
 
 /// Index of a link: 0 is the root, i + 1 the child of joint i.
@@ -85,8 +86,8 @@ pub(crate) struct Joint {
     /// Index of the parent link.
     pub parent: usize,
     /// `parent_from_joint`, calibrated and nominal.
-    pub origin: Pose,
-    pub nominal: Pose,
+    pub origin: Origin,
+    pub nominal: Origin,
     pub axis: Option<Axis>,
     /// Axes across, in the child's frame.
     pub across: [Vector3<f64>; 2],
@@ -102,11 +103,15 @@ pub(crate) struct Joint {
     /// Those of [`crate::effect::HARMONICS`] by their coefficients.
     pub harmonics: [f64; 8],
     /// Those of [`crate::effect::OF_STATE`].
-    pub of_state: [f64; 4],
+    pub of_state: [f64; 5],
+    /// Those of [`crate::effect::LATERAL`].
+    pub lateral: [f64; 2],
+    /// That of the loaded flank.
+    pub flank: f64,
+    /// Those that follow another joint: its index, their coefficients.
+    pub couplings: Vec<(usize, f64)>,
     /// The others.
     pub direct: Vec<JointTerm>,
-    /// Which coordinate axis it turns about, and its sign; `None`: another one, or it slides.
-    pub coordinate: Option<(usize, f64)>,
     /// A term yields across the axis; one is a harmonic of the reading; one of the motor's angle.
     pub yields: bool,
     pub turns: bool,

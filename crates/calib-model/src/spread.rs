@@ -134,7 +134,9 @@ impl Model {
         match number {
             Number::Tracker(k) => (from == From::Tracker).then(|| at.pull_back(&axis(k))),
             Number::Origin(i, k) => chain.contains(&i).then(|| {
-                let joint_from_place = work.frame[i].inverse().then(at);
+                let joint = &self.joints[i];
+                let root_from_joint = work.at[joint.parent].then(&joint.origin.pose);
+                let joint_from_place = root_from_joint.inverse().then(at);
                 joint_from_place.pull_back(&axis(k))
             }),
             Number::Coefficient(i, t) => {

@@ -11,7 +11,8 @@ use super::{
 };
 
 /// f of equation (1).
-fn flank(s: &JointState) -> f64 {
+#[inline]
+pub(crate) fn flank(s: &JointState) -> f64 {
     if s.torque.abs() > s.friction.max(NOTHING) {
         s.torque.signum()
     } else {

@@ -33,7 +33,7 @@ mod shared;
 
 pub use outside::{Outside, Regressor, Stated};
 pub use prior::{Prior, PriorKey};
-pub use shared::{HARMONICS, OF_STATE, SinCos};
+pub use shared::{HARMONICS, LATERAL, OF_STATE, SinCos};
 
 /// All joint effects, in the order in which their parameters are created.
 pub static EFFECTS: &[&Effect] = &[

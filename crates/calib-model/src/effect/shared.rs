@@ -34,12 +34,16 @@ pub const HARMONICS: [EffectKind; 8] = [
 ];
 
 /// Terms that [`EffectKind::of_state`] gives.
-pub const OF_STATE: [EffectKind; 4] = [
+pub const OF_STATE: [EffectKind; 5] = [
     EffectKind::ZeroOffset,
     EffectKind::Gain,
     EffectKind::TorqueCompliance,
     EffectKind::Backlash,
+    EffectKind::Friction,
 ];
+
+/// Terms whose F is the torque about each of the two axes across, which they drive.
+pub const LATERAL: [EffectKind; 2] = [EffectKind::Lateral1, EffectKind::Lateral2];
 
 impl EffectKind {
     /// F of equation (1) from sines that several terms share; `None` for terms of another kind.
@@ -72,6 +76,7 @@ impl EffectKind {
             Self::Gain => s.q,
             Self::TorqueCompliance => s.torque,
             Self::Backlash => -s.approach,
+            Self::Friction => -s.approach * s.torque.abs(),
             _ => return None,
         })
     }

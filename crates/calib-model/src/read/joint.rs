@@ -6,10 +6,11 @@ use nalgebra::{Unit, Vector3};
 
 use super::{Names, UNIT, finite, pose, value};
 use crate::axis::Axis;
-use crate::effect::{Drives, EFFECTS, EffectKind, HARMONICS, OF_STATE, Source, Term};
+use crate::effect::{Drives, EFFECTS, EffectKind, HARMONICS, LATERAL, OF_STATE, Source, Term};
 use crate::error::ModelError;
 use crate::file::{ModelEffect, ModelJoint, ModelMotion};
 use crate::model::{FindOutside, Joint, JointTerm};
+use crate::origin::Origin;
 
 fn unit(place: &str, v: [f64; 3]) -> Result<Unit<Vector3<f64>>, ModelError> {
     let v = Vector3::from(v);
@@ -48,15 +49,6 @@ fn known(
     Ok(Some(EffectKind::Outside(found).term()))
 }
 
-/// The coordinate axis that a turning joint turns about, and its sign.
-fn coordinate(axis: &Axis) -> Option<(usize, f64)> {
-    let Axis::Revolute(a) = axis else {
-        return None;
-    };
-    let k = a.iamax();
-    (a[k].abs() == 1.0 && a.norm() == 1.0).then(|| (k, a[k]))
-}
-
 /// The joint with all names resolved; `entries`: places in q by joint.
 pub(super) fn joint(
     i: usize,
@@ -93,8 +85,11 @@ pub(super) fn joint(
     };
     let mut out = Joint {
         parent: names.link(&place("parent"), &j.parent)?,
-        origin: pose(&place("parent_from_joint"), &j.parent_from_joint)?,
-        nominal: pose(&place("load_origin"), &j.load_origin)?,
+        origin: Origin::of(
+            pose(&place("parent_from_joint"), &j.parent_from_joint)?,
+            axis,
+        ),
+        nominal: Origin::of(pose(&place("load_origin"), &j.load_origin)?, axis),
         axis,
         across: axis.map_or([Vector3::zeros(); 2], |a| a.across()),
         source: entry,
@@ -105,9 +100,11 @@ pub(super) fn joint(
         friction: 0.0,
         terms: Vec::new(),
         harmonics: [0.0; 8],
-        of_state: [0.0; 4],
+        of_state: [0.0; 5],
+        lateral: [0.0; 2],
+        flank: 0.0,
+        couplings: Vec::new(),
         direct: Vec::new(),
-        coordinate: axis.and_then(|a| coordinate(&a)),
         yields: false,
         turns: false,
         geared: false,
@@ -151,6 +148,12 @@ pub(super) fn joint(
             out.turns |= term.term.source == Source::Reading;
         } else if let Some(k) = among(&OF_STATE) {
             out.of_state[k] += term.value;
+        } else if let Some(k) = among(&LATERAL) {
+            out.lateral[k] += term.value;
+        } else if let Some(other) = term.other {
+            out.couplings.push((other, term.value));
+        } else if term.jumps {
+            out.flank += term.value;
         } else {
             out.direct.push(term);
         }
