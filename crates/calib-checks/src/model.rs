@@ -44,17 +44,24 @@ pub fn disagreement(
     )
 }
 
-/// Pairs of rows that turned in one of the two, and by how much they disagree. At most a few thousand.
+/// Rows up to which each is compared with many others.
+const LONG: usize = 4096;
+/// Steps from a row to the rows that it is compared with, where a table is not short; and where it is long.
+const STEPS: (usize, usize) = (24, 8);
+
+/// Pairs of rows that turned in one of the two, and by how much they disagree: every row with every other in short tables.
 fn pairs<'a>(
     tracker_from_body: &'a [Option<Isometry3<f64>>],
     base_from_link: &'a [Isometry3<f64>],
 ) -> impl Iterator<Item = (usize, usize, f64)> + 'a {
     let n = tracker_from_body.len().min(base_from_link.len());
-    // Every row with every other for small tables; with steps of growing size for long ones.
-    let steps: Vec<usize> = if n <= 128 {
-        (1..n).collect()
-    } else {
-        (0..24).map(|k| 1 + k * k * n / 1200).collect()
+    // With steps of growing size, the largest nearly half of the table.
+    let count = if n > LONG { STEPS.1 } else { STEPS.0 };
+    let steps: Vec<usize> = match n {
+        0..=128 => (1..n).collect(),
+        _ => (0..count)
+            .map(|k| 1 + k * k * n * STEPS.0 * STEPS.0 / (1200 * count * count))
+            .collect(),
     };
     let size = size(tracker_from_body);
     steps
@@ -195,10 +202,12 @@ pub fn spoiled_rows(
     // Disagreement of the rows taken out, rad.
     let mut spoiled: Vec<Option<f64>> = vec![None; n];
     let mut usual = 0.0;
+    let pairs: Vec<(usize, usize, f64)> =
+        pairs(&tracker_from_body[..n], &base_from_link[..n]).collect();
     // The worst rows leave first: they weigh on all others.
     for _ in 0..n {
         let mut off: Vec<Vec<f64>> = vec![Vec::new(); n];
-        for (i, j, angle) in pairs(&tracker_from_body[..n], &base_from_link[..n]) {
+        for &(i, j, angle) in &pairs {
             if spoiled[i].is_none() && spoiled[j].is_none() {
                 off[i].push(angle);
                 off[j].push(angle);

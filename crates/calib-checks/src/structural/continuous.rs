@@ -23,9 +23,10 @@ use super::candidates::span;
 use super::data::Data;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{RecordingIndex, SampleIndex};
-use super::linear::{Map, Model, Sums, Test, projected, solve};
+use super::linear::{Map, Model, Sums, projected, solve};
 use super::nonlinear::{fewer, noise_ratio, relinearized};
 use super::screen::{Screened, screen};
+use super::tested::Test;
 
 /// Relinearizations of the geometry before the tests.
 const RELINEARIZATIONS: usize = 3;
@@ -168,7 +169,7 @@ fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<
         ..data.clone()
     };
     let model = Model::new(&at_map, &tests, screened);
-    let sums = model.sums(lambda);
+    let [sums, plain] = model.sums_of([lambda, 0.0]);
     let map = solve(&model, &sums, sigma, &deviation, options)?;
     let mut scored = score_tests(&model, &sums, &map);
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -180,7 +181,6 @@ fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<
     if statistic < threshold {
         return None;
     }
-    let plain = model.sums(0.0);
     let first = model.registration + 6 * model.geometry.len() + which;
     let moved = projected(&plain.gram, model.registration, first, 1)?[(0, 0)].max(0.0);
     let effect = factor.abs() * (3.0 * moved / plain.observations).sqrt();

@@ -8,26 +8,15 @@ use super::Options;
 use super::chain::{Motion, Pose, Walk};
 use super::channels::mounts;
 use super::data::{Data, Measured};
-use super::ids::{JointIndex, LinkIndex, RecordingIndex, SampleIndex};
+use super::ids::{LinkIndex, SampleIndex};
 use super::scan::{Fit, Scan};
+use super::tested::{Instant, Test, TestedSums};
 use super::whitened::{JointNoise, Tall, Whitened};
 
 /// A marker is never known better (m): keeps the priors effective on noise-free data.
 const LEAST_SIGMA: f64 = 3e-5;
 /// Ridge relative to the largest diagonal entry: the mount and the registration share directions.
 const RIDGE: f64 = 1e-10;
-
-/// One test.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Test {
-    /// `reading_joint += k · reading_source`.
-    Reading {
-        joint: JointIndex,
-        source: JointIndex,
-    },
-    /// Every reading of the recording as it was k seconds later.
-    Lag { recording: RecordingIndex },
-}
 
 /// The linear model at one point of linearization: sums over the rows.
 pub(crate) struct Model<'a> {
@@ -72,8 +61,9 @@ impl<'a> Model<'a> {
         }
     }
 
+    /// Columns of registration and geometry.
     fn columns(&self) -> usize {
-        self.registration + 6 * self.geometry.len() + self.tests.len()
+        self.registration + 6 * self.geometry.len()
     }
 
     /// Weight of a channel: the twelve coordinates of a pose hold six measurements.
@@ -93,9 +83,11 @@ impl<'a> Model<'a> {
     /// [`sums`](Self::sums) for several ratios: the rows are the same.
     pub(crate) fn sums_of<const N: usize>(&self, lambdas: [f64; N]) -> [Sums; N] {
         let width = self.columns() + 1;
-        let first = width - 1 - self.tests.len();
-        let mut white = Tall::new(width, first);
-        let mut out = lambdas.map(|lambda| Whitened::new(lambda, width, first));
+        let mut white = Tall::new(width);
+        let mut out = lambdas.map(|lambda| {
+            let tested = TestedSums::new(lambda, width, self.tests);
+            (Whitened::new(lambda, width), tested)
+        });
         let mut observations = 0.0;
         let links: Vec<LinkIndex> = self.scan.data.bodies.iter().map(|b| b.link).collect();
         let mut walk = Walk::new(&self.scan.data.chain, &links);
@@ -119,20 +111,26 @@ impl<'a> Model<'a> {
             let noise = JointNoise::of(&self.scan.data.chain, &block, by_reading);
             if noise.is_narrow() {
                 white.push(&block);
-                out.iter_mut().for_each(|w| w.subtract(&noise));
+                out.iter_mut().for_each(|w| w.0.subtract(&noise));
             } else {
-                out.iter_mut().for_each(|w| w.add(&block, &noise));
+                out.iter_mut().for_each(|w| w.0.add(&block, &noise));
             }
+            let instant = Instant {
+                readings: self.scan.readings(i),
+                recording: self.scan.data.recording[i],
+                rates: self.scan.data.rates.get(i).and_then(Option::as_deref),
+            };
+            out.iter_mut().for_each(|w| w.1.add(&noise, &instant));
         }
         let white = white.gram();
-        out.map(|whitened| Sums {
-            gram: &white + whitened.added.gram() - whitened.subtracted.gram(),
+        out.map(|(whitened, tested)| Sums {
+            gram: tested.beside(&(&white + whitened.added.gram() - whitened.subtracted.gram())),
             log_det: whitened.log_det,
             observations,
         })
     }
 
-    /// The rows of one instant: all columns and the residual; and ∂p/∂reading for each reading.
+    /// The rows of one instant: the columns of registration and geometry and the residual; and ∂p/∂reading for each reading.
     fn row(
         &self,
         i: usize,
@@ -146,7 +144,6 @@ impl<'a> Model<'a> {
         let mut by_reading: Vec<(usize, DVector<f64>)> = (0..joints)
             .map(|j| (j, DVector::zeros(3 * seen.len())))
             .collect();
-        let readings = self.scan.readings(i);
         for (s, &k) in seen.iter().enumerate() {
             let at = 3 * s;
             let (p, link) = self.scan.predicted(&self.fit, i, k);
@@ -175,24 +172,6 @@ impl<'a> Model<'a> {
             }
             let r = self.scan.residual(&self.fit, i, k);
             block.fixed_view_mut::<3, 1>(at, width - 1).copy_from(&r);
-        }
-        let first = self.registration + 6 * self.geometry.len();
-        for (n, test) in self.tests.iter().enumerate() {
-            // r = … − p, and p changes by ∂p/∂reading_joint · reading_source · k
-            let mut column = block.column_mut(first + n);
-            match test {
-                Test::Reading { joint, source } => {
-                    column.axpy(-readings[source.0], &by_reading[joint.0].1, 0.0);
-                }
-                Test::Lag { recording } if data.recording[i] == *recording => {
-                    let rates = data.rates.get(i).and_then(Option::as_ref);
-                    let rates = rates.into_iter().flatten();
-                    for ((_, d), rate) in by_reading.iter().zip(rates) {
-                        column.axpy(-rate, d, 1.0);
-                    }
-                }
-                Test::Lag { .. } => {}
-            }
         }
         by_reading.retain(|(_, d)| d.amax() > 0.0);
         (block, by_reading)
@@ -274,8 +253,13 @@ pub(crate) fn solve(
     // −2 ln L_REML = ν ln χ² + ln|V| + ln|N| − ln|P|
     let log_likelihood = -0.5 * (freedom * chi2.ln() + sums.log_det + log_n - log_prior);
     // ν = observations − tr(N⁻¹ AᵀA) = observations − p + tr(N⁻¹ P)
-    let inverse = factor.inverse();
-    let held: f64 = (0..g).map(|a| inverse[(m + a, m + a)] * precision[a]).sum();
+    // N = L Lᵀ: of the last columns of N⁻¹ = L⁻ᵀ L⁻¹ the last block of L alone decides.
+    let mut inverse = DMatrix::identity(g, g);
+    let root = factor.l_dirty().view((m, m), (g, g));
+    root.solve_lower_triangular_mut(&mut inverse);
+    let held: f64 = (0..g)
+        .map(|a| inverse.column(a).norm_squared() * precision[a])
+        .sum();
     let left = (sums.observations - p as f64 + held).max(1.0);
     let sigma = (chi2 / left).sqrt().max(LEAST_SIGMA);
     Some(Map {

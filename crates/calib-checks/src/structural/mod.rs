@@ -76,6 +76,7 @@ mod scan;
 mod score;
 mod screen;
 mod special;
+mod tested;
 mod thinning;
 mod twin;
 mod whitened;

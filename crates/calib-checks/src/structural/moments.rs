@@ -8,6 +8,29 @@ use super::rotation::{Mat9, Quadratic, Vec9};
 /// Relative ridge on the normal matrix of the tracker's position: directions that the markers absorb as well are harmless.
 const RIDGE: f64 = 1e-12;
 
+/// Where a link is, with what all points on it share.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Placed {
+    rt: Matrix3<f64>,
+    t: Vector3<f64>,
+    /// Rᵀ t
+    u: Vector3<f64>,
+    /// tᵀ t
+    tt: f64,
+}
+
+impl From<&Pose> for Placed {
+    fn from(root_from_link: &Pose) -> Self {
+        let (r, t) = (&root_from_link.r, root_from_link.t);
+        Self {
+            rt: r.transpose(),
+            t,
+            u: r.tr_mul(&t),
+            tt: t.norm_squared(),
+        }
+    }
+}
+
 /// Moments of one marker (or virtual point of a pose) over some rows; they add up.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Moments {
@@ -35,8 +58,8 @@ impl Moments {
         tt: 0.0,
     };
 
-    /// One sample: the measured point y (m), the link's pose, the weight.
-    pub(crate) fn add(&mut self, y: &Vector3<f64>, link: &Pose, w: f64) {
+    /// One sample: the measured point y (m), where its link is, the weight.
+    pub(crate) fn add(&mut self, y: &Vector3<f64>, link: &Placed, w: f64) {
         let z = Vector4::new(y.x, y.y, y.z, 1.0);
         self.w += w;
         self.z.ger(w, &z, &z, 1.0);
@@ -53,19 +76,17 @@ impl Moments {
     }
 
     /// What of a sample depends on the link's pose.
-    pub(crate) fn add_pose(&mut self, y: &Vector3<f64>, link: &Pose, w: f64) {
-        let z = Vector4::new(y.x, y.y, y.z, 1.0);
-        self.t.ger(w, &link.t, &z, 1.0);
-        for a in 0..4 {
-            let wz = w * z[a];
-            for row in 0..3 {
-                for col in 0..3 {
-                    self.b[(row, 3 * a + col)] += wz * link.r[(col, row)];
-                }
-            }
+    pub(crate) fn add_pose(&mut self, y: &Vector3<f64>, link: &Placed, w: f64) {
+        let z = [w * y.x, w * y.y, w * y.z, w];
+        let (rt, t) = (link.rt.as_slice(), link.t.as_slice());
+        for (sums, wz) in self.b.as_mut_slice().chunks_exact_mut(9).zip(z) {
+            sums.iter_mut().zip(rt).for_each(|(sum, r)| *sum += wz * r);
         }
-        self.u += link.r.tr_mul(&link.t) * w;
-        self.tt += w * link.t.norm_squared();
+        for (sums, wz) in self.t.as_mut_slice().chunks_exact_mut(3).zip(z) {
+            sums.iter_mut().zip(t).for_each(|(sum, t)| *sum += wz * t);
+        }
+        self.u += link.u * w;
+        self.tt += w * link.tt;
     }
 
     /// The other's sums on top.
@@ -91,6 +112,7 @@ impl Moments {
 /// The cost of all points as a quadratic of x = [vec Q; c], marker positions eliminated: `xᵀ H x + 2 gᵀ x + d`.
 #[derive(Debug, Clone)]
 pub(crate) struct Normal {
+    /// Its lower half.
     h: SMatrix<f64, 12, 12>,
     g: SVector<f64, 12>,
     d: f64,
@@ -144,14 +166,21 @@ impl Normal {
                 }
             }
         }
-        let bt = m.b.transpose();
-        self.h -= bt * m.b / m.w;
+        // The lower half: `reduced` needs no more.
+        let b = m.b.data.0;
+        for (k, right) in b.iter().enumerate() {
+            let right = right.map(|x| x / m.w);
+            for (i, left) in b.iter().enumerate().skip(k) {
+                let dot = left[0] * right[0] + left[1] * right[1] + left[2] * right[2];
+                self.h[(i, k)] -= dot;
+            }
+        }
         for a in 0..4 {
             for i in 0..3 {
                 self.g[3 * a + i] -= m.t[(i, a)];
             }
         }
-        self.g += bt * m.u / m.w;
+        self.g += m.b.tr_mul(&m.u) / m.w;
         self.d += m.tt - m.u.norm_squared() / m.w;
         self.w += m.w;
         self.points += 1;
@@ -164,9 +193,11 @@ impl Normal {
 
     /// The quadratic of the rotation, with c eliminated, and what gives c.
     fn reduced(&self) -> (Quadratic, SMatrix<f64, 9, 3>, Matrix3<f64>, Vector3<f64>) {
-        let h_qq: Mat9 = self.h.fixed_view::<9, 9>(0, 0).into_owned();
-        let h_qc: SMatrix<f64, 9, 3> = self.h.fixed_view::<9, 3>(0, 9).into_owned();
-        let h_cc: Matrix3<f64> = self.h.fixed_view::<3, 3>(9, 9).into_owned();
+        let mut h_qq: Mat9 = self.h.fixed_view::<9, 9>(0, 0).into_owned();
+        h_qq.fill_upper_triangle_with_lower_triangle();
+        let h_qc: SMatrix<f64, 9, 3> = self.h.fixed_view::<3, 9>(9, 0).transpose();
+        let mut h_cc: Matrix3<f64> = self.h.fixed_view::<3, 3>(9, 9).into_owned();
+        h_cc.fill_upper_triangle_with_lower_triangle();
         let g_q: Vec9 = self.g.fixed_rows::<9>(0).into_owned();
         let g_c: Vector3<f64> = self.g.fixed_rows::<3>(9).into_owned();
         let ridge = RIDGE * self.w.max(f64::MIN_POSITIVE);

@@ -13,7 +13,7 @@ use super::chain::{Axis, Pose, Walk};
 use super::correct::shifted_row;
 use super::hypothesis::{Hypothesis, Scope};
 use super::ids::{JointIndex, LinkIndex};
-use super::moments::Moments;
+use super::moments::{Moments, Placed};
 use super::scan::Scan;
 
 /// A joint that a change of readings moves: by how much for each of (at most two) changed readings.
@@ -186,24 +186,28 @@ impl Scan<'_> {
             }
         }
         let mut poses = vec![Pose::IDENTITY; self.data.bodies.len()];
+        let mut placed: Vec<Placed> = poses.iter().map(Placed::from).collect();
         for i in 0..self.data.readings.len() {
             if !self.asked(scopes, i) || !self.usable[i] {
                 continue;
             }
             change(i, &mut poses);
+            let bodies = placed.iter_mut().zip(&poses).enumerate();
+            let moved_bodies = bodies.filter(|(body, _)| moves(*body));
+            moved_bodies.for_each(|(_, (placed, pose))| *placed = pose.into());
             let recording = self.data.recording[i].0;
             for &k in &moved {
                 let w = self.weights[i * n + k];
                 if w > 0.0 {
-                    let pose = &poses[self.channels[k].body];
-                    sums[recording * n + k].add_pose(&self.points[i * n + k], pose, w);
+                    let link = &placed[self.channels[k].body];
+                    sums[recording * n + k].add_pose(&self.points[i * n + k], link, w);
                 }
             }
         }
         sums
     }
 
-    fn asked(&self, scopes: &[Scope], i: usize) -> bool {
+    pub(super) fn asked(&self, scopes: &[Scope], i: usize) -> bool {
         scopes.iter().any(|s| s.contains(self.data.recording[i]))
     }
 }
@@ -319,6 +323,36 @@ mod tests {
                 let walked = scan.fit_corrected(&correct(&scoped, &data)).score.rms;
                 let off = (scored.score.rms / walked - 1.0).abs();
                 assert!(off < 1e-9, "{scoped:?}: {off}");
+            }
+        }
+    }
+
+    #[test]
+    fn sums_of_corrected_points_are_those_of_each_scope_alone() {
+        let data = data();
+        let scan = Scan::new(&data, &[]);
+        let scopes = [
+            Scope::All,
+            Scope::Recording(RecordingIndex(1)),
+            Scope::AllExcept(RecordingIndex(0)),
+        ];
+        let unit = Hypothesis::TrackerUnit {
+            mistake: UnitMistake::MetersReadAsMillimeters,
+        };
+        for hypothesis in [
+            unit,
+            Hypothesis::Mirrored,
+            Hypothesis::TrackerAxes { rotation: 5 },
+        ] {
+            for scored in scan.score(&hypothesis, &scopes, f64::INFINITY) {
+                let alone = scan.fit(Some(&scored.scoped)).score;
+                for (shared, alone) in [
+                    (scored.score.rms, alone.rms),
+                    (scored.score.score, alone.score),
+                ] {
+                    let off = (shared / alone - 1.0).abs();
+                    assert!(off < 1e-9, "{:?}: {off}", scored.scoped);
+                }
             }
         }
     }

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::chain::Pose;
-use super::moments::{Moments, Normal};
+use super::moments::{Moments, Normal, Placed};
 
 /// The best registration, equation (2) of [`structural`](super), and one to compare it with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +38,7 @@ pub fn registration(points: &[PointRows], other: &Isometry3<f64>) -> Option<Regi
                 r: root_from_link.rotation.to_rotation_matrix().into_inner(),
                 t: root_from_link.translation.vector,
             };
-            moments.add(&(y.coords - mean), &link, 1.0);
+            moments.add(&(y.coords - mean), &Placed::from(&link), 1.0);
         }
         normal.include(&moments);
     }

@@ -10,7 +10,7 @@ use super::correct::{correct, remount};
 use super::data::{Data, Measured};
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{LinkIndex, RecordingIndex, SampleIndex};
-use super::moments::{Moments, Normal, Registration};
+use super::moments::{Moments, Normal, Placed, Registration};
 
 /// Residual of a hypothesis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -178,12 +178,19 @@ impl<'a> Scan<'a> {
     ) {
         let n = self.channels.len();
         let recording = self.data.recording[i].0;
+        // The channels of a body follow each other.
+        let mut placed: Option<(usize, Option<Placed>)> = None;
         for (k, channel) in self.channels.iter().enumerate() {
             let w = self.weights[i * n + k];
-            if w > 0.0
-                && let Some(pose) = pose(channel.body)
-            {
-                sums[recording * n + k].add(&points[i * n + k], &pose, w);
+            if w <= 0.0 {
+                continue;
+            }
+            if placed.is_none_or(|(body, _)| body != channel.body) {
+                let of_body = pose(channel.body);
+                placed = Some((channel.body, of_body.as_ref().map(Placed::from)));
+            }
+            if let Some((_, Some(placed))) = &placed {
+                sums[recording * n + k].add(&points[i * n + k], placed, w);
             }
         }
     }
@@ -201,19 +208,66 @@ impl<'a> Scan<'a> {
         scopes: &[Scope],
         enough: f64,
     ) -> Vec<Scored> {
-        let sums = self.moved_sums(hypothesis, scopes);
+        let moved = self.moved_sums(hypothesis, scopes);
+        let corrected = match &moved {
+            Some(_) => None,
+            None => self.point_sums(hypothesis, scopes),
+        };
         let one = |scope: &Scope| {
             let scoped = Scoped {
                 hypothesis: *hypothesis,
                 scope: *scope,
             };
-            let score = match &sums {
-                Some(sums) => self.bounded(sums, *scope, enough),
-                None => self.fit(Some(&scoped)).score,
+            let score = match (&moved, &corrected) {
+                (Some(sums), _) => self.bounded(sums, *scope, enough),
+                (None, Some(sums)) if hypothesis.log_scale() == 0.0 => {
+                    self.bounded(sums, *scope, enough)
+                }
+                (None, Some(sums)) => self.of_density(self.combine(sums, *scope).1, &scoped),
+                (None, None) => self.fit(Some(&scoped)).score,
             };
             Scored { scoped, score }
         };
         scopes.iter().map(one).collect()
+    }
+
+    /// The sums under a hypothesis that changes measured points alone, in the recordings of the scopes.
+    fn point_sums(&self, h: &Hypothesis, scopes: &[Scope]) -> Option<Vec<Moments>> {
+        if !changes_points(h) {
+            return None;
+        }
+        let n = self.channels.len();
+        let mut sums = vec![Moments::ZERO; self.sums.len()];
+        for i in 0..self.data.readings.len() {
+            if !self.asked(scopes, i) {
+                continue;
+            }
+            let recording = self.data.recording[i].0;
+            let weights = &self.weights[i * n..(i + 1) * n];
+            for (k, channel) in self.channels.iter().enumerate() {
+                if weights[k] > 0.0 {
+                    let y = point(self.data, i, channel, Some(h)).unwrap_or_default();
+                    let pose = &self.poses[i * self.data.bodies.len() + channel.body];
+                    sums[recording * n + k].add(&(y - self.center), &pose.into(), weights[k]);
+                }
+            }
+        }
+        Some(sums)
+    }
+
+    /// −ln p(y) = N ln rms(z) − N_scaled ln s: the density of y, not that of z = s y.
+    fn of_density(&self, mut score: Score, scoped: &Scoped) -> Score {
+        let (mut scaled, mut all) = (0.0, 0.0);
+        let n = self.channels.len();
+        for (at, sum) in self.sums.iter().enumerate() {
+            let inside = scoped.scope.contains(RecordingIndex(at / n));
+            all += sum.w;
+            if inside && self.channels[at % n].scales {
+                scaled += sum.w;
+            }
+        }
+        score.score *= (-scoped.hypothesis.log_scale() * scaled / f64::max(all, 1.0)).exp();
+        score
     }
 
     /// Solves with the corrected sums inside the scope and the uncorrected ones outside.
@@ -290,9 +344,7 @@ impl<'a> Scan<'a> {
             let (registration, score) = self.solve(|r, k| &self.sums[r * n + k], &data);
             return self.finish(registration, score, &self.sums, &data, self.center);
         }
-        if scoped.hypothesis.point(&Vector3::zeros()).is_some()
-            || matches!(scoped.hypothesis, Hypothesis::Poses { .. })
-        {
+        if changes_points(&scoped.hypothesis) {
             return self.fit_points(scoped);
         }
         self.fit_corrected(&correct(scoped, self.data))
@@ -312,7 +364,7 @@ impl<'a> Scan<'a> {
     fn fit_points(&self, scoped: &Scoped) -> Fit {
         let n = self.channels.len();
         let mut points = vec![Vector3::zeros(); self.points.len()];
-        let (mut scaled, mut all) = (0.0, 0.0);
+        let mut all = 0.0;
         let mut center = Vector3::zeros();
         for i in 0..self.data.readings.len() {
             let inside = scoped.scope.contains(self.data.recording[i]);
@@ -326,7 +378,6 @@ impl<'a> Scan<'a> {
                 points[i * n + k] = y;
                 center += y * w;
                 all += w;
-                scaled += if inside && channel.scales { w } else { 0.0 };
             }
         }
         center /= f64::max(all, 1.0);
@@ -340,9 +391,8 @@ impl<'a> Scan<'a> {
                 &points,
             );
         }
-        let (registration, mut score) = self.solve(|r, k| &sums[r * n + k], self.data);
-        // −ln p(y) = N ln rms(z) − N_scaled ln s: the density of y, not that of z = s y
-        score.score *= (-scoped.hypothesis.log_scale() * scaled / f64::max(all, 1.0)).exp();
+        let (registration, score) = self.solve(|r, k| &sums[r * n + k], self.data);
+        let score = self.of_density(score, scoped);
         self.finish(registration, score, &sums, self.data, center)
     }
 
@@ -404,6 +454,11 @@ impl<'a> Scan<'a> {
             .sum();
         (w, 3.0 * w - 6.0 - 3.0 * points as f64)
     }
+}
+
+/// Whether a hypothesis is about what was measured, and not about readings or links.
+fn changes_points(h: &Hypothesis) -> bool {
+    h.point(&Vector3::zeros()).is_some() || matches!(h, Hypothesis::Poses { .. })
 }
 
 /// Data without rows, for what depends on bodies and recordings alone.

@@ -91,6 +91,10 @@ pub(crate) fn screen(data: &Data, corrections: &[Scoped]) -> Screened {
                 .iter()
                 .for_each(|&k| weights[sample.row * n + k] = w);
         }
+        // The next fit would be this one.
+        if weights == scan.weights {
+            break;
+        }
         scan.set_weights(weights);
     }
     only_minorities(data, &samples, &mut screened.samples);

@@ -45,17 +45,17 @@ fn tracker_moved(scope: Scope, data: &Data) -> Data {
             spread(&scan, &mut fit.points, known, &rest);
             fit
         } else {
-            scan.fit(None)
+            let fit = scan.fit(None);
+            if fit.score.rms > last * (1.0 - SETTLED) {
+                break;
+            }
+            last = fit.score.rms;
+            fit
         };
         let Some(new_from_old) = motion(&scan, &fit, &inside) else {
             break;
         };
         transform(&mut moved, &inside, &new_from_old);
-        let now = Scan::new(&moved, &[]).fit(None).score.rms;
-        if now > last * (1.0 - SETTLED) {
-            break;
-        }
-        last = now;
     }
     moved
 }

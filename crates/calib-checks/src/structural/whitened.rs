@@ -9,6 +9,8 @@ const PRISMATIC_NOISE: f64 = 0.06;
 
 /// D of the rows of one instant, its columns weighted, and Dᵀ of all columns.
 pub(super) struct JointNoise {
+    /// The joint of each column, and its weight.
+    joints: Vec<(usize, f64)>,
     d: DMatrix<f64>,
     /// DᵀD
     gram: DMatrix<f64>,
@@ -22,21 +24,63 @@ impl JointNoise {
         block: &DMatrix<f64>,
         by_reading: Vec<(usize, DVector<f64>)>,
     ) -> Self {
-        let columns: Vec<DVector<f64>> = by_reading
-            .into_iter()
-            .map(|(j, d)| d * noise_weight(chain, j).sqrt())
-            .collect();
-        let mut d = DMatrix::zeros(block.nrows(), columns.len());
-        for (k, column) in columns.iter().enumerate() {
-            d.set_column(k, column);
+        let weights = by_reading
+            .iter()
+            .map(|(j, _)| (*j, noise_weight(chain, *j).sqrt()));
+        let joints: Vec<(usize, f64)> = weights.collect();
+        let mut d = DMatrix::zeros(block.nrows(), joints.len());
+        for (k, (_, column)) in by_reading.iter().enumerate() {
+            d.column_mut(k).axpy(joints[k].1, column, 0.0);
         }
         // Products with a transpose have no fast kernel.
         let transposed = d.transpose();
         Self {
             gram: &transposed * &d,
             of_block: &transposed * block,
+            joints,
             d,
         }
+    }
+
+    /// Of joints 0, 1, … whose columns are `d`, with one weight.
+    #[cfg(test)]
+    pub(super) fn of_columns(d: &DMatrix<f64>, block: &DMatrix<f64>, weight: f64) -> Self {
+        let d = d * weight;
+        Self {
+            joints: (0..d.ncols()).map(|j| (j, weight)).collect(),
+            gram: d.tr_mul(&d),
+            of_block: d.tr_mul(block),
+            d,
+        }
+    }
+
+    /// The joints that move a point of this instant.
+    pub(super) fn joints(&self) -> impl Iterator<Item = usize> {
+        self.joints.iter().map(|(joint, _)| *joint)
+    }
+
+    /// The column of a joint; `None` where it moves no point.
+    pub(super) fn place(&self, joint: usize) -> Option<usize> {
+        self.joints().position(|j| j == joint)
+    }
+
+    /// Aᵀ V⁻¹ D and Dᵀ V⁻¹ D of the columns D without their weights, A the block; `None` where λ is not finite.
+    ///
+    /// ```text
+    /// V⁻¹ D = D (1 + λ DᵀD)⁻¹
+    /// ```
+    pub(super) fn whitened(&self, lambda: f64) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+        let joints = self.joints.len();
+        let inner = DMatrix::identity(joints, joints) + &self.gram * lambda;
+        let inverse = Cholesky::new(inner)?.inverse();
+        let mut with_block = self.of_block.tr_mul(&inverse);
+        let mut with_itself = &self.gram * inverse;
+        for (k, (_, weight)) in self.joints.iter().enumerate() {
+            with_block.column_mut(k).scale_mut(1.0 / weight);
+            with_itself.column_mut(k).scale_mut(1.0 / weight);
+            with_itself.row_mut(k).scale_mut(1.0 / weight);
+        }
+        Some((with_block, with_itself))
     }
 
     /// Fewer joints than coordinates.
@@ -61,11 +105,11 @@ pub(super) struct Whitened {
 }
 
 impl Whitened {
-    pub(super) fn new(lambda: f64, width: usize, first: usize) -> Self {
+    pub(super) fn new(lambda: f64, width: usize) -> Self {
         Self {
             lambda,
-            added: Tall::new(width, first),
-            subtracted: Tall::new(width, first),
+            added: Tall::new(width),
+            subtracted: Tall::new(width),
             log_det: 0.0,
         }
     }
@@ -115,8 +159,6 @@ fn inverse_root(of: DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
 pub(super) struct Tall {
     rows: DMatrix<f64>,
     filled: usize,
-    /// Columns before those of the tests.
-    first: usize,
     gram: DMatrix<f64>,
 }
 
@@ -124,11 +166,11 @@ impl Tall {
     /// Rows at a time: with a hundred columns they stay in the cache.
     const ROWS: usize = 128;
 
-    pub(super) fn new(width: usize, first: usize) -> Self {
+    /// The last column is the residual.
+    pub(super) fn new(width: usize) -> Self {
         Self {
             rows: DMatrix::zeros(Self::ROWS, width),
             filled: 0,
-            first,
             gram: DMatrix::zeros(width, width),
         }
     }
@@ -150,8 +192,9 @@ impl Tall {
         if self.filled > 0 {
             self.flush();
         }
-        let half = self.first / 2;
-        for (i, k) in (0..half).flat_map(|i| (half..self.first).map(move |k| (i, k))) {
+        let first = self.gram.ncols() - 1;
+        let half = first / 2;
+        for (i, k) in (0..half).flat_map(|i| (half..first).map(move |k| (i, k))) {
             self.gram[(k, i)] = self.gram[(i, k)];
         }
         self.gram
@@ -159,30 +202,22 @@ impl Tall {
 
     fn flush(&mut self) {
         let rows = self.rows.rows(0, self.filled);
-        let (first, last) = (self.first, rows.ncols() - 1);
+        let last = rows.ncols() - 1;
         // The product of a transpose has no fast kernel.
-        let transposed = rows.columns(0, first).transpose();
-        // Of the products of the first columns with each other, those of the later half with the earlier one are the earlier ones'.
-        let half = first / 2;
+        let transposed = rows.columns(0, last).transpose();
+        // Of the products of the columns with each other, those of the later half with the earlier one are the earlier ones'.
+        let half = last / 2;
         let mut upper = self.gram.rows_mut(0, half);
         upper.gemm(1.0, &transposed.rows(0, half), &rows, 1.0);
         let mut lower = self
             .gram
-            .view_mut((half, half), (first - half, last + 1 - half));
+            .view_mut((half, half), (last - half, last + 1 - half));
         let (left, right) = (
-            transposed.rows(half, first - half),
+            transposed.rows(half, last - half),
             rows.columns(half, last + 1 - half),
         );
         lower.gemm(1.0, &left, &right, 1.0);
-        // Tests are scored one by one.
-        let residual = rows.column(last);
-        for test in first..=last {
-            let own = rows.column(test);
-            self.gram[(test, last)] += own.dot(&residual);
-            if test < last {
-                self.gram[(test, test)] += own.norm_squared();
-            }
-        }
+        self.gram[(last, last)] += rows.column(last).norm_squared();
         self.filled = 0;
     }
 }
@@ -201,18 +236,14 @@ mod tests {
     /// Products by the inverse of V itself, for more and for fewer coordinates than joints.
     #[test]
     fn both_ways_are_the_inverse_of_the_covariance() {
-        let (width, first, lambda) = (9, 6, 0.7);
+        let (width, lambda) = (9, 0.7);
         for (rows, joints) in [(12, 4), (3, 5), (4, 4), (6, 0)] {
             let of = |i: usize, k: usize, a: f64| (a * (1 + i * 7 + k * 3) as f64).sin();
             let block = DMatrix::from_fn(rows, width, |i, k| of(i, k, 1.3));
             let d = DMatrix::from_fn(rows, joints, |i, k| of(i, k, 0.7));
-            let noise = JointNoise {
-                gram: d.tr_mul(&d),
-                of_block: d.tr_mul(&block),
-                d: d.clone(),
-            };
-            let mut whitened = Whitened::new(lambda, width, first);
-            let mut white = Tall::new(width, first);
+            let noise = JointNoise::of_columns(&d, &block, 1.0);
+            let mut whitened = Whitened::new(lambda, width);
+            let mut white = Tall::new(width);
             if noise.is_narrow() {
                 white.push(&block);
                 whitened.subtract(&noise);
@@ -226,9 +257,8 @@ mod tests {
             let expected = block.tr_mul(&(v.try_inverse().expect("regular") * &block));
             let last = width - 1;
             for (i, k) in (0..width).flat_map(|i| (0..width).map(move |k| (i, k))) {
-                // Of two tests there is no product, and what is symmetric is there once.
-                let there = i < first || k == last || (k == i && i < last);
-                if there {
+                // The products of the residual with the columns are there once.
+                if i < last || k == last {
                     let off = gram[(i, k)] - expected[(i, k)];
                     assert!(off.abs() < 1e-12, "{rows} {joints} {i} {k} {off:e}");
                 }

@@ -5,7 +5,7 @@
 //! ```
 
 use calib_geometry::statistics::quantile_nearest;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -37,12 +37,13 @@ impl Chance {
         const ABOVE: usize = 2;
         let count = levels.designs[0].columns.len();
         let tests = levels.tests();
+        let shifts: Vec<Vec<DMatrix<f64>>> = levels.designs.iter().map(shifts).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
         let all = settings.draws.max(20);
         let mut draws: Vec<Vec<f64>> = Vec::with_capacity(all);
         let mut draw = |draws: &mut Vec<Vec<f64>>, until: usize| {
             while draws.len() < until {
-                draws.push(largest(levels, &tests, &mut rng));
+                draws.push(largest(levels, &tests, &shifts, &mut rng));
             }
         };
         draw(&mut draws, FIRST.min(all));
@@ -78,7 +79,12 @@ fn excess(scores: &[f64], quantiles: &[f64]) -> f64 {
 }
 
 /// The largest T of every candidate in one simulated data set: drawn with the noise that was found, seen at every level.
-fn largest(levels: &Levels, tests: &[Vec<Vec<Test>>], rng: &mut ChaCha8Rng) -> Vec<f64> {
+fn largest(
+    levels: &Levels,
+    tests: &[Vec<Vec<Test>>],
+    shifts: &[Vec<DMatrix<f64>>],
+    rng: &mut ChaCha8Rng,
+) -> Vec<f64> {
     let own = &levels.designs[0];
     let rows = own.kept.iter().map(|kept| kept.a.nrows());
     let z: Vec<DVector<f64>> = rows
@@ -95,16 +101,17 @@ fn largest(levels: &Levels, tests: &[Vec<Vec<Test>>], rng: &mut ChaCha8Rng) -> V
     let drawn: Vec<Drawn> = levels
         .designs
         .iter()
+        .zip(shifts)
         .enumerate()
-        .map(|(level, design)| match level {
-            0 => drawn(design, &z, &priors),
+        .map(|(level, (design, shifts))| match level {
+            0 => drawn(design, shifts, &z, &priors),
             _ => {
                 // e = L₀ z, as this level whitens it.
                 let pairs = own.kept.iter().zip(&design.kept).zip(&z);
                 let z: Vec<DVector<f64>> = pairs
                     .map(|((own, kept), z)| &kept.l_inverse * (&own.l * z))
                     .collect();
-                drawn(design, &z, &priors)
+                drawn(design, shifts, &z, &priors)
             }
         })
         .collect();
@@ -114,8 +121,22 @@ fn largest(levels: &Levels, tests: &[Vec<Vec<Test>>], rng: &mut ChaCha8Rng) -> V
         .collect()
 }
 
+/// Eᵀ of all edges of a candidate, one below the other: one product instead of many.
+fn shifts(design: &Design) -> Vec<DMatrix<f64>> {
+    let n = design.covariance.nrows();
+    let of_candidate = |k: usize| {
+        let (sums, d) = (&design.cumulative[k], design.columns[k].len());
+        let mut all = DMatrix::zeros(sums.len() * d, n);
+        for (edge, sum) in sums.iter().enumerate() {
+            all.rows_mut(edge * d, d).tr_copy_from(&sum.e);
+        }
+        all
+    };
+    (0..design.columns.len()).map(of_candidate).collect()
+}
+
 /// F and U of equation (1) for residuals z of the samples and of the priors.
-fn drawn(design: &Design, z: &[DVector<f64>], priors: &[f64]) -> Drawn {
+fn drawn(design: &Design, shifts: &[DMatrix<f64>], z: &[DVector<f64>], priors: &[f64]) -> Drawn {
     let n = design.covariance.nrows();
     let mut g = DVector::zeros(n);
     let mut cost = 0.0;
@@ -145,8 +166,10 @@ fn drawn(design: &Design, z: &[DVector<f64>], priors: &[f64]) -> Drawn {
             Pattern::Constant => vec![own(&steps[0]), own(&steps[count])],
         };
         // U ← U + Eᵀ δ
-        for (u, sum) in u.iter_mut().zip(&design.cumulative[k]) {
-            *u += sum.e.tr_mul(&step);
+        let shift = &shifts[k] * &step;
+        let edges = design.cumulative[k].len();
+        for (u, edge) in u.iter_mut().zip(0..edges) {
+            *u += shift.rows(edge * u.len(), u.len());
         }
         u
     };

@@ -1,0 +1,168 @@
+//! Columns of the score tests: each is a reading times the derivative by a reading, so none is ever written out.
+//!
+//! ```text
+//! G_js = −q_s D_j  of a gain or coupling,   G = −Σ_j q̇_j D_j  of a lag                                (1)
+//! Dᵀ V⁻¹ A = (1 + λ DᵀD)⁻¹ Dᵀ A,            V = 1 + λ D Dᵀ                                            (2)
+//! ```
+//!
+//! (2) is computed once for an instant; the products of every test with the other columns are multiples of its rows.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::ids::{JointIndex, RecordingIndex};
+use super::whitened::JointNoise;
+
+/// One test.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Test {
+    /// `reading_joint += k · reading_source`.
+    Reading {
+        joint: JointIndex,
+        source: JointIndex,
+    },
+    /// Every reading of the recording as it was k seconds later.
+    Lag { recording: RecordingIndex },
+}
+
+/// What the columns of an instant's tests depend on.
+pub(super) struct Instant<'a> {
+    pub readings: &'a [f64],
+    pub recording: RecordingIndex,
+    /// Of the readings, per second; `None` where they are not known.
+    pub rates: Option<&'a [f64]>,
+}
+
+/// Products of the tests' columns with the others and with themselves, as they grow.
+pub(super) struct TestedSums<'a> {
+    lambda: f64,
+    tests: &'a [Test],
+    /// Columns of the model and the residual × tests.
+    cross: DMatrix<f64>,
+    own: DVector<f64>,
+}
+
+impl<'a> TestedSums<'a> {
+    pub(super) fn new(lambda: f64, width: usize, tests: &'a [Test]) -> Self {
+        Self {
+            lambda,
+            tests,
+            cross: DMatrix::zeros(width, tests.len()),
+            own: DVector::zeros(tests.len()),
+        }
+    }
+
+    /// Adds the rows of one instant.
+    pub(super) fn add(&mut self, noise: &JointNoise, instant: &Instant<'_>) {
+        if self.tests.is_empty() {
+            return;
+        }
+        let Some((with_block, with_itself)) = noise.whitened(self.lambda) else {
+            return;
+        };
+        for (t, test) in self.tests.iter().enumerate() {
+            match test {
+                Test::Reading { joint, source } => {
+                    let by = -instant.readings[source.0];
+                    let Some(j) = noise.place(joint.0).filter(|_| by != 0.0) else {
+                        continue;
+                    };
+                    let column = with_block.column(j);
+                    self.cross.column_mut(t).axpy(by, &column, 1.0);
+                    self.own[t] += by * by * with_itself[(j, j)];
+                }
+                Test::Lag { recording } if instant.recording == *recording => {
+                    let Some(rates) = instant.rates else {
+                        continue;
+                    };
+                    let rates = noise
+                        .joints()
+                        .map(|j| -rates.get(j).copied().unwrap_or(0.0));
+                    let rates = DVector::from_iterator(with_itself.nrows(), rates);
+                    let column = &with_block * &rates;
+                    self.cross.column_mut(t).axpy(1.0, &column, 1.0);
+                    self.own[t] += rates.dot(&(&with_itself * &rates));
+                }
+                Test::Lag { .. } => {}
+            }
+        }
+    }
+
+    /// The products of all columns, the tests before the residual; of two tests there is none.
+    pub(super) fn beside(&self, gram: &DMatrix<f64>) -> DMatrix<f64> {
+        let (p, tests) = (gram.ncols() - 1, self.tests.len());
+        let last = p + tests;
+        let mut out = DMatrix::zeros(last + 1, last + 1);
+        out.view_mut((0, 0), (p, p))
+            .copy_from(&gram.view((0, 0), (p, p)));
+        out.view_mut((0, last), (p, 1))
+            .copy_from(&gram.view((0, p), (p, 1)));
+        out[(last, last)] = gram[(p, p)];
+        out.view_mut((0, p), (p, tests))
+            .copy_from(&self.cross.rows(0, p));
+        for t in 0..tests {
+            out[(p + t, p + t)] = self.own[t];
+            out[(p + t, last)] = self.cross[(p, t)];
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The columns written out, by the inverse of V itself.
+    #[test]
+    fn sums_are_those_of_the_columns() {
+        let (width, joints, instants) = (6, 3, 5);
+        let of = |i: usize, k: usize, a: f64| (a * (1 + i * 7 + k * 3) as f64).sin();
+        let mut tests: Vec<Test> = (0..joints)
+            .flat_map(|j| (0..joints).map(move |s| (JointIndex(j), JointIndex(s))))
+            .map(|(joint, source)| Test::Reading { joint, source })
+            .collect();
+        let recordings = [RecordingIndex(0), RecordingIndex(1)];
+        tests.extend(recordings.map(|recording| Test::Lag { recording }));
+        for (rows, lambda, weight) in [(3, 0.7, 1.0), (12, 0.7, 0.06), (6, 0.0, 1.0)] {
+            let mut sums = TestedSums::new(lambda, width, &tests);
+            let mut expected = DMatrix::<f64>::zeros(width, tests.len());
+            let mut own = DVector::<f64>::zeros(tests.len());
+            for n in 0..instants {
+                let block = DMatrix::from_fn(rows, width, |i, k| of(i, k, 1.3 + n as f64));
+                let d = DMatrix::from_fn(rows, joints, |i, k| of(i, k, 0.7 + n as f64));
+                let readings: Vec<f64> = (0..joints).map(|k| of(n, k, 0.4)).collect();
+                let rates: Vec<f64> = (0..joints).map(|k| of(n, k, 0.9)).collect();
+                let instant = Instant {
+                    readings: &readings,
+                    recording: recordings[n % 2],
+                    rates: (n != 4).then_some(rates.as_slice()),
+                };
+                sums.add(&JointNoise::of_columns(&d, &block, weight), &instant);
+                let noise = &d * d.transpose() * (lambda * weight * weight);
+                let v = DMatrix::identity(rows, rows) + noise;
+                let inverse = v.try_inverse().expect("regular");
+                for (t, test) in tests.iter().enumerate() {
+                    let column: DVector<f64> = match test {
+                        Test::Reading { joint, source } => d.column(joint.0) * -readings[source.0],
+                        Test::Lag { recording } if recording.0 == n % 2 && n != 4 => {
+                            &d * -DVector::from_column_slice(&rates)
+                        }
+                        Test::Lag { .. } => DVector::zeros(rows),
+                    };
+                    let whitened = &inverse * &column;
+                    expected.column_mut(t).gemv_tr(1.0, &block, &whitened, 1.0);
+                    own[t] += column.dot(&whitened);
+                }
+            }
+            let all = sums.beside(&DMatrix::identity(width, width));
+            let (p, last) = (width - 1, width - 1 + tests.len());
+            for t in 0..tests.len() {
+                for i in 0..p {
+                    assert!((all[(i, p + t)] - expected[(i, t)]).abs() < 1e-11);
+                }
+                assert!((all[(p + t, last)] - expected[(p, t)]).abs() < 1e-11);
+                assert!((all[(p + t, p + t)] - own[t]).abs() < 1e-11);
+            }
+            assert_eq!(all[(last, last)], 1.0);
+        }
+    }
+}
