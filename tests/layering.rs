@@ -32,6 +32,7 @@ const LAYERS: &[(&str, u8)] = &[
     ("calib-apply", 5),
     ("calib-drift", 5),
     ("calib-fit", 5),
+    ("calib-fleet", 6),
     ("calib-init", 6),
     ("calib-plan", 6),
     ("calib-study", 6),

@@ -15,6 +15,7 @@ mod drift;
 mod effects;
 mod facts;
 mod fit;
+mod fleet;
 mod hostile;
 mod hygiene;
 mod init;

@@ -40,14 +40,14 @@ if command -v npm >/dev/null && (cd "$folder" && npm install --no-audit --no-fun
     && program axe "node \"$folder/axe.js\" \"$browser\""
 fi
 
-# A Python with what reads exports: MuJoCo the MJCF, Pinocchio the URDF, an independent OPW the parameters of six-axis arms.
+# A Python with what reads outputs: MuJoCo the MJCF, Pinocchio the URDF, an independent OPW the parameters of six-axis arms, Arrow tables.
 if command -v python3 >/dev/null && python3 -m venv "$folder/python" >>"$folder/install.log" 2>&1; then
-  for checker in mujoco:mujoco==4.0.0 pinocchio:pin==4.1.0 opw:py-opw-kinematics==1.3.0; do
+  for checker in mujoco:mujoco==4.0.0 pinocchio:pin==4.1.0 opw:py-opw-kinematics==1.3.0 pyarrow:pyarrow==26.0.1; do
     "$folder/python/bin/pip" install -q "${checker#*:}" >>"$folder/install.log" 2>&1 \
       && program "${checker%%:*}" "\"$folder/python/bin/python\""
   done
 fi
 
-for checker in urdf sdf gltf mcap html axe mujoco pinocchio opw; do
+for checker in urdf sdf gltf mcap html axe mujoco pinocchio opw pyarrow; do
   [ -x "$folder/$checker" ] && echo "$checker" || echo "no checker of $checker here"
 done

@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    apply, check, completions, convert, correct, diff, drift, export, fit, history, init, man,
-    plan, plugins, predict, record, revert, run, schema, simulate, study, twin, view,
+    apply, batch, check, completions, convert, correct, diff, drift, export, fit, history, init,
+    man, merge, plan, plugins, predict, record, revert, run, schema, simulate, study, twin, view,
 };
 use crate::terminal::Console;
 
@@ -29,6 +29,8 @@ pub struct Arguments {
 pub enum Command {
     /// Calibrate: from recordings to a patched URDF, a scene and a report
     Run(run::Run),
+    /// Calibrate many robots: a row for each, and which joint drifts in which series
+    Batch(batch::BatchArguments),
     /// Show the report of a folder of results
     View(view::View),
     /// Write the first profile of a robot: from its URDF and any recordings, with the evidence for every guess
@@ -62,6 +64,8 @@ pub enum Command {
     Revert(revert::Revert),
     /// Simulation studies of the estimators, with the Cramér–Rao bound in every cell
     Study(study::StudyRun),
+    /// Merge the shards of a study, a twin or a batch into one file
+    Merge(merge::Merge),
     /// Record a sweep from a live tracker, guided from pose to pose
     Record(record::Record),
     /// Convert a recording to calib's CSV

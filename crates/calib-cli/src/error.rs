@@ -8,6 +8,8 @@ use calib_drift::DriftError;
 use calib_export::ExportError;
 use calib_files::FileError;
 use calib_fit::FitError;
+use calib_fleet::FleetError;
+use calib_fleet::batch::BatchError;
 use calib_init::InitError;
 use calib_pipeline::{ExitCode, PipelineError};
 use calib_plan::PlanError;
@@ -85,6 +87,17 @@ pub enum CliError {
         "--plugin is for the studies of estimators\n  help: calib study cor|aor --plugin PLUGIN; plugins of a profile are named in it"
     )]
     NoEstimatorStudied,
+    /// Of `calib batch`.
+    #[error(transparent)]
+    Batch(BatchError),
+    /// Of work that is divided into shards.
+    #[error(transparent)]
+    Fleet(#[from] FleetError),
+    /// A study of a robot is not divided.
+    #[error(
+        "--shard and --from are for the studies cor, aor and faults\n  help: leave them out; `--trials` and `--seed` divide a study of a robot"
+    )]
+    NotDivided,
     /// A file was not written.
     #[error(transparent)]
     File(#[from] FileError),
@@ -151,6 +164,22 @@ pub enum CliError {
     Stdout(std::io::Error),
 }
 
+// Not a `#[from]`: what is wrong with a shard or a file is the same error in every command.
+impl From<BatchError> for CliError {
+    fn from(error: BatchError) -> Self {
+        match error {
+            BatchError::Work(error) => Self::Fleet(error),
+            error => Self::Batch(error),
+        }
+    }
+}
+
+impl From<calib_fleet::ShardError> for CliError {
+    fn from(error: calib_fleet::ShardError) -> Self {
+        Self::Fleet(error.into())
+    }
+}
+
 // Not a `#[from]`: a file that cannot be written is the same error in every command.
 impl From<NewProjectError> for CliError {
     fn from(error: NewProjectError) -> Self {
@@ -170,6 +199,8 @@ impl CliError {
             Self::Plan(error) => error.exit_code(),
             Self::Init(error) => error.exit_code(),
             Self::Twin(error) => error.exit_code(),
+            Self::Fleet(error) => error.exit_code(),
+            Self::Batch(error) => error.exit_code(),
             Self::Export(
                 ExportError::Name { .. } | ExportError::Tool { .. } | ExportError::Unfit { .. },
             ) => ExitCode::Usage,
@@ -203,6 +234,7 @@ impl CliError {
             | Self::Record(_)
             | Self::View(_)
             | Self::NoEstimatorStudied
+            | Self::NotDivided
             | Self::NewPlugin(_) => ExitCode::Usage,
         }
     }

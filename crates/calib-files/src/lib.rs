@@ -12,6 +12,7 @@ mod output;
 mod results;
 mod staged;
 mod state;
+mod stream;
 #[cfg(test)]
 mod walk;
 
@@ -22,3 +23,4 @@ pub use name::{LONGEST_NAME, MANIFEST, NameFault, check_name};
 pub use output::{new_folder, remove, replace, resume, start, write_new};
 pub use results::{ResultsFolder, is_unfinished, write_results};
 pub use state::StateFile;
+pub use stream::{Pieces, write_pieces};

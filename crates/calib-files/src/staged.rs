@@ -25,6 +25,14 @@ pub(crate) struct Staged {
 impl Staged {
     /// Writes a file into the folder under a name of its own.
     pub(crate) fn file(folder: &Path, bytes: &[u8]) -> Result<Self> {
+        Self::filled(folder, |file| disk::write(file, bytes))
+    }
+
+    /// The same with bytes that `fill` writes piece by piece.
+    pub(crate) fn filled<E: From<Error>>(
+        folder: &Path,
+        fill: impl FnOnce(&mut File) -> std::result::Result<(), E>,
+    ) -> std::result::Result<Self, E> {
         let (path, mut file) = unique(folder, |path| {
             let file = disk::create_new(path)?;
             locked(path, &file).map(|()| file)
@@ -35,7 +43,7 @@ impl Staged {
             held: None,
             placed: false,
         };
-        let done = disk::write(&mut file, bytes).and_then(|()| disk::sync(&file));
+        let done = fill(&mut file).and_then(|()| Ok(disk::sync(&file)?));
         staged.held = Some(file);
         done.map(|()| staged)
     }

@@ -152,6 +152,16 @@ fn single_files_survive_every_fault() {
         }
         start(&path, text.as_bytes()).map(drop)
     };
+    let pieces = |folder: &Path| {
+        crate::write_pieces(&folder.join("x/p.bin"), |sink| {
+            let path = folder.join("x/p.bin");
+            let write = |source| FileError::Write { path, source };
+            let written = ["first ", "second ", "third"]
+                .iter()
+                .try_for_each(|piece| std::io::Write::write_all(sink, piece.as_bytes()));
+            written.map_err(write)
+        })
+    };
     let project = |folder: &Path| {
         let files = [
             OutputFile::text("src/lib.rs", "//!"),
@@ -165,7 +175,8 @@ fn single_files_survive_every_fault() {
     let mut points = walk(&nothing, &new);
     points += walk(&one, &over) + walk(&nothing, &over) + walk(&one, &gone);
     points += walk(&nothing, &begun) + walk(&nothing, &project);
-    assert!(points > 50, "{points} points");
+    points += walk(&nothing, &pieces);
+    assert!(points > 60, "{points} points");
 }
 
 #[test]

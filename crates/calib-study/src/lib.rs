@@ -40,6 +40,7 @@ mod settings;
 mod state;
 mod tally;
 mod tried;
+mod units;
 
 pub use cell::{Cell, Part, Quantity, Scene};
 pub use claims::{Claim, Measured};
@@ -48,3 +49,4 @@ pub use render::{Figure, csv, json, long_tables, markdown, svg, write};
 pub use run::{StudyResult, run, run_with};
 pub use settings::{Study, StudyError, StudyOptions};
 pub use tried::Tried;
+pub use units::Units;

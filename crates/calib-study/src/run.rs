@@ -113,10 +113,20 @@ pub fn run_with(
     let order: Vec<String> = plan.iter().map(|e| e.scene().id()).collect();
     lock(&state).close(&order, &cells)?;
 
+    Ok(result(study, tried, options, cells))
+}
+
+/// The study from the cells of its scenes, in the order of the plan.
+pub(crate) fn result(
+    study: Study,
+    tried: &Tried,
+    options: &StudyOptions,
+    cells: Vec<Vec<Cell>>,
+) -> StudyResult {
     let cells: Vec<Cell> = cells.into_iter().flatten().collect();
     let own = cells.iter().filter(|c| !c.from_plugin);
     let own: Vec<Cell> = own.cloned().collect();
-    Ok(StudyResult {
+    StudyResult {
         calib_study: 1,
         plugins: tried.names(),
         study,
@@ -126,11 +136,11 @@ pub fn run_with(
         standards: held::standards(study, &own),
         claims: claims::claims(study, &own),
         cells,
-    })
+    }
 }
 
 /// The scenes of a study, in the order of its report.
-fn plan(study: Study, tried: &Tried) -> Vec<Box<dyn Experiment>> {
+pub(crate) fn plan(study: Study, tried: &Tried) -> Vec<Box<dyn Experiment>> {
     match study {
         Study::Cor => cor::plan(tried),
         Study::Aor => aor::plan(tried),
@@ -138,7 +148,7 @@ fn plan(study: Study, tried: &Tried) -> Vec<Box<dyn Experiment>> {
 }
 
 /// All trials of one scene.
-fn cells_of(
+pub(crate) fn cells_of(
     experiment: &dyn Experiment,
     id: &str,
     options: &StudyOptions,

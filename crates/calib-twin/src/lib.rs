@@ -28,7 +28,7 @@ pub use note::Note;
 pub use session::Session;
 pub use source::{Source, profile_of, session};
 pub use truth::About;
-pub use twin::{Options, Twin, twin};
+pub use twin::{Options, Twin, settings_text, twin, twin_of};
 
 /// The README's example is a test.
 #[cfg(doctest)]

@@ -77,6 +77,12 @@ impl State {
         Ok(state)
     }
 
+    /// Takes trials that were made elsewhere for finished ones.
+    pub fn take(&mut self, trials: Vec<Trial>) {
+        let numbered = trials.into_iter().map(|trial| (trial.number, trial));
+        self.trials.extend(numbered);
+    }
+
     /// A trial that is finished.
     #[must_use]
     pub fn trial(&self, number: u64) -> Option<Trial> {

@@ -117,6 +117,20 @@ pub fn twin(
     options: &Options,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Twin, TwinError> {
+    twin_of(session, source, options, Vec::new(), progress)
+}
+
+/// As [`twin`], with trials without faults that were made elsewhere, each by [`Session::trial`] with the seed and noise of `options`.
+///
+/// # Errors
+/// As [`twin`].
+pub fn twin_of(
+    session: &Session,
+    source: Source,
+    options: &Options,
+    made: Vec<Trial>,
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<Twin, TwinError> {
     if options.trials == 0 {
         return Err(TwinError::NoTrials);
     }
@@ -124,7 +138,8 @@ pub fn twin(
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|source| TwinError::Threads { threads, source })?;
     let settings = settings(session, options);
-    let state = State::open(options.out.as_deref(), &settings, options.resume)?;
+    let mut state = State::open(options.out.as_deref(), &settings, options.resume)?;
+    state.take(made);
     let bodies = slip::bodies(session);
     let slips = (options.trials / SLIPS_PER).min(SLIPS) * bodies.len() as u64;
     let with_effects = options.trials / EFFECTS_PER;
@@ -190,6 +205,14 @@ pub fn twin(
         curve: curve(session, options.seed, options.sigma),
         notes,
     })
+}
+
+/// Everything that the trials depend on besides their number, as one text.
+///
+/// # Errors
+/// [`TwinError::Unwritable`].
+pub fn settings_text(session: &Session, options: &Options) -> Result<String, TwinError> {
+    Ok(serde_json::to_string(&settings(session, options))?)
 }
 
 fn settings(session: &Session, options: &Options) -> Settings {

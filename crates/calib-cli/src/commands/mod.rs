@@ -1,6 +1,7 @@
 //! One file for each command: its arguments, and what it does with them.
 
 pub mod apply;
+pub mod batch;
 pub mod check;
 pub mod completions;
 pub mod convert;
@@ -12,6 +13,7 @@ pub mod fit;
 pub mod history;
 pub mod init;
 pub mod man;
+pub mod merge;
 mod names;
 pub mod plan;
 mod plan_file;
@@ -22,6 +24,7 @@ pub mod record;
 pub mod revert;
 pub mod run;
 pub mod schema;
+mod shard_options;
 pub mod simulate;
 pub mod study;
 pub mod twin;
@@ -38,6 +41,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
     let console = &arguments.console;
     match &arguments.command {
         Command::Run(options) => run::run(console, options),
+        Command::Batch(options) => batch::run(console, options),
         Command::Init(options) => init::run(console, options),
         Command::Check(options) => check::run(console.color, options),
         Command::Plan(options) => plan::run(console, options),
@@ -53,6 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, CliError> {
         Command::History(options) => history::run(options),
         Command::Revert(options) => revert::run(console, options),
         Command::Study(options) => study::run(console, options),
+        Command::Merge(options) => merge::run(console, options),
         Command::Record(options) => record::run(console, options),
         Command::Convert(options) => convert::run(console, options),
         Command::Plugins(options) => plugins::run(console, options),

@@ -3,12 +3,15 @@
 use std::path::PathBuf;
 
 use calib_files::{OutputFile, write_results};
+use calib_fleet::shard::{Identity, Shard};
+use calib_fleet::work::{Unit, results};
 use calib_pipeline::{ExitCode, PipelineError};
 use calib_plugin::Tables;
-use calib_study::{Study, StudyOptions, Tried, cases, faults};
+use calib_study::{Study, StudyOptions, Tried, Units, cases, faults};
 use clap::{Args, ValueEnum};
 
 use super::plugin_options::{NamedPlugins, PluginOptions};
+use super::shard_options::{Making, ShardOptions, identity, make};
 use crate::error::CliError;
 use crate::terminal::{Console, Counted, emit, emit_written};
 
@@ -42,6 +45,9 @@ pub struct StudyRun {
     /// Which plugins are loaded
     #[command(flatten)]
     plugins: PluginOptions,
+    /// Which part of the work is done here [cor, aor, faults]
+    #[command(flatten)]
+    shards: ShardOptions,
     /// Estimators of plugins to try beside the built-in ones [cor, aor]
     #[command(flatten)]
     named: NamedPlugins,
@@ -71,12 +77,37 @@ pub fn run(console: &Console, study: &StudyRun) -> Result<ExitCode, CliError> {
     if !of_estimators && !study.named.plugin.is_empty() {
         return Err(CliError::NoEstimatorStudied);
     }
+    let of_robots = matches!(study.study, StudyName::Justin | StudyName::Ripley);
+    if of_robots && (study.shards.shard.is_some() || study.shards.from.is_some()) {
+        return Err(CliError::NotDivided);
+    }
     match study.study {
         StudyName::Cor => estimators(console, study, Study::Cor),
         StudyName::Aor => estimators(console, study, Study::Aor),
         StudyName::Justin => robots(console, study, "justin"),
         StudyName::Ripley => robots(console, study, "ripley"),
         StudyName::Faults => of_faults(console, study),
+    }
+}
+
+impl StudyRun {
+    /// A part of the study.
+    fn make(
+        &self,
+        console: &Console,
+        (shard, identity, counted): (Shard, &Identity, &'static str),
+        one: Unit<'_>,
+    ) -> Result<ExitCode, CliError> {
+        let out = self.out.clone();
+        let out = out.unwrap_or_else(|| PathBuf::from("results").join(&identity.kind));
+        let making = Making {
+            identity,
+            out: &out,
+            resume: !self.restart,
+            threads: self.threads,
+            counted,
+        };
+        make(console, shard, &making, one)
     }
 }
 
@@ -95,10 +126,25 @@ fn estimators(console: &Console, study: &StudyRun, which: Study) -> Result<ExitC
     let added = tables.add_named(&study.named.plugin);
     let tried = added.and_then(|()| Tried::of(&tables, &study.named.parameter));
     let tried = tried.map_err(PipelineError::from)?;
-    let bar = Counted::new(console, "trials");
-    let progress = |done, total| bar.at(done, total);
-    let result = calib_study::run_with(which, &tried, &options, &progress)?;
-    bar.end();
+    let units = Units::new(which, &tried, &options)?;
+    let work = || identity(which.word(), options.seed, units.count(), &units.settings());
+    if let Some(shard) = study.shards.shard {
+        let one = |unit| {
+            let (name, cells) = units.one(unit).unwrap_or_default();
+            Ok((name, serde_json::to_string(&cells)?))
+        };
+        return study.make(console, (shard, &work(), "scenes"), &one);
+    }
+    let result = match &study.shards.from {
+        Some(file) => units.result(results(file, &work())?),
+        None => {
+            let bar = Counted::new(console, "trials");
+            let progress = |done, total| bar.at(done, total);
+            let result = calib_study::run_with(which, &tried, &options, &progress)?;
+            bar.end();
+            result
+        }
+    };
     emit(&if study.json {
         calib_study::json(&result)
     } else {
@@ -161,9 +207,26 @@ fn of_faults(console: &Console, study: &StudyRun) -> Result<ExitCode, CliError> 
         resume: !study.restart,
         only: Vec::new(),
     };
-    let bar = Counted::new(console, "cases");
-    let result = faults::run_faults(&options, &|done, total| bar.at(done, total))?;
-    bar.end();
+    let units = faults::Units::new(&options)?;
+    let work = || identity("faults", options.seed, units.count(), &units.settings());
+    if let Some(shard) = study.shards.shard {
+        let one = |unit| {
+            let case = units.one(unit);
+            let name = case.as_ref().map(|(name, _)| name.clone());
+            let result = serde_json::to_string(&case.map(|(_, result)| result))?;
+            Ok((name.unwrap_or_default(), result))
+        };
+        return study.make(console, (shard, &work(), "cases"), &one);
+    }
+    let result = match &study.shards.from {
+        Some(file) => units.result(results(file, &work())?),
+        None => {
+            let bar = Counted::new(console, "cases");
+            let result = faults::run_faults(&options, &|done, total| bar.at(done, total))?;
+            bar.end();
+            result
+        }
+    };
     let json = faults::json(&result)?;
     let text = faults::markdown(&result);
     emit(if study.json { &json } else { &text })?;

@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use calib_files::ResultsFolder;
+use calib_fleet::work::results;
 use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::load::load_robot;
-use calib_twin::{About, Options, profile_of, session, terminal, twin, write};
+use calib_twin::{About, Options, profile_of, session, settings_text, terminal, twin_of, write};
 use clap::{Args, ValueEnum};
 
 use super::plan_file::plan_of;
 use super::plugin_options::PluginOptions;
+use super::shard_options::{Making, ShardOptions, identity, make};
 use crate::error::CliError;
 use crate::terminal::{Console, Counted, emit};
 
@@ -46,6 +48,9 @@ pub struct TwinArguments {
     /// Start over instead of continuing
     #[arg(long)]
     restart: bool,
+    /// Which part of the work is done here
+    #[command(flatten)]
+    shards: ShardOptions,
     /// Which plugins are loaded
     #[command(flatten)]
     plugins: PluginOptions,
@@ -77,7 +82,9 @@ pub fn run(console: &Console, options: &TwinArguments) -> Result<ExitCode, CliEr
         .out
         .clone()
         .unwrap_or_else(|| default_folder(&profile));
-    let folder = ResultsFolder::open(&out)?;
+    // A shard locks a folder of its own.
+    let whole = options.shards.shard.is_none();
+    let folder = whole.then(|| ResultsFolder::open(&out)).transpose()?;
     let plan = options.plan.as_ref().map(|path| plan_of(path, &robot));
     let about = options.truth.map(|truth| match truth {
         TruthName::Found => About::Found,
@@ -94,10 +101,35 @@ pub fn run(console: &Console, options: &TwinArguments) -> Result<ExitCode, CliEr
         out: Some(out.clone()),
         resume: !options.restart,
     };
+    let work = || -> Result<_, CliError> {
+        let settings = settings_text(&session, &asked)?;
+        Ok(identity("twin", asked.seed, asked.trials, &settings))
+    };
+    if let Some(shard) = options.shards.shard {
+        let one = |unit| {
+            let trial = session.trial(asked.seed, unit, asked.noise);
+            Ok((unit.to_string(), serde_json::to_string(&trial)?))
+        };
+        let making = Making {
+            identity: &work()?,
+            out: &out,
+            resume: asked.resume,
+            threads: asked.threads,
+            counted: "trials",
+        };
+        return make(console, shard, &making, &one);
+    }
+    let made = match &options.shards.from {
+        Some(file) => results(file, &work()?)?,
+        None => Vec::new(),
+    };
     let bar = Counted::new(console, "trials");
-    let found = twin(&session, source, &asked, &|done, total| bar.at(done, total))?;
+    let progress = |done, total| bar.at(done, total);
+    let found = twin_of(&session, source, &asked, made, &progress)?;
     bar.end();
-    folder.write(&write::files(&found)?)?;
+    if let Some(folder) = folder {
+        folder.write(&write::files(&found)?)?;
+    }
     emit(&match (console.json, console.quiet) {
         (true, _) => write::json(&found)?,
         (false, true) => terminal::line(&found),

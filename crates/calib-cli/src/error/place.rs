@@ -6,6 +6,7 @@ use calib_apply::ApplyError;
 use calib_drift::DriftError;
 use calib_export::ExportError;
 use calib_files::FileError;
+use calib_fleet::FleetError;
 use calib_init::InitError;
 use calib_pipeline::PipelineError;
 use calib_plan::PlanError;
@@ -77,7 +78,12 @@ impl CliError {
             Self::Table { .. } => "table-not-written",
             Self::Simulation { .. } => "simulation",
             Self::Json { .. } | Self::Report(_) => "report-not-written",
-            Self::Study(_) | Self::Cases(_) | Self::NoEstimatorStudied => "study",
+            Self::Fleet(FleetError::File(error)) => of_file(error),
+            Self::Fleet(FleetError::Shard(_) | FleetError::Missing { .. }) => "shard",
+            Self::Fleet(_) | Self::Batch(_) => "fleet",
+            Self::Study(_) | Self::Cases(_) | Self::NoEstimatorStudied | Self::NotDivided => {
+                "study"
+            }
             Self::Record(_) => "record",
             Self::View(_) => "view",
             Self::Capture(_) => "capture",
@@ -107,6 +113,8 @@ impl CliError {
             Self::Plan(error) => Place::of(error.file()?.to_owned()),
             Self::Apply(ApplyError::Read(error)) => place_of_urdf(error)?,
             Self::Apply(ApplyError::File(error)) | Self::File(error) => place_of_file(error)?,
+            Self::Fleet(error) => Place::path(error.path()?),
+            Self::Batch(error) => Place::path(error.path()?),
             Self::Drift(DriftError::Report(error)) => Place::path(error.path()),
             Self::Export(ExportError::Table(error)) => place_of_recording(error),
             Self::Export(error) => {
@@ -131,7 +139,8 @@ impl CliError {
     }
 }
 
-fn of_pipeline(error: &PipelineError) -> &'static str {
+/// The id of an error of a run.
+pub fn of_pipeline(error: &PipelineError) -> &'static str {
     match error {
         PipelineError::Read { .. } => "file-not-read",
         PipelineError::NotText { .. } => "not-text",

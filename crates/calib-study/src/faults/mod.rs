@@ -28,6 +28,7 @@ mod run;
 mod settings;
 mod state;
 mod true_error;
+mod units;
 mod words;
 
 pub use case::Cell;
@@ -38,3 +39,4 @@ pub use render::{csv, json, markdown};
 pub use robot::Errors;
 pub use run::{FaultResult, run_faults};
 pub use settings::FaultOptions;
+pub use units::Units;

@@ -73,17 +73,7 @@ pub fn run_faults(
     if options.cases == 0 {
         return Err(StudyError::NoTrials { got: 0 });
     }
-    let clean = |cell: &Cell| {
-        if cell.fault.class() == Class::Clean {
-            4
-        } else {
-            1
-        }
-    };
-    let plan: Vec<(Cell, u64)> = matrix(&options.only)
-        .into_iter()
-        .flat_map(|cell| (0..options.cases * clean(&cell)).map(move |k| (cell, k)))
-        .collect();
+    let plan = plan(options);
     let state = Mutex::new(State::open(options)?);
     let threads = options.threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new()
@@ -112,10 +102,30 @@ pub fn run_faults(
             .collect::<Result<Vec<_>, StudyError>>()
     })?;
     lock().close(&results)?;
-    Ok(FaultResult {
+    Ok(result(options, results))
+}
+
+/// The study from its cases, in the order of the matrix.
+pub(super) fn result(options: &FaultOptions, results: Vec<CaseResult>) -> FaultResult {
+    FaultResult {
         calib_fault_study: 3,
         seed: options.seed,
         cases: options.cases,
         results,
-    })
+    }
+}
+
+/// Every case, in the order of the matrix.
+pub(super) fn plan(options: &FaultOptions) -> Vec<(Cell, u64)> {
+    let clean = |cell: &Cell| {
+        if cell.fault.class() == Class::Clean {
+            4
+        } else {
+            1
+        }
+    };
+    matrix(&options.only)
+        .into_iter()
+        .flat_map(|cell| (0..options.cases * clean(&cell)).map(move |k| (cell, k)))
+        .collect()
 }

@@ -1,0 +1,45 @@
+//! What a terminal shows of a fleet.
+
+use std::fmt::Write as _;
+
+use super::summary::Summary;
+
+/// Robots that are named, at the most: the others stand in the table.
+const NAMED: usize = 20;
+
+/// The fleet in some lines.
+#[must_use]
+pub fn text(summary: &Summary) -> String {
+    let mut out = String::new();
+    let counts = summary.verdicts.iter();
+    let counts = counts.map(|(verdict, n)| format!("{n} {}", verdict.replace('_', " ")));
+    let counts: Vec<String> = counts.collect();
+    // Writing to a String does not fail.
+    let _ = writeln!(out, "{} robots: {}", summary.robots, counts.join(", "));
+    for (id, n) in &summary.failures {
+        let _ = writeln!(out, "  {n} without a result: {id}");
+    }
+    let drift = &summary.drift;
+    let familywise = drift.alarms.iter().filter(|a| a.familywise).count();
+    let _ = writeln!(
+        out,
+        "{} compared with their last calibration: {} changed (false alarms: 1 % of robots), {familywise} of them at 1 % for the whole fleet",
+        drift.compared,
+        drift.alarms.len(),
+    );
+    for alarm in drift.alarms.iter().filter(|a| a.familywise).take(NAMED) {
+        let joint = alarm.joint.as_deref().unwrap_or("no single joint");
+        let _ = writeln!(out, "  {} ({}): {joint}", alarm.name, alarm.series);
+    }
+    if familywise > NAMED {
+        let _ = writeln!(out, "  and {} more, in fleet.csv", familywise - NAMED);
+    }
+    for effect in drift.series.iter().filter(|effect| effect.drifts) {
+        let _ = writeln!(
+            out,
+            "series {}: joint {} changed in {} of {} robots, more than chance explains",
+            effect.series, effect.joint, effect.changed, effect.robots
+        );
+    }
+    out
+}

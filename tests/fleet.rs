@@ -1,0 +1,602 @@
+//! Fleets and shards through the program: rows, drift of a joint, interruptions, and work that is divided and merged.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use calib_pipeline::prepare::load::load_robot;
+use calib_recording::{WriteOptions, write_poses};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha12Rng;
+use serde_json::Value;
+
+use crate::scratch::{Files, Scratch};
+
+/// Joints of a small arm: name, origin and axis by design.
+const JOINTS: [(&str, &str, &str); 4] = [
+    ("base", "0 0 0.2", "0 0 1"),
+    ("shoulder", "0.05 0 0.1", "0 1 0"),
+    ("elbow", "0.3 0 0", "0 1 0"),
+    ("wrist", "0.25 0 0.02", "1 0 0"),
+];
+
+/// The arm with rotations of its joints about their own axes, rad.
+fn urdf(offsets: [f64; 4]) -> String {
+    let mut text = String::from("<robot name=\"arm\">\n<link name=\"l0\"/>\n");
+    for (i, ((name, xyz, axis), offset)) in JOINTS.iter().zip(offsets).enumerate() {
+        let rpy: Vec<String> = axis
+            .split(' ')
+            .map(|a| (a.parse::<f64>().expect("a number") * offset).to_string())
+            .collect();
+        text += &format!(
+            "<link name=\"l{}\"/>\n<joint name=\"{name}\" type=\"revolute\"><parent link=\"l{i}\"/><child link=\"l{}\"/>\
+            <origin xyz=\"{xyz}\" rpy=\"{}\"/><axis xyz=\"{axis}\"/><limit lower=\"-3\" upper=\"3\" effort=\"1\" velocity=\"1\"/></joint>\n",
+            i + 1,
+            i + 1,
+            rpy.join(" "),
+        );
+    }
+    text + "</robot>\n"
+}
+
+/// The profile of a robot; with `simulate` the one that its recordings are made with.
+fn profile(urdf: &str, simulate: bool) -> String {
+    let section = "simulate:
+  seed: 1
+  tracker_from_root: {xyz_mm: [900, 300, 700], rpy_deg: [2, 5, 30]}
+  mounts:
+    foot: {xyz_mm: [-80, 60, 20]}
+    tool: {xyz_mm: [20, 0, 30], rpy_deg: [0, 0, 90]}
+  noise: {body_mm: 0.1, body_deg: 0.02}
+  recordings:
+    holds: {random: {base_deg: [-150, 150], shoulder_deg: [-80, 80], elbow_deg: [-120, 120], wrist_deg: [-150, 150]}, poses: 15}
+    checks: {random: {base_deg: [-150, 150], shoulder_deg: [-80, 80], elbow_deg: [-120, 120], wrist_deg: [-150, 150]}, poses: 5}
+";
+    format!(
+        "calib: 1
+robot: {{name: arm, urdf: {urdf}}}
+tracker: {{frame: hall, body_sigma_mm: 0.1, body_sigma_deg: 0.02}}
+bodies:
+  foot: {{link: l0, pose: true, mount: {{xyz_mm: [-80, 60, 20]}}}}
+  tool: {{link: l4, pose: true, mount: {{xyz_mm: [20, 0, 30], rpy_deg: [0, 0, 90]}}}}
+recordings:
+  holds: {{file: holds.csv, use: static}}
+  checks: {{file: checks.csv, use: validation}}
+solve: {{free: [bodies, tracker, joint_offsets], noise: {{model: white}}, limits: {{held_out_rms_mm: 1}}}}
+outputs: {{urdf: arm.calibrated.urdf}}
+{}",
+        if simulate { section } else { "" }
+    )
+}
+
+/// σ of the offsets of unchanged robots, and the change that is planted, deg.
+const SPREAD_DEG: f64 = 0.2;
+const DRIFT_DEG: f64 = 0.3;
+
+/// Robots `visit/r000` and so on as they are recorded at a visit; the elbow of those in `drifted` moved before it.
+fn fleet(dir: &Scratch, visit: &str, count: usize, drifted: &[usize]) {
+    let write = |path: String, text: &str| {
+        let path = dir.path(&path);
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        std::fs::write(path, text).expect("written");
+    };
+    for k in 0..count {
+        // The same robot at each visit, with other noise.
+        let mut rng = ChaCha12Rng::seed_from_u64(k as u64);
+        let spread = SPREAD_DEG.to_radians();
+        let mut offsets = JOINTS.map(|_| rng.random_range(-spread..spread));
+        if drifted.contains(&k) {
+            offsets[2] += DRIFT_DEG.to_radians();
+        }
+        let at = |file: &str| format!("{visit}/r{k:03}/{file}");
+        write(at("true.urdf"), &urdf(offsets));
+        write(at("true.yaml"), &profile("true.urdf", true));
+        let robot = load_robot(&dir.path(&at("true.yaml"))).expect("a robot");
+        let seed = 2 * rng.random_range(0..1 << 40) + visit.len() as u64 % 2;
+        let simulated = calib_sim::simulate(&robot.profile, &robot.model, Some(seed));
+        for (name, poses) in &simulated.expect("a section").recordings {
+            let text = write_poses(poses, &WriteOptions::micro()).expect("plain names");
+            write(at(&format!("{name}.csv")), &text);
+        }
+        write(at("arm.urdf"), &urdf([0.0; 4]));
+        write(at("r.yaml"), &profile("arm.urdf", false));
+    }
+}
+
+/// Files of a fleet that must not depend on how it was made.
+fn results(dir: &Scratch, folder: &str) -> Files {
+    let mut files = dir.files(folder);
+    files.retain(|name, _| !name.starts_with("batch-"));
+    files
+}
+
+#[track_caller]
+fn same(a: &Files, b: &Files) {
+    assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
+    for (name, bytes) in a {
+        assert!(b[name] == *bytes, "{name} differs");
+    }
+}
+
+fn rows(dir: &Scratch, folder: &str) -> Vec<std::collections::BTreeMap<String, String>> {
+    let mut reader =
+        csv::Reader::from_path(dir.path(&format!("{folder}/fleet.csv"))).expect("a table");
+    reader
+        .deserialize()
+        .map(|row| row.expect("a row"))
+        .collect()
+}
+
+/// One elbow that drifted is found, a robot that cannot be calibrated is a row, and nothing depends on how the work is divided.
+#[test]
+fn a_fleet_is_calibrated_and_compared_with_last_time() {
+    let dir = Scratch::new();
+    fleet(&dir, "old", 6, &[]);
+    fleet(&dir, "now", 6, &[3]);
+    dir.calib(["batch", "old/*/r.yaml", "--out", "last"])
+        .expect(0);
+    let dir = dir
+        .file("now/r004/r.yaml", "calib: 1\nrobots: {}\n")
+        .file("now/r005/holds.csv", "no table\n");
+    let batch = ["batch", "now/*/r.yaml", "--earlier", "last", "--out"];
+    let ran = dir
+        .calib_with(&[&batch[..], &["tonight", "--jobs", "2"]].concat())
+        .expect(0);
+    assert!(
+        ran.stdout.contains("6 robots: 4 accepted, 2 failed"),
+        "{}",
+        ran.stdout
+    );
+    let found = rows(&dir, "tonight");
+    let column = |name: &str| -> Vec<&str> { found.iter().map(|row| &*row[name]).collect() };
+    assert_eq!(
+        column("name"),
+        ["r000", "r001", "r002", "r003", "r004", "r005"]
+    );
+    assert_eq!(column("exit_code"), ["0", "0", "0", "0", "2", "3"]);
+    assert_eq!(column("error_id"), ["", "", "", "", "profile", "recording"]);
+    assert_eq!(column("series"), ["arm", "arm", "arm", "arm", "", ""]);
+    let p: Vec<Option<f64>> = column("drift_p_value")
+        .iter()
+        .map(|p| p.parse().ok())
+        .collect();
+    assert!(
+        p[3].is_some_and(|p| p < 1e-6) && column("drift_joint")[3] == "elbow",
+        "{found:?}"
+    );
+    assert!(p[..3].iter().all(|p| p.is_some_and(|p| p > 1e-3)), "{p:?}");
+    for row in &found[..4] {
+        let error: f64 = row["held_out_rms_m"].parse().expect("a number");
+        assert!(error > 1e-5 && error < 5e-4, "{error}");
+    }
+    let summary = dir.json("tonight/fleet.json");
+    assert_eq!(summary["drift"]["compared"], 4);
+    assert_eq!(summary["drift"]["alarms"][0]["name"], "r003");
+    assert_eq!(summary["drift"]["alarms"][0]["familywise"], true);
+
+    // Once more: finished robots are not calibrated again, and every byte stays.
+    let first = results(&dir, "tonight");
+    let row = dir.path("tonight/robots/r000/row.json");
+    let written = || {
+        std::fs::metadata(&row)
+            .expect("a row")
+            .modified()
+            .expect("a time")
+    };
+    let before = written();
+    dir.calib_with(&[&batch[..], &["tonight"]].concat())
+        .expect(0);
+    assert_eq!(written(), before, "it was calibrated again");
+    same(&first, &results(&dir, "tonight"));
+
+    // Divided, merged, and put together elsewhere.
+    let mut whole = None;
+    for of in [1, 2, 7] {
+        let out = format!("divided-{of}");
+        let mut merge = vec![
+            "merge".to_owned(),
+            "--out".to_owned(),
+            format!("{out}.parquet"),
+        ];
+        for i in 1..=of {
+            let shard = format!("{i}/{of}");
+            let ran = dir
+                .calib_with(&[&batch[..], &[&out, "--shard", &shard]].concat())
+                .expect(0);
+            merge.push(ran.stdout.trim().to_owned());
+        }
+        let merge: Vec<&str> = merge.iter().map(String::as_str).collect();
+        dir.calib_with(&merge).expect(0);
+        let bytes = std::fs::read(dir.path(&format!("{out}.parquet"))).expect("merged");
+        assert!(
+            *whole.get_or_insert_with(|| bytes.clone()) == bytes,
+            "{of} shards"
+        );
+        let from = format!("{out}.parquet");
+        dir.calib_with(&[&batch[..], &[&out, "--from", &from]].concat())
+            .expect(0);
+        same(&first, &results(&dir, &out));
+    }
+}
+
+/// Wherever the program is killed, the next call ends with the bytes of a quiet one.
+#[test]
+fn a_killed_batch_goes_on() {
+    let dir = Scratch::new();
+    fleet(&dir, "old", 3, &[]);
+    let started = std::time::Instant::now();
+    dir.calib(["batch", "old/*/r.yaml", "--out", "quiet"])
+        .expect(0);
+    let quiet = started.elapsed();
+    let expected = results(&dir, "quiet");
+    let kills = if skipped_tests::thorough() { 100 } else { 20 };
+    let mut rng = ChaCha12Rng::seed_from_u64(1);
+    let (mut stopped, mut round) = (0, 0);
+    while stopped < kills {
+        let out = format!("killed-{round}");
+        round += 1;
+        // Several kills of one batch, each at another moment.
+        for _ in 0..4 {
+            let mut child = Command::new(env!("CARGO_BIN_EXE_calib"))
+                .args(["batch", "old/*/r.yaml", "--jobs", "2", "--out", &out])
+                .current_dir(dir.path(""))
+                .stdin(Stdio::null())
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn()
+                .expect("it starts");
+            std::thread::sleep(quiet.mul_f64(rng.random_range(0.0..1.0)));
+            child.kill().expect("it can be killed");
+            stopped += u64::from(!child.wait().expect("it ends").success());
+        }
+        dir.calib(["batch", "old/*/r.yaml", "--out", &out])
+            .expect(0);
+        same(&expected, &results(&dir, &out));
+        assert!(round < 10 * kills, "only {stopped} kills came in time");
+    }
+}
+
+#[test]
+fn a_second_batch_into_a_folder_ends_with_seven() {
+    let dir = Scratch::new();
+    fleet(&dir, "old", 1, &[]);
+    for (locked, more) in [("out", &[][..]), ("out/batch-1-of-2", &["--shard", "1/2"])] {
+        let held = calib_files::ResultsFolder::open(&dir.path(locked)).expect("a free folder");
+        let ran = dir.calib_with(&[&["batch", "old/*/r.yaml", "--out", "out"], more].concat());
+        let ran = ran.expect(7);
+        assert!(
+            ran.stderr
+                .contains("another run of this program is writing there"),
+            "{}",
+            ran.stderr
+        );
+        drop(held);
+    }
+}
+
+#[test]
+fn a_fleet_that_is_none_is_refused() {
+    let dir = Scratch::new().file("one.yaml", "calib: 1\n").file("a/r.yaml", "").file("b/a.yaml", "").file(
+        "twice.yaml",
+        "calib_fleet: 1\nrobots: [{profile: a/r.yaml, name: x}, {profile: b/a.yaml, name: X}]\n",
+    ).file("name.yaml", "calib_fleet: 1\nrobots: [{profile: a/r.yaml, name: a/b}]\n");
+    for (fleet, said) in [
+        ("none/*.yaml", "names no robot"),
+        ("none.yaml", "cannot be read"),
+        ("one.yaml", "is not a list of robots"),
+        ("twice.yaml", "two robots are called `X`"),
+        ("name.yaml", "no folder can be called \"a/b\""),
+    ] {
+        let ran = dir.calib(["batch", fleet, "--out", "out"]).expect(2);
+        assert!(
+            ran.stderr.contains(said) && ran.stderr.contains("  help: "),
+            "{}",
+            ran.stderr
+        );
+        assert!(!dir.path("out").exists());
+    }
+}
+
+/// Drift of the elbow in 1 % of the robots: found, with the false alarms that are stated.
+#[test]
+fn drift_of_one_joint_in_a_hundredth_of_a_fleet() {
+    if !skipped_tests::thorough() {
+        return;
+    }
+    let count: usize = match std::env::var("CALIB_FLEET") {
+        Ok(count) => count.parse().expect("a number of robots"),
+        Err(_) => 300,
+    };
+    let drifted: Vec<usize> = (0..count)
+        .step_by(100)
+        .map(|k| k + 42)
+        .filter(|k| *k < count)
+        .collect();
+    let dir = Scratch::new();
+    fleet(&dir, "old", count, &[]);
+    fleet(&dir, "tonight", count, &drifted);
+    dir.calib(["batch", "old/*/r.yaml", "--out", "last"])
+        .expect(0);
+    let started = std::time::Instant::now();
+    dir.calib([
+        "batch",
+        "tonight/*/r.yaml",
+        "--earlier",
+        "last",
+        "--out",
+        "out",
+    ])
+    .expect(0);
+    let rate = count as f64 / started.elapsed().as_secs_f64();
+    let summary = dir.json("out/fleet.json");
+    let alarms = summary["drift"]["alarms"].as_array().expect("a list");
+    let planted = |alarm: &&Value| {
+        let name = alarm["name"].as_str().expect("a name");
+        drifted.iter().any(|k| name == format!("r{k:03}"))
+    };
+    let found = alarms
+        .iter()
+        .filter(planted)
+        .filter(|a| a["joint"] == "elbow")
+        .count();
+    let familywise = |alarm: &&Value| alarm["familywise"] == true;
+    let all = alarms.iter().filter(familywise).filter(planted).count();
+    let false_alarms = alarms.len() - alarms.iter().filter(planted).count();
+    let false_familywise = alarms.iter().filter(familywise).count() - all;
+    println!(
+        "{found} of {} found, {all} familywise; false alarms: {false_alarms} of {}, {false_familywise} familywise; {rate:.1} robots/s",
+        drifted.len(),
+        count - drifted.len()
+    );
+    assert_eq!(
+        (found, all, false_familywise),
+        (drifted.len(), drifted.len(), 0)
+    );
+    // More than 1 % by four standard deviations of a binomial count: the rate that is stated is not kept.
+    let expected = 0.01 * count as f64;
+    assert!((false_alarms as f64) < expected + 4.0 * expected.sqrt() + 1.0);
+    let size = std::fs::metadata(dir.path("out/fleet.html"))
+        .expect("a page")
+        .len();
+    assert!(size < 500 * count as u64 + 20_000, "{size} bytes");
+}
+
+/// All shards of a study, merged; the file and what `--from` makes of it.
+fn divided(dir: &Scratch, study: &[&str], of: u64) -> (Vec<u8>, Files) {
+    let out = format!("shards-{of}");
+    let mut merge = vec![
+        "merge".to_owned(),
+        "--out".to_owned(),
+        format!("{out}.parquet"),
+    ];
+    for i in (1..=of).rev() {
+        let shard = format!("{i}/{of}");
+        let ran = dir
+            .calib_with(&[study, &["--shard", &shard, "--out", &out]].concat())
+            .expect(0);
+        merge.push(ran.stdout.trim().to_owned());
+    }
+    let merge: Vec<&str> = merge.iter().map(String::as_str).collect();
+    dir.calib_with(&merge).expect(0);
+    let (file, from) = (format!("{out}.parquet"), format!("from-{of}"));
+    dir.calib_with(&[study, &["--from", &file, "--out", &from]].concat())
+        .expect(0);
+    (
+        std::fs::read(dir.path(&file)).expect("merged"),
+        dir.files(&from),
+    )
+}
+
+/// The work divided is the work done at once, bit for bit.
+fn check_divided(dir: &Scratch, study: &[&str], numbers: &[u64]) {
+    dir.calib_with(&[study, &["--out", "whole"]].concat())
+        .expect(0);
+    let mut expected = dir.files("whole");
+    // What is finished is kept by the work that was not divided only.
+    let (whole, _) = divided(dir, study, 1);
+    for &of in numbers {
+        let (merged, mut from) = divided(dir, study, of);
+        assert!(merged == whole, "{study:?}: {of} shards");
+        for files in [&mut expected, &mut from] {
+            files.retain(|name, _| !name.ends_with(".state.jsonl"));
+        }
+        same(&expected, &from);
+    }
+}
+
+#[test]
+fn a_divided_study_is_the_study() {
+    let numbers: &[u64] = if skipped_tests::thorough() {
+        &[2, 7, 64]
+    } else {
+        &[7]
+    };
+    check_divided(&Scratch::new(), &["study", "aor", "--trials", "1"], numbers);
+}
+
+#[test]
+fn every_work_that_can_be_divided_is_the_same_divided() {
+    if !skipped_tests::thorough() {
+        return;
+    }
+    check_divided(
+        &Scratch::new(),
+        &["study", "cor", "--trials", "1"],
+        &[2, 7, 64],
+    );
+    check_divided(&Scratch::new(), &["study", "faults", "--trials", "1"], &[7]);
+    let dir = Scratch::new().brief("ripley");
+    check_divided(
+        &dir,
+        &["twin", "robots/ripley.yaml", "--trials", "10"],
+        &[2, 7],
+    );
+}
+
+#[test]
+fn what_is_no_shard_is_refused() {
+    let dir = Scratch::new()
+        .file("torn.parquet", "PAR1")
+        .file("text.csv", "a,b\n");
+    for (arguments, code, said) in [
+        (
+            &["merge", "torn.parquet", "--out", "x"][..],
+            3,
+            "torn.parquet: is not a whole Parquet file",
+        ),
+        (
+            &["merge", "text.csv", "--out", "x"],
+            3,
+            "run that shard again",
+        ),
+        (
+            &["merge", "none.parquet", "--out", "x"],
+            3,
+            "none.parquet: cannot be read",
+        ),
+        (&["study", "aor", "--shard", "0/3"], 2, "expected i/n"),
+        (
+            &["study", "justin", "--shard", "1/3"],
+            2,
+            "--shard and --from are for the studies",
+        ),
+        (
+            &["study", "aor", "--from", "torn.parquet"],
+            3,
+            "is not a whole Parquet file",
+        ),
+    ] {
+        let ran = dir.calib_with(arguments).expect(code);
+        assert!(ran.stderr.contains(said), "{arguments:?}: {}", ran.stderr);
+    }
+}
+
+/// The program stands in a folder of its own on the path; `calib` there may be a stand-in.
+#[cfg(unix)]
+fn shell(dir: &Scratch, calib: &Path, script: &[&str], variables: &[(&str, &str)]) -> String {
+    let bin = dir.path("bin");
+    std::fs::create_dir_all(&bin).expect("a folder");
+    let _ = std::fs::remove_file(bin.join("calib"));
+    std::os::unix::fs::symlink(calib, bin.join("calib")).expect("a link");
+    let path = format!(
+        "{}:{}",
+        bin.display(),
+        std::env::var("PATH").unwrap_or_default()
+    );
+    let ran = Command::new(script[0])
+        .args(&script[1..])
+        .current_dir(dir.path(""))
+        .env("PATH", path)
+        .envs(variables.iter().copied())
+        .output()
+        .expect("a shell");
+    assert!(ran.status.success(), "{ran:?}");
+    String::from_utf8(ran.stdout).expect("text")
+}
+
+/// The script of the array makes the shards that its comment merges.
+#[cfg(unix)]
+#[test]
+fn the_slurm_script_makes_shards() {
+    let dir = Scratch::new();
+    let script = crate::scratch::root()
+        .join("examples/slurm/study.sh")
+        .display()
+        .to_string();
+    let words = ["bash", &script, "aor", "--trials", "1"];
+    for task in ["1", "2"] {
+        let variables = [
+            ("SLURM_ARRAY_TASK_ID", task),
+            ("SLURM_ARRAY_TASK_COUNT", "2"),
+        ];
+        shell(
+            &dir,
+            Path::new(env!("CARGO_BIN_EXE_calib")),
+            &words,
+            &variables,
+        );
+    }
+    let shard = |i| format!("shards/aor-{i}-of-2/aor-{i}-of-2.parquet");
+    dir.calib(["merge", &shard(1), &shard(2), "--out", "aor.parquet"])
+        .expect(0);
+}
+
+/// The pods of the manifest ask for each shard once.
+#[cfg(unix)]
+#[test]
+fn the_kubernetes_manifest_asks_for_every_shard() {
+    let path = crate::scratch::root().join("examples/kubernetes/study.yaml");
+    let text = std::fs::read_to_string(path).expect("the manifest");
+    let job: Value = serde_saphyr::from_str(&text).expect("YAML");
+    assert_eq!(
+        (&job["apiVersion"], &job["kind"]),
+        (&"batch/v1".into(), &"Job".into())
+    );
+    assert_eq!(job["spec"]["completionMode"], "Indexed");
+    let pods = job["spec"]["completions"].as_u64().expect("a number");
+    let container = &job["spec"]["template"]["spec"]["containers"][0];
+    let command = container["args"][0].as_str().expect("a command");
+    let dir = Scratch::new().file("echo.sh", "#!/bin/sh\necho \"$@\"\n");
+    let echo = dir.path("echo.sh");
+    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o755);
+    std::fs::set_permissions(&echo, mode).expect("a program");
+    for (index, shard) in [(0, 1), (pods - 1, pods)] {
+        let index = index.to_string();
+        let said = shell(
+            &dir,
+            &echo,
+            &["sh", "-c", command],
+            &[("JOB_COMPLETION_INDEX", &index)],
+        );
+        let words: Vec<&str> = said.split_whitespace().collect();
+        let place = words
+            .iter()
+            .position(|word| *word == "--shard")
+            .expect("a shard");
+        assert_eq!(words[place + 1], format!("{shard}/{pods}"), "{said}");
+    }
+}
+
+/// A process that is killed while it makes a shard loses nothing.
+#[test]
+fn a_killed_shard_goes_on() {
+    let dir = Scratch::new();
+    let make = |out: &str| -> Vec<String> {
+        let words = [
+            "study", "aor", "--trials", "1", "--shard", "2/5", "--out", out,
+        ];
+        words.map(str::to_owned).into()
+    };
+    let run = |folder: &Path, words: &[String]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
+        command.args(words).current_dir(folder).stdin(Stdio::null());
+        command
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it starts")
+    };
+    let started = std::time::Instant::now();
+    assert!(
+        run(&dir.path(""), &make("quiet"))
+            .wait()
+            .expect("it ends")
+            .success()
+    );
+    let quiet: Duration = started.elapsed();
+    let expected = dir.files("quiet");
+    let mut rng = ChaCha12Rng::seed_from_u64(2);
+    for _ in 0..5 {
+        let mut child = run(&dir.path(""), &make("killed"));
+        std::thread::sleep(quiet.mul_f64(rng.random_range(0.0..1.0)));
+        child.kill().expect("it can be killed");
+        child.wait().expect("it ends");
+    }
+    assert!(
+        run(&dir.path(""), &make("killed"))
+            .wait()
+            .expect("it ends")
+            .success()
+    );
+    same(&expected, &dir.files("killed"));
+}
