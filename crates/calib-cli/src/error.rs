@@ -85,6 +85,11 @@ pub enum CliError {
         "--plugin is for the studies of estimators\n  help: calib study cor|aor --plugin PLUGIN; plugins of a profile are named in it"
     )]
     NoEstimatorStudied,
+    /// A profile is of no use to check or create a plugin.
+    #[error(
+        "--profile lists what the plugins of a profile offer; it is not for `check`, `new` and `header`\n  help: calib plugins --profile PROFILE"
+    )]
+    OnlyListed,
     /// A file was not written.
     #[error(transparent)]
     File(#[from] FileError),
@@ -203,6 +208,7 @@ impl CliError {
             | Self::Record(_)
             | Self::View(_)
             | Self::NoEstimatorStudied
+            | Self::OnlyListed
             | Self::NewPlugin(_) => ExitCode::Usage,
         }
     }
