@@ -171,7 +171,7 @@ fn without_the_plugin_the_run_says_which_one_is_missing() {
         .calib(["run", "unnamed.yaml", "--out", "out"])
         .expect(2)
         .stderr;
-    let says = "unknown joint effect `third`, and no plugin that is loaded offers one";
+    let says = "joint `j2`: no joint effect is called `third`";
     assert!(unknown.contains(says), "{unknown}");
 
     // What a plugin refuses or gets wrong ends the run with its name, and nothing is written.

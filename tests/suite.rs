@@ -28,6 +28,7 @@ mod month;
 mod outputs;
 mod plan;
 mod plugin_effects;
+mod plugin_names;
 mod plugins;
 mod real_robots;
 mod record;

@@ -21,3 +21,33 @@ pub(crate) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 pub(crate) fn robust_range_limit(sigma: f64, n: usize) -> f64 {
     8.0 * sigma * (2.0 * 3.0 / n.max(1) as f64).sqrt()
 }
+
+/// The coarsest 10⁻ᵏ m, k from 2 to 5, of which all coordinates are multiples: positions were rounded to it when they were written. 0 where
+/// there is none, or finer: a step below 10 µm is below every tracker's noise.
+pub(crate) fn written_step(coordinates: impl Iterator<Item = f64> + Clone) -> f64 {
+    let steps = (2..=5).map(|k| 10f64.powi(k));
+    let on_grid = |x: f64, per_meter: f64| ((x * per_meter).round() - x * per_meter).abs() < 1e-4;
+    if coordinates.clone().next().is_none() {
+        return 0.0;
+    }
+    let found = steps
+        .into_iter()
+        .find(|per_meter| coordinates.clone().all(|x| on_grid(x, *per_meter)));
+    found.map_or(0.0, f64::recip)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::written_step;
+
+    #[test]
+    fn the_step_is_the_coarsest_of_which_all_are_multiples() {
+        let values = [0.1234, -1.2, 0.0, 7.0001];
+        assert_eq!(written_step(values.iter().copied()), 1e-4);
+        assert_eq!(written_step([0.12345].into_iter()), 1e-5);
+        assert_eq!(written_step([0.123_456].into_iter()), 0.0);
+        assert_eq!(written_step(std::iter::empty()), 0.0);
+        // 12.3 mm, read as mm.
+        assert_eq!(written_step([12.3 * 1e-3, 100.1 * 1e-3].into_iter()), 1e-4);
+    }
+}

@@ -98,6 +98,11 @@ pub enum CliError {
         "--shard and --from are for the studies cor, aor and faults\n  help: leave them out; `--trials` and `--seed` divide a study of a robot"
     )]
     NotDivided,
+    /// A profile is of no use to check or create a plugin.
+    #[error(
+        "--profile lists what the plugins of a profile offer; it is not for `check`, `new` and `header`\n  help: calib plugins --profile PROFILE"
+    )]
+    OnlyListed,
     /// A file was not written.
     #[error(transparent)]
     File(#[from] FileError),
@@ -235,6 +240,7 @@ impl CliError {
             | Self::View(_)
             | Self::NoEstimatorStudied
             | Self::NotDivided
+            | Self::OnlyListed
             | Self::NewPlugin(_) => ExitCode::Usage,
         }
     }

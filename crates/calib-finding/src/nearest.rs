@@ -8,7 +8,8 @@ const LONGEST: usize = 200;
 /// Of `known`, the name nearest to `wrong` by edit distance (insert, delete, replace, swap neighbors); `None` when
 /// nothing is near enough to be a typo.
 ///
-/// Near enough: a third of the letters (at least one) may be wrong; upper and lower case count as equal. Of names
+/// Near enough: a third of the letters (at least one) may be wrong; upper and lower case count as
+/// equal, and so do `-` and `_`. Of names
 /// that are equally near, the one with the same letters in another order (`haed` is `head`, not `hand`), then the
 /// one that begins alike.
 ///
@@ -19,7 +20,8 @@ const LONGEST: usize = 200;
 /// ```
 #[must_use]
 pub fn nearest_word<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let lower = wrong.to_lowercase();
+    let plain = |word: &str| word.to_lowercase().replace('-', "_");
+    let lower = plain(wrong);
     if lower.chars().count() > LONGEST {
         return None;
     }
@@ -27,7 +29,7 @@ pub fn nearest_word<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -
         .into_iter()
         .filter(|name| name.chars().count() <= LONGEST)
         .map(|name| {
-            let other = name.to_lowercase();
+            let other = plain(name);
             let begins_alike = (lower.chars().zip(other.chars()))
                 .take_while(|(a, b)| a == b)
                 .count();
@@ -68,6 +70,7 @@ mod tests {
         let known = ["shoulder_lift_joint", "elbow_joint", "wrist_1_joint"];
         assert_eq!(nearest_word("elbw_joint", known), Some("elbow_joint"));
         assert_eq!(nearest_word("Elbow_Joint", known), Some("elbow_joint"));
+        assert_eq!(nearest_word("a-b-c", ["a_b_c", "a_bxc"]), Some("a_b_c"));
         assert_eq!(nearest_word("wirst_1_joint", known), Some("wrist_1_joint"));
         assert_eq!(nearest_word("camera", known), None);
         assert_eq!(nearest_word("x", []), None);

@@ -58,8 +58,8 @@ fn chosen<'a, T: ?Sized>(
 ) -> Result<&'a Entry<T>, FitError> {
     if request.all {
         return Err(usage(
-            "--all compares the built-in estimators",
-            "leave out --plugin, or name one estimator with --estimator",
+            "--all runs the built-in estimators, not those of plugins",
+            "replace --all by --estimator NAME, or remove --plugin; `calib study cor|aor --plugin PLUGIN` compares an estimator with the built-in ones",
         ));
     }
     if let Some(name) = &request.estimator {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use calib_pipeline::error::{DataProblem, PipelineError};
 use calib_pipeline::prepare::align::align;
-use calib_pipeline::prepare::inputs::RobotProfile;
+use calib_pipeline::prepare::inputs::{RobotProfile, Written};
 use calib_pipeline::prepare::loads::Masses;
 use calib_pipeline::prepare::timelines::with_robot_log;
 use calib_recording::{Filled, Poses};
@@ -27,6 +27,10 @@ pub fn robot_profile(model: &RobotModel, proposal: &Proposal) -> Result<RobotPro
     let profile = calib_profile::check(&raw, &text, file, model)?;
     Ok(RobotProfile {
         file: file.to_owned(),
+        written: Written {
+            shown: file.to_owned(),
+            text,
+        },
         folder: PathBuf::new(),
         masses: Masses::of(model, &profile.load),
         profile,

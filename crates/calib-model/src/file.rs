@@ -14,7 +14,10 @@
 //! is the joint's origin. A sliding joint feels the force axis · Σ mass_k g. Loads are what gravity exerts: minus what a torque sensor reads.
 
 use std::collections::BTreeMap;
+use std::fmt;
+use std::marker::PhantomData;
 
+use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 
 /// Version of the format.
@@ -67,8 +70,10 @@ pub struct RobotModelFile {
     /// Where the root stands in the tracker.
     pub tracker_from_root: ModelPose,
     /// Tracking bodies.
+    #[serde(deserialize_with = "unique")]
     pub bodies: BTreeMap<String, ModelBody>,
     /// Points of the robot: tool tips.
+    #[serde(deserialize_with = "unique")]
     pub points: BTreeMap<String, ModelPoint>,
     /// Uncertainty of all of these numbers; null with the closed forms.
     pub uncertainty: Option<ModelUncertainty>,
@@ -281,4 +286,32 @@ pub struct ModelNumber {
     pub name: String,
     /// Which number: `rx`, `ry`, `rz`, `x`, `y`, `z`, or an effect (`coupling:other`).
     pub number: String,
+}
+
+/// A map in which a name stands once: of two, one would be lost.
+fn unique<'de, D, T>(deserializer: D) -> Result<BTreeMap<String, T>, D::Error>
+where
+    D: serde::Deserializer<'de>,
+    T: Deserialize<'de>,
+{
+    struct Entries<T>(PhantomData<T>);
+    impl<'de, T: Deserialize<'de>> Visitor<'de> for Entries<T> {
+        type Value = BTreeMap<String, T>;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("an object with names as keys")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+            let mut entries = BTreeMap::new();
+            while let Some(name) = map.next_key::<String>()? {
+                if entries.contains_key(&name) {
+                    return Err(A::Error::custom(format!("the name `{name}` stands twice")));
+                }
+                entries.insert(name, map.next_value()?);
+            }
+            Ok(entries)
+        }
+    }
+    deserializer.deserialize_map(Entries(PhantomData))
 }

@@ -285,7 +285,8 @@ typedef struct calib_recording_sink {
      * each sample stands in the file (frame number or line, from 1). `t_s`: s, never decreasing; NULL: static poses. */
     calib_status (*timeline)(void *context, const char *clock, const uint64_t *rows, const double *t_s, size_t count,
                              size_t *timeline);
-    /* A text column that names samples, e.g. `trial`. */
+    /* A text column that names samples, e.g. `trial`. No name that tables read as something else, as `pose`, `t_s` or
+     * `elbow_rad`: the label would be lost. */
     calib_status (*label)(void *context, size_t timeline, const char *name, const char *const *texts, size_t count);
     /* A marker: count x 3. */
     calib_status (*marker)(void *context, const char *name, size_t timeline, const double *points_m,
@@ -330,7 +331,8 @@ typedef struct calib_files_sink {
     uint32_t struct_size;
     uint32_t reserved;
     void *context;
-    /* Gives one file. `path`: relative, `/` between folders, no `..`. The host writes all files after write() has
+    /* Gives one file. `path`: relative, `/` between folders, no `..`. `calib run` puts it beside the report, with the
+     * writer's name in front and `.` for `/`: `pages/a.txt` of `my_form` is `my_form.pages.a.txt`. The host writes all files after write() has
      * returned CALIB_OK, or none. CALIB_FAILED when the path is refused.
      * [while write() runs; the thread of write(); the host copies everything] */
     calib_status (*file)(void *context, const char *path, const uint8_t *bytes, size_t size);

@@ -70,6 +70,19 @@ impl ProfileError {
         let place = Places::of(text).value(path);
         Self::new(file, text, vec![Problem::new(place, finding, remedy)])
     }
+
+    /// The same at the last key of `path`.
+    pub fn at_key(
+        file: &str,
+        text: &str,
+        path: &[&str],
+        finding: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        let places = Places::of(text);
+        let place = places.key(path).or_else(|| places.value(path));
+        Self::new(file, text, vec![Problem::new(place, finding, remedy)])
+    }
 }
 
 impl std::error::Error for ProfileError {}
@@ -127,6 +140,63 @@ pub(crate) fn expected<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>
         Some(near) => format!("did you mean `{near}`? known: {}", one_of(&known)),
         None => format!("expected {}", one_of(&known)),
     }
+}
+
+/// What a value has to be.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Form {
+    /// Keys with values.
+    Keys,
+    /// A list.
+    List,
+    /// One word, text or number.
+    Value,
+}
+
+/// The form by the parser's name for it.
+fn form(expected: &str) -> Option<Form> {
+    match expected {
+        "mapping start" => Some(Form::Keys),
+        "sequence start" => Some(Form::List),
+        "scalar" | "string scalar" => Some(Form::Value),
+        _ => None,
+    }
+}
+
+/// A value of the wrong form: what was found, and what to write.
+fn misformed(form: Form, path: &[String]) -> (String, String) {
+    let what = match form {
+        Form::Keys => "keys with values belong here",
+        Form::List => "a list belongs here",
+        Form::Value => "a single value belongs here",
+    };
+    let keys: Vec<&str> = path.iter().map(String::as_str).collect();
+    let (finding, remedy) = match (form, keys.as_slice()) {
+        (_, []) => (
+            what.to_owned(),
+            "a profile is YAML: keys, colons, indentation; see the profiles in `robots/`".to_owned(),
+        ),
+        (Form::Keys, ["plugins"]) => (
+            "`plugins`: each plugin is a key".to_owned(),
+            "write `plugins: {my-sphere: {}}`, or `plugins: {my-sphere: {path: libmy-sphere.so}}` for a file elsewhere"
+                .to_owned(),
+        ),
+        (Form::Keys, ["plugins", plugin]) => (
+            format!("plugin `{plugin}`: {what}"),
+            format!("write `{plugin}: {{}}` where it lies in a plugin folder, or `{plugin}: {{path: FILE}}`"),
+        ),
+        (form, [.., key]) => {
+            let remedy = match form {
+                Form::Keys => format!(
+                    "write `{key}: {{NAME: VALUE}}`, or each `NAME: VALUE` on a line of its own below `{key}:`, indented"
+                ),
+                Form::List => format!("write `{key}: [A, B]`"),
+                Form::Value => format!("write `{key}: VALUE`"),
+            };
+            (format!("`{}`: {what}", keys.join(".")), remedy)
+        }
+    };
+    (finding, remedy)
 }
 
 pub(crate) fn from_yaml(error: &serde_saphyr::Error, text: &str, file: &str) -> ProfileError {
@@ -187,6 +257,11 @@ pub(crate) fn from_yaml(error: &serde_saphyr::Error, text: &str, file: &str) -> 
                 ),
             };
             (finding.to_owned(), remedy.to_owned())
+        }
+        Yaml::Unexpected { expected, .. } if form(expected).is_some() => {
+            let path = place.and_then(|at| Places::of(text).path_to(at));
+            let path = path.unwrap_or_default();
+            misformed(form(expected).unwrap_or(Form::Value), &path)
         }
         other => {
             let full = other.to_string();

@@ -62,6 +62,14 @@ impl Places {
 }
 
 impl Places {
+    /// Keys (and list positions as decimal numbers) that lead to the value at a place; empty for the document itself.
+    #[must_use]
+    pub fn path_to(&self, place: Place) -> Option<Vec<String>> {
+        let mut path = Vec::new();
+        let found = self.0.as_ref()?.find(place, &mut path);
+        found.then_some(path)
+    }
+
     /// Places of numbers that are NaN or infinite.
     #[must_use]
     pub fn not_finite(&self) -> Vec<Place> {
@@ -94,6 +102,33 @@ impl Tree {
             Kind::Map(entries) => entries
                 .iter()
                 .for_each(|(_, t)| t.collect_not_finite(found)),
+        }
+    }
+
+    /// Whether a value stands at `place`; `path` then leads to it from here.
+    fn find(&self, place: Place, path: &mut Vec<String>) -> bool {
+        if self.place == place && !matches!(self.kind, Kind::Map(_)) {
+            return true;
+        }
+        let mut under = |key: String, tree: &Self| {
+            path.push(key);
+            let found = tree.find(place, path);
+            if !found {
+                path.pop();
+            }
+            found
+        };
+        match &self.kind {
+            Kind::Leaf | Kind::NotFinite => false,
+            Kind::List(items) => {
+                let mut items = items.iter().enumerate();
+                items.any(|(i, tree)| under(i.to_string(), tree))
+            }
+            Kind::Map(entries) => {
+                let mut entries = entries.iter();
+                // A block mapping begins where its first key does, not where a value does.
+                entries.any(|(key, tree)| under(key.value.clone(), tree)) || self.place == place
+            }
         }
     }
 

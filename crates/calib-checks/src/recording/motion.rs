@@ -1,7 +1,7 @@
 //! Along the rows: rotations that are none, flips, jumps, gaps, rows that were not settled.
 
 use super::Expectations;
-use crate::statistics::{median, range};
+use crate::statistics::{median, range, written_step};
 use calib_finding::{About, Fact, Finding, Subject, catalog};
 use calib_recording::{JointUnit, Poses};
 use nalgebra::{Point3, Vector3};
@@ -227,6 +227,16 @@ pub(super) fn unsettled(poses: &Poses, expected: &Expectations) -> Vec<Finding> 
         return Vec::new();
     }
     let sigma = expected.marker_sigma.unwrap_or(COARSE_SIGMA);
+    let of_markers = poses.markers.values().map(|track| {
+        let points = track.iter().flatten();
+        written_step(points.flat_map(|p| p.iter().copied()))
+    });
+    let of_bodies = poses.bodies.values().map(|track| {
+        let places = track.iter().flatten().map(|p| &p.translation.vector);
+        written_step(places.flat_map(|p| p.iter().copied()))
+    });
+    // In the order of the tracks below.
+    let steps: Vec<f64> = of_markers.chain(of_bodies).collect();
     let mut findings = Vec::new();
     for (hold, rows) in poses
         .groups("hold")
@@ -239,18 +249,17 @@ pub(super) fn unsettled(poses: &Poses, expected: &Expectations) -> Vec<Finding> 
             axis(0).max(axis(1)).max(axis(2))
         };
         let markers = poses.markers.values().map(|track| {
-            rows.iter()
-                .filter_map(|&i| track[i])
-                .map(|p: Point3<f64>| p.coords)
-                .collect()
+            let here = rows.iter().filter_map(|&i| track[i]);
+            here.map(|p: Point3<f64>| p.coords).collect()
         });
         let bodies = poses.bodies.values().map(|track| {
-            rows.iter()
-                .filter_map(|&i| track[i])
-                .map(|p| p.translation.vector)
-                .collect()
+            let here = rows.iter().filter_map(|&i| track[i]);
+            here.map(|p| p.translation.vector).collect()
         });
-        let worst = markers.chain(bodies).map(spread).fold(0.0, f64::max);
+        // The range of rounded values is at most a step larger than that of the values.
+        let beyond = |(points, step): (Vec<Vector3<f64>>, &f64)| (spread(points) - step).max(0.0);
+        let tracks = markers.chain(bodies).zip(&steps);
+        let worst = tracks.map(beyond).fold(0.0, f64::max);
         // The range of n Gaussian values is below 2·(3 + log n) σ.
         let usual = 2.0 * sigma * (UNSETTLED_SIGMAS / 2.0 + (rows.len() as f64).ln());
         if worst > usual {

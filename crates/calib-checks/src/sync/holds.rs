@@ -1,6 +1,6 @@
 //! Intervals in which nothing moves, and one pose for each of them.
 
-use crate::statistics::robust_range_limit;
+use crate::statistics::{robust_range_limit, written_step};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_geometry::{mean::chordal_mean, se3};
 use calib_recording::Poses;
@@ -56,6 +56,8 @@ pub struct StaticPoses {
     pub marker_covariance: BTreeMap<String, Vec<Option<Matrix3<f64>>>>,
     /// Body → covariance of one sample in the body frame, `[ω; v]`.
     pub body_covariance: BTreeMap<String, Vec<Option<Matrix6<f64>>>>,
+    /// Marker or body → step that its positions were rounded to when they were written, m; 0 where none shows.
+    pub written_step: BTreeMap<String, f64>,
     /// Holds that drift although they passed the thresholds.
     pub findings: Vec<Finding>,
 }
@@ -113,21 +115,21 @@ fn channels(poses: &Poses, settings: &HoldSettings) -> Vec<(Vec<Option<f64>>, f6
         .map(|q| (q.clone(), settings.joint_range))
         .collect();
     for track in poses.markers.values() {
+        // What stands still may be written as two neighboring multiples of the step.
+        let limit = settings.point_range + step_of_points(track);
         for axis in 0..3 {
-            channels.push((
-                track.iter().map(|p| p.map(|p| p[axis])).collect(),
-                settings.point_range,
-            ));
+            channels.push((track.iter().map(|p| p.map(|p| p[axis])).collect(), limit));
         }
     }
     for track in poses.bodies.values() {
+        let limit = settings.point_range + step_of_poses(track);
         for axis in 0..3 {
             channels.push((
                 track
                     .iter()
                     .map(|p| p.map(|p| p.translation.vector[axis]))
                     .collect(),
-                settings.point_range,
+                limit,
             ));
         }
         // The nine entries of R change by at most the angle.
@@ -140,6 +142,15 @@ fn channels(poses: &Poses, settings: &HoldSettings) -> Vec<(Vec<Option<f64>>, f6
         }
     }
     channels
+}
+
+fn step_of_points(track: &[Option<Point3<f64>>]) -> f64 {
+    written_step(track.iter().flatten().flat_map(|p| p.iter().copied()))
+}
+
+fn step_of_poses(track: &[Option<Isometry3<f64>>]) -> f64 {
+    let places = track.iter().flatten().map(|p| &p.translation.vector);
+    written_step(places.flat_map(|p| p.iter().copied()))
 }
 
 fn range(values: &[Option<f64>]) -> Option<f64> {
@@ -186,6 +197,8 @@ pub fn static_poses(poses: &Poses, holds: &[Hold]) -> StaticPoses {
     out.poses.torques = scalars(&poses.torques);
     for (name, track) in &poses.markers {
         let (mut means, mut covariances) = (Vec::new(), Vec::new());
+        let step = step_of_points(track);
+        out.written_step.insert(name.clone(), step);
         for hold in holds {
             let points: Vec<Vector3<f64>> = track[hold.rows.clone()]
                 .iter()
@@ -195,13 +208,15 @@ pub fn static_poses(poses: &Poses, holds: &[Hold]) -> StaticPoses {
             means.push(middle_point(&points).map(Point3::from));
             covariances.push(covariance3(&points));
             out.findings
-                .extend(drift(Subject::marker(name), poses, hold, &points));
+                .extend(drift(Subject::marker(name), poses, hold, (&points, step)));
         }
         out.poses.markers.insert(name.clone(), means);
         out.marker_covariance.insert(name.clone(), covariances);
     }
     for (name, track) in &poses.bodies {
         let (mut means, mut covariances) = (Vec::new(), Vec::new());
+        let step = step_of_poses(track);
+        out.written_step.insert(name.clone(), step);
         for hold in holds {
             let seen: Vec<Isometry3<f64>> =
                 track[hold.rows.clone()].iter().flatten().copied().collect();
@@ -213,7 +228,7 @@ pub fn static_poses(poses: &Poses, holds: &[Hold]) -> StaticPoses {
             covariances.push(mean.and_then(|mean| covariance6(&mean, &seen)));
             means.push(mean);
             out.findings
-                .extend(drift(Subject::body(name), poses, hold, &points));
+                .extend(drift(Subject::body(name), poses, hold, (&points, step)));
         }
         out.poses.bodies.insert(name.clone(), means);
         out.body_covariance.insert(name.clone(), covariances);
@@ -251,8 +266,13 @@ fn covariance6(mean: &Isometry3<f64>, poses: &[Isometry3<f64>]) -> Option<Matrix
     })
 }
 
-/// The means of both halves differ by more than the scatter explains.
-fn drift(subject: Subject, poses: &Poses, hold: &Hold, points: &[Vector3<f64>]) -> Option<Finding> {
+/// The means of both halves differ by more than the scatter and the step of the written positions explain.
+fn drift(
+    subject: Subject,
+    poses: &Poses,
+    hold: &Hold,
+    (points, step): (&[Vector3<f64>], f64),
+) -> Option<Finding> {
     let covariance = covariance3(points)?;
     let half = points.len() / 2;
     let mean = |part: &[Vector3<f64>]| part.iter().sum::<Vector3<f64>>() / part.len() as f64;
@@ -266,7 +286,8 @@ fn drift(subject: Subject, poses: &Poses, hold: &Hold, points: &[Vector3<f64>]) 
     let sigma = (steps / 2.0 / 3.0)
         .sqrt()
         .min((covariance.trace() / 3.0).sqrt());
-    let expected = robust_range_limit(sigma, half);
+    // Where noise is far below the step, the least motion over the middle of two multiples moves each coordinate by a step.
+    let expected = robust_range_limit(sigma, half) + 3.0_f64.sqrt() * step;
     (half >= 5 && off.norm() > expected).then(|| {
         Finding::of_kind(catalog::UNSETTLED_ROWS, "drift", subject)
             .with("drift", Fact::meters(off.norm()))

@@ -3,7 +3,7 @@
 use calib_checks::model::{alignment, disagreement, spoiled_rows, up_axis};
 use calib_checks::rigid_body::Template;
 use calib_checks::{Expectations, checks, held_out_in_training};
-use calib_finding::{About, Fact, Finding, Severity};
+use calib_finding::{About, Fact, Finding, Severity, catalog};
 use calib_recording::{JointUnit, Poses};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -465,6 +465,52 @@ pub fn faults() -> Vec<(&'static str, &'static str, bool, Fault)> {
                 .insert("hold".to_string(), (0..300).map(label).collect());
         }),
     ]
+}
+
+/// Holds at rest of a tracker that writes 0.1 or 0.01 mm and is much better than that; and one in motion by ten steps.
+#[test]
+fn rounding_does_not_unsettle_the_rows_of_a_hold() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    for step in [1e-3, 1e-4, 1e-5] {
+        for moving in [false, true] {
+            let expected = Expectations {
+                marker_sigma: Some(0.02 * step),
+                ..Expectations::default()
+            };
+            let mut point = |i: usize| {
+                let drift = if moving && i < 15 {
+                    10.0 * step * i as f64 / 14.0
+                } else {
+                    0.0
+                };
+                let at = |x: f64| {
+                    let noise: f64 = rng.sample(StandardNormal);
+                    ((x + 0.02 * step * noise + 0.5 * step + drift) / step).round() * step
+                };
+                Some(Point3::from([0.1, 0.2, 0.3].map(at)))
+            };
+            let poses = Poses {
+                rows: (0..30).collect(),
+                markers: [("m".to_string(), (0..30).map(&mut point).collect())].into(),
+                labels: [(
+                    "hold".to_string(),
+                    (0..30).map(|i| format!("{}", i / 15)).collect(),
+                )]
+                .into(),
+                ..Poses::default()
+            };
+            let said = checks(&poses, &expected);
+            let said: Vec<_> = said
+                .iter()
+                .filter(|f| f.id == catalog::UNSETTLED_ROWS)
+                .collect();
+            assert_eq!(
+                said.len(),
+                usize::from(moving),
+                "{step} {moving}: {said:#?}"
+            );
+        }
+    }
 }
 
 #[test]

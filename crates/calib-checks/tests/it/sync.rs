@@ -393,3 +393,50 @@ fn a_hold_that_drifts_is_reported() {
         table.findings
     );
 }
+
+/// Positions written with 3 to 6 decimals of a meter: a robot that stands still is settled whatever its place between two multiples of the
+/// step, and one that drifts by several steps is not.
+#[test]
+fn rounding_steps_neither_unsettle_nor_settle_a_hold() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let trials = 40;
+    for decimals in 3..=6 {
+        let step = 10f64.powi(-decimals);
+        for sigma in [1e-6, 2e-5, 1e-4] {
+            let (mut alarms, mut missed, mut found_of) = (0, 0, 0);
+            for _ in 0..trials {
+                // A place just below the middle of two multiples: the tracker's creep of a fifth of σ moves it over.
+                let place = Vector3::new(0.5, 0.1, 0.2) + Vector3::repeat(0.5 * step)
+                    - Vector3::repeat(0.1 * sigma);
+                let mut recorded = |drift: f64| {
+                    let mut point = |i: usize| {
+                        let creep = Vector3::repeat((0.2 * sigma + drift) * i as f64 / 149.0);
+                        let p = place + creep + noise(&mut rng, sigma);
+                        Some(Point3::from(p.map(|x| (x / step).round() * step)))
+                    };
+                    Poses {
+                        rows: (0..150).collect(),
+                        t: Some((0..150).map(|i| 0.01 * f64::from(i)).collect()),
+                        markers: [("m".to_string(), (0..150).map(&mut point).collect())].into(),
+                        ..Poses::default()
+                    }
+                };
+                let still = recorded(0.0);
+                let found = holds(&still, &HoldSettings::default());
+                found_of += found.len();
+                alarms += static_poses(&still, &found).findings.len();
+                // Each half of the hold is off the other by half of it along each axis.
+                let moving = recorded(8.0 * step + 4.0 * sigma);
+                let settings = HoldSettings {
+                    point_range: 0.1,
+                    ..HoldSettings::default()
+                };
+                let found = holds(&moving, &settings);
+                missed += usize::from(static_poses(&moving, &found).findings.is_empty());
+            }
+            assert_eq!(found_of, trials, "{decimals} decimals, σ {sigma}: holds");
+            assert_eq!(alarms, 0, "{decimals} decimals, σ {sigma}: false alarms");
+            assert_eq!(missed, 0, "{decimals} decimals, σ {sigma}: not found");
+        }
+    }
+}

@@ -5,12 +5,14 @@ use std::path::PathBuf;
 
 use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::estimators::Estimators;
+use calib_pipeline::prepare::load::load_robot;
 use calib_plugin::check::{Limits, Row, check};
-use calib_plugin::{HEADER, Host, Kind, Language, Offer, SearchPath, kind_from_name, new_project};
+use calib_plugin::{HEADER, Host, Kind, Language, Origin, SearchPath, kind_from_name, new_project};
 
 use clap::{Args, Subcommand};
 use serde_json::json;
 
+use super::plugin_options::PluginOptions;
 use crate::error::CliError;
 use crate::terminal::{Console, emit, emit_paths, emit_raw, say};
 
@@ -20,6 +22,12 @@ pub struct PluginsCommand {
     /// What to do; lists everything if not given
     #[command(subcommand)]
     what: Option<Plugins>,
+    /// List what the plugins of this profile offer, too
+    #[arg(long)]
+    profile: Option<PathBuf>,
+    /// Which plugins are loaded
+    #[command(flatten)]
+    plugins: PluginOptions,
 }
 
 /// What to do with plugins.
@@ -51,9 +59,12 @@ enum Plugins {
 /// Lists, checks or creates plugins.
 pub fn run(console: &Console, options: &PluginsCommand) -> Result<ExitCode, CliError> {
     let json = console.json;
+    if options.what.is_some() && options.profile.is_some() {
+        return Err(CliError::OnlyListed);
+    }
     match &options.what {
         None => {
-            let listed = Listed::new()?;
+            let listed = Listed::new(options)?;
             emit(&if json { listed.json() } else { listed.text() })?;
             Ok(ExitCode::Accepted)
         }
@@ -119,53 +130,57 @@ fn checked(json: bool, plugin: &str) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Plugin)
 }
 
-/// Built-in estimators and readers, and the library files on the search path (none is opened).
+/// Everything that a profile can name, and the library files on the search path (none of these is opened).
 struct Listed {
-    /// Names and summaries of each kind.
-    kinds: Vec<(Kind, Vec<[String; 2]>)>,
+    /// Names and summaries of each kind, and the plugin of each.
+    kinds: Vec<(Kind, Vec<Offered>)>,
     /// Names and paths.
     found: Vec<[String; 2]>,
+    /// Whether the plugins of a profile are among them.
+    of_profile: bool,
 }
 
+/// Name, summary, and the plugin that offers it.
+type Offered = (String, String, Option<Origin>);
+
 impl Listed {
-    fn new() -> Result<Self, CliError> {
-        let estimators = Estimators::built_in()?;
-        let tables = &estimators.tables;
-        let row = |offer: &Offer| [offer.name.clone(), offer.summary.clone()];
-        let kinds = vec![
-            (
-                Kind::Cor,
-                tables.cor.iter().map(|e| row(e.offer())).collect(),
-            ),
-            (
-                Kind::Aor,
-                tables.aor.iter().map(|e| row(e.offer())).collect(),
-            ),
-            (
-                Kind::Reader,
-                tables.reader.iter().map(|e| row(e.offer())).collect(),
-            ),
-            (
-                Kind::Report,
-                tables.report.iter().map(|e| row(e.offer())).collect(),
-            ),
-        ];
-        let found = Host::new(SearchPath::from_environment(None), true).discover();
-        let found = found.into_iter();
+    fn new(options: &PluginsCommand) -> Result<Self, CliError> {
+        let (estimators, folder) = match &options.profile {
+            None => (Estimators::built_in()?, None),
+            Some(profile) => {
+                let robot = load_robot(profile)?;
+                let plugins = options.plugins.plugins();
+                let all = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
+                (all, Some(robot.folder))
+            }
+        };
+        let list = estimators.tables.list();
+        let of = |kind: Kind| {
+            let all = list.iter().filter(|(offer, _)| offer.kind == kind);
+            let all = all.map(|(offer, origin)| {
+                let plugin = (**origin != Origin::BuiltIn).then(|| (*origin).clone());
+                (offer.name.clone(), offer.summary.clone(), plugin)
+            });
+            (kind, all.collect())
+        };
+        let search = SearchPath::from_environment(folder.as_deref());
+        let found = Host::new(search, true).discover().into_iter();
         Ok(Self {
-            kinds,
+            kinds: Kind::ALL.into_iter().map(of).collect(),
             found: found
                 .map(|plugin| [plugin.name, plugin.path.display().to_string()])
                 .collect(),
+            of_profile: options.profile.is_some(),
         })
     }
 
     fn text(&self) -> String {
         let mut text = String::new();
-        for (kind, rows) in &self.kinds {
+        for (kind, rows) in self.kinds.iter().filter(|(_, rows)| !rows.is_empty()) {
             let _ = writeln!(text, "{}s ({})", kind.word(), kind.id());
-            for [name, what] in rows {
-                let _ = writeln!(text, "  {name:<16} {what}");
+            for (name, what, plugin) in rows {
+                let from = plugin.as_ref().map(|origin| format!(" ({origin})"));
+                let _ = writeln!(text, "  {name:<16} {what}{}", from.unwrap_or_default());
             }
         }
         let none = if self.found.is_empty() { "none" } else { "" };
@@ -173,18 +188,28 @@ impl Listed {
         for [name, path] in &self.found {
             let _ = writeln!(text, "  {name:<16} {path}");
         }
+        if !self.of_profile {
+            text += "what the plugins of a profile offer: calib plugins --profile PROFILE\n";
+        }
         text
     }
 
     fn json(&self) -> String {
-        let row = |key: &str, [name, what]: &[String; 2]| json!({"name": name, key: what});
         let mut all = serde_json::Map::new();
         for (kind, rows) in &self.kinds {
-            let rows = rows.iter().map(|r| row("summary", r)).collect();
+            let row = |(name, what, origin): &Offered| {
+                let plugin = match origin {
+                    Some(Origin::Plugin { plugin, .. }) => Some(plugin),
+                    _ => None,
+                };
+                json!({"name": name, "summary": what, "plugin": plugin})
+            };
+            let rows = rows.iter().map(row).collect();
             all.insert(kind.id().to_owned(), serde_json::Value::Array(rows));
         }
-        let found = self.found.iter().map(|r| row("path", r)).collect();
-        all.insert("plugins".to_owned(), serde_json::Value::Array(found));
+        let found = self.found.iter();
+        let found = found.map(|[name, path]| json!({"name": name, "path": path}));
+        all.insert("plugins".to_owned(), found.collect());
         format!("{:#}\n", serde_json::Value::Object(all))
     }
 }

@@ -87,6 +87,7 @@ impl CliError {
             Self::Record(_) => "record",
             Self::View(_) => "view",
             Self::Capture(_) => "capture",
+            Self::OnlyListed => "plugin",
             Self::NewPlugin(_) => "new-plugin",
             Self::Stdout(_) => "output-lost",
         }

@@ -18,6 +18,11 @@ pub(crate) fn check(problem: &Problem) -> Result<(), Error> {
     if let Some(fault) = problem.faults.first() {
         return Err(fault.clone());
     }
+    let mut frames = BTreeSet::new();
+    if let Some(name) = problem.frames.iter().find(|name| !frames.insert(*name)) {
+        let name = name.clone();
+        return Err(Error::DuplicateFrame { name });
+    }
     for edge in &problem.edges {
         check_edge(edge, problem.samples)?;
     }

@@ -129,6 +129,12 @@ pub enum Error {
         /// The parameter.
         name: String,
     },
+    /// Two frames have one name.
+    #[error("two frames are called `{name}`")]
+    DuplicateFrame {
+        /// The name.
+        name: String,
+    },
     /// Two parameters have one name.
     #[error("two parameters are called `{name}`")]
     DuplicateName {

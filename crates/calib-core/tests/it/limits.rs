@@ -571,6 +571,23 @@ fn a_builder_call_on_the_wrong_kind_of_edge_is_an_error() {
     }
 }
 
+/// A frame or a parameter of a name that is taken: a result could not say which it is of.
+#[test]
+fn names_that_are_taken_are_refused() {
+    let mut p = Problem::new(1);
+    let (a, b) = (p.frame("a"), p.frame("b"));
+    p.unknown("pose", a, b, Isometry3::identity(), Chart::full());
+    let mut frames = p.clone();
+    frames.frame("a");
+    let error = calib_core::Model::new(&frames).expect_err("two frames");
+    assert_eq!(error, Error::DuplicateFrame { name: "a".into() });
+    assert_eq!(error.to_string(), "two frames are called `a`");
+    let c = p.frame("c");
+    p.unknown("pose", b, c, Isometry3::identity(), Chart::full());
+    let error = calib_core::Model::new(&p).expect_err("two parameters");
+    assert!(matches!(error, Error::DuplicateName { .. }), "{error}");
+}
+
 #[test]
 fn an_effect_that_needs_its_regressor_is_not_freed_without_it() {
     let mut p = Problem::new(2);

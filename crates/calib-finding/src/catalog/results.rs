@@ -28,6 +28,21 @@ super::topic! {
             "The axis estimator `{estimator}` states no covariance: the σ of the prior stand in its place ({sigma} across the axis, {sigma_angle} for its direction).",
             "Name an estimator that states a covariance, or let the plugin give one (`covariance`).";
     }
+    /// An estimator that no origin calls.
+    ORIGIN_ESTIMATOR_UNUSED = "origin-estimator-unused" {
+        "center": Warning,
+            "The profile names the center estimator `{estimator}` for an origin with one swept axis: only the axis counts there, and `{called}` finds it.",
+            "Name an axis estimator (`axis:`) and remove `center:`, or sweep a second joint whose axis meets the first in the origin.";
+        "axis": Warning,
+            "The profile names the axis estimator `{estimator}` for an origin that does not have exactly one swept axis: only the center counts there, and `{called}` finds it.",
+            "Name a center estimator (`center:`) and remove `axis:`, or sweep one joint only.";
+    }
+    /// A plugin of which nothing is used.
+    PLUGIN_UNUSED = "plugin-unused" {
+        "": Warning,
+            "The profile loads the plugin `{plugin}` and uses nothing of it. It offers {offers:code}.",
+            "Name what it offers where it belongs (`origins`, `recordings`, `outputs.reports`, `solve.joints`), or remove it from `plugins`.";
+    }
     /// What the method `paper` assumes.
     PAPER_ASSUMPTIONS = "paper-assumptions" {
         "": Info,

@@ -158,7 +158,12 @@ impl Model {
     }
 
     fn add_masses(&mut self, file: &RobotModelFile, names: &Names) -> Result<(), ModelError> {
+        let mut listed = BTreeSet::new();
         for (i, link) in file.links.iter().enumerate() {
+            if !listed.insert(link.name.as_str()) {
+                let place = format!("links[{i}].name");
+                return Err(value(place, &link.name, "a name that no link before has"));
+            }
             finite(&format!("links[{i}].mass_kg"), &[link.mass_kg])?;
             let place = format!("links[{i}].first_moment_kg_m");
             finite(&place, &link.first_moment_kg_m)?;

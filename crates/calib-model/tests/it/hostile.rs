@@ -100,6 +100,11 @@ fn what_is_wrong_is_named_with_its_place() {
         ),
         ("/links/1/name", "hand".into(), "links[1].name: found hand"),
         (
+            "/links/1/name",
+            "base".into(),
+            "links[1].name: found base; expected a name that no link before has",
+        ),
+        (
             "/bodies/marker_plate/link",
             "hand".into(),
             "bodies.marker_plate.link: found hand",
@@ -127,6 +132,44 @@ fn what_is_wrong_is_named_with_its_place() {
         Err(ModelError::Syntax { .. })
     ));
     assert!(Model::from_json(b"").is_err() && Model::from_json(&[0xff, 0xfe]).is_err());
+}
+
+/// Of two bodies or points under one name one would be lost: the line and the name are said.
+#[test]
+fn a_name_that_stands_twice_is_refused() {
+    for (list, entry) in [
+        (
+            "bodies",
+            r#""plate": {"link": "forearm", "link_from_body": {"xyz_m": [0, 0, 0], "quat_xyzw": [0, 0, 0, 1]}, "markers_m": {}}"#,
+        ),
+        (
+            "points",
+            r#""plate": {"link": "forearm", "xyz_m": [0, 0, 0]}"#,
+        ),
+    ] {
+        let mut value: Value = serde_json::from_str(ARM).expect("JSON");
+        let place = value.pointer_mut(&format!("/{list}")).expect("a map");
+        *place = "HERE".into();
+        let once = value
+            .to_string()
+            .replace("\"HERE\"", &format!("{{{entry}}}"));
+        let twice = value
+            .to_string()
+            .replace("\"HERE\"", &format!("{{{entry},\n{entry}}}"));
+        let once = Model::from_json(once.as_bytes());
+        assert!(
+            !matches!(once, Err(ModelError::Syntax { .. })),
+            "{list}: {once:?}"
+        );
+        let said = Model::from_json(twice.as_bytes())
+            .expect_err(list)
+            .to_string();
+        assert!(said.starts_with("line 2, column "), "{list}: {said}");
+        assert!(
+            said.contains("the name `plate` stands twice"),
+            "{list}: {said}"
+        );
+    }
 }
 
 #[test]

@@ -116,7 +116,7 @@ fn add_spots(
         };
         let name = format!("{}.{spot}", of.name);
         let problem = &mut formulation.problem;
-        let frame = problem.frame(&name);
+        let frame = problem.frame(&format!("contact {} spot {spot}", of.name));
         let at = Isometry3::from(at);
         let edge = problem.unknown(&name, place, frame, at, Chart::of(SHIFTS));
         problem.set_role(edge, Role::World, None);
@@ -237,8 +237,8 @@ fn add_place(
     contact: &Contact,
     base: FrameId,
 ) -> (EdgeId, FrameId) {
+    let frame = problem.frame(&format!("contact {name} place"));
     let name = format!("{name}.place");
-    let frame = problem.frame(&name);
     let chart = place_chart(contact);
     let place = problem.unknown(&name, base, frame, contact.base_from_place, chart);
     problem.set_role(place, Role::World, None);

@@ -45,6 +45,8 @@ pub struct Estimators {
     pub tables: Tables,
     /// Effects of joints that plugins compute for this profile.
     pub effects: Vec<PluginEffect>,
+    /// Plugins that the profile names: what each calls itself, by its name there.
+    pub loaded: BTreeMap<String, String>,
 }
 
 impl std::fmt::Debug for Estimators {
@@ -75,6 +77,7 @@ impl Estimators {
         Ok(Self {
             tables,
             effects: Vec::new(),
+            loaded: BTreeMap::new(),
         })
     }
 
@@ -99,6 +102,8 @@ impl Estimators {
             let place = spec.path.clone().unwrap_or_else(|| name.clone());
             let loaded = host.load(&place, spec.sha256.as_deref())?;
             estimators.tables.add(&loaded)?;
+            let own = loaded.description.name.clone();
+            estimators.loaded.insert(name.clone(), own);
         }
         Ok(estimators)
     }

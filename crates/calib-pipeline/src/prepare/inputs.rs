@@ -15,11 +15,22 @@ use crate::prepare::estimators::Estimators;
 use crate::prepare::excluded::Excluded;
 use crate::prepare::loads::Masses;
 
+/// A profile as it was written, for messages with their place.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Written {
+    /// The file, as the caller named it.
+    pub shown: String,
+    /// Its text.
+    pub text: String,
+}
+
 /// A profile with its robot, before any recording is read.
 #[derive(Debug, Clone)]
 pub struct RobotProfile {
     /// The profile's file name, without folder.
     pub file: String,
+    /// The profile as it was written.
+    pub written: Written,
     /// Folder that relative paths start from.
     pub folder: PathBuf,
     /// The checked profile.

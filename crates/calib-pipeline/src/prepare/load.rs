@@ -41,7 +41,7 @@ pub fn load_recordings_with(
 ) -> Result<Inputs, PipelineError> {
     let mut estimators = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
     estimators.tables.add_own(own)?;
-    named::check(&robot.profile, &estimators.tables)?;
+    named::check(&robot, &estimators.tables)?;
     effects::resolve(&mut robot, &mut estimators)?;
     let mut recordings = BTreeMap::new();
     let mut findings = urdf_warnings(&robot);
@@ -97,6 +97,7 @@ pub fn load_recordings_with(
         estimators: Arc::new(estimators),
     };
     inputs.exclude(excluded);
+    inputs.findings.extend(named::unused(&inputs));
     effects::evaluate(&inputs)?;
     Ok(inputs)
 }
@@ -174,7 +175,7 @@ pub fn of_tables(
     plugins: Plugins,
 ) -> Result<Inputs, PipelineError> {
     let mut estimators = Estimators::of_profile(&robot.profile, &robot.folder, plugins)?;
-    named::check(&robot.profile, &estimators.tables)?;
+    named::check(&robot, &estimators.tables)?;
     effects::resolve(&mut robot, &mut estimators)?;
     let mut recordings = BTreeMap::new();
     let mut findings = Vec::new();

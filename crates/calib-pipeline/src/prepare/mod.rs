@@ -24,4 +24,5 @@ pub mod stopped;
 pub mod streams;
 pub mod timelines;
 pub mod tracks;
+mod unknown;
 mod untracked;

@@ -1,15 +1,17 @@
 //! Estimators, readers, report writers and joint effects that a profile names: whether they are there and take what they would be given, and whose code
 //! they are. Asked before a file is opened, so that `calib check` refuses what `calib run` would.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use calib_finding::{About, Fact, Finding, Subject, catalog};
 use calib_plugin::{Entry, Kind, Origin as From, Shape, Tables};
-use calib_profile::{BodyKind, Origin, Profile};
+use calib_profile::{BodyKind, Origin};
 use calib_report::{Component, PluginFile};
 
 use crate::error::PipelineError;
 use crate::prepare::estimators::values;
-use crate::prepare::inputs::Inputs;
+use crate::prepare::inputs::{Inputs, RobotProfile};
+use crate::prepare::unknown;
 
 /// Whether an origin's estimator is that of an axis, not of a center.
 fn is_line(origin: &Origin) -> bool {
@@ -19,8 +21,10 @@ fn is_line(origin: &Origin) -> bool {
 /// Refuses names that are not there, parameters that they do not have, and data that they do not take.
 ///
 /// # Errors
-/// [`PipelineError::Plugin`].
-pub(crate) fn check(profile: &Profile, tables: &Tables) -> Result<(), PipelineError> {
+/// [`PipelineError::Profile`] for names, [`PipelineError::Plugin`] for the rest.
+pub(crate) fn check(robot: &RobotProfile, tables: &Tables) -> Result<(), PipelineError> {
+    let profile = &robot.profile;
+    unknown::check(profile, &robot.model, tables, &robot.written)?;
     for origin in profile.origins.values() {
         let center = tables.cor.get(&origin.center)?;
         center.with(&values(&origin.center_parameters))?;
@@ -41,9 +45,6 @@ pub(crate) fn check(profile: &Profile, tables: &Tables) -> Result<(), PipelineEr
             let reader = tables.reader.get(reader)?;
             reader.with(&values(&spec.reader_parameters))?;
         }
-        if let Some(reader) = spec.robot_log.as_ref().and_then(|log| log.reader.as_ref()) {
-            tables.reader.get(reader)?;
-        }
     }
     for exception in profile.solve.joints.values() {
         for (name, parameters) in &exception.effects {
@@ -54,6 +55,49 @@ pub(crate) fn check(profile: &Profile, tables: &Tables) -> Result<(), PipelineEr
         tables.report.get(writer)?.with(&values(parameters))?;
     }
     Ok(())
+}
+
+/// Estimators that the profile names and no origin calls, and plugins of which nothing is used.
+pub(crate) fn unused(inputs: &Inputs) -> Vec<Finding> {
+    let profile = &inputs.robot.profile;
+    let mut findings = Vec::new();
+    for (name, origin) in &profile.origins {
+        let about = About::Origin(name.clone());
+        let (form, stated, estimator, called) = match is_line(origin) {
+            true => ("center", origin.center_stated, &origin.center, &origin.axis),
+            false => ("axis", origin.axis_stated, &origin.axis, &origin.center),
+        };
+        if stated {
+            findings.push(
+                Finding::of_kind(catalog::ORIGIN_ESTIMATOR_UNUSED, form, about)
+                    .with("estimator", Fact::name(estimator))
+                    .with("called", Fact::name(called)),
+            );
+        }
+    }
+    let used = components(inputs);
+    let used: BTreeSet<&str> = used
+        .iter()
+        .filter_map(|c| Some(c.plugin.as_ref()?.name.as_str()))
+        .collect();
+    for (key, loaded) in &inputs.estimators.loaded {
+        if used.contains(loaded.as_str()) {
+            continue;
+        }
+        let offers = inputs.estimators.tables.list().into_iter();
+        let offers = offers
+            .filter(|(_, from)| matches!(from, From::Plugin { plugin, .. } if plugin == loaded));
+        let offers = offers.map(|(offer, _)| offer.name.clone());
+        findings.push(
+            Finding::new(
+                catalog::PLUGIN_UNUSED,
+                Subject::default().in_file(&inputs.robot.file),
+            )
+            .with("plugin", Fact::name(key))
+            .with("offers", Fact::names(offers)),
+        );
+    }
+    findings
 }
 
 /// Whether an origin is found by a plugin.

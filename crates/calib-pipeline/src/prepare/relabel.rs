@@ -59,7 +59,10 @@ fn relabel_body(
         .flat_map(|(name, r)| (0..r.poses.len()).map(|row| (name.clone(), row)))
         .collect();
     let mut problem = Problem::new(rows.len());
-    let (tracker, frame) = (problem.frame("tracker"), problem.frame(body));
+    let (tracker, frame) = (
+        problem.frame("tracker"),
+        problem.frame(&format!("body {body}")),
+    );
     let noise = problem.noise_group("marker", NoiseKind::Position, 1.0, false);
     let points: Vec<PointId> = markers
         .iter()

@@ -6,12 +6,14 @@ use std::path::{Path, PathBuf};
 use calib_files::input;
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_plugin::OwnEntries;
-use calib_profile::{Profile, ProfileError};
+use calib_profile::Profile;
 use calib_urdf::{Problem, ReadError, ReadProblem, RobotModel, sha256_hex};
 
 use crate::error::{NamedBy, PipelineError, WhyUnread};
-use crate::prepare::inputs::{Digest, RobotProfile};
+use crate::prepare::estimators::Estimators;
+use crate::prepare::inputs::{Digest, RobotProfile, Written};
 use crate::prepare::loads::Masses;
+use crate::prepare::unknown;
 
 /// Largest profile or URDF that is read, bytes.
 const LARGEST_TEXT: u64 = 64 << 20;
@@ -45,9 +47,10 @@ pub fn load_robot_with(
     let urdf_text = read_text(&urdf_path, &named_by)?;
     let model = RobotModel::from_urdf_text(&urdf_text, &urdf_path.display().to_string())?;
     let profile = calib_profile::check(&raw, &text, &shown, &model)?;
+    let written = Written { shown, text };
     // What plugins and the calling program offer is known when the recordings are read.
     if profile.plugins.is_empty() && own.is_empty() {
-        known_estimators(&profile, &text, &shown)?;
+        unknown::check(&profile, &model, &Estimators::built_in()?.tables, &written)?;
     }
     limits_of_moved_joints(&profile, &model, &urdf_path)?;
     let file = profile_path
@@ -56,7 +59,7 @@ pub fn load_robot_with(
     let digests = vec![
         Digest {
             path: file.clone(),
-            sha256: sha256_hex(text.as_bytes()),
+            sha256: sha256_hex(written.text.as_bytes()),
         },
         Digest {
             path: profile.urdf.clone(),
@@ -65,6 +68,7 @@ pub fn load_robot_with(
     ];
     Ok(RobotProfile {
         file,
+        written,
         folder,
         masses: Masses::of(&model, &profile.load),
         profile,
@@ -124,35 +128,6 @@ pub(crate) fn urdf_warnings(robot: &RobotProfile) -> Vec<Finding> {
         })
     };
     robot.model.warnings().iter().filter_map(finding).collect()
-}
-
-/// A profile does not know the estimators; their names are checked here, at their place in the profile.
-fn known_estimators(profile: &Profile, text: &str, shown: &str) -> Result<(), PipelineError> {
-    let centers: Vec<&str> = calib_cor::estimators().iter().map(|e| e.id).collect();
-    let axes: Vec<&str> = calib_aor::estimators().iter().map(|e| e.id).collect();
-    for (name, origin) in &profile.origins {
-        for (key, wanted, ids) in [
-            ("center", &origin.center, &centers),
-            ("axis", &origin.axis, &axes),
-        ] {
-            if ids.contains(&wanted.as_str()) {
-                continue;
-            }
-            let near = match calib_finding::nearest_word(wanted, ids.iter().copied()) {
-                Some(near) => format!("did you mean `{near}`? "),
-                None => String::new(),
-            };
-            return Err(ProfileError::at(
-                shown,
-                text,
-                &["origins", name, key],
-                format!("origin `{name}`: no {key} estimator is called `{wanted}`"),
-                format!("{near}known: {}", ids.join(", ")),
-            )
-            .into());
-        }
-    }
-    Ok(())
 }
 
 fn read_text(path: &Path, named_by: &NamedBy) -> Result<String, PipelineError> {

@@ -70,13 +70,17 @@ pub(crate) fn settle(
     let mut usual = Vec::new();
     for (marker, covariances) in &table.marker_covariance {
         let traces = covariances.iter().map(|c| c.map(|c| c.trace()));
-        note_scatter(marker, traces.collect(), &mut usual, &mut restless);
+        let step = table.written_step.get(marker).copied().unwrap_or(0.0);
+        let stream = (marker.as_str(), step);
+        note_scatter(stream, traces.collect(), &mut usual, &mut restless);
     }
     for (body, covariances) in &table.body_covariance {
         let traces = covariances
             .iter()
             .map(|c| c.map(|c| c.fixed_view::<3, 3>(3, 3).trace()));
-        note_scatter(body, traces.collect(), &mut Vec::new(), &mut restless);
+        let step = table.written_step.get(body).copied().unwrap_or(0.0);
+        let stream = (body.as_str(), step);
+        note_scatter(stream, traces.collect(), &mut Vec::new(), &mut restless);
     }
     // The part that changes from hold to hold and is constant within one (distortion, refraction) does not show in the
     // scatter: half of the weight is the same for all.
@@ -121,9 +125,10 @@ pub(crate) fn settle(
     aligned.poses = table.poses;
 }
 
-/// Adds the usual scatter of one stream and the holds that exceed it.
+/// Adds the usual scatter of one stream and the holds that exceed it. Positions that were rounded to a step scatter by up to half of it along
+/// each axis where nothing moves, and by nothing at all in other holds: √3 of it is beyond that.
 fn note_scatter(
-    stream: &str,
+    (stream, step): (&str, f64),
     traces: Vec<Option<f64>>,
     usual: &mut Vec<f64>,
     restless: &mut BTreeMap<usize, Restless>,
@@ -137,7 +142,7 @@ fn note_scatter(
     for (hold, trace) in traces.iter().enumerate() {
         if let Some(trace) = trace
             && *trace > RESTLESS * middle
-            && trace.sqrt() > RESTLESS_SIGMA
+            && trace.sqrt() > RESTLESS_SIGMA.max(3.0_f64.sqrt() * step)
         {
             restless.entry(hold).or_insert_with(|| Restless {
                 name: stream.to_owned(),

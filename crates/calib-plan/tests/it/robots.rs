@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use calib_pipeline::options::Plugins;
-use calib_pipeline::prepare::inputs::RobotProfile;
+use calib_pipeline::prepare::inputs::{RobotProfile, Written};
 use calib_pipeline::prepare::loads::Masses;
 use calib_plan::Known;
 use calib_urdf::RobotModel;
@@ -124,6 +124,7 @@ pub fn robot(joints: &[JointLine], seen: Seen, shapes: bool, extra: &str) -> Rob
     let profile = profile.unwrap_or_else(|e| panic!("{e}"));
     RobotProfile {
         file: "arm.yaml".to_owned(),
+        written: Written::default(),
         folder: PathBuf::from("/nowhere"),
         masses: Masses::of(&model, &profile.load),
         profile,

@@ -2,6 +2,7 @@
 
 use super::{
     effects,
+    labels::reserved_label,
     motions::{self, CENTER, DIRECTION, POINT},
     subject::{Input, Reply, Subject, text},
 };
@@ -9,6 +10,7 @@ use crate::{
     answer::{Answer, AorFit, CorFit},
     motion::{MotionData, Shape},
     offer::Kind,
+    streams::Streams,
 };
 
 /// Distance from the truth without noise: room for iterative methods, none for wrong ones.
@@ -125,7 +127,7 @@ impl Cases {
                 input: Input::Bytes(example.to_vec()),
                 judge: Box::new(|reply| match reply {
                     Reply::Streams(streams) if streams.is_empty() => Err("no stream".into()),
-                    Reply::Streams(_) => Ok(()),
+                    Reply::Streams(streams) => labels_are_texts(streams),
                     other => Err(text(other)),
                 }),
             });
@@ -229,6 +231,18 @@ impl Cases {
             degenerate: degenerate.into(),
             huge: Input::Bytes(long),
         }
+    }
+}
+
+/// Refuses labels that a table would read as something else.
+fn labels_are_texts(streams: &Streams) -> Result<(), String> {
+    let mut labels = streams.timelines.iter().flat_map(|t| &t.labels);
+    let wrong = labels.find_map(|(name, _)| Some((name, reserved_label(name)?)));
+    match wrong {
+        None => Ok(()),
+        Some((name, what)) => Err(format!(
+            "the label `{name}` has a reserved name: tables take it for {what}; name it otherwise, as `trial`"
+        )),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Conformance of a plugin: does it keep the contract on data that it has never seen?
 //!
 //! ```text
-//! loads · describes fast · loads again · golden cases · degenerate data · same answer twice · eight threads ·
+//! loads · describes fast · loads again · golden cases · degenerate data · covariance · same answer twice · eight threads ·
 //! stops when cancelled · huge input · memory
 //! ```
 //!
@@ -10,7 +10,9 @@
 //! process, as other parts of a program would do.
 
 mod cases;
+mod covariance;
 mod effects;
+mod labels;
 mod memory;
 mod motions;
 mod subject;
@@ -24,6 +26,8 @@ use crate::{
     offer::Kind,
 };
 use cases::Cases;
+use covariance::Stated;
+pub use labels::reserved_label;
 use subject::{Input, Reply, Subject};
 
 /// Threads of the concurrent test, and calls of each.
@@ -248,11 +252,19 @@ fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits)
         table.skip(title, "the rest", "a call did not return");
         return;
     }
+    let ask = |input: Input| {
+        let reply = watch::call(subject, &input, &Cancel::new(), limits.call);
+        reply.map_err(|late| late.to_string())?
+    };
+    if matches!(subject.offer.kind, Kind::Cor | Kind::Aor) {
+        let (shapes, axis) = (&subject.offer.shapes, subject.offer.kind == Kind::Aor);
+        match covariance::judge(&ask, shapes, axis, limits.call) {
+            Stated::Right => table.note(title, "covariance", Ok(())),
+            Stated::Wrong(why) => table.note(title, "covariance", Err(why)),
+            Stated::Unknown(why) => table.skip(title, "covariance", &why),
+        }
+    }
     if subject.offer.kind == Kind::Effect {
-        let ask = |input: Input| {
-            let reply = watch::call(subject, &input, &Cancel::new(), limits.call);
-            reply.map_err(|late| late.to_string())?
-        };
         table.note(title, "of one state alone", effects::alone(&ask));
         table.note(title, "without jumps", effects::smooth(&ask));
     }

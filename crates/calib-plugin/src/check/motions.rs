@@ -133,3 +133,52 @@ pub(super) fn lost(shape: Shape, samples: usize) -> MotionData {
         Shape::TwoBodies => MotionData::two_bodies(&poses, &poses),
     }
 }
+
+/// The same motion with noise of these σ on every coordinate, m, and every orientation about each axis, rad; the same for the same seed.
+pub(super) fn disturbed(
+    data: &MotionData,
+    (sigma_m, sigma_rad): (f64, f64),
+    seed: u64,
+) -> MotionData {
+    let mut state = seed;
+    let mut vector = |sigma: f64| -> Vector { std::array::from_fn(|_| sigma * normal(&mut state)) };
+    let motion = data.view();
+    if motion.shape.is_poses() {
+        let mut pose = |p: BodyPose| BodyPose {
+            rotation: {
+                let w = vector(sigma_rad);
+                let angle = w.iter().map(|x| x * x).sum::<f64>().sqrt();
+                // exp([w]ₓ) R
+                multiply(&rotation(&w.map(|x| x / angle), angle), &p.rotation)
+            },
+            translation_m: plus(&p.translation_m, &vector(sigma_m)),
+        };
+        let mut track =
+            |k: usize| -> Vec<_> { motion.poses(k).map(|p| p.map(&mut pose)).collect() };
+        let first = track(0);
+        return match motion.shape {
+            Shape::TwoBodies => MotionData::two_bodies(&first, &track(1)),
+            _ => MotionData::poses(&first),
+        };
+    }
+    let mut point = |p: Vector| plus(&p, &vector(sigma_m));
+    let mut track = |k: usize| -> Vec<_> { motion.points(k).map(|p| p.map(&mut point)).collect() };
+    let tracks: Vec<_> = (0..motion.tracks).map(&mut track).collect();
+    match motion.shape {
+        Shape::Markers => MotionData::markers(&tracks),
+        _ => MotionData::points(&tracks),
+    }
+}
+
+/// A number of the standard normal distribution: Box and Muller, of two uniform numbers by Knuth's multiplicative congruence.
+fn normal(state: &mut u64) -> f64 {
+    let mut uniform = || {
+        *state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        // The high 53 bits; never 0.
+        ((*state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+    };
+    let (a, b) = (uniform(), uniform());
+    (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+}

@@ -1,5 +1,7 @@
 //! Everything that goes wrong with plugins, with the plugin's name and both sides.
 
+use calib_finding::nearest_word;
+
 use crate::{answer::Failure, offer::Kind, parameters::ParameterError};
 
 /// What went wrong. Paths are as they were searched for.
@@ -124,7 +126,7 @@ pub enum PluginError {
         known: Vec<String>,
     },
     /// Nobody offers such a thing.
-    #[error("unknown {} `{name}`, {}", kind.word(), expected(known))]
+    #[error("unknown {} `{name}`, {}", kind.word(), expected(name, known))]
     Unknown {
         /// What was sought.
         kind: Kind,
@@ -230,12 +232,15 @@ impl PluginError {
 }
 
 /// What a name could have been.
-fn expected(known: &[String]) -> String {
+fn expected(name: &str, known: &[String]) -> String {
     if known.is_empty() {
         return "and no plugin that is loaded offers one: name the plugin that does under `plugins`"
             .into();
     }
-    format!("expected one of {}", offers(known))
+    match nearest_word(name, known.iter().map(String::as_str)) {
+        Some(near) => format!("did you mean `{near}`? expected one of {}", offers(known)),
+        None => format!("expected one of {}", offers(known)),
+    }
 }
 
 fn offers(names: &[String]) -> String {

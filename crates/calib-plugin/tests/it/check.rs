@@ -63,6 +63,45 @@ fn a_mean_is_no_center() {
     assert_eq!(table.exit_code(), 6);
 }
 
+/// The outcome of one test, and why.
+fn row(table: &Conformance, test: &str) -> (Outcome, String) {
+    let mut rows = table.rows.iter().filter(|row| row.test == test);
+    let row = rows.next().unwrap_or_else(|| panic!("no {test}: {table}"));
+    (row.outcome, row.detail.clone())
+}
+
+/// The center of a known sphere with the stated σ: right, twice as large, half as large, with wrong correlations, in some answers, in none.
+#[test]
+fn a_covariance_is_compared_with_the_scatter() {
+    let bed = Bed::new();
+    if bed.build("tests/c/stated.c", "right", &[]).is_none() {
+        return;
+    }
+    let right = row(&checked(&bed, "right"), "covariance");
+    assert_eq!(right, (Outcome::Passed, String::new()));
+    for (deed, outcome, said) in [
+        (
+            "TWICE",
+            Outcome::Failed,
+            "points, σ of the tracker stated: x: the stated σ is ",
+        ),
+        ("HALF", Outcome::Failed, "the scatter of 120 answers "),
+        ("CORRELATED", Outcome::Failed, "its correlations are wrong"),
+        ("SOMETIMES", Outcome::Failed, "a covariance is stated in "),
+        ("NEVER", Outcome::Skipped, "origin-without-covariance"),
+        (
+            "EXACT_ONLY",
+            Outcome::Failed,
+            "0 of 120 motions with noise of 0.2 mm were answered",
+        ),
+    ] {
+        bed.build("tests/c/stated.c", deed, &[deed]).unwrap();
+        let found = row(&checked(&bed, deed), "covariance");
+        assert_eq!(found.0, outcome, "{deed}: {}", found.1);
+        assert!(found.1.contains(said), "{deed}: {}", found.1);
+    }
+}
+
 #[test]
 fn leaks_and_state_are_found() {
     let bed = Bed::new();

@@ -190,6 +190,66 @@ fn c_projects_of_every_kind_are_complete() {
     }
 }
 
+/// Every `depends_on` with its array, and a project without parameters, pass the check: what is not asked for is not read.
+#[test]
+fn a_c_effect_of_anything_passes_the_check() {
+    if cfg!(windows) || compiler("cc", &["--version"]).is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let formula = "sin(order * states->readings[s])";
+    let one = "    const double order = (double)call->values[0].integer;";
+    for (k, (on, changed, parameters)) in [
+        ("CALIB_ON_READING", "sin(3 * states->readings[s])", false),
+        ("CALIB_ON_MOTOR", "sin(order * states->motor_rad[s])", true),
+        ("CALIB_ON_LOAD", "order * states->loads[s]", true),
+        ("CALIB_ON_LOAD", "states->loads[s]", false),
+        ("CALIB_ON_APPROACH", "order * states->approaches[s]", true),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let name = format!("my-effect-{k}");
+        let project = new_project(&name, Kind::Effect, Language::C, folder.path()).unwrap();
+        let source = std::fs::read_to_string(project.join("plugin.c")).unwrap();
+        let mut text = source.replace(formula, changed).replace(
+            ".depends_on = CALIB_ON_READING",
+            &format!(".depends_on = {on}"),
+        );
+        assert!(text.contains(changed) && text.contains(&format!(".depends_on = {on}")));
+        if !parameters {
+            text = text.replace(one, "");
+            let begin = text.find("static const calib_parameter").unwrap();
+            let end = text.find("static const calib_offer").unwrap();
+            text.replace_range(begin..end, "");
+            let lines = text.lines().filter(|l| !l.contains(".parameter"));
+            text = lines.collect::<Vec<_>>().join("\n") + "\n";
+        }
+        std::fs::write(project.join("plugin.c"), text).unwrap();
+        if runs(
+            Command::new("make").arg("CFLAGS=-std=c11 -Wall -O1 -fPIC -Iinclude"),
+            &project,
+        )
+        .is_none()
+        {
+            return;
+        }
+        // The project's own test expects the third harmonic; of another formula it says so, and does not crash.
+        let test = Command::new("make")
+            .arg("test")
+            .current_dir(&project)
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&test.stdout);
+        assert!(
+            said.contains("FAILED: the third harmonic") || said.contains("ok"),
+            "{on}: {said}"
+        );
+        let suffix = std::env::consts::DLL_SUFFIX;
+        passes(&project.join(format!("lib{name}{suffix}")));
+    }
+}
+
 /// What an author forgets ends with a line that says so, not with a segmentation fault.
 #[test]
 fn a_c_test_says_what_is_missing() {

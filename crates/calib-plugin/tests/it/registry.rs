@@ -109,7 +109,7 @@ fn unknown_names_and_wrong_kinds_say_what_there_is() {
     let unknown = tables.cor.get("median").unwrap_err();
     assert_eq!(
         unknown.to_string(),
-        "unknown center estimator `median`, expected one of `mean`"
+        "unknown center estimator `median`, did you mean `mean`? expected one of `mean`"
     );
     assert_eq!(unknown.exit_code(), 2);
     let wrong = tables

@@ -54,8 +54,10 @@ impl Checker<'_> {
                 .center
                 .clone()
                 .unwrap_or_else(|| DEFAULT_CENTER.to_owned()),
+            center_stated: raw.center.is_some(),
             center_parameters: raw.center_parameters.clone(),
             axis: raw.axis.clone().unwrap_or_else(|| DEFAULT_AXIS.to_owned()),
+            axis_stated: raw.axis.is_some(),
             axis_parameters: raw.axis_parameters.clone(),
             axes,
             orientation,

@@ -20,10 +20,14 @@ pub struct Origin {
     pub sweep: String,
     /// Center estimator, by id.
     pub center: String,
+    /// Whether the profile names it.
+    pub center_stated: bool,
     /// Parameters of the center estimator.
     pub center_parameters: BTreeMap<String, ParameterValue>,
     /// Axis estimator, by id.
     pub axis: String,
+    /// Whether the profile names it.
+    pub axis_stated: bool,
     /// Parameters of the axis estimator.
     pub axis_parameters: BTreeMap<String, ParameterValue>,
     /// The swept joints, proximal first.

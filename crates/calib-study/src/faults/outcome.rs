@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use calib_finding::{Fact, Finding, Severity, catalog};
 use calib_pipeline::error::DataProblem;
+use calib_pipeline::prepare::inputs::Written;
 use calib_pipeline::prepare::load::{RobotProfile, of_tables};
 use calib_pipeline::prepare::loads::Masses;
 use calib_pipeline::run::{Plugins, RunOptions, RunOutput, run_on};
@@ -329,6 +330,7 @@ fn robot_profile(profile: &str, urdf: &str) -> Result<RobotProfile, PipelineErro
     let checked = calib_profile::check(&raw, profile, "arm.yaml", &model)?;
     Ok(RobotProfile {
         file: "arm.yaml".to_owned(),
+        written: Written::default(),
         folder: std::path::PathBuf::new(),
         masses: Masses::of(&model, &checked.load),
         profile: checked,

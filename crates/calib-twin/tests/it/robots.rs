@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use calib_pipeline::options::Plugins;
-use calib_pipeline::prepare::inputs::{Inputs, RobotProfile};
+use calib_pipeline::prepare::inputs::{Inputs, RobotProfile, Written};
 use calib_pipeline::prepare::load::of_tables;
 use calib_pipeline::prepare::loads::Masses;
 use calib_twin::nalgebra::Vector3;
@@ -108,6 +108,7 @@ pub fn robot(joints: &[Line], text: &str) -> RobotProfile {
     let profile = profile.unwrap_or_else(|e| panic!("{e}"));
     RobotProfile {
         file: "arm.yaml".to_owned(),
+        written: Written::default(),
         folder: PathBuf::from("/nowhere"),
         masses: Masses::of(&model, &profile.load),
         profile,

@@ -37,7 +37,7 @@ pub(super) fn add_bodies(
         let track = &tracks[name];
         let has_frame = body.kind == BodyKind::Pose || track.template.is_some();
         let frame = if has_frame {
-            let frame = formulation.problem.frame(name);
+            let frame = formulation.problem.frame(&format!("body {name}"));
             let (value, chart) = match body.mount {
                 Some(mount) => (mount, Chart::none()),
                 None => (

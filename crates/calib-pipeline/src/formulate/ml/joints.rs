@@ -5,7 +5,7 @@ use calib_core::{
     Axis, Chart, EFFECTS, EdgeId, EffectKind, GroupId, JointState, NoiseKind, Problem, Role,
 };
 use calib_profile::{ContactBase, JointFreeSet, OriginFreeSet, Profile};
-use calib_urdf::{JointId, JointKind, RobotModel};
+use calib_urdf::{JointId, JointKind, LinkId, RobotModel};
 
 use crate::formulate::formulation::{Formulation, FreeSet};
 use crate::formulate::kinematics::joint_state;
@@ -26,6 +26,11 @@ pub(super) struct Row<'a> {
     pub q: &'a [f64],
     pub under: &'a Conditions,
     pub loads: Loads,
+}
+
+/// Name of a link's frame in the problem. Bodies, links and the tracker may share names; frames may not.
+pub(super) fn link_frame(model: &RobotModel, link: LinkId) -> String {
+    format!("link {}", model.link(link).name)
 }
 
 /// Joints between the root and any link that something is attached to or reported at, parents first.
@@ -108,11 +113,11 @@ pub(super) fn add_joint(
         (OriginFreeSet::Full, _) => Chart::full(),
     };
     let fixed = j.kind == JointKind::Fixed;
-    let child = problem.frame(&model.link(j.child).name);
+    let child = problem.frame(&link_frame(model, j.child));
     let origin_child = if fixed {
         child
     } else {
-        problem.frame(&format!("{}.origin", j.name))
+        problem.frame(&format!("joint {} origin", j.name))
     };
     let name = format!("{}.origin", j.name);
     let origin = problem.unknown(&name, parent, origin_child, j.parent_link_from_joint, chart);

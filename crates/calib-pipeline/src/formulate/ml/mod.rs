@@ -6,7 +6,7 @@ use bodies::add_bodies;
 use calib_core::{Chart, EdgeId, FrameId, Problem, Role, Settings, Solution};
 use calib_profile::{Free, Usage};
 use couplings::coupling_candidates;
-use joints::{Row, add_joint, joint_noise_group};
+use joints::{Row, add_joint, joint_noise_group, link_frame};
 use masses::free_masses;
 use starts::open_starts;
 
@@ -128,8 +128,8 @@ fn add_root(
 ) -> (FrameId, FrameId, EdgeId) {
     let profile = &inputs.robot.profile;
     let model = &inputs.robot.model;
-    let tracker = problem.frame(&profile.tracker.frame);
-    let root_frame = problem.frame(&model.link(model.root()).name);
+    let tracker = problem.frame(&format!("tracker {}", profile.tracker.frame));
+    let root_frame = problem.frame(&link_frame(model, model.root()));
     let tracker_free = !profile.bodies.is_empty()
         && (profile.solve.free.contains(&Free::Tracker) || free_set == FreeSet::RegistrationOnly);
     let chart = if tracker_free {
