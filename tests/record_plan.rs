@@ -321,11 +321,60 @@ fn a_plan_goes_on_after_an_interruption_and_stops_at_the_asked_sigma() {
     assert!(after > before, "{said}");
 }
 
+/// `n` takes another posture, which the file knows: what it replaced is not asked for after an interruption.
+#[test]
+fn a_posture_that_was_exchanged_is_not_asked_for_again() {
+    let dir = planned("12");
+    let asked = |line: &str| line.split(": ").nth(1).expect("a posture").to_owned();
+    let mut cell = Cell::new(&dir, "poses", false, 100, &[]);
+    cell.follows(1);
+    let given_up = asked(&cell.until("pose 2/12", true));
+    cell.presses("n");
+    cell.until("Another posture takes the place", true);
+    let other = cell.until("pose 2/12", true);
+    assert_ne!(asked(&other), given_up);
+    cell.goes(&other);
+    cell.presses("");
+    cell.until("held ", true);
+    cell.presses("q");
+    let number = cell.number;
+    let (code, said) = cell.ends();
+    assert_eq!(code, Some(0), "{said}");
+    let joints = |line: &str| -> Vec<String> {
+        let shown = line.split(';').next().unwrap_or_default();
+        shown.split(", ").map(str::to_owned).collect()
+    };
+    let mut cell = Cell::new(&dir, "poses", false, number, &["--append"]);
+    let mut line = cell.until("pose 3/12", true);
+    for next in 4..=12 {
+        assert_ne!(joints(&asked(&line)), joints(&given_up));
+        cell.presses("s");
+        // Skipped ones are out of the list, which gets shorter.
+        line = cell.until("pose ", true);
+        assert!(line.contains(&format!("/{}", 15 - next)), "{next}: {line}");
+        if next == 12 {
+            break;
+        }
+    }
+    cell.presses("q");
+    let (code, said) = cell.ends();
+    assert_eq!(code, Some(0), "{said}");
+}
+
 /// The held-out postures go into the recording that validates; no σ follows from them.
 #[test]
 fn held_out_postures_are_asked_for_in_a_recording_that_validates() {
     let dir = planned("12");
     let mut cell = Cell::new(&dir, "checks", true, 100, &[]);
+    // One that is asked for later comes at the end: nothing takes its place.
+    let first = cell.until("pose 1/3: ", true);
+    cell.presses("n");
+    cell.until("This posture is asked for at the end.", true);
+    let place = |line: &str| line.split([':', ';']).nth(1).map(str::to_owned);
+    assert_ne!(place(&cell.until("pose 1/3: ", true)), place(&first));
+    cell.presses("n");
+    cell.until("pose 1/3: ", true);
+    cell.presses("n");
     cell.follows(3);
     let (code, said) = cell.ends();
     assert_eq!(code, Some(0), "{said}");

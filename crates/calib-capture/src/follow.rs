@@ -71,6 +71,17 @@ pub trait Planner: Debug {
     fn skipped(&mut self);
     /// The posture that would tell most in place of the first; `None` where there is none.
     fn offer(&mut self) -> Option<Step>;
-    /// Takes the offered posture in place of the first; whether there was one.
-    fn instead(&mut self) -> bool;
+    /// Takes the offered posture in place of the first, or asks for the first later.
+    fn instead(&mut self) -> Instead;
+}
+
+/// What came of the wish for another posture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Instead {
+    /// The offered one took the place of the first, which is not asked for again.
+    Exchanged,
+    /// The first is asked for at the end.
+    Later,
+    /// There is no other one.
+    Nothing,
 }

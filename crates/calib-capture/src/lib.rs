@@ -40,7 +40,7 @@ mod survey;
 mod table;
 pub mod vrpn;
 
-pub use follow::{Held, Outcome, Planner, Progress, asked_is_reached};
+pub use follow::{Held, Instead, Outcome, Planner, Progress, asked_is_reached};
 pub use frame::Frame;
 pub use guide::{Guide, Step, grid};
 pub use joints::{JointColumn, JointListener, JointSource, Unit, parse_joints};

@@ -1,6 +1,7 @@
 //! The file that grows while it is recorded: whole rows, on the disk every second.
 
 use calib_recording::{Filled, ReadOptions, Recording, WRITTEN_LIVE, read_bytes};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
@@ -54,6 +55,9 @@ pub struct Mark {
 /// What a comment of the file says before it lists the requested poses.
 pub const POSES: &str = "poses: ";
 
+/// What a comment of the file says before the joint values (rad, m) of a posture for which another one was recorded.
+const EXCHANGED: &str = "exchanged: ";
+
 /// A table being written.
 #[derive(Debug)]
 pub struct Table {
@@ -72,6 +76,8 @@ pub struct Table {
     pub held: Vec<String>,
     /// What they say, in the same order.
     pub holds: Vec<Held>,
+    /// Postures for which others were recorded, by joint, rad or m.
+    pub exchanged: Vec<BTreeMap<String, f64>>,
 }
 
 impl Table {
@@ -105,6 +111,7 @@ impl Table {
             last_time: None,
             held: Vec::new(),
             holds: Vec::new(),
+            exchanged: Vec::new(),
         })
     }
 
@@ -176,6 +183,7 @@ impl Table {
             last_time,
             held,
             holds,
+            exchanged: exchanged_of(text),
         })
     }
 
@@ -189,6 +197,20 @@ impl Table {
         self.rows += 1;
         self.waiting_since.get_or_insert(now);
         self.tick(now)
+    }
+
+    /// Writes down that another posture is recorded in place of this one, so that it is not asked for when the file is gone on with.
+    ///
+    /// # Errors
+    /// [`TableError::Io`].
+    pub fn exchanged(&mut self, joints: &BTreeMap<String, f64>) -> Result<(), TableError> {
+        let values: Vec<String> = joints
+            .iter()
+            .map(|(name, q)| format!("{name}={q}"))
+            .collect();
+        self.pending
+            .push_str(&format!("# {EXCHANGED}{}\n", values.join(" ")));
+        self.flush()
     }
 
     /// Where the file ends now; everything is written.
@@ -263,6 +285,20 @@ impl Drop for Table {
     fn drop(&mut self) {
         let _ = self.flush();
     }
+}
+
+/// The postures that [`Table::exchanged`] wrote down; a line that is not of this form is somebody's remark.
+fn exchanged_of(text: &str) -> Vec<BTreeMap<String, f64>> {
+    let lines = text.lines();
+    let listed = lines.filter_map(|l| l.strip_prefix("# ")?.strip_prefix(EXCHANGED));
+    let posture = |line: &str| -> Option<BTreeMap<String, f64>> {
+        let values = line.split(' ').map(|part| {
+            let (name, value) = part.rsplit_once('=')?;
+            Some((name.to_owned(), value.parse().ok()?))
+        });
+        values.collect()
+    };
+    listed.filter_map(posture).collect()
 }
 
 /// What each hold of a recording says; `labels`: the hold of each row, empty between holds.

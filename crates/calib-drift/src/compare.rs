@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::FALSE_ALARMS;
 use crate::error::DriftError;
 use crate::evidence::{Evidence, NULL, Number, Side};
+use crate::freedom::combined;
 
 /// A number that both calibrations know.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -27,6 +28,8 @@ pub struct Changed {
     pub change: f64,
     /// σ of the change.
     pub sigma: f64,
+    /// Degrees of freedom of σ, by Welch and Satterthwaite.
+    pub degrees_of_freedom: f64,
     /// Probability of such a change where nothing changed, for this number alone.
     pub p_value: f64,
     /// The same for the whole list (Holm).
@@ -44,7 +47,7 @@ pub struct Joint {
     pub statistic: f64,
     /// How many directions both data see.
     pub degrees_of_freedom: usize,
-    /// Of the noise levels.
+    /// Of the noise of both, combined.
     pub noise_degrees_of_freedom: f64,
     /// Probability of such a distance where nothing changed.
     pub p_value: f64,
@@ -103,8 +106,6 @@ pub fn compare(old: &Evidence, new: &Evidence) -> Result<Drift, DriftError> {
             .map(|(name, _)| name.clone())
             .collect()
     };
-    let dof = old.degrees_of_freedom.min(new.degrees_of_freedom).max(1.0);
-    let both_dof = old.degrees_of_freedom + new.degrees_of_freedom;
     let (mut known_in_one, mut known_in_neither, mut not_credible) =
         (Vec::new(), Vec::new(), Vec::new());
     let mut pairs = Vec::new();
@@ -125,13 +126,13 @@ pub fn compare(old: &Evidence, new: &Evidence) -> Result<Drift, DriftError> {
         }
     }
     let joint = if same_nominal {
-        joint(old, new, both_dof)?
+        joint(old, new)?
     } else {
-        of_numbers(old, new, &pairs, both_dof)?
+        of_numbers(old, new, &pairs)?
     };
     let pairs = pairs.into_iter();
     let mut numbers: Vec<Changed> = pairs
-        .filter_map(|(number, other)| change(old, number, new, other, dof))
+        .filter_map(|(number, other)| change(old, number, new, other))
         .collect();
     holm(&mut numbers);
     let changed = joint.significant || numbers.iter().any(|n| n.significant);
@@ -165,7 +166,7 @@ fn same_robot(old: &Evidence, new: &Evidence) -> Result<(), DriftError> {
 }
 
 /// Equation (1).
-fn joint(old: &Evidence, new: &Evidence, dof: f64) -> Result<Joint, DriftError> {
+fn joint(old: &Evidence, new: &Evidence) -> Result<Joint, DriftError> {
     let shared: Vec<&str> = old
         .parameters
         .iter()
@@ -191,24 +192,25 @@ fn joint(old: &Evidence, new: &Evidence, dof: f64) -> Result<Joint, DriftError> 
     // One tolerance for all ranks: a direction counts in the sum if it counts in a part.
     let limit = NULL * largest;
     forget_common_gauges(&mut sides, limit);
-    let rank_of = |a: &DMatrix<f64>| {
-        let values = decompose::singular_values(a);
-        values.iter().filter(|s| **s > limit).count()
-    };
     let [Side { a: a1, y: y1, .. }, Side { a: a2, y: y2, .. }] = &sides;
     let mut a = DMatrix::zeros(a1.nrows() + a2.nrows(), shared.len());
     a.rows_mut(0, a1.nrows()).copy_from(a1);
     a.rows_mut(a1.nrows(), a2.nrows()).copy_from(a2);
     let mut y = DVector::zeros(a.nrows());
     // Only what lies in the range of each A says anything about the robot.
+    let [of_old, of_new, of_both] = [a1, a2, &a].map(|a| range_of(a, limit));
     y.rows_mut(0, a1.nrows())
-        .copy_from(&in_range(a1, y1, limit));
+        .copy_from(&(&of_old * of_old.tr_mul(y1)));
     y.rows_mut(a1.nrows(), a2.nrows())
-        .copy_from(&in_range(a2, y2, limit));
-    let together = in_range(&a, &y, limit);
-    let statistic = (&y - together).norm_squared();
-    let degrees = (rank_of(a1) + rank_of(a2)).saturating_sub(rank_of(&a));
-    Ok(tested(statistic, degrees, dof))
+        .copy_from(&(&of_new * of_new.tr_mul(y2)));
+    let statistic = (&y - &of_both * of_both.tr_mul(&y)).norm_squared();
+    let degrees = (of_old.ncols() + of_new.ncols()).saturating_sub(of_both.ncols());
+    // s = yᵀ Π y: the diagonal block of Π has the eigenvalues of S₁ S⁻¹ in (3).
+    let both = of_both.rows(0, a1.nrows());
+    let block = &of_old * of_old.transpose() - &both * both.transpose();
+    let values = decompose::singular_values(&block);
+    let shares: Vec<f64> = values.iter().copied().take(degrees).collect();
+    Ok(tested(statistic, &shares, old, new))
 }
 
 /// Equation (1) on the numbers that both data determine: x̃₂ − x̃₁ of them, whitened by both covariances.
@@ -216,7 +218,6 @@ fn of_numbers(
     old: &Evidence,
     new: &Evidence,
     pairs: &[(&Number, &Number)],
-    dof: f64,
 ) -> Result<Joint, DriftError> {
     if pairs.is_empty() {
         return Err(DriftError::NothingInCommon {
@@ -243,21 +244,38 @@ fn of_numbers(
     });
     let change = change.component_div(&sigma);
     let svd = decompose::svd(&scaled);
-    let (mut statistic, mut degrees) = (0.0, 0);
-    for i in 0..svd.s.len() {
-        if svd.s[i] > INDEPENDENT {
-            statistic += svd.v.column(i).dot(&change).powi(2) / svd.s[i];
-            degrees += 1;
-        }
+    let counts: Vec<usize> = (0..svd.s.len())
+        .filter(|i| svd.s[*i] > INDEPENDENT)
+        .collect();
+    let squares = counts
+        .iter()
+        .map(|&i| svd.v.column(i).dot(&change).powi(2) / svd.s[i]);
+    let statistic = squares.sum();
+    // Rows of V diag(1/√s): what turns numbers in units of their σ into independent ones of variance 1.
+    let mut whiten = svd.v.select_columns(&counts);
+    for (k, &i) in counts.iter().enumerate() {
+        whiten.column_mut(k).unscale_mut(svd.s[i].sqrt());
     }
-    Ok(tested(statistic, degrees, dof))
+    let mut of_old = sides[0].clone();
+    for (r, sigma) in sigma.iter().enumerate() {
+        of_old.row_mut(r).unscale_mut(*sigma);
+    }
+    let root = whiten.tr_mul(&of_old);
+    let values = decompose::singular_values(&(&root * root.transpose()));
+    let shares: Vec<f64> = values.iter().copied().collect();
+    Ok(tested(statistic, &shares, old, new))
 }
 
 /// A combination of numbers whose variance is below this share of theirs is the same number twice.
 const INDEPENDENT: f64 = 1e-6;
 
-/// The test of a squared distance.
-fn tested(statistic: f64, degrees: usize, dof: f64) -> Joint {
+/// The test of a squared distance; `shares`: the old calibration's in each of its directions.
+fn tested(statistic: f64, shares: &[f64], old: &Evidence, new: &Evidence) -> Joint {
+    let degrees = shares.len();
+    let dof = match degrees {
+        0 => old.degrees_of_freedom + new.degrees_of_freedom,
+        _ => combined(shares, old.degrees_of_freedom, new.degrees_of_freedom),
+    };
     let p_value = if degrees == 0 {
         1.0
     } else {
@@ -320,16 +338,11 @@ fn forget_common_gauges(sides: &mut [Side; 2], limit: f64) {
     }
 }
 
-/// The part of y in the range of A.
-fn in_range(a: &DMatrix<f64>, y: &DVector<f64>, limit: f64) -> DVector<f64> {
+/// Orthonormal columns that span the range of A.
+fn range_of(a: &DMatrix<f64>, limit: f64) -> DMatrix<f64> {
     let svd = decompose::svd(a);
-    let mut part = DVector::zeros(y.len());
-    for i in 0..svd.s.len() {
-        if svd.s[i] > limit {
-            part += svd.u.column(i) * svd.u.column(i).dot(y);
-        }
-    }
-    part
+    let seen: Vec<usize> = (0..svd.s.len()).filter(|i| svd.s[*i] > limit).collect();
+    svd.u.select_columns(&seen)
 }
 
 /// A number before and after, and its change; angles by the shorter way round.
@@ -355,7 +368,6 @@ fn change(
     old_number: &Number,
     new: &Evidence,
     new_number: &Number,
-    dof: f64,
 ) -> Option<Changed> {
     let (from, to, change) = step(old, old_number, new, new_number);
     let (old_variance, new_variance) = (old.estimate(old_number).1, new.estimate(new_number).1);
@@ -363,7 +375,9 @@ fn change(
     if !(sigma > 0.0 && change.is_finite() && sigma.is_finite()) {
         return None;
     }
-    // t² is F(1, dof); Satterthwaite's degrees lie between the smaller and the sum, the smaller is safe.
+    // t² is F(1, ν), ν by (3).
+    let share = old_variance / sigma.powi(2);
+    let dof = combined(&[share], old.degrees_of_freedom, new.degrees_of_freedom);
     let p_value = chance::f_tail((change / sigma).powi(2), 1.0, dof);
     Some(Changed {
         name: old_number.name.clone(),
@@ -373,6 +387,7 @@ fn change(
         new: to,
         change,
         sigma,
+        degrees_of_freedom: dof,
         p_value,
         p_adjusted: 1.0,
         significant: false,

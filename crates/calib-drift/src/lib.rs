@@ -12,8 +12,8 @@
 //!
 //! if nothing changed. A_k and y_k are taken about x_ref, the mean of the two estimates, so that a gauge, which is a curve,
 //! is straight between them. (1) asks whether *anything* that both data saw is different: no convention, no prior and no frame
-//! enters. (2) asks it of one number that both data determine (g_k ⊥ null U_k). As the noise was estimated, χ² is F with the
-//! residuals' degrees of freedom, and z is Student's t. False alarms of everything that is said together: [`FALSE_ALARMS`];
+//! enters. (2) asks it of one number that both data determine (g_k ⊥ null U_k). As the noise was estimated, χ² is F and z is Student's t,
+//! with the degrees of freedom that Welch and Satterthwaite give for the two residuals together. False alarms of everything that is said together: [`FALSE_ALARMS`];
 //! half of it for (1), half for all (2) by Holm's procedure.
 //!
 //! Parameters are displacements from a nominal URDF. Where the two calibrations start from different ones (the second from the URDF that
@@ -26,6 +26,7 @@
 mod compare;
 mod error;
 mod evidence;
+mod freedom;
 mod history;
 mod render;
 mod render_history;

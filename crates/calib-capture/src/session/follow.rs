@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::Session;
-use crate::{Held, Planner, Screen, TableError, asked_is_reached};
+use crate::{Held, Instead, Planner, Screen, TableError, asked_is_reached};
 
 /// A body that is hidden for so long in a posture is not only passed by an arm, s.
 const HIDDEN: f64 = 3.0;
@@ -88,14 +88,26 @@ impl<'a> Session<'a> {
 
     /// Asks for the next best posture in place of this one.
     pub(super) fn instead(&mut self, screen: &mut dyn Screen) -> Result<(), TableError> {
+        let first = self.plan.guide.steps.iter().find(|step| !step.through);
+        let first = first.map(|step| step.targets.clone()).unwrap_or_default();
         let Some(planner) = &mut self.planner else {
             return Ok(());
         };
-        if !planner.instead() {
-            screen.line("  There is no other posture to offer: s Enter skips this one.");
-            return Ok(());
+        let instead = planner.instead();
+        match instead {
+            Instead::Exchanged => screen.line("  Another posture takes the place of this one."),
+            Instead::Later => screen.line("  This posture is asked for at the end."),
+            Instead::Nothing => {
+                screen.line("  There is no other posture to offer: s Enter skips this one.");
+                return Ok(());
+            }
         }
         self.give_up_hold()?;
+        if instead == Instead::Exchanged {
+            let joints = self.plan.guide.joints.iter().zip(first);
+            let named = joints.map(|(&k, q)| (self.plan.columns[k].name.clone(), q));
+            self.table.exchanged(&named.collect())?;
+        }
         self.next(screen);
         Ok(())
     }

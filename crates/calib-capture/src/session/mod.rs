@@ -3,6 +3,7 @@
 mod ended;
 mod follow;
 mod hold;
+mod keys;
 mod plan;
 mod record;
 mod rows;
@@ -84,6 +85,8 @@ pub struct Session<'a> {
     too_old: u64,
     /// Targets of the pose that was held or passed last.
     before: Option<Vec<f64>>,
+    /// How often the hold of this pose started over.
+    started_over: usize,
     /// Since when a body is hidden in this pose, s, and whether that was said.
     hidden_since: Option<f64>,
     said_hidden: bool,
@@ -122,6 +125,7 @@ impl Session<'_> {
             restarted: false,
             too_old: 0,
             before: None,
+            started_over: 0,
             hidden_since: None,
             said_hidden: false,
             reached: false,
@@ -190,64 +194,6 @@ impl Session<'_> {
         }
     }
 
-    /// Handles the operator's input.
-    ///
-    /// # Errors
-    /// When the file cannot be written.
-    pub fn key(&mut self, key: Key, screen: &mut dyn Screen) -> Result<(), TableError> {
-        match (key, self.phase) {
-            (Key::There, Phase::Going) if self.is_passing() => self.pass(screen),
-            (Key::There, Phase::Going) => self.phase = Phase::Settling,
-            (Key::Instead, _) => self.instead(screen)?,
-            (Key::Keep, Phase::Settling | Phase::Holding(_)) if self.is_guided() => {
-                self.as_it_is = true;
-                screen.line("  this pose counts with what is seen of it");
-            }
-            (Key::Repeat, _) => self.repeat(screen)?,
-            (Key::Skip, _) if self.is_guided() => {
-                screen.line("  skipped");
-                self.give_up_hold()?;
-                if let Some(planner) = &mut self.planner {
-                    planner.skipped();
-                }
-                self.next(screen);
-            }
-            _ => {}
-        }
-        Ok(())
-    }
-
-    /// Whether the requested pose is only on the way.
-    fn is_passing(&self) -> bool {
-        self.step().is_some_and(|step| step.through)
-    }
-
-    /// Takes the pose that was held last out of the file, and asks for it again.
-    fn repeat(&mut self, screen: &mut dyn Screen) -> Result<(), TableError> {
-        let Some(last) = self.last.take() else {
-            screen.line("  No pose of this session can be repeated: only the last one, once.");
-            return Ok(());
-        };
-        self.hold = Hold::default();
-        self.table.cut_back(last.before)?;
-        screen.line(&format!(
-            "  Pose {} is out of the file and is recorded again.",
-            last.hold
-        ));
-        self.held -= 1;
-        self.done.remove(&last.step);
-        self.free = self.free.saturating_sub(1);
-        self.step = last.step;
-        if let Some(planner) = &mut self.planner {
-            planner.forget();
-        }
-        self.follow();
-        self.as_it_is = false;
-        self.phase = self.first_phase();
-        self.announce(screen);
-        Ok(())
-    }
-
     /// What was recorded of a hold that did not become one: nothing is written of it, but where all motion is.
     fn give_up_hold(&mut self) -> Result<(), TableError> {
         let hold = std::mem::take(&mut self.hold);
@@ -261,7 +207,7 @@ impl Session<'_> {
     }
 
     fn next(&mut self, screen: &mut dyn Screen) {
-        self.as_it_is = false;
+        (self.as_it_is, self.started_over) = (false, 0);
         (self.hidden_since, self.said_hidden) = (None, false);
         self.phase = if self.planner.is_some() {
             self.follow();
@@ -391,10 +337,11 @@ impl Session<'_> {
         let lost = self.hold.lost(&self.plan, self.unseen());
         if !lost.is_empty() && !self.as_it_is {
             let names: Vec<&str> = lost.iter().map(|moved| moved.name.as_str()).collect();
-            screen.line(&format!(
+            let why = format!(
                 "  {} was lost: the hold is repeated when it is seen (k Enter = count the pose as it is, s Enter = skip it).",
                 names.join(", ")
-            ));
+            );
+            self.starts_over(&why, screen);
             self.phase = Phase::Settling;
             return self.give_up_hold();
         }
@@ -485,7 +432,7 @@ impl Session<'_> {
                 self.phase = Phase::Holding(host);
             }
             (Phase::Holding(_), None) => {
-                screen.line("  The robot moved: the hold starts over.");
+                self.starts_over("  The robot moved: the hold starts over.", screen);
                 self.give_up_hold()?;
                 self.phase = Phase::Settling;
             }

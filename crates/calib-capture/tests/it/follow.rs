@@ -3,7 +3,9 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use calib_capture::{Held, Key, Outcome, Planner, Progress, Session, Step, Table};
+use calib_capture::{
+    Held, Instead, Key, Outcome, Planner, Progress, Session, Step, Table, Terminal,
+};
 
 use crate::session::{Scene, plan, read};
 use calib_capture::JointSource;
@@ -63,10 +65,10 @@ impl Planner for List {
         Some(Step::at(vec![0.25]))
     }
 
-    fn instead(&mut self) -> bool {
+    fn instead(&mut self) -> Instead {
         self.tell("instead");
         self.rest[0] = Step::at(vec![0.25]);
-        true
+        Instead::Exchanged
     }
 }
 
@@ -150,7 +152,8 @@ fn a_hidden_body_is_said_with_what_to_do_and_the_last_pose_comes_again() {
     let folder = tempfile::tempdir().expect("folder");
     let list = list(&[-0.4, -0.2, 0.0, 0.2]);
     let told = list.told.clone();
-    let mut scene = scene(&folder.path().join("poses.csv"), list);
+    let path = folder.path().join("poses.csv");
+    let mut scene = scene(&path, list);
     scene.go(-0.4);
     (0..280).for_each(|_| scene.frame_of(false, true));
     assert!(!said(&scene).contains("hidden"), "{}", said(&scene));
@@ -175,6 +178,15 @@ fn a_hidden_body_is_said_with_what_to_do_and_the_last_pose_comes_again() {
         "{}",
         said(&scene)
     );
+    // The file knows what was not recorded, and reads as before.
+    drop(told);
+    drop(scene);
+    let header = plan(JointSource::Udp(0), 1).header();
+    let table = Table::append(&path, &header, None).expect("gone on with");
+    let expected = [("waist".to_owned(), -0.4)].into();
+    assert_eq!(table.exchanged, [expected]);
+    assert_eq!(table.holds.len(), 1);
+    assert!(!read(&path).timelines.is_empty());
 }
 
 /// A body that the plan knows to be hidden in a posture does not hold it up.
@@ -188,4 +200,95 @@ fn a_body_that_is_expected_to_be_hidden_need_not_be_seen() {
     scene.go(-0.4);
     (0..120).for_each(|_| scene.frame_of(false, true));
     assert_eq!(*told.borrow(), ["held"]);
+}
+
+/// A terminal of 24 rows, 80 columns: what is seen of the bytes that were written.
+#[derive(Clone, Debug, Default)]
+struct Rows(Rc<RefCell<Vec<u8>>>);
+
+impl std::io::Write for Rows {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.borrow_mut().extend(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Rows {
+    fn seen(&self) -> Vec<String> {
+        const ROWS: usize = 24;
+        const COLUMNS: usize = 80;
+        let written = String::from_utf8(self.0.borrow().clone()).expect("text");
+        let lines = written.split('\n').map(|line| {
+            // A status line is erased and written again.
+            line.rsplit("\r\x1b[K").next().unwrap_or_default()
+        });
+        let mut rows: Vec<String> = Vec::new();
+        for line in lines {
+            let letters: Vec<char> = line.chars().collect();
+            match letters.is_empty() {
+                true => rows.push(String::new()),
+                false => rows.extend(letters.chunks(COLUMNS).map(|c| c.iter().collect())),
+            }
+        }
+        rows.split_off(rows.len().saturating_sub(ROWS))
+    }
+}
+
+/// Bodies are hidden, the robot trembles, postures are exchanged and repeated: what is asked, what is known and the state stay on the screen.
+#[test]
+fn a_terminal_of_24_rows_shows_the_question_the_state_and_sigma() {
+    let folder = tempfile::tempdir().expect("folder");
+    let list = list(&[-0.4, -0.2, 0.0, 0.2, 0.4]);
+    let mut scene = scene(&folder.path().join("poses.csv"), list);
+    let rows = Rows::default();
+    scene.said.1 = Some(Box::new(Terminal::new(rows.clone())));
+    scene.go(-0.4);
+    scene.stay(120);
+    let visible = |scene: &Scene, number: usize, waist: &str| {
+        let seen = rows.seen();
+        let question = format!("pose {number}/5: waist {waist}");
+        let state = format!("pose {number}/5 · ");
+        assert!(
+            seen.iter().any(|r| r.starts_with(&question)),
+            "{question}: {seen:#?}"
+        );
+        assert!(
+            seen.iter().any(|r| r.contains("σ of the tool: ")),
+            "{seen:#?}"
+        );
+        assert!(
+            seen.last().is_some_and(|r| r.starts_with(&state)),
+            "{seen:#?}"
+        );
+        assert!(scene.said.0.contains(&question));
+    };
+    visible(&scene, 2, "-11.46°");
+    scene.go(-0.2);
+    // Thirty holds are begun, and the robot moves in each.
+    for _ in 0..30 {
+        scene.stay(60);
+        scene.go(-0.19);
+        scene.go(-0.2);
+    }
+    visible(&scene, 2, "-11.46°");
+    // The body is hidden in half of as many.
+    for _ in 0..30 {
+        scene.stay(25);
+        (0..40).for_each(|_| scene.frame_of(false, true));
+    }
+    (0..400).for_each(|_| scene.frame_of(false, true));
+    visible(&scene, 2, "-11.46°");
+    scene.key(Key::Instead);
+    scene.frame_of(true, true);
+    visible(&scene, 2, "14.32°");
+    scene.go(0.25);
+    scene.stay(120);
+    visible(&scene, 3, "0.0°");
+    scene.key(Key::Repeat);
+    scene.frame_of(true, true);
+    visible(&scene, 2, "14.32°");
 }

@@ -56,17 +56,24 @@ fn at(waist: f64) -> Isometry3<f64> {
     )
 }
 
-/// Keeps what the operator reads.
+/// Keeps what the operator reads, and shows it on a screen where there is one.
 #[derive(Default)]
-pub(crate) struct Said(pub(crate) String);
+pub(crate) struct Said(pub(crate) String, pub(crate) Option<Box<dyn Screen>>);
 
 impl Screen for Said {
     fn line(&mut self, text: &str) {
         self.0 += text;
         self.0.push('\n');
+        if let Some(screen) = &mut self.1 {
+            screen.line(text);
+        }
     }
 
-    fn status(&mut self, _text: &str, _now: f64) {}
+    fn status(&mut self, text: &str, now: f64) {
+        if let Some(screen) = &mut self.1 {
+            screen.status(text, now);
+        }
+    }
 }
 
 /// A robot under a tracker of 100 Hz.
@@ -124,6 +131,7 @@ impl Scene {
         self.session
             .frame(&frame, now, self.listener.as_ref(), &mut self.said)
             .expect("written");
+        self.said.status(&self.session.status(now), now);
     }
 
     pub(crate) fn go(&mut self, to: f64) {

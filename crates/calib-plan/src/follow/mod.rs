@@ -217,9 +217,21 @@ impl<'a> Follow<'a> {
         Ok(())
     }
 
-    /// Goes on with a file: what it has already is no longer asked for.
-    pub fn resume(&mut self, holds: Vec<Candidate>, near: &dyn Fn(&[f64], &[f64]) -> bool) {
-        if holds.is_empty() {
+    /// Goes on with a file: what it has already is no longer asked for, and neither are postures that were exchanged for others.
+    pub fn resume(
+        &mut self,
+        holds: Vec<Candidate>,
+        exchanged: &[Vec<f64>],
+        near: &dyn Fn(&[f64], &[f64]) -> bool,
+    ) {
+        for q in exchanged {
+            let is_it = |n: &Next| n.why != Why::Detour && near(&n.candidate.q, q);
+            if let Some(place) = self.rest.iter().position(is_it) {
+                self.rest.remove(place);
+            }
+            self.avoided.push(q.clone());
+        }
+        if holds.is_empty() && exchanged.is_empty() {
             return;
         }
         for hold in holds {

@@ -56,6 +56,20 @@ impl Follow<'_> {
         first.is_some()
     }
 
+    /// Asks for the first at the end; whether there is another one before it.
+    pub fn later(&mut self) -> bool {
+        if recorded(&self.rest).nth(1).is_none() {
+            return false;
+        }
+        if let Some(place) = self.rest.iter().position(|n| n.why != Why::Detour) {
+            let first = self.rest.remove(place);
+            self.rest.push(first);
+        }
+        self.offered = None;
+        self.route();
+        true
+    }
+
     /// Candidates that are not to be chosen: postures of the list, and what is near to one that was avoided.
     fn taken(&self) -> Vec<usize> {
         let listed = self.held.iter().map(|h| &h.1).chain(&self.rest);

@@ -143,6 +143,32 @@ fn postures_are_exchanged_skipped_taken_again_and_found_in_a_file() {
     follow.forget();
     assert_eq!(follow.rest()[0].candidate, offered.candidate);
     assert_eq!(count(&follow), 11);
+    // A file says that the first was exchanged for the offered one: neither is asked for.
+    let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.01);
+    let mut gone_on = followed(&known, &options, &plan);
+    let exchanged = [first.candidate.q.clone()];
+    let kept = count(&gone_on);
+    // A posture may be in a list twice.
+    let asked = |follow: &Follow<'_>, q: &[f64]| {
+        let recorded = follow.rest().iter().filter(|n| !n.is_on_the_way());
+        recorded.filter(|n| near(&n.candidate.q, q)).count()
+    };
+    let [given_up, taken] = [&first, &offered].map(|n| n.candidate.q.clone());
+    let before = [&given_up, &taken].map(|q| asked(&gone_on, q));
+    gone_on.resume(vec![offered.candidate.clone()], &exchanged, &near);
+    assert_eq!(count(&gone_on), kept - 1);
+    assert_eq!(asked(&gone_on, &given_up) + 1, before[0]);
+    assert_eq!((asked(&gone_on, &taken), before[1]), (0, 0));
+    // One that is asked for later is the last.
+    let before: Vec<Next> = gone_on.rest().to_vec();
+    assert!(gone_on.later());
+    let recorded = |rest: &[Next]| -> Vec<Vec<f64>> {
+        let rest = rest.iter().filter(|n| !n.is_on_the_way());
+        rest.map(|n| n.candidate.q.clone()).collect()
+    };
+    let (before, mut after) = (recorded(&before), recorded(gone_on.rest()));
+    after.rotate_right(1);
+    assert_eq!(before, after);
     follow.skip();
     assert_eq!(count(&follow), 10);
     assert_ne!(follow.rest()[0].candidate, offered.candidate);
@@ -166,7 +192,7 @@ fn postures_are_exchanged_skipped_taken_again_and_found_in_a_file() {
         candidate(&measured[0].q),
     ];
     let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.01);
-    again.resume(holds, &near);
+    again.resume(holds, &[], &near);
     assert_eq!(count(&again), 10);
     let all = |q: &[f64]| measured.iter().filter(|p| near(&p.q, q)).count();
     let left = |q: &[f64]| {

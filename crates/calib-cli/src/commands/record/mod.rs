@@ -193,8 +193,7 @@ fn record(
         None => follow,
     };
     let guided = follow.zip(planned.as_ref());
-    let guided =
-        guided.map(|(follow, planned)| Guided::new(follow, &plan, (planned, &table.holds)));
+    let guided = guided.map(|(follow, planned)| Guided::new(follow, &plan, (planned, &table)));
     let mut session = Session::new(plan, table);
     if let Some((guided, planned)) = guided.zip(planned.as_ref()) {
         let reached = planned.begins(&guided, spec, screen)?;
@@ -322,6 +321,7 @@ fn keys() -> Receiver<Key> {
             let key = match line.trim() {
                 "" => Key::There,
                 "s" => Key::Skip,
+                "n" => Key::Instead,
                 "r" => Key::Repeat,
                 "k" => Key::Keep,
                 "q" => Key::Quit,

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use calib_capture::{Held, Outcome, Planner, Progress, Screen, Step, Survey, asked_is_reached};
+use calib_capture::{
+    Held, Instead, Outcome, Planner, Progress, Screen, Step, Survey, Table, asked_is_reached,
+};
 use calib_pipeline::prepare::load::RobotProfile;
 use calib_plan::candidates::Candidate;
 use calib_plan::follow::{Follow, Next, Reached, options};
@@ -130,7 +132,7 @@ impl Planned {
             "postures"
         };
         screen.line(&format!(
-            "{count} {what} of {} to record. Keys, each with Enter: none = the robot is at the posture; n = the next best posture instead; r = record the last posture again; s = skip the posture; k = count it though a body is hidden; q = stop.",
+            "{count} {what} of {} to record. Keys, each with Enter: none = the robot is at the posture; n = the next best posture instead (of held-out ones: this one at the end); r = record the last posture again; s = skip the posture; k = count it though a body is hidden; q = stop.",
             self.name
         ));
         if !guided.follow.is_fitted() {
@@ -176,7 +178,7 @@ impl<'a> Guided<'a> {
     pub(super) fn new(
         mut follow: Follow<'a>,
         plan: &calib_capture::Plan,
-        (planned, holds): (&Planned, &[Held]),
+        (planned, table): (&Planned, &Table),
     ) -> Self {
         let model = &planned.known.robot.model;
         let near = |a: &[f64], b: &[f64]| {
@@ -186,11 +188,17 @@ impl<'a> Guided<'a> {
                 (a[joint.index()] - b[joint.index()]).abs() <= near
             })
         };
-        let holds: Vec<Candidate> = holds
+        let holds: Vec<Candidate> = table
+            .holds
             .iter()
             .map(|held| follow.as_held(&held.joints, &held.seen))
             .collect();
-        follow.resume(holds, &near);
+        let exchanged: Vec<Vec<f64>> = table
+            .exchanged
+            .iter()
+            .map(|joints| follow.as_held(joints, &BTreeSet::new()).q)
+            .collect();
+        follow.resume(holds, &exchanged, &near);
         Self {
             follow,
             joints: planned.joints.clone(),
@@ -257,7 +265,13 @@ impl Planner for Guided<'_> {
         Some(self.step(&next))
     }
 
-    fn instead(&mut self) -> bool {
-        self.follow.instead()
+    fn instead(&mut self) -> Instead {
+        if self.follow.instead() {
+            Instead::Exchanged
+        } else if self.follow.later() {
+            Instead::Later
+        } else {
+            Instead::Nothing
+        }
     }
 }
