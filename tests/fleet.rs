@@ -415,7 +415,7 @@ fn a_divided_study_is_the_study() {
 }
 
 #[test]
-fn every_work_that_can_be_divided_is_the_same_divided() {
+fn studies_and_twins_are_the_same_divided() {
     if !skipped_tests::thorough() {
         return;
     }
@@ -424,7 +424,6 @@ fn every_work_that_can_be_divided_is_the_same_divided() {
         &["study", "cor", "--trials", "1"],
         &[2, 7, 64],
     );
-    check_divided(&Scratch::new(), &["study", "faults", "--trials", "1"], &[7]);
     let dir = Scratch::new().brief("ripley");
     check_divided(
         &dir,

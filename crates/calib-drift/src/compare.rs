@@ -207,7 +207,7 @@ fn joint(old: &Evidence, new: &Evidence) -> Result<Joint, DriftError> {
     let degrees = (of_old.ncols() + of_new.ncols()).saturating_sub(of_both.ncols());
     // s = yᵀ Π y: the diagonal block of Π has the eigenvalues of S₁ S⁻¹ in (3).
     let both = of_both.rows(0, a1.nrows());
-    let block = &of_old * of_old.transpose() - &both * both.transpose();
+    let block = &of_old * of_old.transpose() - both * both.transpose();
     let values = decompose::singular_values(&block);
     let shares: Vec<f64> = values.iter().copied().take(degrees).collect();
     Ok(tested(statistic, &shares, old, new))

@@ -336,11 +336,7 @@ mod tests {
             Scope::Recording(RecordingIndex(1)),
             Scope::AllExcept(RecordingIndex(0)),
         ];
-        let unit = Hypothesis::TrackerUnit {
-            mistake: UnitMistake::MetersReadAsMillimeters,
-        };
         for hypothesis in [
-            unit,
             Hypothesis::Mirrored,
             Hypothesis::TrackerAxes { rotation: 5 },
         ] {

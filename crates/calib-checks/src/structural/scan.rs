@@ -208,32 +208,26 @@ impl<'a> Scan<'a> {
         scopes: &[Scope],
         enough: f64,
     ) -> Vec<Scored> {
-        let moved = self.moved_sums(hypothesis, scopes);
-        let corrected = match &moved {
-            Some(_) => None,
-            None => self.point_sums(hypothesis, scopes),
-        };
+        let sums = self.moved_sums(hypothesis, scopes);
+        let sums = sums.or_else(|| self.point_sums(hypothesis, scopes));
         let one = |scope: &Scope| {
             let scoped = Scoped {
                 hypothesis: *hypothesis,
                 scope: *scope,
             };
-            let score = match (&moved, &corrected) {
-                (Some(sums), _) => self.bounded(sums, *scope, enough),
-                (None, Some(sums)) if hypothesis.log_scale() == 0.0 => {
-                    self.bounded(sums, *scope, enough)
-                }
-                (None, Some(sums)) => self.of_density(self.combine(sums, *scope).1, &scoped),
-                (None, None) => self.fit(Some(&scoped)).score,
+            let score = match &sums {
+                Some(sums) => self.bounded(sums, *scope, enough),
+                None => self.fit(Some(&scoped)).score,
             };
             Scored { scoped, score }
         };
         scopes.iter().map(one).collect()
     }
 
-    /// The sums under a hypothesis that changes measured points alone, in the recordings of the scopes.
+    /// The sums under a hypothesis that changes measured points alone, in the recordings of the scopes. One that scales them has a
+    /// center of its own in each scope: a thousand times nearer or farther, they lose their digits to that of the others.
     fn point_sums(&self, h: &Hypothesis, scopes: &[Scope]) -> Option<Vec<Moments>> {
-        if !changes_points(h) {
+        if !changes_points(h) || h.log_scale() != 0.0 {
             return None;
         }
         let n = self.channels.len();

@@ -129,37 +129,37 @@ pub(super) fn joint(
             let found = effect.other.clone().unwrap_or_default();
             return Err(value(place("other"), found, "a joint that moves by itself"));
         }
-        // Both are of the joint; its effects repeat them.
-        out.gear_ratio = effect.gear_ratio.unwrap_or(out.gear_ratio);
-        out.friction = effect.friction.unwrap_or(out.friction);
-        out.across = match term.across {
-            Some((n, about)) => {
-                let mut across = out.across;
-                across[n] = about;
-                across
-            }
-            None => out.across,
-        };
-        out.yields |= term.across.is_some();
-        let among = |kinds: &[EffectKind]| kinds.iter().position(|k| *k == term.term.kind);
-        if let Some(k) = among(&HARMONICS) {
-            out.harmonics[k] += term.value;
-            out.geared |= term.term.source == Source::Motor;
-            out.turns |= term.term.source == Source::Reading;
-        } else if let Some(k) = among(&OF_STATE) {
-            out.of_state[k] += term.value;
-        } else if let Some(k) = among(&LATERAL) {
-            out.lateral[k] += term.value;
-        } else if let Some(other) = term.other {
-            out.couplings.push((other, term.value));
-        } else if term.jumps {
-            out.flank += term.value;
-        } else {
-            out.direct.push(term);
-        }
-        out.terms.push(term);
+        add(&mut out, effect, term);
     }
     Ok(out)
+}
+
+/// Adds a term to those of a joint.
+fn add(out: &mut Joint, effect: &ModelEffect, term: JointTerm) {
+    // Both are of the joint; its effects repeat them.
+    out.gear_ratio = effect.gear_ratio.unwrap_or(out.gear_ratio);
+    out.friction = effect.friction.unwrap_or(out.friction);
+    if let Some((n, about)) = term.across {
+        out.across[n] = about;
+        out.yields = true;
+    }
+    let among = |kinds: &[EffectKind]| kinds.iter().position(|k| *k == term.term.kind);
+    if let Some(k) = among(&HARMONICS) {
+        out.harmonics[k] += term.value;
+        out.geared |= term.term.source == Source::Motor;
+        out.turns |= term.term.source == Source::Reading;
+    } else if let Some(k) = among(&OF_STATE) {
+        out.of_state[k] += term.value;
+    } else if let Some(k) = among(&LATERAL) {
+        out.lateral[k] += term.value;
+    } else if let Some(other) = term.other {
+        out.couplings.push((other, term.value));
+    } else if term.jumps {
+        out.flank += term.value;
+    } else {
+        out.direct.push(term);
+    }
+    out.terms.push(term);
 }
 
 /// The axis of a joint that moves.
