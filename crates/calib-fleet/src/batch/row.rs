@@ -109,7 +109,7 @@ impl Robot {
             verdict: Some(report.verdict),
             exit_code,
             held_out_rms_m: calibrated.map(|stats| stats.rms_m),
-            held_out_poses: held_out.map(|h| h.n),
+            held_out_poses: held_out.map(|h| h.postures),
             warnings: report.warnings(),
             quantities: quantities(report),
             inputs: report.inputs.clone(),

@@ -21,6 +21,10 @@ pub fn text(summary: &Summary) -> String {
     }
     let drift = &summary.drift;
     let familywise = drift.alarms.iter().filter(|a| a.familywise).count();
+    if drift.compared == 0 {
+        out.push_str("none compared with an earlier calibration: nothing is known of changes\n");
+        return out;
+    }
     let _ = writeln!(
         out,
         "{} compared with their last calibration: {} changed (false alarms: 1 % of robots), {familywise} of them at 1 % for the whole fleet",
