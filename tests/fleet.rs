@@ -174,6 +174,13 @@ fn a_fleet_is_calibrated_and_compared_with_last_time() {
     assert_eq!(summary["drift"]["alarms"][0]["name"], "r003");
     assert_eq!(summary["drift"]["alarms"][0]["familywise"], true);
 
+    // With and without a comparison.
+    for page in ["last/fleet.html", "tonight/fleet.html"] {
+        for checker in ["html", "axe"] {
+            let faults = crate::outputs::faults(checker, &dir.path(page)).unwrap_or_default();
+            assert!(faults.is_empty(), "{page}, {checker}: {faults:#?}");
+        }
+    }
     // Once more: finished robots are not calibrated again, and every byte stays.
     let first = results(&dir, "tonight");
     let row = dir.path("tonight/robots/r000/row.json");

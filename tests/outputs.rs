@@ -7,7 +7,7 @@ use std::process::Command;
 use crate::scratch::Scratch;
 
 /// Errors that the checker of `format` finds in `file`; `None` where there is no checker here.
-fn faults(format: &str, file: &Path) -> Option<Vec<String>> {
+pub(crate) fn faults(format: &str, file: &Path) -> Option<Vec<String>> {
     let checker = skipped_tests::checker(format)?;
     let out = Command::new(checker)
         .arg(file)
