@@ -2,6 +2,8 @@
 //!
 //! Equations: [`continuous`](super::continuous).
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
 use super::Options;
@@ -26,6 +28,8 @@ pub(crate) struct Model<'a> {
     /// Columns of registration, of geometry, of tests, and the residual.
     pub registration: usize,
     pub geometry: Vec<usize>,
+    /// Joints whose readings move a body, in their order.
+    sources: Vec<usize>,
     /// For each channel and recording the first column of its point.
     pub point_column: Vec<usize>,
 }
@@ -51,8 +55,12 @@ impl<'a> Model<'a> {
                 next += 3;
             }
         }
+        let geometry = moving_joints(data);
+        let laws = geometry.iter().flat_map(|j| &data.chain.joints()[*j].law);
+        let sources: BTreeSet<usize> = laws.map(|(source, _)| source.0).collect();
         Self {
-            geometry: moving_joints(data),
+            geometry,
+            sources: sources.into_iter().collect(),
             scan,
             fit,
             tests,
@@ -140,9 +148,9 @@ impl<'a> Model<'a> {
         let data = self.scan.data;
         let width = self.columns() + 1;
         let mut block = DMatrix::zeros(3 * seen.len(), width);
-        let joints = data.chain.joints().len();
-        let mut by_reading: Vec<(usize, DVector<f64>)> = (0..joints)
-            .map(|j| (j, DVector::zeros(3 * seen.len())))
+        let sources = self.sources.iter();
+        let mut by_reading: Vec<(usize, DVector<f64>)> = sources
+            .map(|j| (*j, DVector::zeros(3 * seen.len())))
             .collect();
         for (s, &k) in seen.iter().enumerate() {
             let at = 3 * s;
@@ -166,8 +174,10 @@ impl<'a> Model<'a> {
                 }
                 let along = motion_column(data.chain.joints()[joint.0].motion, &frame, &p);
                 for (source, factor) in &data.chain.joints()[joint.0].law {
-                    let mut rows = by_reading[source.0].1.fixed_rows_mut::<3>(at);
-                    rows += along * *factor;
+                    if let Ok(place) = self.sources.binary_search(&source.0) {
+                        let mut rows = by_reading[place].1.fixed_rows_mut::<3>(at);
+                        rows += along * *factor;
+                    }
                 }
             }
             let r = self.scan.residual(&self.fit, i, k);

@@ -12,8 +12,8 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::ChangeSettings;
 use super::columns::Pattern;
-use super::levels::{Drawn, Levels};
-use super::sums::{Design, Test};
+use super::levels::{Drawn, Levels, Tests};
+use super::sums::Design;
 
 /// What is drawn of a prior's σ: robots are nearer to their drawings than priors say, and F, which T counts from, is smaller for it. Drawn in
 /// full, 1.5 % of clean recordings of six and ten poses were called changed.
@@ -30,20 +30,24 @@ pub(super) struct Chance {
 impl Chance {
     /// `seen`: T of every candidate. Where the first draws already show that chance explains them, no more are drawn:
     /// the threshold is then a rough one.
-    pub(super) fn simulate(levels: &Levels, seen: &[f64], settings: &ChangeSettings) -> Self {
+    pub(super) fn simulate(
+        levels: &Levels,
+        tests: &Tests,
+        seen: &[f64],
+        settings: &ChangeSettings,
+    ) -> Self {
         /// Draws that decide on more.
         const FIRST: usize = 20;
         /// So many of them above what is seen: a chance of 0.3 % would bring that about once in 600 scans, a smaller one less often.
         const ABOVE: usize = 2;
         let count = levels.designs[0].columns.len();
-        let tests = levels.tests();
         let shifts: Vec<Vec<DMatrix<f64>>> = levels.designs.iter().map(shifts).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
         let all = settings.draws.max(20);
         let mut draws: Vec<Vec<f64>> = Vec::with_capacity(all);
         let mut draw = |draws: &mut Vec<Vec<f64>>, until: usize| {
             while draws.len() < until {
-                draws.push(largest(levels, &tests, &shifts, &mut rng));
+                draws.push(largest(levels, tests, &shifts, &mut rng));
             }
         };
         draw(&mut draws, FIRST.min(all));
@@ -81,7 +85,7 @@ fn excess(scores: &[f64], quantiles: &[f64]) -> f64 {
 /// The largest T of every candidate in one simulated data set: drawn with the noise that was found, seen at every level.
 fn largest(
     levels: &Levels,
-    tests: &[Vec<Vec<Test>>],
+    tests: &Tests,
     shifts: &[Vec<DMatrix<f64>>],
     rng: &mut ChaCha8Rng,
 ) -> Vec<f64> {

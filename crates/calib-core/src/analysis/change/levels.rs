@@ -16,6 +16,9 @@ pub(super) struct Levels {
     log_dets: Vec<f64>,
 }
 
+/// By level and by candidate.
+pub(super) type Tests = Vec<Vec<Vec<Test>>>;
+
 /// The best change of a candidate.
 pub(super) struct Best {
     pub found: Found,
@@ -59,7 +62,7 @@ impl Levels {
     }
 
     /// The tests of every candidate, by level.
-    pub fn tests(&self) -> Vec<Vec<Vec<Test>>> {
+    pub fn tests(&self) -> Tests {
         let of = |design: &Design| (0..design.columns.len()).map(|k| design.tests(k)).collect();
         self.designs.iter().map(of).collect()
     }
@@ -74,12 +77,12 @@ impl Levels {
     }
 
     /// The best change of every candidate, for residuals that gave these sums.
-    pub fn best(&self, tests: &[Vec<Vec<Test>>], drawn: &[Drawn]) -> Vec<Option<Best>> {
+    pub fn best(&self, tests: &Tests, drawn: &[Drawn]) -> Vec<Option<Best>> {
         let count = self.designs[0].columns.len();
         (0..count).map(|k| self.best_of(k, tests, drawn)).collect()
     }
 
-    fn best_of(&self, k: usize, tests: &[Vec<Vec<Test>>], drawn: &[Drawn]) -> Option<Best> {
+    fn best_of(&self, k: usize, tests: &Tests, drawn: &[Drawn]) -> Option<Best> {
         let levels = self.designs.iter().enumerate();
         let found = levels.filter_map(|(level, design)| {
             let own = &drawn[level];

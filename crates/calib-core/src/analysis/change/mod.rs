@@ -216,7 +216,8 @@ impl Solution {
         let stride = used.len().div_ceil(EDGES);
         let levels = Levels::new(self, &candidates, &used, &every(&used, stride), borders)?;
         let design = &levels.designs[0];
-        let found = levels.best(&levels.tests(), &levels.seen());
+        let tests = levels.tests();
+        let found = levels.best(&tests, &levels.seen());
         let seen: Vec<f64> = found
             .iter()
             .map(|f| f.as_ref().map_or(0.0, |f| f.score))
@@ -225,8 +226,11 @@ impl Solution {
         let fewer = (thin.len() < used.len())
             .then(|| Design::new(self, &candidates, &thin, &thin, borders));
         let chance = match fewer {
-            Some(simulated) => Chance::simulate(&Levels::of(simulated?), &seen, settings),
-            None => Chance::simulate(&levels, &seen, settings),
+            Some(simulated) => {
+                let simulated = Levels::of(simulated?);
+                Chance::simulate(&simulated, &simulated.tests(), &seen, settings)
+            }
+            None => Chance::simulate(&levels, &tests, &seen, settings),
         };
         let mut changes: Vec<(usize, Change)> = Vec::new();
         for (k, (candidate, found)) in candidates.list.iter().zip(&found).enumerate() {

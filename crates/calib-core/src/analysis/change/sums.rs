@@ -79,9 +79,12 @@ impl Sum {
 
     /// Adds what lies between two cumulative sums.
     fn add_between(&mut self, from: &Self, to: &Self) {
-        self.e += &to.e - &from.e;
-        self.ce += &to.ce - &from.ce;
-        self.g += &to.g - &from.g;
+        let add = |sum: &mut DMatrix<f64>, from: &DMatrix<f64>, to: &DMatrix<f64>| {
+            sum.zip_zip_apply(from, to, |sum, from, to| *sum += to - from);
+        };
+        add(&mut self.e, &from.e, &to.e);
+        add(&mut self.ce, &from.ce, &to.ce);
+        add(&mut self.g, &from.g, &to.g);
     }
 }
 
@@ -353,11 +356,17 @@ impl Design {
     }
 
     fn u_of(&self, u: &[DVector<f64>], after: &After) -> DVector<f64> {
-        let mut out = &u[after.end] - &u[after.first];
-        for o in &after.others {
-            out += &u[self.parts[o + 1]] - &u[self.parts[*o]];
-        }
+        let mut out = DVector::zeros(u[after.end].len());
+        self.set_u_of(u, after, &mut out);
         out
+    }
+
+    fn set_u_of(&self, u: &[DVector<f64>], after: &After, out: &mut DVector<f64>) {
+        u[after.end].sub_to(&u[after.first], out);
+        for o in &after.others {
+            *out += &u[self.parts[o + 1]];
+            *out -= &u[self.parts[*o]];
+        }
     }
 
     /// I of equation (1), inverted; `None` where it is not positive.
@@ -388,9 +397,13 @@ impl Design {
         u: &[DVector<f64>],
     ) -> Option<Found> {
         let mut of_part: Vec<Option<(f64, &Test)>> = vec![None; self.parts.len() - 1];
+        // Many tests of few columns: memory is taken once.
+        let mut own = DVector::zeros(self.columns[candidate].len());
+        let mut step = own.clone();
         for test in tests {
-            let own = self.u_of(u, &test.after);
-            let gain = own.dot(&(&test.inverse * &own));
+            self.set_u_of(u, &test.after, &mut own);
+            step.gemv(1.0, &test.inverse, &own, 0.0);
+            let gain = own.dot(&step);
             let best = &mut of_part[test.after.part];
             if gain.is_finite() && best.is_none_or(|(g, _)| gain > g) {
                 *best = Some((gain, test));
