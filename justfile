@@ -31,7 +31,7 @@ studies:
     cargo run --release -q -p calib-cli -- study cor --trials 1500 --seed 1 --out target/studies
     cargo run --release -q -p calib-cli -- study aor --trials 1500 --seed 1 --out target/studies
     for study in justin ripley; do cargo run --release -q -p calib-cli -- study $study --trials 50 --seed 1 --out target/studies; done
-    cargo run --release -q -p calib-cli -- study faults --trials 2 --seed 131 --out target/studies
+    cargo run --release -q -p calib-cli -- study faults --trials 5 --seed 131 --out target/studies
     mkdir -p book/src/studies && cp target/studies/*.md target/studies/*-tables.csv book/src/studies/
 
 # Tests of the Python package, in a virtual environment

@@ -392,3 +392,64 @@ fn a_clean_recording_has_neither() {
         }
     }
 }
+
+/// One mistake, one finding: not its rows, not an effect that explains a part of it, and no marker that pays for it; by `check` as by `run`.
+/// Five degrees are no small angle: the size is true to its uncertainty.
+#[test]
+fn a_zero_that_jumps_far_is_all_that_is_said_and_has_its_size() {
+    // Whether the rows after the jump are few or most of the recording.
+    for (joint, first, table, jump) in [
+        ("shoulder", 12, POSES, 5.0),
+        ("elbow", 32, POSES, -5.0),
+        ("waist", 32, POSES, 5.0),
+        // None of these rows is rejected: without the jump, a coupling would explain a part.
+        ("shoulder", 55, "robots/ripley/base_sweep.csv", -2.0),
+    ] {
+        let dir = jumped(joint, first, table, jump);
+        let (_, report) = run(&dir);
+        let checked = dir.calib(["check", PROFILE, "--json"]);
+        let checked: Value = serde_json::from_str(&checked.stdout).expect("JSON");
+        for said in [&report, &checked] {
+            let all = said["findings"].as_array().expect("a list").iter();
+            let worse = all.clone().filter(|f| f["severity"] != "info");
+            let ids: Vec<&Value> = worse.map(|f| &f["id"]).collect();
+            assert_eq!(
+                ids,
+                ["changed-while-recording"],
+                "{joint} {first}: {said:#}"
+            );
+            assert!(!all.clone().any(|f| f["id"] == "marker-noise"), "{said:#}");
+            let found = finding(said, "changed-while-recording").expect("just seen");
+            let value = |name: &str| found["facts"][name]["value"].as_f64();
+            let off = value("angle").expect("a size").to_degrees() - f64::abs(jump);
+            let sigma = value("sigma_angle").expect("a sigma").to_degrees();
+            assert!(off.abs() < 4.0 * sigma, "{joint}: {off} of {sigma}");
+            let at = (first + BEFORE + 1).to_string();
+            assert_eq!(found["facts"]["row"], *at, "{joint}: {found:#}");
+        }
+    }
+}
+
+/// Ripley with readings of a joint that are off by so many degrees from a row of a table on.
+fn jumped(joint: &str, first: usize, table: &str, degrees: f64) -> Scratch {
+    let dir = Scratch::new().robot("ripley");
+    let mut column = None;
+    let mut row = 0;
+    let line = |line: &str| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        match column {
+            _ if line.starts_with('#') => {}
+            None => column = cells.iter().position(|c| *c == format!("{joint}_deg")),
+            Some(column) => {
+                if row >= first {
+                    let reading: f64 = cells[column].parse().expect("a reading");
+                    cells[column] = format!("{:.6}", reading + degrees);
+                }
+                row += 1;
+            }
+        }
+        cells.join(",")
+    };
+    let lines: Vec<String> = dir.read(table).lines().map(line).collect();
+    dir.file(table, lines.join("\n") + "\n")
+}

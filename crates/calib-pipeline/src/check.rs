@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use calib_core::Settings;
 use calib_finding::{Finding, Severity, catalog};
 use calib_geometry::statistics::median;
 use calib_profile::{BodyKind, Method, Usage};
@@ -10,9 +11,12 @@ use calib_report::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck
 
 use crate::error::{ExitCode, PipelineError};
 use crate::estimate::paper;
-use crate::estimate::start::start;
+use crate::estimate::start::{Start, start};
+use crate::formulate::bad_rows::{bad_rows, is_judged};
 use crate::formulate::by_likelihood::only_a_cross_check;
-use crate::formulate::{bad_rows, model_checks};
+use crate::formulate::completed::bad_rows_beside;
+use crate::formulate::formulation::FreeSet;
+use crate::formulate::{ml, model_checks};
 use crate::options::Plugins;
 use crate::output::of_data::{coverage, lost, used_for};
 use crate::prepare::aligned::Alignment;
@@ -23,6 +27,7 @@ use crate::prepare::named;
 use crate::prepare::relabel::relabel;
 use crate::prepare::robot::load_robot;
 use crate::prepare::tracks::{BodyTrack, body_tracks};
+use crate::verify::causes::causes;
 
 /// Checks a profile, its robot and its recordings; solves nothing.
 ///
@@ -49,7 +54,7 @@ pub fn check(profile: &Path, plugins: Plugins) -> Result<DataChecks, PipelineErr
             model_checks::before_the_fit(&inputs, &tracks, &start, &mut findings);
             let wrong = findings.iter().any(is_wrong);
             if !wrong && inputs.robot.profile.solve.robust {
-                findings.extend(bad_rows::bad_rows_of_inputs(&inputs, &tracks)?.findings);
+                single_rows(&inputs, &tracks, &start, &mut findings)?;
             }
             // What a plugin does with these data shows when it is called.
             if !wrong && named::plugins_find_origins(&inputs) {
@@ -80,6 +85,35 @@ pub fn check(profile: &Path, plugins: Plugins) -> Result<DataChecks, PipelineErr
         checks: checks_of(&inputs, &findings, moved),
         findings,
     })
+}
+
+/// The rows that a robust fit of the profile's model leaves out, and what changed while recording where that is why it did.
+fn single_rows(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    start: &Start,
+    findings: &mut Vec<Finding>,
+) -> Result<(), PipelineError> {
+    if !inputs.recordings.values().any(is_judged) {
+        return Ok(());
+    }
+    let settings = Settings::default();
+    let stated = ml::state(inputs, tracks, start, FreeSet::Profile);
+    let fit = ml::fit(stated, inputs, &settings)?;
+    let bad = bad_rows(inputs, tracks, &fit);
+    // An effect that is suspected may be a change.
+    let suspected = findings.iter().any(|f| f.facts.get("effect").is_some());
+    if bad.findings.is_empty() && !suspected {
+        return Ok(());
+    }
+    let rows = bad_rows_beside(inputs, (tracks, findings), &fit, &settings).unwrap_or(bad);
+    let causes = causes(inputs, &fit, findings);
+    causes.leave_unexplained(findings);
+    findings.extend(rows.findings);
+    // `calib run` decides what it does to the result.
+    let change = causes.change.or(causes.scatter);
+    findings.extend(change.map(|f| f.with_severity(Severity::Warning)));
+    Ok(())
 }
 
 /// 3 with an error among the findings, else 0.

@@ -64,7 +64,8 @@ impl Solution {
         let apart: BTreeMap<PointId, f64> = scatter.iter().flat_map(|poses| apart(poses)).collect();
         let markers: Vec<PointId> = apart.keys().copied().collect();
         let mut own = self.model.problem().with_noise_by_marker(&markers)?;
-        if !self.many_rejected(&markers) {
+        let rejected = self.rejected_part(&markers);
+        if rejected <= MANY {
             return Some((self.with_levels(&own, settings)?, markers));
         }
         for measurement in own.problem.measurements.clone() {
@@ -75,24 +76,45 @@ impl Solution {
             }
         }
         let found = solve(&own.problem, settings).ok()?;
-        let usable = found.status.is_converged() && found.predicts_no_worse(self, &markers)?;
+        // Under levels that are right, the gate has no more to reject.
+        let usable = found.status.is_converged()
+            && found.rejected_part(&markers) < rejected
+            && found.predicts_no_worse(self, &markers)?;
         usable.then_some((found, markers))
     }
 
-    /// Whether the gate rejected more than [`MANY`] of what was seen of these markers.
-    fn many_rejected(&self, markers: &[PointId]) -> bool {
+    /// Measurement and sample of poses most of whose vectors the gate rejected: the body was off there, not one of its markers.
+    fn bodies_off(&self) -> BTreeSet<(usize, usize)> {
+        let poses = self.model.of_measurement.iter().enumerate();
+        let poses = poses.flat_map(|(m, list)| list.iter().map(move |(s, all)| ((m, *s), all)));
+        poses
+            .filter(|(_, all)| {
+                let rejected = self.weights[all.start..all.end]
+                    .iter()
+                    .filter(|w| **w == 0.0)
+                    .count();
+                2 * rejected > all.len()
+            })
+            .map(|(pose, _)| pose)
+            .collect()
+    }
+
+    /// Part of what was seen of these markers that the gate rejected, where it kept the body.
+    fn rejected_part(&self, markers: &[PointId]) -> f64 {
+        let off = self.bodies_off();
         let (mut seen, mut rejected) = (0u32, 0u32);
         for (o, weight) in self.model.observations.iter().zip(&self.weights) {
             let kind = &self.model.problem.measurements[o.measurement].kind;
             if let MeasurementKind::Markers(of) = kind
                 && markers.contains(&of.observations[o.item].point)
                 && !self.model.is_held_out(o.sample)
+                && !off.contains(&(o.measurement, o.sample))
             {
                 seen += 1;
                 rejected += u32::from(*weight == 0.0);
             }
         }
-        f64::from(rejected) > MANY * f64::from(seen)
+        f64::from(rejected) / f64::from(seen.max(1))
     }
 
     /// Whether left-out vectors of all markers but these are predicted no worse than by `other`, by more than chance. Of these markers
@@ -169,7 +191,9 @@ impl Solution {
             return Vec::new();
         }
         let mut at: Vec<BTreeMap<usize, Vec<Seen>>> = vec![BTreeMap::new(); asked.len()];
-        // What the gate rejected belongs to a marker's scatter: one that scatters much is rejected often.
+        // What the gate rejected belongs to a marker's scatter: one that scatters much is rejected often. A body that is off as a whole
+        // is turned, and shows that.
+        let off = self.bodies_off();
         let fitted = |o: &Observation| f64::from(u8::from(!self.model.is_held_out(o.sample)));
         let everything: Vec<f64> = self.model.observations.iter().map(fitted).collect();
         let mut work = Workspace::new(&self.model);
@@ -185,6 +209,7 @@ impl Solution {
             {
                 let o = self.model.observations[o];
                 if let MeasurementKind::Markers(markers) = &problem.measurements[o.measurement].kind
+                    && !off.contains(&(o.measurement, sample))
                 {
                     let error = [0, 1, 2].map(|axis| rows.r[first + axis]);
                     let seen = (markers.observations[o.item].point, error);

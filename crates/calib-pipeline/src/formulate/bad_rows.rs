@@ -17,10 +17,7 @@ use calib_geometry::so3;
 use calib_profile::Usage;
 use nalgebra::{Isometry3, Vector6};
 
-use crate::error::PipelineError;
-use crate::estimate::start::start;
-use crate::formulate::formulation::{FreeSet, MlFit};
-use crate::formulate::ml;
+use crate::formulate::formulation::MlFit;
 use crate::formulate::starts::rows_of_no_side;
 use crate::prepare::conditions::{Conditions, conditions};
 use crate::prepare::excluded::Excluded;
@@ -47,25 +44,8 @@ pub struct BadRows {
     pub unsettled: Vec<Excluded>,
 }
 
-/// The rows that a robust fit of the profile's model leaves out, for a check without a run.
-///
-/// # Errors
-/// [`PipelineError::Solve`] when the problem cannot be stated.
-pub fn bad_rows_of_inputs(
-    inputs: &Inputs,
-    tracks: &BTreeMap<String, BodyTrack>,
-) -> Result<BadRows, PipelineError> {
-    if !inputs.recordings.values().any(is_judged) {
-        return Ok(BadRows::default());
-    }
-    let start = start(inputs, tracks);
-    let stated = ml::state(inputs, tracks, &start, FreeSet::Profile);
-    let fit = ml::fit(stated, inputs, &calib_core::Settings::default())?;
-    Ok(bad_rows(inputs, tracks, &fit))
-}
-
 /// Whether single rows of a recording are judged. Where rows follow each other in time, a lag is the clock's, and every row has one.
-fn is_judged(loaded: &Loaded) -> bool {
+pub(crate) fn is_judged(loaded: &Loaded) -> bool {
     loaded.spec.usage != Usage::Validation && loaded.alignment.is_none()
 }
 

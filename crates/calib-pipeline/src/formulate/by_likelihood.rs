@@ -5,6 +5,7 @@ use calib_finding::{About, Fact, Finding, Severity, Unit, catalog};
 use calib_report::{Status, Unobservable};
 
 use crate::error::PipelineError;
+use crate::formulate::bad_rows::bad_rows;
 use crate::formulate::checked::Checked;
 use crate::formulate::chosen::Chosen;
 use crate::formulate::completed::bad_rows_beside;
@@ -14,7 +15,7 @@ use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
-use crate::formulate::{bad_rows, clock, gear_ratio, noise, priors, starts, wanted};
+use crate::formulate::{clock, gear_ratio, noise, priors, starts, wanted};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
 use crate::prepare::tracks::body_tracks;
@@ -129,10 +130,11 @@ fn fits(
     let mut fit = ml::fit(full, inputs, settings)?;
     let mut findings = Vec::new();
     if settings.robust.enabled {
-        let mut bad = bad_rows::bad_rows(inputs, &checked.tracks, &fit);
+        let mut bad = bad_rows(inputs, &checked.tracks, &fit);
         if !bad.findings.is_empty() {
             progress("judge rows beside what the model lacks");
-            bad = bad_rows_beside(inputs, checked, &fit, settings).unwrap_or(bad);
+            let known = (&checked.tracks, &checked.findings[..]);
+            bad = bad_rows_beside(inputs, known, &fit, settings).unwrap_or(bad);
         }
         findings = bad.findings;
         if !bad.unsettled.is_empty() {

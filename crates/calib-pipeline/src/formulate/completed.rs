@@ -12,7 +12,6 @@ use calib_profile::{Split, Usage};
 
 use crate::estimate::start::start;
 use crate::formulate::bad_rows::{BadRows, bad_rows};
-use crate::formulate::checked::Checked;
 use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::parts::{RobotPart, What, with_parts};
 use crate::formulate::{ml, starts};
@@ -21,17 +20,18 @@ use crate::prepare::inputs::Inputs;
 use crate::prepare::split::{BEFORE, split};
 use crate::prepare::tracks::{BodyTrack, body_tracks};
 
-/// What is wrong with rows when the fit has what it lacks; `None` where it lacks nothing, or cannot have it.
-pub(super) fn bad_rows_beside(
+/// What is wrong with rows when the fit has what it lacks; `None` where it lacks nothing, or cannot have it. `before`: what was found
+/// before the fit.
+pub(crate) fn bad_rows_beside(
     inputs: &Inputs,
-    checked: &Checked,
+    (tracks, before): (&BTreeMap<String, BodyTrack>, &[Finding]),
     fit: &MlFit,
     settings: &Settings,
 ) -> Option<BadRows> {
     let goodness = fit.solution.goodness_of_fit();
     let missing = goodness.map_or_else(Vec::new, |g| g.missing);
     let mut parts = of_tests(inputs, &missing);
-    for part in checked.findings.iter().filter_map(|f| suspected(inputs, f)) {
+    for part in before.iter().filter_map(|f| suspected(inputs, f)) {
         if !parts.contains(&part) {
             parts.push(part);
         }
@@ -61,7 +61,7 @@ pub(super) fn bad_rows_beside(
             split(&mut inputs);
             body_tracks(&inputs, &mut Vec::new()).ok()?
         }
-        false => checked.tracks.clone(),
+        false => tracks.clone(),
     };
     let fit = fit_of(&mut inputs, &tracks, settings)?;
     if !fit.solution.status.is_converged() {

@@ -88,6 +88,10 @@ pub fn causes(inputs: &Inputs, fit: &MlFit, before: &[Finding]) -> Causes {
     let mut causes = those_that_hold(inputs, fit, &open, scan, beside.goodness);
     causes.scatter = beside.finding.or(of_scan).filter(|_| steady);
     causes.explained.extend(beside.explained);
+    if let Some(change) = &causes.changed {
+        let rows = changes::rows_of(inputs, fit, change, before);
+        causes.explained.extend(rows);
+    }
     causes
 }
 

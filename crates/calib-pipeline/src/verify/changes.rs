@@ -76,6 +76,59 @@ pub fn finding(inputs: &Inputs, fit: &MlFit, scan: &ChangeScan, beside: Beside) 
     })
 }
 
+/// Findings of rows that deviate because something moved: they are nearly all rows on the shorter side of a step, and no others.
+#[must_use]
+pub fn rows_of(
+    inputs: &Inputs,
+    fit: &MlFit,
+    change: &Change,
+    findings: &[Finding],
+) -> Vec<Finding> {
+    /// Part of the rows of that side.
+    const NEARLY_ALL: f64 = 0.7;
+    if !matches!(
+        change.moved,
+        Moved::Body(_) | Moved::Reference(_) | Moved::Joint(_)
+    ) {
+        return Vec::new();
+    }
+    let samples = &fit.formulation.samples;
+    let also: BTreeSet<&String> = change.also.iter().map(|s| &samples[*s].0).collect();
+    let (mut after, mut before) = (BTreeSet::new(), BTreeSet::new());
+    for (s, (name, row)) in samples.iter().enumerate() {
+        let loaded = &inputs.recordings[name];
+        if loaded.spec.usage == Usage::Validation {
+            continue;
+        }
+        let is_after = (change.first..change.end).contains(&s) || also.contains(name);
+        let side = if is_after { &mut after } else { &mut before };
+        side.insert((name, loaded.poses.rows[*row]));
+    }
+    let shorter = if after.len() <= before.len() {
+        after
+    } else {
+        before
+    };
+    let of_rows = |f: &&Finding| {
+        let about_rows = [catalog::ROW_OUTLIER, catalog::UNSETTLED_ROWS].contains(&f.id);
+        let at = |row: &u64| {
+            let mut recordings = f.subject.recordings.iter();
+            recordings.any(|name| shorter.contains(&(name, *row)))
+        };
+        about_rows && !f.rows.is_empty() && f.rows.iter().all(at)
+    };
+    let found: Vec<&Finding> = findings.iter().filter(of_rows).collect();
+    let rows = found.iter().flat_map(|f| {
+        let name = f.subject.recordings.first();
+        f.rows.iter().map(move |row| (name, row))
+    });
+    let rows: BTreeSet<_> = rows.collect();
+    if (rows.len() as f64) < NEARLY_ALL * shorter.len() as f64 {
+        return Vec::new();
+    }
+    found.into_iter().cloned().collect()
+}
+
 /// The joint that scatters.
 #[must_use]
 pub fn scatter(inputs: &Inputs, fit: &MlFit, scatter: Scatter) -> Option<Finding> {

@@ -205,6 +205,13 @@ impl Case {
         out
     }
 
+    /// The same case with a change that holds from its first row on.
+    pub(super) fn changed_from_the_first_row(&self) -> Self {
+        let mut out = self.clone();
+        out.disturbance.from = 0.0;
+        out
+    }
+
     /// The tables that the nominal robot would give without noise, under the fault.
     pub(super) fn twin(&self) -> BTreeMap<String, Poses> {
         let mut nominal = self.clone();

@@ -21,7 +21,7 @@
 //!
 //! 10⁻⁶ for each of the thousand effects, places and rows that are tried is 1 in 1 000 recordings, the level of the program. What a discrete fault leaves is in [`odds`](super::odds).
 
-use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 
 use super::case::{Case, SIGMA, SIGMA_JOINT, SIGMA_ORIENTATION, Seen};
@@ -57,35 +57,60 @@ pub(crate) fn shown(case: &Case) -> Shown {
     }
 }
 
+/// What a test knows that knows the fault: the rows of the fitted recordings, whitened.
+pub(super) struct Known {
+    /// L⁻¹A and L⁻¹d of each row, V = L Lᵀ.
+    pub rows: Vec<(DMatrix<f64>, DVector<f64>)>,
+    /// Diagonal of P.
+    pub prior: DVector<f64>,
+    /// Of Σ AᵀV⁻¹A + P.
+    pub factor: Cholesky<f64, Dyn>,
+}
+
+impl Known {
+    /// `None` where the rows do not fix what has to be estimated.
+    pub fn of(case: &Case) -> Option<Self> {
+        let clean = case.without_fault();
+        let body = match case.markers.len() {
+            0 => 6,
+            markers => 3 * markers,
+        };
+        let n = 6 + body + 6 * case.robot.joints.len();
+        let prior = precision(case, 6 + body, n);
+        let mut information = DMatrix::from_diagonal(&prior);
+        let mut rows = Vec::new();
+        for ((q, without), (_, with)) in clean.perfect().iter().zip(&case.perfect()) {
+            let row = Row::new(&clean, q, without);
+            let v = DMatrix::identity(row.a.nrows(), row.a.nrows())
+                + SIGMA_JOINT * SIGMA_JOINT * &row.joints * row.joints.transpose();
+            let l = Cholesky::new(v)?.l();
+            let a = l.solve_lower_triangular(&row.a)?;
+            let d = l.solve_lower_triangular(&difference(with, without))?;
+            information += a.tr_mul(&a);
+            rows.push((a, d));
+        }
+        Some(Self {
+            rows,
+            prior,
+            factor: Cholesky::new(information)?,
+        })
+    }
+}
+
 /// Equation (1), and the test that has it.
 fn evidence(case: &Case) -> Option<(f64, Best)> {
-    let clean = case.without_fault();
-    let body = match case.markers.len() {
-        0 => 6,
-        markers => 3 * markers,
-    };
-    let n = 6 + body + 6 * case.robot.joints.len();
-    let prior = precision(case, 6 + body, n);
-    let mut information = DMatrix::from_diagonal(&prior);
-    let mut observations = 0;
+    let known = Known::of(case)?;
+    let n = known.prior.len();
     let mut b = DVector::zeros(n);
-    let mut own = 0.0;
-    for ((q, without), (_, with)) in clean.perfect().iter().zip(&case.perfect()) {
-        let row = Row::new(&clean, q, without);
-        let v = DMatrix::identity(row.a.nrows(), row.a.nrows())
-            + SIGMA_JOINT * SIGMA_JOINT * &row.joints * row.joints.transpose();
-        let l = Cholesky::new(v)?.l();
-        let a = l.solve_lower_triangular(&row.a)?;
-        let d = l.solve_lower_triangular(&difference(with, without))?;
-        information += a.tr_mul(&a);
-        b += a.tr_mul(&d);
+    let (mut own, mut observations) = (0.0, 0);
+    for (a, d) in &known.rows {
+        b += a.tr_mul(d);
         own += d.norm_squared();
         observations += d.len();
     }
-    let factor = Cholesky::new(information)?;
-    let evidence = (own - b.dot(&factor.solve(&b))).max(0.0).sqrt();
+    let evidence = (own - b.dot(&known.factor.solve(&b))).max(0.0).sqrt();
     // tr(N⁻¹ (N − P)) = n − tr(N⁻¹ P)
-    let held = factor.inverse().diagonal().dot(&prior);
+    let held = known.factor.inverse().diagonal().dot(&known.prior);
     let freedom = observations as f64 - (n as f64 - held) - 1.0;
     Some((evidence, Best::of(freedom)))
 }

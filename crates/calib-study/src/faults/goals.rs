@@ -80,6 +80,12 @@ impl Row {
         Self::mean(condition, &chances, None)
     }
 
+    /// How often the best estimate of a row that knows all else is within one.
+    fn best_place(condition: &str, cases: &[&CaseResult]) -> Self {
+        let chances: Vec<f64> = cases.iter().filter_map(|r| r.row_chance).collect();
+        Self::mean(condition, &chances, None)
+    }
+
     /// Equation (2).
     fn mean(condition: &str, shares: &[f64], goal: Option<Side>) -> Self {
         let n = shares.len() as f64;
@@ -263,6 +269,10 @@ fn effects(all: &[&CaseResult]) -> Vec<Row> {
             &shown,
             Some(Side::AtLeast(0.99)),
             &row,
+        ),
+        Row::best_place(
+            "the same, by the best estimate that knows the slip, its size and all else but the row: within one",
+            &shown,
         ),
     ]
 }

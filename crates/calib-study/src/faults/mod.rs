@@ -21,6 +21,7 @@ mod goals;
 mod names;
 mod odds;
 mod outcome;
+mod place;
 mod profile;
 mod render;
 mod robot;

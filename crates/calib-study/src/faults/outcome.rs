@@ -21,6 +21,7 @@ use super::evidence::shown;
 use super::fault::{Class, Fault};
 use super::names::names_the_cause;
 use super::odds::odds;
+use super::place;
 use super::true_error::{error, rms};
 use crate::noise::Noise;
 
@@ -74,6 +75,9 @@ pub struct CaseResult {
     /// How often the best test that knows the fault, and not the noise, names it.
     #[serde(default)]
     pub chance: Option<f64>,
+    /// How often the best estimate that knows all but the row of a step is within a row of it.
+    #[serde(default)]
+    pub row_chance: Option<f64>,
     /// What the fault moves the residual of a registration of the nominal robot by, rms, m.
     #[serde(default)]
     pub moved_m: Option<f64>,
@@ -235,6 +239,7 @@ fn with_shown(case: &Case, tables: &Tables, result: CaseResult) -> CaseResult {
         evidence: shown.evidence,
         needed: shown.needed,
         chance: shown.chance,
+        row_chance: place::chance(case),
         moved_m: shown.moved_m,
         ..result
     }
@@ -317,6 +322,7 @@ fn stopped(case: &Case, number: u64, error: PipelineError) -> CaseResult {
         evidence: None,
         needed: None,
         chance: None,
+        row_chance: None,
         moved_m: None,
         odds: None,
         row_off: None,
@@ -390,6 +396,7 @@ fn judged(case: &Case, number: u64, output: &RunOutput) -> CaseResult {
         evidence: None,
         needed: None,
         chance: None,
+        row_chance: None,
         moved_m: None,
         odds: None,
         row_off: row_off(case, findings),

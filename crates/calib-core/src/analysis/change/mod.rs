@@ -24,6 +24,7 @@
 mod chance;
 pub(crate) mod columns;
 pub(crate) mod contest;
+mod exact;
 mod levels;
 mod scatter;
 mod sums;
@@ -33,7 +34,8 @@ use serde::{Deserialize, Serialize};
 use crate::analysis::solution::Solution;
 use crate::graph::ids::{EdgeId, FrameId};
 use chance::Chance;
-use columns::{Candidates, Pattern};
+use columns::Candidates;
+use exact::Scanned;
 use levels::{Best, Levels};
 pub use scatter::{BesideScatter, Left, Scatter};
 use sums::{Design, LEAST, SIMULATED};
@@ -205,6 +207,42 @@ impl Solution {
         Some(out)
     }
 
+    /// Places the best change among all samples, and gives those that may be the cause the size that they have without linearization.
+    fn refine(
+        &self,
+        changes: &mut [(usize, Change)],
+        found: &[Option<Best>],
+        coarse: &Scanned<'_>,
+        chance: &Chance,
+    ) {
+        /// What explains less than this part of what the best one does to first order is not the cause.
+        const PART: f64 = 0.25;
+        let least = changes.first().map_or(0.0, |(_, c)| PART * c.explains);
+        for (place, (k, change_of)) in changes.iter_mut().enumerate() {
+            let Some(best) = &found[*k] else { continue };
+            let quantile = chance.quantiles[*k];
+            let near = match place {
+                0 => self.near(coarse, *k, best),
+                _ => None,
+            };
+            if let Some(near) = &near {
+                let design = near.scanned(coarse).design;
+                *change_of = change(change_of.moved, &near.best, design, quantile);
+            }
+            if change_of.excess <= chance.threshold || change_of.explains < least {
+                continue;
+            }
+            let exact = match &near {
+                Some(near) => self.exact_step(&near.scanned(coarse), *k, &near.best, quantile),
+                None => self.exact_step(coarse, *k, best, quantile),
+            };
+            if let Some(exact) = exact {
+                *change_of = exact;
+            }
+        }
+        changes.sort_by(|(_, a), (_, b)| b.excess.total_cmp(&a.excess).then(a.moved.cmp(&b.moved)));
+    }
+
     fn scan(&self, settings: &ChangeSettings) -> Option<ChangeScan> {
         let candidates = Candidates::new(self);
         let borders = &settings.borders;
@@ -214,7 +252,8 @@ impl Solution {
         }
         let thin = every(&used, used.len().div_ceil(SIMULATED));
         let stride = used.len().div_ceil(EDGES);
-        let levels = Levels::new(self, &candidates, &used, &every(&used, stride), borders)?;
+        let edges = every(&used, stride);
+        let levels = Levels::new(self, &candidates, &used, &edges, borders)?;
         let design = &levels.designs[0];
         let tests = levels.tests();
         let found = levels.best(&tests, &levels.seen());
@@ -240,27 +279,14 @@ impl Solution {
             }
         }
         changes.sort_by(|(_, a), (_, b)| b.excess.total_cmp(&a.excess).then(a.moved.cmp(&b.moved)));
-        if stride > 1
-            && let Some((k, first)) = changes.first_mut()
-            && candidates.list[*k].pattern == Pattern::Step
-            && let Some(coarse) = &found[*k]
-        {
-            let edges = design.finer(&coarse.found.after, &self.used_samples());
-            // The samples between two that were looked at say where it is.
-            let mut near = [&used[..], &edges[..]].concat();
-            near.sort_unstable();
-            near.dedup();
-            let fine = Design::new(self, &candidates, &near, &edges, borders)?;
-            if let Some(found) = fine.best_near(*k, design, &coarse.found.after) {
-                let score = fine.score(found.gain);
-                let found = Best {
-                    found,
-                    level: 0,
-                    score,
-                };
-                *first = change(first.moved, &found, &fine, chance.quantiles[*k]);
-            }
-        }
+        let scanned = Scanned {
+            candidates: &candidates,
+            samples: &used,
+            edges: &edges,
+            borders,
+            design,
+        };
+        self.refine(&mut changes, &found, &scanned, &chance);
         Some(ChangeScan {
             changes: changes.into_iter().map(|(_, c)| c).collect(),
             threshold: chance.threshold,

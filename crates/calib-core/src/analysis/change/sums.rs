@@ -147,10 +147,8 @@ impl Design {
             .map(|e| samples.partition_point(|s| s < e))
             .collect();
         let last = at.len() - 1;
-        let mut parts: Vec<usize> = borders
-            .iter()
-            .filter_map(|b| at.binary_search(b).ok())
-            .collect();
+        let place = |b: &usize| at.binary_search(b).ok();
+        let mut parts: Vec<usize> = borders.iter().filter_map(place).collect();
         parts.extend([0, last]);
         parts.sort_unstable();
         parts.dedup();
@@ -295,13 +293,30 @@ impl Design {
         (self.edges[after.first], self.edges[after.end])
     }
 
+    /// Whether a sample lies in a set.
+    pub(super) fn contains(&self, after: &After, sample: usize) -> bool {
+        let between =
+            |first: usize, end: usize| (self.edges[first]..self.edges[end]).contains(&sample);
+        let mut others = after.others.iter();
+        between(after.first, after.end)
+            || others.any(|o| between(self.parts[*o], self.parts[o + 1]))
+    }
+
+    /// One set, tested alone.
+    pub(super) fn tested(
+        &self,
+        candidate: usize,
+        after: &After,
+        u: &[DVector<f64>],
+    ) -> Option<Found> {
+        let inverse = self.inverse(candidate, after)?;
+        Some(found(after, &inverse, &self.u_of(u, after)))
+    }
+
     /// First samples of the other recordings of a set.
     pub(super) fn also(&self, after: &After) -> Vec<usize> {
-        let mut out: Vec<usize> = after
-            .others
-            .iter()
-            .map(|o| self.edges[self.parts[*o]])
-            .collect();
+        let first = |o: &usize| self.edges[self.parts[*o]];
+        let mut out: Vec<usize> = after.others.iter().map(first).collect();
         out.sort_unstable();
         out
     }
@@ -337,11 +352,9 @@ impl Design {
     /// Whether enough samples lie on both sides.
     fn is_large_enough(&self, after: &After) -> bool {
         let between = |first: usize, end: usize| self.places[end] - self.places[first];
-        let others = after
-            .others
-            .iter()
-            .map(|o| between(self.parts[*o], self.parts[o + 1]));
-        let inside = between(after.first, after.end) + others.sum::<usize>();
+        let other = |o: &usize| between(self.parts[*o], self.parts[o + 1]);
+        let inside =
+            between(after.first, after.end) + after.others.iter().map(other).sum::<usize>();
         inside >= LEAST && self.places[self.places.len() - 1] - inside >= LEAST
     }
 
@@ -433,10 +446,7 @@ impl Design {
                 });
             let better = toggled
                 .filter(|after| self.is_large_enough(after))
-                .filter_map(|after| {
-                    let inverse = self.inverse(candidate, &after)?;
-                    Some(found(&after, &inverse, &self.u_of(u, &after)))
-                })
+                .filter_map(|after| self.tested(candidate, &after, u))
                 .max_by(|a, b| a.gain.total_cmp(&b.gain));
             match better {
                 // More than rounding, so that the loop ends.
@@ -458,14 +468,7 @@ impl Design {
             ..near.clone()
         });
         sets.filter(|after| self.is_large_enough(after))
-            .filter_map(|after| {
-                let inverse = self.inverse(candidate, &after)?;
-                Some(found(
-                    &after,
-                    &inverse,
-                    &self.u_of(&self.u[candidate], &after),
-                ))
-            })
+            .filter_map(|after| self.tested(candidate, &after, &self.u[candidate]))
             .max_by(|a, b| a.gain.total_cmp(&b.gain))
     }
 
