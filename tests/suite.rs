@@ -33,6 +33,7 @@ mod plugins;
 mod real_robots;
 mod record;
 mod record_plan;
+mod redefined;
 mod robots;
 mod scratch;
 mod screens;

@@ -8,8 +8,10 @@ mod markers;
 mod motion;
 mod rigidity;
 mod rows;
+mod shapes;
 
 pub use held_out::held_out_in_training;
+pub use shapes::other_shapes;
 
 use crate::rigid_body::Template;
 use calib_finding::Finding;

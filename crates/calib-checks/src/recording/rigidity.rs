@@ -16,6 +16,8 @@ use nalgebra::Point3;
 const SIGMAS: f64 = 8.0;
 /// Smallest deviation of a distance that is called a fault, m: refraction and calibration of good trackers.
 const SMALLEST_FAULT: f64 = 4e-4;
+/// A distance that keeps its new value is another one from this part of the tolerance on: less is what trackers distort.
+const STEADY: f64 = 0.5;
 /// Rows on either side of a change, and rows for a body to be judged at all.
 const ROWS: usize = 5;
 /// Markers up to which all permutations are tried; beyond, exchanges of two.
@@ -31,22 +33,22 @@ const OWN_SIGMAS: f64 = 5.0;
 const FEW_ROWS: f64 = 24.0;
 
 /// One body's markers over all rows.
-struct Body<'a> {
+pub(super) struct Body<'a> {
     name: &'a str,
-    markers: Vec<&'a str>,
+    pub markers: Vec<&'a str>,
     tracks: Vec<&'a [Option<Point3<f64>>]>,
-    pairs: Vec<Pair>,
+    pub pairs: Vec<Pair>,
     /// Deviation of a distance that is a fault, m.
     tolerance: f64,
 }
 
-struct Pair {
-    i: usize,
-    j: usize,
+pub(super) struct Pair {
+    pub i: usize,
+    pub j: usize,
     /// Median distance, m.
-    distance: f64,
+    pub distance: f64,
     /// Robust σ of the distance, m.
-    sigma: f64,
+    pub sigma: f64,
 }
 
 pub(super) fn rigidity(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
@@ -104,11 +106,12 @@ impl<'a> Body<'a> {
         Finding::new(id, Subject::body(self.name))
     }
 
-    fn finding_of(&self, id: Id, kind: &'static str) -> Finding {
+    pub(super) fn finding_of(&self, id: Id, kind: &'static str) -> Finding {
         Finding::of_kind(id, kind, Subject::body(self.name))
     }
 
-    fn new(
+    /// `None` where fewer than three distances are known.
+    pub(super) fn new(
         name: &'a str,
         markers: &'a [String],
         poses: &'a Poses,
@@ -161,6 +164,11 @@ impl<'a> Body<'a> {
         })
     }
 
+    /// A distance that keeps another value is another one from here on, m.
+    pub(super) fn least_step(&self) -> f64 {
+        (STEADY * self.tolerance).max(SMALLEST_FAULT)
+    }
+
     /// Another shape from some row on: distances that are steady on both sides of it and differ.
     fn redefined(&self, poses: &Poses) -> Option<Finding> {
         let mut best: Option<(f64, usize, &Pair)> = None;
@@ -193,7 +201,9 @@ impl<'a> Body<'a> {
                     >= part.len() * 9
             };
             let change = (a - b).abs();
-            if change > self.tolerance
+            // A row is a fault from the tolerance on, rows that agree with each other before.
+            let rows = 1.0 / before.len() as f64 + 1.0 / after.len() as f64;
+            if change > self.least_step().max(self.tolerance * rows.sqrt())
                 && close(before, a)
                 && close(after, b)
                 && best.is_none_or(|(most, _, _)| change > most)

@@ -6,6 +6,9 @@ super::topic! {
         "": Error,
             "The distance between `{first}` and `{second}` changes by {change} from row {row} on, and keeps its new value.",
             "Cut the recording at that row: a marker was moved or relabeled, or the body was created again.";
+        "between": Error,
+            "The distance between `{first}` and `{second}` differs by {change} from that in `{other}`.",
+            "Leave one of the recordings out, or give the body another name in it (`names`): a marker was moved or relabeled between them, or the body was created again.";
     }
     /// A body that is not rigid.
     NOT_RIGID = "not-rigid" {

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::rigid_body::Template;
-use calib_checks::{Expectations, checks, held_out_in_training};
+use calib_checks::{Expectations, checks, held_out_in_training, other_shapes};
 use calib_core::effect::{Drives, Effect, Source};
 use calib_finding::{About, Fact, Finding, Severity, Subject, Unit, catalog};
 use calib_profile::{BodyKind, Contact, Free, JointFree, Load, Usage};
@@ -53,10 +53,21 @@ pub fn check(inputs: &Inputs) -> Vec<Finding> {
             ));
         }
     }
+    findings.extend(shapes(inputs));
     findings.extend(missing_torques(inputs));
     findings.extend(no_masses(inputs));
     findings.extend(stood_still(inputs));
     findings
+}
+
+/// Bodies with another shape in another recording.
+fn shapes(inputs: &Inputs) -> Vec<Finding> {
+    let Some(any) = inputs.recordings.values().next() else {
+        return Vec::new();
+    };
+    let all = inputs.recordings.values();
+    let all: Vec<(&str, &Poses)> = all.map(|r| (r.name.as_str(), &r.poses)).collect();
+    other_shapes(&all, &expectations(inputs, any))
 }
 
 /// What the tracker saw: coordinates of touched points are stated, and in a frame of their own.

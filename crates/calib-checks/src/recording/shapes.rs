@@ -1,0 +1,139 @@
+//! Bodies whose shape is another one in another recording.
+
+use calib_finding::{Fact, Finding, catalog};
+use calib_recording::Poses;
+
+use super::Expectations;
+use super::rigidity::Body;
+use crate::statistics::median;
+
+/// By so much the scale of a tracker changes between two recordings at most.
+const SCALE: f64 = 0.006;
+
+/// Distances of a body between markers that are steady in two recordings and differ, for each recording against the one with most rows;
+/// what one factor explains for all of them is the tracker's scale and no body.
+#[must_use]
+pub fn other_shapes(recordings: &[(&str, &Poses)], expected: &Expectations) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (name, markers) in &expected.bodies {
+        let seen = recordings.iter().filter(|(_, poses)| {
+            let mut columns = markers.iter();
+            columns.all(|marker| poses.markers.contains_key(marker))
+        });
+        let mut bodies: Vec<(&str, usize, Body<'_>)> = seen
+            .filter_map(|(recording, poses)| {
+                let body = Body::new(name, markers, poses, expected)?;
+                Some((*recording, poses.len(), body))
+            })
+            .collect();
+        bodies.sort_by_key(|(_, rows, _)| std::cmp::Reverse(*rows));
+        let Some(((reference, _, most), others)) = bodies.split_first() else {
+            continue;
+        };
+        for (recording, _, body) in others {
+            if let Some((change, first, second)) = body.unlike(most) {
+                findings.push(
+                    body.finding_of(catalog::BODY_REDEFINED, "between")
+                        .with("first", Fact::name(first))
+                        .with("second", Fact::name(second))
+                        .with("change", Fact::meters(change))
+                        .with("other", Fact::name(*reference))
+                        .in_recording(*recording),
+                );
+            }
+        }
+    }
+    findings
+}
+
+impl<'a> Body<'a> {
+    /// The distance that differs most from that of the same body elsewhere, by how much, m, and its markers; `None` where all are alike.
+    fn unlike(&self, other: &Self) -> Option<(f64, &'a str, &'a str)> {
+        let same = |i: usize, j: usize| other.pairs.iter().find(move |p| (p.i, p.j) == (i, j));
+        let both = self.pairs.iter();
+        let both: Vec<_> = both.filter_map(|p| Some((p, same(p.i, p.j)?))).collect();
+        let ratio = median(both.iter().map(|(a, b)| a.distance / b.distance).collect())?;
+        let ratio = ratio.clamp(1.0 - SCALE, 1.0 + SCALE);
+        let least = self.least_step().max(other.least_step());
+        let steady = |sigma: f64| sigma < least;
+        both.into_iter()
+            .filter(|(a, b)| steady(a.sigma) && steady(b.sigma))
+            .map(|(a, b)| ((a.distance - ratio * b.distance).abs(), a))
+            .filter(|(change, _)| *change > least)
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(change, pair)| (change, self.markers[pair.j], self.markers[pair.i]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    /// Markers in random poses with noise of 0.3 mm, lengths times `scale`.
+    fn recording(markers: &[Vector3<f64>], rows: usize, scale: f64, rng: &mut ChaCha8Rng) -> Poses {
+        let normal =
+            |rng: &mut ChaCha8Rng| Vector3::from_fn(|_, _| -> f64 { StandardNormal.sample(rng) });
+        let mut poses = Poses {
+            rows: (1..=rows as u64).collect(),
+            ..Poses::default()
+        };
+        for _ in 0..rows {
+            let place = Isometry3::from_parts(
+                Translation3::from(normal(rng)),
+                UnitQuaternion::from_scaled_axis(normal(rng)),
+            );
+            for (k, p) in markers.iter().enumerate() {
+                let seen = (place * Point3::from(*p)) * scale + 3e-4 * normal(rng);
+                let track = poses.markers.entry(format!("m{k}")).or_default();
+                track.push(Some(seen));
+            }
+        }
+        poses
+    }
+
+    #[test]
+    fn a_marker_that_moved_between_recordings_is_named_and_nothing_else() {
+        let at = [
+            Vector3::new(0.0, 0.0, 0.0),
+            Vector3::new(0.08, 0.0, 0.0),
+            Vector3::new(0.02, 0.06, 0.0),
+            Vector3::new(0.03, 0.02, 0.05),
+        ];
+        for count in [3, 4] {
+            for seed in 0..20 {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed);
+                let mut moved = at[..count].to_vec();
+                moved[1] += Vector3::new(3e-3, 0.0, 0.0);
+                let long = recording(&at[..count], 60, 1.0, &mut rng);
+                let same = recording(&at[..count], 12, 1.0, &mut rng);
+                // 0.5 % is 0.4 mm here and the tracker's.
+                let scaled = recording(&at[..count], 30, 1.005, &mut rng);
+                let other = recording(&moved, 12, 1.0, &mut rng);
+                let names = (0..count).map(|k| format!("m{k}")).collect();
+                let expected = Expectations {
+                    bodies: BTreeMap::from([("hand".to_owned(), names)]),
+                    marker_sigma: Some(3e-4),
+                    ..Expectations::default()
+                };
+                let all = [
+                    ("long", &long),
+                    ("same", &same),
+                    ("scaled", &scaled),
+                    ("other", &other),
+                ];
+                let found = other_shapes(&all, &expected);
+                let of: Vec<_> = found.iter().map(|f| &f.subject.recordings).collect();
+                assert_eq!(of, [&["other".to_owned()]], "{count} {seed}: {found:?}");
+                let pair = ["first", "second"].map(|k| found[0].facts.get(k).cloned());
+                assert!(pair.contains(&Some(Fact::name("m1"))), "{found:?}");
+            }
+        }
+    }
+}
