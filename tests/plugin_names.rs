@@ -407,3 +407,48 @@ fn a_plugin_that_crashes_fails_by_name() {
         );
     }
 }
+
+/// Parameters that an estimator does not have, or not so, have their line; names have the nearest.
+#[test]
+fn a_wrong_parameter_has_its_line() {
+    for (given, place, said) in [
+        (
+            "{weak_fractoin: 0.1}",
+            "ripley.yaml:41:25: ",
+            "did you mean `weak_fraction`?",
+        ),
+        (
+            "{weak_fraction: little}",
+            "ripley.yaml:41:40: ",
+            "must be a number, got",
+        ),
+        (
+            "{weak_fraction: 0.1, seed: 3}",
+            "ripley.yaml:41:45: ",
+            "no parameter is called `seed`",
+        ),
+    ] {
+        let changed = format!("center: sfe\n    center_parameters: {given}");
+        let ran = arm("", &[("center: sfe", &changed)]).calib(["check", PROFILE]);
+        assert_eq!(ran.code, 2, "{given}: {}", ran.stderr);
+        assert!(
+            ran.stderr.contains(place) && ran.stderr.contains(said),
+            "{given}: {}",
+            ran.stderr
+        );
+    }
+    // The same of a plugin.
+    let changed = "center: my_ball\n    center_parameters: {flatnes: 0.1}";
+    let dir = arm("{my-ball: {}}", &[("center: sfe", changed)]);
+    if project(&dir, "my-ball", "center", &[]).is_none() {
+        return;
+    }
+    let ran = dir.calib(["check", PROFILE]);
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert!(ran.stderr.contains("ripley.yaml:42:25: "), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("did you mean `flatness`?"),
+        "{}",
+        ran.stderr
+    );
+}
