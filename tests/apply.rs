@@ -386,7 +386,11 @@ fn a_macro_that_is_called_for_each_joint_is_patched_in_its_calls() {
     assert!(dir.read(xacro) == CALLS);
     // What does not stand in a call of its own is refused.
     for (from, to, said) in [
-        (" rpy=\"0 0 0\"/>", "/>", "computes"),
+        (
+            " rpy=\"0 0 0\"/>",
+            "/>",
+            "arm.urdf.xacro:8:3: the call that gives joint `shoulder` leaves `rpy` at its default",
+        ),
         (
             "<origin xyz=\"${xyz}\"",
             "<origin xyz=\"0.4 0 0\"",
@@ -411,6 +415,89 @@ fn a_macro_that_is_called_for_each_joint_is_patched_in_its_calls() {
         assert_ne!(ran.code, 0, "{to}");
         println!("{to}: {}", ran.stderr);
         assert!(ran.stderr.contains(said), "{to}: {}", ran.stderr);
+        assert!(dir.read(xacro) == other, "{to}: it was changed");
+    }
+}
+
+/// The same with the origins as elements of the calls, of one call and of several.
+#[test]
+fn a_block_of_a_macro_is_patched_in_its_call() {
+    let several = CALLS
+        .replace("xyz rpy:='0 0 0'\"", "*place\"")
+        .replace(
+            "<origin xyz=\"${xyz}\" rpy=\"${rpy}\"/>",
+            "<xacro:insert_block name=\"place\"/>",
+        )
+        .replace(
+            "xyz=\"0 0 0.3\" rpy=\"0 0 0\"/>",
+            "><origin xyz=\"0 0 0.3\"/></xacro:axis>",
+        )
+        .replace(
+            "xyz=\"0.4 0 0\" rpy=\"0 ${0} 0\"/>",
+            "><origin xyz=\"0.4 0 0\"/></xacro:axis>",
+        )
+        .replace("rpy=\"0 0 0\" xyz=\"0.25 0 0\" name", "name")
+        .replace(
+            "child=\"hand\"/>",
+            "child=\"hand\"><origin rpy=\"0 0 0\" xyz=\"0.25 0 0\"/></xacro:axis>",
+        );
+    let xacro = "my_arm/urdf/arm.urdf.xacro";
+    let calibrated =
+        |dir: &Scratch| RobotModel::from_urdf_text(&dir.read(RESULT), "r").expect("a robot");
+    let dir = with_xacro(&several);
+    dir.calib(["apply", RESULT, xacro, "--in-place"]).expect(0);
+    let changed = dir.read(xacro);
+    let macro_end = changed.find("</xacro:macro>").expect("the macro");
+    assert_eq!(changed[..macro_end], several[..macro_end]);
+    let expanded = roxmltree::Document::parse(&changed).expect("XML");
+    let calls: Vec<_> = expanded
+        .descendants()
+        .filter(|n| n.tag_name().name() == "axis")
+        .collect();
+    assert_eq!(calls.len(), 3);
+    for call in calls {
+        let origins: Vec<_> = call
+            .children()
+            .filter(|n| n.has_tag_name("origin"))
+            .collect();
+        assert_eq!(origins.len(), 1, "{changed}");
+        let numbers = |key: &str| -> Vec<f64> {
+            let text = origins[0].attribute(key).unwrap_or("0 0 0");
+            text.split(' ')
+                .map(|x| x.parse().expect("a number"))
+                .collect()
+        };
+        let (xyz, rpy) = (numbers("xyz"), numbers("rpy"));
+        let written = Isometry3::from_parts(
+            Translation3::new(xyz[0], xyz[1], xyz[2]),
+            rotation_from_rpy(&Vector3::new(rpy[0], rpy[1], rpy[2])),
+        );
+        let robot = calibrated(&dir);
+        let joint = robot
+            .joint_id(call.attribute("name").expect("a name"))
+            .expect("a joint");
+        let off = robot.joint(joint).parent_link_from_joint.inverse() * written;
+        assert!(
+            off.translation.vector.norm() < 2e-9 && off.rotation.angle() < 2e-9,
+            "{changed}"
+        );
+    }
+    dir.calib(["revert", xacro, "--in-place"]).expect(0);
+    assert!(dir.read(xacro) == several);
+    // A block that several places insert, or whose call has something else there, is not one joint's own.
+    for (from, to) in [
+        ("</joint>", "</joint><xacro:insert_block name=\"place\"/>"),
+        ("<origin xyz=\"0.4 0 0\"/>", "<xacro:my_origin/>"),
+    ] {
+        let other = several.replacen(from, to, 1);
+        let dir = with_xacro(&other);
+        let ran = dir.calib(["apply", RESULT, xacro, "--in-place"]);
+        assert_ne!(ran.code, 0, "{to}");
+        assert!(
+            ran.stderr.contains("comes from the block `place`"),
+            "{to}: {}",
+            ran.stderr
+        );
         assert!(dir.read(xacro) == other, "{to}: it was changed");
     }
 }

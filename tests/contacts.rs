@@ -95,7 +95,7 @@ const RANGES: [(f64, f64); 6] = [
 ];
 
 /// The things of the laboratory by the names of their contacts.
-fn thing(contact: &str) -> Thing {
+pub(crate) fn thing(contact: &str) -> Thing {
     let unit = |x: f64, y: f64, z: f64| Unit::new_normalize(Vector3::new(x, y, z));
     match contact {
         "bar" => Thing::Bar(Vector3::new(0.605, -0.256, 0.104), 0.3),
@@ -107,6 +107,17 @@ fn thing(contact: &str) -> Thing {
 
 /// Postures in which the true tip touches, with the noise of a touch.
 pub(crate) fn touches(arm: &RobotModel, thing: Thing, n: usize, rng: &mut ChaCha8Rng) -> String {
+    touches_of(TOUCH, arm, thing, n, rng)
+}
+
+/// The same with another noise, m.
+pub(crate) fn touches_of(
+    sigma: f64,
+    arm: &RobotModel,
+    thing: Thing,
+    n: usize,
+    rng: &mut ChaCha8Rng,
+) -> String {
     let tip_link = arm.link_id("l6").expect("there");
     let tip = Point3::from(Vector3::from(TRUE_TIP));
     let mut table = String::from("j1_rad,j2_rad,j3_rad,j4_rad,j5_rad,j6_rad\n");
@@ -122,7 +133,7 @@ pub(crate) fn touches(arm: &RobotModel, thing: Thing, n: usize, rng: &mut ChaCha
         ]
         .map(|(low, high)| rng.random_range(low..high))
         .to_vec();
-        let noise = Vector3::from_fn(|_, _| TOUCH * normal(rng));
+        let noise = Vector3::from_fn(|_, _| sigma * normal(rng));
         let at = |q: &[f64]| (arm.root_from_link(q, tip_link) * tip).coords;
         // The thing is touched where the noise puts it.
         let wanted = |q: &[f64]| thing.nearest(&(at(q) - noise)) + noise;

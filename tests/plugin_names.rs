@@ -372,3 +372,83 @@ fn reserved_names_are_those_that_tables_read_as_something_else() {
         assert!(!labels.unwrap_or(false), "{name}");
     }
 }
+
+/// A plugin that ends the program fails the test that it was asked; the program goes on.
+#[test]
+fn a_plugin_that_crashes_fails_by_name() {
+    let dir = Scratch::new();
+    let first = "    const double least_flatness = call->values[0].number;\n";
+    let crashes = [
+        (
+            "reads",
+            "    if (motion->rotations[0] > 2) return CALIB_FAILED;\n",
+            "signal 11 (SIGSEGV); the usual cause: a pointer of the input that is NULL",
+        ),
+        ("leaves", "    exit(3);\n", "ended the program with code 3"),
+    ];
+    for (name, line, cause) in crashes {
+        let changed = format!("{line}{first}");
+        let changes = [(first, changed.as_str())];
+        let Some(library) = project(&dir, name, "center", &changes) else {
+            return;
+        };
+        let said = dir.calib(["plugins", "check", &library]);
+        assert_eq!(said.code, 6, "{}{}", said.stdout, said.stderr);
+        assert!(said.stdout.contains(cause), "{}", said.stdout);
+        assert!(said.stdout.contains("golden cases"), "{}", said.stdout);
+        let table = dir.calib(["plugins", "check", &library, "--json"]);
+        let table: Value = serde_json::from_str(&table.stdout).expect("JSON");
+        let tests = table["tests"].as_array().expect("tests");
+        let last = tests.iter().rev().take(2).rev();
+        let last: Vec<&str> = last.filter_map(|row| row["outcome"].as_str()).collect();
+        assert_eq!(
+            (table["passed"].as_bool(), last),
+            (Some(false), vec!["FAILED", "skipped"])
+        );
+    }
+}
+
+/// Parameters that an estimator does not have, or not so, have their line; names have the nearest.
+#[test]
+fn a_wrong_parameter_has_its_line() {
+    for (given, place, said) in [
+        (
+            "{weak_fractoin: 0.1}",
+            "ripley.yaml:41:25: ",
+            "did you mean `weak_fraction`?",
+        ),
+        (
+            "{weak_fraction: little}",
+            "ripley.yaml:41:40: ",
+            "must be a number, got",
+        ),
+        (
+            "{weak_fraction: 0.1, seed: 3}",
+            "ripley.yaml:41:45: ",
+            "no parameter is called `seed`",
+        ),
+    ] {
+        let changed = format!("center: sfe\n    center_parameters: {given}");
+        let ran = arm("", &[("center: sfe", &changed)]).calib(["check", PROFILE]);
+        assert_eq!(ran.code, 2, "{given}: {}", ran.stderr);
+        assert!(
+            ran.stderr.contains(place) && ran.stderr.contains(said),
+            "{given}: {}",
+            ran.stderr
+        );
+    }
+    // The same of a plugin.
+    let changed = "center: my_ball\n    center_parameters: {flatnes: 0.1}";
+    let dir = arm("{my-ball: {}}", &[("center: sfe", changed)]);
+    if project(&dir, "my-ball", "center", &[]).is_none() {
+        return;
+    }
+    let ran = dir.calib(["check", PROFILE]);
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert!(ran.stderr.contains("ripley.yaml:42:25: "), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("did you mean `flatness`?"),
+        "{}",
+        ran.stderr
+    );
+}

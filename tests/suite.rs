@@ -49,6 +49,7 @@ mod tolerance;
 mod truth;
 mod tutorial;
 mod twin;
+mod unchanged;
 mod urdf_out;
 mod verdict;
 mod view;

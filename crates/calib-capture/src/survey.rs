@@ -10,6 +10,10 @@ use std::time::Duration;
 pub struct Survey {
     /// Bodies and markers of the tracker.
     pub tracker: BTreeSet<String>,
+    /// Those of them that have a pose: bodies.
+    pub bodies: BTreeSet<String>,
+    /// Most markers of one frame that have no name of their own.
+    pub unnamed: usize,
     /// Joints of the robot.
     pub joints: BTreeSet<String>,
 }
@@ -30,7 +34,7 @@ pub fn survey(
     let mut first = None;
     let mut warned = began;
     let mut found = Survey::default();
-    let mut foreign = false;
+    let mut foreign = None;
     loop {
         let input = source.next(Duration::from_millis(50))?;
         let now = clock();
@@ -44,12 +48,15 @@ pub fn survey(
             Input::Frames(frames) => {
                 for frame in frames {
                     first.get_or_insert(now);
+                    found.unnamed = found.unnamed.max(frame.unlabeled);
+                    found.bodies.extend(frame.bodies.keys().cloned());
                     found.tracker.extend(frame.bodies.into_keys());
                     found.tracker.extend(frame.markers.into_keys());
                 }
             }
-            Input::Foreign(why) if !std::mem::replace(&mut foreign, true) => {
+            Input::Foreign(why) if foreign.is_none() => {
                 screen.line(&format!("ignored: {why}"));
+                foreign = Some(why);
             }
             Input::Closed if first.is_none() => return Ok(Err(Ended::Closed)),
             Input::Closed => return Ok(Ok(found)),
@@ -60,7 +67,10 @@ pub fn survey(
         }
         let silent = now - began;
         if first.is_none() && silent >= patience {
-            return Ok(Err(Ended::Silent(silent)));
+            return Ok(Err(match foreign {
+                Some(why) => Ended::Unreadable(why),
+                None => Ended::Silent(silent),
+            }));
         }
         if first.is_none() && now - warned >= 5.0 {
             warned = now;
@@ -72,12 +82,13 @@ pub fn survey(
 /// The tracker's name of each requested body or marker: as given, otherwise the same name.
 ///
 /// # Errors
-/// A message with the names that the tracker sends and how to map them.
+/// A message with the names that the tracker sends and what to do: map them, or state in the profile what the tracker sends.
 pub fn map_names(
     wanted: &[(String, WatchedKind)],
     given: &BTreeMap<String, String>,
-    seen: &BTreeSet<String>,
+    heard: &Survey,
 ) -> Result<Vec<Watched>, String> {
+    let seen = &heard.tracker;
     let list = |names: &mut dyn Iterator<Item = &str>| {
         let all: Vec<&str> = names.collect();
         if all.is_empty() {
@@ -89,7 +100,7 @@ pub fn map_names(
     let profile = || list(&mut wanted.iter().map(|(name, _)| name.as_str()));
     if let Some(name) = given.keys().find(|n| !wanted.iter().any(|(w, _)| w == *n)) {
         return Err(format!(
-            "--map: `{name}` is not in the profile, which has {}",
+            "--map: `{name}` is not in the profile, which has {}\n  help: the names are case-sensitive",
             profile()
         ));
     }
@@ -102,7 +113,9 @@ pub fn map_names(
             None => continue,
         };
         if let Some(other) = from_names.insert(from.clone(), name.clone()) {
-            return Err(format!("`{from}` is mapped to `{other}` and to `{name}`"));
+            return Err(format!(
+                "`{from}` is mapped to `{other}` and to `{name}`\n  help: map each to a name of its own"
+            ));
         }
         watched.push(Watched {
             name: name.clone(),
@@ -111,15 +124,51 @@ pub fn map_names(
         });
     }
     if watched.is_empty() {
-        let (first, example) = (
-            wanted.first().map_or("BODY", |(name, _)| name.as_str()),
-            seen.iter().next().map_or("body_0", String::as_str),
-        );
-        return Err(format!(
-            "the tracker sends {}, the profile has {}. Map the names: --map {first}={example}",
-            list(&mut seen.iter().map(String::as_str)),
-            profile()
-        ));
+        return Err(unmapped(wanted, heard, &list, &profile()));
     }
     Ok(watched)
+}
+
+/// Why nothing of the profile is among what the tracker sends.
+fn unmapped(
+    wanted: &[(String, WatchedKind)],
+    heard: &Survey,
+    list: &dyn Fn(&mut dyn Iterator<Item = &str>) -> String,
+    profile: &str,
+) -> String {
+    let seen = &heard.tracker;
+    if seen.is_empty() && heard.unnamed > 0 {
+        return format!(
+            "the tracker sends {} single markers without names and no body, the profile has {profile}\n  help: define the markers as a body in the tracker's \
+             program, which then sends its pose, and write `pose: true` in place of `markers` in the profile",
+            heard.unnamed
+        );
+    }
+    if seen.is_empty() {
+        return format!(
+            "the tracker is measuring, but it sees no body and no marker; the profile has {profile}\n  help: uncover them, bring them into its volume, and check \
+             that its program sends them"
+        );
+    }
+    let sent = list(&mut seen.iter().map(String::as_str));
+    let kind = match wanted.iter().all(|(_, kind)| *kind == WatchedKind::Marker) {
+        true => WatchedKind::Marker,
+        false => WatchedKind::Body,
+    };
+    let of_kind = |name: &&String| heard.bodies.contains(*name) == (kind == WatchedKind::Body);
+    let first = wanted.iter().find(|(_, of)| *of == kind);
+    let first = first.map_or("BODY", |(name, _)| name.as_str());
+    match seen.iter().find(of_kind) {
+        Some(example) => format!(
+            "the tracker sends {sent}, the profile has {profile}. Map the names: --map {first}={example}\n  help: the names are case-sensitive"
+        ),
+        None if kind == WatchedKind::Marker => format!(
+            "the tracker sends the poses of {sent}, the profile has the markers {profile}\n  help: write `pose: true` in place of `markers` in the profile, or let \
+             the tracker send named markers"
+        ),
+        None => format!(
+            "the tracker sends the markers {sent}, the profile has {profile} with poses\n  help: write `markers: [NAMES]` in place of `pose: true` in the profile, or \
+             let the tracker send bodies"
+        ),
+    }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use calib_estimator::{Input, Kind, Options, Verdict};
 use calib_handeye::{Correction, HandEye};
-use calib_recording::{BodyColumns, ColumnMap, ReadOptions};
+use calib_recording::{BodyColumns, ColumnMap, Problem, ReadOptions};
 use calib_urdf::rpy::{rotation_from_rpy, rpy_from_rotation};
 use nalgebra::{Isometry3, Translation3, Vector3};
 use serde_json::{Value, json};
@@ -116,10 +116,14 @@ fn pose_pairs(table: &Measured, robot: &str, measured: &str) -> Result<PosePairs
                 columns: Some(map),
                 ..ReadOptions::default()
             };
-            table.poses(&options).map_err(|error| FitError::Data {
-                file: file.display().to_string(),
-                finding: format!("does not hold two poses per row, `{robot}` and `{measured}`: {error}"),
-                remedy: "name the columns <prefix>_x, _y, _z, _qx, _qy, _qz, _qw and give the prefixes with --robot and --measured".to_owned(),
+            table.poses(&options).map_err(|error| match error {
+                // Nothing of the columns is known of a file that is not there.
+                FitError::Recording(unread) if matches!(*unread.problem, Problem::Io(_)) => unread.into(),
+                error => FitError::Data {
+                    file: file.display().to_string(),
+                    finding: format!("does not hold two poses per row, `{robot}` and `{measured}`: {error}"),
+                    remedy: "name the columns <prefix>_x, _y, _z, _qx, _qy, _qz, _qw and give the prefixes with --robot and --measured".to_owned(),
+                },
             })?
         }
     };

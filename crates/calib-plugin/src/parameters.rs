@@ -73,6 +73,21 @@ pub enum ParameterError {
     },
 }
 
+impl ParameterError {
+    /// The parameter that is wrong.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Unknown { name, .. }
+            | Self::Type { name, .. }
+            | Self::Range { name, .. }
+            | Self::Choice { name, .. }
+            | Self::Value { name, .. }
+            | Self::Missing { name, .. } => name,
+        }
+    }
+}
+
 fn hint(name: &str, known: &[String]) -> String {
     calib_finding::nearest_word(name, known.iter().map(String::as_str))
         .map_or_else(String::new, |near| format!("; did you mean `{near}`?"))

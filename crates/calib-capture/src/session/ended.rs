@@ -38,6 +38,8 @@ pub enum Ended {
     TimeIsOver,
     /// The tracker sent nothing for this long, s.
     Silent(f64),
+    /// Something arrived, and nothing of it was a frame: what the first of it was.
+    Unreadable(String),
     /// The tracker closed the connection.
     Closed,
     /// The tracker's frame counter or clock jumped back.
@@ -67,6 +69,10 @@ impl std::fmt::Display for Ended {
             Ended::Silent(s) => write!(
                 f,
                 "no data from the tracker for {s:.0} s. Check that it is measuring, that it sends to this computer and port, and that no firewall blocks it."
+            ),
+            Ended::Unreadable(why) => write!(
+                f,
+                "what arrives is not from the tracker: {why}. Check which port the tracker sends to and which protocol."
             ),
             Ended::Closed => f.write_str("the tracker's server closed the connection"),
             Ended::Restarted => f.write_str(

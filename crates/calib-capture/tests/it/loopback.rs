@@ -197,6 +197,23 @@ fn a_silent_tracker_is_told() {
     assert!(text.contains("no data from the tracker for"), "{text}");
 }
 
+/// What arrives and cannot be read is said to, and not called silence.
+#[test]
+fn another_program_on_the_port_is_told() {
+    let (mut source, sender) = udp();
+    sender.send(b"hello tracker\r\n").expect("loopback");
+    let began = Instant::now();
+    let clock = || 40.0 * began.elapsed().as_secs_f64();
+    let mut text = Vec::new();
+    let mut screen = Lines::new(&mut text);
+    let ended = survey(&mut source, &mut None, &clock, 1.0, 12.0, &mut screen).expect("open");
+    let ended = ended.expect_err("no frame").to_string();
+    assert!(
+        ended.starts_with("what arrives is not from the tracker: 15 bytes"),
+        "{ended}"
+    );
+}
+
 /// A VRPN server that says this and then, when asked to, hangs up.
 fn server(says: Vec<u8>, stays: bool) -> (u16, std::thread::JoinHandle<Vec<u8>>) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");

@@ -1,6 +1,8 @@
 //! The small parts: addresses, joint datagrams, grids, lines of text.
 
-use calib_capture::{Address, Lines, Screen, Terminal, WIDTH, grid, map_names, parse_joints};
+use calib_capture::{
+    Address, Lines, Screen, Survey, Terminal, WIDTH, grid, map_names, parse_joints,
+};
 use calib_capture::{JointListener, WatchedKind};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -101,7 +103,12 @@ fn names_are_mapped_or_asked_for() {
         ("hand".to_string(), WatchedKind::Body),
         ("head".to_string(), WatchedKind::Body),
     ];
-    let seen: BTreeSet<String> = ["body_0", "body_1", "head"].map(str::to_string).into();
+    let names: BTreeSet<String> = ["body_0", "body_1", "head"].map(str::to_string).into();
+    let seen = Survey {
+        tracker: names.clone(),
+        bodies: names,
+        ..Survey::default()
+    };
     let map = |pairs: &[(&str, &str)]| -> BTreeMap<String, String> {
         pairs
             .iter()
@@ -117,8 +124,40 @@ fn names_are_mapped_or_asked_for() {
     let none = map_names(&wanted[..1], &map(&[]), &seen).expect_err("unmapped");
     assert_eq!(
         none,
-        "the tracker sends body_0, body_1, head, the profile has hand. Map the names: --map hand=body_0"
+        "the tracker sends body_0, body_1, head, the profile has hand. Map the names: --map hand=body_0\n  help: the names are case-sensitive"
     );
+    // What has no name to map is not asked to be mapped.
+    let marker = [("m1".to_string(), WatchedKind::Marker)];
+    for (heard, wanted, said) in [
+        (&seen, &marker[..], "`pose: true` in place of `markers`"),
+        (
+            &Survey::default(),
+            &wanted[..1],
+            "sees no body and no marker",
+        ),
+        (
+            &Survey {
+                unnamed: 3,
+                ..Survey::default()
+            },
+            &wanted[..1],
+            "3 single markers without names",
+        ),
+        (
+            &Survey {
+                tracker: ["m1".to_string()].into(),
+                ..Survey::default()
+            },
+            &wanted[..1],
+            "`markers: [NAMES]` in place of `pose: true`",
+        ),
+    ] {
+        let said_so = map_names(wanted, &map(&[]), heard).expect_err("unmapped");
+        assert!(
+            said_so.contains(said) && !said_so.contains("--map"),
+            "{said_so}"
+        );
+    }
     let stranger = map_names(&wanted, &map(&[("arm", "body_0")]), &seen).expect_err("stranger");
     assert!(stranger.contains("`arm`"), "{stranger}");
     let twice = map_names(&wanted, &map(&[("hand", "head")]), &seen).expect_err("twice");

@@ -17,6 +17,7 @@ pub mod merge;
 mod names;
 pub mod plan;
 mod plan_file;
+mod plugin_check;
 mod plugin_options;
 pub mod plugins;
 pub mod predict;

@@ -6,15 +6,15 @@ use std::path::PathBuf;
 use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::estimators::Estimators;
 use calib_pipeline::prepare::load::load_robot;
-use calib_plugin::check::{Limits, Row, check};
 use calib_plugin::{HEADER, Host, Kind, Language, Origin, SearchPath, kind_from_name, new_project};
 
 use clap::{Args, Subcommand};
 use serde_json::json;
 
+use super::plugin_check;
 use super::plugin_options::PluginOptions;
 use crate::error::CliError;
-use crate::terminal::{Console, emit, emit_paths, emit_raw, say};
+use crate::terminal::{Console, emit, emit_paths, emit_raw};
 
 /// Arguments of `calib plugins`.
 #[derive(Debug, Args)]
@@ -37,6 +37,9 @@ enum Plugins {
     Check {
         /// Path of the plugin, or its name on the search path
         plugin: String,
+        /// Make the tests in this process, and print each step as a line of JSON
+        #[arg(long, hide = true)]
+        steps: bool,
     },
     /// Create a plugin project
     New {
@@ -76,7 +79,11 @@ pub fn run(console: &Console, options: &PluginsCommand) -> Result<ExitCode, CliE
             }
             Ok(ExitCode::Accepted)
         }
-        Some(Plugins::Check { plugin }) => checked(json, plugin),
+        Some(Plugins::Check {
+            plugin,
+            steps: true,
+        }) => plugin_check::steps(plugin),
+        Some(Plugins::Check { plugin, .. }) => plugin_check::run(json, plugin),
         Some(Plugins::New {
             name,
             kind,
@@ -89,45 +96,6 @@ pub fn run(console: &Console, options: &PluginsCommand) -> Result<ExitCode, CliE
             Ok(ExitCode::Accepted)
         }
     }
-}
-
-/// Prints what the checks of a plugin found.
-fn checked(json: bool, plugin: &str) -> Result<ExitCode, CliError> {
-    let host = Host::new(SearchPath::from_environment(None), true);
-    let conformance = check(&host, plugin, &Limits::default());
-    if json {
-        let row = |row: &Row| {
-            json!({
-                "subject": row.subject,
-                "test": row.test,
-                "outcome": row.outcome.word(),
-                "detail": row.detail,
-            })
-        };
-        let rows: Vec<_> = conformance.rows.iter().map(row).collect();
-        let all = json!({
-            "plugin": conformance.plugin,
-            "passed": conformance.passed(),
-            "tests": rows,
-        });
-        emit(&format!("{all:#}\n"))?;
-    } else {
-        emit(&format!("{}\n", conformance.to_string().trim_end()))?;
-    }
-    if conformance.passed() {
-        return Ok(ExitCode::Accepted);
-    }
-    let loaded = conformance.rows.len() > 1;
-    if !json && loaded {
-        say(
-            "  help: the contract is `calib plugins header`; what each test asks is in the manual, under `plugins`",
-        );
-    } else if !json {
-        say(
-            "  help: give the library's file with its folder (`./libname.so`), or a name on CALIB_PLUGIN_PATH; the contract is `calib plugins header`",
-        );
-    }
-    Ok(ExitCode::Plugin)
 }
 
 /// Everything that a profile can name, and the library files on the search path (none of these is opened).

@@ -9,7 +9,6 @@ use calib_profile::{BodyKind, Origin};
 use calib_report::{Component, PluginFile};
 
 use crate::error::PipelineError;
-use crate::prepare::estimators::values;
 use crate::prepare::inputs::{Inputs, RobotProfile};
 use crate::prepare::unknown;
 
@@ -21,38 +20,45 @@ fn is_line(origin: &Origin) -> bool {
 /// Refuses names that are not there, parameters that they do not have, and data that they do not take.
 ///
 /// # Errors
-/// [`PipelineError::Profile`] for names, [`PipelineError::Plugin`] for the rest.
+/// [`PipelineError::Profile`] with the place.
 pub(crate) fn check(robot: &RobotProfile, tables: &Tables) -> Result<(), PipelineError> {
-    let profile = &robot.profile;
-    unknown::check(profile, &robot.model, tables, &robot.written)?;
-    for origin in profile.origins.values() {
+    let (profile, written) = (&robot.profile, &robot.written);
+    unknown::check(profile, &robot.model, tables, written)?;
+    for (name, origin) in &profile.origins {
+        let path = |key| ["origins", name.as_str(), key];
         let center = tables.cor.get(&origin.center)?;
-        center.with(&values(&origin.center_parameters))?;
+        let given = &origin.center_parameters;
+        unknown::parameters(center, given, &path("center_parameters"), written)?;
         let axis = tables.aor.get(&origin.axis)?;
-        axis.with(&values(&origin.axis_parameters))?;
+        let given = &origin.axis_parameters;
+        unknown::parameters(axis, given, &path("axis_parameters"), written)?;
         let markers = matches!(
             profile.bodies.get(&origin.body).map(|b| &b.kind),
             Some(BodyKind::Markers { .. })
         );
         if is_line(origin) {
-            axis.takes(Shape::Poses)?;
+            unknown::takes(axis, Shape::Poses, &path("axis"), written)?;
         } else if !(markers && center.offer().shapes.contains(&Shape::Markers)) {
-            center.takes(Shape::Poses)?;
+            unknown::takes(center, Shape::Poses, &path("center"), written)?;
         }
     }
-    for spec in profile.recordings.values() {
+    for (name, spec) in &profile.recordings {
         if let Some(reader) = &spec.reader {
+            let path = ["recordings", name.as_str(), "reader_parameters"];
             let reader = tables.reader.get(reader)?;
-            reader.with(&values(&spec.reader_parameters))?;
+            unknown::parameters(reader, &spec.reader_parameters, &path, written)?;
         }
     }
-    for exception in profile.solve.joints.values() {
-        for (name, parameters) in &exception.effects {
-            tables.effect.get(name)?.with(&values(parameters))?;
+    for (joint, exception) in &profile.solve.joints {
+        let joint = robot.model.joint(*joint).name.as_str();
+        for (name, given) in &exception.effects {
+            let path = ["solve", "joints", joint, "effects", name.as_str()];
+            unknown::parameters(tables.effect.get(name)?, given, &path, written)?;
         }
     }
-    for (writer, parameters) in &profile.outputs.reports {
-        tables.report.get(writer)?.with(&values(parameters))?;
+    for (name, given) in &profile.outputs.reports {
+        let path = ["outputs", "reports", name.as_str()];
+        unknown::parameters(tables.report.get(name)?, given, &path, written)?;
     }
     Ok(())
 }

@@ -1,11 +1,15 @@
-//! Names of estimators, readers, report writers and joint effects in a profile that nothing is called, each at its place.
+//! Names of estimators, readers, report writers and joint effects in a profile that nothing is called, and parameters that these do not
+//! have, each at its place.
 
 use calib_finding::nearest_word;
-use calib_plugin::{Kind, Origin, Registry, Tables};
-use calib_profile::{Profile, ProfileError};
+use std::collections::BTreeMap;
+
+use calib_plugin::{Entry, Kind, Origin, ParameterError, PluginError, Registry, Shape, Tables};
+use calib_profile::{ParameterValue, Profile, ProfileError};
 use calib_urdf::RobotModel;
 
 use crate::error::PipelineError;
+use crate::prepare::estimators::values;
 use crate::prepare::inputs::Written;
 
 /// A name in the profile.
@@ -55,6 +59,65 @@ pub(crate) fn check(
         return Err(error.into());
     }
     Ok(())
+}
+
+/// Refuses parameters, at this path of the profile, that are not what the offer describes.
+///
+/// # Errors
+/// [`PipelineError::Profile`] at the parameter.
+pub(crate) fn parameters<T: ?Sized>(
+    entry: &Entry<T>,
+    given: &BTreeMap<String, ParameterValue>,
+    path: &[&str],
+    written: &Written,
+) -> Result<(), PipelineError> {
+    let (of, problem) = match entry.with(&values(given)) {
+        Ok(_) => return Ok(()),
+        Err(PluginError::Parameter { of, problem }) => (of, problem),
+        Err(other) => return Err(other.into()),
+    };
+    let Written { shown, text } = written;
+    let path = [path, &[problem.name()]].concat();
+    Err(match &problem {
+        ParameterError::Unknown { name, known } => {
+            let finding = format!("{of}: no parameter is called `{name}`");
+            let near = match nearest_word(name, known.iter().map(String::as_str)) {
+                Some(near) => format!("did you mean `{near}`? "),
+                None => String::new(),
+            };
+            let remedy = match known.is_empty() {
+                true => "it has none: delete the key".to_owned(),
+                false => format!("{near}known: {}", known.join(", ")),
+            };
+            ProfileError::at_key(shown, text, &path, finding, remedy)
+        }
+        ParameterError::Missing { .. } => {
+            let remedy = format!("give it under `{}`", path[path.len() - 2]);
+            ProfileError::at(shown, text, &path, format!("{of}: {problem}"), remedy)
+        }
+        _ => {
+            let remedy = "correct the value, or delete the key: then the default is used";
+            ProfileError::at(shown, text, &path, format!("{of}: {problem}"), remedy)
+        }
+    }
+    .into())
+}
+
+/// Refuses an estimator, at this path of the profile, that does not take the data that it would be given.
+///
+/// # Errors
+/// [`PipelineError::Profile`] at its name.
+pub(crate) fn takes<T: ?Sized>(
+    entry: &Entry<T>,
+    shape: Shape,
+    path: &[&str],
+    written: &Written,
+) -> Result<(), PipelineError> {
+    entry.takes(shape).map_err(|error| {
+        let Written { shown, text } = written;
+        let remedy = "`calib plugins` lists the others; what each takes is in the manual, under `estimators`";
+        ProfileError::at(shown, text, path, error.to_string(), remedy).into()
+    })
 }
 
 /// Names of a kind with the plugin that offers each.

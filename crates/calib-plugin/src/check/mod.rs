@@ -16,9 +16,10 @@ mod labels;
 mod memory;
 mod motions;
 mod subject;
+mod table;
 mod watch;
 
-use std::{fmt, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use crate::{
     answer::Failure,
@@ -29,6 +30,7 @@ use cases::Cases;
 use covariance::Stated;
 pub use labels::reserved_label;
 use subject::{Input, Reply, Subject};
+pub use table::{Conformance, End, Outcome, Row, Step};
 
 /// Threads of the concurrent test, and calls of each.
 const THREADS: (usize, usize) = (8, 20);
@@ -59,166 +61,105 @@ impl Default for Limits {
     }
 }
 
-/// How a test ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
-    /// As the contract says.
-    Passed,
-    /// Otherwise.
-    Failed,
-    /// It could not be made; the detail says why.
-    Skipped,
+/// The tests that are made, told step by step.
+struct Tests<'a> {
+    table: Conformance,
+    told: &'a mut dyn FnMut(&Step),
 }
 
-impl Outcome {
-    /// `ok`, `FAILED` or `skipped`.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Passed => "ok",
-            Self::Failed => "FAILED",
-            Self::Skipped => "skipped",
-        }
-    }
-}
-
-/// One test.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Row {
-    /// The plugin, or one of its offers.
-    pub subject: String,
-    /// What was tested.
-    pub test: &'static str,
-    /// How it ended.
-    pub outcome: Outcome,
-    /// Why, when it did not pass.
-    pub detail: String,
-}
-
-/// All tests of one plugin.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Conformance {
-    /// Its name, or what was asked for when it did not load.
-    pub plugin: String,
-    /// In the order they were made.
-    pub rows: Vec<Row>,
-}
-
-impl Conformance {
-    /// True when nothing failed.
-    #[must_use]
-    pub fn passed(&self) -> bool {
-        self.rows.iter().all(|row| row.outcome != Outcome::Failed)
+impl Tests<'_> {
+    fn take(&mut self, step: &Step) {
+        self.table.take(step);
+        (self.told)(step);
     }
 
-    /// The program's exit code: 0, or 6 when something failed.
-    #[must_use]
-    pub fn exit_code(&self) -> u8 {
-        if self.passed() { 0 } else { 6 }
+    /// A test begins, or one of its calls.
+    fn begin(&mut self, subject: &str, test: &str, case: &str) {
+        self.take(&Step::Begun {
+            subject: subject.to_owned(),
+            test: test.to_owned(),
+            case: case.to_owned(),
+        });
     }
 
-    fn note(&mut self, subject: &str, test: &'static str, result: Result<(), String>) {
-        let (outcome, detail) = match result {
-            Ok(()) => (Outcome::Passed, String::new()),
-            Err(detail) => (Outcome::Failed, detail),
-        };
-        self.rows.push(Row {
-            subject: subject.to_string(),
-            test,
+    fn made(&mut self, subject: &str, test: &str, outcome: Outcome, detail: String) {
+        self.take(&Step::Made(Row {
+            subject: subject.to_owned(),
+            test: test.to_owned(),
             outcome,
             detail,
-        });
+        }));
     }
 
-    fn skip(&mut self, subject: &str, test: &'static str, why: &str) {
-        self.rows.push(Row {
-            subject: subject.to_string(),
-            test,
-            outcome: Outcome::Skipped,
-            detail: why.to_string(),
-        });
-    }
-}
-
-impl fmt::Display for Conformance {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = |of: fn(&Row) -> usize, head: usize| {
-            self.rows.iter().map(of).max().unwrap_or(0).max(head)
-        };
-        let subject = width(|row| row.subject.chars().count(), "offer".len());
-        let test = width(|row| row.test.chars().count(), "test".len());
-        writeln!(f, "plugin {}", self.plugin)?;
-        writeln!(f, "{:subject$}  {:test$}  result", "offer", "test")?;
-        for row in &self.rows {
-            write!(
-                f,
-                "{:subject$}  {:test$}  {}",
-                row.subject,
-                row.test,
-                row.outcome.word()
-            )?;
-            match row.detail.as_str() {
-                "" => writeln!(f)?,
-                detail => writeln!(f, ": {detail}")?,
-            }
+    fn note(&mut self, subject: &str, test: &str, result: Result<(), String>) {
+        match result {
+            Ok(()) => self.made(subject, test, Outcome::Passed, String::new()),
+            Err(detail) => self.made(subject, test, Outcome::Failed, detail),
         }
-        let count = |outcome| {
-            self.rows
-                .iter()
-                .filter(|row| row.outcome == outcome)
-                .count()
-        };
-        let (failed, skipped) = (count(Outcome::Failed), count(Outcome::Skipped));
-        write!(
-            f,
-            "{} passed, {failed} failed, {skipped} skipped",
-            count(Outcome::Passed)
-        )
+    }
+
+    /// Makes a test of one call.
+    fn test(&mut self, subject: &str, test: &str, made: impl FnOnce() -> Result<(), String>) {
+        self.begin(subject, test, "");
+        self.note(subject, test, made());
+    }
+
+    fn skip(&mut self, subject: &str, test: &str, why: &str) {
+        self.made(subject, test, Outcome::Skipped, why.to_owned());
     }
 }
 
-/// Tests a plugin.
+/// Tests a plugin in this process, which a plugin with a fault may end.
 #[must_use]
 pub fn check(host: &Host, name_or_path: &str, limits: &Limits) -> Conformance {
-    let mut table = Conformance {
-        plugin: name_or_path.to_string(),
-        rows: Vec::new(),
-    };
-    let plugin = match host.load(name_or_path, None) {
-        Ok(plugin) => plugin,
-        Err(error) => {
-            table.note("plugin", "loads", Err(error.to_string()));
-            return table;
-        }
-    };
-    table.note("plugin", "loads", Ok(()));
-    let again = || host.load(name_or_path, None);
-    check_loaded(table, &plugin, again, limits)
+    check_told(host, name_or_path, limits, &mut |_| ())
+}
+
+/// The same, told step by step, so that another process knows where a plugin ended this one.
+pub fn check_told(
+    host: &Host,
+    name_or_path: &str,
+    limits: &Limits,
+    told: &mut dyn FnMut(&Step),
+) -> Conformance {
+    let load = || host.load(name_or_path, None);
+    checked(Conformance::new(name_or_path), load, limits, told)
 }
 
 /// Tests a plugin that is linked into the program.
 #[must_use]
 pub fn check_adopted(entry: &'static crate::abi::Entry, limits: &Limits) -> Conformance {
-    let mut table = Conformance {
-        plugin: "in the program".to_string(),
-        rows: Vec::new(),
-    };
-    match Host::adopt(entry) {
-        Ok(plugin) => check_loaded(table, &plugin, || Host::adopt(entry), limits),
-        Err(error) => {
-            table.note("plugin", "loads", Err(error.to_string()));
-            table
+    let table = Conformance::new("in the program");
+    checked(table, || Host::adopt(entry), limits, &mut |_| ())
+}
+
+fn checked(
+    table: Conformance,
+    load: impl Fn() -> Result<LoadedPlugin, PluginError>,
+    limits: &Limits,
+    told: &mut dyn FnMut(&Step),
+) -> Conformance {
+    let mut tests = Tests { table, told };
+    tests.begin("plugin", "loads", "");
+    match load() {
+        Ok(plugin) => {
+            tests.note("plugin", "loads", Ok(()));
+            check_loaded(&mut tests, &plugin, load, limits);
         }
+        Err(error) => tests.note("plugin", "loads", Err(error.to_string())),
     }
+    tests.take(&Step::Done);
+    tests.table
 }
 
 fn check_loaded(
-    mut table: Conformance,
+    table: &mut Tests<'_>,
     plugin: &LoadedPlugin,
     again: impl Fn() -> Result<LoadedPlugin, PluginError>,
     limits: &Limits,
-) -> Conformance {
-    table.plugin = format!("{} {}", plugin.description.name, plugin.description.version);
+) {
+    let name = format!("{} {}", plugin.description.name, plugin.description.version);
+    table.take(&Step::Named(name));
     for skipped in &plugin.description.skipped {
         table.skip("plugin", "understood", skipped);
     }
@@ -235,16 +176,15 @@ fn check_loaded(
         Ok(_) => Err("described itself differently".to_string()),
         Err(error) => Err(error.to_string()),
     };
-    table.note("plugin", "loads again", (0..REPEATS).try_for_each(same));
+    table.test("plugin", "loads again", || (0..REPEATS).try_for_each(same));
 
     for subject in Subject::all(plugin) {
-        check_offer(&mut table, &Arc::new(subject), limits);
+        check_offer(table, &Arc::new(subject), limits);
     }
-    table
 }
 
 /// All tests of one offer; a call that hangs ends them.
-fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits) {
+fn check_offer(table: &mut Tests<'_>, subject: &Arc<Subject>, limits: &Limits) {
     let title = subject.title.as_str();
     let cases = Cases::of(subject, limits.huge);
 
@@ -258,6 +198,7 @@ fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits)
     };
     if matches!(subject.offer.kind, Kind::Cor | Kind::Aor) {
         let (shapes, axis) = (&subject.offer.shapes, subject.offer.kind == Kind::Aor);
+        table.begin(title, "covariance", "");
         match covariance::judge(&ask, shapes, axis, limits.call) {
             Stated::Right => table.note(title, "covariance", Ok(())),
             Stated::Wrong(why) => table.note(title, "covariance", Err(why)),
@@ -265,8 +206,8 @@ fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits)
         }
     }
     if subject.offer.kind == Kind::Effect {
-        table.note(title, "of one state alone", effects::alone(&ask));
-        table.note(title, "without jumps", effects::smooth(&ask));
+        table.test(title, "of one state alone", || effects::alone(&ask));
+        table.test(title, "without jumps", || effects::smooth(&ask));
     }
     let Some(usual) = cases
         .golden
@@ -280,6 +221,7 @@ fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits)
     let answer = || format!("{:?}", subject.call(&usual, &Control::default()));
     check_repeats(table, title, &answer);
 
+    table.begin(title, "stops when cancelled", "");
     let stopped = stops_when_cancelled(subject, &cases, limits);
     let hangs = stopped.is_err();
     table.note(title, "stops when cancelled", stopped);
@@ -288,11 +230,13 @@ fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits)
         table.skip(title, "memory", "the call before it failed");
         return;
     }
-    let huge = watch::call(subject, &cases.huge, &Cancel::new(), limits.call)
-        .map_err(|late| late.to_string())
-        .and_then(|reply| reply.map(drop));
-    table.note(title, "huge input", huge);
+    table.test(title, "huge input", || {
+        watch::call(subject, &cases.huge, &Cancel::new(), limits.call)
+            .map_err(|late| late.to_string())
+            .and_then(|reply| reply.map(drop))
+    });
 
+    table.begin(title, "memory", "");
     match memory::growth(|| drop(answer())) {
         Ok(result) => table.note(title, "memory", result),
         Err(why) => table.skip(title, "memory", why),
@@ -301,7 +245,7 @@ fn check_offer(table: &mut Conformance, subject: &Arc<Subject>, limits: &Limits)
 
 /// The golden and the degenerate cases; whether a call did not return.
 fn check_cases(
-    table: &mut Conformance,
+    table: &mut Tests<'_>,
     subject: &Arc<Subject>,
     cases: &Cases,
     limits: &Limits,
@@ -316,6 +260,7 @@ fn check_cases(
             continue;
         }
         let result = list.iter().try_for_each(|case| {
+            table.begin(&subject.title, test, &case.name);
             let said = watch::call(subject, &case.input, &Cancel::new(), limits.call)
                 .map_err(|late| late.to_string());
             hangs |= said.is_err();
@@ -344,7 +289,8 @@ fn difference(first: &str, second: &str) -> String {
 }
 
 /// The same call gives the same answer, one after the other and in eight threads at once.
-fn check_repeats(table: &mut Conformance, title: &str, answer: &(impl Fn() -> String + Sync)) {
+fn check_repeats(table: &mut Tests<'_>, title: &str, answer: &(impl Fn() -> String + Sync)) {
+    table.begin(title, "same answer twice", "");
     let first = answer();
     let same = |second: String| {
         if second == first {
@@ -359,6 +305,7 @@ fn check_repeats(table: &mut Conformance, title: &str, answer: &(impl Fn() -> St
         (0..3).try_for_each(|_| same(answer())),
     );
 
+    table.begin(title, "eight threads", "");
     let (threads, calls) = THREADS;
     let answers: Vec<String> = std::thread::scope(|scope| {
         let one = || (0..calls).map(|_| answer()).collect::<Vec<_>>();

@@ -95,7 +95,7 @@ fn the_check_finds_effects_that_are_no_function_of_one_state() {
         };
         let table = check(&Host::new(search, true), deed, &limits);
         let failed = table.rows.iter().filter(|r| r.outcome == Outcome::Failed);
-        let failed: Vec<&str> = failed.map(|row| row.test).collect();
+        let failed: Vec<&str> = failed.map(|row| row.test.as_str()).collect();
         let first = failed.first().copied().unwrap_or_default();
         assert_eq!(first, test, "{deed}\n{table}");
     }

@@ -83,6 +83,24 @@ pub enum EditError {
         found: String,
     },
     #[error(
+        "{file}:{place}: the call that gives joint `{joint}` leaves `{parameter}` at its default, which other calls share\n  help: write `{parameter}=\"…\"` with its present value into this call, and apply again"
+    )]
+    XacroNotGiven {
+        file: String,
+        place: Place,
+        joint: String,
+        parameter: String,
+    },
+    #[error(
+        "{file}:{place}: the origin of joint `{joint}` comes from the block `{block}`, and the text does not show one `<origin>` of this joint alone\n  help: give the call of the macro an `<origin>` of its own for this block, or patch the expanded URDF"
+    )]
+    XacroBlock {
+        file: String,
+        place: Place,
+        joint: String,
+        block: String,
+    },
+    #[error(
         "{file}:{place}: the origin or axis of joint `{joint}` takes {value}, which is {}: a new value would change more than this joint\n  help: give this origin a {} of its own, or patch the expanded URDF",
         value_uses(lines, included),
         value.noun()

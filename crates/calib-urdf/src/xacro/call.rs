@@ -6,7 +6,7 @@
 //! ```
 
 use crate::error::Place;
-use crate::read::source::OwnAttributes as _;
+use crate::read::source::{OwnAttributes as _, is_element};
 use crate::xacro::expression::{expressions, whole};
 use crate::xacro::{enclosing_macro, is_expression, is_joint, is_xacro, words};
 use roxmltree::{Document, Node};
@@ -57,6 +57,58 @@ fn with_parameters(pattern: &str, call: Node<'_, '_>) -> Option<String> {
         rest = &rest[end + 1..];
     }
     (!is_expression(rest)).then(|| name + rest)
+}
+
+/// What a block parameter of a macro puts into a joint.
+pub(crate) enum Block<'a, 'b> {
+    /// There is none.
+    None,
+    /// This `<origin>`, an element of the call.
+    Origin(Node<'a, 'b>),
+    /// Something that the text does not show.
+    Hidden(Node<'a, 'b>),
+}
+
+/// The block that is inserted into a joint without an `<origin>` of its own.
+///
+/// ```text
+/// <xacro:macro name="axis" params="name *place">  <joint name="${name}" …> <xacro:insert_block name="place"/> …
+/// <xacro:axis name="elbow">  <origin xyz="0.3 0 0"/>  </xacro:axis>
+/// ```
+pub(crate) fn block<'a, 'b>(
+    document: &'a Document<'b>,
+    joint: Node<'a, 'b>,
+    call: Option<Node<'a, 'b>>,
+) -> Block<'a, 'b> {
+    let mut inserted = joint.descendants();
+    let Some(insert) = inserted.find(|node| is_xacro(*node, "insert_block")) else {
+        return Block::None;
+    };
+    let of_call = || {
+        let name = insert.own("name")?;
+        let definition = enclosing_macro(joint)?;
+        let macro_name = definition.own("name")?;
+        let calls = document.descendants();
+        let calls: Vec<_> = calls.filter(|node| is_xacro(*node, macro_name)).collect();
+        let call = match (call, calls.as_slice()) {
+            (Some(call), _) => call,
+            (None, [only]) => *only,
+            _ => return None,
+        };
+        let inserts = definition
+            .descendants()
+            .filter(|node| is_xacro(*node, "insert_block") && node.own("name") == Some(name));
+        if enclosing_macro(call).is_some() || inserts.count() != 1 {
+            return None;
+        }
+        // The n-th block of the parameters is the n-th element of the call.
+        let parameters = definition.own("params")?.split_whitespace();
+        let mut blocks = parameters.filter(|word| word.starts_with('*'));
+        let place = blocks.position(|word| word.strip_prefix('*') == Some(name))?;
+        let element = call.children().filter(Node::is_element).nth(place)?;
+        is_element(element, "origin").then_some(element)
+    };
+    of_call().map_or(Block::Hidden(insert), Block::Origin)
 }
 
 /// The parameter of a macro that a word of an attribute consists of.

@@ -10,7 +10,7 @@ mod expression;
 pub mod origins;
 pub(crate) mod value;
 
-pub(crate) use call::{called, mentions, parameter};
+pub(crate) use call::{Block, block, called, mentions, parameter};
 
 use crate::edit::error::EditError;
 use crate::error::Place;

@@ -90,6 +90,8 @@ pub(crate) enum Unwritable {
     Computed,
     /// A parameter that the macro uses more than once.
     SharedParameter { name: String, lines: Vec<usize> },
+    /// A parameter that the call at this byte leaves at its default.
+    NotGiven { name: String, call: usize },
     /// The YAML was not found.
     NotFound(String),
     /// The YAML cannot be read.
@@ -146,7 +148,10 @@ fn of_call(
     call: Node<'_, '_>,
     name: &str,
 ) -> Result<Vec<Cell>, Unwritable> {
-    let attribute = call.own_attribute(name).ok_or(Unwritable::Computed)?;
+    let attribute = call.own_attribute(name).ok_or(Unwritable::NotGiven {
+        name: name.to_owned(),
+        call: call.range().start,
+    })?;
     let range = value_range(context.text, &attribute);
     let mut cells = Vec::new();
     for (offset, word) in value_words(&context.text[range.clone()]) {

@@ -30,7 +30,7 @@ pub(super) fn watched(
     // A name that is not sent now may be the profile's own in another laboratory.
     given.retain(|name, from| heard.tracker.contains(from) || !heard.tracker.contains(name));
     given.extend(names_of(map)?);
-    let watched = map_names(&wanted, &given, &heard.tracker).map_err(RecordError::Names)?;
+    let watched = map_names(&wanted, &given, heard).map_err(RecordError::Names)?;
     let unseen: Vec<&str> = watched
         .iter()
         .filter(|w| !heard.tracker.contains(&w.from))

@@ -121,6 +121,6 @@ pub enum RecordError {
     #[error("--map `{0}`\n  help: write the profile's name and the tracker's: --map gripM=body_0")]
     Map(String),
     /// The tracker's names do not fit the profile's; the text says how.
-    #[error("{0}\n  help: the names are case-sensitive")]
+    #[error("{0}")]
     Names(String),
 }

@@ -9,8 +9,8 @@ use crate::edit::rotation::{is_zero, quaternion_near, rpy_for};
 use crate::kinematics::rpy::{angle_between, rotation_from_rpy, rpy_from_rotation};
 use crate::read::source::OwnAttributes as _;
 use crate::read::source::child;
-use crate::xacro;
 use crate::xacro::value::Context;
+use crate::xacro::{self, Block};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3, Vector4};
 
 impl Patcher<'_, '_> {
@@ -19,10 +19,26 @@ impl Patcher<'_, '_> {
         joint: &str,
         wanted: &Isometry3<f64>,
     ) -> Result<(), EditError> {
-        let (node, call) = self.joint_and_call(joint)?;
+        let (node, mut call) = self.joint_and_call(joint)?;
+        let mut written = child(node, "origin");
+        if written.is_none() && self.is_xacro {
+            match xacro::block(self.context.document, node, call) {
+                Block::None => {}
+                // The text of one call is that of one joint.
+                Block::Origin(origin) => (written, call) = (Some(origin), None),
+                Block::Hidden(insert) => {
+                    return Err(EditError::XacroBlock {
+                        file: self.file.to_owned(),
+                        place: self.place(insert.range().start),
+                        joint: joint.to_owned(),
+                        block: insert.own("name").unwrap_or("").to_owned(),
+                    });
+                }
+            }
+        }
         let xyz = wanted.translation.vector;
         let mut before = Isometry3::identity();
-        let Some(origin) = child(node, "origin") else {
+        let Some(origin) = written else {
             self.before.insert(joint.to_owned(), before);
             let rpy = rpy_from_rotation(&wanted.rotation).map(tidy_angle);
             if is_zero(&xyz)

@@ -114,6 +114,12 @@ impl Patcher<'_, '_> {
                 attribute: site.name.to_owned(),
                 found: self.context.text[raw].to_owned(),
             },
+            Unwritable::NotGiven { name, call } => EditError::XacroNotGiven {
+                file,
+                place: self.place(call),
+                joint,
+                parameter: name,
+            },
             Unwritable::SharedParameter { name, lines } => EditError::XacroShared {
                 file,
                 place,
