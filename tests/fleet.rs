@@ -1,8 +1,7 @@
 //! Fleets and shards through the program: rows, drift of a joint, interruptions, and work that is divided and merged.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::process::Command;
 
 use calib_pipeline::prepare::load::load_robot;
 use calib_recording::{WriteOptions, write_poses};
@@ -74,7 +73,7 @@ const SPREAD_DEG: f64 = 0.2;
 const DRIFT_DEG: f64 = 0.3;
 
 /// Robots `visit/r000` and so on as they are recorded at a visit; the elbow of those in `drifted` moved before it.
-fn fleet(dir: &Scratch, visit: &str, count: usize, drifted: &[usize]) {
+pub(crate) fn fleet(dir: &Scratch, visit: &str, count: usize, drifted: &[usize]) {
     let write = |path: String, text: &str| {
         let path = dir.path(&path);
         std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
@@ -104,14 +103,14 @@ fn fleet(dir: &Scratch, visit: &str, count: usize, drifted: &[usize]) {
 }
 
 /// Files of a fleet that must not depend on how it was made.
-fn results(dir: &Scratch, folder: &str) -> Files {
+pub(crate) fn results(dir: &Scratch, folder: &str) -> Files {
     let mut files = dir.files(folder);
     files.retain(|name, _| !name.starts_with("batch-"));
     files
 }
 
 #[track_caller]
-fn same(a: &Files, b: &Files) {
+pub(crate) fn same(a: &Files, b: &Files) {
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
     for (name, bytes) in a {
         assert!(b[name] == *bytes, "{name} differs");
@@ -223,43 +222,6 @@ fn a_fleet_is_calibrated_and_compared_with_last_time() {
         dir.calib_with(&[&batch[..], &[&out, "--from", &from]].concat())
             .expect(0);
         same(&first, &results(&dir, &out));
-    }
-}
-
-/// Wherever the program is killed, the next call ends with the bytes of a quiet one.
-#[test]
-fn a_killed_batch_goes_on() {
-    let dir = Scratch::new();
-    fleet(&dir, "old", 3, &[]);
-    let started = std::time::Instant::now();
-    dir.calib(["batch", "old/*/r.yaml", "--out", "quiet"])
-        .expect(0);
-    let quiet = started.elapsed();
-    let expected = results(&dir, "quiet");
-    let kills = if skipped_tests::thorough() { 100 } else { 20 };
-    let mut rng = ChaCha12Rng::seed_from_u64(1);
-    let (mut stopped, mut round) = (0, 0);
-    while stopped < kills {
-        let out = format!("killed-{round}");
-        round += 1;
-        // Several kills of one batch, each at another moment.
-        for _ in 0..4 {
-            let mut child = Command::new(env!("CARGO_BIN_EXE_calib"))
-                .args(["batch", "old/*/r.yaml", "--jobs", "2", "--out", &out])
-                .current_dir(dir.path(""))
-                .stdin(Stdio::null())
-                .stdout(Stdio::null())
-                .stderr(Stdio::null())
-                .spawn()
-                .expect("it starts");
-            std::thread::sleep(quiet.mul_f64(rng.random_range(0.0..1.0)));
-            child.kill().expect("it can be killed");
-            stopped += u64::from(!child.wait().expect("it ends").success());
-        }
-        dir.calib(["batch", "old/*/r.yaml", "--out", &out])
-            .expect(0);
-        same(&expected, &results(&dir, &out));
-        assert!(round < 10 * kills, "only {stopped} kills came in time");
     }
 }
 
@@ -527,11 +489,42 @@ fn the_slurm_script_makes_shards() {
         .expect(0);
 }
 
+/// A real controller and a node run the array; its results are those of the undivided study. `local.sh` compares them.
+#[cfg(unix)]
+#[test]
+fn a_slurm_controller_runs_the_array() {
+    let there = |program: &str| {
+        let path = std::env::var("PATH").unwrap_or_default() + ":/usr/sbin";
+        std::env::split_paths(&path).any(|folder| folder.join(program).is_file())
+    };
+    if !["slurmctld", "slurmd", "munged", "sbatch", "python3"]
+        .iter()
+        .all(|program| there(program))
+    {
+        return skipped_tests::skip("no Slurm (slurmctld, slurmd, munge)");
+    }
+    if !skipped_tests::thorough() {
+        return;
+    }
+    let dir = Scratch::new();
+    let script = crate::scratch::root().join("examples/slurm/local.sh");
+    let script = script.display().to_string();
+    let calib = Path::new(env!("CARGO_BIN_EXE_calib"));
+    let said = shell(&dir, calib, &["bash", &script, "slurm"], &[]);
+    assert!(
+        said.contains("the bytes of the undivided study"),
+        "{said}"
+    );
+    assert!(dir.path("slurm/work/results/aor.csv").is_file());
+}
+
 /// The pods of the manifest ask for each shard once.
 #[cfg(unix)]
 #[test]
 fn the_kubernetes_manifest_asks_for_every_shard() {
     let path = crate::scratch::root().join("examples/kubernetes/study.yaml");
+    let faults = crate::outputs::faults("kubernetes", &path).unwrap_or_default();
+    assert!(faults.is_empty(), "{faults:#?}");
     let text = std::fs::read_to_string(path).expect("the manifest");
     let job: Value = serde_saphyr::from_str(&text).expect("YAML");
     assert_eq!(
@@ -561,48 +554,4 @@ fn the_kubernetes_manifest_asks_for_every_shard() {
             .expect("a shard");
         assert_eq!(words[place + 1], format!("{shard}/{pods}"), "{said}");
     }
-}
-
-/// A process that is killed while it makes a shard loses nothing.
-#[test]
-fn a_killed_shard_goes_on() {
-    let dir = Scratch::new();
-    let make = |out: &str| -> Vec<String> {
-        let words = [
-            "study", "aor", "--trials", "1", "--shard", "2/5", "--out", out,
-        ];
-        words.map(str::to_owned).into()
-    };
-    let run = |folder: &Path, words: &[String]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
-        command.args(words).current_dir(folder).stdin(Stdio::null());
-        command
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("it starts")
-    };
-    let started = std::time::Instant::now();
-    assert!(
-        run(&dir.path(""), &make("quiet"))
-            .wait()
-            .expect("it ends")
-            .success()
-    );
-    let quiet: Duration = started.elapsed();
-    let expected = dir.files("quiet");
-    let mut rng = ChaCha12Rng::seed_from_u64(2);
-    for _ in 0..5 {
-        let mut child = run(&dir.path(""), &make("killed"));
-        std::thread::sleep(quiet.mul_f64(rng.random_range(0.0..1.0)));
-        child.kill().expect("it can be killed");
-        child.wait().expect("it ends");
-    }
-    assert!(
-        run(&dir.path(""), &make("killed"))
-            .wait()
-            .expect("it ends")
-            .success()
-    );
-    same(&expected, &dir.files("killed"));
 }

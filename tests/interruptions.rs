@@ -44,7 +44,7 @@ struct Trial<'a> {
     next: &'a dyn Fn(&Scratch, &Files, &Files),
 }
 
-fn traced(dir: &Scratch, options: &[&str], arguments: &[&str]) -> Option<Output> {
+pub(crate) fn traced(dir: &Scratch, options: &[&str], arguments: &[&str]) -> Option<Output> {
     Command::new("strace")
         .args(["-f", "-qq", "-o", "trace.txt"])
         .args(options)
@@ -99,7 +99,7 @@ fn files(dir: &Scratch) -> Files {
     files
 }
 
-fn is_part(name: &str) -> bool {
+pub(crate) fn is_part(name: &str) -> bool {
     Path::new(name)
         .file_name()
         .is_some_and(|n| n.to_string_lossy().starts_with(".calib-"))

@@ -16,6 +16,7 @@ mod effects;
 mod facts;
 mod fit;
 mod fleet;
+mod fleet_faults;
 mod hostile;
 mod hygiene;
 mod init;

@@ -46,8 +46,11 @@ if command -v python3 >/dev/null && python3 -m venv "$folder/python" >>"$folder/
     "$folder/python/bin/pip" install -q "${checker#*:}" >>"$folder/install.log" 2>&1 \
       && program "${checker%%:*}" "\"$folder/python/bin/python\""
   done
+  # Manifests against the schemas of Kubernetes; unknown keys are faults.
+  "$folder/python/bin/pip" install -q kubernetes-validate==1.37.0 >>"$folder/install.log" 2>&1 \
+    && program kubernetes "\"$folder/python/bin/kubernetes-validate\" --strict"
 fi
 
-for checker in urdf sdf gltf mcap html axe mujoco pinocchio opw pyarrow; do
+for checker in urdf sdf gltf mcap html axe mujoco pinocchio opw pyarrow kubernetes; do
   [ -x "$folder/$checker" ] && echo "$checker" || echo "no checker of $checker here"
 done

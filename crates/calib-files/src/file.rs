@@ -25,22 +25,27 @@ impl OutputFile {
     }
 }
 
+/// Their names.
+pub(crate) fn names(files: &[OutputFile]) -> Vec<&str> {
+    files.iter().map(|file| &*file.name).collect()
+}
+
 /// Names that a folder can hold, none twice.
-pub(crate) fn check_names(files: &[OutputFile]) -> Result<(), FileError> {
-    for (i, file) in files.iter().enumerate() {
-        match check_name(&file.name) {
+pub(crate) fn check_names(names: &[&str]) -> Result<(), FileError> {
+    for (i, name) in names.iter().enumerate() {
+        match check_name(name) {
             // Something was added to a name that a person gave.
-            Err(NameFault::TooLong) if file.name.len() <= LONGEST_IN_FOLDER => {}
+            Err(NameFault::TooLong) if name.len() <= LONGEST_IN_FOLDER => {}
             checked => checked.map_err(|fault| FileError::Name {
-                name: file.name.clone(),
+                name: (*name).to_owned(),
                 fault,
             })?,
         }
         // Two names that differ in case alone are one file on macOS and Windows.
-        let same = |earlier: &OutputFile| earlier.name.eq_ignore_ascii_case(&file.name);
-        if files[..i].iter().any(same) {
+        let same = |earlier: &&str| earlier.eq_ignore_ascii_case(name);
+        if names[..i].iter().any(same) {
             return Err(FileError::SameName {
-                name: file.name.clone(),
+                name: (*name).to_owned(),
             });
         }
     }

@@ -21,6 +21,6 @@ pub use file::OutputFile;
 pub use folder::{folder_of, make_folder};
 pub use name::{LONGEST_NAME, MANIFEST, NameFault, check_name};
 pub use output::{new_folder, remove, replace, resume, start, write_new};
-pub use results::{ResultsFolder, is_unfinished, write_results};
+pub use results::{GrowingFile, ResultsFolder, is_unfinished, write_results};
 pub use state::StateFile;
 pub use stream::{Pieces, write_pieces};

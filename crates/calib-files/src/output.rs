@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::disk::{self, is_there};
 use crate::error::FileError;
-use crate::file::{OutputFile, check_names};
+use crate::file::{OutputFile, check_names, names};
 use crate::folder::{folder_of, make_folder};
 use crate::input;
 use crate::staged::{Staged, clean};
@@ -17,7 +17,7 @@ use crate::staged::{Staged, clean};
 /// # Errors
 /// [`FileError::Name`], [`FileError::SameName`], [`FileError::Exists`] or [`FileError::Write`].
 pub fn write_new(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>, FileError> {
-    check_names(files)?;
+    check_names(&names(files))?;
     let mut missing = Vec::new();
     for file in files {
         let path = folder.join(&file.name);

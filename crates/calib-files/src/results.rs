@@ -8,12 +8,12 @@
 //! that the next run may replace it; while the list says "unfinished", [`is_unfinished`] tells readers of the folder.
 
 use std::fs::{File, TryLockError};
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use crate::disk::{self, is_there};
 use crate::error::FileError;
-use crate::file::{OutputFile, check_names};
+use crate::file::{OutputFile, check_names, names};
 use crate::folder::make_folders;
 use crate::input;
 use crate::name::{MANIFEST, check_name};
@@ -36,6 +36,24 @@ pub struct ResultsFolder {
     lock: Option<File>,
 }
 
+/// A file that is too large to be held in memory, written piece by piece; it gets its place with the others of its folder
+/// ([`ResultsFolder::write_with`]), and is removed when it is dropped before.
+#[derive(Debug)]
+pub struct GrowingFile {
+    name: String,
+    staged: Staged,
+}
+
+impl Write for GrowingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.staged.add(bytes).map(|()| bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 impl ResultsFolder {
     /// Makes the folder where needed, locks it, and removes what a killed run left.
     ///
@@ -55,30 +73,63 @@ impl ResultsFolder {
         Ok(results)
     }
 
+    /// Starts a file that is written piece by piece.
+    ///
+    /// # Errors
+    /// [`FileError::Write`].
+    pub fn grow(&self, name: &str) -> Result<GrowingFile, FileError> {
+        let staged = Staged::file(&self.folder, &[]);
+        let staged = staged.map_err(FileError::write(&self.folder.join(name)))?;
+        Ok(GrowingFile {
+            name: name.to_owned(),
+            staged,
+        })
+    }
+
+    /// [`Self::write_with`] without files that grew.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn write(self, files: &[OutputFile]) -> Result<Vec<PathBuf>, FileError> {
+        self.write_with(Vec::new(), files)
+    }
+
     /// Writes all files, or none; returns their paths.
     ///
     /// Files of an earlier run, listed in the folder's [`MANIFEST`], are replaced. Any other file of the same name is kept,
-    /// and the call fails before a byte is written.
+    /// and the call fails before a name is changed.
     ///
     /// # Errors
     /// [`FileError::Name`], [`FileError::SameName`], [`FileError::Foreign`] or [`FileError::Write`].
-    pub fn write(mut self, files: &[OutputFile]) -> Result<Vec<PathBuf>, FileError> {
-        check_names(files)?;
+    pub fn write_with(
+        mut self,
+        grown: Vec<GrowingFile>,
+        files: &[OutputFile],
+    ) -> Result<Vec<PathBuf>, FileError> {
+        let new: Vec<String> = grown.iter().map(|file| file.name.clone()).collect();
+        let mut new: Vec<&str> = new.iter().map(String::as_str).collect();
+        new.extend(names(files));
+        check_names(&new)?;
         let folder = self.folder.clone();
         let ours = manifest(&folder);
-        for file in files {
-            let path = folder.join(&file.name);
-            if is_there(&path) && !ours.contains(&file.name) {
+        for name in &new {
+            let path = folder.join(name);
+            if is_there(&path) && !ours.iter().any(|n| n == name) {
                 return Err(FileError::Foreign { path });
             }
         }
-        let names = listed(&folder, &ours, files);
+        let names = listed(&folder, &ours, &new);
         let unfinished = format!("{UNFINISHED}\n{names}");
         let list = folder.join(MANIFEST);
         let stage = |path: &Path, bytes: &[u8]| {
             Staged::file(&folder, bytes).map_err(FileError::write(path))
         };
         let mut staged = Vec::new();
+        for file in grown {
+            let path = folder.join(&file.name);
+            file.staged.sync().map_err(FileError::write(&path))?;
+            staged.push((file.staged, path));
+        }
         for file in files {
             let path = folder.join(&file.name);
             staged.push((stage(&path, &file.bytes)?, path));
@@ -119,7 +170,7 @@ impl Drop for ResultsFolder {
 /// # Errors
 /// As those.
 pub fn write_results(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>, FileError> {
-    check_names(files)?;
+    check_names(&names(files))?;
     ResultsFolder::open(folder)?.write(files)
 }
 
@@ -137,8 +188,8 @@ fn manifest(folder: &Path) -> Vec<String> {
 }
 
 /// The names of these files, and those of earlier files that are still there.
-fn listed(folder: &Path, ours: &[String], files: &[OutputFile]) -> String {
-    let mut names: Vec<&str> = files.iter().map(|f| f.name.as_str()).collect();
+fn listed(folder: &Path, ours: &[String], new: &[&str]) -> String {
+    let mut names = new.to_vec();
     names.extend(
         ours.iter()
             .map(String::as_str)

@@ -67,6 +67,19 @@ impl Staged {
         })
     }
 
+    /// Adds bytes to a file.
+    pub(crate) fn add(&mut self, bytes: &[u8]) -> Result<()> {
+        match &mut self.held {
+            Some(file) => disk::write(file, bytes),
+            None => Err(Error::from(ErrorKind::NotFound)),
+        }
+    }
+
+    /// Synchronizes a file that grew.
+    pub(crate) fn sync(&self) -> Result<()> {
+        self.held.as_ref().map_or(Ok(()), disk::sync)
+    }
+
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }

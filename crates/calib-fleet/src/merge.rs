@@ -4,14 +4,23 @@
 //! footers of all shards ──► one work, each part once ──► rows of 1/n, 2/n, …, n/n ──► file
 //! ```
 //!
-//! One group of rows is held in memory, and one shard is open at a time.
+//! One shard is open at a time. It is read, and its checksum computed, while the part before it is written: in memory are a group of
+//! rows that is read, one that is written, and few pieces between them.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc;
 
 use crate::error::{FleetError, ShardError, ShardFault};
 use crate::shard::{Difference, Identity, Of, Shard};
-use crate::shard_file::{ShardFile, write_shard};
+use crate::shard_file::{Finished, ShardFile, write_shard};
+
+/// Bytes of results that the reader hands over at a time: some thousand times what handing them over costs.
+const PIECE: usize = 1 << 20;
+/// What a unit takes besides its result.
+const UNIT: usize = 64;
+/// Pieces that wait for the writer.
+const AHEAD: usize = 4;
 
 /// What was merged.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,24 +51,68 @@ pub fn merge(
     };
     let order = ordered(&known, (&identity, of))?;
     let total = identity.units;
-    let units = order.iter().flat_map(|path| {
-        // The iterator of a shard ends with its checksum: a changed byte stops the file before it gets its name.
-        let (opened, failed) = match ShardFile::open(path) {
-            Ok(file) => (Some(file), None),
-            Err(error) => (None, Some(Err(error))),
-        };
-        failed.into_iter().chain(opened.into_iter().flatten())
-    });
-    let counted = units.map(|unit| {
-        let unit = unit?;
-        progress(unit.unit + 1, total);
-        Ok(unit)
-    });
-    write_shard(out, (&identity, Shard::WHOLE), counted)?;
+    std::thread::scope(|scope| {
+        let (sender, read) = mpsc::sync_channel(AHEAD);
+        scope.spawn(move || send(&order, &sender));
+        let mut found = 0;
+        let mut units = read.into_iter().flatten();
+        let counted = std::iter::from_fn(|| match units.next() {
+            Some(Ok(unit)) => {
+                found = unit.unit + 1;
+                progress(found, total);
+                Some(Ok(unit))
+            }
+            Some(Err(error)) => Some(Err(error)),
+            // The reader ended before it said why.
+            None if found < total => {
+                let fault = ShardFault::Rows {
+                    expected: total,
+                    found,
+                };
+                Some(Err(FleetError::unusable(out, fault)))
+            }
+            None => None,
+        });
+        write_shard(out, (&identity, Shard::WHOLE), counted)
+    })?;
     Ok(Merged {
         identity,
         shards: of,
     })
+}
+
+type Piece = Vec<Result<Finished, FleetError>>;
+
+/// Reads the shards one after another, until there are no more, one is not whole, or nobody listens.
+fn send(order: &[PathBuf], to: &mpsc::SyncSender<Piece>) {
+    for path in order {
+        let mut file = match ShardFile::open(path) {
+            Ok(file) => file,
+            Err(error) => {
+                let _ = to.send(vec![Err(error.into())]);
+                return;
+            }
+        };
+        // The iterator of a shard ends with its checksum: a changed byte stops the file before it gets its name.
+        loop {
+            let (mut piece, mut bytes) = (Piece::new(), 0);
+            while bytes < PIECE {
+                let Some(unit) = file.next() else {
+                    break;
+                };
+                bytes += unit.as_ref().map_or(PIECE, |unit| unit.result.len() + UNIT);
+                piece.push(unit.map_err(FleetError::from));
+            }
+            let failed = piece.last().is_some_and(Result::is_err);
+            let ended = piece.is_empty();
+            if ended {
+                break;
+            }
+            if to.send(piece).is_err() || failed {
+                return;
+            }
+        }
+    }
 }
 
 type Known<'a> = (&'a Path, Identity, Shard);

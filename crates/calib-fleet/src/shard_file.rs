@@ -72,7 +72,7 @@ pub fn write_shard(
         for finished in units {
             table.push(row(finished?)).map_err(unwritable)?;
         }
-        table.finish().map_err(unwritable)
+        table.finish().map(drop).map_err(unwritable)
     })
 }
 

@@ -1,9 +1,9 @@
 //! The files of a fleet: two tables in Parquet, one as CSV, a summary as JSON, and the page.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use calib_files::{OutputFile, ResultsFolder};
+use calib_files::{FileError, GrowingFile, OutputFile, ResultsFolder};
 
 use super::error::BatchError;
 use super::page::Page;
@@ -24,16 +24,23 @@ pub struct Files {
     pub written: Vec<PathBuf>,
 }
 
-/// Tables that are being made, row by row.
+/// Names of the tables.
+const ROBOTS: &str = "fleet.parquet";
+const QUANTITIES: &str = "fleet-quantities.parquet";
+
+/// Tables that are being made, row by row. The two in Parquet grow on the disk: memory is that of one group of rows.
 pub(super) struct Writing {
-    robots: TableWriter<Vec<u8>>,
-    quantities: TableWriter<Vec<u8>>,
+    robots: TableWriter<GrowingFile>,
+    quantities: TableWriter<GrowingFile>,
     csv: String,
     page: Page,
     tally: Tally,
     summary: BTreeMap<String, u64>,
     failures: BTreeMap<String, u64>,
     count: u64,
+    // Dropped last: a folder that was made is removed if it is empty.
+    folder: ResultsFolder,
+    out: PathBuf,
 }
 
 const ROBOT: &[(&str, Kind)] = &[
@@ -64,15 +71,25 @@ const QUANTITY: &[(&str, Kind)] = &[
     ("p_value", Kind::Real),
 ];
 
-fn table(columns: &[(&str, Kind)]) -> Result<TableWriter<Vec<u8>>, BatchError> {
+fn table(
+    folder: &ResultsFolder,
+    out: &Path,
+    (name, columns): (&str, &[(&str, Kind)]),
+) -> Result<TableWriter<GrowingFile>, BatchError> {
     let columns: Vec<Column> = columns.iter().map(|(n, k)| Column::new(n, *k)).collect();
-    let table = TableWriter::new(Vec::new(), &columns, BTreeMap::new());
-    table.map_err(defect)
+    let table = TableWriter::new(folder.grow(name)?, &columns, BTreeMap::new());
+    table.map_err(|fault| failed(out, name, fault))
 }
 
-/// A table in memory cannot fail but by a defect.
-fn defect(fault: TableFault) -> BatchError {
-    BatchError::Work(FleetError::Table(fault))
+/// What the system says of the file; anything else is a defect.
+fn failed(out: &Path, name: &str, fault: TableFault) -> BatchError {
+    BatchError::Work(match fault {
+        TableFault::Unwritable(source) => FleetError::File(FileError::Write {
+            path: out.join(name),
+            source,
+        }),
+        fault => FleetError::Table(fault),
+    })
 }
 
 fn text(value: Option<&str>) -> Cell {
@@ -143,16 +160,19 @@ fn shown(cell: &Cell) -> String {
 }
 
 impl Writing {
-    pub fn new() -> Result<Self, BatchError> {
+    /// Starts the tables in the folder `out`, which is locked.
+    pub fn new(folder: ResultsFolder, out: &Path) -> Result<Self, BatchError> {
         Ok(Self {
-            robots: table(ROBOT)?,
-            quantities: table(QUANTITY)?,
+            robots: table(&folder, out, (ROBOTS, ROBOT))?,
+            quantities: table(&folder, out, (QUANTITIES, QUANTITY))?,
             csv: line(ROBOT.iter().map(|(name, _)| (*name).to_owned())),
             page: Page::default(),
             tally: Tally::default(),
             summary: BTreeMap::new(),
             failures: BTreeMap::new(),
             count: 0,
+            folder,
+            out: out.to_path_buf(),
         })
     }
 
@@ -160,10 +180,12 @@ impl Writing {
     pub fn add(&mut self, robot: &Robot) -> Result<(), BatchError> {
         let cells = cells(robot);
         self.csv += &line(cells.iter().map(shown));
-        self.robots.push(cells).map_err(defect)?;
+        let of_robots = |fault| failed(&self.out, ROBOTS, fault);
+        self.robots.push(cells).map_err(of_robots)?;
         for quantity in &robot.quantities {
             let cells = of_quantity(robot, quantity);
-            self.quantities.push(cells).map_err(defect)?;
+            let of_quantities = |fault| failed(&self.out, QUANTITIES, fault);
+            self.quantities.push(cells).map_err(of_quantities)?;
         }
         self.page.add(robot);
         self.tally.add(robot);
@@ -177,7 +199,7 @@ impl Writing {
     }
 
     /// Writes all of them, or none.
-    pub fn write(self, folder: ResultsFolder) -> Result<Files, BatchError> {
+    pub fn write(self) -> Result<Files, BatchError> {
         let summary = Summary {
             calib_fleet: 1,
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -186,22 +208,21 @@ impl Writing {
             failures: self.failures,
             drift: self.tally.statistics(),
         };
-        let parquet = |name: &str, table: TableWriter<Vec<u8>>| {
-            let bytes = table.bytes().map_err(defect)?;
-            Ok::<_, BatchError>(OutputFile {
-                name: name.to_owned(),
-                bytes,
-            })
-        };
         let json = serde_json::to_string_pretty(&summary)? + "\n";
+        let finished = |name: &str, table: TableWriter<GrowingFile>| {
+            let finished = table.finish();
+            finished.map_err(|fault| failed(&self.out, name, fault))
+        };
+        let tables = vec![
+            finished(ROBOTS, self.robots)?,
+            finished(QUANTITIES, self.quantities)?,
+        ];
         let files = [
-            parquet("fleet.parquet", self.robots)?,
-            parquet("fleet-quantities.parquet", self.quantities)?,
             OutputFile::text("fleet.csv", self.csv),
             OutputFile::text("fleet.html", self.page.html(&summary)?),
             OutputFile::text("fleet.json", json.clone()),
         ];
-        let written = folder.write(&files)?;
+        let written = self.folder.write_with(tables, &files)?;
         Ok(Files {
             summary,
             json,

@@ -89,11 +89,11 @@ impl Batch<'_> {
         let folder = ResultsFolder::open(self.out)?;
         self.calibrate(self.members, progress)?;
         let rows = self.members.iter().map(|member| self.row(member));
-        let mut files = files::Writing::new()?;
+        let mut files = files::Writing::new(folder, self.out)?;
         for row in rows {
             files.add(&row?)?;
         }
-        files.write(folder)
+        files.write()
     }
 
     /// Writes the tables and the page from merged shards, without calibrating.
@@ -102,11 +102,11 @@ impl Batch<'_> {
     /// [`BatchError`] where they are not those of this batch.
     pub fn from(&self, merged: &Path) -> Result<Files, BatchError> {
         let folder = ResultsFolder::open(self.out)?;
-        let mut files = files::Writing::new()?;
+        let mut files = files::Writing::new(folder, self.out)?;
         for robot in results::<Robot>(merged, &self.identity())? {
             files.add(&robot)?;
         }
-        files.write(folder)
+        files.write()
     }
 
     /// Calibrates the robots of one shard and writes its file, which is returned.

@@ -138,36 +138,20 @@ impl<W: Write + Send> TableWriter<W> {
         group.close().map(drop).map_err(fault)
     }
 
-    /// Writes the last group and the footer.
+    /// Writes the last group and the footer, and returns where they went.
     ///
     /// # Errors
     /// What the system says.
-    pub fn finish(mut self) -> Result<(), TableFault> {
-        self.end()
-    }
-
-    fn end(&mut self) -> Result<(), TableFault> {
+    pub fn finish(mut self) -> Result<W, TableFault> {
         if !self.group.is_empty() {
             self.flush()?;
         }
-        let sum = std::mem::take(&mut self.sum);
-        self.facts.insert(CONTENT.to_owned(), hex(sum));
-        for (key, value) in std::mem::take(&mut self.facts) {
+        self.facts.insert(CONTENT.to_owned(), hex(self.sum));
+        for (key, value) in self.facts {
             let fact = KeyValue::new(key, value);
             self.file.append_key_value_metadata(fact);
         }
-        self.file.finish().map(drop).map_err(fault)
-    }
-}
-
-impl TableWriter<Vec<u8>> {
-    /// [`TableWriter::finish`], and the bytes of the file.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn bytes(mut self) -> Result<Vec<u8>, TableFault> {
-        self.end()?;
-        Ok(std::mem::take(self.file.inner_mut()))
+        self.file.into_inner().map_err(fault)
     }
 }
 

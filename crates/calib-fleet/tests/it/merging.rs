@@ -60,6 +60,46 @@ fn merged_shards_are_the_work_done_at_once() {
     }
 }
 
+/// `cargo test --release -p calib-fleet --test it gigabytes -- --ignored --nocapture` prints how fast shards of 2 GB are merged, and what
+/// memory that takes.
+#[test]
+#[ignore = "writes 4 GB"]
+fn shards_of_gigabytes() {
+    // The results of a scene of `study aor` have some 4 kB.
+    let result = format!("[{}]", vec!["0.12345678901234567"; 200].join(","));
+    let work = work(512 * 1024);
+    let folder = tempfile::tempdir().expect("a folder");
+    let of = 8;
+    let mut size = 0;
+    let mut files = Vec::new();
+    for index in 1..=of {
+        let path = folder.path().join(format!("{index}.parquet"));
+        let part = Shard { index, of };
+        let units = part.range(work.units).map(|k| {
+            Ok(Finished {
+                result: result.clone(),
+                ..unit(k)
+            })
+        });
+        write_shard(&path, (&work, part), units).expect("a shard");
+        size += std::fs::metadata(&path).expect("a file").len();
+        files.push(path);
+    }
+    let out = folder.path().join("merged.parquet");
+    let started = std::time::Instant::now();
+    merge(&files, &out, &|_, _| {}).expect("merged");
+    let rate = size as f64 / 1e6 / started.elapsed().as_secs_f64();
+    // Peak of the resident memory, kB, where the system says it.
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let peak = status.lines().find_map(|line| {
+        let text = line.strip_prefix("VmHWM:")?.trim();
+        text.strip_suffix(" kB")?.parse::<u64>().ok()
+    });
+    println!("{} MB, {rate:.0} MB/s, peak {peak:?} kB", size / 1_000_000);
+    assert!(size > 2_000_000_000 && rate > 200.0, "{rate:.0} MB/s");
+    assert!(peak.is_none_or(|peak| peak < 300_000), "{peak:?} kB");
+}
+
 /// What is wrong is named with its file, and nothing is written.
 #[track_caller]
 fn refused(files: &[PathBuf], folder: &Path, file: Option<&Path>, said: &[&str]) {
