@@ -511,10 +511,7 @@ fn a_slurm_controller_runs_the_array() {
     let script = script.display().to_string();
     let calib = Path::new(env!("CARGO_BIN_EXE_calib"));
     let said = shell(&dir, calib, &["bash", &script, "slurm"], &[]);
-    assert!(
-        said.contains("the bytes of the undivided study"),
-        "{said}"
-    );
+    assert!(said.contains("the bytes of the undivided study"), "{said}");
     assert!(dir.path("slurm/work/results/aor.csv").is_file());
 }
 

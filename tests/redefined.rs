@@ -57,5 +57,6 @@ fn a_marker_that_moved_between_recordings_is_named() {
     let change = found["facts"]["change"]["value"]
         .as_f64()
         .expect("a length");
-    assert!((change - 3e-3).abs() < 5e-4, "{found:#}");
+    // Up to 0.6 % of the distance may be the tracker's scale.
+    assert!((2e-3..3.3e-3).contains(&change), "{found:#}");
 }

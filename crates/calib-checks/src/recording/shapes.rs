@@ -10,6 +10,9 @@ use crate::statistics::median;
 /// By so much the scale of a tracker changes between two recordings at most.
 const SCALE: f64 = 0.006;
 
+/// A body whose distances are all longer or shorter by more of them is in another unit, or another body.
+const UNIT: f64 = 0.2;
+
 /// Distances of a body between markers that are steady in two recordings and differ, for each recording against the one with most rows;
 /// what one factor explains for all of them is the tracker's scale and no body.
 #[must_use]
@@ -53,6 +56,10 @@ impl<'a> Body<'a> {
         let both = self.pairs.iter();
         let both: Vec<_> = both.filter_map(|p| Some((p, same(p.i, p.j)?))).collect();
         let ratio = median(both.iter().map(|(a, b)| a.distance / b.distance).collect())?;
+        // Another unit is said to be one.
+        if !(1.0 - UNIT..1.0 + UNIT).contains(&ratio) {
+            return None;
+        }
         let ratio = ratio.clamp(1.0 - SCALE, 1.0 + SCALE);
         let least = self.least_step().max(other.least_step());
         let steady = |sigma: f64| sigma < least;
