@@ -213,7 +213,7 @@ impl<'a> Body<'a> {
         }
         let (change, row, pair) = best?;
         Some(
-            self.finding(catalog::BODY_REDEFINED)
+            self.finding_of(catalog::BODY_REDEFINED, "from_row")
                 .with("first", Fact::name(self.markers[pair.j]))
                 .with("second", Fact::name(self.markers[pair.i]))
                 .with("change", Fact::meters(change))

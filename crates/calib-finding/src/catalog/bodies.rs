@@ -3,7 +3,7 @@
 super::topic! {
     /// A distance on the body changes for good.
     BODY_REDEFINED = "body-redefined" {
-        "": Error,
+        "from_row": Error,
             "The distance between `{first}` and `{second}` changes by {change} from row {row} on, and keeps its new value.",
             "Cut the recording at that row: a marker was moved or relabeled, or the body was created again.";
         "between": Error,
