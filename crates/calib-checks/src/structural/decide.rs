@@ -8,6 +8,7 @@ use super::expected::expected;
 use super::few;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{JointIndex, SampleIndex};
+use super::jump::jump;
 use super::likelihood::{Opinion, opinion};
 use super::naming::{Asked, EQUIVALENT_WITHIN, on_twin};
 use super::outcome::{Correction, Decision, Design, Evidence, Named, Options, Outcome};
@@ -21,6 +22,8 @@ use super::twin::twin;
 /// Degrees of freedom below which a gross outlier looks like a mistake. One marker in six poses has nine, and six where
 /// the rows are shifted by one.
 const FEW_FREEDOM: f64 = 10.0;
+/// A change that leaves the residual below this part of what nominal errors explain is found, with its size, by a fit.
+const WITHIN_A_FIT: f64 = 0.8;
 /// Rounds of screening: the set settles in one or two.
 const SCREENINGS: usize = 3;
 /// Leaders under which outliers are looked for, beside the data as they are.
@@ -41,6 +44,7 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
             ratio: 1.0,
         },
         readings: None,
+        jump: None,
         continuous: None,
         rms: 0.0,
         expected: None,
@@ -99,20 +103,64 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
         ..*s
     };
     outcome.screened = screened.iter().map(original).collect();
-    match &outcome.decision {
+    beyond_hypotheses(data, (work, &screened), &mut outcome, options);
+    Ok(outcome)
+}
+
+/// What no hypothesis of the list says: a change at one row, or a column that is wrong in a way of its own. `work` and `screened`:
+/// the rows that were scored, and their outliers.
+fn beyond_hypotheses(
+    data: &Data,
+    (work, screened): (&Data, &[SampleIndex]),
+    outcome: &mut Outcome,
+    options: &Options,
+) {
+    match &outcome.decision.clone() {
         Decision::Undecided { .. } => {
-            outcome.readings = wrong_readings(data, &outcome, options);
+            let most = clearly_below(outcome.rms, outcome, options);
+            outcome.jump = jump(data, outcome, most, options);
+            if outcome.jump.is_none() {
+                outcome.readings = wrong_readings(data, outcome, options);
+            }
         }
         Decision::Named(named) if named.evidence.ratio < options.pair_ratio => {
-            if let Some(found) = better_than(named, data, &outcome, options) {
-                let ratio = named.evidence.ratio;
+            let ratio = named.evidence.ratio;
+            let most = clearly_below(named.evidence.best, outcome, options);
+            if let Some(found) = jump(data, outcome, most, options) {
+                outcome.jump = Some(found);
+                outcome.decision = undecided(None, ratio);
+            } else if let Some(found) = better_than(named, data, outcome, options) {
                 outcome.readings = Some(found);
                 outcome.decision = undecided(None, ratio);
             }
         }
+        // What looks like a gain of the whole joint may be a change of its zero at one row.
+        Decision::Consistent { ratio, .. } => {
+            if let Some(found) = &outcome.continuous {
+                let whole = Scoped {
+                    hypothesis: found.hypothesis,
+                    scope: Scope::All,
+                };
+                let left = Scan::new(&apply(&whole, work), screened).none().rms;
+                let most = clearly_below(left, outcome, options);
+                let limit = outcome.expected.map_or(0.0, |e| e.limit);
+                if outcome.rms > WITHIN_A_FIT * limit
+                    && let Some(found) = jump(data, outcome, most, options)
+                {
+                    outcome.decision = undecided(None, *ratio);
+                    outcome.continuous = None;
+                    outcome.jump = Some(found);
+                }
+            }
+        }
         _ => {}
     }
-    Ok(outcome)
+}
+
+/// What a change at one row may leave beside another explanation, m: less than that by the ratio that names a hypothesis, and than
+/// the data as they are by that ratio twice.
+fn clearly_below(other: f64, outcome: &Outcome, options: &Options) -> f64 {
+    other.min(outcome.rms / options.name_ratio) / options.name_ratio
 }
 
 /// The joint whose readings are wrong, where that explains clearly more than the name, and most of them are off after the correction as well.

@@ -34,7 +34,7 @@
 //! **Decision.** A hypothesis is named where it divides the score of the data as they are by 1.5 or more, and no further hypothesis
 //! does so after it was applied; else the likeliest beside errors of the robot is asked for, and pairs are tried. Where few
 //! samples are left, a single bad row is the rival. What the design cannot tell apart from the winner is found on
-//! noise-free twins and named with it. Where nothing is named, the readings of each joint are left out in turn ([`WrongReadings`]). Gross outliers are screened under the leading hypotheses, by the one with
+//! noise-free twins and named with it. Where nothing is named, a change at one row is looked for ([`Jump`]), and the readings of each joint are left out in turn ([`WrongReadings`]). Gross outliers are screened under the leading hypotheses, by the one with
 //! the smallest robust scale, never under one alone. Gains and fractional couplings are found by score tests.
 //!
 //! What this module does not do: it fits no geometry and writes no sentence; it lists the rows that deviate ([`deviations`]), and the caller judges them; the outcome is data.
@@ -60,6 +60,7 @@ mod expected;
 mod few;
 mod hypothesis;
 mod ids;
+mod jump;
 mod likelihood;
 mod linear;
 mod moments;
@@ -90,6 +91,7 @@ pub use hypothesis::{
     Hypothesis, PoseMistake, QuarterTurns, Scope, Scoped, UnitMistake, axes_rotation,
 };
 pub use ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex, SampleIndex};
+pub use jump::{Jump, Moved, Size};
 pub use likelihood::{KnownNoise, log_odds};
 pub use outcome::{
     Allowing, Correction, Decision, Design, Evidence, Expected, Named, Options, Outcome,

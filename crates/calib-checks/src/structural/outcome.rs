@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::continuous::Continuous;
 use super::hypothesis::Scoped;
 use super::ids::{JointIndex, RecordingIndex, SampleIndex};
+use super::jump::Jump;
 use super::readings::WrongReadings;
 
 /// How decisions are made. The defaults are measured, see the book's page on structural hypotheses.
@@ -160,6 +161,8 @@ pub struct Outcome {
     pub decision: Decision,
     /// Where nothing is named: the joint without whose readings nominal errors explain the data.
     pub readings: Option<WrongReadings>,
+    /// Where nothing is named: a change at one row, with which nominal errors explain the data.
+    pub jump: Option<Jump>,
     /// A gain or a coupling that the data demand beside (or without) the discrete correction.
     pub continuous: Option<Continuous>,
     /// Residual of the data as they are, rms, m, screened samples left out.

@@ -2,6 +2,7 @@
 
 mod bodies;
 mod checks;
+mod jumps;
 mod likelihood;
 mod real_tables;
 mod recall;

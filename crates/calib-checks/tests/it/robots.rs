@@ -44,6 +44,7 @@ pub const BIG: Errors = Errors(1.0, 5.0, 0.5);
 pub const HUGE: Errors = Errors(3.0, 20.0, 2.0);
 
 /// A robot with its readings; measurements are made of it as often as wanted.
+#[derive(Clone)]
 pub struct Setting {
     pub nominal: Chain,
     pub truth: Chain,
@@ -251,6 +252,22 @@ impl Setting {
     }
 
     /// Correct data of the robot with errors and noise, or of the nominal robot without noise.
+    /// The same with the tracker elsewhere.
+    pub fn moved(&self, motion: &Isometry3<f64>) -> Self {
+        Self {
+            tracker_from_root: motion * self.tracker_from_root,
+            ..self.clone()
+        }
+    }
+
+    /// The same with the body elsewhere on its link.
+    pub fn remounted(&self, motion: &Isometry3<f64>) -> Self {
+        Self {
+            mount: self.mount * motion,
+            ..self.clone()
+        }
+    }
+
     pub fn data(&self, noisy: bool) -> Data {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ 0x5eed);
         let sigma = 1e-4 * 10.0_f64.powf(rng.random::<f64>());

@@ -27,6 +27,15 @@ super::topic! {
         "axis": Warning,
             "The zero of this joint changed by {distance} ± {sigma} between row {before}[[ of `{before_in}`]] and row {row}.[[ Nearly as likely: {rivals:code} moved.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
             "Check the joint's encoder and its coupling, home the robot, and record again.";
+        "tracker-far": Error,
+            "The tracker, or the whole robot, moved by {distance} and {angle} between row {before} and row {row}[[; {later:code} came after]]: with that the recordings fit the nominal robot to {best} rms, without it to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
+            "Secure the tracker and the robot's stand, and record again; until then keep only the rows of one side.";
+        "body-far": Error,
+            "Body `{body}` moved on its link[[ by {distance}]][[ and {angle}]] between row {before} and row {row}[[; {later:code} came after]]: with that the recordings fit the nominal robot to {best} rms, without it to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
+            "Fasten the body and record again, or estimate one mount for each part: add `split: {recording: {recording}, at_row: {row}[[, before: {earlier:list}]]}` to the body in the profile, and list held-out recordings that were made before the change under `before` as well.";
+        "joint-far": Error,
+            "The zero of this joint changed by [[{angle}]][[{distance}]] between row {before} and row {row}[[; {later:code} came after]]: with that the recordings fit the nominal robot to {best} rms, without it to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
+            "Check the joint's encoder and its coupling, home the robot, and record again; until then keep only the rows of one side.";
         "drift": Warning,
             "The tracker's frame drifted by {distance} ± {sigma} and {angle} from the first row to the last.[[ Missing physics explains as much: `{physics}`.]]",
             "Let tracker and robot warm up before recording, and record the poses in random order.";

@@ -6,6 +6,7 @@
 
 mod codes;
 mod declared;
+mod jump;
 mod layout;
 mod limits;
 mod merge;
@@ -83,9 +84,16 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     );
     if found.rows_count {
         let all = Layout::new(inputs, tracks, &chain, true);
-        found
-            .findings
-            .extend(of_validation(&all, &outcome, options));
+        let errors = of_validation(&all, &outcome, options);
+        // A change at one row looks like a gain in the rows around it.
+        if errors
+            .iter()
+            .any(|f| f.id == catalog::CHANGED_WHILE_RECORDING)
+        {
+            let of_gain = [catalog::JOINT_GAIN, catalog::JOINT_COUPLING];
+            found.findings.retain(|f| !of_gain.contains(&f.id));
+        }
+        found.findings.extend(errors);
     }
     found
 }
@@ -152,6 +160,12 @@ fn readings(layout: &Layout<'_>, outcome: &Outcome, found: &WrongReadings) -> Fi
 fn decision(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
     match &outcome.decision {
         Decision::Named(named) => named::findings(layout, outcome, named),
+        Decision::Undecided { .. } if outcome.jump.is_some() => {
+            let found = outcome.jump.iter();
+            found
+                .map(|found| jump::finding(layout, outcome, found))
+                .collect()
+        }
         Decision::Undecided { .. } if outcome.readings.is_some() => {
             let found = outcome.readings.iter();
             found
