@@ -441,10 +441,48 @@ fn a_block_of_a_macro_is_patched_in_its_call() {
             "child=\"hand\"/>",
             "child=\"hand\"><origin rpy=\"0 0 0\" xyz=\"0.25 0 0\"/></xacro:axis>",
         );
+    // A block beside it that is no origin, and one of a property, do not hide it.
+    let beside = several
+        .replace("*place\"", "*turns *place\"")
+        .replace(
+            "<xacro:insert_block name=\"place\"/>",
+            "<xacro:insert_block name=\"turns\"/><xacro:insert_block name=\"place\"/><xacro:insert_block name=\"rubs\"/>",
+        )
+        .replace("<origin x", "<calibration rising=\"0\"/><origin x")
+        .replace("<origin r", "<calibration rising=\"0\"/><origin r")
+        .replace(
+            "<xacro:macro",
+            "<xacro:property name=\"rubs\"><dynamics damping=\"1\"/></xacro:property><xacro:macro",
+        );
+    assert_eq!(beside.matches("<calibration").count(), 3);
+    for text in [&several, &beside] {
+        blocks_are_patched(text);
+    }
+    // A block that several places insert, or whose call has something else there, is not one joint's own.
+    let xacro = "my_arm/urdf/arm.urdf.xacro";
+    for (from, to) in [
+        ("</joint>", "</joint><xacro:insert_block name=\"place\"/>"),
+        ("<origin xyz=\"0.4 0 0\"/>", "<xacro:my_origin/>"),
+    ] {
+        let other = several.replacen(from, to, 1);
+        let dir = with_xacro(&other);
+        let ran = dir.calib(["apply", RESULT, xacro, "--in-place"]);
+        assert_ne!(ran.code, 0, "{to}");
+        assert!(
+            ran.stderr.contains("comes from the block `place`"),
+            "{to}: {}",
+            ran.stderr
+        );
+        assert!(dir.read(xacro) == other, "{to}: it was changed");
+    }
+}
+
+/// Each call has the calibrated origin of its joint, the macro is as it was, and all of it goes back.
+fn blocks_are_patched(several: &str) {
     let xacro = "my_arm/urdf/arm.urdf.xacro";
     let calibrated =
         |dir: &Scratch| RobotModel::from_urdf_text(&dir.read(RESULT), "r").expect("a robot");
-    let dir = with_xacro(&several);
+    let dir = with_xacro(several);
     dir.calib(["apply", RESULT, xacro, "--in-place"]).expect(0);
     let changed = dir.read(xacro);
     let macro_end = changed.find("</xacro:macro>").expect("the macro");
@@ -484,22 +522,6 @@ fn a_block_of_a_macro_is_patched_in_its_call() {
     }
     dir.calib(["revert", xacro, "--in-place"]).expect(0);
     assert!(dir.read(xacro) == several);
-    // A block that several places insert, or whose call has something else there, is not one joint's own.
-    for (from, to) in [
-        ("</joint>", "</joint><xacro:insert_block name=\"place\"/>"),
-        ("<origin xyz=\"0.4 0 0\"/>", "<xacro:my_origin/>"),
-    ] {
-        let other = several.replacen(from, to, 1);
-        let dir = with_xacro(&other);
-        let ran = dir.calib(["apply", RESULT, xacro, "--in-place"]);
-        assert_ne!(ran.code, 0, "{to}");
-        assert!(
-            ran.stderr.contains("comes from the block `place`"),
-            "{to}: {}",
-            ran.stderr
-        );
-        assert!(dir.read(xacro) == other, "{to}: it was changed");
-    }
 }
 
 /// The file is named as it is in its own folder, and packages are sought above it.

@@ -367,6 +367,34 @@ fn refusals_before_anything_is_written() {
             "--joints udp:PORT",
         ),
         (
+            justin(&[
+                "--source",
+                "dtrack:0",
+                "--recording",
+                "head_sweep",
+                "--out",
+                "a.csv",
+                "--hold",
+                "0",
+            ]),
+            2,
+            "--hold 0",
+        ),
+        (
+            justin(&[
+                "--source",
+                "dtrack:0",
+                "--recording",
+                "head_sweep",
+                "--out",
+                "a.csv",
+                "--at",
+                "waist_deg=3",
+            ]),
+            2,
+            "--at: ",
+        ),
+        (
             justin(&["--source", "dtrack:0", "--recording", "head_sweep"]),
             7,
             "already exists. Continue it with `--append`, or choose another file with",
@@ -405,6 +433,58 @@ fn refusals_before_anything_is_written() {
         );
     }
     assert_eq!(dir.files(""), before);
+}
+
+#[test]
+fn a_robot_that_sends_none_of_its_joints_is_refused() {
+    let dir = Scratch::new().brief("justin");
+    for (sends, heard) in [
+        (None, "what arrives is: nothing"),
+        (Some("J1_deg=20"), "what arrives is: J1"),
+        (Some("20.0 30.0"), "what arrives is: found `20.0`"),
+    ] {
+        let (tracker, robot) = (free_port(), free_port());
+        let stop = Arc::new(AtomicBool::new(false));
+        let sender = still_body(tracker, 1, stop.clone());
+        let (source, joints) = (format!("dtrack:{tracker}"), format!("udp:{robot}"));
+        let child = start(
+            &dir,
+            &[
+                "record",
+                "robots/justin.yaml",
+                "--source",
+                &source,
+                "--joints",
+                &joints,
+                "--recording",
+                "arm_poses",
+                "--map",
+                "heT=body_0",
+                "--patience",
+                "2",
+                "--out",
+                "a.csv",
+            ],
+        );
+        let stop_sending = stop.clone();
+        let of_robot = std::thread::spawn(move || {
+            let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+            while !stop_sending.load(Ordering::Relaxed) {
+                if let Some(text) = sends {
+                    let _ = socket.send_to(text.as_bytes(), ("127.0.0.1", robot));
+                }
+                std::thread::sleep(Duration::from_millis(20));
+            }
+        });
+        let output = child.wait_with_output().expect("ended");
+        stop.store(true, Ordering::Relaxed);
+        sender.join().expect("sent");
+        of_robot.join().expect("sent");
+        let said = String::from_utf8(output.stderr).expect("text");
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(heard), "{said}");
+        assert!(!dir.path("a.csv").exists());
+    }
 }
 
 #[test]

@@ -18,7 +18,8 @@ pub struct Survey {
     pub joints: BTreeSet<String>,
 }
 
-/// Listens for `seconds` after the first frame, at most `patience` s without any.
+/// Listens for `seconds` after the first frame, at most `patience` s without any; with `joints`, until the robot has sent
+/// a joint too, or for `patience`.
 ///
 /// # Errors
 /// [`CaptureError::Source`]; an early end is `Ok(Err(Ended))`.
@@ -26,8 +27,8 @@ pub fn survey(
     source: &mut Source,
     listener: &mut Option<JointListener>,
     clock: &dyn Fn() -> f64,
-    seconds: f64,
-    patience: f64,
+    (seconds, patience): (f64, f64),
+    joints: bool,
     screen: &mut dyn Screen,
 ) -> Result<Result<Survey, Ended>, CaptureError> {
     let began = clock();
@@ -62,10 +63,11 @@ pub fn survey(
             Input::Closed => return Ok(Ok(found)),
             Input::Foreign(_) | Input::Nothing => {}
         }
-        if first.is_some_and(|first| now - first >= seconds) {
+        let silent = now - began;
+        let waits = joints && found.joints.is_empty() && silent < patience;
+        if first.is_some_and(|first| now - first >= seconds) && !waits {
             return Ok(Ok(found));
         }
-        let silent = now - began;
         if first.is_none() && silent >= patience {
             return Ok(Err(match foreign {
                 Some(why) => Ended::Unreadable(why),
@@ -75,6 +77,10 @@ pub fn survey(
         if first.is_none() && now - warned >= 5.0 {
             warned = now;
             screen.line(&format!("no data from the tracker for {silent:.0} s"));
+        }
+        if first.is_some() && waits && now - warned >= 5.0 {
+            warned = now;
+            screen.line(&format!("no joint values from the robot for {silent:.0} s"));
         }
     }
 }

@@ -17,6 +17,7 @@ use calib_plugin::NewProjectError;
 use calib_study::StudyError;
 use calib_study::cases::CaseError;
 use calib_twin::TwinError;
+use calib_urdf::EditError;
 
 use crate::commands::record::error::RecordError;
 use crate::commands::view::error::ViewError;
@@ -273,6 +274,8 @@ fn of_apply(error: &ApplyError) -> ExitCode {
         ApplyError::Read(_) | ApplyError::YamlUnused { .. } => ExitCode::Usage,
         ApplyError::NotAccepted { .. } => ExitCode::VerdictFail,
         ApplyError::File(error) => of_file(error),
+        // A file that was given and is not what it should be.
+        ApplyError::Edit(EditError::Read(_) | EditError::Yaml { .. }) => ExitCode::Usage,
         ApplyError::Edit(_) | ApplyError::Unwritable(_) => ExitCode::NotWritten,
         _ => ExitCode::Data,
     }

@@ -189,7 +189,7 @@ pub(crate) fn judge(
     let point_sigma = if absolute { plain_sigma } else { sigma };
     let bias: Vec<f64> = radii
         .iter()
-        .map(|r| radius_bias * point_sigma * point_sigma / r.max(f64::MIN_POSITIVE))
+        .map(|r| bias_of_radius(radius_bias, point_sigma, *r))
         .collect();
     Outcome::Estimate(Box::new(CorEstimate {
         estimator,
@@ -216,6 +216,11 @@ pub(crate) fn judge(
         },
         reason,
     }))
+}
+
+/// Second-order bias of a radius, m; a stated noise as large as the radius leaves nothing of it.
+fn bias_of_radius(factor: f64, sigma: f64, radius: f64) -> f64 {
+    (factor * sigma * sigma / radius.max(f64::MIN_POSITIVE)).min(radius)
 }
 
 fn diverged(estimator: &'static str, center: &Vector3<f64>, scatter: f64) -> Option<Outcome> {

@@ -145,7 +145,7 @@ fn pose_pairs(table: &Measured, robot: &str, measured: &str) -> Result<PosePairs
 
 fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rejected: &[u64]) -> Answer {
     let observable = e.verdict == Verdict::Ok;
-    let camera = request.optical.then(|| e.x * link_from_optical().inverse());
+    let camera = (request.optical && observable).then(|| e.x * link_from_optical().inverse());
     let value = json!({
         "estimator": id,
         "observable": observable,
@@ -154,7 +154,7 @@ fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rejected: &[u
         "explanation": e.explanation,
         "x": pose_value(&e.x),
         "z": pose_value(&e.z),
-        "x_urdf": origin_value(&e.x),
+        "x_urdf": observable.then(|| origin_value(&e.x)),
         "camera_link_urdf": camera.as_ref().map(origin_value),
         "covariance": e.covariance.as_ref().map(matrix),
         "degrees_of_freedom": e.noise.degrees_of_freedom,
@@ -193,7 +193,10 @@ fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rejected: &[u
             );
         }
     }
-    let _ = writeln!(text, "  X in a URDF: {}", origin_text(&e.x));
+    // A line to copy is for a pose that can be used.
+    if observable {
+        let _ = writeln!(text, "  X in a URDF: {}", origin_text(&e.x));
+    }
     if let Some(camera) = &camera {
         let _ = writeln!(
             text,

@@ -115,7 +115,7 @@ fn refused(
     let none = |verdict| Ok(Outcome::none(estimator, verdict, error.to_string(), ()));
     match *error {
         HandEyeError::TooFew { .. } => none(Verdict::TooFew),
-        HandEyeError::OneAxis { .. } => none(Verdict::SingleAxis),
+        HandEyeError::OneAxis { .. } | HandEyeError::NoRotation => none(Verdict::SingleAxis),
         HandEyeError::Lengths { a, b } => Err(DataError::Lengths {
             what: "poses of the robot and of the tracker",
             left: a,

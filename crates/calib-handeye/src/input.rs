@@ -30,6 +30,11 @@ pub enum HandEyeError {
         /// Its index.
         index: usize,
     },
+    /// Nothing turns between the poses.
+    #[error(
+        "the poses of one side are all turned alike; turn the flange about two axes between them"
+    )]
+    NoRotation,
     /// All rotations are about one axis: the translation along it is not observable.
     #[error(
         "the rotations share one axis: σ ratio {ratio:.1e} is under {limit:.0e}; rotate about a second axis"
@@ -45,6 +50,9 @@ pub enum HandEyeError {
 /// Rotation vectors whose second direction is weaker than this fraction of the first are one axis: 0.1° of
 /// noise on 10° of motion.
 pub(crate) const ONE_AXIS: f64 = 1e-2;
+
+/// Rotation vectors whose squares sum to less than the square of this, rad, are rounding.
+const NO_ROTATION: f64 = 1e-6;
 
 pub(crate) fn check(
     a: &[Isometry3<f64>],
@@ -81,6 +89,9 @@ pub(crate) fn check_axes(a: &[Isometry3<f64>]) -> Result<(), HandEyeError> {
 pub(crate) fn two_axes(logs: impl Iterator<Item = Vector3<f64>>) -> Result<(), HandEyeError> {
     let moment: Matrix3<f64> = logs.map(|l| l * l.transpose()).sum();
     let s = decompose::svd_small(&moment).s;
+    if s[0].sqrt() < NO_ROTATION {
+        return Err(HandEyeError::NoRotation);
+    }
     let ratio = if s[0] > 0.0 {
         (s[1] / s[0]).sqrt()
     } else {

@@ -53,6 +53,9 @@ pub struct BodyNoise {
     pub body: String,
     /// Standard deviation of one marker coordinate, m; null where fewer than three markers leave it open.
     pub sigma_m: Option<f64>,
+    /// What the profile states it to be, m.
+    #[serde(default)]
+    pub stated_m: Option<f64>,
 }
 
 /// A check and how it ended.

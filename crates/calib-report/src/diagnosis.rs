@@ -215,7 +215,8 @@ fn open(report: &Report) -> Option<Diagnosis> {
         ReasonId::HeldOutBeyondStated
         | ReasonId::UncertaintyTooSmall
         | ReasonId::GoodnessOfFit
-        | ReasonId::NoiseAboveStated => Diagnosis::BeyondStated { evidence },
+        | ReasonId::NoiseAboveStated
+        | ReasonId::NoiseBelowStated => Diagnosis::BeyondStated { evidence },
         _ => Diagnosis::Open { evidence },
     })
 }

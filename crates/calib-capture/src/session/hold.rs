@@ -1,7 +1,7 @@
 //! The pose that is being held: its rows wait until the whole hold is good, so that no part of one is in the file.
 
 use super::plan::{Moved, Plan};
-use crate::{Frame, Held};
+use crate::{Frame, Held, JointColumn, JointSource, Unit};
 
 /// A frame's row, but for the number of its hold.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,9 +28,29 @@ pub(super) struct Hold {
     seen: Vec<u64>,
     /// Frames in which each moved body was seen.
     moved: Vec<u64>,
-    /// Sum and number of the values of each joint column.
-    joints: Vec<(f64, u64)>,
+    /// The values of each joint column.
+    joints: Vec<Values>,
 }
+
+/// Values of a joint in a hold, rad or m.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Values {
+    sum: f64,
+    count: u64,
+    range: Option<(f64, f64)>,
+}
+
+impl Values {
+    fn take(&mut self, q: f64) {
+        let (low, high) = self.range.unwrap_or((q, q));
+        self.range = Some((low.min(q), high.max(q)));
+        self.sum += q;
+        self.count += 1;
+    }
+}
+
+/// Range of a measured joint within a hold, rad and m: more is a motion, whatever the tracker sees of it.
+const STILL: (f64, f64) = (5e-3, 2e-3);
 
 /// A moved body must be seen in this share of a hold: its median is then of the pose, whatever the rest shows.
 const ENOUGH: f64 = 0.5;
@@ -39,9 +59,11 @@ impl Hold {
     /// Takes a frame.
     pub(super) fn take(&mut self, plan: &Plan, frame: &Frame, joints: &[Option<f64>], row: Row) {
         self.rows.push(row);
-        self.joints.resize(joints.len(), (0.0, 0));
-        for (sum, q) in self.joints.iter_mut().zip(joints) {
-            *sum = q.map_or(*sum, |q| (sum.0 + q, sum.1 + 1));
+        self.joints.resize(joints.len(), Values::default());
+        for (values, q) in self.joints.iter_mut().zip(joints) {
+            if let Some(q) = q {
+                values.take(*q);
+            }
         }
         self.seen.resize(plan.watched.len(), 0);
         self.moved.resize(plan.moved.len(), 0);
@@ -61,6 +83,25 @@ impl Hold {
             .collect()
     }
 
+    /// The measured joint that moved most in the hold, and how far, rad or m.
+    pub(super) fn moving<'p>(&self, plan: &'p Plan) -> Option<(&'p JointColumn, f64)> {
+        if plan.joints == JointSource::Targets {
+            return None;
+        }
+        let each = plan.columns.iter().zip(&self.joints);
+        let far = each.filter_map(|(column, values)| {
+            let (low, high) = values.range?;
+            let still = match column.unit {
+                Unit::Angle => STILL.0,
+                Unit::Length => STILL.1,
+            };
+            let far = high - low;
+            (far > still).then_some((far / still, (column, far)))
+        });
+        let most = far.max_by(|a, b| a.0.total_cmp(&b.0));
+        most.map(|(_, moved)| moved)
+    }
+
     fn is_enough(&self, seen: u64) -> bool {
         seen as f64 >= ENOUGH * self.rows.len() as f64
     }
@@ -68,12 +109,12 @@ impl Hold {
     /// What the hold says, by name.
     pub(super) fn held(&self, plan: &Plan) -> Held {
         let joints = plan.columns.iter().zip(&self.joints);
-        let means = joints.filter(|(_, (_, count))| *count > 0);
+        let means = joints.filter(|(_, values)| values.count > 0);
         let seen = plan.watched.iter().zip(&self.seen);
         let seen = seen.filter(|(_, seen)| self.is_enough(**seen));
         Held {
             joints: means
-                .map(|(column, (sum, count))| (column.name.clone(), sum / *count as f64))
+                .map(|(column, values)| (column.name.clone(), values.sum / values.count as f64))
                 .collect(),
             seen: seen.map(|(watched, _)| watched.name.clone()).collect(),
         }

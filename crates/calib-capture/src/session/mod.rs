@@ -310,7 +310,14 @@ impl Session<'_> {
                 let at = 0..self.plan.columns.len();
                 let joints: Vec<_> = at.map(|c| self.joint(c, host, listener)).collect();
                 self.hold.take(&self.plan, frame, &joints, row);
-                if host - since >= self.plan.hold {
+                let moving = self.hold.moving(&self.plan);
+                let moving = moving.map(|(joint, far)| (joint.name.clone(), joint.unit.shown(far)));
+                if let Some((joint, far)) = moving {
+                    let why = format!("  {joint} moved by {far}: the hold starts over.");
+                    self.starts_over(&why, screen);
+                    self.give_up_hold()?;
+                    self.phase = Phase::Settling;
+                } else if host - since >= self.plan.hold {
                     self.end_hold(host - since, host, screen)?;
                 }
             }

@@ -185,7 +185,15 @@ fn a_silent_tracker_is_told() {
     let clock = || 40.0 * began.elapsed().as_secs_f64();
     let mut text = Vec::new();
     let mut screen = Lines::new(&mut text);
-    let ended = survey(&mut source, &mut None, &clock, 1.0, 12.0, &mut screen).expect("open");
+    let ended = survey(
+        &mut source,
+        &mut None,
+        &clock,
+        (1.0, 12.0),
+        false,
+        &mut screen,
+    )
+    .expect("open");
     let ended = ended.expect_err("nobody sends");
     assert!(matches!(ended, Ended::Silent(s) if s >= 12.0));
     assert!(
@@ -206,7 +214,15 @@ fn another_program_on_the_port_is_told() {
     let clock = || 40.0 * began.elapsed().as_secs_f64();
     let mut text = Vec::new();
     let mut screen = Lines::new(&mut text);
-    let ended = survey(&mut source, &mut None, &clock, 1.0, 12.0, &mut screen).expect("open");
+    let ended = survey(
+        &mut source,
+        &mut None,
+        &clock,
+        (1.0, 12.0),
+        false,
+        &mut screen,
+    )
+    .expect("open");
     let ended = ended.expect_err("no frame").to_string();
     assert!(
         ended.starts_with("what arrives is not from the tracker: 15 bytes"),

@@ -83,6 +83,8 @@ pub(crate) struct Scene {
     listener: Option<JointListener>,
     number: u64,
     waist: f64,
+    /// What the robot says beside where the body is, rad.
+    said_beside: f64,
 }
 
 impl Scene {
@@ -96,6 +98,7 @@ impl Scene {
             listener,
             number: 0,
             waist: -0.5,
+            said_beside: 0.0,
         }
     }
 
@@ -114,7 +117,8 @@ impl Scene {
     pub(crate) fn frame_of(&mut self, with_hand: bool, with_tip: bool) {
         let now = self.now();
         if let Some(listener) = &mut self.listener {
-            listener.datagram(format!("waist_rad={}", self.waist).as_bytes(), now);
+            let waist = self.waist + self.said_beside;
+            listener.datagram(format!("waist_rad={waist}").as_bytes(), now);
         }
         let mut frame = Frame {
             number: Some(self.number),
@@ -254,6 +258,23 @@ fn measured_joints_say_when_the_robot_is_there() {
     assert_eq!(scene.session.summary().poses, 3);
     let (low, high) = scene.session.summary().covered["waist"];
     assert!((low + 0.5).abs() < 0.03 && (high - 0.5).abs() < 0.03);
+}
+
+#[test]
+fn a_joint_that_moves_is_not_held_though_the_bodies_stand_still() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("sweep.csv");
+    let mut scene = Scene::new(&path, plan(JointSource::Udp(0), 3));
+    // 0.02 rad/s, within what is near the target.
+    for i in 0..80 {
+        scene.said_beside = 0.0002 * f64::from(i);
+        scene.stay(1);
+    }
+    assert_eq!(scene.session.summary().poses, 0, "{}", scene.said.0);
+    let why = "waist moved by 0.3°: the hold starts over.";
+    assert!(scene.said.0.contains(why), "{}", scene.said.0);
+    scene.stay(60);
+    assert_eq!(scene.session.summary().poses, 1, "{}", scene.said.0);
 }
 
 #[test]

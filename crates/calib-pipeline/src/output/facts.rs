@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 
 use calib_core::NoiseKind;
 use calib_finding::{Finding, Severity, catalog};
+use calib_geometry::statistics::median;
 use calib_report::{
-    Goodness, HeldOut, ImplausibleChange, Improvement, Limit, Orientation, Share, SingleJoint,
-    Solver, Unit, UrdfAlone, Validation, VerdictFacts,
+    FoundNoise, Goodness, HeldOut, ImplausibleChange, Improvement, Limit, Orientation, Share,
+    SingleJoint, Solver, Unit, UrdfAlone, Validation, VerdictFacts,
 };
 use nalgebra::UnitVector3;
 
@@ -178,14 +179,25 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
     let s = &fit.solution;
     /// Levels from fewer samples say little.
     const ENOUGH: usize = 20;
-    let above = s.noise.iter().filter_map(|n| {
+    let of_markers = e.tracks.values().filter_map(|track| track.marker_sigma);
+    let rigid = median(of_markers.collect());
+    let beside = s.noise.iter().filter_map(|n| {
         let stated = stated_sigma(&e.inputs.robot.profile, &n.name).filter(|s| *s > 0.0)?;
         let known = n.estimated && n.samples >= ENOUGH && n.kind != NoiseKind::Scale;
-        known.then(|| (n.name.clone(), n.sigma / stated))
+        known.then(|| FoundNoise {
+            group: n.name.clone(),
+            factor: n.sigma / stated,
+            rigid: rigid
+                .filter(|_| n.kind == NoiseKind::Position)
+                .map(|sigma| sigma / stated),
+        })
     });
+    let beside: Vec<FoundNoise> = beside.collect();
+    let by_factor = |a: &&FoundNoise, b: &&FoundNoise| a.factor.total_cmp(&b.factor);
     Goodness {
         used: s.chi2 / s.degrees_of_freedom.max(1.0),
         band: Goodness::band_of(s.degrees_of_freedom),
-        above_stated: above.max_by(|a, b| a.1.total_cmp(&b.1)),
+        above_stated: beside.iter().max_by(by_factor).cloned(),
+        below_stated: beside.iter().min_by(by_factor).cloned(),
     }
 }

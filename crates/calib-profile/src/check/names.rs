@@ -286,6 +286,16 @@ impl Checker<'_> {
         }
     }
 
+    pub(super) fn above_zero(&mut self, path: &[&str], value: f64) {
+        if !(value > 0.0 || self.named_already(value)) {
+            self.problem(
+                path,
+                format!("{value} is not above 0"),
+                "give a number above 0",
+            );
+        }
+    }
+
     pub(super) fn not_negative(&mut self, path: &[&str], value: f64) {
         if !(value >= 0.0 || self.named_already(value)) {
             self.problem(

@@ -41,6 +41,13 @@ impl Checker<'_> {
                 "add `timing: {}`: holds become poses, and the clocks are brought together",
             );
         }
+        if raw.reader.is_none() && !raw.reader_parameters.is_empty() {
+            self.key_problem(
+                &["recordings", name, "reader_parameters"],
+                "no reader is named that these could be parameters of",
+                "add `reader: <reader>`, or remove the key; `calib plugins` lists readers",
+            );
+        }
         let timing = raw.timing.as_ref().map(|timing| self.timing(name, timing));
         RecordingSpec {
             file: raw.file.clone(),
@@ -66,13 +73,7 @@ impl Checker<'_> {
             ("rate_hz", raw.rate_hz),
             ("max_offset_s", raw.max_offset_s),
         ] {
-            if !(value > 0.0 || self.named_already(value)) {
-                self.problem(
-                    &["recordings", name, "timing", key],
-                    format!("{value} is not above 0"),
-                    "give a number above 0",
-                );
-            }
+            self.above_zero(&["recordings", name, "timing", key], value);
         }
         Timing {
             poses: raw.poses,

@@ -150,6 +150,20 @@ impl Checker<'_> {
                 self.raw.loops.keys(),
             );
         }
+        for (key, limit) in [
+            ("held_out_rms_mm", raw.held_out_rms_mm),
+            ("held_out_max_mm", raw.held_out_max_mm),
+            ("held_out_rms_deg", raw.held_out_rms_deg),
+            ("held_out_max_deg", raw.held_out_max_deg),
+            ("origin_sigma_mm", raw.origin_sigma_mm),
+        ] {
+            if let Some(limit) = limit {
+                self.above_zero(&["solve", "limits", key], limit);
+            }
+        }
+        for (loop_name, limit) in &raw.loop_mean_mm {
+            self.above_zero(&["solve", "limits", "loop_mean_mm", loop_name], *limit);
+        }
         Limits {
             held_out_rms: raw.held_out_rms_mm.map(|l| l * MM),
             held_out_max: raw.held_out_max_mm.map(|l| l * MM),

@@ -348,6 +348,19 @@ pub struct Goodness {
     pub used: f64,
     /// 99.9 % band of that number.
     pub band: (f64, f64),
-    /// The group whose noise is furthest above what the profile states, and by which factor.
-    pub above_stated: Option<(String, f64)>,
+    /// The group whose noise is furthest above what the profile states.
+    pub above_stated: Option<FoundNoise>,
+    /// The group whose noise is furthest below it.
+    pub below_stated: Option<FoundNoise>,
+}
+
+/// A noise level of the fit beside the one that the profile states.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundNoise {
+    /// The group of measurements.
+    pub group: String,
+    /// Found over stated.
+    pub factor: f64,
+    /// Scatter of the markers about their own rigid bodies over the stated noise: no model of the robot is in it.
+    pub rigid: Option<f64>,
 }

@@ -88,6 +88,8 @@ reasons! {
     GoodnessOfFit = "goodness-of-fit": Warns | LeavesOpen,
     /// The noise that was found is far above the noise that was stated.
     NoiseAboveStated = "noise-above-stated": Warns,
+    /// The noise that was found is far below the noise that was stated.
+    NoiseBelowStated = "noise-below-stated": Warns,
     /// Held-out errors after registration only are not significantly higher.
     NotBetterThanRegistration = "not-better-than-registration": Warns,
     /// No recording is held out: every pose was left out in turn.

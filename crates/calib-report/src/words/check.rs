@@ -78,9 +78,14 @@ pub(crate) fn noise(of: &DataChecks) -> Option<String> {
         Some(format!("{} {sigma}", n.body))
     });
     let known: Vec<String> = known.collect();
+    let stated = of.noise.iter().find_map(|n| n.stated_m);
+    let stated = stated.map_or(String::new(), |stated| {
+        let stated = number::sigma(Some(stated), Unit::Meter);
+        format!("; stated: {stated}")
+    });
     (!known.is_empty()).then(|| {
         format!(
-            "Noise floor: {} (σ of a marker coordinate about the rigid body).",
+            "Noise floor: {} (σ of a marker coordinate about the rigid body{stated}).",
             known.join(", ")
         )
     })

@@ -66,9 +66,10 @@ fn place(id: ReasonId) -> &'static str {
         | ReasonId::UnresolvedError
         | ReasonId::RejectedPart
         | ReasonId::RejectedShare => "data",
-        ReasonId::NotConverged | ReasonId::GoodnessOfFit | ReasonId::NoiseAboveStated => {
-            "residuals"
-        }
+        ReasonId::NotConverged
+        | ReasonId::GoodnessOfFit
+        | ReasonId::NoiseAboveStated
+        | ReasonId::NoiseBelowStated => "residuals",
         ReasonId::ImplausibleChange | ReasonId::ReversedAxis => "changes",
         ReasonId::PredictionUndecided
         | ReasonId::EffectsNotExcluded

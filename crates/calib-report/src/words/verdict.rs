@@ -98,6 +98,7 @@ impl Reason {
             | ReasonId::OriginNotDetermined
             | ReasonId::GoodnessOfFit
             | ReasonId::NoiseAboveStated
+            | ReasonId::NoiseBelowStated
             | ReasonId::UnresolvedError
             | ReasonId::WarningFinding => of_fit(self, &v),
             ReasonId::RejectedPart | ReasonId::RejectedShare | ReasonId::ScreenedHeldOut => {
@@ -195,6 +196,17 @@ fn of_fit(reason: &Reason, v: &Values<'_>) -> String {
                 v.number("high")
             )
         }
+        ReasonId::NoiseAboveStated if v.get("rigid").is_some() => format!(
+            "The estimated noise of {} is {} times the stated noise, and the markers scatter {} times as much about their own bodies: the stated noise is too small. The reported uncertainty uses the estimated noise.",
+            v.name("group"),
+            v.number("factor"),
+            v.number("rigid")
+        ),
+        ReasonId::NoiseBelowStated => format!(
+            "The estimated noise of {} is {} times the stated noise: the stated noise is too large. The reported uncertainty uses the estimated noise; the checks of the data that use the stated noise see less than they could.",
+            v.name("group"),
+            v.number("factor")
+        ),
         ReasonId::NoiseAboveStated => format!(
             "The estimated noise of {} is {} times the stated noise: the model is incomplete. The reported uncertainty includes the excess.",
             v.name("group"),

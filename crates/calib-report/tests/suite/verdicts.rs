@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use calib_report::{
-    Agreement, Compared, Effect, FitEnd, Goodness, ImplausibleChange, Improvement, Limit, Limited,
-    Orientation, Part, Predicted, Prediction, Reason, ReasonId, RejectedPart, Share, SingleJoint,
-    Solver, Unit, Untested, UntestedKind, UrdfAlone, Validation, Verdict, VerdictFacts, judge,
+    Agreement, Compared, Effect, FitEnd, FoundNoise, Goodness, ImplausibleChange, Improvement,
+    Limit, Limited, Orientation, Part, Predicted, Prediction, Reason, ReasonId, RejectedPart,
+    Share, SingleJoint, Solver, Unit, Untested, UntestedKind, UrdfAlone, Validation, Verdict,
+    VerdictFacts, judge,
 };
 
 /// A result against which nothing speaks.
@@ -40,9 +41,18 @@ fn clean() -> VerdictFacts {
         goodness: Some(Goodness {
             used: 1.0,
             band: Goodness::band_of(800.0),
-            above_stated: Some(("marker".into(), 1.1)),
+            above_stated: Some(found(1.1, None)),
+            below_stated: Some(found(0.9, None)),
         }),
         ..VerdictFacts::default()
+    }
+}
+
+fn found(factor: f64, rigid: Option<f64>) -> FoundNoise {
+    FoundNoise {
+        group: "marker".into(),
+        factor,
+        rigid,
     }
 }
 
@@ -454,7 +464,21 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
             ReasonId::NoiseAboveStated,
             Warns,
             with(|f| {
-                f.goodness.as_mut().expect("there").above_stated = Some(("marker".into(), 2.5));
+                f.goodness.as_mut().expect("there").above_stated = Some(found(2.5, Some(1.1)));
+            }),
+        ),
+        (
+            ReasonId::NoiseAboveStated,
+            Warns,
+            with(|f| {
+                f.goodness.as_mut().expect("there").above_stated = Some(found(2.5, Some(2.4)));
+            }),
+        ),
+        (
+            ReasonId::NoiseBelowStated,
+            Warns,
+            with(|f| {
+                f.goodness.as_mut().expect("there").below_stated = Some(found(0.4, Some(0.4)));
             }),
         ),
         (
@@ -565,7 +589,8 @@ fn every_rule_is_silent_on_the_other_side() {
         };
         let goodness = f.goodness.as_mut().expect("there");
         goodness.used = 1.45;
-        goodness.above_stated = Some(("marker".into(), 2.0));
+        goodness.above_stated = Some(found(2.0, None));
+        goodness.below_stated = Some(found(0.5, None));
     });
     assert_eq!(
         judge(&near).verdict,

@@ -170,6 +170,7 @@ impl CaseResult {
             ReasonId::ReversedAxis,
             ReasonId::GoodnessOfFit,
             ReasonId::NoiseAboveStated,
+            ReasonId::NoiseBelowStated,
         ];
         let worse = self.reasons.contains(&ReasonId::WorseThanRegistration);
         self.cell.fault.class() == Class::Clean

@@ -80,35 +80,80 @@ pub(crate) fn block<'a, 'b>(
     joint: Node<'a, 'b>,
     call: Option<Node<'a, 'b>>,
 ) -> Block<'a, 'b> {
-    let mut inserted = joint.descendants();
-    let Some(insert) = inserted.find(|node| is_xacro(*node, "insert_block")) else {
-        return Block::None;
-    };
-    let of_call = || {
-        let name = insert.own("name")?;
-        let definition = enclosing_macro(joint)?;
-        let macro_name = definition.own("name")?;
-        let calls = document.descendants();
-        let calls: Vec<_> = calls.filter(|node| is_xacro(*node, macro_name)).collect();
-        let call = match (call, calls.as_slice()) {
-            (Some(call), _) => call,
-            (None, [only]) => *only,
-            _ => return None,
-        };
-        let inserts = definition
-            .descendants()
-            .filter(|node| is_xacro(*node, "insert_block") && node.own("name") == Some(name));
-        if enclosing_macro(call).is_some() || inserts.count() != 1 {
-            return None;
+    let mut hidden = None;
+    let inserts = joint.descendants();
+    for insert in inserts.filter(|node| is_xacro(*node, "insert_block")) {
+        match inserted(document, (joint, insert), call) {
+            Some(Inserted::Origin(origin)) => return Block::Origin(origin),
+            Some(Inserted::Other) => {}
+            None => hidden = hidden.or(Some(insert)),
         }
-        // The n-th block of the parameters is the n-th element of the call.
-        let parameters = definition.own("params")?.split_whitespace();
-        let mut blocks = parameters.filter(|word| word.starts_with('*'));
-        let place = blocks.position(|word| word.strip_prefix('*') == Some(name))?;
-        let element = call.children().filter(Node::is_element).nth(place)?;
-        is_element(element, "origin").then_some(element)
+    }
+    hidden.map_or(Block::None, Block::Hidden)
+}
+
+/// What stands in the place of an `insert_block`.
+enum Inserted<'a, 'b> {
+    /// This `<origin>`, which no other place inserts.
+    Origin(Node<'a, 'b>),
+    /// Elements that are no origin.
+    Other,
+}
+
+/// An element of xacro's own: what it becomes does not stand in the text.
+fn is_computed(node: Node<'_, '_>) -> bool {
+    node.is_element() && node.tag_name().namespace().is_some()
+}
+
+/// What a joint's `insert_block` inserts; `None` where the text does not show it.
+fn inserted<'a, 'b>(
+    document: &'a Document<'b>,
+    (joint, insert): (Node<'a, 'b>, Node<'a, 'b>),
+    call: Option<Node<'a, 'b>>,
+) -> Option<Inserted<'a, 'b>> {
+    let name = insert.own("name")?;
+    let origin = |node: &Node<'_, '_>| is_element(*node, "origin");
+    let definition = enclosing_macro(joint);
+    let parameters = definition.and_then(|d| d.own("params")).unwrap_or("");
+    let mut blocks = parameters.split_whitespace().filter(|w| w.starts_with('*'));
+    // The n-th block of the parameters is the n-th element of the call; of `**name`, its children are inserted.
+    let Some(place) = blocks.position(|word| word.trim_start_matches('*') == name) else {
+        let mut properties = document.descendants();
+        let property =
+            properties.find(|n| is_xacro(*n, "property") && n.own("name") == Some(name))?;
+        let plain = |node: Node<'_, '_>| !origin(&node) && !is_computed(node);
+        return property.children().all(plain).then_some(Inserted::Other);
     };
-    of_call().map_or(Block::Hidden(insert), Block::Origin)
+    let definition = definition?;
+    let macro_name = definition.own("name")?;
+    let calls = document.descendants();
+    let calls: Vec<_> = calls.filter(|node| is_xacro(*node, macro_name)).collect();
+    let call = match (call, calls.as_slice()) {
+        (Some(call), _) => call,
+        (None, [only]) => *only,
+        _ => return None,
+    };
+    if enclosing_macro(call).is_some() {
+        return None;
+    }
+    let element = call.children().filter(Node::is_element).nth(place)?;
+    let children = parameters
+        .split_whitespace()
+        .any(|word| word.strip_prefix("**") == Some(name));
+    let mut elements = match children {
+        true => element.children().filter(Node::is_element).collect(),
+        false => vec![element],
+    };
+    elements.retain(|node| origin(node) || is_computed(*node));
+    let found = match elements.as_slice() {
+        [] => return Some(Inserted::Other),
+        [only] if origin(only) => *only,
+        _ => return None,
+    };
+    let inserts = definition
+        .descendants()
+        .filter(|node| is_xacro(*node, "insert_block") && node.own("name") == Some(name));
+    (inserts.count() == 1).then_some(Inserted::Origin(found))
 }
 
 /// The parameter of a macro that a word of an attribute consists of.

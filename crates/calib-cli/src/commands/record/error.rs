@@ -67,6 +67,16 @@ pub enum RecordError {
         /// Joints that are.
         sent: Vec<String>,
     },
+    /// The robot was to send its joints and sends none of them.
+    #[error(
+        "the robot was to send its joint values, and what arrives is: {heard}\n  help: let it send the joints of the profile as `NAME_deg=VALUE` or `NAME_mm=VALUE`: {}", known.join(", ")
+    )]
+    JointsNotSent {
+        /// What arrives instead.
+        heard: String,
+        /// Joints that move a recorded body.
+        known: Vec<String>,
+    },
     /// No body that the plan moves is recorded.
     #[error(
         "{plan}: none of the recorded bodies is moved by its joints\n  help: map one that they move: `--map`"

@@ -13,7 +13,7 @@ use std::time::{Instant, SystemTime};
 
 use calib_capture::{
     Address, CaptureError, JointListener, JointSource, Key, Lines, POSES, Plan, Screen, Session,
-    Source, SourceError, Table, TableError, Terminal, survey,
+    Source, SourceError, Survey, Table, TableError, Terminal, survey,
 };
 use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::load::{RobotProfile, load_robot};
@@ -23,9 +23,9 @@ use clap::Args;
 use super::plugin_options::PluginOptions;
 use crate::error::CliError;
 use crate::terminal::{Console, emit_paths, say_stage};
-use bodies::unrecorded;
+use bodies::{joints_of, unrecorded};
 use error::RecordError;
-use plan::{assumed_zero, plan};
+use plan::{assumed_zero, check_options, plan};
 use planned::{Guided, Planned};
 use rules::is_continuous;
 
@@ -142,6 +142,7 @@ fn record(
     if let Some(sigma) = options.sigma_mm.filter(|s| !(*s > 0.0 && s.is_finite())) {
         return Err(CliError::NotASigma { sigma });
     }
+    check_options(robot, spec, options)?;
     let planned = match &options.plan {
         Some(path) => Some(Planned::read(path, robot, (name, spec), options)?),
         None => None,
@@ -160,7 +161,17 @@ fn record(
     ));
     let seconds = options.seconds.unwrap_or(f64::INFINITY);
     let patience = seconds.min(options.patience);
-    let heard = survey(&mut source, &mut listener, &clock, SURVEY, patience, screen)?;
+    // Without poses to guide to, the columns of the joints are those that the robot sends now.
+    let from_robot = matches!(joints, JointSource::Udp(_)) && !asks;
+    let times = (SURVEY, patience);
+    let heard = survey(
+        &mut source,
+        &mut listener,
+        &clock,
+        times,
+        from_robot,
+        screen,
+    )?;
     let heard = match heard {
         Ok(heard) => heard,
         Err(ended) => {
@@ -173,17 +184,11 @@ fn record(
     }
     let asked = (spec, planned.as_ref());
     let plan = plan(robot, asked, options, (joints, &heard), screen)?;
+    if from_robot {
+        some_joint_is_sent(robot, &plan, &heard, listener.as_ref())?;
+    }
     let path = out_path(robot, spec, options);
-    let table = if options.append && path.exists() {
-        let poses = poses(&plan, planned.is_some());
-        Table::append(&path, &plan.header(), poses.as_deref())
-    } else {
-        let comments = comments(robot, (name, spec), &address, joints, &plan);
-        let poses = poses(&plan, planned.is_some()).map(|poses| format!("{POSES}{poses}"));
-        let comments: Vec<String> = comments.into_iter().chain(poses).collect();
-        Table::create(&path, &comments, &plan.header())
-    };
-    let table = table.map_err(CaptureError::from)?;
+    let table = table(robot, (name, spec), options, (&address, joints), &plan)?;
     // Bodies that the tracker does not send tell nothing, whatever the plan says.
     let missing = unrecorded(robot, &plan.watched);
     let fewer = planned.as_ref().filter(|_| !missing.is_empty());
@@ -212,6 +217,48 @@ fn record(
         ExitCode::Data
     };
     Ok((code, Some(path)))
+}
+
+/// The file that the rows go to: a new one, or the one that is continued.
+fn table(
+    robot: &RobotProfile,
+    (name, spec): (&str, &RecordingSpec),
+    options: &Record,
+    (address, joints): (&Address, JointSource),
+    plan: &Plan,
+) -> Result<Table, CaptureError> {
+    let path = out_path(robot, spec, options);
+    let planned = options.plan.is_some();
+    let table = if options.append && path.exists() {
+        let poses = poses(plan, planned);
+        Table::append(&path, &plan.header(), poses.as_deref())
+    } else {
+        let comments = comments(robot, (name, spec), address, joints, plan);
+        let poses = poses(plan, planned).map(|poses| format!("{POSES}{poses}"));
+        let comments: Vec<String> = comments.into_iter().chain(poses).collect();
+        Table::create(&path, &comments, &plan.header())
+    };
+    Ok(table?)
+}
+
+/// The robot sends its joints, it was said: without any, every joint would count as 0.
+fn some_joint_is_sent(
+    robot: &RobotProfile,
+    plan: &Plan,
+    heard: &Survey,
+    listener: Option<&JointListener>,
+) -> Result<(), RecordError> {
+    let mut columns = plan.columns.iter();
+    if columns.any(|c| c.fixed.is_none() && heard.joints.contains(&c.name)) {
+        return Ok(());
+    }
+    let joints = joints_of(robot, &plan.watched).into_iter();
+    Err(RecordError::JointsNotSent {
+        heard: listener.map_or_else(|| "nothing".to_owned(), JointListener::heard),
+        known: joints
+            .map(|id| robot.model.joint(id).name.clone())
+            .collect(),
+    })
 }
 
 /// What the file says of its poses: another list is another recording.

@@ -120,6 +120,22 @@ fn say_zero(joints: &[String], screen: &mut dyn Screen) {
     }
 }
 
+/// What can be said of the options before anything is heard.
+pub(super) fn check_options(
+    robot: &RobotProfile,
+    spec: &RecordingSpec,
+    options: &Record,
+) -> Result<(), RecordError> {
+    let guided = if options.plan.is_some() {
+        0
+    } else {
+        spec.ranges.len()
+    };
+    checked(options, guided)?;
+    parse_at(robot, &options.at)?;
+    Ok(())
+}
+
 /// Values of each joint and durations that make sense.
 fn checked(options: &Record, joints: usize) -> Result<usize, RecordError> {
     let poses = options.poses.unwrap_or(if joints == 1 { 11 } else { 6 });

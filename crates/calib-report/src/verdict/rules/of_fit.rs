@@ -3,7 +3,7 @@
 use calib_finding::Fact;
 
 use crate::FitEnd;
-use crate::verdict::facts::Facts;
+use crate::verdict::facts::{Facts, FoundNoise};
 use crate::verdict::rules::of_prediction::unless_confirmed;
 use crate::verdict::{Effect, Reason, ReasonId};
 
@@ -102,16 +102,29 @@ pub(super) fn goodness(facts: &Facts) -> Vec<Reason> {
 /// Found noise above this many times the stated one says that something is missing, although the uncertainty has it.
 const ABOVE_STATED: f64 = 2.0;
 
+/// Found noise below this part of the stated one says that the stated one is wrong.
+const BELOW_STATED: f64 = 0.5;
+
+/// From this part of the excess on, the scatter about the rigid bodies explains it.
+const EXPLAINS: f64 = 0.8;
+
 pub(super) fn stated_noise(facts: &Facts) -> Vec<Reason> {
-    let above = facts
-        .goodness
-        .as_ref()
-        .and_then(|g| g.above_stated.as_ref());
-    let reason = |(group, factor): &(String, f64)| {
-        Reason::new(ReasonId::NoiseAboveStated, Effect::Warns)
-            .with("group", Fact::name(group))
-            .with("factor", Fact::ratio(*factor))
+    let Some(goodness) = &facts.goodness else {
+        return Vec::new();
     };
-    let far = above.filter(|(_, factor)| *factor > ABOVE_STATED);
-    far.map(reason).into_iter().collect()
+    let reason = |id: ReasonId, found: &FoundNoise| {
+        Reason::new(id, Effect::Warns)
+            .with("group", Fact::name(&found.group))
+            .with("factor", Fact::ratio(found.factor))
+    };
+    let above = goodness.above_stated.as_ref();
+    let above = above.filter(|found| found.factor > ABOVE_STATED);
+    let above = above.map(|found| {
+        let rigid = found.rigid.filter(|rigid| *rigid > EXPLAINS * found.factor);
+        reason(ReasonId::NoiseAboveStated, found).with_some("rigid", rigid.map(Fact::ratio))
+    });
+    let below = goodness.below_stated.as_ref();
+    let below = below.filter(|found| found.factor < BELOW_STATED);
+    let below = below.map(|found| reason(ReasonId::NoiseBelowStated, found));
+    above.into_iter().chain(below).collect()
 }
