@@ -187,7 +187,7 @@ impl Writing {
             let of_quantities = |fault| failed(&self.out, QUANTITIES, fault);
             self.quantities.push(cells).map_err(of_quantities)?;
         }
-        self.page.add(robot);
+        self.page.add(robot)?;
         self.tally.add(robot);
         let verdict = word(robot.verdict).to_owned();
         *self.summary.entry(verdict).or_default() += 1;

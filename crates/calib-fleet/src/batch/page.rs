@@ -48,18 +48,12 @@ struct Line(
     Option<f64>,
 );
 
-#[derive(Debug, Serialize)]
-struct Data<'a> {
-    words: &'a Words,
-    robots: &'a [Line],
-    summary: &'a Summary,
-}
-
 /// The robots of a page.
 #[derive(Debug, Default)]
 pub(super) struct Page {
     words: Words,
-    lines: Vec<Line>,
+    /// [`Line`]s as they stand in the page, which is a tenth of what they are as values.
+    lines: String,
 }
 
 /// Three digits: what a person compares.
@@ -69,7 +63,7 @@ fn rounded(value: f64) -> Option<f64> {
 }
 
 impl Page {
-    pub fn add(&mut self, robot: &Robot) {
+    pub fn add(&mut self, robot: &Robot) -> Result<(), BatchError> {
         let words = &mut self.words;
         let most = robot.most_changed();
         let change = |joint: &super::row::JointDrift| {
@@ -86,17 +80,33 @@ impl Page {
             most.map(change),
             robot.drift.as_ref().and_then(|d| rounded(d.p_value)),
         );
-        self.lines.push(line);
+        if !self.lines.is_empty() {
+            self.lines.push(',');
+        }
+        self.lines += &json(&line)?;
+        Ok(())
     }
 
     /// The page.
     pub fn html(&self, summary: &Summary) -> Result<String, BatchError> {
-        let data = serde_json::to_string(&Data {
-            words: &self.words,
-            robots: &self.lines,
-            summary,
-        })?;
-        // No name can end the element that the data stand in.
-        Ok(TEMPLATE.replacen(DATA, &data.replace('<', "\\u003c"), 1))
+        let (before, after) = TEMPLATE.split_once(DATA).unwrap_or((TEMPLATE, ""));
+        let (words, summary) = (json(&self.words)?, json(summary)?);
+        let parts = [
+            before,
+            "{\"words\":",
+            &words,
+            ",\"robots\":[",
+            &self.lines,
+            "],\"summary\":",
+            &summary,
+            "}",
+            after,
+        ];
+        Ok(parts.concat())
     }
+}
+
+/// No name can end the element that the data stand in.
+fn json(value: &impl Serialize) -> Result<String, BatchError> {
+    Ok(serde_json::to_string(value)?.replace('<', "\\u003c"))
 }

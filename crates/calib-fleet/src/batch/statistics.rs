@@ -72,8 +72,10 @@ pub struct Statistics {
 /// What is kept of each robot while the others are read.
 #[derive(Debug, Default)]
 pub(crate) struct Tally {
-    /// Robots that were compared.
-    robots: Vec<(f64, String, String, Option<String>)>,
+    /// Of each robot that was compared, the probability of its change without one.
+    robots: Vec<f64>,
+    /// Those that are alarms: place in the list, name, series, joint that changed most.
+    alarms: Vec<(usize, String, String, Option<String>)>,
     /// Robots and changed ones, by series and joint.
     joints: BTreeMap<(String, String), (u64, u64)>,
 }
@@ -84,13 +86,16 @@ impl Tally {
         let Some(drift) = &robot.drift else {
             return;
         };
-        let most = robot.most_changed();
-        self.robots.push((
-            drift.p_value,
-            robot.name.clone(),
-            robot.series.clone(),
-            most.map(|joint| joint.joint.clone()),
-        ));
+        if drift.p_value < FALSE_ALARMS {
+            let most = robot.most_changed();
+            self.alarms.push((
+                self.robots.len(),
+                robot.name.clone(),
+                robot.series.clone(),
+                most.map(|joint| joint.joint.clone()),
+            ));
+        }
+        self.robots.push(drift.p_value);
         for joint in &drift.joints {
             let key = (robot.series.clone(), joint.joint.clone());
             let (robots, changed) = self.joints.entry(key).or_default();
@@ -102,17 +107,17 @@ impl Tally {
     /// (1), (2) and (3).
     pub fn statistics(self) -> Statistics {
         let compared = self.robots.len() as u64;
-        let adjusted = holm(&self.robots.iter().map(|r| r.0).collect::<Vec<_>>());
-        let robots = self.robots.into_iter().zip(adjusted);
-        let alarms = robots.filter(|((p, ..), _)| *p < FALSE_ALARMS);
-        let mut alarms: Vec<Alarm> = alarms
-            .map(|((p_value, name, series, joint), p_adjusted)| Alarm {
+        let adjusted = holm(&self.robots);
+        let mut alarms: Vec<Alarm> = self
+            .alarms
+            .into_iter()
+            .map(|(place, name, series, joint)| Alarm {
                 name,
                 series,
                 joint,
-                p_value,
-                p_adjusted,
-                familywise: p_adjusted < FALSE_ALARMS,
+                p_value: self.robots[place],
+                p_adjusted: adjusted[place],
+                familywise: adjusted[place] < FALSE_ALARMS,
             })
             .collect();
         // The order of the fleet where they are equal: the sort is stable.
