@@ -32,9 +32,9 @@ fn a_robot_that_was_never_recorded_has_a_plan() {
     for file in ["plan.csv", "held_out.csv", "plan.yaml", "plan.html"] {
         assert!(dir.path(&format!("out/{file}")).is_file(), "{file}");
     }
-    let blocked = dir
-        .read("out/plan.html")
-        .contains("No collision-free motion");
+    let page = dir.read("out/plan.html");
+    assert!(page.contains("id=\"view-data\""), "the 3-D view");
+    let blocked = page.contains("No collision-free motion");
     assert_eq!(dir.path("out/trajectory.json").is_file(), !blocked);
     // The list itself is a table of postures.
     let again = dir.calib([

@@ -13,9 +13,11 @@ use crate::formulate::checked::{Checked, check_data};
 use crate::formulate::chosen::Chosen;
 use crate::formulate::from_origins::origins;
 use crate::formulate::kinematics::Calibration;
+use crate::formulate::repeated::{is_repeatable, repeated};
 use crate::formulate::solved::{Solved, nominal};
 use crate::options::RunOptions;
 use crate::prepare::inputs::Inputs;
+use crate::prepare::tracks::body_tracks;
 
 /// What the stages from the data checks to the solution give.
 #[derive(Debug)]
@@ -63,6 +65,28 @@ pub fn estimated(
         nominal,
         origins,
         method,
+        solved,
+    })
+}
+
+/// Estimates recordings that a robot of the same kind gave in the postures of `like`, and in which nothing is wrong: the checks, the closed forms and the
+/// choice of the noise are those of `like`, and the fit begins where that of `like` ended. `None` where that is not the same estimate, so that
+/// [`estimated`] must be asked: the noise of `like` is no single statement, or the recordings show other parameters.
+#[must_use]
+pub fn estimated_again(mut inputs: Inputs, like: &Estimated) -> Option<Estimated> {
+    let fit = like.solved.fit.as_ref().filter(|fit| is_repeatable(fit))?;
+    let mut checked = Checked {
+        findings: Vec::new(),
+        tracks: body_tracks(&inputs, &mut Vec::new()).ok()?,
+        start: like.checked.start.clone(),
+    };
+    let solved = repeated(&mut inputs, &mut checked, fit)?;
+    Some(Estimated {
+        inputs,
+        checked,
+        nominal: like.nominal.clone(),
+        origins: BTreeMap::new(),
+        method: like.method,
         solved,
     })
 }

@@ -1,5 +1,6 @@
 //! From candidates to a list: what is chosen by information, what fills the space, what is repeated, and in which order.
 
+use calib_report::view3d::View3d;
 use nalgebra::DMatrix;
 
 use crate::candidates::Candidate;
@@ -124,6 +125,7 @@ pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError>
         motion_time,
         blocked,
         notes,
+        view: View3d::default(),
     })
 }
 

@@ -87,6 +87,30 @@ pub enum PlanError {
         /// Why.
         why: String,
     },
+    /// A table of places is none.
+    #[error(
+        "{file}: {why}\n  help: give joint positions, `<joint>_deg` in the header, or the places of one link, body or marker in the frame of the robot's root: `flange_x,flange_y,flange_z`, in meters"
+    )]
+    NotPlaces {
+        /// The list.
+        file: String,
+        /// Why.
+        why: String,
+    },
+    /// A place of the task has no posture.
+    #[error("{file}, row {row}: {}", words::no_posture(*nearest_mm, *oriented, *touching))]
+    PlaceOutOfReach {
+        /// The list.
+        file: String,
+        /// Row from 1.
+        row: usize,
+        /// How near the tool comes, mm; a radian counts as 300.
+        nearest_mm: f64,
+        /// Whether an orientation is asked for.
+        oriented: bool,
+        /// Whether there are postures that touch something.
+        touching: bool,
+    },
     /// A file is no plan of this robot.
     #[error("{file}: {why}\n  help: give the `plan.yaml` that `calib plan` wrote for this robot")]
     NotAPlan {
@@ -203,6 +227,8 @@ impl PlanError {
             | Self::OutOfReach { file, .. }
             | Self::BoxOutOfReach { file, .. }
             | Self::NotJoints { file, .. }
+            | Self::NotPlaces { file, .. }
+            | Self::PlaceOutOfReach { file, .. }
             | Self::NotAPlan { file, .. }
             | Self::OtherRobot { file, .. }
             | Self::OutsideRanges { file, .. }
@@ -222,6 +248,8 @@ impl PlanError {
             Self::NotReached { .. } => ExitCode::VerdictFail,
             Self::OutOfReach { .. }
             | Self::NotJoints { .. }
+            | Self::NotPlaces { .. }
+            | Self::PlaceOutOfReach { .. }
             | Self::NotAPlan { .. }
             | Self::OtherRobot { .. }
             | Self::OutsideRanges { .. }

@@ -77,11 +77,19 @@ impl JointBox {
         Ok(Self { moved, base })
     }
 
-    /// Postures by an Owen-scrambled Sobol sequence, the same for the same seed; at most 65 536.
+    /// Postures by an Owen-scrambled Sobol sequence, the same for the same seed; after 65 536 by another one of another seed.
     #[must_use]
     pub fn postures(&self, count: usize, seed: u32) -> Vec<Vec<f64>> {
-        let count = count.min(1 << 16) as u32;
-        (0..count).map(|i| self.posture(i, seed)).collect()
+        /// Postures of one sequence.
+        const LENGTH: usize = 1 << 16;
+        /// Between the seeds of sequences that follow each other: odd and large, so that they share nothing with seeds that people choose.
+        const NEXT: u32 = 0x9e37_79b9;
+        let one = |i: usize| {
+            let sequence = (i / LENGTH) as u32;
+            let seed = seed.wrapping_add(sequence.wrapping_mul(NEXT));
+            self.posture((i % LENGTH) as u32, seed)
+        };
+        (0..count).map(one).collect()
     }
 
     fn posture(&self, i: u32, seed: u32) -> Vec<f64> {

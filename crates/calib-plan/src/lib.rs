@@ -14,12 +14,14 @@ pub mod list;
 mod note;
 pub mod order;
 mod page;
+pub mod places;
 pub mod plan;
 pub mod prepare;
 pub mod scene;
 pub mod shape;
 pub mod sight;
 pub mod terminal;
+pub mod view;
 mod words;
 pub mod write;
 

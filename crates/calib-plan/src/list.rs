@@ -1,5 +1,6 @@
 //! A plan as data.
 
+use calib_report::view3d::View3d;
 use serde::{Deserialize, Serialize};
 
 use crate::candidates::Counts;
@@ -94,6 +95,8 @@ pub struct Plan {
     pub blocked: Vec<usize>,
     /// What was assumed.
     pub notes: Vec<Note>,
+    /// The 3-D view of the page; empty where only the list is wanted.
+    pub view: View3d,
 }
 
 /// What a plan makes of a parameter.

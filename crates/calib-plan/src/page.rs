@@ -1,5 +1,6 @@
 //! `plan.html`: the plan as one page that needs no other file.
 
+use calib_report::ReportError;
 use calib_report::gallery::{self, Grid};
 use calib_report::plots::{Plot, PlotKind, PlotRow, Series};
 use calib_urdf::RobotModel;
@@ -9,8 +10,10 @@ use crate::list::{Plan, Why};
 use crate::words;
 
 /// The page.
-#[must_use]
-pub fn page(plan: &Plan, model: &RobotModel, profile: &str) -> String {
+///
+/// # Errors
+/// [`ReportError::Json`] for a view with numbers that are not finite.
+pub fn page(plan: &Plan, model: &RobotModel, profile: &str) -> Result<String, ReportError> {
     let measured = plan
         .postures
         .iter()
@@ -55,7 +58,8 @@ pub fn page(plan: &Plan, model: &RobotModel, profile: &str) -> String {
             .map(|why| format!("Reason `{}`: {}.", words::why(why), words::why_in_full(why))),
     );
     let title = format!("Plan for {}", plan.robot);
-    gallery::page(&title, &lines, &plots(plan), &[postures(plan, model)])
+    let tables = [postures(plan, model)];
+    gallery::page_with_view(&title, &lines, &plan.view, &plots(plan), &tables)
 }
 
 /// The postures in their order.

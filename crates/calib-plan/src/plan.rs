@@ -6,6 +6,7 @@ use crate::error::PlanError;
 use crate::known::Known;
 use crate::list::Plan;
 use crate::prepare::{Options, Prepared, prepare};
+use crate::view::view;
 use crate::words;
 
 /// Postures where neither a number nor a σ is asked for.
@@ -21,10 +22,12 @@ const FEWEST: usize = 6;
 /// [`PlanError`] where no posture is possible, the task cannot be reached, or the σ is not.
 pub fn plan(known: &Known, options: &Options) -> Result<Plan, PlanError> {
     let prepared = prepare(known, options)?;
-    let Some(asked) = options.sigma.filter(|_| options.poses.is_none()) else {
-        return compose(&prepared, options.poses.unwrap_or(POSES).max(FEWEST));
-    };
-    for_sigma(&prepared, asked)
+    let mut plan = match options.sigma.filter(|_| options.poses.is_none()) {
+        None => compose(&prepared, options.poses.unwrap_or(POSES).max(FEWEST)),
+        Some(asked) => for_sigma(&prepared, asked),
+    }?;
+    plan.view = view(&prepared, &plan);
+    Ok(plan)
 }
 
 /// The plan with the fewest postures that reaches a σ.

@@ -235,3 +235,44 @@ pub fn parameter_sigma(sigma: Option<f64>, unit: calib_core::Unit) -> String {
     };
     number::sigma(sigma, unit)
 }
+
+/// Why a place of the task has no posture.
+#[must_use]
+pub fn no_posture(nearest_mm: f64, oriented: bool, touching: bool) -> String {
+    let orientation = if oriented {
+        " with this orientation"
+    } else {
+        ""
+    };
+    if touching {
+        return format!(
+            "the postures that bring the tool there{orientation} touch the robot itself, the ground or a keep-out\n  help: change the place, `plan.keep_outs` or `plan.clearance_mm`"
+        );
+    }
+    format!(
+        "no posture brings the tool there{orientation}; the nearest is {nearest_mm:.1} mm off\n  help: places are in the frame of the robot's root, in meters; widen `plan.joints` if the ranges are narrower than the robot's"
+    )
+}
+
+/// What stands where the robot must not be, in the 3-D view.
+pub const KEEP_OUTS: &str = "keep-outs";
+/// The tracker's cameras, in the 3-D view.
+pub const CAMERAS: &str = "cameras";
+
+/// What a posture is called; `None`: nothing is recorded there.
+#[must_use]
+pub fn pose(number: Option<usize>) -> String {
+    number.map_or_else(|| "on the way".to_owned(), |k| format!("pose {k}"))
+}
+
+/// What a posture to validate with is called.
+#[must_use]
+pub fn held_out_pose(number: usize) -> String {
+    format!("validation {number}")
+}
+
+/// Why a posture is recorded, and σ after it.
+#[must_use]
+pub fn posture(why: &str, sigma: Option<f64>) -> String {
+    format!("{why}; expected σ after it: {}", length(sigma))
+}

@@ -10,10 +10,12 @@ use serde::{Deserialize, Serialize};
 use crate::candidates::Counts;
 use crate::error::PlanError;
 use crate::joints::{JointBox, shown};
+use crate::known::Known;
 use crate::linear::joint_table;
 use crate::list::{Goal, Parameter, Plan, Why};
 use crate::note::Note;
 use crate::page::page;
+use crate::places;
 
 /// What is wrong with a table that cannot be written.
 const RENAME: &str = "rename the joint in the URDF";
@@ -144,11 +146,12 @@ impl Plan {
         let recorded = self.postures.iter().filter(|p| p.why != Why::Detour);
         let q: Vec<&Vec<f64>> = recorded.map(|p| &p.q).collect();
         let held_out: Vec<&Vec<f64>> = self.held_out.iter().collect();
+        let html = page(self, model, profile).map_err(|e| unwritable("plan.html", &e))?;
         let mut files = vec![
             OutputFile::text("plan.yaml", yaml),
             OutputFile::text("plan.csv", table(model, profile, &q)?),
             OutputFile::text("held_out.csv", table(model, profile, &held_out)?),
-            OutputFile::text("plan.html", page(self, model, profile)),
+            OutputFile::text("plan.html", html),
         ];
         // A list of points that a controller would drive through must not lead through anything.
         if self.blocked.is_empty() {
@@ -308,13 +311,50 @@ pub fn read_postures(
         file: name.to_owned(),
         why,
     };
-    let table = calib_recording::read_bytes(name, bytes, &ReadOptions::default());
-    let table = table.map_err(|e| wrong(e.to_string()))?;
-    let table = table.poses(calib_recording::Filled::Exclude);
-    let table: Poses = table.map_err(|e| wrong(e.to_string()))?;
+    let table = read_poses(bytes, name)?;
     if table.joints.is_empty() || table.is_empty() {
         return Err(wrong("the table has no joint positions".to_owned()));
     }
+    of_joints(&table, name, model, joints)
+}
+
+/// Reads a task: a table of joint positions, or of places of one link, body or marker in the frame of the robot's root, for each of which a posture is
+/// found.
+///
+/// # Errors
+/// As [`read_postures`]; [`PlanError::NotPlaces`] for a table of neither, [`PlanError::PlaceOutOfReach`] for a place without a posture.
+pub fn read_task(bytes: &[u8], name: &str, known: &Known) -> Result<Vec<Vec<f64>>, PlanError> {
+    let table = read_poses(bytes, name)?;
+    let (model, joints) = (&known.robot.model, known.joint_box()?);
+    if !table.joints.is_empty() && !table.is_empty() {
+        return of_joints(&table, name, model, &joints);
+    }
+    let (feasible, _) = known.feasible(&joints, 1);
+    let (tool, goals) = places::goals(&table, name, model, &feasible)?;
+    places::postures((tool, &goals), name, &joints, &feasible)
+}
+
+fn read_poses(bytes: &[u8], name: &str) -> Result<Poses, PlanError> {
+    let wrong = |why: String| PlanError::NotJoints {
+        file: name.to_owned(),
+        why,
+    };
+    let table = calib_recording::read_bytes(name, bytes, &ReadOptions::default());
+    let table = table.map_err(|e| wrong(e.to_string()))?;
+    let table = table.poses(calib_recording::Filled::Exclude);
+    table.map_err(|e| wrong(e.to_string()))
+}
+
+fn of_joints(
+    table: &Poses,
+    name: &str,
+    model: &RobotModel,
+    joints: &JointBox,
+) -> Result<Vec<Vec<f64>>, PlanError> {
+    let wrong = |why: String| PlanError::NotJoints {
+        file: name.to_owned(),
+        why,
+    };
     let mut columns = Vec::new();
     for (joint, column) in &table.joints {
         let id = model.joint_id(joint).map_err(|e| wrong(e.to_string()))?;

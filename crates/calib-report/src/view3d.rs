@@ -31,6 +31,9 @@ pub struct View3d {
     pub circles: Vec<Circle>,
     /// Axes.
     pub axes: Vec<Axis>,
+    /// Nothing is measured yet: what a marker's place says is whether it will be in sight.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub planned: bool,
 }
 
 /// A frame of the robot.

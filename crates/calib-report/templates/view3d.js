@@ -127,7 +127,7 @@
     if (m) {
       const e = m.residual_mm;
       const mm = function (x) { return x.toFixed(2).replace("-", "\u2212"); };
-      document.getElementById("view-status").textContent = m.name + ": " + (e ? "predicted minus measured " + mm(Math.hypot(e[0], e[1], e[2])) + " mm (x " + mm(e[0]) + ", y " + mm(e[1]) + ", z " + mm(e[2]) + " mm)" : "not seen by the tracker");
+      document.getElementById("view-status").textContent = m.name + ": " + (view.planned ? (e ? "in sight" : "not in sight") : e ? "predicted minus measured " + mm(Math.hypot(e[0], e[1], e[2])) + " mm (x " + mm(e[0]) + ", y " + mm(e[1]) + ", z " + mm(e[2]) + " mm)" : "not seen by the tracker");
     }
     draw();
   }

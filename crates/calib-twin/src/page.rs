@@ -19,12 +19,13 @@ const ROWS: usize = 40;
 #[must_use]
 pub fn page(twin: &Twin) -> String {
     let mut lines = vec![format!(
-        "Profile: `{}`. {} trials from {}, true robots drawn {} (seed {}). Each was recorded in the same postures with the same gaps, and calibrated as `calib run` does it.",
+        "Profile: `{}`. {} trials from {}, true robots drawn {} (seed {}). Each was recorded in the same postures with the same gaps. {}",
         twin.profile,
         twin.trials,
         words::source(twin.source),
         words::about(twin.about),
-        twin.seed
+        twin.seed,
+        words::calibrated(twin.whole, twin.trials)
     )];
     lines.extend(resembles(twin).map(|said| format!("Resemblance: {said}.")));
     if twin.refused + twin.not_converged > 0 {

@@ -2,7 +2,7 @@
 
 use calib_core::{EffectKind, Moved, Physics};
 use calib_finding::catalog;
-use calib_pipeline::estimated::Estimated;
+use calib_pipeline::estimated::{Estimated, estimated_again};
 use calib_pipeline::formulate::formulation::MlFit;
 use calib_pipeline::verify::causes::{Causes, causes};
 use serde::{Deserialize, Serialize};
@@ -18,6 +18,9 @@ use crate::session::Session;
 pub struct Trial {
     /// Its number, from 0.
     pub number: u64,
+    /// Whether it was calibrated as a run does it, from the data checks to the choice of the noise; else with the statement that the session's own
+    /// calibration chose.
+    pub whole: bool,
     /// Why it has no result: the message of the pipeline.
     pub refused: Option<String>,
     /// The result.
@@ -67,8 +70,12 @@ pub struct Injected {
     pub noticed: bool,
 }
 
+/// One trial of so many is calibrated as a run does it. What the others leave out, the checks and the choice of the noise, takes most of a run, and
+/// finds in clean data of the same robot what it found in the session.
+const WHOLE: u64 = 10;
+
 impl Session {
-    /// One trial without a fault. `scale`: the noise times this.
+    /// One trial without a fault, every [`WHOLE`]th of them whole. `scale`: the noise times this.
     #[must_use]
     pub fn trial(&self, seed: u64, number: u64, scale: f64) -> Trial {
         let mut rng = Self::numbers(seed, number);
@@ -81,12 +88,17 @@ impl Session {
             noise: &noise,
             fault: None,
         };
+        let recordings = replay.recordings(&mut rng);
+        let again = (!number.is_multiple_of(WHOLE))
+            .then(|| estimated_again(recordings.clone(), &self.own))
+            .flatten();
         let mut trial = Trial {
             number,
+            whole: again.is_none(),
             refused: None,
             done: None,
         };
-        let of = match self.calibrate(replay.recordings(&mut rng)) {
+        let of = match again.map_or_else(|| self.calibrate(recordings), Ok) {
             Ok(of) => of,
             Err(why) => {
                 trial.refused = Some(why.to_string());
@@ -121,7 +133,13 @@ impl Session {
             noise: &self.noise,
             fault: Some(fault),
         };
-        let (named, noticed) = match self.calibrate(replay.recordings(&mut rng)) {
+        let recordings = replay.recordings(&mut rng);
+        // An effect of a joint may be taken for noise; a slip is looked for in the residuals of the session's own statement.
+        let again = matches!(fault, Fault::Slip { .. })
+            .then(|| estimated_again(recordings.clone(), &self.own))
+            .flatten();
+        let of = again.map_or_else(|| self.calibrate(recordings), Ok);
+        let (named, noticed) = match of {
             // What stops a run is noticed, and not by its name.
             Err(_) => (false, true),
             Ok(of) => of.solved.fit.as_ref().map_or((false, true), |fit| {

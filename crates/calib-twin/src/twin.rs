@@ -75,6 +75,9 @@ pub struct Twin {
     pub seed: u64,
     /// Trials.
     pub trials: usize,
+    /// Trials that were calibrated as a run does it, with data checks and choice of the noise; the others take the statement that the session's own
+    /// calibration chose.
+    pub whole: usize,
     /// Trials that the pipeline refused, and the message of the first.
     pub refused: usize,
     /// See `refused`.
@@ -193,6 +196,7 @@ pub fn twin_of(
         about: session.about,
         seed: options.seed,
         trials: trials.len(),
+        whole: trials.iter().filter(|t| t.whole).count(),
         refused: refused().count(),
         first_refusal: refused().next().cloned(),
         not_converged: done.iter().filter(|d| !d.converged).count(),
@@ -223,7 +227,7 @@ fn settings(session: &Session, options: &Options) -> Settings {
     });
     let files = session.rows.robot.digests.iter().map(|d| d.sha256.clone());
     Settings {
-        calib_twin: 1,
+        calib_twin: 2,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         inputs: files.chain(rows).collect(),
         seed: options.seed,

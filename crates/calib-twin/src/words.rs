@@ -63,6 +63,17 @@ pub fn about(about: About) -> &'static str {
     }
 }
 
+/// How the trials were calibrated.
+#[must_use]
+pub fn calibrated(whole: usize, trials: usize) -> String {
+    if whole == trials {
+        return "Each was calibrated as `calib run` does it.".to_owned();
+    }
+    format!(
+        "{whole} of the {trials} trials, and all with an effect that the model lacks, were calibrated as `calib run` does it; the others without the checks for mistakes in the data, with the noise model that was chosen for the session."
+    )
+}
+
 /// A note as a sentence.
 #[must_use]
 pub fn note(note: &Note) -> String {

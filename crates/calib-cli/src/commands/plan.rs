@@ -29,11 +29,11 @@ pub struct PlanPostures {
     /// Only these parameters, by a part of their names; with `--goal parameters` or `variances`
     #[arg(long, value_delimiter = ',')]
     of: Vec<String>,
-    /// Table of joint positions where the robot is to be accurate [default: `plan.task_box_mm`, else all postures]
+    /// Table of joint positions, or of places of one link, body or marker (`flange_x,flange_y,flange_z`, m), where the robot is to be accurate [default: `plan.task_box_mm`, else all postures]
     #[arg(long)]
     task: Option<PathBuf>,
     /// Postures that the choice is made from, before impossible ones are removed
-    #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(64..=65536))]
+    #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(64..=100_000))]
     candidates: u32,
     /// Seed of the candidates
     #[arg(long, default_value_t = 1)]
@@ -118,13 +118,7 @@ fn task(known: &Known, path: &Path) -> Result<Vec<Vec<f64>>, CliError> {
         file: shown.clone(),
         why: e.to_string(),
     })?;
-    let joints = known.joint_box()?;
-    Ok(write::read_postures(
-        &bytes,
-        &shown,
-        &known.robot.model,
-        &joints,
-    )?)
+    Ok(write::read_task(&bytes, &shown, known)?)
 }
 
 fn default_folder(profile: &Path) -> PathBuf {

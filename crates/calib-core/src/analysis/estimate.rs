@@ -4,16 +4,14 @@
 //! start ─► minimize ─► Huber ─► GNC ─► gate ─► minimize ⇄ REML ─► gate again until it stays ─► analyze
 //! ```
 
-use std::collections::BTreeSet;
-
 use crate::analysis::information::Information;
+use crate::analysis::levels_found::levels_found;
 use crate::analysis::looked_at::fewer;
 use crate::analysis::observability::observe;
 use crate::analysis::precision::{FULL, Precision, ROUGH};
 use crate::analysis::settings::Settings;
-use crate::analysis::solution::{NoiseEstimate, Solution, describe_parameters};
+use crate::analysis::solution::{Solution, describe_parameters};
 use crate::graph::error::Error;
-use crate::graph::ids::GroupId;
 use crate::graph::problem::Problem;
 use crate::model::layout::{Model, Observation};
 use crate::model::values::Values;
@@ -22,7 +20,6 @@ use crate::solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize_in
 use crate::solve::noise::{Scoring, score};
 use crate::solve::normal::data_cost;
 use crate::solve::robust::{RejectReason, Rejection, clean, clean_near, explain, gate};
-use crate::solve::rows::add_block;
 
 /// Gate and refit alternate; the set settles in two or three rounds unless an observation lies at the border.
 const GATE_ROUNDS: usize = 6;
@@ -52,6 +49,46 @@ pub fn solve_kept(
         return Err(Error::OtherMeasurements);
     }
     solve_of(model, Some(&kept.weights), settings)
+}
+
+/// As [`solve`], from where the fit of `near` ended, values and noise levels: for other observations of the same robot without gross errors. The gate
+/// rejects as in any fit; the search for gross errors before it is left out.
+///
+/// # Errors
+/// As [`solve`], and [`Error::OtherParameters`] where the problem has not the parameters and noise groups of `near`.
+pub fn solve_near(
+    problem: &Problem,
+    near: &Solution,
+    settings: &Settings,
+) -> Result<Solution, Error> {
+    let model = Model::new(problem)?;
+    let names = |of: &Model| -> Vec<String> {
+        let parameters = of.problem.parameters.iter().map(|p| p.name.clone());
+        let groups = of.problem.groups.iter().map(|g| g.name.clone());
+        parameters.chain(groups).collect()
+    };
+    if names(&model) != names(&near.model) {
+        return Err(Error::OtherParameters);
+    }
+    let mask = mask_of(&model, None)?;
+    let mut work = Workspace::new(&model);
+    let mut fit = Fit::new(&model, settings, FULL, 0);
+    let mut start = model.start();
+    for (k, value) in start.0.iter_mut().enumerate() {
+        // What is held stays as it is stated.
+        if model.column_of[k].is_some() {
+            *value = near.values.0[k];
+        }
+    }
+    let mut theta = near.theta.clone();
+    let (minimum, weights) = fit.settled(start, mask.clone(), &mask, &mut theta, &mut work);
+    let found = Found {
+        minimum,
+        weights,
+        theta,
+    };
+    let outcome = fit.outcome(&found, &mask, &mut work);
+    finish(model, found.minimum, outcome)
 }
 
 /// A fit of which nothing is said but where it ended.
@@ -426,20 +463,7 @@ fn finish(model: Model, minimum: Minimum, outcome: Outcome) -> Result<Solution, 
     } = outcome;
     let information =
         Information::at(&model, &minimum.values, &weights, &theta).ok_or(Error::NotEvaluable)?;
-    let samples = samples_per_group(&model, &weights);
-    let groups = model.problem.groups.iter().enumerate();
-    let noise = groups
-        .map(|(g, group)| NoiseEstimate {
-            id: GroupId::of(g),
-            name: group.name.clone(),
-            kind: group.kind,
-            stated: group.sigma,
-            sigma: theta[g].sqrt(),
-            relative_error: relative_sigma[g],
-            estimated: group.estimate,
-            samples: samples[g],
-        })
-        .collect();
+    let noise = levels_found(&model, &weights, &theta, &relative_sigma);
     rejected.extend(
         model
             .lost()
@@ -472,26 +496,4 @@ fn finish(model: Model, minimum: Minimum, outcome: Outcome) -> Result<Solution, 
         theta,
         model,
     })
-}
-
-/// What each noise level is found from: kept observations whose covariance has it, and readings of its joints on
-/// their paths.
-fn samples_per_group(model: &Model, weights: &[f64]) -> Vec<usize> {
-    /// In place of an edge, where the observation itself is counted.
-    const ITSELF: usize = usize::MAX;
-    let mut used = vec![BTreeSet::new(); model.problem.groups.len()];
-    for (o, observation) in model.observations.iter().enumerate() {
-        if weights[o] == 0.0 {
-            continue;
-        }
-        add_block(model, o, |_, _, group, _| {
-            used[group].insert((o, ITSELF));
-        });
-        for &k in &model.paths[observation.measurement].slots {
-            if let Some(group) = model.slots[k].group {
-                used[group].insert((observation.sample, model.slots[k].edge));
-            }
-        }
-    }
-    used.iter().map(BTreeSet::len).collect()
 }

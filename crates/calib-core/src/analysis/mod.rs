@@ -13,6 +13,7 @@ pub(crate) mod gear_ratio;
 pub(crate) mod goodness;
 pub(crate) mod information;
 mod less_noise;
+mod levels_found;
 mod looked_at;
 pub(crate) mod observability;
 mod own_levels;

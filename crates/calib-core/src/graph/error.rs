@@ -105,6 +105,9 @@ pub enum Error {
     /// Observations were to be kept as in the solution of a problem with other measurements.
     #[error("the measurements are not those of the solution whose observations are to be kept")]
     OtherMeasurements,
+    /// A fit was to begin at the solution of a problem with other parameters or noise groups.
+    #[error("the parameters and noise groups are not those of the solution to begin at")]
+    OtherParameters,
     /// A builder call on an edge of another kind.
     #[error("`Problem::{call}` was called on edge `{edge}`, which is not {expected}")]
     WrongEdge {

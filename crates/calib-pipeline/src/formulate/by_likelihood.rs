@@ -82,7 +82,7 @@ pub fn likelihood(
     }
     clock::noticed(&mut checked.findings, inputs, &fit);
     *inputs = clock::corrected(inputs, &fit);
-    ml_result(inputs, fit, registered)
+    ml_result(inputs, fit, Some(registered))
 }
 
 /// [`fits`], again from the start where the residuals tell from which side joints came before their first motion.
@@ -232,7 +232,11 @@ pub(crate) fn only_a_cross_check(findings: &mut [Finding]) {
     }
 }
 
-fn ml_result(inputs: &Inputs, fit: MlFit, registered: MlFit) -> Result<Solved, PipelineError> {
+pub(crate) fn ml_result(
+    inputs: &Inputs,
+    fit: MlFit,
+    registered: Option<MlFit>,
+) -> Result<Solved, PipelineError> {
     let at_zero = calib_core::Configuration::zero();
     let judged = priors::judged(&fit);
     let mut found = Vec::new();
@@ -259,8 +263,8 @@ fn ml_result(inputs: &Inputs, fit: MlFit, registered: MlFit) -> Result<Solved, P
     Ok(Solved {
         robot: fit.calibration.clone(),
         fk: fit.calibration.clone(),
-        registered: Some(registered.calibration.clone()),
-        registration: Some(registered),
+        registered: registered.as_ref().map(|r| r.calibration.clone()),
+        registration: registered,
         found,
         root_covariance,
         fit: Some(fit),

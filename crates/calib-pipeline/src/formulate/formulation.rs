@@ -122,11 +122,22 @@ impl Formulation {
     }
 }
 
+/// Noise levels that were taken by evidence beside the common ones.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct OwnLevels {
+    /// One for each body.
+    pub by_body: bool,
+    /// One for each of these markers.
+    pub markers: Vec<PointId>,
+}
+
 /// A solved problem.
 #[derive(Debug, Clone)]
 pub struct MlFit {
     /// What was tried of the noise from pose to pose; `None` where the profile states it.
     pub noise: Option<NoiseChoice>,
+    /// Which noise levels of their own were taken beside those that were stated.
+    pub levels: OwnLevels,
     /// What was found of each of the formulation's widths; `None` for those that are as stated, or that the data cannot tell.
     pub widths: Vec<Option<WidthEstimate>>,
     /// Standard deviations over those of a given model, where the model was chosen and its choice cost something.

@@ -21,6 +21,7 @@ pub(crate) mod noise;
 pub mod parts;
 pub(crate) mod priors;
 pub mod realign;
+pub(crate) mod repeated;
 pub mod row_checks;
 pub mod selection;
 pub mod solved;

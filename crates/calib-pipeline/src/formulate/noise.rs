@@ -46,6 +46,7 @@ fn own_levels(fit: &mut MlFit, inputs: &Inputs, settings: &Settings) -> bool {
     {
         fit.formulation.problem = own.problem;
         fit.solution = solution;
+        fit.levels.by_body = true;
         changed = true;
     }
     if let Some((solution, apart)) = fit.solution.with_levels_by_marker(settings)
@@ -53,6 +54,7 @@ fn own_levels(fit: &mut MlFit, inputs: &Inputs, settings: &Settings) -> bool {
     {
         fit.formulation.problem = own.problem;
         fit.solution = solution;
+        fit.levels.markers = apart;
         changed = true;
     }
     if changed {

@@ -122,6 +122,7 @@ pub fn view(
         circles,
         axes,
         solids,
+        planned: false,
     }
 }
 

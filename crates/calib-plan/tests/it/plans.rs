@@ -541,3 +541,64 @@ fn a_subset_is_determined_better_by_a_plan_for_it() {
     let task = planned(&known, &few(16));
     assert!(mean(&own) < mean(&task), "{} {}", mean(&own), mean(&task));
 }
+
+#[test]
+fn places_of_the_tool_are_a_task() {
+    let known = six(Seen::Markers(4), "plan: {ground_mm: 0}\n");
+    let model = &known.robot.model;
+    let link = model.link_id("l6").expect("the last link").index();
+    // From postures: places that are reached.
+    let joints = known.joint_box().expect("ranges");
+    let (feasible, _) = known.feasible(&joints, 1);
+    let free = |q: &Vec<f64>| feasible.candidate(q.clone()).is_ok();
+    let there: Vec<_> = joints
+        .postures(40, 3)
+        .into_iter()
+        .filter(free)
+        .take(10)
+        .collect();
+    assert_eq!(there.len(), 10);
+    let mut with = "pose,l6_x,l6_y,l6_z,l6_qx,l6_qy,l6_qz,l6_qw\n".to_owned();
+    let mut without = "pose,l6_x,l6_y,l6_z\n".to_owned();
+    for (i, q) in there.iter().enumerate() {
+        let pose = model.forward_kinematics(q)[link];
+        let (p, r) = (pose.translation.vector, pose.rotation);
+        with += &format!(
+            "{i},{},{},{},{},{},{},{}\n",
+            p.x, p.y, p.z, r.i, r.j, r.k, r.w
+        );
+        without += &format!("{i},{},{},{}\n", p.x, p.y, p.z);
+    }
+    for (table, oriented) in [(&with, true), (&without, false)] {
+        let task = write::read_task(table.as_bytes(), "task.csv", &known);
+        let task = task.unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(task.len(), there.len());
+        for (q, wanted) in task.iter().zip(&there) {
+            let own = model.forward_kinematics(q)[link];
+            let wanted = model.forward_kinematics(wanted)[link];
+            let off = (own.translation.vector - wanted.translation.vector).norm();
+            assert!(off < 1e-4, "{off}");
+            if oriented {
+                assert!(own.rotation.angle_to(&wanted.rotation) < 1e-3);
+            }
+            assert!(joints.holds(q) && free(q));
+        }
+        let options = Options {
+            task: Some(task),
+            ..few(8)
+        };
+        assert!(planned(&known, &options).sigma.is_some());
+    }
+    let far = "pose,l6_x,l6_y,l6_z\n0,0.4,0.1,0.5\n1,4,0,1\n";
+    let below = "pose,l6_x,l6_y,l6_z\n0,0.4,0.1,-0.2\n";
+    let unknown = "pose,hand_x,hand_y,hand_z\n0,0.4,0.1,0.5\n";
+    for (table, said) in [
+        (far, &["row 2", "mm off", "meters"][..]),
+        (below, &["row 1", "touch", "plan.keep_outs"][..]),
+        (unknown, &["`hand`", "link, body or marker"][..]),
+    ] {
+        let error = write::read_task(table.as_bytes(), "task.csv", &known);
+        let error = error.expect_err(table).to_string();
+        assert!(said.iter().all(|s| error.contains(s)), "{error}");
+    }
+}

@@ -13,7 +13,7 @@ use starts::open_starts;
 use crate::error::PipelineError;
 use crate::estimate::start::Start;
 use crate::formulate::contacts::add_contacts;
-use crate::formulate::formulation::{Formulation, FreeSet, MlFit, NoiseGroups};
+use crate::formulate::formulation::{Formulation, FreeSet, MlFit, NoiseGroups, OwnLevels};
 use crate::prepare::conditions::{Conditions, conditions};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
@@ -171,9 +171,21 @@ pub fn fit_kept(
     Some(found(formulation.clone(), inputs, solution))
 }
 
+/// As [`fit`], from where the fit of other observations of the same robot ended; `None` where that has other parameters or noise groups.
+pub(crate) fn fit_near(
+    formulation: Formulation,
+    inputs: &Inputs,
+    near: &Solution,
+    settings: &Settings,
+) -> Option<MlFit> {
+    let solution = calib_core::solve_near(&formulation.problem, near, settings).ok()?;
+    Some(found(formulation, inputs, solution))
+}
+
 fn found(formulation: Formulation, inputs: &Inputs, solution: Solution) -> MlFit {
     MlFit {
         noise: None,
+        levels: OwnLevels::default(),
         widths: Vec::new(),
         widened: None,
         calibration: calibration(&formulation, &solution, inputs),

@@ -123,5 +123,6 @@ pub fn view() -> View3d {
             sigma_direction: Some(0.001),
             frame: None,
         }],
+        planned: false,
     }
 }
