@@ -89,7 +89,7 @@ pub enum PlanError {
     },
     /// A table of places is none.
     #[error(
-        "{file}: {why}\n  help: give joint positions, `<joint>_deg` in the header, or the places of one link, body or marker in the frame of the robot's root: `flange_x,flange_y,flange_z`, in meters"
+        "{file}: {why}\n  help: give joint positions, `<joint>_deg` in the header, or the places of one link, body or marker in the frame of the robot's root: `flange.x_m,flange.y_m,flange.z_m`"
     )]
     NotPlaces {
         /// The list.

@@ -1,19 +1,23 @@
 //! Do the trials resemble the recording? Numbers of the residuals, and one test of all of them together.
 //!
 //! ```text
-//! D_k = max_i |s_ki − median_i| / τ_i,   τ = max(1.4826 median|s − median|, ¼ rms)   over trials and the recording    (1)
+//! D_k = max_i |s_ki − median_i| / τ_i,   τ = max(q₉₅|s − median| / 1.96, ¼ rms)        over trials and the recording    (1)
 //! p = #{k: D_k ≥ D of the recording} / (N + 1)                                                             (2)
 //! ```
 //!
 //! If the recording is another draw of what the trials are drawn from, all orders of the N + 1 are equally likely, and (2) is exact whatever the
-//! numbers are: no distribution is assumed.
+//! numbers are: no distribution is assumed. For that, the numbers of the recording and of all trials come from one way of fitting: that with the
+//! statement of the session where it has one, also in the trials that are calibrated as a whole.
+//!
+//! The power of (2) is that of the number with the longest tail: q₉₅, which is σ for a normal distribution as well, is wide where a tail is long, so that no
+//! such number sets D for all others. Where one is found at 0 in some trials, it is not a logarithm: 0 would be infinitely far from a small one.
 
 use std::collections::BTreeMap;
 
 use calib_geometry::statistics::median;
 use calib_pipeline::estimated::Estimated;
 use calib_pipeline::formulate::formulation::MlFit;
-use calib_pipeline::verify::causes::Causes;
+use calib_pipeline::verify::causes::{Causes, causes};
 use calib_pipeline::verify::deviations::deviations;
 use calib_pipeline::verify::residuals::residual_rows;
 use calib_profile::Usage;
@@ -32,11 +36,11 @@ pub enum Mark {
     Orientation,
     /// rms of the errors on the validation recordings, log.
     HeldOut,
-    /// Noise of the joints that was found, rms, log.
+    /// Noise of the joints that was found, rms, mrad or mm; often 0.
     JointNoise,
     /// χ² per degree of freedom with the noise as stated, log.
     Goodness,
-    /// The largest z² of the tests for missing effects, log.
+    /// The largest |z| of the tests for missing effects.
     LargestTest,
     /// The largest excess of the scan for changes.
     LargestChange,
@@ -56,6 +60,14 @@ pub struct Likeness(pub BTreeMap<Mark, f64>);
 const FLOOR: f64 = 1e-12;
 
 impl Likeness {
+    /// Of one calibration, with what it says of its residuals; `None`: it has no fit.
+    #[must_use]
+    pub fn of_estimated(of: &Estimated) -> Option<Self> {
+        let fit = of.solved.fit.as_ref()?;
+        let causes = causes(&of.inputs, fit, &of.checked.findings);
+        Some(Self::of(of, fit, &causes))
+    }
+
     /// Of one calibration.
     #[must_use]
     pub fn of(of: &Estimated, fit: &MlFit, causes: &Causes) -> Self {
@@ -104,17 +116,14 @@ impl Likeness {
         let held_out = deviations(&of.inputs, tracks, &fit.calibration, validation);
         let held_out: Vec<f64> = held_out.iter().map(|d| d.vector.norm_squared()).collect();
         put(Mark::HeldOut, rms(&held_out).map(log));
-        put(
-            Mark::JointNoise,
-            fit.joint_sigma().map(|s| s.max(1e-6).ln()),
-        );
+        put(Mark::JointNoise, fit.joint_sigma().map(|s| s * 1e3));
         put(
             Mark::Goodness,
             causes.goodness.as_ref().map(|g| log(g.chi2_per_dof)),
         );
         let tests = causes.goodness.iter().flat_map(|g| &g.tests);
         let largest = tests.map(|t| t.z2).reduce(f64::max);
-        put(Mark::LargestTest, largest.map(log));
+        put(Mark::LargestTest, largest.map(f64::sqrt));
         let change = causes.scan.as_ref().and_then(|scan| scan.changes.first());
         put(Mark::LargestChange, change.map(|c| c.excess));
         Self(marks)
@@ -168,6 +177,8 @@ const LEVEL: f64 = 0.02;
 pub fn resemblance(recording: &Likeness, trials: &[&Likeness]) -> Resemblance {
     // A spread below this is rounding: numbers are logarithms or of the order of 1.
     const ROUNDING: f64 = 1e-9;
+    // A normal deviation is below so many σ with this probability.
+    const TAIL: (f64, f64) = (0.95, 1.96);
     let mut marks = Vec::new();
     let mut distances = vec![0.0_f64; trials.len() + 1];
     for (mark, own) in &recording.0 {
@@ -182,8 +193,8 @@ pub fn resemblance(recording: &Likeness, trials: &[&Likeness]) -> Resemblance {
         let squares: f64 = deviations.iter().map(|d| d * d).sum();
         // Where most are equal, the few others do not count as infinitely far.
         let wide = (squares / all.len() as f64).sqrt() / 4.0;
-        let spread = 1.4826 * median(deviations).unwrap_or(0.0);
-        let spread = spread.max(wide).max(ROUNDING);
+        let tail = quantile(deviations, TAIL.0) / TAIL.1;
+        let spread = tail.max(wide).max(ROUNDING);
         for (d, x) in distances
             .iter_mut()
             .zip(of.iter().copied().chain([Some(*own)]))
@@ -207,6 +218,13 @@ pub fn resemblance(recording: &Likeness, trials: &[&Likeness]) -> Resemblance {
         differs: p_value.is_some_and(|p| p <= LEVEL),
         marks,
     }
+}
+
+/// The smallest value that so large a share does not exceed; 0 of nothing.
+fn quantile(mut of: Vec<f64>, share: f64) -> f64 {
+    of.sort_by(f64::total_cmp);
+    let place = (share * of.len() as f64).ceil() as usize;
+    of.get(place.saturating_sub(1)).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -240,6 +258,31 @@ mod tests {
         // 1 of 61 orders: 1.6 %, 10 of 600 expected; 99.99 % are below 23.
         assert!(flagged[0] <= 23, "{flagged:?}");
         assert!(flagged[1] >= 570, "{flagged:?}");
+    }
+
+    /// A level that is at its limit in most trials and far from it in a few, and an excess with a long tail, hide no other number.
+    #[test]
+    fn numbers_with_long_tails_do_not_hide_one_that_differs() {
+        let mut rng = rand_chacha::ChaCha12Rng::seed_from_u64(6);
+        let mut flagged = [0; 2];
+        for _ in 0..300 {
+            for (count, shift) in flagged.iter_mut().zip([0.0, 9.0]) {
+                let mut one = |shift: f64| {
+                    let mut of = drawn(&mut rng, shift);
+                    // Half of the noise levels of joints are found at 0.
+                    let level: f64 = rng.sample(StandardNormal);
+                    of.0.insert(Mark::JointNoise, 0.1 * level.max(0.0));
+                    let excess: f64 = rng.sample(rand_distr::Exp1);
+                    of.0.insert(Mark::LargestChange, 2.0 * excess);
+                    of
+                };
+                let trials: Vec<Likeness> = (0..60).map(|_| one(0.0)).collect();
+                let trials: Vec<&Likeness> = trials.iter().collect();
+                *count += u32::from(resemblance(&one(shift), &trials).differs);
+            }
+        }
+        // 1.6 % by chance: 5 of 300 expected; 99.99 % are below 16.
+        assert!(flagged[0] < 16 && flagged[1] >= 285, "{flagged:?}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A session: postures, gaps, noise and freed parameters, from recordings that exist or would exist.
 
 use calib_pipeline::PipelineError;
-use calib_pipeline::estimated::{Estimated, estimated};
+use calib_pipeline::estimated::{Estimated, estimated, estimated_again};
 use calib_pipeline::formulate::formulation::MlFit;
 use calib_pipeline::formulate::ml::calibration_at;
 use calib_pipeline::prepare::inputs::Inputs;
@@ -29,7 +29,7 @@ pub struct Session {
     pub own: Estimated,
     /// What it says of its residuals.
     pub causes: Causes,
-    /// Its own residuals, for comparison with those of the trials.
+    /// Its own residuals, fitted as the trials are, for comparison with theirs.
     pub likeness: Likeness,
     /// What it promises: σ of each quantity; errors are 0.
     pub promised: Vec<Off>,
@@ -84,8 +84,11 @@ impl Session {
         let solution = &fit.solution;
         let draws = Draws::new(&solution.model, &solution.values, covariance, about);
         let rows = rows(&own.inputs, fit, &mut notes);
+        // As the trials are fitted, so that both differ by what is recorded alone.
+        let again = estimated_again(rows.clone(), &own);
+        let likeness = again.as_ref().and_then(Likeness::of_estimated);
         Ok(Self {
-            likeness: Likeness::of(&own, fit, &causes),
+            likeness: likeness.unwrap_or_else(|| Likeness::of(&own, fit, &causes)),
             noise: noise.unwrap_or_else(|| Noise::found(fit, &own.inputs.robot.model)),
             promised,
             causes,

@@ -89,12 +89,17 @@ impl Session {
             fault: None,
         };
         let recordings = replay.recordings(&mut rng);
-        let again = (!number.is_multiple_of(WHOLE))
-            .then(|| estimated_again(recordings.clone(), &self.own))
-            .flatten();
+        let again = estimated_again(recordings.clone(), &self.own);
+        let whole = again.is_none() || number.is_multiple_of(WHOLE);
+        // Whole trials are compared with the recording as all others are.
+        let likeness = again
+            .as_ref()
+            .filter(|_| whole)
+            .and_then(Likeness::of_estimated);
+        let again = again.filter(|_| !whole);
         let mut trial = Trial {
             number,
-            whole: again.is_none(),
+            whole,
             refused: None,
             done: None,
         };
@@ -110,7 +115,7 @@ impl Session {
             trial.done = Some(Done {
                 converged: fit.solution.status.is_converged(),
                 off: errors(&of, fit, &truth, &self.places),
-                likeness: Likeness::of(&of, fit, &causes),
+                likeness: likeness.unwrap_or_else(|| Likeness::of(&of, fit, &causes)),
                 tests: tests(&causes),
                 alarm: is_alarm(&of, &causes),
             });

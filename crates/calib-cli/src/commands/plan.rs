@@ -29,7 +29,7 @@ pub struct PlanPostures {
     /// Only these parameters, by a part of their names; with `--goal parameters` or `variances`
     #[arg(long, value_delimiter = ',')]
     of: Vec<String>,
-    /// Table of joint positions, or of places of one link, body or marker (`flange_x,flange_y,flange_z`, m), where the robot is to be accurate [default: `plan.task_box_mm`, else all postures]
+    /// Table of joint positions, or of places of one link, body or marker (`flange.x_m,flange.y_m,flange.z_m`), where the robot is to be accurate [default: `plan.task_box_mm`, else all postures]
     #[arg(long)]
     task: Option<PathBuf>,
     /// Postures that the choice is made from, before impossible ones are removed

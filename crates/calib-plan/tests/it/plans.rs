@@ -558,16 +558,13 @@ fn places_of_the_tool_are_a_task() {
         .take(10)
         .collect();
     assert_eq!(there.len(), 10);
-    let mut with = "pose,l6_x,l6_y,l6_z,l6_qx,l6_qy,l6_qz,l6_qw\n".to_owned();
-    let mut without = "pose,l6_x,l6_y,l6_z\n".to_owned();
-    for (i, q) in there.iter().enumerate() {
+    let mut with = "l6.x_m,l6.y_m,l6.z_m,l6.qx,l6.qy,l6.qz,l6.qw\n".to_owned();
+    let mut without = "l6.x_m,l6.y_m,l6.z_m\n".to_owned();
+    for q in &there {
         let pose = model.forward_kinematics(q)[link];
         let (p, r) = (pose.translation.vector, pose.rotation);
-        with += &format!(
-            "{i},{},{},{},{},{},{},{}\n",
-            p.x, p.y, p.z, r.i, r.j, r.k, r.w
-        );
-        without += &format!("{i},{},{},{}\n", p.x, p.y, p.z);
+        with += &format!("{},{},{},{},{},{},{}\n", p.x, p.y, p.z, r.i, r.j, r.k, r.w);
+        without += &format!("{},{},{}\n", p.x, p.y, p.z);
     }
     for (table, oriented) in [(&with, true), (&without, false)] {
         let task = write::read_task(table.as_bytes(), "task.csv", &known);
@@ -589,13 +586,17 @@ fn places_of_the_tool_are_a_task() {
         };
         assert!(planned(&known, &options).sigma.is_some());
     }
-    let far = "pose,l6_x,l6_y,l6_z\n0,0.4,0.1,0.5\n1,4,0,1\n";
-    let below = "pose,l6_x,l6_y,l6_z\n0,0.4,0.1,-0.2\n";
-    let unknown = "pose,hand_x,hand_y,hand_z\n0,0.4,0.1,0.5\n";
+    let far = "l6.x_m,l6.y_m,l6.z_m\n0.4,0.1,0.5\n4,0,1\n";
+    // Reached with the hand straight down, 4 cm below the ground.
+    let q = [0.0, 1.55, 0.02, 0.0, 0.0, 0.0];
+    let p = model.forward_kinematics(&q)[link].translation.vector;
+    assert!(p.z < -0.03, "{p}");
+    let below = format!("l6.x_m,l6.y_m,l6.z_m\n{},{},{}\n", p.x, p.y, p.z);
+    let unknown = "arm.x_m,arm.y_m,arm.z_m\n0.4,0.1,0.5\n";
     for (table, said) in [
         (far, &["row 2", "mm off", "meters"][..]),
-        (below, &["row 1", "touch", "plan.keep_outs"][..]),
-        (unknown, &["`hand`", "link, body or marker"][..]),
+        (&below, &["row 1", "touch", "plan.keep_outs"][..]),
+        (unknown, &["`arm`", "link, body or marker"][..]),
     ] {
         let error = write::read_task(table.as_bytes(), "task.csv", &known);
         let error = error.expect_err(table).to_string();

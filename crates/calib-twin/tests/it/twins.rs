@@ -56,18 +56,16 @@ fn a_twin_that_was_stopped_goes_on_to_the_same_bytes_whatever_the_threads() {
 
 #[test]
 fn twice_the_noise_is_no_twin_of_the_recording() {
-    let session = session(5);
-    let options = Options {
-        trials: 50,
-        noise: 2.0,
-        ..Options::default()
-    };
-    let trials: Vec<_> = (0..options.trials)
-        .filter_map(|k| session.trial(1, k, options.noise).done)
-        .collect();
-    let marks: Vec<_> = trials.iter().map(|t| &t.likeness).collect();
-    let found = calib_twin::likeness::resemblance(&session.likeness, &marks);
-    assert!(found.differs, "{found:?}");
+    // Of the sessions some have a statement of their own, and in some the joints' noise is found at 0.
+    for seed in 4..9 {
+        let session = session(seed);
+        let trials: Vec<_> = (0..50)
+            .filter_map(|k| session.trial(1, k, 2.0).done)
+            .collect();
+        let marks: Vec<_> = trials.iter().map(|t| &t.likeness).collect();
+        let found = calib_twin::likeness::resemblance(&session.likeness, &marks);
+        assert!(found.differs, "{seed}: {found:?}");
+    }
 }
 
 #[test]
