@@ -266,7 +266,7 @@ mod tests {
         let mut rng = rand_chacha::ChaCha12Rng::seed_from_u64(6);
         let mut flagged = [0; 2];
         for _ in 0..300 {
-            for (count, shift) in flagged.iter_mut().zip([0.0, 9.0]) {
+            for (count, shift) in flagged.iter_mut().zip([0.0, 12.0]) {
                 let mut one = |shift: f64| {
                     let mut of = drawn(&mut rng, shift);
                     // Half of the noise levels of joints are found at 0.
