@@ -75,7 +75,7 @@ pub struct Injected {
 const WHOLE: u64 = 10;
 
 impl Session {
-    /// One trial without a fault, every [`WHOLE`]th of them whole. `scale`: the noise times this.
+    /// One trial without a fault, every tenth of them whole. `scale`: the noise times this.
     #[must_use]
     pub fn trial(&self, seed: u64, number: u64, scale: f64) -> Trial {
         let mut rng = Self::numbers(seed, number);

@@ -14,7 +14,7 @@ use serde_json::json;
 use super::plugin_check;
 use super::plugin_options::PluginOptions;
 use crate::error::CliError;
-use crate::terminal::{Console, emit, emit_paths, emit_raw};
+use crate::terminal::{Console, emit, emit_paths, emit_raw, say};
 
 /// Arguments of `calib plugins`.
 #[derive(Debug, Args)]
@@ -92,7 +92,12 @@ pub fn run(console: &Console, options: &PluginsCommand) -> Result<ExitCode, CliE
         }) => {
             let (kind, language) = (kind_from_name(kind)?, Language::from_name(lang)?);
             let folder = new_project(name, kind, language, out)?;
+            let readme = folder.join("README.md");
             emit_paths(json, &[folder])?;
+            if !json && !console.quiet {
+                let readme = readme.display();
+                say(&format!("{readme} says how to build, check and use it."));
+            }
             Ok(ExitCode::Accepted)
         }
     }
