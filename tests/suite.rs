@@ -45,6 +45,7 @@ mod streams;
 mod structural;
 mod studies;
 mod sweeps;
+mod thermal;
 mod third_robot;
 mod tolerance;
 mod truth;

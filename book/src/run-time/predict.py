@@ -4,7 +4,8 @@
     predict.py MODEL.json TABLE.csv      compares with a table of 6-DoF bodies: rms distance in mm
     predict.py MODEL.json joint=deg …    prints where the bodies are, m in the tracker's frame
 
-The equations are those at the top of crates/calib-model/src/file.rs. Joints are taken in the middle of their backlash.
+The equations are those at the top of crates/calib-model/src/file.rs. Joints are taken in the middle of their backlash, and
+links at the reference temperature unless `temperature_c` (an argument, or a column) says how warm the robot is.
 """
 import csv, json, math, sys
 
@@ -44,8 +45,8 @@ def compose(a, b):
 def pose(p): return p["xyz_m"], p["quat_xyzw"]
 
 
-def factor(effect, r, load, axis, reading):
-    """F of equation (2): an effect turns the joint by its value times this."""
+def factor(effect, r, load, axis, reading, warmer):
+    """F of equation (2): an effect moves the joint by its value times this."""
     kind, n = effect["kind"], effect.get("gear_ratio") or 1.0
     across = effect["about"] and dot(turn(inverse(quat(scale(r, axis))), load), effect["about"])
     simple = {"offset": 1.0, "gain": r, "compliance": dot(load, axis),
@@ -55,7 +56,8 @@ def factor(effect, r, load, axis, reading):
               "motor_eccentricity_cos": math.cos(n*r) - 1, "motor_eccentricity_sin": math.sin(n*r),
               "motor_eccentricity_2_cos": math.cos(2*n*r) - 1,
               "motor_eccentricity_2_sin": math.sin(2*n*r),
-              "backlash": 0.0, "friction": 0.0}
+              "flank_backlash": math.copysign(1, dot(load, axis)) if abs(dot(load, axis)) > (effect.get("friction") or 1e-9) else 0.0,
+              "backlash": 0.0, "friction": 0.0, "thermal_expansion": warmer}
     if kind.startswith("coupling"):
         return reading(effect["other"])
     return simple[kind]
@@ -64,6 +66,8 @@ def factor(effect, r, load, axis, reading):
 def links(model, q):
     """root_from_link of every link; q in rad or m by joint name, absent joints at zero."""
     joints = {j["name"]: j for j in model["joints"]}
+    reference = model.get("reference_temperature_c") or 20
+    warmer = q.get("temperature_c", reference) - reference
 
     def reading(name):
         mimic = joints[name].get("mimic")
@@ -75,16 +79,19 @@ def links(model, q):
             here = compose(at[j["parent"]], pose(j["parent_from_joint" if loads else "load_origin"]))
             axis = j.get("axis")
             if axis:
-                r, theta = reading(j["name"]), [0, 0, 0]
+                r, theta, grown = reading(j["name"]), [0, 0, 0], [0, 0, 0]
                 phi = r
                 for e in j["effects"] if loads else []:
-                    change = e["value"] * factor(e, r, loads[j["name"]], axis, reading)
+                    change = e["value"] * factor(e, r, loads[j["name"]], axis, reading, warmer)
                     if e["about"]:
                         theta = add(theta, scale(change, e["about"]))
+                    elif e.get("along"):
+                        grown = add(grown, scale(change, e["along"]))
                     else:
                         phi += change
                 slides = j["motion"] == "prismatic"
                 moved = (scale(phi, axis), [0, 0, 0, 1]) if slides else ([0, 0, 0], quat(scale(phi, axis)))
+                here = compose(here, (grown, [0, 0, 0, 1]))
                 here = compose(compose(here, moved), ([0, 0, 0], quat(theta)))
             at[j["child"]] = here
         return at
@@ -116,7 +123,9 @@ def bodies(model, q):
 
 
 def joints_of(row):
-    return {k[:-4]: math.radians(float(v)) for k, v in row.items() if k.endswith("_deg")}
+    """Columns `joint_deg` in rad, and how warm it is."""
+    q = {k[:-4]: math.radians(float(v)) for k, v in row.items() if k.endswith("_deg")}
+    return q | {k: float(row[k]) for k in ["temperature_c"] if row.get(k)}
 
 
 def main(model_file, *rest):
@@ -132,7 +141,8 @@ def main(model_file, *rest):
                     squares.append(dot(off, off))
         print(f"{len(squares)} positions, rms {1e3 * math.sqrt(sum(squares) / len(squares)):.2f} mm")
     else:
-        q = {k: math.radians(float(v)) for k, v in (pair.split("=") for pair in rest)}
+        pairs = dict(pair.split("=") for pair in rest)
+        q = joints_of({k if k == "temperature_c" else f"{k}_deg": v for k, v in pairs.items()})
         for name, (at, _) in bodies(model, q).items():
             print(name, " ".join(f"{v:.5f}" for v in at))
 

@@ -42,6 +42,8 @@ pub struct Corrected {
     pub after_m: [f64; 2],
     /// Joints that the table has no column for: they counted as 0.
     pub absent: Vec<String>,
+    /// Temperature that was assumed, °C, because the table has none and lengths follow it.
+    pub assumed_temperature_c: Option<f64>,
     /// The rows have poses of the tool: these are reached by the command.
     pub cartesian: bool,
 }
@@ -64,6 +66,7 @@ pub fn correct(
     let without_joints = program.absent.len() == model.joints().len();
     let (mut work, mut approach) = (model.work(), Approach::new(model));
     let mut out = Corrected::of(&program.absent, wanted.is_some());
+    out.assumed_temperature_c = program.assumed_temperature_c(model);
     let mut csv = Csv::default();
     header(&mut csv, robot);
     let mut command = vec![0.0; model.joints().len()];
@@ -88,6 +91,7 @@ pub fn correct(
         let under = Under {
             approach: approach.directions(),
             held: None,
+            temperature_c: program.temperature_c(k),
         };
         let done = match target.flatten() {
             None => {
@@ -135,6 +139,7 @@ impl Corrected {
             before_m: [0.0; 2],
             after_m: [0.0; 2],
             absent: absent.to_vec(),
+            assumed_temperature_c: None,
             cartesian,
         }
     }

@@ -43,6 +43,8 @@ pub struct Predicted {
     pub outside: usize,
     /// Joints that the table has no column for: they counted as 0.
     pub absent: Vec<String>,
+    /// Temperature that was assumed, °C, because the table has none and lengths follow it.
+    pub assumed_temperature_c: Option<f64>,
 }
 
 /// Predicts the poses of a table of joint positions.
@@ -71,6 +73,7 @@ pub fn predict(
         rows: 0,
         outside: 0,
         absent: program.absent.clone(),
+        assumed_temperature_c: program.assumed_temperature_c(&robot.model),
     };
     let mut rows = Rows {
         robot,
@@ -179,6 +182,7 @@ impl Rows<'_> {
         let under = Under {
             approach: self.approach.directions(),
             held: held.flatten(),
+            temperature_c: self.program.temperature_c(k),
         };
         for (_, place) in places {
             let tracker = self.options.frame == Frame::Tracker;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use calib_model::{Model, Place, Pose};
-use calib_recording::{Filled, JointUnit, Poses, ReadOptions, read_path};
+use calib_recording::{Filled, JointUnit, Poses, ReadOptions, WHOLE_ROBOT, read_path};
 
 use crate::error::ExportError;
 use crate::read::Robot;
@@ -20,10 +20,25 @@ pub(crate) struct Program {
     pub q: Vec<Option<Vec<f64>>>,
     /// Torques that the joints hold, N m or N; empty where the table has none.
     pub held: Vec<Option<Vec<f64>>>,
+    /// Temperatures of the links before joints, °C; empty where the table has none.
+    pub temperature_c: Vec<Vec<f64>>,
     /// Poses that the table has, by name and row.
     pub poses: BTreeMap<String, Vec<Option<Pose>>>,
     /// Joints of the robot that the table has no column for: they count as 0.
     pub absent: Vec<String>,
+}
+
+impl Program {
+    /// Of a row; empty where the table has none.
+    pub(crate) fn temperature_c(&self, row: usize) -> &[f64] {
+        self.temperature_c.get(row).map_or(&[], Vec::as_slice)
+    }
+
+    /// The reference temperature, °C, where the robot grows and the table does not say how warm it is.
+    pub(crate) fn assumed_temperature_c(&self, model: &Model) -> Option<f64> {
+        let unknown = self.temperature_c.is_empty() && model.grows();
+        unknown.then(|| model.reference_temperature_c())
+    }
 }
 
 /// Reads a table of joint positions in any format that `calib` reads.
@@ -60,6 +75,7 @@ pub(crate) fn program(path: &Path, model: &Model) -> Result<Program, ExportError
         } else {
             Vec::new()
         },
+        temperature_c: temperatures(&poses, model),
         absent: absent.map(|j| j.name.clone()).collect(),
         poses: poses
             .bodies
@@ -72,6 +88,27 @@ pub(crate) fn program(path: &Path, model: &Model) -> Result<Program, ExportError
         lines: poses.rows,
         file,
     })
+}
+
+/// By row and joint, °C; a cell that is empty has that of the last one before it, or of the first.
+fn temperatures(poses: &Poses, model: &Model) -> Vec<Vec<f64>> {
+    if poses.temperatures.is_empty() {
+        return Vec::new();
+    }
+    let mut rows = vec![vec![model.reference_temperature_c(); model.joints().len()]; poses.len()];
+    for (i, joint) in model.joints().iter().enumerate() {
+        let own = poses.temperatures.get(&joint.name);
+        let column = own.or_else(|| poses.temperatures.get(WHOLE_ROBOT));
+        let column = column.map(Vec::as_slice).unwrap_or_default();
+        let Some(mut last) = column.iter().flatten().next().copied() else {
+            continue;
+        };
+        for (row, celsius) in rows.iter_mut().zip(column) {
+            last = celsius.unwrap_or(last);
+            row[i] = last;
+        }
+    }
+    rows
 }
 
 /// The postures of a table, without rows that lost a joint.

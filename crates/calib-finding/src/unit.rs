@@ -42,6 +42,9 @@ pub enum Unit {
     /// Compliance of a prismatic joint, m/N.
     #[serde(rename = "m/N")]
     MeterPerNewton,
+    /// Thermal expansion, 1/K.
+    #[serde(rename = "1/K")]
+    PerKelvin,
     /// First moment of a mass, kg·m.
     #[serde(rename = "kg·m")]
     KilogramMeter,
@@ -62,6 +65,7 @@ impl Unit {
             Unit::RadianPerSecond => "rad/s",
             Unit::RadianPerNewtonMeter => "rad/(N·m)",
             Unit::MeterPerNewton => "m/N",
+            Unit::PerKelvin => "1/K",
             Unit::KilogramMeter => "kg·m",
             Unit::Kilogram => "kg",
         }
@@ -83,6 +87,7 @@ impl Unit {
             Unit::RadianPerSecond => (DEGREES, "°/s"),
             Unit::RadianPerNewtonMeter => (DEGREES, "°/(N·m)"),
             Unit::MeterPerNewton => (1e3, " mm/N"),
+            Unit::PerKelvin => (1e6, " ppm/K"),
             Unit::KilogramMeter => (1.0, " kg·m"),
             Unit::Kilogram => (1.0, " kg"),
         }
@@ -99,6 +104,7 @@ impl Unit {
             Unit::RadianPerSecond => "deg/s",
             Unit::RadianPerNewtonMeter => "deg/(N·m)",
             Unit::MeterPerNewton => "mm/N",
+            Unit::PerKelvin => "ppm/K",
             Unit::KilogramMeter => "kg·m",
             Unit::Kilogram => "kg",
         }

@@ -9,7 +9,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 mod common;
 
 use calib_model::{Model, Options, Place, Under, Work};
-use common::{Effects, posture, rng, robot, with_uncertainty};
+use common::{Effects, WARM, posture, rng, robot, with_uncertainty};
 
 /// Median and 99th percentile of single calls, each timed in groups of 16.
 fn percentiles(name: &str, mut call: impl FnMut(usize)) {
@@ -52,6 +52,7 @@ fn arm(c: &mut Criterion) {
     let under = Under {
         approach: &approach,
         held: None,
+        temperature_c: &WARM[..7],
     };
     for (name, file) in [("usual effects", &usual), ("all effects", &all)] {
         let model = Model::new(file).expect("a model");

@@ -9,6 +9,7 @@
  * Units: rad, m, N m. Joint arrays have calib_model_joints() numbers, in the order of calib_model_joint_name().
  * Poses: 12 numbers by rows, R | t, root_from_link. Twists: [omega; v] in the frame of the link.
  * `held`: torques (forces) that the joints hold, as sensors in them read; NULL: gravity loads the joints.
+ * Temperature: lengths that grow hold at the model's reference until calib_model_set_temperature() says how warm each link is.
  * Backlash: calib_model_moved_to() remembers from which side each joint came; before any motion it is taken in the middle.
  *
  * A model may be used by several threads at once, a work by one. Pointers must be valid for as many numbers as said; NULL is
@@ -101,6 +102,8 @@ int calib_model_moved_to(const calib_model *model, calib_model_work *work, const
 /* +1: a joint came from below, -1: from above, 0: not known. */
 int calib_model_approach(const calib_model_work *work, double *directions);
 int calib_model_set_approach(calib_model_work *work, const double *directions);
+/* celsius: of the link before each joint; NULL: where the lengths of the model hold */
+int calib_model_set_temperature(const calib_model *model, calib_model_work *work, const double *celsius);
 
 #ifdef __cplusplus
 }

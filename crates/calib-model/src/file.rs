@@ -2,11 +2,13 @@
 //!
 //! ```text
 //! tracker_from_link = tracker_from_root · Π_joints parent_from_joint · joint_from_child                  (1)
-//! φ = q + Σ c F,  θ = Σ c F e:   joint_from_child = exp(axis φ) · Exp(θ)       turning joints
-//!                                joint_from_child = translation by axis φ       sliding joints
+//! φ = q + Σ c F,  θ = Σ c F e,  δ = Σ c F along:
+//!                                joint_from_child = Trans(δ) · exp(axis φ) · Exp(θ)   turning joints
+//!                                joint_from_child = translation by δ + axis φ         sliding joints
 //! F: 1, q, cos q − 1, sin q, cos 2q − 1, sin 2q, the same of n q and 2 n q (n: gear ratio), the load,
 //!    −(direction of approach), the sign of the load or −(direction of approach) where |load| ≤ friction,
-//!    −(direction of approach) |load|, another joint's q, or what a plugin computes                             (2)
+//!    −(direction of approach) |load|, another joint's q, temperature − reference_temperature_c,
+//!    or what a plugin computes                                                                              (2)
 //! load about the axis = axis · Σ (moment_k − mass_k o) × g   over the links that the joint carries           (3)
 //! ```
 //!
@@ -80,6 +82,9 @@ pub struct RobotModelFile {
     /// Sign of every load that an effect depends on.
     #[serde(default)]
     pub loads: ModelLoads,
+    /// Temperature at which the lengths hold, °C; written where some grow with it. 20 where it is not stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_temperature_c: Option<f64>,
     /// Position of every joint where the harmonic effects and gains are 0, rad or m: zero offsets are what is wrong there.
     #[serde(default)]
     pub reference_position: f64,
@@ -217,6 +222,9 @@ pub struct ModelEffect {
     pub unit: String,
     /// The axis that it turns about after the joint's own motion, in the child's frame; null: the joint's own.
     pub about: Option<[f64; 3]>,
+    /// The length that grows, m, in the axes of the joint, for thermal expansion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub along: Option<[f64; 3]>,
     /// The joint whose reading it follows, for couplings.
     pub other: Option<String>,
     /// n, turns of the motor per turn of the joint, for effects at the motor.

@@ -18,6 +18,9 @@ pub struct Under<'a> {
     pub approach: &'a [f64],
     /// Torques (N m) or forces (N) that the joints hold about (along) their axes, as sensors in them read; `None`: gravity loads them.
     pub held: Option<&'a [f64]>,
+    /// Temperature of the link before each joint, °C; empty: that at which the model's lengths hold
+    /// ([`Model::reference_temperature_c`]).
+    pub temperature_c: &'a [f64],
 }
 
 /// Working memory of one thread, made by [`Model::work`]. It holds the result of the last call.
@@ -165,6 +168,9 @@ impl Model {
         if !under.approach.is_empty() {
             self.checked("approach", under.approach)?;
         }
+        if !under.temperature_c.is_empty() {
+            self.checked("temperature", under.temperature_c)?;
+        }
         let same = work.at.len() == self.links.len()
             && work.q.len() == self.moved.len()
             && work.spread.len() == self.columns;
@@ -271,6 +277,9 @@ impl Model {
         if joint.terms.is_empty() {
             return state;
         }
+        if joint.grows && !under.temperature_c.is_empty() {
+            state.warmth = under.temperature_c[joint.source] - self.reference_temperature;
+        }
         if joint.own && !under.approach.is_empty() {
             state.approach = under.approach[joint.source];
         }
@@ -368,6 +377,9 @@ impl Model {
             let mut local = joint.origin.moved(joint.axis, phi, &turned);
             if joint.yields {
                 local.r = product(&local.r, &swing(&work.theta[i]));
+            }
+            if joint.grows {
+                local.t += joint.origin.pose.r * (joint.growth * work.state[i].warmth);
             }
             work.at[i + 1] = then(&work.at[joint.parent], &local);
         }

@@ -3,8 +3,8 @@
 //!
 //! ```text
 //! load_i = a_i · Σ (h_k + m_k (o_k − o_i)) × g       over the links k that joint i carries, nominal geometry          (1)
-//! φ_i = q_i + Σ_t c_t F_t(q_i, load_i, …),   θ_i = Σ_t e_t c_t F_t                                                    (2)
-//! root_from_link = Π_i parent_from_joint_i · exp(S_i φ_i) · Exp(θ_i)                                                 (3)
+//! φ_i = q_i + Σ_t c_t F_t(q_i, load_i, …),   θ_i = Σ_t e_t c_t F_t,   δ_i = p_i Σ_t c_t F_t                             (2)
+//! root_from_link = Π_i parent_from_joint_i · Trans(δ_i) · exp(S_i φ_i) · Exp(θ_i)                                                 (3)
 //! Cov = (G R)(G R)ᵀ,   G = ∂[ω; v]/∂numbers,   R: root of the covariance in the file                                 (4)
 //! root_from_tool(q_command) = nominal root_from_tool(q_desired)                                                      (5)
 //! ```
@@ -14,7 +14,7 @@
 //! after it was made, no call allocates. Positions `q` are in the order of [`Model::joints`], rad or m, as the controller reads them.
 //! Twists are `[ω; v]` in the frame of the link that is asked for; lengths m, angles rad.
 //!
-//! It does **not** know: dynamics, contact, temperature, and postures outside the recorded range ([`Model::scope`] says so).
+//! It does **not** know: dynamics, contact, temperature beyond the growth of links ([`Under::temperature_c`]), and postures outside the recorded range ([`Model::scope`] says so).
 //!
 //! ```
 //! use calib_model::{Model, Options, Under};

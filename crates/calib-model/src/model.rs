@@ -72,8 +72,10 @@ pub(crate) struct JointTerm {
     pub term: &'static Term,
     /// Its coefficient.
     pub value: f64,
-    /// Axis across and which of the two; `None`: about the joint's own axis.
+    /// Axis across and which of the two; `None`: not across.
     pub across: Option<(usize, Vector3<f64>)>,
+    /// The reach that grows, m, in the joint's axes; `None`: no growth.
+    pub along: Option<Vector3<f64>>,
     /// The joint whose reading it follows.
     pub other: Option<usize>,
     /// Its size jumps with the load's sign: no derivative is taken through the jump.
@@ -110,9 +112,12 @@ pub(crate) struct Joint {
     pub flank: f64,
     /// Those that follow another joint: its index, their coefficients.
     pub couplings: Vec<(usize, f64)>,
+    /// Growth of what leads to the joint, m/K, in the joint's axes.
+    pub growth: Vector3<f64>,
     /// The others.
     pub direct: Vec<JointTerm>,
-    /// A term yields across the axis; one is a harmonic of the reading; one of the motor's angle.
+    /// A term grows with the temperature; one yields across the axis; one is a harmonic of the reading; one of the motor's angle.
+    pub grows: bool,
     pub yields: bool,
     pub turns: bool,
     pub geared: bool,
@@ -161,6 +166,8 @@ pub struct Model {
     /// A term of some joint depends on the load.
     pub(crate) loaded: bool,
     pub(crate) threshold: f64,
+    /// At which the lengths hold, °C.
+    pub(crate) reference_temperature: f64,
     pub(crate) tracker_from_root: Pose,
     pub(crate) bodies: Vec<Fixed>,
     pub(crate) points: Vec<Fixed>,
@@ -253,6 +260,18 @@ impl Model {
     #[must_use]
     pub fn approach_threshold(&self) -> f64 {
         self.threshold
+    }
+
+    /// Whether the length of a link follows its temperature.
+    #[must_use]
+    pub fn grows(&self) -> bool {
+        self.joints.iter().any(|j| j.grows)
+    }
+
+    /// Temperature at which the lengths hold, °C.
+    #[must_use]
+    pub fn reference_temperature_c(&self) -> f64 {
+        self.reference_temperature
     }
 
     /// Whether [`Model::sigma`] can answer.

@@ -1,7 +1,8 @@
 //! Motion of one joint with its effects: the one place where they are evaluated.
 //!
 //! ```text
-//! φ = q + Σ_j F_j c_j,   θ = Σ_j e_j F_j c_j,   joint_from_child = exp(S φ) · Exp(θ)        (1)
+//! φ = q + Σ_j F_j c_j,   θ = Σ_j e_j F_j c_j,   δ = p Σ_j F_j c_j
+//! joint_from_child = Trans(δ) · exp(S φ) · Exp(θ)                                           (1)
 //! ```
 
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3, Vector6};
@@ -9,10 +10,10 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3, Vector
 use calib_geometry::so3;
 
 use crate::axis::Axis;
-use crate::effect::EffectKind;
+use crate::effect::{Drives, EffectKind};
 use crate::pose::Pose;
 
-/// φ and θ of equation (1).
+/// φ, θ and δ of equation (1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointMotion {
     axis: Axis,
@@ -21,27 +22,43 @@ pub struct JointMotion {
     sin: f64,
     cos: f64,
     theta: Option<Vector3<f64>>,
+    delta: Option<Vector3<f64>>,
 }
 
 impl JointMotion {
-    /// From the reading (rad or m) and the amount F·c of every term.
-    pub fn new(axis: Axis, q: f64, amounts: impl IntoIterator<Item = (EffectKind, f64)>) -> Self {
+    /// From the reading (rad or m) and the amount F·c of every term, at a joint with this reach (m, in its axes).
+    pub fn new(
+        (axis, reach): (Axis, Vector3<f64>),
+        q: f64,
+        amounts: impl IntoIterator<Item = (EffectKind, f64)>,
+    ) -> Self {
         let amounts = amounts.into_iter();
-        Self::sum(axis, q, amounts.map(|(kind, a)| (kind.lateral(), a)))
+        let amounts = amounts.map(|(kind, a)| (kind.drives(), a));
+        Self::sum((axis, &reach), q, amounts)
     }
 
-    /// Equation (1); the terms by the axis across that they drive.
+    /// Equation (1); the terms by what they drive.
     #[inline]
-    pub fn sum(axis: Axis, q: f64, amounts: impl Iterator<Item = (Option<usize>, f64)>) -> Self {
+    pub fn sum(
+        (axis, reach): (Axis, &Vector3<f64>),
+        q: f64,
+        amounts: impl Iterator<Item = (Drives, f64)>,
+    ) -> Self {
         let mut phi = q;
-        let mut theta: Option<Vector3<f64>> = None;
-        for (lateral, amount) in amounts {
-            match lateral {
-                None => phi += amount,
-                Some(k) => *theta.get_or_insert_with(Vector3::zeros) += axis.across()[k] * amount,
+        let (mut theta, mut delta) = (None, None);
+        for (drives, amount) in amounts {
+            match drives {
+                Drives::About => phi += amount,
+                Drives::Across(k) => {
+                    *theta.get_or_insert_with(Vector3::zeros) += axis.across()[k] * amount;
+                }
+                Drives::Along => *delta.get_or_insert_with(Vector3::zeros) += reach * amount,
             }
         }
-        Self::of(axis, phi, theta)
+        Self {
+            delta,
+            ..Self::of(axis, phi, theta)
+        }
     }
 
     /// From φ (rad or m) and θ (rad).
@@ -58,6 +75,7 @@ impl JointMotion {
             sin,
             cos,
             theta,
+            delta: None,
         }
     }
 
@@ -75,6 +93,7 @@ impl JointMotion {
             sin,
             cos,
             theta: None,
+            delta: None,
         }
     }
 
@@ -94,6 +113,7 @@ impl JointMotion {
             sin,
             cos,
             theta: None,
+            delta: None,
         }
     }
 
@@ -104,10 +124,20 @@ impl JointMotion {
         self.theta
     }
 
-    /// The same θ with another φ: for joints that follow the motion of this one.
+    /// δ: the growth of what leads to the joint, m; `None` where nothing grows.
+    #[inline]
+    #[must_use]
+    pub fn delta(&self) -> Option<Vector3<f64>> {
+        self.delta
+    }
+
+    /// The same θ and δ with another φ: for joints that follow the motion of this one.
     #[must_use]
     pub fn with_phi(&self, phi: f64) -> Self {
-        Self::of(self.axis, phi, self.theta)
+        Self {
+            delta: self.delta,
+            ..Self::of(self.axis, phi, self.theta)
+        }
     }
 
     /// `joint_from_child`: equation (1) in quaternions, where the solver's inner loop has matrices.
@@ -126,6 +156,9 @@ impl JointMotion {
         if let Some(theta) = self.theta {
             x.rotation *= so3::exp(&theta);
         }
+        if let Some(delta) = self.delta {
+            x.translation.vector += delta;
+        }
         x
     }
 
@@ -136,6 +169,9 @@ impl JointMotion {
         let mut x = self.screw_motion(false);
         if let Some(theta) = self.theta {
             x.r *= so3::exp(&theta).to_rotation_matrix().matrix();
+        }
+        if let Some(delta) = self.delta {
+            x.t += delta;
         }
         x.oriented(inverse)
     }
@@ -183,6 +219,13 @@ pub fn screw(axis: &Axis) -> Vector6<f64> {
         Axis::Revolute(_) => Vector6::new(a.x, a.y, a.z, 0.0, 0.0, 0.0),
         Axis::Prismatic(_) => Vector6::new(0.0, 0.0, 0.0, a.x, a.y, a.z),
     }
+}
+
+/// A translation without rotation as a twist `[ω; v]`.
+#[inline]
+#[must_use]
+pub fn translation_twist(v: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(0.0, 0.0, 0.0, v.x, v.y, v.z)
 }
 
 /// A rotation without translation as a twist `[ω; v]`.

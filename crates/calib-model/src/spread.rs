@@ -14,6 +14,7 @@ use crate::error::ModelError;
 use crate::forward::{Under, Work};
 use crate::jacobian::Across;
 use crate::model::{LinkId, Model, Number, Place};
+use crate::motion::translation_twist;
 use crate::pose::Pose;
 
 /// In which frame a pose is predicted.
@@ -120,6 +121,14 @@ impl Model {
         }
     }
 
+    /// Twist of a link where the length before a joint that leads to it grows by this, m in the joint's axes.
+    fn along_twist(&self, i: usize, link: LinkId, work: &Work, by: &Vector3<f64>) -> Vector6<f64> {
+        let joint = &self.joints[i];
+        let root_from_joint = work.at[joint.parent].r * joint.origin.pose.r;
+        let moved = work.at[link.0].r.tr_mul(&(root_from_joint * by));
+        translation_twist(&moved)
+    }
+
     /// A column of G; `None` where the number moves nothing here.
     fn twist(
         &self,
@@ -143,9 +152,10 @@ impl Model {
                 let term = &self.joints[i].terms[t];
                 chain.contains(&i).then_some(())?;
                 let f = self.regressor(term, &work.state[i], q);
-                let twist = match term.across {
-                    None => self.about_twist(i, id, work)? * f,
-                    Some((_, e)) => Across::of(i, id, work).twist(&(e * f)),
+                let twist = match (term.across, term.along) {
+                    (None, None) => self.about_twist(i, id, work)? * f,
+                    (Some((_, e)), _) => Across::of(i, id, work).twist(&(e * f)),
+                    (None, Some(reach)) => self.along_twist(i, id, work, &(reach * f)),
                 };
                 Some(offset.pull_back(&twist))
             }

@@ -21,6 +21,8 @@ pub enum Unit {
     MeterPerNewton,
     /// Time, s.
     Second,
+    /// Share per kelvin, 1/K.
+    PerKelvin,
     /// Mass times distance, kg·m.
     KilogramMeter,
     /// Ratio without unit.
@@ -28,7 +30,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// Symbol: `rad`, `m`, `rad/Nm`, `m/N`, `s`, `kg·m`, `1`.
+    /// Symbol: `rad`, `m`, `rad/Nm`, `m/N`, `s`, `1/K`, `kg·m`, `1`.
     #[must_use]
     pub fn symbol(self) -> &'static str {
         match self {
@@ -37,12 +39,13 @@ impl Unit {
             Self::RadianPerNewtonMeter => "rad/Nm",
             Self::MeterPerNewton => "m/N",
             Self::Second => "s",
+            Self::PerKelvin => "1/K",
             Self::KilogramMeter => "kg·m",
             Self::One => "1",
         }
     }
 
-    /// Ending of a key that holds a number in this unit: `_rad`, `_m`, `_rad_per_nm`, `_m_per_n`, `_s`, `_kg_m`, or nothing.
+    /// Ending of a key that holds a number in this unit: `_rad`, `_m`, `_rad_per_nm`, `_m_per_n`, `_s`, `_per_k`, `_kg_m`, or nothing.
     #[must_use]
     pub fn key_ending(self) -> &'static str {
         match self {
@@ -51,6 +54,7 @@ impl Unit {
             Self::RadianPerNewtonMeter => "_rad_per_nm",
             Self::MeterPerNewton => "_m_per_n",
             Self::Second => "_s",
+            Self::PerKelvin => "_per_k",
             Self::KilogramMeter => "_kg_m",
             Self::One => "",
         }
@@ -67,6 +71,8 @@ impl Unit {
             Self::RadianPerNewtonMeter | Self::MeterPerNewton => 1e-4,
             // 10 ms: a tracker frame at 100 Hz.
             Self::Second => 0.01,
+            // Between steel and aluminium.
+            Self::PerKelvin => 2e-5,
             // A link of 5 kg with its center 0.1 m from where it was assumed.
             Self::KilogramMeter => 0.5,
             // 1 %: the reading error of an encoder with a wrong gear ratio.

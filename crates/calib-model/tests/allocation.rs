@@ -7,7 +7,7 @@ use std::cell::Cell;
 mod common;
 
 use calib_model::{Approach, Model, Options, Place, Under};
-use common::{Effects, posture, rng, robot, with_uncertainty};
+use common::{Effects, WARM, posture, rng, robot, with_uncertainty};
 
 struct Counting;
 
@@ -58,6 +58,7 @@ fn no_call_allocates() {
     let under = Under {
         approach: approach.directions(),
         held: None,
+        temperature_c: &WARM[..7],
     };
     model.forward(&q, &under, &mut work).expect("poses");
     let wanted = work.root_from_link(tool);

@@ -40,6 +40,8 @@ static int refuses(const calib_model *model, calib_model_work *work, calib_model
     HOLDS(calib_model_correct(model, work, good, NULL, none, NULL, out, NULL) < 0 && is_marked(out, n));
     HOLDS(calib_model_correct(model, work, good, NULL, tip, NULL, NULL, NULL) < 0);
     HOLDS(calib_model_correct(model, foreign, good, NULL, tip, NULL, out, NULL) < 0 && is_marked(out, n));
+    HOLDS(calib_model_set_temperature(model, work, bad) < 0 && calib_model_set_temperature(NULL, work, good) < 0);
+    HOLDS(calib_model_set_temperature(model, NULL, good) < 0 && calib_model_set_temperature(model, work, NULL) == CALIB_MODEL_OK);
     pose[3] = NAN;
     HOLDS(calib_model_ik(model, work, pose, good, NULL, tip, NULL, out, NULL) < 0 && is_marked(out, n));
     HOLDS(calib_model_ik(model, work, good, bad, NULL, tip, NULL, out, NULL) < 0 && is_marked(out, n));

@@ -11,8 +11,11 @@ use crate::error::{misused, raised, refused};
 
 type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 
-/// Directions of approach and held torques, where they are given.
-type Given<'py> = (Option<Array<'py>>, Option<Array<'py>>);
+/// Directions of approach, held torques and temperatures, where they are given.
+type Given<'py> = (Option<Array<'py>>, Option<Array<'py>>, Option<Array<'py>>);
+
+/// Nothing beside the readings.
+const NOTHING: Given<'static> = (None, None, None);
 
 /// A calibrated robot, read once.
 #[pyclass(frozen, module = "calib._native")]
@@ -25,6 +28,7 @@ struct Postures<'a> {
     q: &'a [f64],
     approach: Option<&'a [f64]>,
     held: Option<&'a [f64]>,
+    temperature_c: Option<&'a [f64]>,
     dof: usize,
 }
 
@@ -43,7 +47,7 @@ impl<'a> Postures<'a> {
         py: Python<'_>,
         model: &calib_model::Model,
         q: &'a Array<'_>,
-        (approach, held): &'a Given<'_>,
+        (approach, held, temperature_c): &'a Given<'_>,
     ) -> PyResult<Self> {
         let dof = model.joints().len();
         let q = slice(py, "q", q)?;
@@ -62,6 +66,7 @@ impl<'a> Postures<'a> {
             q,
             approach: of("approach", approach.as_ref())?,
             held: of("held", held.as_ref())?,
+            temperature_c: of("temperature_c", temperature_c.as_ref())?,
             dof,
         })
     }
@@ -83,6 +88,7 @@ impl<'a> Postures<'a> {
             let under = Under {
                 approach: self.approach.map_or(&[], of_row),
                 held: self.held.map(of_row),
+                temperature_c: self.temperature_c.map_or(&[], of_row),
             };
             of(q, &under, out).map_err(|error| Refused(row, error))?;
         }
@@ -133,6 +139,8 @@ impl Model {
         facts.set_item("points", m.points().collect::<Vec<_>>())?;
         facts.set_item("tool", &m.links()[m.last_link().index()])?;
         facts.set_item("has_uncertainty", m.has_uncertainty())?;
+        let reference = m.grows().then(|| m.reference_temperature_c());
+        facts.set_item("reference_temperature_c", reference)?;
         let joints: Vec<_> = m.joints().iter().collect();
         let joints: Vec<_> = joints
             .into_iter()
@@ -291,7 +299,7 @@ impl Model {
 
     /// n × 2: 0 inside, 1 outside of the fitted range, 2 beyond limits; and the joint, −1 where none.
     fn scope<'py>(&self, py: Python<'py>, q: Array<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let asked = Postures::of(py, &self.model, &q, &(None, None))?;
+        let asked = Postures::of(py, &self.model, &q, &NOTHING)?;
         let done = py.detach(|| {
             asked.each(2, |q, _, out| {
                 let found = match self.model.scope(q)? {
@@ -313,7 +321,7 @@ impl Model {
         q: Array<'py>,
         threshold: Option<f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let asked = Postures::of(py, &self.model, &q, &(None, None))?;
+        let asked = Postures::of(py, &self.model, &q, &NOTHING)?;
         let mut approach = Approach::new(&self.model);
         if let Some(threshold) = threshold {
             approach = approach.with_threshold(threshold);

@@ -55,6 +55,17 @@ pub(crate) fn plain<'py>(py: Python<'py>, recording: &Recording) -> PyResult<Bou
         let values = view(py, numbers(&s.torque), [s.torque.len()])?;
         streams.append(("torque", &s.name, s.timeline, "N m", values, py.None()))?;
     }
+    for s in &recording.temperatures {
+        let values = view(py, numbers(&s.celsius), [s.celsius.len()])?;
+        streams.append((
+            "temperature",
+            &s.name,
+            s.timeline,
+            "degC",
+            values,
+            py.None(),
+        ))?;
+    }
     for s in &recording.bodies {
         let n = s.tracker_from_body.len();
         let matrices: Vec<f64> = s.tracker_from_body.iter().flat_map(matrix).collect();

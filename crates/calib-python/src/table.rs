@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use calib_geometry::so3;
 use calib_recording::{
     BodyStream, JointStream, JointUnit, MarkerSample, MarkerStream, Meta, Poses, Recording,
-    Timeline, TorqueStream,
+    TemperatureStream, Timeline, TorqueStream,
 };
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 use numpy::PyReadonlyArrayDyn;
@@ -47,6 +47,10 @@ pub(crate) fn poses(given: &Bound<'_, PyDict>) -> PyResult<Poses> {
     for (name, numbers) in columns(given, "torques", 1)? {
         same(&name, numbers.len())?;
         table.torques.insert(name, seen(&numbers));
+    }
+    for (name, numbers) in columns(given, "temperatures", 1)? {
+        same(&name, numbers.len())?;
+        table.temperatures.insert(name, seen(&numbers));
     }
     for (name, numbers) in columns(given, "markers", 3)? {
         same(&name, numbers.len() / 3)?;
@@ -161,6 +165,13 @@ pub(crate) fn as_recording(table: Poses, source: &str, format: &str) -> Recordin
                 name,
                 timeline: 0,
                 torque,
+            })
+            .collect(),
+        temperatures: (table.temperatures.into_iter())
+            .map(|(name, celsius)| TemperatureStream {
+                name,
+                timeline: 0,
+                celsius,
             })
             .collect(),
         bodies: (table.bodies.into_iter())

@@ -47,6 +47,9 @@ pub struct ColumnMap {
     /// Joint torques in N·m: joint name → column.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub torques: BTreeMap<String, String>,
+    /// Temperatures in °C of the links before joints: joint name, or `robot` for all of them → column.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub temperatures: BTreeMap<String, String>,
     /// Markers: marker name → its x, y and z column.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub markers: BTreeMap<String, [String; 3]>,
@@ -241,6 +244,11 @@ impl ColumnMap {
             prismatic: or(&self.prismatic, &default.prismatic, &base.prismatic),
             reversed: or(&self.reversed, &default.reversed, &base.reversed),
             torques: or(&self.torques, &default.torques, &base.torques),
+            temperatures: or(
+                &self.temperatures,
+                &default.temperatures,
+                &base.temperatures,
+            ),
             markers: or(&self.markers, &default.markers, &base.markers),
             bodies: or(&self.bodies, &default.bodies, &base.bodies),
             long: self.long.clone().or(base.long),

@@ -3,7 +3,7 @@
 //! A recording is a set of streams, each sampled at instants `t_i` of its own clock:
 //!
 //! ```text
-//! joints   q_i ∈ R (rad, m)              torques  τ_i (N·m)
+//! joints   q_i ∈ R (rad, m)              torques  τ_i (N·m), temperatures (°C)
 //! markers  p_i ∈ R³ (m)                  bodies   tracker_from_body_i ∈ SE(3)
 //! ```
 //!
@@ -39,7 +39,7 @@ pub use column_map::{BodyColumns, ColumnMap, Delimiter, LongColumns, PRESETS, Ti
 pub use error::{At, Error, Problem};
 pub use model::{
     BodyStream, Filled, JointStream, JointUnit, MarkerSample, MarkerStream, Meta, Recording,
-    Timeline, TorqueStream,
+    TemperatureStream, Timeline, TorqueStream, WHOLE_ROBOT,
 };
 pub use poses::{NotOneTable, Poses};
 pub use readers::{ReadOptions, RotationForm, read_bytes, read_path, read_path_with};

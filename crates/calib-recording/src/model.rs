@@ -4,9 +4,9 @@ use calib_finding::Finding;
 use nalgebra::{Isometry3, Matrix6, Point3};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Everything that one file says: streams of joints, torques, bodies and markers, in SI, each with its clock.
+/// Everything that one file says: streams of joints, torques, temperatures, bodies and markers, in SI, each with its clock.
 ///
-/// Lengths m, angles rad, times s, torques N·m, right-handed. A lost sample is a state, never zeros or NaN.
+/// Lengths m, angles rad, times s, torques N·m, temperatures °C, right-handed. A lost sample is a state, never zeros or NaN.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {
     /// Where it comes from and what was done to it.
@@ -17,6 +17,8 @@ pub struct Recording {
     pub joints: Vec<JointStream>,
     /// Joint torques (forces for prismatic joints).
     pub torques: Vec<TorqueStream>,
+    /// Temperatures.
+    pub temperatures: Vec<TemperatureStream>,
     /// Bodies with six degrees of freedom.
     pub bodies: Vec<BodyStream>,
     /// Single markers.
@@ -127,6 +129,20 @@ pub struct TorqueStream {
     pub timeline: usize,
     /// Torque, N·m; `None` = not recorded.
     pub torque: Vec<Option<f64>>,
+}
+
+/// Name of the temperature of a robot as a whole: the column `temperature_c`.
+pub const WHOLE_ROBOT: &str = "robot";
+
+/// Temperature of the link before one joint, or of the whole robot, °C.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TemperatureStream {
+    /// The joint's name, or [`WHOLE_ROBOT`].
+    pub name: String,
+    /// Index into [`Recording::timelines`].
+    pub timeline: usize,
+    /// Temperature, °C; `None` = not recorded.
+    pub celsius: Vec<Option<f64>>,
 }
 
 /// One rigid body as the tracker reports it.

@@ -1,8 +1,8 @@
 //! The plain view that estimators take: one row per static pose, or per sample of one clock.
 
 use crate::model::{
-    BodyStream, Filled, JointStream, JointUnit, MarkerSample, MarkerStream, Recording, Timeline,
-    TorqueStream,
+    BodyStream, Filled, JointStream, JointUnit, MarkerSample, MarkerStream, Recording,
+    TemperatureStream, Timeline, TorqueStream,
 };
 use nalgebra::{Isometry3, Point3};
 use std::collections::BTreeMap;
@@ -22,6 +22,8 @@ pub struct Poses {
     pub joint_units: BTreeMap<String, JointUnit>,
     /// Joint torques, N·m.
     pub torques: BTreeMap<String, Vec<Option<f64>>>,
+    /// Temperatures of the links before joints, °C; [`WHOLE_ROBOT`](crate::WHOLE_ROBOT): of all of them.
+    pub temperatures: BTreeMap<String, Vec<Option<f64>>>,
     /// `tracker_from_body`.
     pub bodies: BTreeMap<String, Vec<Option<Isometry3<f64>>>>,
     /// Marker points in the tracker's frame, m.
@@ -83,6 +85,7 @@ impl Poses {
             joints: pick_each(&self.joints, &kept),
             joint_units: self.joint_units.clone(),
             torques: pick_each(&self.torques, &kept),
+            temperatures: pick_each(&self.temperatures, &kept),
             bodies: pick_each(&self.bodies, &kept),
             markers: pick_each(&self.markers, &kept),
             labels: pick_each(&self.labels, &kept),
@@ -121,6 +124,7 @@ impl Poses {
             joints,
             joint_units,
             torques,
+            temperatures,
             bodies,
             markers,
             labels,
@@ -153,6 +157,14 @@ impl Poses {
                     name,
                     timeline: 0,
                     torque,
+                })
+                .collect(),
+            temperatures: temperatures
+                .into_iter()
+                .map(|(name, celsius)| TemperatureStream {
+                    name,
+                    timeline: 0,
+                    celsius,
                 })
                 .collect(),
             bodies: bodies
@@ -237,6 +249,9 @@ impl Recording {
             .filter(|torque| torque.timeline == timeline)
         {
             add(&mut poses.torques, &torque.name, torque.torque.clone())?;
+        }
+        for warm in self.temperatures.iter().filter(|t| t.timeline == timeline) {
+            add(&mut poses.temperatures, &warm.name, warm.celsius.clone())?;
         }
         for body in self.bodies.iter().filter(|body| body.timeline == timeline) {
             add(

@@ -105,7 +105,8 @@ impl TrueRobot {
             let amounts = effects.map(|(kind, c)| (kind, c * kind.term().regressor.at(&state)));
             // Only joints that rotate have offsets (see `draw`).
             if let Some(axis) = self.model.joint(*id).kind.axis() {
-                let motion = JointMotion::new(Axis::Revolute(axis), state.q, amounts);
+                let still = (Axis::Revolute(axis), Vector3::zeros());
+                let motion = JointMotion::new(still, state.q, amounts);
                 q[id.index()] = motion.phi() + noise;
             }
         }

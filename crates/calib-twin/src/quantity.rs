@@ -216,6 +216,7 @@ pub fn unit_of(unit: calib_core::Unit) -> Unit {
         calib_core::Unit::Second => Unit::Second,
         calib_core::Unit::RadianPerNewtonMeter => Unit::RadianPerNewtonMeter,
         calib_core::Unit::MeterPerNewton => Unit::MeterPerNewton,
+        calib_core::Unit::PerKelvin => Unit::PerKelvin,
         calib_core::Unit::KilogramMeter => Unit::KilogramMeter,
         calib_core::Unit::One => Unit::One,
     }

@@ -54,7 +54,7 @@ impl Replay<'_> {
             fault.put_into(&mut robot);
         }
         for loaded in inputs.recordings.values_mut() {
-            let under = conditions(loaded, &inputs.robot.model, load);
+            let under = conditions(loaded, &inputs.robot, load);
             let mut last: Option<Vec<f64>> = None;
             for row in 0..loaded.q.len() {
                 let Some(q) = loaded.q[row].clone() else {

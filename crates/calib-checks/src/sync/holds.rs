@@ -195,6 +195,7 @@ pub fn static_poses(poses: &Poses, holds: &[Hold]) -> StaticPoses {
     };
     out.poses.joints = scalars(&poses.joints);
     out.poses.torques = scalars(&poses.torques);
+    out.poses.temperatures = scalars(&poses.temperatures);
     for (name, track) in &poses.markers {
         let (mut means, mut covariances) = (Vec::new(), Vec::new());
         let step = step_of_points(track);

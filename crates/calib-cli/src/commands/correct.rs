@@ -7,7 +7,7 @@ use calib_pipeline::ExitCode;
 use clap::Args;
 
 use super::plugin_options::Evaluated;
-use super::predict::{say_absent, write};
+use super::predict::{say_absent, say_assumed, write};
 use crate::error::CliError;
 use crate::terminal::{Console, say};
 
@@ -62,6 +62,7 @@ pub fn run(console: &Console, options: &Correct) -> Result<ExitCode, CliError> {
         if !done.cartesian || done.absent.len() < robot.model.joints().len() {
             say_absent(&done.absent);
         }
+        say_assumed(done.assumed_temperature_c);
         say(&summary(&done));
     }
     write(console, options.out.as_ref(), &done.csv)?;

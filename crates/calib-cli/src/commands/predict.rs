@@ -63,6 +63,7 @@ pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
     robot.evaluated()?;
     if !console.quiet {
         say_absent(&done.absent);
+        say_assumed(done.assumed_temperature_c);
         if done.outside > 0 {
             say(&format!(
                 "calib: {} of {} rows are outside of the range that was fitted: nothing was verified there",
@@ -71,6 +72,15 @@ pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
         }
     }
     write(console, options.out.as_ref(), &done.csv)
+}
+
+/// The temperature that the robot was taken to have.
+pub(super) fn say_assumed(celsius: Option<f64>) {
+    if let Some(celsius) = celsius {
+        say(&format!(
+            "calib: the table has no temperature (`temperature_c`), and lengths of this robot follow it: they are those at {celsius} °C"
+        ));
+    }
 }
 
 /// Joints without a column.

@@ -24,10 +24,11 @@ use crate::analysis::looked_at::LookedAt;
 use crate::analysis::score::Scored;
 use crate::analysis::solution::Solution;
 use crate::graph::edge::EdgeKind;
-use crate::graph::effect::{EFFECTS, EffectKind, Source};
+use crate::graph::effect::{Drives, EFFECTS, EffectKind, Source};
 use crate::graph::ids::EdgeId;
 use crate::model::cache::State;
 use crate::model::layout::Model;
+use crate::model::path::DRIVEN;
 use crate::solve::equations::{NormalEquations, Workspace};
 use crate::solve::normal::add_prior;
 use crate::solve::rows::{dot, residual};
@@ -106,8 +107,8 @@ impl GoodnessOfFit {
 /// What is regressed on.
 #[derive(Clone)]
 enum Effect {
-    /// (edge, lateral axis, regressor) of each joint that takes part.
-    Joints(Vec<(usize, Option<usize>, Vec<f64>)>),
+    /// (edge, what is driven, regressor) of each joint that takes part.
+    Joints(Vec<(usize, Drives, Vec<f64>)>),
     /// A drift of the measuring frame along one of its axes.
     Drift(usize, Vec<f64>),
 }
@@ -129,7 +130,7 @@ impl Candidate {
             name: String::new(),
             joint: None,
             physics: Physics::Effect(kind),
-            effect: Effect::Joints(vec![(joint.index(), kind.lateral(), values)]),
+            effect: Effect::Joints(vec![(joint.index(), kind.drives(), values)]),
             tries: 1.0,
         }
     }
@@ -368,8 +369,8 @@ impl Solution {
                 let twist = match &candidate.effect {
                     Effect::Joints(parts) => parts
                         .iter()
-                        .flat_map(|(edge, lateral, values)| {
-                            let which = lateral.map_or(0, |l| l + 1);
+                        .flat_map(|(edge, drives, values)| {
+                            let which = DRIVEN.iter().position(|d| d == drives).unwrap_or(0);
                             twists
                                 .iter()
                                 .filter(move |(e, _)| e == edge)
@@ -394,7 +395,7 @@ impl Solution {
 
 fn candidates(model: &Model) -> Vec<Candidate> {
     let mut out = Vec::new();
-    let mut clocks = BTreeMap::<&String, Vec<(usize, Option<usize>, Vec<f64>)>>::new();
+    let mut clocks = BTreeMap::<&String, Vec<(usize, Drives, Vec<f64>)>>::new();
     let used: std::collections::BTreeSet<usize> = model
         .paths
         .iter()
@@ -414,7 +415,7 @@ fn candidates(model: &Model) -> Vec<Candidate> {
                 name: label,
                 joint: Some(name.clone()),
                 physics: Physics::Effect(kind),
-                effect: Effect::Joints(vec![(e, kind.lateral(), values)]),
+                effect: Effect::Joints(vec![(e, kind.drives(), values)]),
                 tries: 1.0,
             });
         };
@@ -430,7 +431,7 @@ fn candidates(model: &Model) -> Vec<Candidate> {
         for candidate in &joint.candidates {
             if candidate.kind.term().source == Source::Velocity {
                 let clock = clocks.entry(&candidate.name).or_default();
-                clock.push((e, None, candidate.values.clone()));
+                clock.push((e, Drives::About, candidate.values.clone()));
             } else {
                 add(
                     candidate.kind,

@@ -1,11 +1,11 @@
 //! The edges of the frame graph: what lies between two frames, and which of it is unknown.
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::{Isometry3, Matrix6, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::graph::axis::Axis;
 use crate::graph::chart::Chart;
-use crate::graph::effect::EffectKind;
+use crate::graph::effect::{Drives, EffectKind};
 use crate::graph::ids::{FrameId, GroupId, ParameterId};
 
 /// `parent_from_child(s)` for every sample s.
@@ -27,6 +27,7 @@ impl Edge {
         let kind = match &self.kind {
             EdgeKind::Joint(j) => EdgeKind::Joint(Joint {
                 axis: j.axis,
+                reach: j.reach,
                 q: Vec::new(),
                 effects: j.effects.iter().map(JointEffect::clone_shallow).collect(),
                 candidates: Vec::new(),
@@ -104,12 +105,14 @@ pub struct UnknownPose {
     pub parameters: [Option<ParameterId>; 6],
 }
 
-/// Joint: `exp(S φ_s) · Exp(θ_s)` with `φ_s = q_s + Σ_j F_j(s) c_j` and lateral rotations
-/// `θ_s = Σ_j e_j F_j(s) c_j` across the axis.
+/// Joint: `Trans(δ_s) · exp(S φ_s) · Exp(θ_s)` with `φ_s = q_s + Σ_j F_j(s) c_j`, lateral rotations
+/// `θ_s = Σ_j e_j F_j(s) c_j` across the axis and the growth `δ_s = p Σ_j F_j(s) c_j` of what leads to the joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
     /// Axis in the joint frame.
     pub axis: Axis,
+    /// p, from the joint before it that moves, m, in the joint frame; 0 where nothing grows.
+    pub reach: Vector3<f64>,
     /// Reading per sample, rad or m.
     pub q: Vec<f64>,
     /// Effects whose coefficients are parameters.
@@ -131,8 +134,8 @@ pub struct JointEffect {
     pub parameter: ParameterId,
     /// What the regressor follows beside: `F_s = values_s + Σ_i shares_i(s) x_i`.
     pub shares: Vec<Share>,
-    /// [`EffectKind::lateral`], looked up once.
-    pub(crate) lateral: Option<usize>,
+    /// [`EffectKind::drives`], looked up once.
+    pub(crate) drives: Drives,
 }
 
 impl JointEffect {
@@ -142,7 +145,7 @@ impl JointEffect {
             values,
             parameter,
             shares: Vec::new(),
-            lateral: kind.lateral(),
+            drives: kind.drives(),
         }
     }
 

@@ -6,6 +6,7 @@ use nalgebra::Vector6;
 
 use crate::graph::axis::Axis;
 use crate::graph::edge::{EdgeKind, Joint};
+use crate::graph::effect::Drives;
 use crate::graph::problem::Problem;
 use crate::model::pose::Pose;
 use crate::model::values::{Values, coordinates};
@@ -78,11 +79,11 @@ impl EdgeCache {
         }
         let amounts = joint.effects.iter().map(|f| {
             (
-                f.lateral,
+                f.drives,
                 f.value(sample, &values.0) * values.0[f.parameter.index()],
             )
         });
-        JointMotion::sum(joint.axis, joint.q[sample], amounts)
+        JointMotion::sum((joint.axis, &joint.reach), joint.q[sample], amounts)
     }
 
     pub(crate) fn new(problem: &Problem, trig: Trig) -> Self {
@@ -114,7 +115,7 @@ impl EdgeCache {
                 let constant = matches!(j.axis, Axis::Revolute(_))
                     && j.effects
                         .iter()
-                        .all(|f| f.values.is_none() && f.lateral.is_none());
+                        .all(|f| f.values.is_none() && f.drives == Drives::About);
                 self.offset[e] = constant.then(|| {
                     j.effects
                         .iter()

@@ -109,7 +109,7 @@ struct Evaluated {
     /// Derivatives by the free parameters.
     buffer: PathBuffer,
     /// Body twists of its end per unit of motion of each joint: about the axis, about the two axes across.
-    motions: Vec<(usize, [Vector6<f64>; 3])>,
+    motions: Vec<(usize, [Vector6<f64>; 4])>,
 }
 
 /// F n below this (rad, m, for n of one prior σ) is rounding: prior σ are about 1e-2, null vectors

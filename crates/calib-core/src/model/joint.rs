@@ -3,16 +3,18 @@
 //! Body twists at the end of the path, P being the path behind the joint, φ and θ those of its motion:
 //!
 //! ```text
-//! forward    ∂/∂φ: Ad((Exp(θ) P)⁻¹) S           ∂/∂θ: Ad(P⁻¹) Jr(θ)                         (1)
-//! backward   ∂/∂φ: −Ad(P⁻¹) S                   ∂/∂θ: −Ad((exp(−Sφ) P)⁻¹) Exp(θ) Jr(θ)      (2)
+//! forward    ∂/∂φ: Ad((Exp(θ) P)⁻¹) S            ∂/∂θ: Ad(P⁻¹) Jr(θ)                              (1)
+//! backward   ∂/∂φ: −Ad((Trans(−δ) P)⁻¹) S        ∂/∂θ: −Ad((exp(−Sφ) Trans(−δ) P)⁻¹) Exp(θ) Jr(θ) (2)
+//! growth     ∂/∂δ: Ad((exp(Sφ) Exp(θ) P)⁻¹) [0; p]   backward: −Ad(P⁻¹) [0; p]                      (3)
 //! ```
 
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 use calib_geometry::so3;
-use calib_model::motion::{JointMotion, rotation_twist, screw};
+use calib_model::motion::{JointMotion, rotation_twist, screw, translation_twist};
 
 use crate::graph::edge::Joint;
+use crate::graph::effect::Drives;
 use crate::model::pose::Pose;
 use crate::model::values::Values;
 
@@ -40,7 +42,7 @@ pub(crate) struct JointDerivatives<'a> {
 }
 
 impl JointPass<'_> {
-    /// The path from this joint on, and equations (1) and (2) into `out`.
+    /// The path from this joint on, and equations (1) to (3) into `out`.
     #[inline]
     pub(crate) fn then(&self, suffix: Pose, mut out: Option<JointDerivatives<'_>>) -> Pose {
         let swing = self.motion.theta().map(|theta| {
@@ -49,6 +51,10 @@ impl JointPass<'_> {
             (Pose { r, t }, so3::right_jacobian(&theta))
         });
         if self.inverse {
+            let suffix = match self.grown(&suffix, -1.0, &mut out) {
+                Some(shift) => shift.inverse().then(&suffix),
+                None => suffix,
+            };
             self.about(&suffix, -1.0, &mut out);
             let suffix = self.motion.screw_motion(true).then(&suffix);
             match swing {
@@ -67,8 +73,36 @@ impl JointPass<'_> {
                 }
             };
             self.about(&suffix, 1.0, &mut out);
-            self.motion.screw_motion(false).then(&suffix)
+            let suffix = self.motion.screw_motion(false).then(&suffix);
+            match self.grown(&suffix, 1.0, &mut out) {
+                Some(shift) => shift.then(&suffix),
+                None => suffix,
+            }
         }
+    }
+
+    /// Trans(δ) where something grows; equation (3).
+    #[inline]
+    fn grown(
+        &self,
+        suffix: &Pose,
+        sign: f64,
+        out: &mut Option<JointDerivatives<'_>>,
+    ) -> Option<Pose> {
+        let delta = self.motion.delta()?;
+        if let Some(columns) = out.as_mut().and_then(|out| out.columns.as_mut()) {
+            let twist = suffix.pull_back(&translation_twist(&self.joint.reach)) * sign;
+            for &(f, c) in self.columns {
+                let effect = &self.joint.effects[f];
+                if effect.drives == Drives::Along {
+                    columns[c] += twist * effect.value(self.sample, &self.values.0);
+                }
+            }
+        }
+        Some(Pose {
+            t: delta,
+            ..Pose::identity()
+        })
     }
 
     /// ∂/∂φ: S commutes with exp(Sφ), so it is the same twist on either side of it.
@@ -79,12 +113,12 @@ impl JointPass<'_> {
         if let Some(columns) = &mut out.columns {
             for &(f, c) in self.columns {
                 let effect = &self.joint.effects[f];
-                if effect.lateral.is_none() {
+                if effect.drives == Drives::About {
                     columns[c] += column * effect.value(self.sample, &self.values.0);
                 }
             }
             for &(f, i, c) in self.shares {
-                if self.joint.effects[f].lateral.is_none() {
+                if self.joint.effects[f].drives == Drives::About {
                     columns[c] += column * self.share(f, i);
                 }
             }
@@ -112,12 +146,12 @@ impl JointPass<'_> {
         });
         for &(f, c) in self.columns {
             let effect = &self.joint.effects[f];
-            if let Some(k) = effect.lateral {
+            if let Drives::Across(k) = effect.drives {
                 columns[c] += twists[k] * effect.value(self.sample, &self.values.0);
             }
         }
         for &(f, i, c) in self.shares {
-            if let Some(k) = self.joint.effects[f].lateral {
+            if let Drives::Across(k) = self.joint.effects[f].drives {
                 columns[c] += twists[k] * self.share(f, i);
             }
         }
@@ -129,24 +163,38 @@ impl JointPass<'_> {
         self.values.0[effect.parameter.index()] * effect.shares[share].values[self.sample]
     }
 
-    /// Body twist at the path's end per unit of φ (`None`) or of θ about one of the axes across.
-    pub(crate) fn twist(&self, lateral: Option<usize>, suffix: &Pose) -> Vector6<f64> {
+    /// Body twist at the path's end per unit of what a term drives.
+    pub(crate) fn twist(&self, drives: Drives, suffix: &Pose) -> Vector6<f64> {
         let theta = self.motion.theta().unwrap_or_else(Vector3::zeros);
         let swing = Pose {
             r: *so3::exp(&theta).to_rotation_matrix().matrix(),
             t: Vector3::zeros(),
         };
         let jr = so3::right_jacobian(&theta);
+        let shift = Pose {
+            t: self.motion.delta().unwrap_or_else(Vector3::zeros),
+            ..Pose::identity()
+        };
         let axis = &self.joint.axis;
-        match (self.inverse, lateral) {
-            (false, None) => swing.then(suffix).pull_back(&screw(axis)),
-            (true, None) => -suffix.pull_back(&screw(axis)),
-            (false, Some(k)) => suffix.pull_back(&rotation_twist(&(jr * axis.across()[k]))),
-            (true, Some(k)) => -self
+        let along = translation_twist(&self.joint.reach);
+        // Backward, all of it lies before the path's rest: Trans(−δ) first.
+        let behind = || shift.inverse().then(suffix);
+        match (self.inverse, drives) {
+            (false, Drives::About) => swing.then(suffix).pull_back(&screw(axis)),
+            (true, Drives::About) => -behind().pull_back(&screw(axis)),
+            (false, Drives::Across(k)) => {
+                suffix.pull_back(&rotation_twist(&(jr * axis.across()[k])))
+            }
+            (true, Drives::Across(k)) => -self
                 .motion
                 .screw_motion(true)
-                .then(suffix)
+                .then(&behind())
                 .pull_back(&rotation_twist(&(swing.r * jr * axis.across()[k]))),
+            (false, Drives::Along) => {
+                let moved = self.motion.screw_motion(false).then(&swing).then(suffix);
+                moved.pull_back(&along)
+            }
+            (true, Drives::Along) => -suffix.pull_back(&along),
         }
     }
 }

@@ -11,6 +11,7 @@
 use nalgebra::Vector6;
 
 use crate::graph::edge::{EdgeKind, Joint};
+use crate::graph::effect::Drives;
 use crate::graph::ids::EdgeId;
 use crate::graph::problem::Problem;
 use crate::model::cache::State;
@@ -58,6 +59,14 @@ pub(crate) enum Step {
         noise: Vec<(Vector6<f64>, usize)>,
     },
 }
+
+/// What terms of joints can drive, in the order of [`CompiledPath::effects`].
+pub(crate) const DRIVEN: [Drives; 4] = [
+    Drives::About,
+    Drives::Across(0),
+    Drives::Across(1),
+    Drives::Along,
+];
 
 /// Where a path writes its derivatives.
 #[derive(Debug, Clone, Default)]
@@ -323,7 +332,7 @@ impl CompiledPath {
         &self,
         at: State,
         sample: usize,
-        out: &mut Vec<(usize, [Vector6<f64>; 3])>,
+        out: &mut Vec<(usize, [Vector6<f64>; 4])>,
     ) -> Pose {
         let State {
             problem,
@@ -353,8 +362,7 @@ impl CompiledPath {
                         shares: &[],
                         slot: None,
                     };
-                    let lateral = [None, Some(0), Some(1)];
-                    out.push((*edge, lateral.map(|k| pass.twist(k, &suffix))));
+                    out.push((*edge, DRIVEN.map(|drives| pass.twist(drives, &suffix))));
                     motion.pose(*inverse).then(&suffix)
                 }
                 Step::Measured { edge, inverse, .. } => {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use crate::graph::edge::EdgeKind;
-use crate::graph::effect::Source;
+use crate::graph::effect::{Drives, Source};
 use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId};
 use crate::graph::problem::Problem;
@@ -83,13 +83,16 @@ pub(crate) fn contract_unmoved(
                 + joint
                     .effects
                     .iter()
-                    .filter(|f| f.lateral.is_none())
+                    .filter(|f| f.drives == Drives::About)
                     .map(|f| f.value(s, &start) * start[f.parameter.index()])
                     .sum::<f64>()
         };
         let driven = joint.effects.iter().any(|f| {
-            matches!(f.kind.term().source, Source::OtherJoint | Source::Caller)
-                && !problem.parameters[f.parameter.index()].fixed
+            let source = f.kind.term().source;
+            matches!(
+                source,
+                Source::OtherJoint | Source::Caller | Source::Temperature
+            ) && !problem.parameters[f.parameter.index()].fixed
                 && range_of(&|s| f.value(s, &start)) > MIN_JOINT_RANGE
         });
         let own: Vec<usize> = joint.effects.iter().map(|f| f.parameter.index()).collect();

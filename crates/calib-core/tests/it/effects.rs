@@ -3,11 +3,13 @@
 use crate::common::{axis, jitter, normal, pose, rng};
 use calib_core::effect::{
     Effect, compliance, flank_backlash, friction, motor_eccentricity, motor_eccentricity_2, offset,
+    thermal_expansion,
 };
 use calib_core::{
     Axis, Chart, EFFECTS, EffectKind, Gauge, JointMotion, JointState, NoiseKind, Parameter,
     ParameterKind, PoseNoise, PoseObservation, Problem, Settings, Share, Unit, solve,
 };
+use nalgebra::Vector3;
 use rand::RngExt;
 
 /// Noise of position (m) and orientation (rad).
@@ -26,10 +28,14 @@ fn states(samples: usize, seed: u64) -> Vec<JointState> {
             motor: r.random_range(-100.0..100.0),
             friction: 5.0,
             other: r.random_range(-1.0..1.0),
+            warmth: r.random_range(-20.0..20.0),
             given: r.random_range(-1.0..1.0),
         })
         .collect()
 }
+
+/// From the joint before, m.
+const REACH: Vector3<f64> = Vector3::new(0.5, -0.3, 0.4);
 
 fn recover(effect: &Effect, motion: Axis) {
     let states = states(40, 5);
@@ -40,6 +46,7 @@ fn recover(effect: &Effect, motion: Axis) {
     p.unknown("origin", base, a, base_from_a, Chart::none());
     let q = states.iter().map(|s| s.q).collect();
     let joint = p.joint("joint", a, b, motion, q);
+    p.joint_reach(joint, REACH);
     let mut truth = Vec::new();
     for (i, term) in effect.terms.iter().enumerate() {
         let id = p.free_effect_at(joint, term.kind, &states, None);
@@ -53,7 +60,8 @@ fn recover(effect: &Effect, motion: Axis) {
             let amounts = truth
                 .iter()
                 .map(|(_, term, c)| (term.kind, c * term.regressor.at(state)));
-            let a_from_b = JointMotion::new(motion, state.q, amounts).joint_from_child();
+            let moved = JointMotion::new((motion, REACH), state.q, amounts);
+            let a_from_b = moved.joint_from_child();
             let pose = base_from_a * a_from_b * jitter(&mut r, NOISE, NOISE);
             PoseObservation { sample, pose }
         })
@@ -133,7 +141,7 @@ fn yielding(seed: u64) -> [f64; 3] {
     let observations = (0..samples)
         .map(|s| {
             let load = (1.0 + truth[0]) * lever[0][s] + (1.0 + truth[1]) * lever[1][s];
-            let moved = JointMotion::new(motion, q[s], [(kind, SOFT * load)]);
+            let moved = JointMotion::new((motion, REACH), q[s], [(kind, SOFT * load)]);
             let pose = moved.joint_from_child() * jitter(&mut r, sigma, sigma);
             PoseObservation { sample: s, pose }
         })
@@ -193,7 +201,7 @@ fn the_common_scale_of_masses_and_compliances_is_named() {
     p.follow(joint, kind, vec![share]);
     let observations = (0..30)
         .map(|s| {
-            let moved = JointMotion::new(motion, q[s], [(kind, 3e-3 * lever[s])]);
+            let moved = JointMotion::new((motion, REACH), q[s], [(kind, 3e-3 * lever[s])]);
             let pose = moved.joint_from_child() * jitter(&mut r, NOISE, NOISE);
             PoseObservation { sample: s, pose }
         })
@@ -232,7 +240,7 @@ fn with_confounders(effect: &Effect, seed: u64) -> Vec<f64> {
     let mut r = rng(seed);
     let mut before = 0.0;
     let states: Vec<JointState> = (0..60)
-        .map(|_| {
+        .map(|row| {
             let q: f64 = r.random_range(-2.8..2.8);
             let approach = f64::signum(q - before);
             before = q;
@@ -242,6 +250,8 @@ fn with_confounders(effect: &Effect, seed: u64) -> Vec<f64> {
                 approach,
                 motor: 101.0 * q,
                 friction: 5.0,
+                // From a cold start to 15 K above it.
+                warmth: 15.0 * (1.0 - (-row as f64 / 20.0).exp()),
                 ..JointState::default()
             }
         })
@@ -250,6 +260,7 @@ fn with_confounders(effect: &Effect, seed: u64) -> Vec<f64> {
     let mut p = Problem::new(states.len());
     let (a, b) = (p.frame("a"), p.frame("b"));
     let joint = p.joint("joint", a, b, motion, states.iter().map(|s| s.q).collect());
+    p.joint_reach(joint, REACH);
     let sizes: Vec<_> = [&offset::EFFECT, &compliance::EFFECT, effect]
         .iter()
         .flat_map(|e| e.terms)
@@ -257,6 +268,7 @@ fn with_confounders(effect: &Effect, seed: u64) -> Vec<f64> {
             let size = match term.kind {
                 EffectKind::TorqueCompliance => 2e-4,
                 EffectKind::Friction => 1e-4,
+                EffectKind::ThermalExpansion => 2e-5,
                 _ => 1e-3,
             };
             let id = p.free_effect_at(joint, term.kind, &states, None);
@@ -270,7 +282,7 @@ fn with_confounders(effect: &Effect, seed: u64) -> Vec<f64> {
             let amounts = sizes
                 .iter()
                 .map(|(_, term, c)| (term.kind, c * term.regressor.at(state)));
-            let moved = JointMotion::new(motion, state.q, amounts).joint_from_child();
+            let moved = JointMotion::new((motion, REACH), state.q, amounts).joint_from_child();
             let pose = moved * jitter(&mut r, SIGMA, SIGMA);
             PoseObservation { sample, pose }
         })
@@ -298,6 +310,7 @@ fn effects_of_the_drive_are_found_beside_their_confounders() {
         &motor_eccentricity_2::EFFECT,
         &flank_backlash::EFFECT,
         &friction::EFFECT,
+        &thermal_expansion::EFFECT,
     ] {
         let z: Vec<f64> = (0..300)
             .flat_map(|seed| with_confounders(effect, seed))

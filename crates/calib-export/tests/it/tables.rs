@@ -60,6 +60,7 @@ fn rows_are_predicted_in_their_order_with_their_lines() {
         let under = Under {
             approach: approach.directions(),
             held: None,
+            temperature_c: &[],
         };
         robot.model.forward(&q, &under, &mut work).expect("poses");
         let body = robot.model.place("marker_plate").expect("a body");
@@ -162,6 +163,7 @@ fn corrected(named: Option<&str>) {
         let under = Under {
             approach: approach.directions(),
             held: None,
+            temperature_c: &[],
         };
         robot
             .model

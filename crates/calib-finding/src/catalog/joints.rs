@@ -112,6 +112,12 @@ super::topic! {
             "No recording moves {joints}, so their axes and zeros are not calibrated, and postures in which they stand elsewhere are not covered.",
             "Move them in some recordings. If something other than its own motor moves one of them (a passive joint), declare what: `<mimic>` in the URDF, or `coupled_to` under `solve: {joints: …}`. With `free: []` there you state that it is locked.";
     }
+    /// Growth with temperature is free, and a recording has no temperature.
+    TEMPERATURE_MISSING = "temperature-missing" {
+        "": Warning,
+            "The profile frees `thermal_expansion`, but the recording has no temperature of {joints}; their links are taken as warm as the reference.",
+            "Record a column `temperature_c` (the whole robot) or `<joint>_temperature_c`, map one under `columns`, or leave `thermal_expansion` out of `free`.";
+    }
     /// The load is to be measured, and joints have no torque.
     TORQUE_MISSING = "torque-missing" {
         "": Warning,

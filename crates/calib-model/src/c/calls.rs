@@ -71,6 +71,7 @@ struct Call<'a> {
     work: &'a mut Work,
     approach: &'a Approach,
     held: Option<&'a [f64]>,
+    temperature_c: &'a [f64],
 }
 
 impl<'a> Call<'a> {
@@ -80,7 +81,11 @@ impl<'a> Call<'a> {
         held: *const f64,
     ) -> Result<Self, ModelError> {
         let model = &unsafe { given::shared(model) }?.model;
-        let CWork { work, approach } = unsafe { given::unique(work) }?;
+        let CWork {
+            work,
+            approach,
+            temperature_c,
+        } = unsafe { given::unique(work) }?;
         let held = match held.is_null() {
             true => None,
             false => Some(unsafe { given::numbers(held, model.joints().len()) }?),
@@ -90,6 +95,7 @@ impl<'a> Call<'a> {
             work,
             approach,
             held,
+            temperature_c,
         })
     }
 
@@ -97,6 +103,7 @@ impl<'a> Call<'a> {
         Under {
             approach: self.approach.directions(),
             held: self.held,
+            temperature_c: self.temperature_c,
         }
     }
 }
@@ -360,6 +367,30 @@ pub unsafe extern "C" fn calib_model_set_approach(
         let own = &mut unsafe { given::unique(work) }?.approach;
         let n = own.directions().len();
         own.set(unsafe { given::numbers(directions, n) }?)?;
+        Ok(status::OK)
+    })
+}
+
+/// States the temperature of the link before each joint, °C; null: that at which the lengths hold.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn calib_model_set_temperature(
+    model: *const CModel,
+    work: *mut CWork,
+    celsius: *const f64,
+) -> c_int {
+    guarded(|| {
+        let model = &unsafe { given::shared(model) }?.model;
+        let own = &mut unsafe { given::unique(work) }?.temperature_c;
+        if celsius.is_null() {
+            own.fill(model.reference_temperature_c());
+            return Ok(status::OK);
+        }
+        let given = unsafe { given::numbers(celsius, model.joints().len()) }?;
+        model.checked("temperature", given)?;
+        if own.len() != given.len() {
+            return Err(ModelError::ForeignWork);
+        }
+        own.copy_from_slice(given);
         Ok(status::OK)
     })
 }

@@ -42,6 +42,8 @@ pub struct CModel {
 pub struct CWork {
     work: Work,
     approach: Approach,
+    /// Of the link before each joint, °C.
+    temperature_c: Vec<f64>,
 }
 
 fn status_of(error: &ModelError) -> c_int {
@@ -201,6 +203,11 @@ pub unsafe extern "C" fn calib_model_link(
     })
 }
 
+/// Every link is as warm as where the model's lengths hold.
+fn reference(model: &Model) -> Vec<f64> {
+    vec![model.reference_temperature_c(); model.joints().len()]
+}
+
 /// Working memory for one thread, or null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn calib_model_work_new(model: *const CModel) -> *mut CWork {
@@ -209,6 +216,7 @@ pub unsafe extern "C" fn calib_model_work_new(model: *const CModel) -> *mut CWor
         Some(Box::new(CWork {
             work: model.model.work(),
             approach: Approach::new(&model.model),
+            temperature_c: reference(&model.model),
         }))
     }));
     made.ok()

@@ -1,10 +1,12 @@
 //! Joint effects: what the motion of a real joint adds to its reading. One file and one entry of [`EFFECTS`] each.
 //!
 //! ```text
-//! φ = q + Σ_j F_j c_j,   θ = Σ_j e_j F_j c_j,   joint_from_child = exp(S φ) · Exp(θ)        (1)
+//! φ = q + Σ_j F_j c_j,   θ = Σ_j e_j F_j c_j,   δ = p Σ_j F_j c_j
+//! joint_from_child = Trans(δ) · exp(S φ) · Exp(θ)                                           (1)
 //! ```
 //!
-//! F_j, the regressor of a term, follows from the [`JointState`]; c_j is its coefficient. Everything that depends on
+//! F_j, the regressor of a term, follows from the [`JointState`]; c_j is its coefficient. p, the joint's reach, leads from the
+//! joint before it that moves (or from the root) to its origin, m, in the axes of the joint, as the nominal robot has it. Everything that depends on
 //! the set of effects (formulation, simulation, prediction, score tests, profile keys, export, report) reads the
 //! table. To add an effect: write its file, name its terms in [`EffectKind`] and list it in [`EFFECTS`].
 
@@ -30,6 +32,7 @@ pub mod other;
 mod outside;
 mod prior;
 mod shared;
+pub mod thermal_expansion;
 
 pub use outside::{Outside, Regressor, Stated};
 pub use prior::{Prior, PriorKey};
@@ -49,6 +52,7 @@ pub static EFFECTS: &[&Effect] = &[
     &flank_backlash::EFFECT,
     &friction::EFFECT,
     &coupling::EFFECT,
+    &thermal_expansion::EFFECT,
     &clock_offset::EFFECT,
     &other::EFFECT,
 ];
@@ -96,6 +100,8 @@ pub enum EffectKind {
     Friction,
     /// F = another joint's reading.
     Coupling,
+    /// Along the joint's reach, F = temperature above that of the reference, K.
+    ThermalExpansion,
     /// F = joint velocity, rad/s (m/s); the coefficient is a time.
     ClockOffset,
     /// F = whatever the caller supplies.
@@ -124,6 +130,8 @@ pub struct JointState {
     pub friction: f64,
     /// Reading of the joint that this one is coupled to, rad or m.
     pub other: f64,
+    /// Temperature of the link before the joint above that at which the nominal lengths hold, K.
+    pub warmth: f64,
     /// Regressor that the caller supplies.
     pub given: f64,
 }
@@ -146,6 +154,8 @@ pub enum Source {
     Friction,
     /// Another joint's reading.
     OtherJoint,
+    /// The temperature.
+    Temperature,
     /// The joint's velocity.
     Velocity,
     /// The caller.
@@ -154,12 +164,13 @@ pub enum Source {
 
 /// What a term adds to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Drives {
     /// φ of equation (1): the motion about (along) the axis.
     About,
     /// θ of equation (1): the rotation about this axis across ([`Axis::across`]).
     Across(usize),
+    /// δ of equation (1): the length that leads to the joint.
+    Along,
 }
 
 /// What a coefficient measures; its unit follows with the joint's kind.
@@ -176,6 +187,8 @@ pub enum Quantity {
     LateralCompliance,
     /// A time, s.
     Time,
+    /// Growth of a length per temperature, 1/K.
+    Expansion,
 }
 
 impl Quantity {
@@ -189,6 +202,7 @@ impl Quantity {
             (Self::Compliance, true) => Unit::MeterPerNewton,
             (Self::Compliance, false) | (Self::LateralCompliance, _) => Unit::RadianPerNewtonMeter,
             (Self::Time, _) => Unit::Second,
+            (Self::Expansion, _) => Unit::PerKelvin,
         }
     }
 }
@@ -427,13 +441,10 @@ impl EffectKind {
         self.effect().physics
     }
 
-    /// The rotation axis across the joint axis that the term drives, if it is lateral.
+    /// What the term adds to.
     #[must_use]
-    pub fn lateral(self) -> Option<usize> {
-        match self.term().drives {
-            Drives::About => None,
-            Drives::Across(k) => Some(k),
-        }
+    pub fn drives(self) -> Drives {
+        self.term().drives
     }
 
     /// F of equation (1) at every state; `None` where it is 1 everywhere.

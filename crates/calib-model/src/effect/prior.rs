@@ -40,6 +40,16 @@ impl PriorKey {
         }
     }
 
+    /// A key in millionths per kelvin.
+    pub(crate) const fn ppm_per_k(key: &'static str, text: &'static str, default: f64) -> Self {
+        Self {
+            key,
+            text,
+            default,
+            si: 1e-6,
+        }
+    }
+
     /// A key in millimeters.
     pub(crate) const fn mm(key: &'static str, text: &'static str, default: f64) -> Self {
         Self {

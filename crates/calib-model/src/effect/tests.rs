@@ -34,6 +34,7 @@ fn numbers_of_the_state_are_the_regressors() {
         motor: 31.0,
         friction: 0.5,
         other: 0.9,
+        warmth: 3.0,
         given: 1.7,
     };
     let shared: Vec<EffectKind> = EffectKind::all()

@@ -104,6 +104,8 @@ pub(super) fn joint(
         lateral: [0.0; 2],
         flank: 0.0,
         couplings: Vec::new(),
+        growth: Vector3::zeros(),
+        grows: false,
         direct: Vec::new(),
         yields: false,
         turns: false,
@@ -152,6 +154,9 @@ fn add(out: &mut Joint, effect: &ModelEffect, term: JointTerm) {
         out.of_state[k] += term.value;
     } else if let Some(k) = among(&LATERAL) {
         out.lateral[k] += term.value;
+    } else if let Some(reach) = term.along {
+        out.growth += reach * term.value;
+        out.grows = true;
     } else if let Some(other) = term.other {
         out.couplings.push((other, term.value));
     } else if term.jumps {
@@ -202,13 +207,13 @@ fn joint_term(
         ));
     }
     let across = match (term.drives, effect.about) {
-        (Drives::About, None) => None,
+        (Drives::About | Drives::Along, None) => None,
         (Drives::Across(n), Some(about)) => Some((n, unit(&place("about"), about)?.into_inner())),
-        (Drives::About, Some(_)) => {
+        (Drives::About | Drives::Along, Some(_)) => {
             return Err(value(
                 place("about"),
                 "a vector",
-                "null: this effect is about the axis",
+                "null: this effect does not turn across the axis",
             ));
         }
         (Drives::Across(_), None) => {
@@ -218,6 +223,20 @@ fn joint_term(
                 "the axis across that it is about",
             ));
         }
+    };
+    let along = match (term.drives, effect.along) {
+        (Drives::Along, Some(along)) => {
+            finite(&place("along"), &along)?;
+            Some(Vector3::from(along))
+        }
+        (Drives::Along, None) => {
+            return Err(value(place("along"), "null", "the length that grows"));
+        }
+        (_, Some(_)) => {
+            let expected = "null: this effect changes no length";
+            return Err(value(place("along"), "a vector", expected));
+        }
+        (_, None) => None,
     };
     let other = match (term.kind, &effect.other) {
         (EffectKind::Coupling, Some(name)) => Some(names.joint(&place("other"), name)?),
@@ -230,6 +249,7 @@ fn joint_term(
         term,
         value: effect.value,
         across,
+        along,
         other,
         jumps: term.kind == EffectKind::FlankBacklash,
     })

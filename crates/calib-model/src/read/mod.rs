@@ -8,6 +8,7 @@ use calib_geometry::so3;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::effect::Source;
+use crate::effect::thermal_expansion::REFERENCE_TEMPERATURE_C;
 use crate::error::ModelError;
 use crate::file::{FormatVersion, ModelMotion, ModelNumber, ModelPose, RobotModelFile, VERSION};
 use crate::model::{FindOutside, Fixed, Joint, JointInfo, JointTerm, Model, Number};
@@ -89,6 +90,11 @@ impl Model {
             let place = "approach_threshold".to_owned();
             return Err(value(place, file.approach_threshold, "a number from 0 up"));
         }
+        let temperature = file.reference_temperature_c;
+        finite(
+            "reference_temperature_c",
+            &[temperature.unwrap_or_default()],
+        )?;
         if file.joints.len() > MOST_JOINTS {
             let found = file.joints.len();
             return Err(value("joints".to_owned(), found, "at most 500 joints"));
@@ -102,6 +108,9 @@ impl Model {
             gravity: Vector3::from(file.gravity_m_s2),
             loaded: false,
             threshold: file.approach_threshold,
+            reference_temperature: file
+                .reference_temperature_c
+                .unwrap_or(REFERENCE_TEMPERATURE_C),
             tracker_from_root: pose("tracker_from_root", &file.tracker_from_root)?,
             bodies: Vec::new(),
             points: Vec::new(),

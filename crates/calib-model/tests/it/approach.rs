@@ -44,6 +44,7 @@ fn backlash_lies_on_the_side_that_the_joint_came_from() {
         let under = Under {
             approach: &approach,
             held: None,
+            temperature_c: &[],
         };
         model
             .forward(&[0.2, 0.3], &under, &mut work)

@@ -99,6 +99,7 @@ pub fn robot(r: &mut ChaCha8Rng, n: usize, mixed: bool, which: Effects) -> Robot
         file.links.push(link(&joint.child, r));
         file.joints.push(joint);
     }
+    grow(&mut file);
     let end = format!("link_{n}");
     let mount = Some(pose(&Isometry3::new(vector(r, 0.1), vector(r, 1.0))));
     file.bodies.insert(
@@ -113,6 +114,36 @@ pub fn robot(r: &mut ChaCha8Rng, n: usize, mixed: bool, which: Effects) -> Robot
     file.points
         .insert("tip".to_owned(), ModelPoint { link: end, xyz_m });
     file
+}
+
+/// °C of links: for robots of up to ten joints.
+pub const WARM: [f64; 10] = [31.0, 27.5, 35.0, 12.0, 20.0, 41.0, 8.0, 25.0, 22.0, 30.0];
+
+/// What grows is the length from the joint before that moves, nominal, in the axes of the joint.
+fn grow(file: &mut RobotModelFile) {
+    let at = |p: &ModelPose| {
+        let [x, y, z, w] = p.quat_xyzw;
+        let rotation =
+            nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, x, y, z));
+        Isometry3::from_parts(Vector3::from(p.xyz_m).into(), rotation)
+    };
+    for i in 0..file.joints.len() {
+        let mut joint = &file.joints[i];
+        let mut reach = at(&joint.load_origin);
+        while let Some(before) = file.joints.iter().find(|j| j.child == joint.parent) {
+            if before.motion != ModelMotion::Fixed {
+                break;
+            }
+            reach = at(&before.load_origin) * reach;
+            joint = before;
+        }
+        let reach = reach.rotation.inverse() * reach.translation.vector;
+        for effect in &mut file.joints[i].effects {
+            if let Some(along) = &mut effect.along {
+                *along = reach.into();
+            }
+        }
+    }
 }
 
 fn link(name: &str, r: &mut ChaCha8Rng) -> ModelLink {
@@ -158,12 +189,18 @@ fn effects(
             out.push(ModelEffect {
                 kind: term.name.to_owned(),
                 formula: term.formula.to_owned(),
-                value: within(r, size),
+                value: match term.source {
+                    // Aluminium.
+                    Source::Temperature => 2.3e-5,
+                    _ => within(r, size),
+                },
                 unit: String::new(),
                 about: match term.drives {
                     Drives::Across(k) => Some(axis.across()[k].into()),
                     _ => None,
                 },
+                // Known when all joints are there.
+                along: (term.drives == Drives::Along).then_some([0.0; 3]),
                 other: (term.kind == EffectKind::Coupling)
                     .then(|| before[before.len() - 1].clone()),
                 gear_ratio: (term.source == Source::Motor).then_some(50.0),

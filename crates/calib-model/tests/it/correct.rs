@@ -6,7 +6,7 @@ use calib_model::{Aim, Model, Options, Outcome, Pose, Under};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::common::{Effects, pose, posture, rng, robot, vector, within};
+use crate::common::{Effects, WARM, pose, posture, rng, robot, vector, within};
 
 /// The same robot as a calibration finds it: every coefficient wrong by up to 5 %, every origin by up to 0.05 mm and 0.1 mrad.
 fn found(truth: &RobotModelFile, r: &mut ChaCha8Rng) -> RobotModelFile {
@@ -44,6 +44,7 @@ fn the_true_tool_error_becomes_the_error_of_the_prediction() {
             let under = Under {
                 approach: &approach,
                 held: None,
+                temperature_c: &WARM[..model.joints().len()],
             };
             let mut command = vec![0.0; dof];
             let done = model

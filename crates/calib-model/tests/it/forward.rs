@@ -113,6 +113,7 @@ fn measured_torques_replace_gravity() {
         let under = Under {
             approach: &[],
             held,
+            temperature_c: &[],
         };
         model.forward(&q, &under, work).expect("a pose");
         work.root_from_link(tool).t
@@ -124,6 +125,57 @@ fn measured_torques_replace_gravity() {
     assert!((gravity - free).norm() > 1e-4);
     let arm = (free - work_origin()).norm();
     assert!(((pushed - free).norm() - 10.0 * 2e-4 * arm).abs() < 1e-6);
+}
+
+#[test]
+fn a_link_grows_with_its_temperature_from_the_reference_on() {
+    let mut file = RobotModelFile::from_json(ARM.as_bytes()).expect("a file");
+    file.reference_temperature_c = Some(25.0);
+    let along = [0.1, -0.2, 0.3];
+    let mut effect = file.joints[0].effects[0].clone();
+    effect.kind = "thermal_expansion".to_owned();
+    (effect.value, effect.about, effect.along) = (2e-5, None, Some(along));
+    let joint = file
+        .joints
+        .iter_mut()
+        .find(|j| j.axis.is_some())
+        .expect("one");
+    joint.effects.push(effect);
+    let model = Model::new(&file).expect("a model");
+    assert!(model.grows() && !arm().grows());
+    let tool = model.link("tool").expect("a link");
+    let mut work = model.work();
+    let mut at = |temperature_c: &[f64]| {
+        let under = Under {
+            temperature_c,
+            ..Under::default()
+        };
+        model
+            .forward(&[0.4, -0.7], &under, &mut work)
+            .expect("a pose");
+        work.root_from_link(tool).t
+    };
+    let (unknown, reference, warm) = (at(&[]), at(&[25.0, 60.0]), at(&[35.0, 60.0]));
+    assert_eq!(unknown, reference);
+    let grown = calib_model::nalgebra::Vector3::from(along).norm() * 2e-5 * 10.0;
+    assert!(((warm - reference).norm() - grown).abs() < 1e-15);
+    let short = Under {
+        temperature_c: &[25.0],
+        ..Under::default()
+    };
+    let refused = model.forward(&[0.4, -0.7], &short, &mut model.work());
+    let named = matches!(&refused, Err(ModelError::Length { what, .. }) if *what == "temperature");
+    assert!(named, "{refused:?}");
+    // Growth of nothing, or along an axis, is refused.
+    let last = |file: &mut RobotModelFile, along, about| {
+        let joint = file.joints.iter_mut().find(|j| j.axis.is_some());
+        let effect = joint.and_then(|j| j.effects.last_mut()).expect("one");
+        (effect.along, effect.about) = (along, about);
+    };
+    for (along, about) in [(None, None), (Some(along), Some([0.0, 0.0, 1.0]))] {
+        last(&mut file, along, about);
+        assert!(matches!(Model::new(&file), Err(ModelError::Value { .. })));
+    }
 }
 
 /// Where the shoulder of the arm is.

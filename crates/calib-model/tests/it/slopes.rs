@@ -6,7 +6,7 @@ use calib_model::nalgebra::{
 };
 use calib_model::{Model, Place, Pose, Under};
 
-use crate::common::{Effects, pose, posture, rng, robot, with_uncertainty};
+use crate::common::{Effects, WARM, pose, posture, rng, robot, with_uncertainty};
 
 /// Twist from one pose to another, [ω; v] in the first.
 fn between(a: &Pose, b: &Pose) -> Vector6<f64> {
@@ -21,6 +21,7 @@ fn at(model: &Model, q: &[f64], place: Place, approach: &[f64], tracker: bool) -
     let under = Under {
         approach,
         held: None,
+        temperature_c: &WARM[..model.joints().len()],
     };
     model.forward(q, &under, &mut work).expect("poses");
     match tracker {
@@ -43,7 +44,10 @@ fn the_jacobian_is_the_slope_of_the_pose() {
         let mut work = model.work();
         for link in [model.last_link(), model.link("link_3").expect("a link")] {
             let mut jacobian = vec![0.0; 6 * dof];
-            let under = Under::default();
+            let under = Under {
+                temperature_c: &WARM[..dof],
+                ..Under::default()
+            };
             model
                 .jacobian(&q, link, &under, &mut work, &mut jacobian)
                 .expect("a jacobian");
@@ -163,6 +167,7 @@ fn the_covariance_is_that_of_the_numbers() {
             let under = Under {
                 approach: &approach,
                 held: None,
+                temperature_c: &WARM[..model.joints().len()],
             };
             let own = match tracker {
                 true => model.sigma_in_tracker(&q, place, &under, &mut work),

@@ -57,10 +57,10 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
         return bad;
     }
     let rejected = rejected_bodies(fit);
-    let (model, load) = (&inputs.robot.model, inputs.robot.profile.solve.load);
+    let load = inputs.robot.profile.solve.load;
     let recordings = inputs.recordings.iter();
     let conditions = recordings
-        .map(|(name, r)| (name.as_str(), conditions(r, model, load)))
+        .map(|(name, r)| (name.as_str(), conditions(r, &inputs.robot, load)))
         .collect();
     let of_no_side = rows_of_no_side(inputs);
     for name in inputs.robot.profile.bodies.keys() {

@@ -106,7 +106,7 @@ fn root_with_mounts_held(
     let (mut at_root, mut seen_at) = (Vec::new(), Vec::new());
     let recordings = inputs.recordings.iter();
     for (name, loaded) in recordings.filter(|(_, r)| r.spec.usage != Usage::Validation) {
-        let under = conditions(loaded, &robot.model, profile.solve.load);
+        let under = conditions(loaded, &inputs.robot, profile.solve.load);
         for (row, q) in loaded.q.iter().enumerate() {
             let Some(q) = q else { continue };
             let root_from_link = robot.root_from_link_under(q, &under[row]);
@@ -143,7 +143,7 @@ fn paper_transform(
     let pose = estimate.pose?;
     let zero = model.forward_kinematics(&model.zero_positions());
     let sweep = &inputs.recordings[&origin.sweep];
-    let under = conditions(sweep, model, profile.solve.load);
+    let under = conditions(sweep, &inputs.robot, profile.solve.load);
     let mut samples = Vec::new();
     for ((q, under), seen) in sweep
         .q

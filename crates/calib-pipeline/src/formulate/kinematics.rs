@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use calib_core::{Axis, EffectKind, JointMotion, JointState};
 use calib_profile::RobotLoad;
 use calib_urdf::{JointId, JointKind, RobotModel};
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::prepare::conditions::Conditions;
@@ -129,7 +129,8 @@ impl Calibration {
                 c * regressor.at(&JointState { other, ..state }),
             )
         });
-        JointMotion::new(axis, state.q, own.chain(coupled)).joint_from_child()
+        let reach = self.masses.reach()[joint.index()];
+        JointMotion::new((axis, reach), state.q, own.chain(coupled)).joint_from_child()
     }
 
     /// The geometry with zero offsets put into the origins: what a URDF can hold.
@@ -143,7 +144,8 @@ impl Calibration {
                 continue;
             };
             let amount = [(EffectKind::ZeroOffset, offset)];
-            let moved = JointMotion::new(axis, 0.0, amount).joint_from_child();
+            let still = (axis, Vector3::zeros());
+            let moved = JointMotion::new(still, 0.0, amount).joint_from_child();
             model = model.with_origin(joint, j.parent_link_from_joint * moved);
         }
         model
@@ -191,6 +193,7 @@ pub fn joint_state(
         torque: loads.about_axis[index],
         across: loads.across[index],
         approach: under.approach_of(index),
+        warmth: under.warmth_of(index),
         ..JointState::default()
     }
 }

@@ -201,7 +201,7 @@ fn solved(vectors: &[Vector], drifts: bool) -> Option<(Vector2<f64>, Vec<Vector2
 /// rᵢ and vᵢ of every marker, and of every body that is measured as a pose.
 fn vectors(inputs: &Inputs, loaded: &Loaded, robot: &Robot<'_>) -> Vec<Vector> {
     let model = &inputs.robot.model;
-    let under = conditions(loaded, model, inputs.robot.profile.solve.load);
+    let under = conditions(loaded, &inputs.robot, inputs.robot.profile.solve.load);
     let so_far = so_far(loaded);
     let mut out = Vec::new();
     for (row, q) in loaded.q.iter().enumerate() {

@@ -37,7 +37,7 @@ pub(crate) fn rows_of_no_side(inputs: &Inputs) -> BTreeSet<(String, usize)> {
     let joints: Vec<JointId> = sided_joints(inputs).collect();
     let mut out = BTreeSet::new();
     for (name, loaded) in inputs.recordings.iter().filter(|_| !joints.is_empty()) {
-        let under = conditions(loaded, &inputs.robot.model, Load::Gravity);
+        let under = conditions(loaded, &inputs.robot, Load::Gravity);
         for joint in &joints {
             let open = |row: &usize| under[*row].approach_of(joint.index()) == 0.0;
             let rows: Vec<usize> = (0..under.len()).take_while(open).collect();

@@ -196,6 +196,7 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
         "# Joint effects that a URDF cannot hold. Zero offsets are in the URDF's origins already.\n\
          # phi = q + {}\n\
          # rotation about the first axis across: {}; about the second: {}\n\
+         {}\
          # torque: what the load exerts about the axis, N m (minus what the joint holds); torque_across: about the two axes\n\
          # across, which turn with the joint. A compliance above 0 gives way.\n\
          # approach: +1 where the joint came from below, -1 from above; backlash is half of the clearance.\n\
@@ -205,6 +206,7 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
         sum(Drives::About),
         sum(Drives::Across(0)),
         sum(Drives::Across(1)),
+        growth_comment(inputs, robot, &sum(Drives::Along)),
         plugins_comment(robot),
         loads_yaml(inputs, robot),
     );
@@ -224,6 +226,11 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
                     let [x, y, z] = [v.x, v.y, v.z];
                     let _ = writeln!(text, "    {}_axis: [{x}, {y}, {z}]", term.name);
                 }
+                if term.drives == Drives::Along {
+                    let reach = robot.masses.reach()[joint.index()];
+                    let [x, y, z] = [reach.x, reach.y, reach.z];
+                    let _ = writeln!(text, "    {}_of_m: [{x}, {y}, {z}]", term.name);
+                }
             }
         }
         text.push_str(&plugins_yaml(e));
@@ -236,6 +243,18 @@ pub fn calibration_yaml(inputs: &Inputs, robot: &Calibration) -> Option<String> 
         }
     }
     Some(text)
+}
+
+/// What grows, and from which temperature on.
+fn growth_comment(inputs: &Inputs, robot: &Calibration, sum: &str) -> String {
+    let grows = |e: &JointEffects| e.of(EffectKind::ThermalExpansion) != 0.0;
+    if !robot.effects.iter().any(grows) {
+        return String::new();
+    }
+    let reference = inputs.robot.profile.load.reference_temperature_c;
+    format!(
+        "# The length before the joint (`_of_m`, from the joint before that moves, in the joint's axes) grows by {sum}, T0 = {reference} degC.\n"
+    )
 }
 
 /// Coefficients of the effects that plugins compute.

@@ -54,6 +54,8 @@ pub fn model_file(inputs: &Inputs, solved: &Solved, scene: &Scene) -> RobotModel
             .map(|j| joint(inputs, robot, j))
             .collect(),
         approach_threshold: STILL,
+        reference_temperature_c: grows(robot)
+            .then_some(inputs.robot.profile.load.reference_temperature_c),
         tracker: profile.tracker.frame.clone(),
         tracker_from_root: pose(&robot.tracker_from_root),
         bodies: bodies(inputs, robot),
@@ -152,6 +154,16 @@ pub(super) fn mimic(model: &RobotModel, joint: &Joint) -> Option<ModelMimic> {
     })
 }
 
+/// Whether some length follows the temperature.
+fn grows(robot: &Calibration) -> bool {
+    let mut joints = robot.effects.iter();
+    joints.any(|e| {
+        e.coefficients
+            .keys()
+            .any(|kind| kind.drives() == Drives::Along)
+    })
+}
+
 fn effects(inputs: &Inputs, robot: &Calibration, id: JointId) -> Vec<ModelEffect> {
     let Some(axis) = motion_axis(&robot.model, id) else {
         return Vec::new();
@@ -169,6 +181,7 @@ fn effects(inputs: &Inputs, robot: &Calibration, id: JointId) -> Vec<ModelEffect
                 Drives::Across(k) => Some(axis.across()[k].into()),
                 _ => None,
             },
+            along: (term.drives == Drives::Along).then(|| robot.masses.reach()[id.index()].into()),
             other: other.map(|o| robot.model.joints()[o].name.clone()),
             gear_ratio: (term.source == Source::Motor).then_some(drive.gear_ratio),
             friction: (term.source == Source::Friction).then_some(drive.friction),

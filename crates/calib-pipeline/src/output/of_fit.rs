@@ -34,6 +34,7 @@ pub(crate) fn unit(unit: calib_core::Unit) -> Unit {
         calib_core::Unit::One => Unit::One,
         calib_core::Unit::RadianPerNewtonMeter => Unit::RadianPerNewtonMeter,
         calib_core::Unit::MeterPerNewton => Unit::MeterPerNewton,
+        calib_core::Unit::PerKelvin => Unit::PerKelvin,
         calib_core::Unit::KilogramMeter => Unit::KilogramMeter,
     }
 }

@@ -186,7 +186,7 @@ impl<'a> Streams<'a> {
         }
     }
 
-    /// Adds joint positions and torques at the tracker's times to its table; gives the joints' speeds.
+    /// Adds joint positions, torques and temperatures at the tracker's times to its table; gives the joints' speeds.
     fn add_robot(&self, full: &mut Poses, clocks: &ClockState) -> Velocities {
         let mut velocities = BTreeMap::new();
         let at_robot = |t: &f64| clocks.at_robot(*t);
@@ -203,6 +203,10 @@ impl<'a> Streams<'a> {
         for (joint, stream) in Scalars::of_torques(self.recording) {
             let torque = self.times.iter().map(|t| stream.at(at_robot(t))).collect();
             full.torques.insert(joint, torque);
+        }
+        for (joint, stream) in Scalars::of_temperatures(self.recording) {
+            let celsius = self.times.iter().map(|t| stream.at(at_robot(t))).collect();
+            full.temperatures.insert(joint, celsius);
         }
         velocities
     }

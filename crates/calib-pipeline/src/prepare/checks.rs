@@ -11,7 +11,7 @@ use calib_profile::{BodyKind, Contact, Free, JointFree, Load, Usage};
 use calib_recording::Poses;
 use calib_urdf::JointId;
 
-use crate::prepare::conditions::missing_torques;
+use crate::prepare::conditions::{missing_temperatures, missing_torques};
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::untracked::missing_bodies;
 
@@ -55,6 +55,7 @@ pub fn check(inputs: &Inputs) -> Vec<Finding> {
     }
     findings.extend(shapes(inputs));
     findings.extend(missing_torques(inputs));
+    findings.extend(missing_temperatures(inputs));
     findings.extend(no_masses(inputs));
     findings.extend(stood_still(inputs));
     findings

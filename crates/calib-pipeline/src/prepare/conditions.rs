@@ -1,10 +1,12 @@
-//! What a joint reading alone does not say: from which side each joint came, and which torques were measured.
+//! What a joint reading alone does not say: from which side each joint came, which torques were measured, and how warm it was.
 
+use calib_core::effect::{Effect, Source};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::Load;
-use calib_urdf::RobotModel;
+use calib_recording::WHOLE_ROBOT;
+use calib_urdf::JointId;
 
-use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::inputs::{Inputs, Loaded, RobotProfile};
 
 /// A joint that moves less than this from one row to the next keeps its direction of approach, rad or m.
 pub(crate) const STILL: f64 = 1e-5;
@@ -16,14 +18,56 @@ pub struct Conditions {
     pub approach: Vec<f64>,
     /// Measured torque that each joint holds about its axis, N m, by joint index; `None`: gravity loads it.
     pub torque: Option<Vec<f64>>,
+    /// Temperature of the link before each joint above that at which the nominal lengths hold, K, by joint index; empty: none.
+    pub warmth: Vec<f64>,
 }
 
 impl Conditions {
+    /// How much warmer than the reference the link before a joint is, K.
+    #[must_use]
+    pub fn warmth_of(&self, joint: usize) -> f64 {
+        self.warmth.get(joint).copied().unwrap_or(0.0)
+    }
+
     /// Direction of approach of one joint.
     #[must_use]
     pub fn approach_of(&self, joint: usize) -> f64 {
         self.approach.get(joint).copied().unwrap_or(0.0)
     }
+}
+
+/// Joints whose growth is free, in recordings without a temperature of theirs.
+#[must_use]
+pub fn missing_temperatures(inputs: &Inputs) -> Vec<Finding> {
+    let robot = &inputs.robot;
+    let grows = |joint: &JointId| {
+        let set = robot.profile.solve.free_set(*joint, true, false);
+        let by_temperature = |e: &Effect| e.terms.iter().any(|t| t.source == Source::Temperature);
+        set.effects.iter().any(|free| by_temperature(free.effect))
+    };
+    let growing: Vec<JointId> = robot
+        .model
+        .independent_joints()
+        .into_iter()
+        .filter(grows)
+        .collect();
+    let mut findings = Vec::new();
+    for (name, loaded) in &inputs.recordings {
+        let of = &loaded.poses.temperatures;
+        let measured = |joint: &str| {
+            let own = of.get(joint).or_else(|| of.get(WHOLE_ROBOT));
+            own.is_some_and(|column| column.iter().any(Option::is_some))
+        };
+        let joints = growing.iter().map(|j| robot.model.joint(*j).name.as_str());
+        let without: Vec<&str> = joints.filter(|j| !measured(j)).collect();
+        if !without.is_empty() {
+            findings.push(
+                Finding::new(catalog::TEMPERATURE_MISSING, Subject::recording(name))
+                    .with("joints", Fact::names(without)),
+            );
+        }
+    }
+    findings
 }
 
 /// Joints that moved in a recording whose load is to be measured, and was not.
@@ -51,7 +95,9 @@ pub fn missing_torques(inputs: &Inputs) -> Vec<Finding> {
 
 /// Circumstances of every row of a recording, whose rows are taken in the order in which they were recorded.
 #[must_use]
-pub fn conditions(loaded: &Loaded, model: &RobotModel, load: Load) -> Vec<Conditions> {
+pub fn conditions(loaded: &Loaded, robot: &RobotProfile, load: Load) -> Vec<Conditions> {
+    let model = &robot.model;
+    let warmth = warmth(loaded, robot);
     let n = model.joints().len();
     let known = |joint| loaded.starts.get(&joint).copied().unwrap_or(0.0);
     let mut approach: Vec<f64> = (0..n).map(known).collect();
@@ -80,7 +126,34 @@ pub fn conditions(loaded: &Loaded, model: &RobotModel, load: Load) -> Vec<Condit
         out.push(Conditions {
             approach: approach.clone(),
             torque,
+            warmth: warmth.get(row).cloned().unwrap_or_default(),
         });
+    }
+    out
+}
+
+/// Warmth of every row by joint; empty where the recording has no temperature. Temperatures change slowly: a cell that is empty has
+/// that of the last one before it, or of the first.
+fn warmth(loaded: &Loaded, robot: &RobotProfile) -> Vec<Vec<f64>> {
+    let temperatures = &loaded.poses.temperatures;
+    if temperatures.is_empty() {
+        return Vec::new();
+    }
+    let reference = robot.profile.load.reference_temperature_c;
+    let mut out = vec![vec![0.0; robot.model.joints().len()]; loaded.q.len()];
+    for (index, joint) in robot.model.joints().iter().enumerate() {
+        let source = &robot.model.joint(joint.law.source).name;
+        let names = [joint.name.as_str(), source, WHOLE_ROBOT];
+        let Some(column) = names.iter().find_map(|name| temperatures.get(*name)) else {
+            continue;
+        };
+        let Some(mut last) = column.iter().flatten().next().copied() else {
+            continue;
+        };
+        for (row, celsius) in out.iter_mut().zip(column) {
+            last = celsius.unwrap_or(last);
+            row[index] = last - reference;
+        }
     }
     out
 }

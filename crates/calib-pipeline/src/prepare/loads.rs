@@ -7,6 +7,7 @@
 //!
 //! τ is what gravity exerts: a joint that gives way turns along it.
 
+use calib_core::effect::Drives;
 use calib_core::{Axis, EffectKind};
 use calib_profile::{Prior, RobotLoad};
 use calib_urdf::{JointId, LinkId, RobotModel};
@@ -27,6 +28,8 @@ pub struct Masses {
     leaves_first: Vec<JointId>,
     /// By joint index.
     drives: Vec<Drive>,
+    /// From the joint before that moves, m, in the joint's axes, by joint index: the lengths that grow with temperature.
+    reach: Vec<Vector3<f64>>,
     /// Mass that was assumed because the URDF has none, kg.
     pub assumed: Option<f64>,
 }
@@ -73,6 +76,7 @@ impl Masses {
                     friction: load.friction.get(&joint).copied().unwrap_or(0.0),
                 })
                 .collect(),
+            reach: model.joint_ids().map(|j| model.reach(j)).collect(),
             beyond: vec![Vector3::zeros(); model.links().len()],
             leaves_first,
             assumed: (!model.has_masses()).then(|| unladen.total_mass()),
@@ -102,6 +106,12 @@ impl Masses {
     #[must_use]
     pub fn drives(&self) -> &[Drive] {
         &self.drives
+    }
+
+    /// Lengths that lead to the joints, from the joint before that moves, m, in their axes, by joint index; nominal.
+    #[must_use]
+    pub fn reach(&self) -> &[Vector3<f64>] {
+        &self.reach
     }
 
     /// The nominal robot with all masses that are given or assumed.
@@ -188,9 +198,9 @@ impl Masses {
         let Some(frame) = Frame::of(model, joint, &poses).filter(|_| turning) else {
             return vec![0.0; moments.len()];
         };
-        let along = match kind.lateral() {
-            None => frame.axis,
-            Some(k) => frame.across[k],
+        let along = match kind.drives() {
+            Drives::Across(k) => frame.across[k],
+            _ => frame.axis,
         };
         let share = |(link, axis): &FirstMoment| {
             if model.carries(joint, *link) {

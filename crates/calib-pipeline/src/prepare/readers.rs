@@ -234,6 +234,7 @@ pub fn recording(streams: Streams, source: &str, reader: &str) -> Recording {
                 torque: t.samples,
             })
             .collect(),
+        temperatures: Vec::new(),
         bodies: streams
             .bodies
             .into_iter()

@@ -67,6 +67,16 @@ impl Scalars {
         recording.torques.iter().map(stream).collect()
     }
 
+    /// All temperatures of a recording.
+    #[must_use]
+    pub fn of_temperatures(recording: &Recording) -> BTreeMap<String, Self> {
+        let stream = |s: &calib_recording::TemperatureStream| {
+            let scalars = Self::new(recording, s.timeline, &s.celsius, None);
+            (s.name.clone(), scalars)
+        };
+        recording.temperatures.iter().map(stream).collect()
+    }
+
     /// The value at `t`; `None` outside, in gaps, and next to a lost sample.
     #[must_use]
     pub fn at(&self, t: f64) -> Option<f64> {

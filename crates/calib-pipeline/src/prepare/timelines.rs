@@ -43,6 +43,11 @@ pub fn with_robot_log(mut tracker: Recording, robot: Recording) -> Recording {
             s.timeline += first;
             s
         }));
+    let temperatures = robot.temperatures.into_iter().map(|mut s| {
+        s.timeline += first;
+        s
+    });
+    tracker.temperatures.extend(temperatures);
     tracker.meta.conversions.extend(robot.meta.conversions);
     tracker.meta.findings.extend(robot.meta.findings);
     tracker

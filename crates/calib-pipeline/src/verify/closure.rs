@@ -55,7 +55,7 @@ pub fn close_loops(
             }
             let seen_from = tracks[&from.body].in_recording(recording);
             let seen_to = tracks[&to.body].in_recording(recording);
-            let under = conditions(loaded, &inputs.robot.model, inputs.robot.profile.solve.load);
+            let under = conditions(loaded, &inputs.robot, inputs.robot.profile.solve.load);
             for (row, q) in loaded.q.iter().enumerate() {
                 let (Some(q), Some(Some(t_a)), Some(Some(t_b))) =
                     (q, seen_from.get(row), seen_to.get(row))

@@ -45,7 +45,6 @@ pub fn deviations(
     robot: &Calibration,
     usage: impl Fn(Usage) -> bool,
 ) -> Vec<Deviation> {
-    let model = &inputs.robot.model;
     let profile = &inputs.robot.profile;
     let recordings = inputs.recordings.iter();
     let moved: Vec<(&String, &Body)> = profile
@@ -59,7 +58,7 @@ pub fn deviations(
         .collect();
     let mut out = Vec::new();
     for (name, loaded) in recordings.filter(|(_, r)| usage(r.spec.usage)) {
-        let under = conditions(loaded, model, profile.solve.load);
+        let under = conditions(loaded, &inputs.robot, profile.solve.load);
         for (row, q) in loaded.q.iter().enumerate() {
             let Some(q) = q else { continue };
             let root_from_link = robot.root_from_link_under(q, &under[row]);

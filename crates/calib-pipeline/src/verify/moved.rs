@@ -154,7 +154,7 @@ fn explained(
     robot: &Calibration,
     loaded: &Loaded,
 ) -> Option<(Tried, Vec<Tried>)> {
-    let under = conditions(loaded, &inputs.robot.model, inputs.robot.profile.solve.load);
+    let under = conditions(loaded, &inputs.robot, inputs.robot.profile.solve.load);
     let view = View {
         inputs,
         tracks,

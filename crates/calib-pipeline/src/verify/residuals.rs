@@ -64,7 +64,7 @@ pub fn residual_rows(
         .filter(|(_, r)| r.spec.usage != Usage::Validation)
     {
         let solve = &inputs.robot.profile.solve;
-        let under = conditions(loaded, &inputs.robot.model, solve.load);
+        let under = conditions(loaded, &inputs.robot, solve.load);
         for (row, q) in loaded.q.iter().enumerate() {
             let Some(q) = q else { continue };
             let root_from_link = robot.root_from_link_under(q, &under[row]);

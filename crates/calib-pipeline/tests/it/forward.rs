@@ -126,6 +126,7 @@ fn add_joint(
         .collect();
     let q = states.iter().map(|s| s.q).collect();
     let edge = p.joint(&j.name, origin, child, axis, q);
+    p.joint_reach(edge, robot.masses.reach()[joint.index()]);
     let effects = &robot.effects[joint.index()];
     for (kind, c) in &effects.coefficients {
         let id = p.free_effect_at(edge, *kind, &states, None);
@@ -152,7 +153,13 @@ fn the_predicted_pose_of_every_link_is_the_solver_s() {
                 let approach: Vec<f64> = draw(1.0);
                 let torque = (k % 2 == 0).then(|| draw(10.0));
                 let approach = approach.iter().map(|a| f64::signum(*a)).collect();
-                (q, Conditions { approach, torque })
+                let warmth = draw(15.0);
+                let under = Conditions {
+                    approach,
+                    torque,
+                    warmth,
+                };
+                (q, under)
             })
             .collect();
         let mut p = Problem::new(SAMPLES);

@@ -19,7 +19,7 @@ use rand::RngExt as _;
 #[allow(dead_code)]
 mod common;
 
-use common::{Effects, posture, rng, robot};
+use common::{Effects, WARM, posture, rng, robot};
 
 fn isometry(pose: &ModelPose) -> Isometry3<f64> {
     let [x, y, z, w] = pose.quat_xyzw;
@@ -139,6 +139,7 @@ fn by_graph(
         };
         let state = joint_state(model, id, q, &loads, under);
         let edge = problem.joint(&joint.name, origin, child, axis, vec![state.q]);
+        problem.joint_reach(edge, robot.masses.reach()[id.index()]);
         let effects = &robot.effects[id.index()];
         for (kind, value) in &effects.coefficients {
             problem.free_effect_at(edge, *kind, &[state], None);
@@ -201,17 +202,24 @@ fn the_library_the_solver_and_the_report_have_one_forward_model() {
             let mut under = Conditions {
                 approach: q.clone(),
                 torque: None,
+                warmth: q.clone(),
             };
             approach.update(&model, &own).expect("finite");
             for (k, joint) in model.joints().iter().enumerate() {
                 let id = robot.model.joint_id(&joint.name).expect("there").index();
                 q[id] = own[k];
+                under.warmth[id] = WARM[k] - 20.0;
                 under.approach[id] = before.as_ref().map_or(0.0, |b| (own[k] - b[k]).signum());
+            }
+            for id in robot.model.joint_ids() {
+                let source = robot.model.joint(id).law.source;
+                under.warmth[id.index()] = under.warmth[source.index()];
             }
             before = Some(own.clone());
             let given = Under {
                 approach: approach.directions(),
                 held: None,
+                temperature_c: &WARM[..model.joints().len()],
             };
             model.forward(&own, &given, &mut work).expect("poses");
             let here = model.root_from(place, &work).expect("a place");

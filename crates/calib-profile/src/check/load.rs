@@ -49,6 +49,15 @@ impl Checker<'_> {
             }
             load.stiffness.insert(joint, *stiffness);
         }
+        if let Some(celsius) = raw.reference_temperature_c {
+            // Absolute zero, and what no robot survives.
+            if !(-273.15..=1000.0).contains(&celsius) && !self.named_already(celsius) {
+                let path = ["robot", "reference_temperature_c"];
+                let finding = format!("{celsius} is not the temperature of a robot");
+                self.problem(&path, finding, "give degrees Celsius, 20 for most drawings");
+            }
+            load.reference_temperature_c = celsius;
+        }
         self.drives(&mut load);
         load
     }

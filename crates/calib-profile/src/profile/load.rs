@@ -1,5 +1,6 @@
 //! What loads the joints: gravity, masses, payloads; and how stiff they are known to be.
 
+use calib_core::effect::thermal_expansion::REFERENCE_TEMPERATURE_C;
 use calib_urdf::{Inertial, JointId, LinkId, RobotModel};
 use nalgebra::{Unit, Vector3};
 use std::collections::BTreeMap;
@@ -26,6 +27,8 @@ pub struct RobotLoad {
     pub gear_ratio: BTreeMap<JointId, f64>,
     /// Load that friction holds, N m or N.
     pub friction: BTreeMap<JointId, f64>,
+    /// Temperature at which the nominal lengths hold, °C.
+    pub reference_temperature_c: f64,
 }
 
 impl Default for RobotLoad {
@@ -38,6 +41,7 @@ impl Default for RobotLoad {
             stiffness: BTreeMap::new(),
             gear_ratio: BTreeMap::new(),
             friction: BTreeMap::new(),
+            reference_temperature_c: REFERENCE_TEMPERATURE_C,
         }
     }
 }

@@ -38,6 +38,9 @@ pub struct RawRobot {
     /// which flank a gear rests; 0 when absent.
     #[serde(default)]
     pub friction_nm: BTreeMap<String, f64>,
+    /// Temperature at which the nominal lengths hold, °C; 20 when absent, as drawings state it. `thermal_expansion` counts from there.
+    #[serde(default)]
+    pub reference_temperature_c: Option<f64>,
 }
 
 /// A mass on a link.

@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 _Array = npt.NDArray[np.float64]
-_Under = tuple[_Array | None, _Array | None]
+_Under = tuple[_Array | None, _Array | None, _Array | None]
 _Path = str | os.PathLike[str]
 
 class CalibError(Exception):

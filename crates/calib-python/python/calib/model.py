@@ -119,6 +119,8 @@ class Model:
         """The link at the end of the longest chain: what is meant where no place is named."""
         self.has_uncertainty: bool = facts["has_uncertainty"]
         """Whether :meth:`sigma` can answer."""
+        self.reference_temperature_c: float | None = facts["reference_temperature_c"]
+        """Temperature at which the lengths hold, °C; ``None`` where none follows the temperature."""
         self.tracker_from_root: Array = facts["tracker_from_root"]
         """Where the root stands in the tracker, 4 × 4."""
 
@@ -134,8 +136,12 @@ class Model:
         return last(what, q, (self.dof,))
 
     def _under(
-        self, approach: npt.ArrayLike | None, held: npt.ArrayLike | None, like: Array
-    ) -> tuple[Array | None, Array | None]:
+        self,
+        approach: npt.ArrayLike | None,
+        held: npt.ArrayLike | None,
+        temperature_c: npt.ArrayLike | None,
+        like: Array,
+    ) -> tuple[Array | None, Array | None, Array | None]:
         def of(what: str, values: npt.ArrayLike | None) -> Array | None:
             if values is None:
                 return None
@@ -144,7 +150,10 @@ class Model:
             one = len(rows) == 1
             return np.ascontiguousarray(np.broadcast_to(rows, like.shape)) if one else rows
 
-        return of("approach", approach), of("held", held)
+        if temperature_c is not None and np.ndim(temperature_c) == 0:
+            # One temperature of the whole robot.
+            temperature_c = np.full(self.dof, temperature_c)
+        return of("approach", approach), of("held", held), of("temperature_c", temperature_c)
 
     def fk(
         self,
@@ -155,12 +164,14 @@ class Model:
         nominal: bool = False,
         approach: npt.ArrayLike | None = None,
         held: npt.ArrayLike | None = None,
+        temperature_c: npt.ArrayLike | None = None,
     ) -> Array:
         """Poses ``frame_from_of`` as homogeneous matrices, … × 4 × 4, m.
 
         ``of`` is a link, a body or a point; the tool where none is named. ``nominal``: what a controller without calibration believes.
         ``approach`` (… × dof): +1 where a joint comes from below, −1 from above, 0 not known; see :meth:`approach`. ``held`` (… × dof):
-        torques (N m) that sensors in the joints read, in place of those of gravity.
+        torques (N m) that sensors in the joints read, in place of those of gravity. ``temperature_c`` (… × dof, or one number): how warm
+        the link before each joint is, where lengths follow it; see :attr:`reference_temperature_c`.
 
         >>> pose = Model(arm_file).fk([[0.0, 0.0], [0.3, -0.5]])
         >>> pose.shape, bool(abs(pose[0, 3, 3] - 1) < 1e-15)
@@ -171,7 +182,7 @@ class Model:
             rows,
             of,
             (frame == "tracker", nominal),
-            self._under(approach, held, rows),
+            self._under(approach, held, temperature_c, rows),
         )
         return poses.reshape(*lead, 4, 4)
 
@@ -182,6 +193,7 @@ class Model:
         *,
         approach: npt.ArrayLike | None = None,
         held: npt.ArrayLike | None = None,
+        temperature_c: npt.ArrayLike | None = None,
     ) -> Array:
         """Jacobians of a link, … × 6 × dof: twists ``[ω; v]`` in the link's frame per unit of each joint, all effects included.
 
@@ -192,7 +204,7 @@ class Model:
         found = self._native.jacobian(
             rows,
             link,
-            self._under(approach, held, rows),
+            self._under(approach, held, temperature_c, rows),
         )
         return found.reshape(*lead, 6, self.dof)
 
@@ -204,6 +216,7 @@ class Model:
         frame: Frame = "root",
         approach: npt.ArrayLike | None = None,
         held: npt.ArrayLike | None = None,
+        temperature_c: npt.ArrayLike | None = None,
     ) -> Array:
         """Covariances of predicted poses, … × 6 × 6: ``[ω; v]`` in the place's own frame, rad² and m².
 
@@ -218,7 +231,7 @@ class Model:
             rows,
             of,
             frame == "tracker",
-            self._under(approach, held, rows),
+            self._under(approach, held, temperature_c, rows),
         )
         return found.reshape(*lead, 6, 6)
 
@@ -235,6 +248,7 @@ class Model:
         iterations: int | None = None,
         approach: npt.ArrayLike | None = None,
         held: npt.ArrayLike | None = None,
+        temperature_c: npt.ArrayLike | None = None,
     ) -> Correction:
         """Commands at which the link stands where the nominal model has it at ``q``.
 
@@ -259,7 +273,7 @@ class Model:
             rows,
             link,
             options,
-            self._under(approach, held, rows),
+            self._under(approach, held, temperature_c, rows),
         )
         return self._correction(done, lead)
 
@@ -277,6 +291,7 @@ class Model:
         iterations: int | None = None,
         approach: npt.ArrayLike | None = None,
         held: npt.ArrayLike | None = None,
+        temperature_c: npt.ArrayLike | None = None,
     ) -> Correction:
         """Positions at which the link stands at ``poses`` (``root_from_link``, … × 4 × 4), near ``seed`` (… × dof, or one for all).
 
@@ -302,7 +317,7 @@ class Model:
             seeds,
             link,
             options,
-            self._under(approach, held, seeds),
+            self._under(approach, held, temperature_c, seeds),
         )
         return self._correction(done, lead)
 

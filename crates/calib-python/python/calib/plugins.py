@@ -118,6 +118,8 @@ class Table:
     """Positions of sliding joints, n, m."""
     torques: Mapping[str, npt.ArrayLike] = field(default_factory=dict)
     """By joint, n, N m."""
+    temperatures: Mapping[str, npt.ArrayLike] = field(default_factory=dict)
+    """Of the link before a joint, or of the whole ``robot``, n, °C."""
     markers: Mapping[str, npt.ArrayLike] = field(default_factory=dict)
     """Points in the tracker's frame, n × 3, m."""
     bodies: Mapping[str, npt.ArrayLike] = field(default_factory=dict)
@@ -309,6 +311,7 @@ def reader(
                 "joints": arrays(table.joints, ("n",)),
                 "lengths": arrays(table.lengths, ("n",)),
                 "torques": arrays(table.torques, ("n",)),
+                "temperatures": arrays(table.temperatures, ("n",)),
                 "markers": arrays(table.markers, ("n", 3)),
                 "bodies": arrays(table.bodies, ("n", 4, 4)),
                 "t": _list("t", table.t, ("n",)),

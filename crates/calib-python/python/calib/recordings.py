@@ -39,7 +39,7 @@ class Stream:
     """``rad``, ``m`` or ``N m``."""
     timeline: Timeline
     values: Array
-    """Joints and torques: n. Markers: n × 3, m. Bodies: n × 4 × 4, ``tracker_from_body``. Read-only; a lost sample is NaN."""
+    """Joints, torques and temperatures: n. Markers: n × 3, m. Bodies: n × 4 × 4, ``tracker_from_body``. Read-only; a lost sample is NaN."""
     filled: npt.NDArray[np.bool_] | None = None
     """Markers: which samples were interpolated by the device and measure nothing."""
 
@@ -77,13 +77,14 @@ class Recording:
     timelines: list[Timeline]
     joints: dict[str, Stream] = field(default_factory=dict)
     torques: dict[str, Stream] = field(default_factory=dict)
+    temperatures: dict[str, Stream] = field(default_factory=dict)
     bodies: dict[str, Stream] = field(default_factory=dict)
     markers: dict[str, Stream] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         counts = ", ".join(
             f"{len(streams)} {name}"
-            for name in ("joints", "torques", "bodies", "markers")
+            for name in ("joints", "torques", "temperatures", "bodies", "markers")
             if (streams := getattr(self, name))
         )
         rows = " + ".join(str(len(t.rows)) for t in self.timelines) or "0"
@@ -92,7 +93,8 @@ class Recording:
 
 def _recording(plain: dict[str, Any]) -> Recording:
     timelines = [Timeline(**timeline) for timeline in plain["timelines"]]
-    streams: dict[str, dict[str, Stream]] = {"joint": {}, "torque": {}, "body": {}, "marker": {}}
+    kinds = ("joint", "torque", "temperature", "body", "marker")
+    streams: dict[str, dict[str, Stream]] = {kind: {} for kind in kinds}
     for kind, name, timeline, unit, values, filled in plain["streams"]:
         of_kind = streams[kind]
         # Unlabeled markers may share a name.
@@ -110,6 +112,7 @@ def _recording(plain: dict[str, Any]) -> Recording:
         timelines=timelines,
         joints=streams["joint"],
         torques=streams["torque"],
+        temperatures=streams["temperature"],
         bodies=streams["body"],
         markers=streams["marker"],
     )

@@ -2,7 +2,7 @@
 
 use super::header::Layout;
 use crate::column_map::ColumnMap;
-use crate::model::{self, JointUnit, MarkerSample, Recording, Timeline};
+use crate::model::{self, JointUnit, MarkerSample, Recording, Timeline, WHOLE_ROBOT};
 use crate::poses::{NotOneTable, Poses};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -97,7 +97,7 @@ struct OutColumn<'a> {
     value: Box<dyn Fn(usize) -> Option<f64> + 'a>,
 }
 
-/// The table as text: counter, labels, `t_s`, `host_s`, joints, torques, bodies, markers, each in alphabetical order. A label
+/// The table as text: counter, labels, `t_s`, `host_s`, joints, torques, temperatures, bodies, markers, each in alphabetical order. A label
 /// column of another name than the usual ones (`trial`, `group`, …) must be named when the table is read, in
 /// [`ColumnMap::labels`].
 ///
@@ -251,6 +251,16 @@ fn columns<'a>(poses: &'a Poses, options: &WriteOptions) -> Vec<OutColumn<'a>> {
             value: Box::new(|row| torque[row]),
         });
     }
+    for (name, celsius) in &poses.temperatures {
+        columns.push(OutColumn {
+            name: match name.as_str() {
+                WHOLE_ROBOT => "temperature_c".to_owned(),
+                joint => format!("{joint}_temperature_c"),
+            },
+            decimals,
+            value: Box::new(|row| celsius[row]),
+        });
+    }
     for (name, track) in &poses.bodies {
         for (i, axis) in ["x_m", "y_m", "z_m"].into_iter().enumerate() {
             let value = move |row: usize| track[row].map(|pose| pose.translation.vector[i]);
@@ -319,6 +329,10 @@ fn misread(poses: &Poses, header: &[&str]) -> Option<String> {
             layout.torques.iter().map(|torque| &torque.0).collect(),
         ),
         (
+            poses.temperatures.keys().collect(),
+            layout.temperatures.iter().map(|t| &t.0).collect(),
+        ),
+        (
             poses.bodies.keys().collect(),
             layout.bodies.iter().map(|body| &body.name).collect(),
         ),
@@ -376,6 +390,7 @@ fn check_lengths(poses: &Poses) -> Result<(), NotWritten> {
         .iter()
         .map(|(name, v)| (name, v.len()))
         .chain(poses.torques.iter().map(|(name, v)| (name, v.len())))
+        .chain(poses.temperatures.iter().map(|(name, v)| (name, v.len())))
         .chain(poses.bodies.iter().map(|(name, v)| (name, v.len())))
         .chain(poses.markers.iter().map(|(name, v)| (name, v.len())))
         .chain(poses.labels.iter().map(|(name, v)| (name, v.len())));

@@ -406,6 +406,10 @@ prop_compose! {
             joints: BTreeMap::from([("q".to_string(), rows.iter().map(|r| r.0).collect())]),
             joint_units: BTreeMap::from([("q".to_string(), JointUnit::Angle)]),
             torques: BTreeMap::from([("q".to_string(), rows.iter().map(|r| r.3).collect())]),
+            temperatures: BTreeMap::from([
+                ("q".to_string(), rows.iter().map(|r| r.3).collect()),
+                (calib_recording::WHOLE_ROBOT.to_string(), rows.iter().map(|r| r.0).collect()),
+            ]),
             bodies: BTreeMap::from([("hand".to_string(), rows.iter().map(|r| r.2).collect())]),
             markers: BTreeMap::from([("m_1".to_string(), rows.iter().map(|r| r.1.map(Point3::from)).collect())]),
             labels: BTreeMap::from([("trial".to_string(), rows.iter().map(|r| r.4.clone()).collect())]),
@@ -421,6 +425,7 @@ proptest! {
         let back = read_bytes("x.csv", text.as_bytes(), &ReadOptions::default()).expect("own table").poses(Filled::Exclude).expect("one");
         prop_assert_eq!(&back.joints, &poses.joints);
         prop_assert_eq!(&back.torques, &poses.torques);
+        prop_assert_eq!(&back.temperatures, &poses.temperatures);
         prop_assert_eq!(&back.markers, &poses.markers);
         prop_assert_eq!(&back.labels, &poses.labels);
         prop_assert_eq!(&back.t, &poses.t);

@@ -160,6 +160,21 @@ impl RobotModel {
         self.up(link).collect()
     }
 
+    /// The length that leads to a joint: from the joint before it that moves, or from the root, to its origin, m, in its axes.
+    #[must_use]
+    pub fn reach(&self, joint: JointId) -> Vector3<f64> {
+        let mut before_from_joint = self.joint(joint).parent_link_from_joint;
+        for fixed in self.up(self.joint(joint).parent) {
+            let fixed = self.joint(fixed);
+            if fixed.kind.axis().is_some() {
+                break;
+            }
+            before_from_joint = fixed.parent_link_from_joint * before_from_joint;
+        }
+        let rotation = before_from_joint.rotation;
+        rotation.inverse() * before_from_joint.translation.vector
+    }
+
     /// The joints from one link to another through the last link that both hang on; fixed ones included.
     #[must_use]
     pub fn chain(&self, from: LinkId, to: LinkId) -> Vec<ChainStep> {

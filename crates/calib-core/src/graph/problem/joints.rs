@@ -1,6 +1,7 @@
 //! Joints and their effects.
 
 use calib_geometry::plausible::{Unlikely, unlikely_meters, unlikely_radians};
+use nalgebra::Vector3;
 
 use crate::graph::axis::Axis;
 use crate::graph::edge::{Candidate, EdgeKind, Joint, JointEffect, Share};
@@ -26,12 +27,20 @@ impl Problem {
             child,
             EdgeKind::Joint(Joint {
                 axis,
+                reach: Vector3::zeros(),
                 q,
                 effects: Vec::new(),
                 candidates: Vec::new(),
                 noise: None,
             }),
         )
+    }
+
+    /// States the reach of a joint, m in its frame: what grows with its temperature.
+    pub fn joint_reach(&mut self, edge: EdgeId, reach: Vector3<f64>) {
+        if let Some(joint) = self.joint_mut(edge, "joint_reach") {
+            joint.reach = reach;
+        }
     }
 
     /// The joint of an edge; where it is none, a fault that [`Model::new`](crate::Model::new) reports.

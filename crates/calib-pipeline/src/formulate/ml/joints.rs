@@ -1,6 +1,6 @@
 //! Joints: their origins, their motion and its effects.
 
-use calib_core::effect::{Effect, Source};
+use calib_core::effect::{Drives, Effect, Source};
 use calib_core::{
     Axis, Chart, EFFECTS, EdgeId, EffectKind, GroupId, JointState, NoiseKind, Problem, Role,
 };
@@ -17,6 +17,9 @@ use crate::prepare::loads::Loads;
 const JOINT_SIGMA: f64 = 1.7e-4;
 /// A revolute joint that moves less than this in the fitted recordings did not move, rad.
 const MOVED: f64 = 1e-3;
+
+/// A shorter length before a joint does not grow by what any tracker sees, m: a millimeter of aluminium by 0.02 µm per kelvin.
+const SHORTEST: f64 = 1e-3;
 
 /// The term whose coefficient is one over a stiffness.
 const COMPLIANCE: EffectKind = EffectKind::TorqueCompliance;
@@ -143,6 +146,7 @@ pub(super) fn add_joint(
     };
     let edge = problem.joint(&j.name, origin_child, child, motion, readings);
     formulation.joints[joint.index()] = Some(edge);
+    problem.joint_reach(edge, inputs.robot.masses.reach()[joint.index()]);
     formulation.loaded |= add_effects(problem, profile, model, joint, edge, &free, rows);
     if let Some(group) = noise
         && moved
@@ -175,10 +179,14 @@ fn add_effects(
         .iter()
         .map(|r| joint_state(model, joint, r.q, &r.loads, r.under))
         .collect();
+    // Where two joints cross, nothing lies between them that could grow.
+    let leads = model.reach(joint).norm() > SHORTEST;
+    let possible = |e: &Effect| leads || e.terms.iter().all(|t| t.drives != Drives::Along);
     let stiffness = profile.load.stiffness.get(&joint);
     let given = stiffness.map(|stiffness| 1.0 / stiffness);
     let mut loaded = false;
-    for effect in EFFECTS.iter().filter(|e| e.profile.is_some()) {
+    let listed = EFFECTS.iter().filter(|e| e.profile.is_some());
+    for effect in listed.filter(|e| possible(e)) {
         let wanted = free.effects.iter().find(|f| f.effect == *effect);
         if let Some(wanted) = wanted.filter(|_| (effect.estimable)(&states)) {
             for term in effect.terms {

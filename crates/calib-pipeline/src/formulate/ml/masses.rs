@@ -8,7 +8,7 @@
 //! there. The h are all that static postures can tell of the masses (the base inertial parameters of gravity); a single mass or
 //! center is not among them. Their scale is a gauge against the compliances, which the priors of both hold.
 
-use calib_core::effect::Source;
+use calib_core::effect::{Drives, Source};
 use calib_core::{EdgeKind, EffectKind, Parameter, ParameterId, ParameterKind, Share, Unit};
 
 use super::joints::Row;
@@ -82,7 +82,7 @@ fn loaded_effects(
             continue;
         };
         let by_masses = |kind: &EffectKind| {
-            let about = kind.lateral().is_none();
+            let about = kind.drives() == Drives::About;
             kind.term().source == Source::Load && !(measured && about)
         };
         let kinds = j.effects.iter().map(|f| f.kind).filter(by_masses);

@@ -44,7 +44,12 @@ pub fn state(
     let conditions_of: BTreeMap<&str, Vec<Conditions>> = inputs
         .recordings
         .iter()
-        .map(|(name, r)| (name.as_str(), conditions(r, model, profile.solve.load)))
+        .map(|(name, r)| {
+            (
+                name.as_str(),
+                conditions(r, &inputs.robot, profile.solve.load),
+            )
+        })
         .collect();
     let rows: Vec<Row<'_>> = samples
         .iter()

@@ -135,7 +135,7 @@ impl Mapping<'_> {
         }
     }
 
-    /// Joints and torques.
+    /// Joints, torques and temperatures.
     fn robot(&mut self, map: &ColumnMap) -> Result<(), Problem> {
         let named = map.joint_columns.iter().map(|name| (name, name));
         let sign = |joint: &String| match map.reversed.contains(joint) {
@@ -160,6 +160,11 @@ impl Mapping<'_> {
             let what = format!("torque of `{joint}`");
             let slot = self.take(&what, column, SlotKind::Robot, 1.0)?;
             self.layout.torques.push((joint.clone(), slot));
+        }
+        for (joint, column) in &map.temperatures {
+            let what = format!("temperature of `{joint}`");
+            let slot = self.take(&what, column, SlotKind::Robot, 1.0)?;
+            self.layout.temperatures.push((joint.clone(), slot));
         }
         Ok(())
     }

@@ -84,6 +84,7 @@ pub(super) struct Layout {
     pub counter: Option<usize>,
     pub joints: Vec<(String, JointUnit, usize)>,
     pub torques: Vec<(String, usize)>,
+    pub temperatures: Vec<(String, usize)>,
     pub markers: Vec<MarkerPlan>,
     pub bodies: Vec<BodyPlan>,
     pub labels: Vec<String>,

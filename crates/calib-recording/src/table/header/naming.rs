@@ -9,13 +9,17 @@
 //! 4. `NAME_x_m`, `NAME_qx`: the same, if `NAME` has another coordinate in this style; a lone `NAME_x_m` is
 //!    a prismatic joint `NAME_x`.
 //! 5. `x_m` or `qx` without a name: the body `body` with a quaternion, the marker `marker` without.
-//! 6. `NAME_rad|_deg`: a revolute joint; `NAME_m|_cm|_mm`: a prismatic one; `NAME_nm`: a torque in N·m.
+//! 6. `NAME_rad|_deg`: a revolute joint; `NAME_m|_cm|_mm`: a prismatic one; `NAME_nm`: a torque in N·m;
+//!    `NAME_temperature_c`, `temperature_c`: a temperature in °C.
 //!
 //! Anything else has no meaning here.
 
-use crate::model::JointUnit;
+use crate::model::{JointUnit, WHOLE_ROBOT};
 use crate::units::{AngleUnit, LengthUnit, TimeUnit};
 use calib_finding::nearest_word;
+
+/// A temperature, °C.
+const TEMPERATURE: &str = "temperature_c";
 
 const COUNTERS: [&str; 6] = ["frame", "pose", "row", "sample", "index", "config"];
 const LABELS: [&str; 8] = [
@@ -74,6 +78,7 @@ pub(super) enum Meaning<'a> {
         scale: f64,
     },
     Torque(&'a str),
+    Temperature(&'a str),
     Unknown,
 }
 
@@ -83,10 +88,17 @@ pub(super) fn meaning(name: &str) -> Meaning<'_> {
         "t_ms" => return Meaning::Time(TimeUnit::Ms),
         "t_us" => return Meaning::Time(TimeUnit::Us),
         "host_s" => return Meaning::Received,
+        TEMPERATURE => return Meaning::Temperature(WHOLE_ROBOT),
         "marker" | "body" | "point" => return Meaning::Entity,
         _ if COUNTERS.contains(&name) => return Meaning::Counter,
         _ if LABELS.contains(&name) => return Meaning::Label,
         _ => {}
+    }
+    if let Some(joint) = name.strip_suffix(TEMPERATURE)
+        && let Some(joint) = joint.strip_suffix(['_', '.'])
+        && !joint.is_empty()
+    {
+        return Meaning::Temperature(joint);
     }
     if let Some((part, scale)) = part(name) {
         return Meaning::Part {
@@ -164,7 +176,15 @@ pub(super) fn nearest_rule(name: &str) -> Option<String> {
         return Some(format!("{head}_{unit}"));
     }
     let fixed = COUNTERS.iter().chain(&LABELS).copied().chain([
-        "t_s", "t_ms", "host_s", "marker", "point", "body", "x_m", "x_mm",
+        "t_s",
+        "t_ms",
+        "host_s",
+        TEMPERATURE,
+        "marker",
+        "point",
+        "body",
+        "x_m",
+        "x_mm",
     ]);
     nearest_word(name, fixed)
         .map(str::to_owned)

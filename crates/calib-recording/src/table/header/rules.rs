@@ -7,7 +7,7 @@ use crate::error::Problem;
 use crate::model::JointUnit;
 use std::collections::BTreeMap;
 
-const EXPECTED: &str = "`<joint>_rad|_deg|_m|_mm`, `<joint>_nm`, `<marker>.x_m|.x_mm`, `<body>.qx`, `t_s`, `frame` or `trial`; or a column map in the profile";
+const EXPECTED: &str = "`<joint>_rad|_deg|_m|_mm`, `<joint>_nm`, `temperature_c`, `<marker>.x_m|.x_mm`, `<body>.qx`, `t_s`, `frame` or `trial`; or a column map in the profile";
 
 /// Columns of one marker or body while they are collected: part → (column, units in the SI unit).
 #[derive(Default)]
@@ -68,6 +68,10 @@ impl Layout {
                 Meaning::Torque(name) => {
                     let slot = self.slot(i, SlotKind::Robot, 1.0);
                     self.torques.push((name.to_string(), slot));
+                }
+                Meaning::Temperature(name) => {
+                    let slot = self.slot(i, SlotKind::Robot, 1.0);
+                    self.temperatures.push((name.to_string(), slot));
                 }
                 Meaning::Time(_)
                 | Meaning::Received

@@ -3,7 +3,8 @@
 use super::Rows;
 use crate::error::Placed;
 use crate::model::{
-    BodyStream, JointStream, MarkerSample, MarkerStream, Meta, Recording, TorqueStream,
+    BodyStream, JointStream, MarkerSample, MarkerStream, Meta, Recording, TemperatureStream,
+    TorqueStream,
 };
 use calib_finding::{Fact, Finding, Subject, catalog};
 
@@ -82,6 +83,17 @@ impl Rows<'_> {
                     name,
                     timeline: 0,
                     torque,
+                })
+                .collect(),
+            temperatures: self
+                .layout
+                .temperatures
+                .into_iter()
+                .zip(self.temperatures)
+                .map(|((name, _), celsius)| TemperatureStream {
+                    name,
+                    timeline: 0,
+                    celsius,
                 })
                 .collect(),
             bodies: body_names

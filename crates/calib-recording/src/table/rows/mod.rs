@@ -44,6 +44,7 @@ pub(super) struct Rows<'a> {
     received: Vec<f64>,
     joints: Vec<Vec<Option<f64>>>,
     torques: Vec<Vec<Option<f64>>>,
+    temperatures: Vec<Vec<Option<f64>>>,
     markers: Vec<Vec<MarkerSample>>,
     bodies: Vec<Vec<Option<Isometry3<f64>>>>,
     /// Long tables: name → stream, names in order, current frame, samples given.
@@ -81,6 +82,7 @@ impl<'a> Rows<'a> {
             received: Vec::new(),
             joints: vec![Vec::new(); layout.joints.len()],
             torques: vec![Vec::new(); layout.torques.len()],
+            temperatures: vec![Vec::new(); layout.temperatures.len()],
             markers: vec![Vec::new(); streams(layout.markers.len())],
             bodies: vec![Vec::new(); streams(layout.bodies.len())],
             long: BTreeMap::new(),
@@ -238,13 +240,15 @@ impl<'a> Rows<'a> {
         Ok(())
     }
 
-    /// Joint positions and torques of a new sample.
+    /// Joint positions, torques and temperatures of a new sample.
     fn robot(&mut self) {
         let given = |value: f64| if value.is_nan() { None } else { Some(value) };
         for ((_, _, slot), stream) in self.layout.joints.iter().zip(&mut self.joints) {
             push(stream, given(self.values[*slot]));
         }
-        for ((_, slot), stream) in self.layout.torques.iter().zip(&mut self.torques) {
+        let torques = self.layout.torques.iter().zip(&mut self.torques);
+        let warm = self.layout.temperatures.iter().zip(&mut self.temperatures);
+        for ((_, slot), stream) in torques.chain(warm) {
             push(stream, given(self.values[*slot]));
         }
     }
@@ -287,7 +291,10 @@ impl<'a> Rows<'a> {
             }
         };
         let sample = self.sample;
-        let of_robot = || self.joints.iter().chain(&self.torques);
+        let of_robot = || {
+            let scalars = self.joints.iter().chain(&self.torques);
+            scalars.chain(&self.temperatures)
+        };
         if of_robot().any(|values| values.len() == sample) {
             self.robot();
         } else {

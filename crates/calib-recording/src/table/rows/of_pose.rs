@@ -69,10 +69,12 @@ impl Rows<'_> {
                 }
             }
         }
-        for (i, (_, slot)) in self.layout.torques.iter().enumerate() {
+        let torques = self.layout.torques.iter().zip(&mut self.torques);
+        let warm = self.layout.temperatures.iter().zip(&mut self.temperatures);
+        for ((_, slot), stream) in torques.chain(warm) {
             let value = self.values[*slot];
             if !value.is_nan() {
-                self.torques[i][sample].get_or_insert(value);
+                stream[sample].get_or_insert(value);
             }
         }
         Ok(())
