@@ -26,6 +26,7 @@ mod laboratory;
 mod layering;
 mod loads;
 mod month;
+mod occluded;
 mod outputs;
 mod plan;
 mod plugin_effects;

@@ -158,3 +158,59 @@ fn a_number_that_is_not_finite_has_its_place() {
         assert!(problem.finding.contains("not finite"), "{problem:#?}");
     }
 }
+
+/// Justin's `torso_tests` repeats its poses at five values.
+#[test]
+fn factors_of_the_tracker_s_noise_are_above_zero_and_one_per_repetition() {
+    const AT: &str = "repeat_at: {torso_0_deg: [0, 90, 90, -90, 90]}\n";
+    let with = |repeat: &str, times: &str| {
+        problems("justin", "justin/justin.urdf", &|text| {
+            assert!(text.contains(AT), "no `{AT}`");
+            let indent = if repeat.is_empty() { "" } else { "      " };
+            let lines = format!("tracker_noise_times: {times}\n{indent}{repeat}");
+            text.replacen(AT, &lines, 1)
+        })
+    };
+    for (repeat, times) in [
+        (AT, "2.5"),
+        (AT, "[1, 1, 1, 1.8, 1]"),
+        ("", "2.5"),
+        ("", "1"),
+    ] {
+        assert_eq!(with(repeat, times), [], "`{times}`");
+    }
+    for (repeat, times, finding, remedy) in [
+        (AT, "[1, 1, 1, 2]", "4 factors for 5", "give 5 numbers"),
+        (AT, "[]", "0 factors for 5", "give 5 numbers"),
+        ("", "[1, 2]", "no `repeat_at`", "one number for the whole"),
+        (AT, "[1, 1, 1, 0, 1]", "0 is not above 0", "above 0"),
+        (AT, "-2", "-2 is not above 0", "above 0"),
+        (AT, "[1, 1, .inf, 1, 1]", "not finite", "finite number"),
+        ("", ".nan", "not finite", "finite number"),
+    ] {
+        let found = with(repeat, times);
+        let [problem] = found.as_slice() else {
+            panic!("`{times}`: {found:#?}");
+        };
+        assert!(problem.finding.contains(finding), "{problem:#?}");
+        assert!(problem.remedy.contains(remedy), "{problem:#?}");
+        assert_eq!(problem.place.map(|p| p.line), Some(115), "{problem:#?}");
+    }
+}
+
+#[test]
+fn factors_of_another_form_are_refused_with_what_they_could_be() {
+    let found = problems("justin", "justin/justin.urdf", &|text| {
+        let poses = "      poses: 30\n";
+        text.replacen(
+            poses,
+            &format!("{poses}      tracker_noise_times: {{torso_0: 2}}\n"),
+            1,
+        )
+    });
+    let [problem] = found.as_slice() else {
+        panic!("{found:#?}");
+    };
+    assert!(problem.finding.contains("`repeat_at`"), "{problem:#?}");
+    assert_eq!(problem.place.map(|p| p.line), Some(115), "{problem:#?}");
+}

@@ -9,6 +9,7 @@
 //! body   = tracker_from_root · FK'(q_true) · link_from_body' · exp(N(0, diag(σ_r², σ_t²))) (4)
 //! ```
 //!
+//! σ_m, σ_r and σ_t may be larger by a stated factor in a recording, or where it repeats its poses (cameras that are occluded there).
 //! `g` is the torque that gravity exerts about the joint (N m), so that c > 0 gives way: from the masses of the URDF (uniform rods where
 //! it has none) and the payloads of the profile.
 //! (1) has no errors of an origin along or about its own axis: a zero offset and the choice of a frame on the axis
@@ -120,11 +121,18 @@ pub fn simulate_postures(
     };
     for (index, (name, q)) in postures.iter().enumerate() {
         let mut rng = stream(seed, GIVEN + index as u64);
+        let protocol = plan.recordings.get(name);
+        // Given postures stand at none of the values of `repeat_at`: only a factor of the whole recording holds for them.
+        let times = protocol.map_or(&[][..], |protocol| &protocol.tracker_noise_times);
+        let times = match times {
+            [first, rest @ ..] if rest.iter().all(|other| other == first) => *first,
+            _ => 1.0,
+        };
         let commanded = Commanded {
             q: q.clone(),
             groups: Vec::new(),
+            tracker_noise_times: vec![times; q.len()],
         };
-        let protocol = plan.recordings.get(name);
         let all: Vec<String> = profile.bodies.keys().cloned().collect();
         let bodies = protocol.map_or(&all, |protocol| &protocol.bodies);
         let poses = measure(&tracker, model, &commanded, bodies, &mut rng);
@@ -199,10 +207,10 @@ fn measure(
         let column = commanded.q.iter().map(|q| Some(q[id.index()])).collect();
         poses.joints.insert(joint.name.clone(), column);
     }
-    for q in &commanded.q {
+    for (q, times) in commanded.q.iter().zip(&commanded.tracker_noise_times) {
         let sigma = tracker.plan.noise.joint;
         let root_from_link = tracker.robot.forward_kinematics(q, sigma, rng);
-        tracker.observe(bodies, &root_from_link, &mut poses, rng);
+        tracker.observe(bodies, &root_from_link, *times, &mut poses, rng);
     }
     poses
 }

@@ -1,5 +1,7 @@
 //! The commanded joint positions of a recording.
 
+use std::iter::repeat;
+
 use calib_profile::Protocol;
 use calib_urdf::RobotModel;
 use rand::RngExt;
@@ -12,6 +14,8 @@ pub struct Commanded {
     pub q: Vec<Vec<f64>>,
     /// Group text per pose; empty without groups.
     pub groups: Vec<String>,
+    /// What the tracker's noise is multiplied by, per pose.
+    pub tracker_noise_times: Vec<f64>,
 }
 
 /// Expands a protocol: the grid or the random poses, repeated at each value of the repeated joint.
@@ -55,7 +59,9 @@ pub fn commanded_poses(
             .collect();
     }
     let Some((joint, values)) = &protocol.repeat_at else {
+        let times = protocol.tracker_noise_times.first().unwrap_or(&1.0);
         return Commanded {
+            tracker_noise_times: vec![*times; poses.len()],
             q: poses,
             groups: Vec::new(),
         };
@@ -63,9 +69,11 @@ pub fn commanded_poses(
     let mut repeated = Commanded {
         q: Vec::new(),
         groups: Vec::new(),
+        tracker_noise_times: Vec::new(),
     };
     let robot_joint = model.joint(*joint);
-    for (i, value) in values.iter().enumerate() {
+    let times = protocol.tracker_noise_times.iter().chain(repeat(&1.0));
+    for (i, (value, times)) in values.iter().zip(times).enumerate() {
         let shown = if robot_joint.kind.turns() {
             format!("{:.0} deg", value.to_degrees())
         } else {
@@ -75,6 +83,7 @@ pub fn commanded_poses(
             let mut q = q.clone();
             q[joint.index()] = *value;
             repeated.q.push(q);
+            repeated.tracker_noise_times.push(*times);
             repeated
                 .groups
                 .push(format!("{}: {} {shown}", i + 1, robot_joint.name));

@@ -210,7 +210,7 @@ pub fn simulate_streams(
             Motion::StopAndGo { .. } => 0.0,
         };
         let root_from_link = robot.forward_kinematics(&q, sigma, &mut rng);
-        tracker.observe(&plan.bodies, &root_from_link, &mut seen, &mut rng);
+        tracker.observe(&plan.bodies, &root_from_link, 1.0, &mut seen, &mut rng);
     }
     seen.t = Some(times);
     let truth = Truth::of(profile, model, &robot, seed)?;

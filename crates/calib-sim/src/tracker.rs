@@ -17,11 +17,12 @@ pub(crate) struct Tracker<'a> {
 }
 
 impl Tracker<'_> {
-    /// Appends one sample of each body to `poses`; `root_from_link` by link.
+    /// Appends one sample of each body to `poses`; `root_from_link` by link, and what the noise of bodies and markers is multiplied by.
     pub(crate) fn observe(
         &self,
         bodies: &[String],
         root_from_link: &[Isometry3<f64>],
+        noise_times: f64,
         poses: &mut Poses,
         rng: &mut ChaCha12Rng,
     ) {
@@ -37,8 +38,8 @@ impl Tracker<'_> {
             match &body.kind {
                 BodyKind::Pose => {
                     let error = Twist::new(
-                        normal3(rng, noise.body.angle),
-                        normal3(rng, noise.body.position),
+                        normal3(rng, noise.body.angle * noise_times),
+                        normal3(rng, noise.body.position * noise_times),
                     );
                     let seen = rng.random::<f64>() >= noise.occluded;
                     let sample = seen.then(|| tracker_from_body * se3::exp(&error));
@@ -47,7 +48,7 @@ impl Tracker<'_> {
                 BodyKind::Markers { names, .. } => {
                     for marker in names {
                         let p_body = self.plan.mounts[name].markers[marker];
-                        let error = normal3(rng, noise.marker);
+                        let error = normal3(rng, noise.marker * noise_times);
                         let seen = rng.random::<f64>() >= noise.occluded;
                         let sample = seen.then(|| tracker_from_body * p_body + error);
                         let track = poses.markers.entry(marker.clone()).or_default();

@@ -5,7 +5,7 @@ use calib_finding::nearest_word;
 use super::names::MarkerList;
 use super::*;
 use crate::profile::{Error3, Protocol, SimErrors, SimMount, SimNoise, Simulation, Steps};
-use crate::raw::{RawProtocol, RawSimErrors, RawSimulate, RawSteps};
+use crate::raw::{RawNoiseTimes, RawProtocol, RawSimErrors, RawSimulate, RawSteps};
 
 impl Checker<'_> {
     pub(super) fn simulation(&mut self, raw: &RawSimulate) -> Simulation {
@@ -181,6 +181,40 @@ impl Checker<'_> {
         random
     }
 
+    /// One factor per value of `repeat_at`, or a single one without.
+    fn noise_times(&mut self, name: &str, raw: &RawProtocol) -> Vec<f64> {
+        const KEY: &str = "tracker_noise_times";
+        let at = ["simulate", "recordings", name, KEY];
+        let groups = raw.repeat_at.values().next().map(Vec::len);
+        match &raw.tracker_noise_times {
+            None => vec![1.0; groups.unwrap_or(1)],
+            Some(RawNoiseTimes::Everywhere(times)) => {
+                self.above_zero(&at, *times);
+                vec![*times; groups.unwrap_or(1)]
+            }
+            Some(RawNoiseTimes::Each(each)) => {
+                for (i, times) in each.iter().enumerate() {
+                    let at = ["simulate", "recordings", name, KEY, &i.to_string()];
+                    self.above_zero(&at, *times);
+                }
+                match groups {
+                    None => self.problem(
+                        &at,
+                        "a list of factors, but no `repeat_at` whose values they belong to",
+                        "give one number for the whole recording, or add `repeat_at`",
+                    ),
+                    Some(groups) if groups != each.len() => self.problem(
+                        &at,
+                        format!("{} factors for {groups} values of `repeat_at`", each.len()),
+                        format!("give {groups} numbers, or one for all"),
+                    ),
+                    Some(_) => {}
+                }
+                each.clone()
+            }
+        }
+    }
+
     pub(super) fn protocol(&mut self, name: &str, raw: &RawProtocol) -> Protocol {
         let at = |key: &'static str| ["simulate", "recordings", name, key];
         let grid = self.grid(name, &raw.grid);
@@ -223,6 +257,7 @@ impl Checker<'_> {
             random,
             poses: raw.poses,
             repeat_at,
+            tracker_noise_times: self.noise_times(name, raw),
             hold: self.joint_values(&at("hold"), &raw.hold),
             bodies: raw
                 .bodies

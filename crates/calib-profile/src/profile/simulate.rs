@@ -79,6 +79,8 @@ pub struct Protocol {
     pub poses: usize,
     /// One group of all poses per value of this joint.
     pub repeat_at: Option<(JointId, Vec<f64>)>,
+    /// What the tracker's noise is multiplied by, above 0: one factor per value of `repeat_at`, or a single one without.
+    pub tracker_noise_times: Vec<f64>,
     /// Held joints.
     pub hold: BTreeMap<JointId, f64>,
     /// Bodies in view.

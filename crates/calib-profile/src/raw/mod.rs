@@ -22,7 +22,9 @@ pub use origin::{RawLoop, RawOrientation, RawOrigin, RawPoint, RawTransform};
 pub use plan::{RawCamera, RawFacing, RawKeepOut, RawPlan};
 pub use recording::{RawClocks, RawRecording, RawRobotLog, RawTimedPoses, RawTiming, RawUse};
 pub use robot::{RawPayload, RawRobot};
-pub use simulate::{RawProtocol, RawSimErrors, RawSimMount, RawSimNoise, RawSimulate, RawSteps};
+pub use simulate::{
+    RawNoiseTimes, RawProtocol, RawSimErrors, RawSimMount, RawSimNoise, RawSimulate, RawSteps,
+};
 pub use solve::{
     RawJointSolve, RawLimits, RawLoad, RawMethod, RawNoise, RawNoiseModel, RawSolve, RawStart,
 };

@@ -92,12 +92,29 @@ pub struct RawProtocol {
     /// Repeat all poses with this joint at each of these values, one group each: `<joint>_deg: [values]`.
     #[serde(default)]
     pub repeat_at: BTreeMap<String, Vec<f64>>,
+    /// The tracker's noise here is that of `noise` times this, above 0: one number for the whole recording, or a list with one per value of
+    /// `repeat_at`, as `[1, 1, 1, 3, 1]` where cameras are occluded at the fourth. The joints' noise and the share of lost samples stay.
+    #[serde(default)]
+    pub tracker_noise_times: Option<RawNoiseTimes>,
     /// Joints held still: `<joint>_deg: value`; all others stand at zero.
     #[serde(default)]
     pub hold: BTreeMap<String, f64>,
     /// Bodies in view; all when absent.
     #[serde(default)]
     pub bodies: Option<Vec<String>>,
+}
+
+/// Factors of the tracker's noise in one recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected a number, or a list of numbers with one per value of `repeat_at`"
+)]
+pub enum RawNoiseTimes {
+    /// In all poses.
+    Everywhere(f64),
+    /// At each value of `repeat_at`.
+    Each(Vec<f64>),
 }
 
 /// Equal steps over a range, ends included.
