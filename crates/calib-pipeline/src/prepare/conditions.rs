@@ -45,12 +45,7 @@ pub fn missing_temperatures(inputs: &Inputs) -> Vec<Finding> {
         let by_temperature = |e: &Effect| e.terms.iter().any(|t| t.source == Source::Temperature);
         set.effects.iter().any(|free| by_temperature(free.effect))
     };
-    let growing: Vec<JointId> = robot
-        .model
-        .independent_joints()
-        .into_iter()
-        .filter(grows)
-        .collect();
+    let growing: Vec<JointId> = robot.model.independent_joints().filter(grows).collect();
     let mut findings = Vec::new();
     for (name, loaded) in &inputs.recordings {
         let of = &loaded.poses.temperatures;
