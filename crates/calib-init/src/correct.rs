@@ -43,6 +43,12 @@ pub fn mistake(model: &RobotModel, bodies: &[String], hypothesis: &Hypothesis) -
             body: bodies.get(body.0).cloned().unwrap_or_default(),
         },
         Hypothesis::Poses { .. } => Mistake::Poses,
+        Hypothesis::MissingColumn { joint: j } => Mistake::MissingColumn { joint: joint(j) },
+        Hypothesis::StoodAt { joint: j, value } => Mistake::StoodAt {
+            joint: joint(j),
+            value,
+            turns: model.joints()[j.0].kind.turns(),
+        },
         _ => Mistake::Other,
     }
 }

@@ -37,6 +37,16 @@ pub enum InitError {
         /// The URDF.
         file: String,
     },
+    /// No joint that carries the body has a range, and nothing is recorded.
+    #[error(
+        "{file}: the limits leave no range to {}, so that there are no postures to record\n  help: correct `lower` and `upper` of these joints in the URDF", listed(.joints)
+    )]
+    NoRange {
+        /// The URDF.
+        file: String,
+        /// The joints.
+        joints: Vec<String>,
+    },
     /// A link that the robot does not have.
     #[error("{unknown}\n  help: name the link that carries the markers: {}", .tips.join(", "))]
     NoSuchLink {
@@ -125,6 +135,7 @@ impl InitError {
     pub fn file(&self) -> Option<&str> {
         match self {
             Self::NothingMoves { file }
+            | Self::NoRange { file, .. }
             | Self::Unread { file, .. }
             | Self::NoJoints { file, .. }
             | Self::HandEye { file, .. }

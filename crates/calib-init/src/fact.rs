@@ -112,6 +112,20 @@ pub enum Mistake {
     },
     /// A convention of poses was misread.
     Poses,
+    /// A joint moved, and no column holds its readings.
+    MissingColumn {
+        /// The joint.
+        joint: String,
+    },
+    /// A joint without a column stood elsewhere than at 0.
+    StoodAt {
+        /// The joint.
+        joint: String,
+        /// Where it stood, rad or m.
+        value: f64,
+        /// Whether it turns.
+        turns: bool,
+    },
     /// Any other: `calib check` names it.
     Other,
 }
@@ -147,6 +161,10 @@ pub enum About {
         moving: usize,
         /// Those of them without position limits.
         unlimited: Vec<String>,
+        /// Those of them that turn without end.
+        endless: Vec<String>,
+        /// Those of them whose limits leave no range.
+        no_range: Vec<String>,
     },
     /// The body is put on the end of a chain, since nothing was recorded.
     TipOfChain {
@@ -399,7 +417,11 @@ impl Fact {
 
 fn is_guess(about: &About) -> bool {
     match about {
-        About::Joints { unlimited, .. } => !unlimited.is_empty(),
+        About::Joints {
+            unlimited,
+            no_range,
+            ..
+        } => !(unlimited.is_empty() && no_range.is_empty()),
         About::LinkStated { better, .. } => better.is_some(),
         About::Link {
             rms, next, same, ..

@@ -74,7 +74,7 @@ pub fn propose(
         facts: vec![joints(model)],
     };
     if files.is_empty() {
-        without_recordings(model, request, stated, longest, &mut proposal);
+        without_recordings(model, request, stated, longest, &mut proposal)?;
     } else {
         with_recordings(model, files, stated, longest, &mut proposal)?;
     }
@@ -120,12 +120,27 @@ fn joints(model: &RobotModel) -> Fact {
             && !matches!(joint.kind, calib_urdf::JointKind::Continuous { .. })
     });
     let unlimited: Vec<JointId> = unlimited.copied().collect();
+    let endless = |j: &JointId| {
+        matches!(
+            model.joint(*j).kind,
+            calib_urdf::JointKind::Continuous { .. }
+        )
+    };
+    let endless: Vec<JointId> = moving.iter().copied().filter(endless).collect();
+    let no_range = moving
+        .iter()
+        .copied()
+        .filter(|j| robot::has_no_range(model, *j));
+    let no_range: Vec<JointId> = no_range.collect();
+    let names = |joints: &[JointId]| {
+        let names = robot::names(model, joints).into_iter();
+        names.map(str::to_owned).collect()
+    };
     let about = About::Joints {
         moving: moving.len(),
-        unlimited: robot::names(model, &unlimited)
-            .iter()
-            .map(|n| (*n).to_owned())
-            .collect(),
+        unlimited: names(&unlimited),
+        endless: names(&endless),
+        no_range: names(&no_range),
     };
     Fact::new(Place::Robot, about)
 }
@@ -137,7 +152,7 @@ fn without_recordings(
     stated: Option<LinkId>,
     longest: &robot::Tip,
     proposal: &mut Proposal,
-) {
+) -> Result<(), InitError> {
     const BODY: &str = "tool";
     let link = stated.unwrap_or(longest.link);
     let named = |link: LinkId| model.link(link).name.clone();
@@ -162,17 +177,22 @@ fn without_recordings(
         .push(Fact::new(Place::Body(BODY.to_owned()), about));
     let joints = robot::movers(model, link);
     let skeleton = skeleton::skeleton(model, &joints);
+    if skeleton.random.is_empty() && !joints.is_empty() {
+        let joints = robot::names(model, &joints).into_iter();
+        return Err(InitError::NoRange {
+            file: request.urdf_shown.clone(),
+            joints: joints.map(str::to_owned).collect(),
+        });
+    }
     proposal.bodies.push(Body {
         name: BODY.to_owned(),
         markers: (1..=4).map(|i| format!("{BODY}_{i}")).collect(),
         link,
     });
-    let uses = [
-        ("sweep", Use::Sweep(skeleton.sweep.clone())),
-        ("poses", Use::Static),
-        ("checks", Use::Validation),
-    ];
-    for (name, usage) in uses {
+    // A robot that only slides has no axis to sweep.
+    let sweep = (!skeleton.sweep.is_empty()).then(|| ("sweep", Use::Sweep(skeleton.sweep.clone())));
+    let poses = [("poses", Use::Static), ("checks", Use::Validation)];
+    for (name, usage) in sweep.into_iter().chain(poses) {
         proposal.recordings.push(Recording {
             name: name.to_owned(),
             table: Table {
@@ -192,6 +212,7 @@ fn without_recordings(
     proposal
         .facts
         .push(Fact::new(Place::Simulate, About::Invented));
+    Ok(())
 }
 
 /// Everything from the files.

@@ -39,6 +39,14 @@ pub fn movers(model: &RobotModel, link: LinkId) -> Vec<JointId> {
     found
 }
 
+/// Whether the limits of a joint leave it no range; a joint that turns without end has one.
+#[must_use]
+pub fn has_no_range(model: &RobotModel, joint: JointId) -> bool {
+    let joint = model.joint(joint);
+    let endless = matches!(joint.kind, JointKind::Continuous { .. });
+    !endless && joint.limits.range().is_some_and(|(low, high)| high <= low)
+}
+
 /// The end of a chain: a link that moves and carries no other moving link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tip {

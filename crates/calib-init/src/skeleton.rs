@@ -2,6 +2,8 @@
 
 use calib_urdf::{JointId, RobotModel};
 
+use crate::robot;
+
 /// Widest range of a joint that is simulated, rad: beyond, cables and cameras are the limit.
 const WIDEST: f64 = 2.0;
 /// Share of a limited range that is used.
@@ -23,11 +25,11 @@ pub struct Skeleton {
     pub random: Ranges,
 }
 
-/// Postures for the joints that carry the bodies.
+/// Postures for the joints that carry the bodies and whose limits leave a range.
 #[must_use]
 pub fn skeleton(model: &RobotModel, joints: &[JointId]) -> Skeleton {
-    let random: Ranges = joints
-        .iter()
+    let with_range = joints.iter().filter(|j| !robot::has_no_range(model, **j));
+    let random: Ranges = with_range
         .map(|joint| (*joint, range(model, *joint)))
         .collect();
     let turning = random

@@ -100,19 +100,45 @@ pub fn sentence(about: &About) -> String {
     }
 }
 
+fn of_joints(
+    moving: usize,
+    unlimited: &[String],
+    endless: &[String],
+    no_range: &[String],
+) -> String {
+    let joints = plural(moving, "moving joint", "moving joints");
+    let turn = |names: &[String]| if names.len() == 1 { "turns" } else { "turn" };
+    if unlimited.is_empty() && no_range.is_empty() {
+        return match endless {
+            [] => format!("The URDF has {joints}, all with limits."),
+            _ => format!(
+                "The URDF has {joints}; {} {} without limits.",
+                quoted(endless),
+                turn(endless)
+            ),
+        };
+    }
+    let mut text = format!("The URDF has {joints}.");
+    if !unlimited.is_empty() {
+        text += &format!(" No limits are given for {}.", quoted(unlimited));
+    }
+    if !no_range.is_empty() {
+        text += &format!(
+            " The limits of {} leave no range (`lower` is `upper`): correct them in the URDF, or no planned posture moves them.",
+            quoted(no_range)
+        );
+    }
+    text
+}
+
 fn of_links(about: &About) -> String {
     match about {
-        About::Joints { moving, unlimited } if unlimited.is_empty() => {
-            format!(
-                "The URDF has {}, all with limits.",
-                plural(*moving, "moving joint", "moving joints")
-            )
-        }
-        About::Joints { moving, unlimited } => format!(
-            "The URDF has {}. No limits are given for {}.",
-            plural(*moving, "moving joint", "moving joints"),
-            quoted(unlimited)
-        ),
+        About::Joints {
+            moving,
+            unlimited,
+            endless,
+            no_range,
+        } => of_joints(*moving, unlimited, endless, no_range),
         About::TipOfChain {
             link,
             joints,
@@ -342,6 +368,20 @@ fn found(mistake: &Mistake) -> String {
             format!("`{body}` moved on its link between recordings.")
         }
         Mistake::Poses => "The convention of the tracked poses was misread.".to_owned(),
+        Mistake::MissingColumn { joint } => {
+            format!("Joint `{joint}` moved, and no column has its readings.")
+        }
+        Mistake::StoodAt {
+            joint,
+            value,
+            turns,
+        } => {
+            let unit = if *turns { Unit::Radian } else { Unit::Meter };
+            format!(
+                "Joint `{joint}` has no column, and stood at {}.",
+                number::plain(*value, unit)
+            )
+        }
         Mistake::Other => "A mistake in the recordings stands out.".to_owned(),
     }
 }

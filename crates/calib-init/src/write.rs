@@ -282,8 +282,10 @@ impl Page<'_> {
         let noise = yaml::two_digits(marker);
         self.line(&format!("  noise: {{marker_mm: {noise}, joint_deg: 0.01}}"));
         self.line("  recordings:");
-        self.line("    sweep:");
-        self.line("      grid:");
+        if !skeleton.sweep.is_empty() {
+            self.line("    sweep:");
+            self.line("      grid:");
+        }
         for (joint, (low, high)) in &skeleton.sweep {
             let (key, low, high) = (
                 self.key(*joint),

@@ -39,6 +39,34 @@ pub enum PlanError {
         /// The joint.
         joint: String,
     },
+    /// No joint that carries a body can move.
+    #[error(
+        "{file}: no joint that carries a body can move: {}\n  help: {}",
+        words::standing(held, fixed),
+        words::to_move(fixed)
+    )]
+    NothingMoves {
+        /// The profile.
+        file: String,
+        /// Joints that `plan.hold` holds, or that stood still in all recordings.
+        held: Vec<String>,
+        /// Joints whose limits leave no range.
+        fixed: Vec<String>,
+    },
+    /// No free parameter has the name that was asked for.
+    #[error(
+        "{file}: `--of {part}` names no free parameter{}\n  help: give a part of one of their names: {}", words::nearest(nearest.as_deref()), words::some_of(known)
+    )]
+    NoSuchParameter {
+        /// The profile.
+        file: String,
+        /// What was asked for.
+        part: String,
+        /// The nearest name, or part of a name between points.
+        nearest: Option<String>,
+        /// All free parameters.
+        known: Vec<String>,
+    },
     /// Cameras are given in a frame of which nobody knows where it is.
     #[error(
         "{file}: the cameras are given in the frame of the tracker, and it is not known where the robot stands in it\n  help: give `tracker: {{from_root: …}}`, or record some postures first"
@@ -222,6 +250,8 @@ impl PlanError {
             Self::NoPosture { file, .. }
             | Self::TooFew { file, .. }
             | Self::NoRange { file, .. }
+            | Self::NothingMoves { file, .. }
+            | Self::NoSuchParameter { file, .. }
             | Self::NoRecording { profile: file }
             | Self::NoPlace { file }
             | Self::OutOfReach { file, .. }

@@ -25,6 +25,8 @@ pub struct JointBox {
     pub moved: Vec<Moved>,
     /// Positions of all others, by joint index.
     pub base: Vec<f64>,
+    /// Joints that carry a body and whose limits leave no range: they stand there.
+    pub fixed: Vec<JointId>,
 }
 
 /// Planned positions are whole hundredths of a degree and hundredths of a millimeter: a list that a person can type.
@@ -51,7 +53,7 @@ impl JointBox {
         for (joint, value) in &spec.hold {
             base[joint.index()] = *value;
         }
-        let mut moved = Vec::new();
+        let (mut moved, mut fixed) = (Vec::new(), Vec::new());
         for id in model.independent_joints() {
             let joint = model.joint(id);
             let stated = spec.joints.get(&id).copied();
@@ -64,6 +66,13 @@ impl JointBox {
             let limits = joint.limits.range().filter(|_| !endless);
             let turn = turns.then_some((-std::f64::consts::PI, std::f64::consts::PI));
             let (low, high) = stated.or(limits).or(turn).ok_or(id)?;
+            if high <= low {
+                base[id.index()] = low;
+                if stated.is_none() {
+                    fixed.push(id);
+                }
+                continue;
+            }
             let usual = if turns { 1.0 } else { 0.25 };
             let speed = joint.limits.velocity.filter(|v| *v > 0.0).unwrap_or(usual);
             moved.push(Moved {
@@ -74,7 +83,7 @@ impl JointBox {
                 turns,
             });
         }
-        Ok(Self { moved, base })
+        Ok(Self { moved, base, fixed })
     }
 
     /// Postures by an Owen-scrambled Sobol sequence, the same for the same seed; after 65 536 by another one of another seed.

@@ -162,7 +162,8 @@ impl Known {
     }
 
     /// What a fit found, by name; start values of the rest.
-    fn values_of(&self, model: &Model) -> Values {
+    #[must_use]
+    pub fn values_of(&self, model: &Model) -> Values {
         let mut values = model.start();
         let parameters = model.problem().parameters().iter();
         for (value, parameter) in values.0.iter_mut().zip(parameters) {

@@ -40,6 +40,18 @@ pub enum Note {
         /// Their names.
         links: Vec<String>,
     },
+    /// Ground or keep-outs are stated, and links that move have no shape to compare with them.
+    SurroundingsUnchecked {
+        /// What is stated: keys of `plan`.
+        stated: Vec<String>,
+        /// The links.
+        links: Vec<String>,
+    },
+    /// Joints whose limits leave no range: they do not move in the plan.
+    NoRoom {
+        /// Their names.
+        joints: Vec<String>,
+    },
     /// Links of which a shape could not be read.
     ShapeUnread {
         /// Their names.

@@ -1,5 +1,7 @@
 //! Everything that the choice needs: candidates, task, and their linearization.
 
+use std::collections::BTreeSet;
+
 use calib_pipeline::output::shapes::collision_solids;
 use calib_urdf::{JointId, LinkId};
 use nalgebra::DMatrix;
@@ -102,12 +104,17 @@ pub fn prepare<'a>(known: &'a Known, options: &'a Options) -> Result<Prepared<'a
     let spec = &known.robot.profile.plan;
     let file = || known.robot.file.clone();
     let joints = known.joint_box()?;
+    if joints.moved.is_empty() {
+        return Err(nothing_moves(known, &joints));
+    }
     if !spec.cameras.is_empty() && !known.placed {
         return Err(PlanError::NoPlace { file: file() });
     }
     let mut notes = known.notes.clone();
     let (mut feasible, unread) = known.feasible(&joints, options.seed);
     notes.extend(of_scene(known, &joints, &feasible.scene, unread));
+    // The terminal shows the first few: what can damage the robot is among them.
+    notes.sort_by_key(|note| !matches!(note, Note::SurroundingsUnchecked { .. }));
     let (candidates, counts) = feasible.all(joints.postures(options.candidates, options.seed));
     if candidates.is_empty() {
         let counts = Box::new(counts);
@@ -124,6 +131,7 @@ pub fn prepare<'a>(known: &'a Known, options: &'a Options) -> Result<Prepared<'a
     if linear.names.is_empty() {
         return Err(PlanError::NothingFree { file: file() });
     }
+    all_named(&options.of, &linear.names, file)?;
     let basis = Basis::new(
         linear.scale.clone(),
         &linear.has_prior,
@@ -153,6 +161,37 @@ pub fn prepare<'a>(known: &'a Known, options: &'a Options) -> Result<Prepared<'a
         b,
         criterion,
         notes,
+    })
+}
+
+fn nothing_moves(known: &Known, joints: &JointBox) -> PlanError {
+    let model = &known.robot.model;
+    let name = |joint: &JointId| model.joint(*joint).name.clone();
+    let still = known.still.iter().map(|s| s.0);
+    let held = known.robot.profile.plan.hold.keys().copied();
+    let held: BTreeSet<JointId> = still.chain(held).collect();
+    PlanError::NothingMoves {
+        file: known.robot.file.clone(),
+        held: held.iter().map(name).collect(),
+        fixed: joints.fixed.iter().map(name).collect(),
+    }
+}
+
+/// Whether every part of a name that is asked for is in the name of a free parameter.
+fn all_named(of: &[String], names: &[String], file: impl Fn() -> String) -> Result<(), PlanError> {
+    let is_none = |part: &&String| !names.iter().any(|name| name.contains(part.as_str()));
+    let Some(part) = of.iter().find(is_none) else {
+        return Ok(());
+    };
+    let words = names
+        .iter()
+        .flat_map(|n| std::iter::once(n.as_str()).chain(n.split('.')));
+    let nearest = calib_finding::nearest_word(part, words);
+    Err(PlanError::NoSuchParameter {
+        file: file(),
+        part: part.clone(),
+        nearest: nearest.map(str::to_owned),
+        known: names.to_vec(),
     })
 }
 
@@ -224,11 +263,24 @@ fn of_scene(known: &Known, joints: &JointBox, scene: &Scene, unread: Vec<String>
     let model = &known.robot.model;
     let spec = &known.robot.profile.plan;
     let mut notes = Vec::new();
+    if !joints.fixed.is_empty() {
+        let names = joints.fixed.iter().map(|j| model.joint(*j).name.clone());
+        notes.push(Note::NoRoom {
+            joints: names.collect(),
+        });
+    }
     let moved = |link: &LinkId| joints.moved.iter().any(|m| model.carries(m.joint, *link));
     let has_shape = |link: &LinkId| scene.capsules.iter().any(|c| c.link == *link);
     let without = model.link_ids().filter(|l| moved(l) && !has_shape(l));
     let links: Vec<String> = without.map(|l| model.link(l).name.clone()).collect();
     if !links.is_empty() {
+        let ground = spec.ground.map(|_| "plan.ground_mm".to_owned());
+        let boxes = spec.keep_outs.keys().map(|k| format!("plan.keep_outs.{k}"));
+        let stated: Vec<String> = ground.into_iter().chain(boxes).collect();
+        if !stated.is_empty() {
+            let links = links.clone();
+            notes.push(Note::SurroundingsUnchecked { stated, links });
+        }
         notes.push(Note::NoShape { links });
     }
     if !unread.is_empty() {

@@ -193,6 +193,15 @@ pub fn note(note: &Note) -> String {
             "Collisions are not checked for links without shapes: {}.",
             names(links)
         ),
+        Note::SurroundingsUnchecked { stated, links } => format!(
+            "{} not compared with links without shapes: {}. The plan may move them through. Give them `<collision>` shapes in the URDF.",
+            if stated.len() == 1 { format!("{} is", names(stated)) } else { format!("{} are", names(stated)) },
+            names(links)
+        ),
+        Note::NoRoom { joints } => format!(
+            "Held, because their limits in the URDF leave no range: {}. Correct the limits to move them.",
+            names(joints)
+        ),
         Note::ShapeUnread { links } => format!(
             "Some shapes could not be read, and collisions with them are not checked: {}.",
             names(links)
@@ -223,6 +232,57 @@ pub fn note(note: &Note) -> String {
             "The tool's position depends on something that neither the plan nor a prior determines; its σ is not stated. Fix it in the profile or state a prior.".to_owned()
         }
     }
+}
+
+/// Why no joint moves.
+#[must_use]
+pub fn standing(held: &[String], fixed: &[String]) -> String {
+    let quoted = |names: &[String]| {
+        let all: Vec<String> = names.iter().map(|n| format!("`{n}`")).collect();
+        all.join(", ")
+    };
+    let mut parts = Vec::new();
+    if !fixed.is_empty() {
+        parts.push(format!(
+            "the URDF's limits leave no range to {}",
+            quoted(fixed)
+        ));
+    }
+    if !held.is_empty() {
+        parts.push(format!("{} stand still", quoted(held)));
+    }
+    if parts.is_empty() {
+        return "the links of the bodies hang on fixed joints".to_owned();
+    }
+    parts.join(", ")
+}
+
+/// How to let joints move.
+#[must_use]
+pub fn to_move(fixed: &[String]) -> &'static str {
+    if fixed.is_empty() {
+        "give ranges under `plan.joints`, take joints out of `plan.hold`, or put a body on a link that moves"
+    } else {
+        "correct `lower` and `upper` of these joints in the URDF"
+    }
+}
+
+/// The nearest name, after what was not found.
+#[must_use]
+pub fn nearest(name: Option<&str>) -> String {
+    name.map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
+}
+
+/// At most eight names.
+#[must_use]
+pub fn some_of(names: &[String]) -> String {
+    const MOST: usize = 8;
+    let shown = names.iter().take(MOST).map(|n| format!("`{n}`"));
+    let mut shown: Vec<String> = shown.collect();
+    if names.len() > MOST {
+        shown.push(format!("and {} more", names.len() - MOST));
+    }
+    shown.join(", ")
 }
 
 /// σ of a parameter in the unit in which it is read.

@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use calib_files::folder_of;
+use calib_pipeline::PipelineError;
 use calib_pipeline::formulate::formulation::FreeSet;
-use calib_pipeline::formulate::ml;
+use calib_pipeline::formulate::ml::{self, calibration_at};
 use calib_pipeline::formulate::solved::nominal;
 use calib_pipeline::options::Plugins;
 use calib_pipeline::prepare::inputs::{Inputs, RobotProfile};
@@ -158,8 +159,13 @@ fn planned(
             loaded.shapes.insert(marker, of);
         }
     }
-    let start = nominal(&inputs, &known.start);
     let stated = ml::state(&inputs, &known.tracks, &known.start, FreeSet::Profile);
+    let model = calib_core::Model::new(&stated.problem).map_err(PipelineError::from)?;
+    // Beside recordings, by the robot that they show: postures of the nominal one would be rejected as gross errors.
+    let start = match known.values.is_empty() {
+        true => nominal(&inputs, &known.start),
+        false => calibration_at(&stated, &model, &known.values_of(&model), &inputs),
+    };
     let groups = stated.problem.groups();
     let level = |group: calib_core::GroupId| {
         let group = &groups[group.index()];

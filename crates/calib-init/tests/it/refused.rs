@@ -113,3 +113,91 @@ fn from_the_urdf_alone_the_profile_can_be_simulated() {
         assert_eq!(simulated.recordings["poses"].len(), 40);
     }
 }
+
+/// A robot of joints one after the other: type, and its limits.
+fn chain(joints: &[(&str, &str)]) -> RobotModel {
+    let mut text = "<robot name=\"chain\"><link name=\"l0\"/>".to_owned();
+    for (i, (kind, limits)) in joints.iter().enumerate() {
+        let axis = ["0 0 1", "0 1 0", "1 0 0"][i % 3];
+        let k = i + 1;
+        text += &format!(
+            "<link name=\"l{k}\"/><joint name=\"j{k}\" type=\"{kind}\"><parent link=\"l{i}\"/><child link=\"l{k}\"/>\
+             <origin xyz=\"0.2 0 0.1\"/><axis xyz=\"{axis}\"/>{limits}</joint>"
+        );
+    }
+    RobotModel::from_urdf_text(&(text + "</robot>"), "chain.urdf").expect("a chain")
+}
+
+const TURN: &str = "<limit lower=\"-2\" upper=\"2\" effort=\"1\" velocity=\"1\"/>";
+const SLIDE: &str = "<limit lower=\"0\" upper=\"0.5\" effort=\"1\" velocity=\"1\"/>";
+const NONE: &str = "<limit lower=\"0\" upper=\"0\" effort=\"1\" velocity=\"1\"/>";
+
+#[test]
+fn robots_that_only_slide_turn_without_end_or_have_no_range_get_a_profile_that_is_valid() {
+    let cases: [(&[(&str, &str)], &str, &[&str]); 3] = [
+        (
+            &[
+                ("prismatic", SLIDE),
+                ("prismatic", SLIDE),
+                ("prismatic", SLIDE),
+            ],
+            "all with limits",
+            &["checks", "poses"],
+        ),
+        (
+            &[("continuous", ""), ("revolute", TURN), ("revolute", TURN)],
+            "`j1` turns without limits",
+            &["checks", "poses", "sweep"],
+        ),
+        (
+            &[("revolute", TURN), ("revolute", NONE), ("revolute", TURN)],
+            "CHECK: The URDF has 3 moving joints. The limits of `j2` leave no range",
+            &["checks", "poses", "sweep"],
+        ),
+    ];
+    for (joints, said, recordings) in cases {
+        let model = chain(joints);
+        let proposal = propose(&model, &request(), &[]).unwrap_or_else(|e| panic!("{e}"));
+        let text = write::profile(&model, &proposal);
+        let lines: Vec<&str> = text
+            .lines()
+            .map(|l| l.trim_start_matches(['#', ' ']))
+            .collect();
+        assert!(lines.join(" ").contains(said), "{text}");
+        let robot =
+            tables::robot_profile(&model, &proposal).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let simulated = calib_sim::simulate(&robot.profile, &model, None).expect("a section");
+        let names: Vec<&String> = simulated.recordings.keys().collect();
+        assert_eq!(names, recordings, "{text}");
+    }
+    // Without any range there is nothing to record.
+    let still = chain(&[("revolute", NONE), ("prismatic", NONE)]);
+    let refused = propose(&still, &request(), &[])
+        .err()
+        .map(|e| e.to_string());
+    let refused = refused.unwrap_or_default();
+    assert!(
+        refused.contains("no range to `j1`, `j2`") && refused.contains("help:"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn a_column_that_is_missing_is_named() {
+    let hand = [("hand", "flange", Kind::Markers(3))];
+    let table = text(&recordings(&hand, Design::Random, 1)["poses"]);
+    // The tutorial's arm with five of its six columns.
+    let without = with_names(&table, |name| match name.starts_with("joint_3") {
+        true => "spare".to_owned(),
+        false => name.to_owned(),
+    });
+    let proposal = propose(&arm(), &request(), &[file("poses", without)]);
+    let proposal = proposal.unwrap_or_else(|e| panic!("{e}"));
+    let facts: Vec<String> = proposal
+        .facts
+        .iter()
+        .map(|fact| calib_init::words::sentence(&fact.about))
+        .collect();
+    let said = "Joint `joint_3` moved, and no column has its readings.";
+    assert!(facts.iter().any(|fact| fact.contains(said)), "{facts:#?}");
+}

@@ -4,7 +4,7 @@ use calib_plan::candidates::Candidate;
 use calib_plan::list::Why;
 use calib_plan::prepare::{Prepared, prepare};
 use calib_plan::shape::Capsule;
-use calib_plan::{Goal, Known, Options, Plan, PlanError, plan, terminal, write};
+use calib_plan::{Goal, Known, Note, Options, Plan, PlanError, plan, terminal, write};
 use nalgebra::{Point3, Vector3};
 use rand::seq::index::sample;
 use rand::{RngExt, SeedableRng};
@@ -602,4 +602,86 @@ fn places_of_the_tool_are_a_task() {
         let error = error.expect_err(table).to_string();
         assert!(said.iter().all(|s| error.contains(s)), "{error}");
     }
+}
+
+/// An arm of three joints whose second one has these limits, without shapes.
+fn held(low: f64, high: f64, extra: &str) -> Known {
+    let mut joints = SIX[..3].to_vec();
+    (joints[1].4, joints[1].5) = (low, high);
+    known(robot(&joints, Seen::Markers(4), false, extra))
+}
+
+#[test]
+fn a_joint_whose_limits_leave_no_range_stands_still_and_the_plan_says_so() {
+    let known = held(0.3, 0.3, "");
+    let plan = planned(&known, &few(8));
+    let second = known.robot.model.joint_id("j2").expect("a joint").index();
+    assert!(plan.postures.iter().all(|p| p.q[second] == 0.3));
+    let joints = vec!["j2".to_owned()];
+    assert!(
+        plan.notes.contains(&Note::NoRoom { joints }),
+        "{:?}",
+        plan.notes
+    );
+    let all = held(0.3, 0.3, "plan: {hold: {j1_deg: 0, j3_deg: 0}}\n");
+    let error = plan_error(&all, &few(8));
+    for said in [
+        "no range to `j2`",
+        "`j1`, `j3` stand still",
+        "`lower` and `upper`",
+    ] {
+        assert!(error.contains(said), "{error}");
+    }
+    let all = held(
+        -1.0,
+        1.0,
+        "plan: {hold: {j1_deg: 0, j2_deg: 0, j3_deg: 0}}\n",
+    );
+    let error = plan_error(&all, &few(8));
+    assert!(
+        error.contains("stand still") && error.contains("plan.hold"),
+        "{error}"
+    );
+}
+
+fn plan_error(known: &Known, options: &Options) -> String {
+    let made = plan(known, options);
+    made.map_or_else(|e| e.to_string(), |_| "a plan".to_owned())
+}
+
+#[test]
+fn a_name_that_no_parameter_has_is_refused() {
+    let known = held(-1.0, 1.0, "");
+    let asked = |part: &str| Options {
+        goal: Goal::Parameters,
+        of: vec!["j2".to_owned(), part.to_owned()],
+        ..few(8)
+    };
+    let error = plan_error(&known, &asked("ofset"));
+    for said in ["--of ofset", "did you mean `offset`?", "j1."] {
+        assert!(error.contains(said), "{error}");
+    }
+    assert!(plan(&known, &asked("offset")).is_ok());
+}
+
+#[test]
+fn surroundings_that_nothing_is_compared_with_come_first_among_the_notes() {
+    let extra = "plan: {ground_mm: 0, keep_outs: {desk: {size_mm: [900, 900, 900], center: {}}}}\n";
+    let plan = planned(&held(-1.0, 1.0, extra), &few(8));
+    let first = plan.notes.first();
+    let is_first = matches!(first, Some(Note::SurroundingsUnchecked { .. }));
+    assert!(is_first, "{:?}", plan.notes);
+    let screen = terminal::summary(&plan, "out");
+    let words: Vec<&str> = screen.split_whitespace().collect();
+    let said = words.join(" ");
+    for part in [
+        "`plan.ground_mm`, `plan.keep_outs.desk` are",
+        "`l3`",
+        "<collision>",
+    ] {
+        assert!(said.contains(part), "{said}");
+    }
+    let stated = planned(&six(Seen::Markers(4), "plan: {ground_mm: -900}\n"), &few(8));
+    let checked = |n: &Note| !matches!(n, Note::SurroundingsUnchecked { .. });
+    assert!(stated.notes.iter().all(checked));
 }

@@ -1,6 +1,11 @@
 //! Whole twins of a small robot.
 
 use calib_pipeline::formulate::formulation::MlFit;
+use calib_pipeline::options::Plugins;
+use calib_pipeline::prepare::load::load_robot;
+use calib_pipeline::verify::residuals::left_out;
+use calib_plan::Known;
+use calib_recording::{WriteOptions, write_poses};
 use calib_twin::replay::Replay;
 use calib_twin::{About, Options, Session, Source, Twin, quantity, terminal, twin, write};
 
@@ -128,4 +133,49 @@ fn a_trial_with_the_statement_of_the_session_finds_what_a_whole_one_finds() {
         compared >= 5 && 10 * agreed >= 7 * compared,
         "{agreed} of {compared}"
     );
+}
+
+#[test]
+fn postures_of_a_plan_are_recorded_by_the_robot_that_the_recordings_show() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    // Offsets that no gate lets pass.
+    let text =
+        profile(3, Seen::Markers(3), 30, 7).replace("joint_offset_deg: 0.3", "joint_offset_deg: 1");
+    let text = text.replace("offset_deg: 0.3}", "offset_deg: 1}");
+    let drawn = robot(THREE, &text);
+    let tables = calib_sim::simulate(&drawn.profile, &drawn.model, None);
+    for (name, table) in tables.expect("recordings").recordings {
+        let written = write_poses(&table, &WriteOptions::micro()).expect("a table");
+        std::fs::write(at(&format!("{name}.csv")), written).expect("written");
+    }
+    std::fs::write(at("arm.urdf"), &drawn.urdf_text).expect("written");
+    std::fs::write(at("arm.yaml"), &text).expect("written");
+    let loaded = load_robot(&at("arm.yaml")).unwrap_or_else(|e| panic!("{e}"));
+    let known = Known::of(loaded.clone(), Plugins::Refused).unwrap_or_else(|e| panic!("{e}"));
+    let asked = calib_plan::Options {
+        poses: Some(12),
+        candidates: 128,
+        ..calib_plan::Options::default()
+    };
+    let plan = calib_plan::plan(&known, &asked).unwrap_or_else(|e| panic!("{e}"));
+    let plan = plan.file(&known.robot.model);
+    let (session, source) = calib_twin::session(loaded, Some(&plan), Plugins::Refused, None)
+        .unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(source, Source::Plan);
+    let fit = session.fit().expect("a fit");
+    let rejected = left_out(fit);
+    let planned = |name: &String| name.starts_with("planned");
+    let of_plan = rejected
+        .iter()
+        .filter(|(recording, ..)| planned(recording))
+        .count();
+    let rows = fit
+        .formulation
+        .samples
+        .iter()
+        .filter(|(recording, _)| planned(recording));
+    assert!(rows.count() >= 12);
+    // 1 of 500 good ones is rejected.
+    assert!(of_plan <= 2, "{rejected:?}");
 }
