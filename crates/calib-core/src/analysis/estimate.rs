@@ -4,6 +4,7 @@
 //! start ─► minimize ─► Huber ─► GNC ─► gate ─► minimize ⇄ REML ─► gate again until it stays ─► analyze
 //! ```
 
+use crate::analysis::beginning::{first_levels, mask_of, stated_levels};
 use crate::analysis::information::Information;
 use crate::analysis::levels_found::levels_found;
 use crate::analysis::looked_at::fewer;
@@ -30,7 +31,20 @@ const GATE_ROUNDS: usize = 6;
 /// [`Error`] when the problem cannot be stated; a fit that does not converge or cannot determine something
 /// is a [`Solution`] that says so.
 pub fn solve(problem: &Problem, settings: &Settings) -> Result<Solution, Error> {
-    solve_of(Model::new(problem)?, None, settings)
+    solve_of(Model::new(problem)?, None, None, settings)
+}
+
+/// As [`solve`], with these noise levels to begin with in place of the stated ones: σ² per noise group, those of a fit that ended near. Levels of
+/// another number of groups, and of groups that are not estimated, are not taken.
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_from(
+    problem: &Problem,
+    levels: &[f64],
+    settings: &Settings,
+) -> Result<Solution, Error> {
+    solve_of(Model::new(problem)?, None, Some(levels), settings)
 }
 
 /// As [`solve`], from the observations only that `kept` kept: the solution of a problem with the same measurements.
@@ -48,7 +62,7 @@ pub fn solve_kept(
     if !own.eq(kept.model.observations.iter().map(place)) {
         return Err(Error::OtherMeasurements);
     }
-    solve_of(model, Some(&kept.weights), settings)
+    solve_of(model, Some(&kept.weights), None, settings)
 }
 
 /// As [`solve`], from where the fit of `near` ended, values and noise levels: for other observations of the same robot without gross errors. The gate
@@ -121,12 +135,7 @@ pub(crate) fn try_out(
 ) -> Result<Trial, Error> {
     let model = Model::new(problem)?;
     let mask = mask_of(&model, None)?;
-    let mut theta = stated_levels(&model);
-    if let Some(levels) = levels.filter(|levels| levels.len() == theta.len()) {
-        let groups = model.problem.groups.iter().zip(&mut theta).zip(levels);
-        let estimated = groups.filter(|((group, _), _)| group.estimate);
-        estimated.for_each(|((_, theta), level)| *theta = *level);
-    }
+    let mut theta = first_levels(&model, levels);
     let mut work = Workspace::new(&model);
     // What the gate keeps hangs on the noise levels: a little less of them, and a trial of TIAGo lost two parts that its run supports.
     let precision = match settings.robust.enabled {
@@ -148,30 +157,16 @@ pub(crate) fn try_out(
     })
 }
 
-/// σ² of every group as it is stated.
-fn stated_levels(model: &Model) -> Vec<f64> {
-    let groups = model.problem.groups.iter();
-    groups.map(|g| g.sigma * g.sigma).collect()
-}
-
-/// Per observation: 1 fitted, 0 held out or rejected before.
-fn mask_of(model: &Model, kept: Option<&[f64]>) -> Result<Vec<f64>, Error> {
-    let fitted = |(o, observation): (usize, &Observation)| {
-        let taken = kept.is_none_or(|kept| kept[o] > 0.0);
-        f64::from(u8::from(taken && !model.is_held_out(observation.sample)))
-    };
-    let mask: Vec<f64> = model.observations.iter().enumerate().map(fitted).collect();
-    if mask.iter().all(|w| *w == 0.0) {
-        return Err(Error::NoObservations);
-    }
-    Ok(mask)
-}
-
-fn solve_of(model: Model, kept: Option<&[f64]>, settings: &Settings) -> Result<Solution, Error> {
+fn solve_of(
+    model: Model,
+    kept: Option<&[f64]>,
+    levels: Option<&[f64]>,
+    settings: &Settings,
+) -> Result<Solution, Error> {
     let mask = mask_of(&model, kept)?;
     let mut work = Workspace::new(&model);
     let mut fit = Fit::new(&model, settings, FULL, 0);
-    let mut theta = stated_levels(&model);
+    let mut theta = first_levels(&model, levels);
     let (minimum, weights) = fit.robustly(&mask, &mut theta, &mut work);
     let found = Found {
         minimum,

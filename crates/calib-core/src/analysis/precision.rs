@@ -20,10 +20,10 @@ pub(crate) const FULL: Precision = Precision {
     between_levels: 1e-4,
     last: 0.0,
 };
-/// Of a trial, which only tells how well a model predicts: levels to 2.5 %, values to 3e-3 σ.
+/// Of a trial, which only tells how well a model predicts: levels to 2.5 %, values to 1e-2 σ.
 pub(crate) const ROUGH: Precision = Precision {
     settled: 5e-2,
-    between_rounds: 1e-4,
-    between_levels: 1e-4,
-    last: 1e-5,
+    between_rounds: 1e-3,
+    between_levels: 1e-3,
+    last: 1e-4,
 };

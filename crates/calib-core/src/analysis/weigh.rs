@@ -272,6 +272,9 @@ impl Fitted<'_> {
         models: &[NoiseModel],
         weights: &[f64],
     ) -> Option<(Vec<Trial>, NoiseChoice)> {
+        // One statement alone is no choice.
+        let can_be = |model: &&NoiseModel| problem.with_noise_model(**model).is_some();
+        models.iter().filter(can_be).nth(1)?;
         let thinned = thinned(self.objective.model, weights);
         let mut trials: Vec<Trial> = models
             .par_iter()

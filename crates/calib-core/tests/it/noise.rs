@@ -1,7 +1,7 @@
 //! Noise levels and intervals against simulated truth.
 
 use crate::common::{Chain, Free, rng, six_r};
-use calib_core::{NoiseKind, Settings, Solution, sandwich, solve};
+use calib_core::{NoiseKind, Settings, Solution, sandwich, solve, solve_from};
 
 const MARKER: f64 = 2e-4;
 const JOINT: f64 = 3.5e-4;
@@ -253,4 +253,28 @@ fn a_tracker_better_than_stated_is_found_so() {
     // 10 × 100 degrees of freedom or more: ± 2 %.
     assert!((orientation - 1.0).abs() < 0.08, "{orientation}");
     assert!((position - 1.0).abs() < 0.08, "{position}");
+}
+
+/// Levels to begin with change the way, not the end; those of another number of groups are not taken.
+#[test]
+fn a_fit_from_the_levels_that_were_found_ends_where_it_did_and_sooner() {
+    let settings = Settings::default();
+    let found = draw(5000, 36, JOINT, true, 0.0).solution;
+    let from = |levels: &[f64]| solve_from(found.model.problem(), levels, &settings).unwrap();
+    let again = from(&found.theta);
+    for (a, b) in again.parameters.iter().zip(&found.parameters) {
+        let off = (a.value - b.value).abs() / b.sigma.unwrap();
+        assert!(off < 1e-3, "{}: {off} σ", a.name);
+    }
+    for (a, b) in again.noise.iter().zip(&found.noise) {
+        assert!((a.sigma / b.sigma - 1.0).abs() < 1e-3, "{}", a.name);
+        assert_eq!(a.stated, b.stated, "{}", a.name);
+    }
+    assert!(
+        again.iterations < found.iterations,
+        "{} after {}",
+        again.iterations,
+        found.iterations
+    );
+    assert_eq!(from(&[1.0]).values.0, found.values.0);
 }

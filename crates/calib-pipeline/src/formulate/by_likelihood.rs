@@ -47,13 +47,18 @@ pub fn likelihood(
     }
     let mut settings = Settings::default();
     settings.robust.enabled = inputs.robot.profile.solve.robust;
-    let (mut registered, mut fit, mut of_rows) = sided(inputs, checked, &settings, progress)?;
+    let how = How {
+        settings: &settings,
+        // Where gross errors are looked for, what is kept may hang on the start: then it is that of a run of the profile.
+        near: chosen.filter(|_| !settings.robust.enabled),
+    };
+    let (mut registered, mut fit, mut of_rows) = sided(inputs, checked, &how, progress)?;
     for _ in 0..ALIGNMENTS {
         if !realign(inputs, &checked.tracks, &fit, ALIGNED) {
             break;
         }
         progress("fit again with the clocks brought together");
-        let again = fits(inputs, checked, &settings, progress)?;
+        let again = fits(inputs, checked, &how, progress)?;
         (registered, fit) = (again.0, again.1);
         // Rows that had not settled are out; others are judged again.
         of_rows.retain(|f| f.id == catalog::UNSETTLED_ROWS);
@@ -89,12 +94,12 @@ pub fn likelihood(
 fn sided(
     inputs: &mut Inputs,
     checked: &mut Checked,
-    settings: &Settings,
+    how: &How<'_>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Fits, PipelineError> {
     // Rows are judged again with the sides known.
     let first = starts::matter(inputs).then(|| (inputs.clone(), checked.tracks.clone()));
-    let mut found = fits(inputs, checked, settings, progress)?;
+    let mut found = fits(inputs, checked, how, progress)?;
     let Some((as_read, tracks)) = first else {
         return Ok(found);
     };
@@ -109,10 +114,17 @@ fn sided(
         checked.tracks = tracks.clone();
         starts::take(inputs, &sides);
         progress("fit again with the sides that joints came from");
-        found = fits(inputs, checked, settings, progress)?;
+        found = fits(inputs, checked, how, progress)?;
     }
     checked.findings.extend(starts::findings(inputs));
     Ok(found)
+}
+
+/// How to fit.
+struct How<'a> {
+    settings: &'a Settings,
+    /// The model that was chosen, where its values are to begin with.
+    near: Option<&'a Chosen>,
 }
 
 /// Registration, fit, and what is wrong with rows.
@@ -122,12 +134,19 @@ type Fits = (MlFit, MlFit, Vec<Finding>);
 fn fits(
     inputs: &mut Inputs,
     checked: &mut Checked,
-    settings: &Settings,
+    how: &How<'_>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Fits, PipelineError> {
     progress("fit all loops");
-    let full = ml::state(inputs, &checked.tracks, &checked.start, FreeSet::Profile);
-    let mut fit = ml::fit(full, inputs, settings)?;
+    let settings = how.settings;
+    let mut full = ml::state(inputs, &checked.tracks, &checked.start, FreeSet::Profile);
+    let mut fit = match how.near {
+        Some(chosen) => {
+            chosen.start(&mut full.problem);
+            ml::fit_from(full, inputs, &chosen.levels, settings)?
+        }
+        None => ml::fit(full, inputs, settings)?,
+    };
     let mut findings = Vec::new();
     if settings.robust.enabled {
         let mut bad = bad_rows(inputs, &checked.tracks, &fit);

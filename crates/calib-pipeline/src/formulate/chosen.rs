@@ -1,6 +1,8 @@
 //! A model that was chosen by `calib run --select`.
 
-use calib_core::NestedError;
+use std::collections::BTreeMap;
+
+use calib_core::{NestedError, Problem};
 use calib_profile::Solve;
 use calib_report::Selection;
 
@@ -15,9 +17,22 @@ pub struct Chosen {
     pub selection: Selection,
     /// What it costs in folds; `None` where nothing was added or there are too few poses.
     pub nested: Option<NestedError>,
+    /// Values of its parameters by name: where the trial of the choice ended.
+    pub values: BTreeMap<String, f64>,
+    /// Its noise levels, σ² per group; empty where its noise from pose to pose is not as the profile states it.
+    pub levels: Vec<f64>,
 }
 
 impl Chosen {
+    /// Lets a fit of the chosen model begin where its trial ended.
+    pub(crate) fn start(&self, problem: &mut Problem) {
+        for (name, value) in &self.values {
+            if let Some(id) = problem.find_parameter(name) {
+                problem.parameter_mut(id).start = *value;
+            }
+        }
+    }
+
     /// The choice with the factor that it widens the standard deviations of the fit by.
     #[must_use]
     pub fn fitted(self, fit: Option<&MlFit>) -> Selection {

@@ -2,7 +2,7 @@
 //!
 //! It starts from what the profile frees, on the rows that a run of the profile fits, with its noise, priors and robust weights.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_core::{SelectionRule, Settings, StepOutcome};
 use calib_report::{
@@ -35,6 +35,8 @@ pub fn choose(
             solve: profile.solve,
             selection: Selection::default(),
             nested: None,
+            values: BTreeMap::new(),
+            levels: Vec::new(),
         });
     };
     progress("choose effects");
@@ -73,6 +75,14 @@ pub fn choose(
     Ok(Chosen {
         selection: facts.selection(yaml(&solve, &inputs.robot.model)),
         nested: found.nested.clone().filter(|_| !added.is_empty()),
+        values: stated
+            .problem
+            .parameters()
+            .iter()
+            .zip(&found.values)
+            .map(|(parameter, value)| (parameter.name.clone(), *value))
+            .collect(),
+        levels: found.levels.clone(),
         solve,
     })
 }

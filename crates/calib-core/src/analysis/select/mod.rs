@@ -161,6 +161,8 @@ pub struct Selection {
     pub nested: Option<NestedError>,
     /// Values of all parameters in the last model.
     pub values: Vec<f64>,
+    /// σ² per noise group in the last model; empty where its noise from pose to pose is not as the problem states it.
+    pub levels: Vec<f64>,
 }
 
 /// Chooses among `parts`, from a model that has those of `first`. `problem` has all parts free; `progress` is told what was

@@ -9,6 +9,7 @@ use crate::analysis::select::step::{Candidate, Stage, additions, candidates, sim
 use crate::analysis::select::task::{EXCHANGES, Task};
 use crate::analysis::select::{Selection, SelectionStep, StepOutcome};
 use crate::graph::error::Error;
+use crate::graph::problem::NoiseModel;
 
 /// Parts, and then groups, that are fitted in full at each step: where the one that promises most predicts no better, the next may.
 const TRIES: usize = 3;
@@ -62,6 +63,10 @@ pub(super) fn select(task: &Task<'_>, progress: &mut dyn FnMut(usize)) -> Result
         rms: first.against(current).rms,
         ranks: (first.rank(), current.rank()),
         values: current.trial.values.0.clone(),
+        levels: match current.noise {
+            NoiseModel::Joint => current.trial.theta.clone(),
+            _ => Vec::new(),
+        },
         parts: course.chosen,
         steps: course.steps,
         tested: course.tested,

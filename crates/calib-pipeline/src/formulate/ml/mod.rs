@@ -165,6 +165,20 @@ pub fn fit(
     Ok(found(formulation, inputs, solution))
 }
 
+/// As [`fit`], with noise levels to begin with, σ² per group.
+///
+/// # Errors
+/// As [`fit`].
+pub(crate) fn fit_from(
+    formulation: Formulation,
+    inputs: &Inputs,
+    levels: &[f64],
+    settings: &Settings,
+) -> Result<MlFit, PipelineError> {
+    let solution = calib_core::solve_from(&formulation.problem, levels, settings)?;
+    Ok(found(formulation, inputs, solution))
+}
+
 /// As [`fit`], from the observations only that another fit kept; `None` where the two do not have the same ones, or too few are left.
 pub fn fit_kept(
     formulation: &Formulation,
