@@ -93,6 +93,10 @@ fn rms(errors: &[f64]) -> f64 {
 fn an_effect_of_a_plugin_is_found_and_predicted_with() {
     let Some(dir) = wavy() else { return };
     dir.calib(["check", "arm.yaml"]).expect(0);
+    // The closed forms estimate no effects: left out, it would count as estimated.
+    let closed = ["run", "arm.yaml", "--method", "paper", "--out", "closed"];
+    let said = dir.calib(closed).expect(2).stderr;
+    assert!(said.contains("estimates no joint effects"), "{said}");
     dir.calib(["run", "arm.yaml", "--out", "out"]).expect(0);
     let report = dir.json("out/report.json");
     let p = parameter(&report, "j2.waves").expect("freed");

@@ -168,9 +168,7 @@ impl PipelineError {
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Solve(_) => "look at what `calib check` says of the profile and the recordings",
-            Self::Plugin(_) => {
-                "`calib plugins` lists what there is, `calib plugins check PLUGIN` tests a plugin"
-            }
+            Self::Plugin(error) => error.remedy(),
             Self::Patch { .. } => "look at the names under `outputs`, and at the URDF there",
             Self::Urdf(_) => "correct it there, or export the nominal URDF again",
             Self::Edit(_) => "nothing was written; give the expanded URDF",

@@ -3,7 +3,7 @@
 use calib_core::JointState;
 use calib_core::effect::EFFECTS;
 use calib_plugin::{DependsOn, PluginError};
-use calib_profile::{Free, FreeEffect};
+use calib_profile::{Free, FreeEffect, Method};
 
 use crate::error::PipelineError;
 use crate::prepare::estimators::{Estimators, values};
@@ -26,7 +26,9 @@ pub(crate) fn resolve(
             let term = entry.term();
             let geared = robot.masses.drives()[joint.index()].gear_ratio != 0.0;
             let terms = || EFFECTS.iter().flat_map(|e| e.terms);
-            let why = if of.kind.axis().is_none() {
+            let why = if robot.profile.solve.method == Method::Paper {
+                "`method: paper` estimates no joint effects, `method: ml` does"
+            } else if of.kind.axis().is_none() {
                 "the joint is fixed"
             } else if term.revolute_only && !of.kind.turns() {
                 "it is an effect of turning joints, and this one slides"

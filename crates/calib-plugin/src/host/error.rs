@@ -218,6 +218,34 @@ impl PluginError {
         }
     }
 
+    /// What to do.
+    #[must_use]
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Disabled { .. } => {
+                "leave out `--no-plugins` and CALIB_NO_PLUGINS, or leave the plugin out"
+            }
+            Self::NotFound { .. } => {
+                "give the library's file with its folder (`./libname.so`), or put its folder on the search path CALIB_PLUGIN_PATH; those of a profile lie in `plugins/` beside it"
+            }
+            Self::Foreign { .. } => "look at where the file comes from before you allow it",
+            Self::BadPin { .. } => "`sha256sum` of the library's file gives it",
+            Self::Pin { .. } => {
+                "another build of the plugin: look at where it comes from, then pin the new hash"
+            }
+            Self::StaticProgram { .. } => "use the release for `linux-gnu`",
+            Self::Taken { .. } => "rename what the plugin offers, or leave one of the two out",
+            Self::NotOffered { .. } | Self::Unknown { .. } | Self::Parameter { .. } => {
+                "`calib plugins --profile PROFILE` lists what the profile can name"
+            }
+            Self::Joint { .. } => {
+                "take the effect out of `solve: {joints: …}`, or change what it needs"
+            }
+            Self::Shape { .. } => "name an estimator that takes these data",
+            _ => "`calib plugins check PLUGIN` tests a plugin",
+        }
+    }
+
     /// True when somebody asked for the end.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {

@@ -207,7 +207,7 @@ impl Checker<'_> {
                 // As many as were written: one whose name is wrong was named above.
                 let axes = raw.axes.len();
                 if axes < 2 {
-                    self.key_problem(&["origins", name], format!("origin `{name}` has {axes} swept axes: its orientation is open"), "give two `axes`, or `orientation: {from: <body>}` to take it from the URDF");
+                    self.key_problem(&["origins", name], format!("`axes` of origin `{name}` has {axes} of the two entries that its orientation takes"), "name a second swept joint under `axes`, or `orientation: {from: <body>}` to take it from the URDF");
                 }
                 Orientation::Axes
             }
@@ -235,7 +235,7 @@ impl Checker<'_> {
             Some(RawPoint::FromBodyMm(distance)) => Some(PointChoice::FromBody(distance * MM)),
             None => {
                 if raw.axes.len() == 1 {
-                    self.key_problem(&["origins", name], format!("origin `{name}` sweeps one axis: only a line can be observed, not a point on it"), "choose the point with `point: {from_body_mm: 0}` or `point: {nominal_distance_from: <origin>}`");
+                    self.key_problem(&["origins", name], format!("`axes` of origin `{name}` has one entry: only a line can be observed, not a point on it"), "name a second swept joint under `axes`, or choose the point with `point: {from_body_mm: 0}` or `point: {nominal_distance_from: <origin>}`");
                 }
                 None
             }
