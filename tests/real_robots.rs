@@ -381,12 +381,12 @@ fn study_agile_justin_geometry_under_other_widths() {
 }
 
 #[test]
-#[ignore = "study: four folds with what is selected and with all effects, half an hour"]
+#[ignore = "study: ten folds with what is selected and with all effects, ten minutes"]
 fn study_agile_justin_selected() {
     let Some(data) = data() else { return };
     let (all, own) = EVERYTHING;
     let (mut with_selected, mut with_all) = (Vec::new(), Vec::new());
-    for left in 0..4 {
+    for left in 0..10 {
         let selected = mean(&fold(&data, left, justin("", ""), &["--select"])) * 1e3;
         let everything = mean(&fold(&data, left, justin(all, own), &[])) * 1e3;
         println!("fold {left}: {selected:.2} mm selected, {everything:.2} mm with all effects");

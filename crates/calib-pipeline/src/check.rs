@@ -21,6 +21,7 @@ use crate::options::Plugins;
 use crate::output::of_data::{coverage, lost, used_for};
 use crate::prepare::aligned::Alignment;
 use crate::prepare::checks;
+use crate::prepare::effects;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
 use crate::prepare::named;
@@ -35,6 +36,7 @@ use crate::verify::causes::causes;
 /// [`PipelineError`] for what cannot be read at all.
 pub fn check(profile: &Path, plugins: Plugins) -> Result<DataChecks, PipelineError> {
     let mut inputs = load_recordings(load_robot(profile)?, plugins)?;
+    effects::taken(&inputs, inputs.robot.profile.solve.method)?;
     let mut findings = inputs.findings.clone();
     if inputs.robot.profile.solve.robust {
         findings.extend(relabel(&mut inputs));

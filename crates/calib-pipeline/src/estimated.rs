@@ -16,6 +16,7 @@ use crate::formulate::kinematics::Calibration;
 use crate::formulate::repeated::{is_repeatable, repeated};
 use crate::formulate::solved::{Solved, nominal};
 use crate::options::RunOptions;
+use crate::prepare::effects;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::body_tracks;
 
@@ -47,11 +48,12 @@ pub fn estimated(
     chosen: Option<&Chosen>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Estimated, PipelineError> {
+    let method = options.method(&inputs.robot.profile);
+    effects::taken(&inputs, method)?;
     let mut checked = check_data(&mut inputs, of_shapes, options.force)?;
     progress("estimate origins");
     let nominal = nominal(&inputs, &checked.start);
     let origins = origins(&inputs, &mut checked, &nominal)?;
-    let method = options.method(&inputs.robot.profile);
     let solved = match method {
         Method::Paper => {
             checked.findings.push(paper_assumptions());

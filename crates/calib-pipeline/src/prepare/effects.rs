@@ -26,9 +26,7 @@ pub(crate) fn resolve(
             let term = entry.term();
             let geared = robot.masses.drives()[joint.index()].gear_ratio != 0.0;
             let terms = || EFFECTS.iter().flat_map(|e| e.terms);
-            let why = if robot.profile.solve.method == Method::Paper {
-                "`method: paper` estimates no joint effects, `method: ml` does"
-            } else if of.kind.axis().is_none() {
+            let why = if of.kind.axis().is_none() {
                 "the joint is fixed"
             } else if term.revolute_only && !of.kind.turns() {
                 "it is an effect of turning joints, and this one slides"
@@ -56,6 +54,24 @@ pub(crate) fn resolve(
                 within: None,
             });
             estimators.effects.push(made);
+        }
+    }
+    Ok(())
+}
+
+/// Refuses effects where the closed forms would leave them out.
+///
+/// # Errors
+/// [`PipelineError::Plugin`].
+pub(crate) fn taken(inputs: &Inputs, method: Method) -> Result<(), PipelineError> {
+    let joints = inputs.robot.profile.solve.joints.iter();
+    for (joint, exception) in joints.filter(|_| method == Method::Paper) {
+        if let Some(name) = exception.effects.keys().next() {
+            return Err(PipelineError::from(PluginError::Joint {
+                of: inputs.estimators.tables.effect.get(name)?.title(),
+                joint: inputs.robot.model.joint(*joint).name.clone(),
+                why: "`method: paper` estimates no joint effects, `method: ml` does",
+            }));
         }
     }
     Ok(())
