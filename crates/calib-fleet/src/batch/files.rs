@@ -1,6 +1,7 @@
 //! The files of a fleet: two tables in Parquet, one as CSV, a summary as JSON, and the page.
 
 use std::collections::BTreeMap;
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use calib_files::{FileError, GrowingFile, OutputFile, ResultsFolder};
@@ -27,12 +28,14 @@ pub struct Files {
 /// Names of the tables.
 const ROBOTS: &str = "fleet.parquet";
 const QUANTITIES: &str = "fleet-quantities.parquet";
+const CSV: &str = "fleet.csv";
+const PAGE: &str = "fleet.html";
 
-/// Tables that are being made, row by row. The two in Parquet grow on the disk: memory is that of one group of rows.
+/// Tables that are being made, row by row. All of them and the page grow on the disk: memory is that of one group of rows.
 pub(super) struct Writing {
     robots: TableWriter<GrowingFile>,
     quantities: TableWriter<GrowingFile>,
-    csv: String,
+    csv: BufWriter<GrowingFile>,
     page: Page,
     tally: Tally,
     summary: BTreeMap<String, u64>,
@@ -90,6 +93,12 @@ fn failed(out: &Path, name: &str, fault: TableFault) -> BatchError {
         }),
         fault => FleetError::Table(fault),
     })
+}
+
+/// A file that cannot be written.
+fn unwritten(out: &Path, name: &str) -> impl FnOnce(io::Error) -> BatchError {
+    let path = out.join(name);
+    |source| BatchError::Work(FleetError::File(FileError::Write { path, source }))
 }
 
 fn text(value: Option<&str>) -> Cell {
@@ -162,11 +171,16 @@ fn shown(cell: &Cell) -> String {
 impl Writing {
     /// Starts the tables in the folder `out`, which is locked.
     pub fn new(folder: ResultsFolder, out: &Path) -> Result<Self, BatchError> {
+        let head = line(ROBOT.iter().map(|(name, _)| (*name).to_owned()));
+        let mut csv = BufWriter::new(folder.grow(CSV)?);
+        csv.write_all(head.as_bytes())
+            .map_err(unwritten(out, CSV))?;
+        let page = Page::new(folder.grow(PAGE)?);
         Ok(Self {
             robots: table(&folder, out, (ROBOTS, ROBOT))?,
             quantities: table(&folder, out, (QUANTITIES, QUANTITY))?,
-            csv: line(ROBOT.iter().map(|(name, _)| (*name).to_owned())),
-            page: Page::default(),
+            csv,
+            page: page.map_err(unwritten(out, PAGE))?,
             tally: Tally::default(),
             summary: BTreeMap::new(),
             failures: BTreeMap::new(),
@@ -179,7 +193,9 @@ impl Writing {
     /// Adds a robot to all of them.
     pub fn add(&mut self, robot: &Robot) -> Result<(), BatchError> {
         let cells = cells(robot);
-        self.csv += &line(cells.iter().map(shown));
+        let text = line(cells.iter().map(shown));
+        let written = self.csv.write_all(text.as_bytes());
+        written.map_err(unwritten(&self.out, CSV))?;
         let of_robots = |fault| failed(&self.out, ROBOTS, fault);
         self.robots.push(cells).map_err(of_robots)?;
         for quantity in &robot.quantities {
@@ -187,7 +203,8 @@ impl Writing {
             let of_quantities = |fault| failed(&self.out, QUANTITIES, fault);
             self.quantities.push(cells).map_err(of_quantities)?;
         }
-        self.page.add(robot)?;
+        let added = self.page.add(robot);
+        added.map_err(unwritten(&self.out, PAGE))?;
         self.tally.add(robot);
         let verdict = word(robot.verdict).to_owned();
         *self.summary.entry(verdict).or_default() += 1;
@@ -213,16 +230,20 @@ impl Writing {
             let finished = table.finish();
             finished.map_err(|fault| failed(&self.out, name, fault))
         };
-        let tables = vec![
+        let csv = self
+            .csv
+            .into_inner()
+            .map_err(io::IntoInnerError::into_error);
+        let grown = vec![
             finished(ROBOTS, self.robots)?,
             finished(QUANTITIES, self.quantities)?,
+            csv.map_err(unwritten(&self.out, CSV))?,
+            self.page
+                .end(&summary)
+                .map_err(unwritten(&self.out, PAGE))?,
         ];
-        let files = [
-            OutputFile::text("fleet.csv", self.csv),
-            OutputFile::text("fleet.html", self.page.html(&summary)?),
-            OutputFile::text("fleet.json", json.clone()),
-        ];
-        let written = self.folder.write_with(tables, &files)?;
+        let files = [OutputFile::text("fleet.json", json.clone())];
+        let written = self.folder.write_with(grown, &files)?;
         Ok(Files {
             summary,
             json,

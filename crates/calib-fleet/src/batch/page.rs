@@ -1,11 +1,12 @@
 //! The page of a fleet: its robots as compact data that a script in the page shows, sorts and filters. It needs no other file.
 
 use std::collections::BTreeMap;
+use std::io::{self, BufWriter, Write};
 
+use calib_files::GrowingFile;
 use calib_report::number;
 use serde::Serialize;
 
-use super::error::BatchError;
 use super::row::Robot;
 use super::summary::{Summary, word};
 
@@ -48,12 +49,12 @@ struct Line(
     Option<f64>,
 );
 
-/// The robots of a page.
-#[derive(Debug, Default)]
+/// A page that is being written: robots as they come, then what is known of all of them.
+#[derive(Debug)]
 pub(super) struct Page {
     words: Words,
-    /// [`Line`]s as they stand in the page, which is a tenth of what they are as values.
-    lines: String,
+    out: BufWriter<GrowingFile>,
+    begun: bool,
 }
 
 /// Three digits: what a person compares.
@@ -62,8 +63,27 @@ fn rounded(value: f64) -> Option<f64> {
     text.parse().ok().filter(|v: &f64| v.is_finite())
 }
 
+/// What stands before and after the data.
+fn around() -> (&'static str, &'static str) {
+    TEMPLATE.split_once(DATA).unwrap_or((TEMPLATE, ""))
+}
+
 impl Page {
-    pub fn add(&mut self, robot: &Robot) -> Result<(), BatchError> {
+    /// Begins the page.
+    pub fn new(file: GrowingFile) -> io::Result<Self> {
+        let mut out = BufWriter::new(file);
+        let (before, _) = around();
+        out.write_all(before.as_bytes())?;
+        out.write_all(b"{\"robots\":[")?;
+        Ok(Self {
+            words: Words::default(),
+            out,
+            begun: false,
+        })
+    }
+
+    /// Adds a robot.
+    pub fn add(&mut self, robot: &Robot) -> io::Result<()> {
         let words = &mut self.words;
         let most = robot.most_changed();
         let change = |joint: &super::row::JointDrift| {
@@ -80,33 +100,34 @@ impl Page {
             most.map(change),
             robot.drift.as_ref().and_then(|d| rounded(d.p_value)),
         );
-        if !self.lines.is_empty() {
-            self.lines.push(',');
+        if self.begun {
+            self.out.write_all(b",")?;
         }
-        self.lines += &json(&line)?;
-        Ok(())
+        self.begun = true;
+        self.out.write_all(json(&line)?.as_bytes())
     }
 
-    /// The page.
-    pub fn html(&self, summary: &Summary) -> Result<String, BatchError> {
-        let (before, after) = TEMPLATE.split_once(DATA).unwrap_or((TEMPLATE, ""));
+    /// The rest of the page: the texts that robots share, and the fleet in numbers.
+    pub fn end(mut self, summary: &Summary) -> io::Result<GrowingFile> {
         let (words, summary) = (json(&self.words)?, json(summary)?);
-        let parts = [
-            before,
-            "{\"words\":",
+        let (_, after) = around();
+        for part in [
+            "],\"words\":",
             &words,
-            ",\"robots\":[",
-            &self.lines,
-            "],\"summary\":",
+            ",\"summary\":",
             &summary,
             "}",
             after,
-        ];
-        Ok(parts.concat())
+        ] {
+            self.out.write_all(part.as_bytes())?;
+        }
+        self.out
+            .into_inner()
+            .map_err(io::IntoInnerError::into_error)
     }
 }
 
 /// No name can end the element that the data stand in.
-fn json(value: &impl Serialize) -> Result<String, BatchError> {
+fn json(value: &impl Serialize) -> io::Result<String> {
     Ok(serde_json::to_string(value)?.replace('<', "\\u003c"))
 }

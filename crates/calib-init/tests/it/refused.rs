@@ -134,7 +134,9 @@ const NONE: &str = "<limit lower=\"0\" upper=\"0\" effort=\"1\" velocity=\"1\"/>
 
 #[test]
 fn robots_that_only_slide_turn_without_end_or_have_no_range_get_a_profile_that_is_valid() {
-    let cases: [(&[(&str, &str)], &str, &[&str]); 3] = [
+    // Replacements, what is asked for, what is said.
+    type Case<'a> = (&'a [(&'a str, &'a str)], &'a str, &'a [&'a str]);
+    let cases: [Case<'_>; 3] = [
         (
             &[
                 ("prismatic", SLIDE),
