@@ -6,6 +6,7 @@ use crate::scratch;
 
 use std::path::PathBuf;
 
+use rand::{SeedableRng as _, seq::SliceRandom as _};
 use scratch::Scratch;
 
 /// Position error of the body on the other day that the field's best published fit leaves, m (norm, rms).
@@ -380,6 +381,42 @@ fn study_agile_justin_geometry_under_other_widths() {
     }
 }
 
+/// What endless postures would reach: geometry from a third, from half and from nine tenths of the postures, drawn at random, judged on the others.
+#[test]
+#[ignore = "study: 60 runs of geometry, a minute or two"]
+fn study_agile_justin_geometry_of_endless_postures() {
+    let Some(data) = data() else { return };
+    let read = |path: &str| std::fs::read_to_string(data.join(path)).expect("part of the data");
+    let table = read("agile_justin/postures.csv");
+    let (header, postures) = table.split_once('\n').expect("lines");
+    let mut postures: Vec<&str> = postures.lines().collect();
+    let urdf = read("agile_justin/agile_justin_nominal.urdf");
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+    let mut of = |count: usize| {
+        let errors = (0..20).map(|_| {
+            postures.shuffle(&mut rng);
+            let (fitted, others) = postures.split_at(count);
+            let dir = Scratch::new()
+                .file("justin.yaml", justin("", ""))
+                .file("justin.urdf", urdf.clone())
+                .file("train.csv", format!("{header}\n{}\n", fitted.join("\n")))
+                .file("check.csv", format!("{header}\n{}\n", others.join("\n")));
+            dir.calib(["run", "justin.yaml", "--out", "out"]);
+            mean(&dir.json("out/report.json")) * 1e3
+        });
+        errors.sum::<f64>() / 20.0
+    };
+    let points = [117, 175, 315].map(|count| (1.0 / count as f64, of(count)));
+    // Error = what endless postures reach + what estimating costs, which falls as 1/n.
+    let [x, y] = [|p: &(f64, f64)| p.0, |p: &(f64, f64)| p.1]
+        .map(|of| points.iter().map(of).sum::<f64>() / 3.0);
+    let slope = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>()
+        / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>();
+    let endless = y - slope * x;
+    println!("geometry alone: {points:?} mm by 1/postures; of endless postures {endless:.2} mm");
+    assert!((10.1..10.6).contains(&endless), "{points:?}");
+}
+
 #[test]
 #[ignore = "study: ten folds with what is selected and with all effects, ten minutes"]
 fn study_agile_justin_selected() {
@@ -431,7 +468,7 @@ fn rms_of(held_out: &serde_json::Value, robot: &str) -> f64 {
 
 const PLAIN: &str = "solve: {robust: false, noise: {joint_deg: 0}}\n";
 
-/// What decides line 19 are the spoiled lines that the gate keeps, and a good one that it rejects in their place.
+/// What decides line 19: line 13 alone determines what it needs, and spoiled lines contradict it. The gate keeps it.
 #[test]
 fn without_the_spoiled_lines_the_outlying_posture_is_predicted() {
     if !skipped_tests::thorough() {
@@ -451,7 +488,7 @@ fn without_the_spoiled_lines_the_outlying_posture_is_predicted() {
          lines {clean:.1} mm, plain {plain:.1} mm"
     );
     assert!(clean < 3.5 && clean < 0.5 * plain);
-    assert!((default - without_13).abs() < 1.0 && without_13 > with_13 + 3.0);
+    assert!(default < with_13 && without_13 > with_13 + 3.0);
 }
 
 /// The spoiled table, each posture left out in turn and everything done again without it: what line 19 alone decides.
@@ -488,6 +525,8 @@ fn study_tiago_left_out_by_refits() {
             "without line {without:?}: default {default:.2} mm, plain {plain:.2} mm, registration only {registered:.2} mm"
         );
     }
-    assert!(rms(0, Some(19)) < 0.9 * rms(1, Some(19)));
-    assert!(rms(0, None) < 1.05 * rms(1, None));
+    for registration_or_plain in [1, 2] {
+        assert!(rms(0, Some(19)) < rms(registration_or_plain, Some(19)));
+        assert!(rms(0, None) < 0.95 * rms(registration_or_plain, None));
+    }
 }

@@ -100,6 +100,7 @@ fn single_rows(
         return Ok(());
     }
     let settings = Settings::default();
+    let settings = settings.clone().with_robust(settings.robust.gate_alone());
     let stated = ml::state(inputs, tracks, start, FreeSet::Profile);
     let fit = ml::fit(stated, inputs, &settings)?;
     let bad = bad_rows(inputs, tracks, &fit);

@@ -20,12 +20,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
+use crate::analysis::settings::Settings;
+use crate::analysis::solution::Solution;
 use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::accumulate;
+use crate::solve::predicted::uncontradicted;
 use crate::solve::robust::{RejectReason, Rejection, RobustSettings, gate_of};
 use crate::solve::whitened::{covariance_of, whitened};
 
@@ -57,6 +60,21 @@ const HARM: f64 = 1.5;
 /// …where those are no more than this share of all. Where they are more, as behind a step in the middle of the recordings, nothing tells
 /// which side is right, and what looks for changes has to see both.
 const FEW: f64 = 0.2;
+
+impl Solution {
+    /// Whether a fit that knows the uncertainty of its predictions keeps something that this one rejected.
+    #[must_use]
+    pub fn would_keep_more(&self, settings: &Settings) -> bool {
+        if self.rejected.is_empty() || !settings.robust.enabled || !settings.robust.uncontradicted {
+            return false;
+        }
+        let mask = eligible(&self.model, &[]);
+        let mut work = Workspace::new(&self.model);
+        let parts = (&mask[..], &self.weights[..]);
+        let robust = &settings.robust;
+        uncontradicted(self.objective(), &self.values, parts, robust, &mut work).is_some()
+    }
+}
 
 /// Every observation that may take part: not held out, and not where another marker should be.
 pub(crate) fn eligible(model: &Model, rejected: &[Rejection]) -> Vec<f64> {

@@ -20,10 +20,11 @@ use crate::solve::equations::{Objective, Workspace};
 use crate::solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize_in};
 use crate::solve::noise::{Scoring, score};
 use crate::solve::normal::data_cost;
-use crate::solve::robust::{RejectReason, Rejection, clean, clean_near, explain, gate};
+use crate::solve::predicted::gate_beside;
+use crate::solve::robust::{RejectReason, Rejection, clean, clean_near, explain};
 
-/// Gate and refit alternate; the set settles in two or three rounds unless an observation lies at the border.
-const GATE_ROUNDS: usize = 6;
+/// Gate and refit alternate; the set settles in two or three rounds unless an observation lies at the border, or is kept though the gate rejects it.
+const GATE_ROUNDS: usize = 16;
 
 /// Solves a problem.
 ///
@@ -371,7 +372,12 @@ impl<'a> Fit<'a> {
             if !robust.enabled || ended {
                 break;
             }
-            match gate(model, &minimum.values, theta, mask, robust, work) {
+            let objective = Objective {
+                model,
+                weights: &weights,
+                theta,
+            };
+            match gate_beside(objective, &minimum.values, mask, robust, work) {
                 Some(again) if again != weights => weights = again,
                 _ => break,
             }

@@ -11,6 +11,7 @@ pub(crate) mod minimize;
 pub(crate) mod noise;
 pub(crate) mod normal;
 pub(crate) mod panel;
+pub(crate) mod predicted;
 pub(crate) mod relabel;
 pub(crate) mod robust;
 pub(crate) mod rows;

@@ -69,6 +69,8 @@ pub struct RobustSettings {
     pub gate: f64,
     /// μ shrinks by this factor per step of (3).
     pub anneal: f64,
+    /// Whether observations are kept that the others contradict no more than chance does, however far they lie. Off, what the gate rejects stays out: for those who ask which observations are off.
+    pub uncontradicted: bool,
 }
 
 impl Default for RobustSettings {
@@ -78,6 +80,7 @@ impl Default for RobustSettings {
             huber: 2.8,
             gate: 0.999,
             anneal: 1.6,
+            uncontradicted: true,
         }
     }
 }
@@ -91,6 +94,15 @@ impl RobustSettings {
             ..Self::default()
         }
     }
+
+    /// The same without `uncontradicted`.
+    #[must_use]
+    pub fn gate_alone(self) -> Self {
+        Self {
+            uncontradicted: false,
+            ..self
+        }
+    }
 }
 
 /// χ² quantile; the distributions are valid by construction (freedom ≥ 1).
@@ -100,7 +112,7 @@ fn chi2_quantile(dimension: usize, probability: f64) -> f64 {
 
 /// Limits per dimension 0..=6, looked up once.
 pub(crate) struct Limits {
-    gate: [f64; 7],
+    pub gate: [f64; 7],
     huber: [f64; 7],
     median: [f64; 7],
 }
@@ -172,7 +184,7 @@ pub(crate) fn distances(
 }
 
 /// Factor by which the typical d² exceeds what its noise model says (≥ 1).
-fn inflation(model: &Model, d2: &[f64], mask: &[f64], limits: &Limits) -> f64 {
+pub(crate) fn inflation(model: &Model, d2: &[f64], mask: &[f64], limits: &Limits) -> f64 {
     let mut ratio: Vec<f64> = model
         .observations
         .iter()

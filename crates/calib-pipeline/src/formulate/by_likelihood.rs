@@ -139,13 +139,15 @@ fn fits(
 ) -> Result<Fits, PipelineError> {
     progress("fit all loops");
     let settings = how.settings;
+    // Which rows are off is asked of the gate alone.
+    let alone = settings.clone().with_robust(settings.robust.gate_alone());
     let mut full = ml::state(inputs, &checked.tracks, &checked.start, FreeSet::Profile);
     let mut fit = match how.near {
         Some(chosen) => {
             chosen.start(&mut full.problem);
-            ml::fit_from(full, inputs, &chosen.levels, settings)?
+            ml::fit_from(full, inputs, &chosen.levels, &alone)?
         }
-        None => ml::fit(full, inputs, settings)?,
+        None => ml::fit(full, inputs, &alone)?,
     };
     let mut findings = Vec::new();
     if settings.robust.enabled {
@@ -153,11 +155,12 @@ fn fits(
         if !bad.findings.is_empty() {
             progress("judge rows beside what the model lacks");
             let known = (&checked.tracks, &checked.findings[..]);
-            bad = bad_rows_beside(inputs, known, &fit, settings).unwrap_or(bad);
+            bad = bad_rows_beside(inputs, known, &fit, &alone).unwrap_or(bad);
         }
         findings = bad.findings;
-        if !bad.unsettled.is_empty() {
-            progress("fit again without the unsettled rows");
+        let unsettled = !bad.unsettled.is_empty();
+        if unsettled || fit.solution.would_keep_more(settings) {
+            progress("fit again with the rows that count");
             inputs.exclude(bad.unsettled);
             checked.tracks = body_tracks(inputs, &mut Vec::new())?;
             let full = ml::state(inputs, &checked.tracks, &checked.start, FreeSet::Profile);
