@@ -68,10 +68,11 @@ impl Solution {
         if rejected <= MANY {
             return Some((self.with_levels(&own, settings)?, markers));
         }
-        for measurement in own.problem.measurements.clone() {
-            if let MeasurementKind::Markers(seen) = measurement.kind {
-                for (marker, level) in seen.own {
-                    own.problem.group_mut(level).sigma = apart[&marker];
+        let measurements = std::sync::Arc::clone(&own.problem.measurements);
+        for measurement in measurements.iter() {
+            if let MeasurementKind::Markers(seen) = &measurement.kind {
+                for (marker, level) in &seen.own {
+                    own.problem.group_mut(*level).sigma = apart[marker];
                 }
             }
         }

@@ -60,7 +60,8 @@ fn lay_out(
     problem: &Problem,
     walks: &[Vec<(EdgeId, bool)>],
 ) -> (Vec<Observation>, Vec<(usize, usize, usize)>) {
-    let mut observations = Vec::new();
+    let count = |m: &Measurement| m.kind.of().samples().len();
+    let mut observations = Vec::with_capacity(problem.measurements.iter().map(count).sum());
     let mut lost_items = Vec::new();
     for (h, measurement) in problem.measurements.iter().enumerate() {
         let kind = measurement.kind.of();
@@ -134,7 +135,7 @@ impl Model {
         crate::graph::check::check(problem)?;
         let mut problem = problem.clone();
         let mut walks = Vec::with_capacity(problem.measurements.len());
-        for measurement in &problem.measurements {
+        for measurement in problem.measurements.iter() {
             walks.push(walk(
                 &problem,
                 measurement.from,

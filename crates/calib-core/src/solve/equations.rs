@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::model::cache::EdgeCache;
 use crate::model::layout::Model;
+use crate::model::values::Values;
 use crate::solve::rows::SampleRows;
 use crate::solve::structured::RandomPart;
 
@@ -67,6 +68,9 @@ pub(crate) struct Workspace {
     /// on the values: a step is judged by the same V_s that proposed it. (With V_s moving along, the
     /// cost would reward values that only make the noise look larger.)
     pub factors: Vec<Vec<f64>>,
+    /// In place of `factors`, where there are so many samples that these would fill the memory: the values of the last linearization and the
+    /// edges' poses at them.
+    pub linearized: Option<(Values, EdgeCache)>,
 }
 
 impl Workspace {
@@ -81,6 +85,7 @@ impl Workspace {
             rows: SampleRows::new(model),
             random: RandomPart::default(),
             factors: Vec::new(),
+            linearized: None,
         }
     }
 }

@@ -18,6 +18,9 @@ use crate::solve::panel::Local;
 use crate::solve::rows::SampleRows;
 use crate::solve::structured::RandomPart;
 
+/// Of more samples the random parts of V_s are computed again for every cost: kept, they would be most of the memory of a run.
+const MOST_KEPT: usize = 4096;
+
 /// Equation (1). `false` when some V_s is not positive definite or a number is not finite.
 pub(crate) fn accumulate(
     objective: Objective,
@@ -53,11 +56,15 @@ pub(crate) fn accumulate_rows(
         rows,
         random,
         factors,
+        linearized,
     } = work;
+    let kept = count <= MOST_KEPT;
+    *linearized = (!kept).then(|| (values.clone(), cache.clone()));
     let pass = Pass {
         objective,
         values,
         cache,
+        kept,
     };
     let mut reused = factors.pop().unwrap_or_default();
     reused.clear();
@@ -95,6 +102,19 @@ struct Pass<'a> {
     objective: Objective<'a>,
     values: &'a Values,
     cache: &'a EdgeCache,
+    /// Whether the random parts are kept.
+    kept: bool,
+}
+
+/// Where the random part of V_s comes from.
+#[derive(Clone, Copy)]
+enum RandomAt<'a> {
+    /// The values of the residuals themselves.
+    Here,
+    /// What a linearization kept of a chunk of samples.
+    Kept(&'a [f64]),
+    /// The values of a linearization.
+    There(State<'a>),
 }
 
 impl Pass<'_> {
@@ -127,7 +147,9 @@ impl Pass<'_> {
             });
             rows.whiten_blocks(model, weights, theta, true)?;
             rows.random_part(random)?;
-            random.store(rows, &mut factors);
+            if self.kept {
+                random.store(rows, &mut factors);
+            }
             let m = rows.m;
             random.whiten(&mut rows.r[..m]);
             sum.cost += rows.squared_norm();
@@ -147,7 +169,7 @@ impl Pass<'_> {
         samples: Range<usize>,
         rows: &mut SampleRows,
         random: &mut RandomPart,
-        stored: Option<&[f64]>,
+        of: RandomAt<'_>,
     ) -> Option<f64> {
         let Objective {
             model,
@@ -155,9 +177,9 @@ impl Pass<'_> {
             theta,
         } = self.objective;
         let at = State::new(&model.problem, self.cache, self.values);
-        let wanted = match stored {
-            Some(_) => Derivatives::None,
-            None => Derivatives::Random,
+        let wanted = match of {
+            RandomAt::Here => Derivatives::Random,
+            RandomAt::Kept(_) | RandomAt::There(_) => Derivatives::None,
         };
         let mut sum = 0.0;
         let mut next = 0;
@@ -165,12 +187,18 @@ impl Pass<'_> {
             if model.of_sample[sample].is_empty() {
                 continue;
             }
+            if let RandomAt::There(there) = of {
+                rows.fill(model, there, weights, sample, Derivatives::Random);
+                rows.whiten_blocks(model, weights, theta, false)?;
+                rows.random_part(random)?;
+            }
             rows.fill(model, at, weights, sample, wanted);
             rows.whiten_blocks(model, weights, theta, false)?;
             let m = rows.m;
-            match stored {
-                Some(factors) => next += random.load(&factors[next..], m, rows.k),
-                None => rows.random_part(random)?,
+            match of {
+                RandomAt::Here => rows.random_part(random)?,
+                RandomAt::Kept(factors) => next += random.load(&factors[next..], m, rows.k),
+                RandomAt::There(_) => {}
             }
             random.whiten(&mut rows.r[..m]);
             sum += rows.squared_norm();
@@ -226,13 +254,20 @@ fn evaluate_cost(objective: Objective, values: &Values, work: &mut Workspace, st
         rows,
         random,
         factors,
+        linearized,
     } = work;
     let pass = Pass {
         objective,
         values,
         cache,
+        kept: false,
     };
-    let of_chunk = |chunk: usize| stored.then(|| factors.get(chunk).map_or(&[][..], Vec::as_slice));
+    let (factors, linearized) = (&*factors, linearized.as_ref());
+    let of_chunk = |chunk: usize| match linearized {
+        _ if !stored => RandomAt::Here,
+        Some((values, cache)) => RandomAt::There(State::new(&model.problem, cache, values)),
+        None => RandomAt::Kept(factors.get(chunk).map_or(&[][..], Vec::as_slice)),
+    };
     if is_one_chunk(count) {
         let sum = pass.cost(0..count, rows, random, of_chunk(0));
         return sum.unwrap_or(f64::INFINITY);

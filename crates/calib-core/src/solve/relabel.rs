@@ -33,7 +33,7 @@ pub struct Relabeled {
 pub fn relabel(problem: &mut Problem, tolerance: f64) -> Vec<Relabeled> {
     let mut out = Vec::new();
     let samples = problem.samples;
-    for (m, measurement) in problem.measurements.iter_mut().enumerate() {
+    for (m, measurement) in problem.measurements_mut().iter_mut().enumerate() {
         if let MeasurementKind::Markers(Markers { observations, .. }) = &mut measurement.kind {
             let mut by_sample: Vec<Vec<usize>> = vec![Vec::new(); samples];
             for (i, o) in observations.iter().enumerate() {

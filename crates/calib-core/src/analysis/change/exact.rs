@@ -160,7 +160,13 @@ impl Solution {
         let mut work = Workspace::new(model);
         work.cache.update(&model.problem, &self.values);
         let state = State::new(&model.problem, &work.cache, &self.values);
-        for (m, measurement) in corrected.model.problem.measurements.iter_mut().enumerate() {
+        for (m, measurement) in corrected
+            .model
+            .problem
+            .measurements_mut()
+            .iter_mut()
+            .enumerate()
+        {
             let mut buffer = model.paths[m].buffer();
             // from_from_to · back · to_from_from for a body, about the middle of what is seen for a reference
             let mut around = |sample: usize| match what {

@@ -1,6 +1,7 @@
 //! Points and measurements.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::Point3;
 
@@ -58,7 +59,7 @@ impl Problem {
 
     /// Adds a measurement.
     pub fn add_measurement(&mut self, measurement: Measurement) {
-        self.measurements.push(measurement);
+        Arc::make_mut(&mut self.measurements).push(measurement);
     }
 
     /// Markers of frame `to` seen from frame `from`, along the shortest path.

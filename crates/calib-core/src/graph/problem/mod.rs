@@ -1,5 +1,7 @@
 //! The problem as the caller states it: frames, edges, points, noise groups, measurements.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Unit as UnitVec, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -71,7 +73,8 @@ pub struct Problem {
     pub(crate) points: Vec<Point>,
     pub(crate) parameters: Vec<Parameter>,
     pub(crate) groups: Vec<NoiseGroup>,
-    pub(crate) measurements: Vec<Measurement>,
+    /// Shared by the copies of a problem until one of them changes its own.
+    pub(crate) measurements: Arc<Vec<Measurement>>,
     /// Calls of the builder that could not be carried out.
     pub(crate) faults: Vec<Error>,
     /// Samples before a joint's first motion.
@@ -209,7 +212,7 @@ impl Problem {
 
     /// One measurement, to edit its observations.
     pub fn measurements_mut(&mut self) -> &mut [Measurement] {
-        &mut self.measurements
+        Arc::make_mut(&mut self.measurements).as_mut_slice()
     }
 
     /// Unit vector helper for axes given as three numbers; `None` for a zero or non-finite vector.

@@ -65,7 +65,7 @@ impl Problem {
         let mut own: BTreeMap<(GroupId, FrameId), GroupId> = BTreeMap::new();
         for i in 0..self.measurements.len() {
             let (body, name) = (self.measurements[i].to, self.measurements[i].name.clone());
-            let common: Vec<GroupId> = levels_of(&mut out.problem.measurements[i].kind)
+            let common: Vec<GroupId> = levels_of(&mut out.problem.measurements_mut()[i].kind)
                 .into_iter()
                 .map(|level| *level)
                 .collect();
@@ -83,7 +83,7 @@ impl Problem {
                 let level = *own
                     .entry((common, body))
                     .or_insert_with(|| out.level(common, &name));
-                let levels = levels_of(&mut out.problem.measurements[i].kind);
+                let levels = levels_of(&mut out.problem.measurements_mut()[i].kind);
                 levels
                     .into_iter()
                     .filter(|l| **l == common)
@@ -117,7 +117,9 @@ impl Problem {
                 let level = *own
                     .entry((common, point))
                     .or_insert_with(|| out.level(common, name));
-                if let MeasurementKind::Markers(markers) = &mut out.problem.measurements[i].kind {
+                if let MeasurementKind::Markers(markers) =
+                    &mut out.problem.measurements_mut()[i].kind
+                {
                     markers.own.insert(point, level);
                 }
             }

@@ -97,6 +97,7 @@ pub(super) fn add_bodies(
                         }
                     }
                 }
+                seen.shrink_to_fit();
                 formulation
                     .problem
                     .markers(name, formulation.tracker, frame, noise, seen);
