@@ -320,7 +320,7 @@ mod tests {
                     sample: i / 3,
                     point: points[i % 3],
                     position: Point3::new((i as f64).sin(), (i as f64 * 1.7).cos(), 0.1),
-                    shape,
+                    shape: shape.map(Box::new),
                 })
                 .collect();
             p.markers(name, base, b, noise, seen);

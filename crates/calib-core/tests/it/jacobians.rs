@@ -176,7 +176,7 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
                 sample,
                 point,
                 position: Point3::from(normal3(&mut r)),
-                shape,
+                shape: shape.map(Box::new),
             });
         }
     }

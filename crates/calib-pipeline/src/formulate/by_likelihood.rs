@@ -86,7 +86,7 @@ pub fn likelihood(
         checked.findings.extend(gear_ratio::searched(&fit));
     }
     clock::noticed(&mut checked.findings, inputs, &fit);
-    *inputs = clock::corrected(inputs, &fit);
+    clock::correct(inputs, &fit);
     ml_result(inputs, fit, Some(registered))
 }
 
@@ -176,7 +176,10 @@ fn fits(
 /// worse. It is plain least squares: what is left is the geometry's fault, not noise to be estimated.
 fn registered(inputs: &Inputs, checked: &Checked, fit: &MlFit) -> Result<MlFit, PipelineError> {
     let (tracks, start) = (&checked.tracks, &checked.start);
-    let baseline = ml::state(inputs, tracks, start, FreeSet::RegistrationOnly);
+    let mut baseline = ml::state(inputs, tracks, start, FreeSet::RegistrationOnly);
+    baseline
+        .problem
+        .share_measurements(&fit.formulation.problem);
     let settings = Settings::plain();
     match ml::fit_kept(&baseline, inputs, &fit.solution, &settings) {
         Some(registered) => Ok(registered),

@@ -220,10 +220,8 @@ pub fn noticed(findings: &mut Vec<Finding>, inputs: &Inputs, fit: &MlFit) {
     }
 }
 
-/// The inputs with joint values at the times that the fit found, for residuals and predictions.
-#[must_use]
-pub fn corrected(inputs: &Inputs, fit: &MlFit) -> Inputs {
-    let mut inputs = inputs.clone();
+/// Takes joint values at the times that the fit found, for residuals and predictions.
+pub fn correct(inputs: &mut Inputs, fit: &MlFit) {
     let model = &inputs.robot.model;
     for (name, loaded) in &mut inputs.recordings {
         let Some([(c0, _), (c1, _)]) = estimates(fit, name) else {
@@ -246,7 +244,6 @@ pub fn corrected(inputs: &Inputs, fit: &MlFit) -> Inputs {
             }
         }
     }
-    inputs
 }
 
 /// The report's answer to "did the clocks agree?", recording by recording.

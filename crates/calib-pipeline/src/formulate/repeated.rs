@@ -35,7 +35,7 @@ pub(crate) fn repeated(inputs: &mut Inputs, checked: &mut Checked, like: &MlFit)
     priors::by_evidence(&mut fit, inputs, &settings);
     checked.findings.extend(noise::meaning(&mut fit));
     checked.findings.extend(with_memory(&mut fit));
-    *inputs = clock::corrected(inputs, &fit);
+    clock::correct(inputs, &fit);
     ml_result(inputs, fit, None).ok()
 }
 

@@ -20,7 +20,7 @@ pub struct Markers {
 }
 
 /// Marker seen at `position` in the measurement's `from` frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MarkerObservation {
     /// Sample index.
     pub sample: usize,
@@ -29,7 +29,7 @@ pub struct MarkerObservation {
     /// Where it was seen, m.
     pub position: Point3<f64>,
     /// Shape of its covariance in `from`, in units of σ²; `None` isotropic.
-    pub shape: Option<Matrix3<f64>>,
+    pub shape: Option<Box<Matrix3<f64>>>,
 }
 
 impl Markers {
@@ -53,8 +53,8 @@ impl Kind for Markers {
         for o in &self.observations {
             (input.at_frame)(o.point)?;
             input.finite(o.sample, o.position.coords.as_slice())?;
-            if let Some(shape) = o.shape {
-                input.definite(shape, shape.determinant())?;
+            if let Some(shape) = &o.shape {
+                input.definite(**shape, shape.determinant())?;
             }
         }
         Ok(())
@@ -71,7 +71,7 @@ impl Kind for Markers {
     fn covariance(&self, item: usize, add: &mut dyn FnMut(usize, usize, GroupId, f64)) {
         let o = &self.observations[item];
         let noise = self.noise_of(o.point);
-        let Some(shape) = o.shape else {
+        let Some(shape) = &o.shape else {
             return isotropic(0..3, noise, add);
         };
         for i in 0..3 {

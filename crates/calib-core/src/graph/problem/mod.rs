@@ -215,6 +215,13 @@ impl Problem {
         Arc::make_mut(&mut self.measurements).as_mut_slice()
     }
 
+    /// Holds the measurements of another problem in place of its own, where they are the same: once for both.
+    pub fn share_measurements(&mut self, with: &Self) {
+        if self.measurements == with.measurements {
+            self.measurements = Arc::clone(&with.measurements);
+        }
+    }
+
     /// Unit vector helper for axes given as three numbers; `None` for a zero or non-finite vector.
     #[must_use]
     pub fn unit(x: f64, y: f64, z: f64) -> Option<UnitVec<Vector3<f64>>> {

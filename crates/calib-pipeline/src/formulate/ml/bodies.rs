@@ -92,7 +92,9 @@ pub(super) fn add_bodies(
                                 sample,
                                 point: *point,
                                 position,
-                                shape: shapes.and_then(|s| s.get(*row).copied().flatten()),
+                                shape: shapes
+                                    .and_then(|s| s.get(*row).copied().flatten())
+                                    .map(Box::new),
                             });
                         }
                     }
