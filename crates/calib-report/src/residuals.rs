@@ -8,14 +8,14 @@ use std::sync::Arc;
 /// One observation compared with the model: predicted − observed. The rows of `residuals.csv`; not part of `report.json`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ResidualRow {
-    /// The recording's name.
-    pub recording: String,
+    /// The recording's name, once for all its rows.
+    pub recording: Arc<str>,
     /// Row in the recording, counted from 1 without the header.
     pub row: u64,
     /// Time in the recording, s; `None` for static poses.
     pub time_s: Option<f64>,
-    /// The marker, or the body for a pose.
-    pub subject: String,
+    /// The marker, or the body for a pose, once for all rows.
+    pub subject: Arc<str>,
     /// predicted − observed, in the tracker frame, m.
     pub residual_m: [f64; 3],
     /// Rotation part for a body's pose, rad; `None` for a marker.
@@ -120,7 +120,7 @@ impl Residuals {
         let finite = |row: &&ResidualRow| row.residual_m.iter().all(|x| x.is_finite());
         let (used, rejected): (Vec<&ResidualRow>, Vec<_>) =
             rows.iter().filter(finite).partition(|row| row.used);
-        let rejected_of = |name: &str| rejected.iter().filter(|row| row.subject == name).count();
+        let rejected_of = |name: &str| rejected.iter().filter(|row| &*row.subject == name).count();
         let lengths: Vec<f64> = used.iter().map(|row| row.length_m()).collect();
         let mut by_marker: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
         let mut by_joint: BTreeMap<&str, (Unit, Vec<At<'_>>)> = BTreeMap::new();

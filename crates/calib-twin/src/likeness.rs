@@ -94,7 +94,7 @@ impl Likeness {
         let mut product = 0.0;
         for (r, s) in kept.iter().zip(&squares) {
             of_subject.entry(&r.subject).or_default().push(*s);
-            let key = (r.recording.as_str(), r.subject.as_str());
+            let key = (&*r.recording, &*r.subject);
             if let Some(before) = last.insert(key, r.residual_m) {
                 product += before
                     .iter()

@@ -123,7 +123,7 @@ fn residual(own: &Estimated, session: &Session, body: &str) -> Option<f64> {
         BodyKind::Pose => Vec::new(),
     };
     let of = |r: &&calib_report::ResidualRow| {
-        r.used && (r.subject == body || names.iter().any(|n| **n == r.subject))
+        r.used && (&*r.subject == body || names.iter().any(|n| **n == *r.subject))
     };
     let squares = rows.iter().filter(of);
     let squares: Vec<f64> = squares

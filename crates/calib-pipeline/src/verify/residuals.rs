@@ -58,6 +58,7 @@ pub fn residual_rows(
 ) -> Vec<ResidualRow> {
     let left_out = fit.map(left_out).unwrap_or_default();
     let mut rows = Vec::new();
+    let mut subjects: BTreeMap<String, Arc<str>> = BTreeMap::new();
     for (name, loaded) in inputs
         .recordings
         .iter()
@@ -65,6 +66,7 @@ pub fn residual_rows(
     {
         let solve = &inputs.robot.profile.solve;
         let under = conditions(loaded, &inputs.robot, solve.load);
+        let recording: Arc<str> = name.as_str().into();
         for (row, q) in loaded.q.iter().enumerate() {
             let Some(q) = q else { continue };
             let root_from_link = robot.root_from_link_under(q, &under[row]);
@@ -82,16 +84,22 @@ pub fn residual_rows(
             let joints: Arc<[_]> = joint_values(inputs, name, row).into();
             let differences = sample.contacts(&root_from_link).into_iter();
             let differences = differences.chain(sample.bodies());
-            rows.extend(differences.map(|d| ResidualRow {
-                recording: name.clone(),
-                row: loaded.poses.rows[row],
-                time_s: loaded.poses.t.as_ref().map(|t| t[row]),
-                used: !sample.is_out(&left_out, &d.subject),
-                subject: d.subject,
-                residual_m: d.position.into(),
-                rotation_rad: d.rotation,
-                normalized: None,
-                joints: joints.clone(),
+            rows.extend(differences.map(|d| {
+                ResidualRow {
+                    recording: Arc::clone(&recording),
+                    row: loaded.poses.rows[row],
+                    time_s: loaded.poses.t.as_ref().map(|t| t[row]),
+                    used: !sample.is_out(&left_out, &d.subject),
+                    subject: Arc::clone(
+                        subjects
+                            .entry(d.subject)
+                            .or_insert_with_key(|s| s.as_str().into()),
+                    ),
+                    residual_m: d.position.into(),
+                    rotation_rad: d.rotation,
+                    normalized: None,
+                    joints: joints.clone(),
+                }
             }));
         }
     }
