@@ -1,6 +1,7 @@
 //! Profiles, robots, change records and model files: an error with a place, or something that holds together.
 
-use calib_report::robot_model::RobotModelFile;
+use calib_model::file::RobotModelFile;
+use calib_model::{Model, Options, Under};
 use calib_urdf::{ChangeRecord, JointKind, Patched, RobotModel, UrdfEdit, patch, revert};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -89,8 +90,20 @@ pub fn change_record(text: &str) {
     let _ = revert(patched, &own);
 }
 
-/// A model file reads, or not; what was read is written and read again as the same.
+/// A model file reads, or not; what was read is written and read again as the same. Of a robot that was accepted, every link can be asked for, and a
+/// command that brings it where it is said to be.
 pub fn model_file(bytes: &[u8]) {
+    if let Ok(model) = Model::from_json(bytes) {
+        let (mut work, q) = (model.work(), vec![0.1; model.joints().len()]);
+        let mut command = q.clone();
+        if model.forward(&q, &Under::default(), &mut work).is_ok() {
+            for link in model.links().iter().take(4).filter_map(|name| model.link(name).ok()) {
+                let _ = work.root_from_link(link);
+                let (options, under) = (Options::default(), Under::default());
+                let _ = model.correct(&q, link, &options, &under, &mut work, &mut command);
+            }
+        }
+    }
     let Ok(model) = serde_json::from_slice::<RobotModelFile>(bytes) else {
         return;
     };
