@@ -399,6 +399,11 @@ fn studies_and_twins_are_the_same_divided() {
         &["twin", "robots/ripley.yaml", "--trials", "10"],
         &[2, 7],
     );
+    check_divided(
+        &Scratch::new().robot("ripley"),
+        &["study", "ripley", "--trials", "3"],
+        &[2, 7],
+    );
 }
 
 #[test]
@@ -423,11 +428,6 @@ fn what_is_no_shard_is_refused() {
             "none.parquet: cannot be read",
         ),
         (&["study", "aor", "--shard", "0/3"], 2, "expected i/n"),
-        (
-            &["study", "justin", "--shard", "1/3"],
-            2,
-            "--shard and --from are for the studies",
-        ),
         (
             &["study", "aor", "--from", "torn.parquet"],
             3,

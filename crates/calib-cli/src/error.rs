@@ -94,11 +94,6 @@ pub enum CliError {
     /// Of work that is divided into shards.
     #[error(transparent)]
     Fleet(#[from] FleetError),
-    /// A study of a robot is not divided.
-    #[error(
-        "--shard and --from are for the studies cor, aor and faults\n  help: leave them out; `--trials` and `--seed` divide a study of a robot"
-    )]
-    NotDivided,
     /// A profile is of no use to check or create a plugin.
     #[error(
         "--profile lists what the plugins of a profile offer; it is not for `check`, `new` and `header`\n  help: calib plugins --profile PROFILE"
@@ -240,7 +235,6 @@ impl CliError {
             | Self::Record(_)
             | Self::View(_)
             | Self::NoEstimatorStudied
-            | Self::NotDivided
             | Self::OnlyListed
             | Self::NewPlugin(_) => ExitCode::Usage,
         }

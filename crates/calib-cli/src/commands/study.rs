@@ -45,7 +45,7 @@ pub struct StudyRun {
     /// Which plugins are loaded
     #[command(flatten)]
     plugins: PluginOptions,
-    /// Which part of the work is done here [cor, aor, faults]
+    /// Which part of the work is done here
     #[command(flatten)]
     shards: ShardOptions,
     /// Estimators of plugins to try beside the built-in ones [cor, aor]
@@ -76,10 +76,6 @@ pub fn run(console: &Console, study: &StudyRun) -> Result<ExitCode, CliError> {
     let of_estimators = matches!(study.study, StudyName::Cor | StudyName::Aor);
     if !of_estimators && !study.named.plugin.is_empty() {
         return Err(CliError::NoEstimatorStudied);
-    }
-    let of_robots = matches!(study.study, StudyName::Justin | StudyName::Ripley);
-    if of_robots && (study.shards.shard.is_some() || study.shards.from.is_some()) {
-        return Err(CliError::NotDivided);
     }
     match study.study {
         StudyName::Cor => estimators(console, study, Study::Cor),
@@ -172,9 +168,27 @@ fn robots(console: &Console, study: &StudyRun, name: &str) -> Result<ExitCode, C
         resume: !study.restart,
         plugins: study.plugins.plugins(),
     };
-    let bar = Counted::new(console, "robots");
-    let result = cases::run_cases(&options, &|done, total| bar.at(done, total))?;
-    bar.end();
+    let units = cases::Units::new(&options)?;
+    let settings = units.settings()?;
+    let work = || identity(name, options.seed, units.count(), &settings);
+    if let Some(shard) = study.shards.shard {
+        let one = |unit| {
+            Ok((
+                units.seed(unit).to_string(),
+                serde_json::to_string(&units.one(unit))?,
+            ))
+        };
+        return study.make(console, (shard, &work(), "robots"), &one);
+    }
+    let result = match &study.shards.from {
+        Some(file) => units.result(results(file, &work())?),
+        None => {
+            let bar = Counted::new(console, "robots");
+            let result = cases::run_cases(&units, &|done, total| bar.at(done, total))?;
+            bar.end();
+            result
+        }
+    };
     let json = cases::json(&result).map_err(|source| CliError::Json {
         what: "the study",
         source,

@@ -81,9 +81,7 @@ impl CliError {
             Self::Fleet(FleetError::File(error)) => of_file(error),
             Self::Fleet(FleetError::Shard(_) | FleetError::Missing { .. }) => "shard",
             Self::Fleet(_) | Self::Batch(_) => "fleet",
-            Self::Study(_) | Self::Cases(_) | Self::NoEstimatorStudied | Self::NotDivided => {
-                "study"
-            }
+            Self::Study(_) | Self::Cases(_) | Self::NoEstimatorStudied => "study",
             Self::Record(_) => "record",
             Self::View(_) => "view",
             Self::Capture(_) => "capture",

@@ -115,7 +115,7 @@ def _divided(
 
 
 def study(
-    kind: Literal["cor", "aor", "faults"],
+    kind: Literal["cor", "aor", "faults", "justin", "ripley"],
     *,
     shards: int,
     out: str | os.PathLike[str],

@@ -8,13 +8,14 @@ mod error;
 mod render;
 mod repeat;
 mod state;
+mod units;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use calib_pipeline::prepare::load::{RobotProfile, load_robot, of_tables};
+use calib_pipeline::prepare::load::{RobotProfile, of_tables};
 use calib_pipeline::run::{Plugins, RunOptions, run_on};
 use calib_profile::Method;
 use calib_report::{LoopClosure, Report, Stats};
@@ -26,6 +27,7 @@ use serde::{Deserialize, Serialize};
 pub use error::CaseError;
 pub use render::{csv, json, markdown, svg};
 use state::State;
+pub use units::Units;
 
 /// Both ways of solving.
 const METHODS: [(Method, &str); 2] = [(Method::Paper, "paper"), (Method::Ml, "ml")];
@@ -106,14 +108,11 @@ pub struct CaseResult {
 /// [`CaseError`] for a profile that cannot be read or simulated, for no robots, and for a state file that cannot be used. A robot that
 /// cannot be calibrated is a result, not an error.
 pub fn run_cases(
-    options: &CaseOptions,
+    units: &Units<'_>,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<CaseResult, CaseError> {
-    if options.robots == 0 {
-        return Err(CaseError::NoRobots);
-    }
-    let robot = load_robot(&options.profile)?;
-    let state = Mutex::new(State::open(options, &robot)?);
+    let options = units.options;
+    let state = Mutex::new(State::open(units)?);
     let threads = options.threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -127,12 +126,11 @@ pub fn run_cases(
             .par_iter()
             .with_max_len(1)
             .map(|&k| {
-                let seed = options.seed.wrapping_add(k);
-                let known = lock().finished(seed);
+                let known = lock().finished(units.seed(k));
                 let both = match known {
                     Some(both) => both,
                     None => {
-                        let both = one_robot(&robot, seed, options)?;
+                        let both = units.one(k);
                         lock().append(&both)?;
                         both
                     }
@@ -142,33 +140,14 @@ pub fn run_cases(
             })
             .collect::<Result<_, CaseError>>()
     })?;
-    Ok(CaseResult {
-        study: options.name.clone(),
-        robots: options.robots,
-        recorded: options.recorded,
-        seed: options.seed,
-        results: results.into_iter().flatten().collect(),
-    })
+    Ok(units.result(results))
 }
 
 /// Draws a robot and calibrates it by both methods, from each of its recordings.
-fn one_robot(
-    robot: &RobotProfile,
-    seed: u64,
-    options: &CaseOptions,
-) -> Result<Vec<RobotResult>, CaseError> {
-    let recorded = |repetition: u64| {
-        let simulated =
-            calib_sim::simulate_again(&robot.profile, &robot.model, Some(seed), repetition);
-        simulated.map_err(|source| CaseError::Simulation {
-            file: robot.file.clone(),
-            source: Box::new(source),
-        })
-    };
-    let simulated = recorded(0)?;
-    let again: Vec<Simulated> = (1..options.recorded)
-        .map(recorded)
-        .collect::<Result<_, _>>()?;
+fn one_robot(robot: &RobotProfile, seed: u64, options: &CaseOptions) -> Vec<RobotResult> {
+    let recorded =
+        |again: u64| calib_sim::simulate_again(&robot.profile, &robot.model, Some(seed), again);
+    let drawn: Result<Vec<Simulated>, _> = (0..options.recorded).map(recorded).collect();
     let mut out = Vec::new();
     for (method, word) in METHODS {
         let run = RunOptions {
@@ -193,22 +172,26 @@ fn one_robot(
             scatter: BTreeMap::new(),
             failed_again: 0,
         };
-        match calibrated(&simulated) {
-            Ok(output) => {
+        let first = match &drawn {
+            Ok(drawn) => calibrated(&drawn[0]).map_err(|e| e.to_string()),
+            Err(e) => Err(e.to_string()),
+        };
+        match (first, &drawn) {
+            (Ok(output), Ok(drawn)) => {
                 let first = transforms(&output.report);
                 let found = |s: &Simulated| Some(transforms(&calibrated(s).ok()?.report));
-                let again: Vec<Option<Found>> = again.iter().map(found).collect();
-                result.off = against(&first, &simulated.truth);
+                let again: Vec<Option<Found>> = drawn[1..].iter().map(found).collect();
+                result.off = against(&first, &drawn[0].truth);
                 result.failed_again = again.iter().filter(|a| a.is_none()).count() as u64;
                 let all: Option<Vec<Found>> = std::iter::once(Some(first)).chain(again).collect();
                 result.scatter = all.map(|all| repeat::scatter(&all)).unwrap_or_default();
                 result.loops = output.report.loops;
             }
-            Err(e) => result.failure = Some(e.to_string()),
+            (first, _) => result.failure = first.err(),
         }
         out.push(result);
     }
-    Ok(out)
+    out
 }
 
 /// Transforms of one calibration, by the report's names.

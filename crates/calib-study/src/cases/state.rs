@@ -3,21 +3,8 @@
 use std::collections::BTreeMap;
 
 use calib_files::StateFile;
-use calib_pipeline::prepare::load::RobotProfile;
-use serde::{Deserialize, Serialize};
 
-use super::{CaseError, CaseOptions, RobotResult};
-
-/// What must be the same for robots to be kept. The number of robots is not: a longer study continues a shorter one.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Settings {
-    calib_case_study: u32,
-    study: String,
-    recorded: u64,
-    /// Digests of profile and URDF.
-    inputs: Vec<String>,
-    version: String,
-}
+use super::{CaseError, RobotResult, Units};
 
 pub(super) struct State {
     file: Option<StateFile>,
@@ -25,20 +12,15 @@ pub(super) struct State {
 }
 
 impl State {
-    pub fn open(options: &CaseOptions, robot: &RobotProfile) -> Result<Self, CaseError> {
+    pub fn open(units: &Units<'_>) -> Result<Self, CaseError> {
+        let options = units.options;
         let Some(folder) = &options.out else {
             return Ok(Self {
                 file: None,
                 finished: BTreeMap::new(),
             });
         };
-        let settings = serde_json::to_string(&Settings {
-            calib_case_study: 3,
-            study: options.name.clone(),
-            recorded: options.recorded,
-            inputs: robot.digests.iter().map(|d| d.sha256.clone()).collect(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-        })?;
+        let settings = units.settings()?;
         let path = folder.join(format!("{}.state.jsonl", options.name));
         let (file, lines) =
             StateFile::open(&path, &settings, options.resume, |l| both(l).is_some())?;
