@@ -12,9 +12,8 @@ use scratch::Scratch;
 const WORSE: f64 = 1.03;
 /// …and on one of them, where few poses decide.
 const ONCE: f64 = 1.08;
-/// Where 15 postures stand beside sweeps and compliance is missing from the model, the gate rejects some of the postures that the model describes
-/// worst, and left-out poses, most of which are rows of sweeps, do not tell: so much is lost on average, and once.
-const WORSE_OF_FEW: (f64, f64) = (1.05, 1.2);
+/// …or on one of those where 15 postures stand beside sweeps and compliance is missing: one posture of the fifteen decides there.
+const ONCE_OF_FEW: f64 = 1.15;
 /// Every measurement counts alike.
 const PLAIN: &str = "solve: {robust: false, noise: {joint_deg: 0}}\n";
 
@@ -143,7 +142,7 @@ fn with_noisy_joints_few_poses_or_large_errors_a_default_run_predicts_no_worse()
         &justin_with(("joint_deg: 0.005", "joint_deg: 0.05")),
     );
     let few = justin(&[("poses: 80", "poses: 15")], 16);
-    is_no_worse_than("15 poses", &few, WORSE_OF_FEW);
+    is_no_worse_than("15 poses", &few, (WORSE, ONCE_OF_FEW));
     let offsets = ("joint_offset_deg: 0.15", "joint_offset_deg: 2");
     is_no_worse(
         "large errors",

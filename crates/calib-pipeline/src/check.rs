@@ -14,7 +14,7 @@ use crate::estimate::paper;
 use crate::estimate::start::{Start, start};
 use crate::formulate::bad_rows::{bad_rows, is_judged};
 use crate::formulate::by_likelihood::only_a_cross_check;
-use crate::formulate::completed::bad_rows_beside;
+use crate::formulate::completed::beside;
 use crate::formulate::formulation::FreeSet;
 use crate::formulate::{ml, model_checks};
 use crate::options::Plugins;
@@ -109,7 +109,7 @@ fn single_rows(
     if bad.findings.is_empty() && !suspected {
         return Ok(());
     }
-    let rows = bad_rows_beside(inputs, (tracks, findings), &fit, &settings).unwrap_or(bad);
+    let rows = beside(inputs, (tracks, findings), &fit, &settings).map_or(bad, |beside| beside.bad);
     let causes = causes(inputs, &fit, findings);
     causes.leave_unexplained(findings);
     findings.extend(rows.findings);

@@ -103,8 +103,13 @@ fn below_noise(report: &Report) -> Option<Diagnosis> {
     })
 }
 
-/// Stated noise of the tracker over the noise that was found, at most 1: what a model lacks is found as noise, too.
+/// Stated noise of the tracker over the noise that was found, at most 1: what a model lacks is found as noise, too. Where that is known, no more
+/// than the stated noise is called the tracker's anyway.
 fn stated_share(report: &Report) -> f64 {
+    let lacking = [catalog::MISSING_PHYSICS, catalog::CHANGED_WHILE_RECORDING];
+    if report.findings.iter().any(|f| lacking.contains(&f.id)) {
+        return 1.0;
+    }
     let noise = report.noise.iter();
     let positions = noise.filter(|noise| noise.kind == NoiseKind::Position);
     let shares = positions.filter_map(|noise| Some(noise.stated? / noise.sigma?));

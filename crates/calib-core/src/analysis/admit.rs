@@ -20,6 +20,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
+use crate::analysis::estimate::{Start, refit};
 use crate::analysis::settings::Settings;
 use crate::analysis::solution::Solution;
 use crate::model::cache::State;
@@ -73,6 +74,34 @@ impl Solution {
         let parts = (&mask[..], &self.weights[..]);
         let robust = &settings.robust;
         uncontradicted(self.objective(), &self.values, parts, robust, &mut work).is_some()
+    }
+}
+
+impl Solution {
+    /// This fit with what another kept of the same observations, of which each rejects its own: what a model with more effects explains is no
+    /// gross error of this one. `None` where that is nothing more, and where the other has other observations.
+    #[must_use]
+    pub fn with_kept_of(&self, other: &Solution, settings: &Settings) -> Option<Solution> {
+        let places = |of: &Solution| -> Vec<(usize, usize, usize)> {
+            let observations = of.model.observations.iter();
+            let place = observations.map(|o| (o.sample, o.measurement, o.item));
+            place.collect()
+        };
+        if places(self) != places(other) {
+            return None;
+        }
+        let pairs = self.weights.iter().zip(&other.weights);
+        let weights: Vec<f64> = pairs.map(|(own, theirs)| own.max(*theirs)).collect();
+        if weights == self.weights {
+            return None;
+        }
+        let start = Start {
+            values: self.values.clone(),
+            weights,
+            theta: self.theta.clone(),
+            iterations: self.iterations,
+        };
+        refit(self.model.problem(), start, settings).ok()
     }
 }
 

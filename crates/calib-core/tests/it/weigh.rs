@@ -3,8 +3,8 @@
 
 use crate::common::{Chain, Free, Handles, normal, rng, six_r};
 use calib_core::{
-    Configuration, ErrorSummary, MeasurementKind, NoiseKind, NoiseModel, Settings, Solution,
-    Weighed, solve,
+    Configuration, ErrorSummary, MeasurementKind, NoiseKind, NoiseModel, RobustSettings, Settings,
+    Solution, Weighed, solve,
 };
 
 const MARKER: f64 = 2e-4;
@@ -326,6 +326,41 @@ fn gross_errors_stay_out() {
         assert_eq!(admission.readmitted, 0, "{admission:?}");
         assert_eq!(choice.chosen, NoiseModel::Joint);
     }
+}
+
+#[test]
+fn what_another_fit_explains_takes_part_and_nothing_else_changes() {
+    let case = Case::new(320, 40, Truth::Joint(3.5e-4));
+    // Noise that the gate takes for gross errors, in the first of two statements only.
+    let mut strict = Settings::default();
+    strict.robust.gate = 0.8;
+    let noise = case.handles.problem.with_noise_model(NoiseModel::Joint);
+    let problem = noise.unwrap();
+    let narrow = solve(&problem, &strict).unwrap();
+    let all = Settings::default().with_robust(RobustSettings::off());
+    let wide = solve(&problem, &all).unwrap();
+    assert!(narrow.rejected.len() > 5, "{}", narrow.rejected.len());
+    let both = narrow.with_kept_of(&wide, &strict).expect("more is kept");
+    assert!(both.rejected.is_empty(), "{:?}", both.rejected);
+    let apart = |a: &Solution, b: &Solution| {
+        let pairs = a.parameters.iter().zip(&b.parameters);
+        let off = pairs.map(|(a, b)| (a.value - b.value).abs() / b.sigma.unwrap_or(1.0));
+        off.fold(0.0, f64::max)
+    };
+    assert!(apart(&both, &wide) < 1e-3, "{}", apart(&both, &wide));
+    assert!(apart(&narrow, &wide) > 0.1, "{}", apart(&narrow, &wide));
+    // Nothing more, and other observations.
+    assert!(wide.with_kept_of(&narrow, &strict).is_none());
+    let other = Case::new(320, 39, Truth::White).solved(NoiseModel::Joint);
+    let fewer = Case::new(320, 30, Truth::White);
+    let mut shorter = fewer.handles.problem.clone();
+    for measurement in shorter.measurements_mut() {
+        if let MeasurementKind::Markers(markers) = &mut measurement.kind {
+            markers.observations.truncate(60);
+        }
+    }
+    let shorter = solve(&shorter, &Settings::default()).unwrap();
+    assert!(shorter.with_kept_of(&other, &strict).is_none());
 }
 
 /// What the tracker sees of the body.

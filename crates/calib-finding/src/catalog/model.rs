@@ -173,12 +173,12 @@ super::topic! {
             "Correct or drop these rows.";
         "several_bodies_few": Warning,
             "Several bodies disagree with the robot's model at once in {count:row}: their joint values are wrong, or the tracker's frame was off.",
-            "Look at these rows. A robust fit rejects them.";
+            "Look at these rows. The robust fit leaves out what it cannot explain.";
         "one_body": Warning,
-            "{count:row} deviate by up to {position} and {angle}, {ratio} times the usual; no motion between rows explains it[[; an error of joint {joints:or} alone would]].",
-            "Look at these rows: a wrong reading, or backlash of that joint. A robust fit rejects them.";
+            "In {count:row} the body deviates by up to {position} and {angle}, {ratio} times the usual; no motion between rows explains it[[; an error of joint {joints:or} alone would]].",
+            "Look at these rows: a wrong reading, or backlash of that joint. The robust fit leaves out what it cannot explain.";
         "model": Warning,
-            "{count:row} deviate from the nominal robot by up to {position} and {worst}; {usual} is usual.",
-            "Look at these rows: a wrong reading of a joint or of the body. A robust fit rejects them.";
+            "In {count:row} the body deviates from the nominal robot by up to {position} and {worst}; {usual} is usual.",
+            "Look at these rows: a wrong reading of a joint or of the body. The robust fit leaves out what it cannot explain.";
     }
 }

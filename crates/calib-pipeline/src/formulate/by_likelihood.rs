@@ -8,7 +8,7 @@ use crate::error::PipelineError;
 use crate::formulate::bad_rows::bad_rows;
 use crate::formulate::checked::Checked;
 use crate::formulate::chosen::Chosen;
-use crate::formulate::completed::bad_rows_beside;
+use crate::formulate::completed::beside;
 use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::found::Found;
 use crate::formulate::memory::with_memory;
@@ -152,14 +152,24 @@ fn fits(
     let mut findings = Vec::new();
     if settings.robust.enabled {
         let mut bad = bad_rows(inputs, &checked.tracks, &fit);
-        if !bad.findings.is_empty() {
+        let mut complete = None;
+        if !fit.solution.rejected.is_empty() {
             progress("judge rows beside what the model lacks");
             let known = (&checked.tracks, &checked.findings[..]);
-            bad = bad_rows_beside(inputs, known, &fit, &alone).unwrap_or(bad);
+            if let Some(beside) = beside(inputs, known, &fit, &alone) {
+                complete = beside.fit;
+                if !bad.findings.is_empty() {
+                    bad = beside.bad;
+                }
+            }
         }
         findings = bad.findings;
         let unsettled = !bad.unsettled.is_empty();
-        if unsettled || fit.solution.would_keep_more(settings) {
+        // What the model lacks is no gross error of the rows that show it.
+        let explained = complete.and_then(|c| fit.solution.with_kept_of(&c.solution, &alone));
+        if let Some(solution) = explained.filter(|_| !unsettled) {
+            fit = ml::found(fit.formulation, inputs, solution);
+        } else if unsettled || fit.solution.would_keep_more(settings) {
             progress("fit again with the rows that count");
             inputs.exclude(bad.unsettled);
             checked.tracks = body_tracks(inputs, &mut Vec::new())?;

@@ -20,14 +20,21 @@ use crate::prepare::inputs::Inputs;
 use crate::prepare::split::{BEFORE, split};
 use crate::prepare::tracks::{BodyTrack, body_tracks};
 
-/// What is wrong with rows when the fit has what it lacks; `None` where it lacks nothing, or cannot have it. `before`: what was found
-/// before the fit.
-pub(crate) fn bad_rows_beside(
+/// A fit that has what another lacks.
+pub(crate) struct Beside {
+    /// What is wrong with rows there.
+    pub bad: BadRows,
+    /// The fit, where it has the rows of the other and no body split.
+    pub fit: Option<MlFit>,
+}
+
+/// The fit with what it lacks; `None` where it lacks nothing, or cannot have it. `before`: what was found before the fit.
+pub(crate) fn beside(
     inputs: &Inputs,
     (tracks, before): (&BTreeMap<String, BodyTrack>, &[Finding]),
     fit: &MlFit,
     settings: &Settings,
-) -> Option<BadRows> {
+) -> Option<Beside> {
     let goodness = fit.solution.goodness_of_fit();
     let missing = goodness.map_or_else(Vec::new, |g| g.missing);
     let mut parts = of_tests(inputs, &missing);
@@ -71,7 +78,8 @@ pub(crate) fn bad_rows_beside(
     if let Some(name) = name {
         renamed(&mut bad, &name);
     }
-    Some(bad)
+    let fit = (!divided).then_some(fit);
+    Some(Beside { bad, fit })
 }
 
 /// The effects of tests as parts of the model, those that a profile can free.

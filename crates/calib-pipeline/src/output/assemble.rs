@@ -96,7 +96,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         coverage: coverage(e.inputs),
         rejected: rejected(e.inputs, e.fit, e.held_out.as_ref()),
         accuracy_limits: e.fit.map_or_else(Vec::new, |fit| {
-            accuracy_limits(e.inputs, e.held_out.as_ref(), fit)
+            accuracy_limits(e.inputs, e.held_out.as_ref(), fit, e.causes.lacks_effects())
         }),
         weak_directions: weak,
         selection: e.selection.clone(),
@@ -145,7 +145,9 @@ fn verification(e: &Evidence<'_>, verdict: Verdict) -> Verification {
 /// The held-out errors with the share of the tracker's noise.
 fn held_out(e: &Evidence<'_>) -> Option<HeldOut> {
     let mut held_out = e.held_out.clone()?;
-    let tracker_m = e.fit.and_then(|fit| TrackerNoise::of(fit).over(&held_out));
+    let tracker_m = e
+        .fit
+        .and_then(|fit| TrackerNoise::of(fit, e.causes.lacks_effects()).over(&held_out));
     if let Some(expected) = &mut held_out.expected {
         expected.tracker_m = tracker_m;
     }

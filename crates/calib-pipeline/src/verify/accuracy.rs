@@ -110,18 +110,19 @@ pub(crate) fn workspace(inputs: &Inputs, fit: &MlFit) -> Option<Workspace> {
         .map(|w| w.relative_to(&inputs.robot.profile.tracker.frame))
 }
 
-/// What a held-out error is made of: rms over the bodies and postures that were held out, in meters.
+/// What a held-out error is made of: rms over the bodies and postures that were held out, in meters. `lacking`: the model lacks an effect.
 pub(crate) fn accuracy_limits(
     inputs: &Inputs,
     held_out: Option<&HeldOut>,
     fit: &MlFit,
+    lacking: bool,
 ) -> Vec<AccuracyLimit> {
     let Some((held_out, measured)) = held_out.and_then(|h| Some((h, h.calibrated?))) else {
         return Vec::new();
     };
     let of_errors = OfErrors::of(inputs, held_out, fit);
     let parameters = of_errors.parameters;
-    let tracker = TrackerNoise::of(fit).over(held_out).unwrap_or(0.0);
+    let tracker = TrackerNoise::of(fit, lacking).over(held_out).unwrap_or(0.0);
     let joints = fit.joint_sigma().unwrap_or(0.0) * of_errors.lever;
     let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
     let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
@@ -268,7 +269,7 @@ impl ToolBody<'_> {
         fit: Option<&MlFit>,
     ) -> Option<f64> {
         let fit = fit?;
-        let noise = TrackerNoise::of(fit);
+        let noise = TrackerNoise::of(fit, false);
         let track = tracks.get(self.name)?;
         if *self.kind == BodyKind::Pose || track.is_computed() {
             let mut noise = fit.solution.noise.iter();

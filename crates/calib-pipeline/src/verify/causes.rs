@@ -47,6 +47,12 @@ impl Causes {
         self
     }
 
+    /// Whether the model lacks something, of which a part is in the noise as it was found.
+    pub(crate) fn lacks_effects(&self) -> bool {
+        let missing = self.goodness.as_ref().map(|g| &g.missing);
+        missing.is_some_and(|missing| !missing.is_empty()) || self.change.is_some()
+    }
+
     /// Takes out what other causes explain.
     pub fn leave_unexplained(&self, findings: &mut Vec<Finding>) {
         findings.retain(|finding| !self.explained.contains(finding));

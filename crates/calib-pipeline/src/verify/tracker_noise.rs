@@ -17,10 +17,12 @@ pub(crate) struct TrackerNoise<'a> {
 }
 
 impl<'a> TrackerNoise<'a> {
-    pub(crate) fn of(fit: &'a MlFit) -> Self {
+    /// Of a fit. `lacking`: the model lacks an effect, and what it lacks is found as noise too, so no more than was stated is the tracker's.
+    pub(crate) fn of(fit: &'a MlFit, lacking: bool) -> Self {
         let level = |group: GroupId| {
             let found = fit.solution.noise.iter().find(|n| n.id == group)?;
-            Some(found.sigma * found.sigma)
+            let most = if lacking { found.stated } else { f64::INFINITY };
+            Some(found.sigma.min(most).powi(2))
         };
         let (markers, bodies) = (markers(fit), bodies(fit));
         let mut by_subject = BTreeMap::new();

@@ -201,7 +201,7 @@ pub(crate) fn fit_near(
     Some(found(formulation, inputs, solution))
 }
 
-fn found(formulation: Formulation, inputs: &Inputs, solution: Solution) -> MlFit {
+pub(crate) fn found(formulation: Formulation, inputs: &Inputs, solution: Solution) -> MlFit {
     MlFit {
         noise: None,
         levels: OwnLevels::default(),
