@@ -452,3 +452,23 @@ fn a_wrong_parameter_has_its_line() {
         ran.stderr
     );
 }
+
+#[test]
+fn a_new_plugin_has_no_name_that_is_built_in() {
+    let dir = Scratch::new();
+    let new = |name: &str, kind: &str| dir.calib(["plugins", "new", name, "--kind", kind]);
+    for (name, kind) in [
+        ("sfe", "center"),
+        ("planar-radial", "axis"),
+        ("csv", "reader"),
+        ("summary", "report"),
+        ("compliance", "effect"),
+    ] {
+        let ran = new(name, kind).expect(2);
+        let said = format!("`{}` is built in", name.replace('-', "_"));
+        assert!(ran.stderr.contains(&said), "{name}: {}", ran.stderr);
+        assert!(!dir.path(name).exists(), "{name}");
+    }
+    // A name is taken among its own kind only.
+    new("csv", "center").expect(0);
+}

@@ -83,7 +83,7 @@ pub use host::{
     Cancel, Control, Description, Found, Host, LoadedPlugin, PluginError, Progress, SearchPath,
 };
 #[cfg(feature = "host")]
-pub use new_project::{Language, NewProjectError, kind_from_name, new_project};
+pub use new_project::{Language, NewProjectError, kind_from_name, new_project, offered_name};
 #[cfg(feature = "host")]
 pub use own::OwnEntries;
 #[cfg(feature = "host")]

@@ -71,6 +71,14 @@ pub enum NewProjectError {
         /// What was asked for.
         got: String,
     },
+    /// What the plugin would offer has a name that the program itself gives.
+    #[error(
+        "`{got}` is built in, and a plugin of that name cannot be used beside it\n  help: choose another name"
+    )]
+    BuiltIn {
+        /// What was asked for.
+        got: String,
+    },
     /// Something is there already, or the files cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
@@ -101,6 +109,12 @@ const AUTHOR_SIDE: &[(&str, &str)] = &[
     ("offer.rs", include_str!("offer.rs")),
     ("streams.rs", include_str!("streams.rs")),
 ];
+
+/// Name under which a profile finds what a new plugin of this name offers.
+#[must_use]
+pub fn offered_name(name: &str) -> String {
+    name.replace('-', "_")
+}
 
 /// Makes the folder `folder/name` with a complete project, and returns its path.
 ///
@@ -173,7 +187,7 @@ fn template(kind: Kind) -> Template {
 }
 
 fn files(name: &str, kind: Kind, language: Language) -> Vec<(String, String)> {
-    let offer = name.replace('-', "_");
+    let offer = offered_name(name);
     let library = format!(
         "{}{}{}",
         std::env::consts::DLL_PREFIX,

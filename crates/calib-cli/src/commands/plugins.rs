@@ -6,7 +6,10 @@ use std::path::PathBuf;
 use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::estimators::Estimators;
 use calib_pipeline::prepare::load::load_robot;
-use calib_plugin::{HEADER, Host, Kind, Language, Origin, SearchPath, kind_from_name, new_project};
+use calib_plugin::{
+    HEADER, Host, Kind, Language, NewProjectError, Origin, SearchPath, kind_from_name, new_project,
+    offered_name,
+};
 
 use clap::{Args, Subcommand};
 use serde_json::json;
@@ -91,6 +94,7 @@ pub fn run(console: &Console, options: &PluginsCommand) -> Result<ExitCode, CliE
             out,
         }) => {
             let (kind, language) = (kind_from_name(kind)?, Language::from_name(lang)?);
+            is_free(kind, name)?;
             let folder = new_project(name, kind, language, out)?;
             let readme = folder.join("README.md");
             emit_paths(json, &[folder])?;
@@ -100,6 +104,15 @@ pub fn run(console: &Console, options: &PluginsCommand) -> Result<ExitCode, CliE
             }
             Ok(ExitCode::Accepted)
         }
+    }
+}
+
+/// Whether nothing that is built in has the name.
+fn is_free(kind: Kind, name: &str) -> Result<(), CliError> {
+    let offered = offered_name(name);
+    match Estimators::built_in()?.has(kind, &offered) {
+        true => Err(NewProjectError::BuiltIn { got: offered }.into()),
+        false => Ok(()),
     }
 }
 

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use calib_cor::{InputKind, Pose, Shape as CorShape};
+use calib_core::EffectKind;
 use calib_estimator::{Estimate, EstimatorInfo, OptionId, Outcome, parameter};
 use calib_plugin::{
     Answer, AorFit, AxisLine, ByFn, Call, Control, CorFit, Entry, Failure, Host, Kind, Motion,
@@ -79,6 +80,16 @@ impl Estimators {
             effects: Vec::new(),
             loaded: BTreeMap::new(),
         })
+    }
+
+    /// Whether something of this kind has the name.
+    #[must_use]
+    pub fn has(&self, kind: Kind, name: &str) -> bool {
+        let effects = || EffectKind::all().map(|kind| kind.effect().id);
+        let offered = self.tables.list();
+        let mut same = offered.iter().filter(|(offer, _)| offer.kind == kind);
+        same.any(|(offer, _)| offer.name == name)
+            || kind == Kind::Effect && effects().any(|effect| effect == name)
     }
 
     /// With the plugins that a profile names, found beside it and on the search path.
