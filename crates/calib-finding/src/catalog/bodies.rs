@@ -70,7 +70,7 @@ super::topic! {
             "The body rotates by more than {limit} between two rows, {count:time}; {usual} is usual.",
             "Drop the flipped rows, and move one marker: the marker pattern is nearly symmetric.";
         "model": Error,
-            "{count:row} deviate from the robot's model by up to {worst}; {usual} is usual.",
+            "In {count:row} the body deviates from the robot's model by up to {worst}; {usual} is usual.",
             "Drop the flipped rows, and move one marker: the marker pattern is nearly symmetric.";
     }
 }

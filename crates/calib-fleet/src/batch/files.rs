@@ -74,6 +74,9 @@ const QUANTITY: &[(&str, Kind)] = &[
     ("p_value", Kind::Real),
 ];
 
+/// Rows of a group: a fleet of hundreds needs as much memory as one of ten thousands.
+const GROUP: usize = 512;
+
 fn table(
     folder: &ResultsFolder,
     out: &Path,
@@ -81,7 +84,8 @@ fn table(
 ) -> Result<TableWriter<GrowingFile>, BatchError> {
     let columns: Vec<Column> = columns.iter().map(|(n, k)| Column::new(n, *k)).collect();
     let table = TableWriter::new(folder.grow(name)?, &columns, BTreeMap::new());
-    table.map_err(|fault| failed(out, name, fault))
+    let table = table.map_err(|fault| failed(out, name, fault))?;
+    Ok(table.in_groups_of(GROUP))
 }
 
 /// What the system says of the file; anything else is a defect.

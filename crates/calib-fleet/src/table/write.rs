@@ -22,6 +22,8 @@ pub struct TableWriter<W: Write + Send> {
     columns: Vec<Column>,
     facts: BTreeMap<String, String>,
     group: Vec<Row>,
+    /// Rows of a group at the most.
+    rows: usize,
     bytes: usize,
     sum: Sha256,
 }
@@ -81,9 +83,16 @@ impl<W: Write + Send> TableWriter<W> {
             columns: columns.to_vec(),
             facts,
             group: Vec::new(),
+            rows: GROUP_ROWS,
             bytes: 0,
             sum: Sha256::new(),
         })
+    }
+
+    /// The same in groups of at most so many rows: fewer need less memory, and more of the file for its index.
+    #[must_use]
+    pub fn in_groups_of(self, rows: usize) -> Self {
+        Self { rows, ..self }
     }
 
     /// Adds a row.
@@ -97,7 +106,7 @@ impl<W: Write + Send> TableWriter<W> {
             return Err(TableFault::Unfit(column.name.clone()));
         }
         let bytes: usize = row.iter().map(Cell::bytes).sum();
-        let full = self.group.len() == GROUP_ROWS || self.bytes + bytes > GROUP_BYTES;
+        let full = self.group.len() >= self.rows || self.bytes + bytes > GROUP_BYTES;
         if full && !self.group.is_empty() {
             self.flush()?;
         }
