@@ -129,6 +129,137 @@ fn the_export_of_the_tutorial_needs_no_line_of_a_profile() {
     assert!(again.stderr.contains("exists already"), "{}", again.stderr);
 }
 
+/// The tutorial's arm with a simulated recording of 40 postures in meters, and what follows `simulate:` of it.
+fn simulated_arm() -> (Scratch, String) {
+    let urdf = std::fs::read(root().join("book/src/tutorial/arm.urdf")).expect("committed");
+    let dir = Scratch::new().file("arm.urdf", urdf);
+    let made = dir.calib_with(&["init", "arm.urdf", "--out", "robots/arm.yaml"]);
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    let made = dir.calib_with(&["simulate", "robots/arm.yaml", "--out", "robots/arm"]);
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    let table = dir.read("robots/arm/poses.csv");
+    let table = table.lines().filter(|l| !l.starts_with('#'));
+    let table: Vec<String> = table.map(|line| line.to_owned() + "\n").collect();
+    (dir, table.concat())
+}
+
+#[test]
+fn two_files_of_postures_and_a_wrong_unit_of_length_are_told() {
+    let (dir, table) = simulated_arm();
+    // Columns of joints and of markers, each in a file of its own.
+    let names: Vec<&str> = table.lines().next().expect("a header").split(',').collect();
+    let part = |keep: &dyn Fn(&str) -> bool| -> String {
+        let cells = |line: &str| {
+            let of = line.split(',').zip(&names).filter(|(_, n)| keep(n));
+            of.map(|(cell, _)| cell).collect::<Vec<_>>().join(",") + "\n"
+        };
+        table.lines().map(cells).collect()
+    };
+    let dir = dir
+        .file("tracker.csv", part(&|n| n.contains('.')).into_bytes())
+        .file("robot.csv", part(&|n| n.starts_with("joint")).into_bytes());
+    let made = written(dir, "arm.urdf", &["tracker.csv", "robot.csv"]);
+    assert_eq!((made.code, made.run), (0, 0), "{}", made.json);
+    assert!(made.held_out_mm.is_some_and(|mm| mm < 1.0));
+    let profile = made.dir.read("robots/it.yaml");
+    assert!(profile.contains("rows: same"), "{profile}");
+    // Rows that were deleted in one of them.
+    let robot = made.dir.read("robot.csv");
+    let short: Vec<&str> = robot.lines().collect();
+    let dir = made
+        .dir
+        .file("robot.csv", short[..20].join("\n").into_bytes());
+    let ran = dir.calib_with(&["run", "robots/it.yaml", "--out", "again"]);
+    assert!(ran.code > 1, "{}", ran.stdout);
+    assert!(
+        ran.stderr.contains("40 rows, the robot's log 19"),
+        "{}",
+        ran.stderr
+    );
+    // Lengths that the names call millimeters, and are centimeters: scaled by 10, wherever the names say it.
+    let (dir, table) = simulated_arm();
+    let (unit, scale) = match table.contains("_mm") {
+        true => ("_mm", 0.1),
+        false => ("_m", 100.0),
+    };
+    let names: Vec<String> = table
+        .lines()
+        .next()
+        .expect("a header")
+        .split(',')
+        .map(str::to_owned)
+        .collect();
+    let scaled: Vec<String> = table
+        .lines()
+        .skip(1)
+        .map(|line| {
+            let cell = |(cell, name): (&str, &String)| match name.ends_with(unit) {
+                true => cell
+                    .parse::<f64>()
+                    .map_or_else(|_| cell.to_owned(), |x| (x * scale).to_string()),
+                false => cell.to_owned(),
+            };
+            line.split(',')
+                .zip(&names)
+                .map(cell)
+                .collect::<Vec<_>>()
+                .join(",")
+                + "\n"
+        })
+        .collect();
+    let header = names.join(",").replace(unit, "_mm") + "\n";
+    let dir = dir.file(
+        "robots/arm/poses.csv",
+        (header + &scaled.concat()).into_bytes(),
+    );
+    let checked = dir.calib_with(&["check", "robots/arm.yaml"]);
+    assert!(checked.code > 1, "{}", checked.stdout);
+    let said = checked.stdout.replace("\n", " ");
+    let words: Vec<&str> = said.split_whitespace().collect();
+    let said = words.join(" ");
+    assert!(said.contains("10 times larger"), "{said}");
+}
+
+#[test]
+fn limits_in_degrees_are_warned_of_and_not_planned() {
+    let urdf =
+        std::fs::read_to_string(root().join("book/src/tutorial/arm.urdf")).expect("committed");
+    let mut degrees = String::new();
+    for (i, part) in urdf.split("er=\"").enumerate() {
+        match (i, part.split_once('"')) {
+            (0, _) => degrees += part,
+            (_, Some((number, rest))) if number.parse::<f64>().is_ok() => {
+                let degree = number.parse::<f64>().expect("a number").to_degrees();
+                degrees += &format!("er=\"{degree:.0}\"{rest}");
+            }
+            _ => degrees += &format!("er=\"{part}"),
+        }
+    }
+    let dir = Scratch::new().file("arm.urdf", degrees.into_bytes());
+    let made = dir.calib_with(&["init", "arm.urdf", "--out", "robots/arm.yaml"]);
+    assert!(made.stdout.contains("probably degrees"), "{}", made.stdout);
+    // Its own ranges are planned.
+    let planned = dir.calib_with(&["plan", "robots/arm.yaml", "--poses", "12", "--out", "plan"]);
+    assert_eq!(planned.code, 0, "{}", planned.stderr);
+    let profile = dir.read("robots/arm.yaml");
+    let without: Vec<&str> = profile
+        .lines()
+        .filter(|l| *l != "plan:" && !l.starts_with("  joints: {"))
+        .collect();
+    let dir = dir.file("robots/arm.yaml", without.join("\n").into_bytes());
+    let planned = dir.calib_with(&["plan", "robots/arm.yaml", "--poses", "12", "--out", "again"]);
+    assert_ne!(planned.code, 0, "{}", planned.stdout);
+    assert!(
+        planned.stderr.contains("probably degrees"),
+        "{}",
+        planned.stderr
+    );
+    let simulated = dir.calib_with(&["simulate", "robots/arm.yaml", "--out", "robots/arm"]);
+    assert_eq!(simulated.code, 0, "{}", simulated.stderr);
+    let checked = dir.calib_with(&["check", "robots/arm.yaml"]);
+    assert!(checked.stdout.contains("probably"), "{}", checked.stdout);
+}
+
 #[test]
 fn the_shipped_robots_are_found_again_from_their_tables() {
     if !skipped_tests::thorough() {

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use calib_checks::structural::{Chain, Correction, Decision, Hypothesis, RecordingIndex, Scoped};
-use calib_urdf::{LinkId, RobotModel};
+use calib_urdf::{LinkId, RobotModel, doubt};
 
 use crate::bodies::Found;
 use crate::correct;
 use crate::error::InitError;
-use crate::fact::{About, CERTAIN, Fact, Place, Residuals, Rival};
+use crate::fact::{About, CERTAIN, Fact, Mistake, Place, Residuals, Rival};
 use crate::links::{Assigned, Choice, Scene, is_of_links};
 use crate::robot;
 use crate::session::Draft;
@@ -161,6 +161,7 @@ pub fn next_correction(
             let about = About::Agrees {
                 rms: outcome.rms,
                 rows: outcome.rows,
+                corrected: false,
             };
             next.facts.push(Fact::new(Place::Recordings, about));
             return Ok(next);
@@ -182,12 +183,24 @@ pub fn next_correction(
         best: named.evidence.best,
         next: named.evidence.next,
     };
-    let evidence = (residuals, named.equivalent.len());
+    let all: Vec<&Correction> = std::iter::once(&named.correction)
+        .chain(&named.equivalent)
+        .collect();
+    let in_words = |correction: &Correction| -> Vec<Mistake> {
+        let source = drafts.first().map(|draft| &sources[draft.source]);
+        let of = |s: &Scoped| correct::mistake(model, source, &bodies, &s.hypothesis);
+        correction.iter().map(of).collect()
+    };
     // Of corrections that the recordings do not distinguish, one that a column map can hold.
     let mut first = None;
-    let is_of_tables = |c: &&Correction| c.iter().any(|s| !is_of_links(&s.hypothesis));
-    let equivalent = named.equivalent.iter().filter(is_of_tables);
-    for correction in std::iter::once(&named.correction).chain(equivalent) {
+    let is_of_tables = |c: &Correction| c.iter().any(|s| !is_of_links(&s.hypothesis));
+    for (i, correction) in all.iter().enumerate() {
+        if i > 0 && !is_of_tables(correction) {
+            continue;
+        }
+        let others = all.iter().enumerate().filter(|(k, _)| *k != i);
+        let others: Vec<Vec<Mistake>> = others.map(|(_, c)| in_words(c)).collect();
+        let evidence = (residuals, others.as_slice());
         let all = apply_each(model, sources, drafts, &bodies, correction, evidence)?;
         if all.complete {
             first = Some(all);
@@ -217,7 +230,7 @@ fn apply_each(
     drafts: &[Draft],
     bodies: &[String],
     correction: &Correction,
-    evidence: (Residuals, usize),
+    evidence: (Residuals, &[Vec<Mistake>]),
 ) -> Result<Applied, InitError> {
     let mut applied = Applied {
         facts: Vec::new(),
@@ -236,7 +249,7 @@ fn apply_each(
     Ok(applied)
 }
 
-/// A correction, in the column maps where these can hold it, and its fact. `evidence`: residuals, and how many corrections are equivalent.
+/// A correction, in the column maps where these can hold it, and its fact. `evidence`: residuals, and the corrections that are equivalent.
 ///
 /// # Errors
 /// As [`next_correction`].
@@ -246,15 +259,25 @@ pub fn apply_one(
     drafts: &[Draft],
     bodies: &[String],
     scoped: &Scoped,
-    (residuals, equivalent): (Residuals, usize),
+    (residuals, equivalent): (Residuals, &[Vec<Mistake>]),
 ) -> Result<(Fact, Option<Vec<Source>>), InitError> {
-    let mistake = correct::mistake(model, bodies, &scoped.hypothesis);
+    if correct::is_of_robot(model, &scoped.hypothesis) {
+        return Err(InitError::RobotTooLarge {
+            reach: doubt::reach(model),
+            ratio: scoped.hypothesis.log_scale().exp(),
+            rms: (residuals.none, residuals.best),
+        });
+    }
+    let recordings = drafts.iter().enumerate();
+    let mut inside = recordings.filter(|(r, _)| scoped.scope.contains(RecordingIndex(*r)));
+    let source = inside.next().map(|(_, draft)| &sources[draft.source]);
+    let mistake = correct::mistake(model, source, bodies, &scoped.hypothesis);
     let done = correct::corrected(model, sources, drafts, scoped)?;
     let about = match &done {
         Some(_) => About::Corrected {
             mistake,
             residuals,
-            equivalent,
+            equivalent: equivalent.to_vec(),
         },
         None => About::NotCorrected { mistake, residuals },
     };

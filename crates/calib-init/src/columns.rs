@@ -235,6 +235,10 @@ fn joints(model: &RobotModel, header: &Header, guess: &mut Guess, used: &mut BTr
 
 /// The unit in a column's name does not speak against the joint.
 fn fits(model: &RobotModel, joint: JointId, column: &str) -> bool {
+    // A joint may have a unit's word in its own name.
+    if model.joint(joint).name == column {
+        return true;
+    }
     match name::unit(column).unit {
         Some(NamedUnit::Angle(_)) => model.joint(joint).kind.turns(),
         Some(NamedUnit::Length(_)) => !model.joint(joint).kind.turns(),
@@ -351,7 +355,7 @@ fn lengths(model: &RobotModel, header: &Header, guess: &mut Guess) {
         _ => None,
     });
     let extent = columns.iter().map(|i| header.span(*i)).fold(0.0, f64::max);
-    let reach = robot::reach(model).max(0.1);
+    let reach = calib_urdf::doubt::reach(model).max(0.1);
     let (unit, how) = match named {
         Some(unit) => (unit, LengthHow::Named),
         None => {

@@ -1,20 +1,26 @@
 //! Mistakes in tables, corrected in the profile: columns exchanged, negated, or read in another unit. The tables themselves are never changed.
 
-use calib_checks::structural::{Hypothesis, Scoped, UnitMistake};
+use calib_checks::structural::{BodyIndex, Hypothesis, Length, Scoped, UnitMistake};
 use calib_recording::{AngleUnit, ColumnMap, LengthUnit};
-use calib_urdf::{JointKind, RobotModel};
+use calib_urdf::{JointKind, RobotModel, doubt};
 
 use crate::error::InitError;
 use crate::fact::Mistake;
 use crate::header::header;
-use crate::name::{self, NamedUnit};
+use crate::name::{self, NamedUnit, Unit};
 use crate::session::Draft;
 use crate::source::Source;
 
 /// The mistake in words that a profile can name.
 #[must_use]
-pub fn mistake(model: &RobotModel, bodies: &[String], hypothesis: &Hypothesis) -> Mistake {
+pub fn mistake(
+    model: &RobotModel,
+    source: Option<&Source>,
+    bodies: &[String],
+    hypothesis: &Hypothesis,
+) -> Mistake {
     let joint = |j: calib_checks::structural::JointIndex| model.joints()[j.0].name.clone();
+    let named = |b: BodyIndex| bodies.get(b.0).cloned().unwrap_or_default();
     match *hypothesis {
         Hypothesis::Sign { joint: j } => Mistake::Sign { joint: joint(j) },
         Hypothesis::Exchange { first, second } => Mistake::Exchange {
@@ -29,9 +35,13 @@ pub fn mistake(model: &RobotModel, bodies: &[String], hypothesis: &Hypothesis) -
             joint: None,
             unit: really(mistake),
         },
-        Hypothesis::TrackerUnit { mistake } => Mistake::TrackerUnit {
-            unit: really(mistake),
-        },
+        Hypothesis::TrackerUnit { unit, read_as } => {
+            let was = source.and_then(lengths_of);
+            match was.and_then(|was| scaled(was, unit, read_as)) {
+                Some(unit) => Mistake::TrackerUnit { unit: unit.name() },
+                None => Mistake::Other,
+            }
+        }
         Hypothesis::Offset { joint: j, turns } => Mistake::Offset {
             joint: joint(j),
             degrees: turns.angle().to_degrees(),
@@ -39,9 +49,7 @@ pub fn mistake(model: &RobotModel, bodies: &[String], hypothesis: &Hypothesis) -
         Hypothesis::RowShift { rows } => Mistake::Rows { rows },
         Hypothesis::Mirrored => Mistake::Mirrored,
         Hypothesis::TrackerMoved | Hypothesis::TrackerAxes { .. } => Mistake::TrackerMoved,
-        Hypothesis::Remounted { body } => Mistake::Remounted {
-            body: bodies.get(body.0).cloned().unwrap_or_default(),
-        },
+        Hypothesis::Remounted { body } => Mistake::Remounted { body: named(body) },
         Hypothesis::Poses { .. } => Mistake::Poses,
         Hypothesis::MissingColumn { joint: j } => Mistake::MissingColumn { joint: joint(j) },
         Hypothesis::StoodAt { joint: j, value } => Mistake::StoodAt {
@@ -49,8 +57,21 @@ pub fn mistake(model: &RobotModel, bodies: &[String], hypothesis: &Hypothesis) -
             value,
             turns: model.joints()[j.0].kind.turns(),
         },
+        Hypothesis::WrongLink { body, link } => Mistake::Link {
+            body: named(body),
+            link: model.links()[link.0].name.clone(),
+        },
+        Hypothesis::ExchangedBodies { first, second } => Mistake::Bodies {
+            first: named(first),
+            second: named(second),
+        },
         _ => Mistake::Other,
     }
+}
+
+/// Lengths that are too small for a robot which is larger than robots are: its URDF has another unit.
+pub fn is_of_robot(model: &RobotModel, hypothesis: &Hypothesis) -> bool {
+    hypothesis.log_scale() > 0.0 && doubt::reach(model) > doubt::LARGEST
 }
 
 /// The unit that the values really have.
@@ -142,7 +163,8 @@ fn new_map(model: &RobotModel, source: &Source, hypothesis: &Hypothesis) -> Opti
                 _ => AngleUnit::Rad,
             };
         }
-        Hypothesis::TrackerUnit { mistake } => {
+        Hypothesis::TrackerUnit { unit, read_as } => {
+            let unit = scaled(lengths_of(source)?, unit, read_as)?;
             let columns = places(source, &map);
             let bare = columns.iter().all(|column| !name::unit(column).native);
             // One unit for all lengths of the map.
@@ -151,16 +173,54 @@ fn new_map(model: &RobotModel, source: &Source, hypothesis: &Hypothesis) -> Opti
                 .values()
                 .all(|column| name::unit(column).native);
             if !(bare && alone) {
-                return renamed(source, &map, &columns, really(mistake));
+                return renamed(source, &map, &columns, unit.name());
             }
-            map.lengths = match really(mistake) {
-                "mm" => LengthUnit::Mm,
-                _ => LengthUnit::M,
-            };
+            map.lengths = unit;
         }
         _ => return None,
     }
     Some(map)
+}
+
+/// The other units of length, each with the one that was read.
+pub fn units_but(read_as: LengthUnit) -> impl Iterator<Item = (Length, Length)> {
+    let others = LengthUnit::ALL.into_iter().filter(move |u| *u != read_as);
+    others.map(move |unit| (length(unit), length(read_as)))
+}
+
+fn length(unit: LengthUnit) -> Length {
+    match unit {
+        LengthUnit::M => Length::Meter,
+        LengthUnit::Cm => Length::Centimeter,
+        LengthUnit::Mm => Length::Millimeter,
+        LengthUnit::Um => Length::Micrometer,
+        LengthUnit::In => Length::Inch,
+        LengthUnit::Ft => Length::Foot,
+    }
+}
+
+/// The unit that differs from another one as `unit` does from `read_as`.
+fn scaled(was: LengthUnit, unit: Length, read_as: Length) -> Option<LengthUnit> {
+    let wanted = length(was).meters() * unit.meters() / read_as.meters();
+    let mut all = LengthUnit::ALL.into_iter();
+    all.find(|u| (length(*u).meters() / wanted - 1.0).abs() < 1e-9)
+}
+
+/// The one unit that the positions of a file are read in; `None` where there are several, or the file states it itself.
+#[must_use]
+pub fn lengths_of(source: &Source) -> Option<LengthUnit> {
+    let map = source.columns.clone().unwrap_or_default();
+    let columns = places(source, &map);
+    let unit = |column: &String| match name::unit(column) {
+        Unit {
+            unit: Some(NamedUnit::Length(unit)),
+            native: true,
+            ..
+        } => unit,
+        _ => map.lengths,
+    };
+    let first = unit(columns.first()?);
+    columns.iter().all(|c| unit(c) == first).then_some(first)
 }
 
 /// Columns of positions: those of the map, and those that the readers' own rules take.

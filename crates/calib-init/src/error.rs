@@ -1,5 +1,6 @@
 //! Why there is no profile.
 
+use calib_finding::{Unit, number};
 use calib_pipeline::PipelineError;
 use calib_pipeline::error::ExitCode;
 use calib_profile::ProfileError;
@@ -55,6 +56,29 @@ pub enum InitError {
         /// Ends of chains.
         tips: Vec<String>,
     },
+    /// Markers on a link that no joint moves, and nothing is recorded.
+    #[error(
+        "no joint moves `{link}`: markers there show nothing of the robot\n  help: name the link that carries the markers: {}", .tips.join(", ")
+    )]
+    StillLink {
+        /// The link.
+        link: String,
+        /// Ends of chains.
+        tips: Vec<String>,
+    },
+    /// The lengths of the URDF are not in meters.
+    #[error(
+        "the robot of the URDF reaches {} m, and the recordings show it {} times smaller: they fit it to {} rms, and in meters to {}\n  help: lengths of a URDF are in meters: divide its origins, the limits of prismatic joints and the meshes by {}",
+        number::fixed(*.reach, 0), number::fixed(*.ratio, 0), number::plain(.rms.0, Unit::Meter), number::plain(.rms.1 / .ratio, Unit::Meter), number::fixed(*.ratio, 0)
+    )]
+    RobotTooLarge {
+        /// Its reach as the URDF has it, m.
+        reach: f64,
+        /// How many times too large it is.
+        ratio: f64,
+        /// Residuals of the registration as it is, and with the recordings made larger by the ratio, rms, m.
+        rms: (f64, f64),
+    },
     /// Columns, but none is a joint of the robot, and no robot log is given.
     #[error(
         "{file}: no column is a joint of this robot (columns: {}; joints: {})\n  help: give the robot's own log as another file, or name the columns as the joints: `{}_deg`",
@@ -108,6 +132,19 @@ pub enum InitError {
         /// The end of the longest chain.
         tip: String,
     },
+    /// A tracker's file and a robot's log that have neither clocks nor the same number of rows.
+    #[error(
+        "{file} has {} rows and {log} has {}: neither do their rows belong together, nor do they have times of streams\n  help: give files with one row for every posture, in the same order, or streams with a time column in both",
+        .rows.0, .rows.1
+    )]
+    RowsDiffer {
+        /// The tracker's file.
+        file: String,
+        /// The robot's log.
+        log: String,
+        /// Rows of both.
+        rows: (usize, usize),
+    },
     /// Two recordings are the same file.
     #[error("{file} is given twice\n  help: give every recording once")]
     Twice {
@@ -140,6 +177,7 @@ impl InitError {
             | Self::NoJoints { file, .. }
             | Self::HandEye { file, .. }
             | Self::NothingTracked { file, .. }
+            | Self::RowsDiffer { file, .. }
             | Self::Twice { file } => Some(file),
             Self::NoMotion { files, .. } | Self::NothingSeen { files } => {
                 files.first().map(String::as_str)
@@ -157,6 +195,7 @@ impl InitError {
             | Self::NoJoints { .. }
             | Self::HandEye { .. }
             | Self::NothingTracked { .. }
+            | Self::RowsDiffer { .. }
             | Self::NothingSeen { .. }
             | Self::NoMotion { .. } => ExitCode::Data,
             _ => ExitCode::Usage,

@@ -34,11 +34,6 @@ pub enum AngleHow {
         /// In the unit of the file.
         largest: f64,
     },
-    /// The other unit fits the robot worse, so many times.
-    Motion {
-        /// Residual of the other unit over that of this one.
-        times: f64,
-    },
 }
 
 /// How the unit of lengths was found.
@@ -53,11 +48,6 @@ pub enum LengthHow {
         extent: f64,
         /// m.
         reach: f64,
-    },
-    /// The other unit fits the robot worse, so many times.
-    Motion {
-        /// Residual of the other unit over that of this one.
-        times: f64,
     },
 }
 
@@ -126,6 +116,20 @@ pub enum Mistake {
         /// Whether it turns.
         turns: bool,
     },
+    /// A body is on another link.
+    Link {
+        /// The body.
+        body: String,
+        /// The link.
+        link: String,
+    },
+    /// Two bodies are exchanged.
+    Bodies {
+        /// One.
+        first: String,
+        /// The other.
+        second: String,
+    },
     /// Any other: `calib check` names it.
     Other,
 }
@@ -165,6 +169,13 @@ pub enum About {
         endless: Vec<String>,
         /// Those of them whose limits leave no range.
         no_range: Vec<String>,
+        /// Those of them whose limits are probably in degrees.
+        in_degrees: Vec<String>,
+    },
+    /// The robot is larger than robots are: its lengths are probably not in meters.
+    TooLarge {
+        /// Its reach, m.
+        reach: f64,
     },
     /// The body is put on the end of a chain, since nothing was recorded.
     TipOfChain {
@@ -340,6 +351,8 @@ pub enum About {
         file: String,
         /// It is the only one, or shares most words with the name of the tracker's file; else paired by order.
         named: bool,
+        /// How many rows both files have, one for every posture; `None`: two clocks.
+        rows: Option<usize>,
     },
     /// A mistake in the recordings that the profile corrects.
     Corrected {
@@ -348,7 +361,7 @@ pub enum About {
         /// What it explains.
         residuals: Residuals,
         /// Other mistakes that these recordings do not distinguish from it.
-        equivalent: usize,
+        equivalent: Vec<Vec<Mistake>>,
     },
     /// A mistake in the recordings that no profile can correct.
     NotCorrected {
@@ -363,6 +376,8 @@ pub enum About {
         rms: f64,
         /// Poses.
         rows: usize,
+        /// After the corrections that stand beside it.
+        corrected: bool,
     },
     /// Too few poses to test order, signs and units.
     TooFew {
@@ -420,8 +435,9 @@ fn is_guess(about: &About) -> bool {
         About::Joints {
             unlimited,
             no_range,
+            in_degrees,
             ..
-        } => !(unlimited.is_empty() && no_range.is_empty()),
+        } => !(unlimited.is_empty() && no_range.is_empty() && in_degrees.is_empty()),
         About::LinkStated { better, .. } => better.is_some(),
         About::Link {
             rms, next, same, ..
@@ -430,7 +446,7 @@ fn is_guess(about: &About) -> bool {
             near || !same.is_empty()
         }
         About::Time { named, .. } => !named,
-        About::Log { named, .. } => !named,
+        About::Log { named, rows, .. } => !named || rows.is_some(),
         About::TipOfChain { .. }
         | About::LinkUnknown { .. }
         | About::TooFew { .. }
@@ -442,6 +458,7 @@ fn is_guess(about: &About) -> bool {
         | About::ValidationSmallest { .. }
         | About::Corrected { .. }
         | About::NotCorrected { .. }
+        | About::TooLarge { .. }
         | About::Disagrees { .. }
         | About::Limits { .. }
         | About::NoLimits

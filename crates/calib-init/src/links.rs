@@ -6,12 +6,13 @@
 
 use calib_checks::structural::{
     Body, Chain, Data, Decision, Hypothesis, LinkIndex, Measured, Named, Options, Outcome,
-    RecordingIndex, Scope, Scoped, UnitMistake, apply, explain, registration_residual, thin,
+    RecordingIndex, Scope, Scoped, TRACKER_UNITS, apply, explain, registration_residual, thin,
 };
-use calib_recording::Poses;
-use calib_urdf::{JointId, LinkId, RobotModel};
+use calib_recording::{LengthUnit, Poses};
+use calib_urdf::{JointId, LinkId, RobotModel, doubt};
 
 use crate::bodies::Found;
+use crate::correct;
 use crate::fact::{CERTAIN, Residuals, Rival};
 use crate::robot;
 
@@ -162,23 +163,24 @@ impl Scene<'_> {
     }
 
     /// The unit of the tracker's lengths, if another one explains the motion of the bodies better on whatever links. A body read too small seems to
-    /// stand still, so this is asked before any link: residuals are compared as densities of what was measured, per unit of the file.
+    /// stand still, so this is asked before any link, of a file that was read as `read_as`: residuals are compared as densities of what was measured, per unit of the file.
     #[must_use]
-    pub fn tracker_unit(&self) -> Option<(Scoped, Residuals)> {
+    pub fn tracker_unit(&self, read_as: LengthUnit) -> Option<(Scoped, Residuals)> {
         let chain = Chain::from_model(self.model).ok()?;
         let least = |body: usize, correction: Option<&Scoped>| {
             let all = self.residuals(&chain, body, correction)?;
             all.into_iter().map(|(_, rms)| rms).min_by(f64::total_cmp)
         };
         let mut best: Option<(f64, Scoped, Residuals)> = None;
-        for mistake in [
-            UnitMistake::MillimetersReadAsMeters,
-            UnitMistake::MetersReadAsMillimeters,
-        ] {
+        // A URDF in millimeters makes every unit too small.
+        let too_large = doubt::reach(self.model) > doubt::LARGEST;
+        let of_robot = TRACKER_UNITS.into_iter().filter(|_| too_large);
+        for (unit, read_as) in correct::units_but(read_as).chain(of_robot) {
             let scoped = Scoped {
-                hypothesis: Hypothesis::TrackerUnit { mistake },
+                hypothesis: Hypothesis::TrackerUnit { unit, read_as },
                 scope: Scope::All,
             };
+            let factor = unit.meters() / read_as.meters();
             let (mut gain, mut none, mut after) = (0.0, 0.0_f64, 0.0_f64);
             for body in 0..self.bodies.len() {
                 let (Some(as_read), Some(scaled)) = (least(body, None), least(body, Some(&scoped)))
@@ -191,7 +193,7 @@ impl Scene<'_> {
                 } else {
                     1.0
                 };
-                gain += (as_read / scaled).ln() + share * mistake.factor().ln();
+                gain += (as_read / scaled).ln() + share * factor.ln();
                 (none, after) = (none.max(as_read), after.max(scaled));
             }
             let residuals = Residuals {

@@ -31,12 +31,22 @@ pub fn unit(name: &str) -> Unit<'_> {
         .strip_suffix([']', ')'])
         .and_then(|head| head.rsplit_once(['[', '(']));
     let split = bracket.or_else(|| name.rsplit_once('_'));
-    let found = split.and_then(|(stem, word)| Some((stem, word_of_unit(word.trim())?)));
+    let found = split.and_then(|(stem, word)| {
+        let word = word.trim();
+        let unit = word_of_unit(word)?;
+        // `plug_in` is no length.
+        let is_word = matches!(word, "in" | "ft") && bracket.is_none();
+        let of_place = || {
+            let before = stem.strip_suffix(['x', 'y', 'z', 'X', 'Y', 'Z']);
+            before.is_some_and(|b| !b.ends_with(char::is_alphabetic))
+        };
+        (!is_word || of_place()).then_some((stem, word, unit))
+    });
     match found {
-        Some((stem, unit)) if !stem.is_empty() => Unit {
+        Some((stem, word, unit)) if !stem.is_empty() => Unit {
             stem: stem.trim_end(),
             unit: Some(unit),
-            native: bracket.is_none(),
+            native: bracket.is_none() && word == unit.name(),
         },
         _ => Unit {
             stem: name,
@@ -46,13 +56,29 @@ pub fn unit(name: &str) -> Unit<'_> {
     }
 }
 
+impl NamedUnit {
+    /// As the readers understand it behind `_`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Angle(AngleUnit::Rad) => "rad",
+            Self::Angle(AngleUnit::Deg) => "deg",
+            Self::Length(unit) => unit.name(),
+            Self::Time(TimeUnit::S) => "s",
+            Self::Time(TimeUnit::Ms) => "ms",
+            Self::Time(TimeUnit::Us) => "us",
+            Self::Time(TimeUnit::Ns) => "ns",
+        }
+    }
+}
+
 fn word_of_unit(word: &str) -> Option<NamedUnit> {
+    if let Some(unit) = LengthUnit::from_text(word) {
+        return Some(NamedUnit::Length(unit));
+    }
     Some(match word.to_ascii_lowercase().as_str() {
         "rad" | "radian" | "radians" => NamedUnit::Angle(AngleUnit::Rad),
         "deg" | "degree" | "degrees" | "°" => NamedUnit::Angle(AngleUnit::Deg),
-        "m" => NamedUnit::Length(LengthUnit::M),
-        "cm" => NamedUnit::Length(LengthUnit::Cm),
-        "mm" => NamedUnit::Length(LengthUnit::Mm),
         "s" | "sec" => NamedUnit::Time(TimeUnit::S),
         "ms" => NamedUnit::Time(TimeUnit::Ms),
         "us" => NamedUnit::Time(TimeUnit::Us),

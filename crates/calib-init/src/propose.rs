@@ -1,12 +1,13 @@
 //! From a URDF and files to a proposal.
 
-use calib_recording::Poses;
-use calib_urdf::{JointId, LinkId, RobotModel};
+use calib_recording::{LengthUnit, Poses};
+use calib_urdf::{JointId, LinkId, RobotModel, doubt};
 
 use crate::ask::{apply_one, ask, next_correction};
 use crate::bodies::{self, Found};
+use crate::correct;
 use crate::error::InitError;
-use crate::fact::{About, Fact, Place};
+use crate::fact::{About, AngleHow, Fact, LengthHow, Mistake, Place};
 use crate::limits;
 use crate::links::Scene;
 use crate::proposal::{Body, Noise, Proposal, Recording, Table};
@@ -53,15 +54,14 @@ pub fn propose(
     };
     let stated = match &request.markers_on {
         None => None,
-        Some(name) => Some(model.link_id(name).map_err(|unknown| {
-            InitError::NoSuchLink {
-                unknown,
-                tips: tips
-                    .iter()
-                    .map(|t| model.link(t.link).name.clone())
-                    .collect(),
-            }
-        })?),
+        Some(name) => Some(
+            model
+                .link_id(name)
+                .map_err(|unknown| InitError::NoSuchLink {
+                    unknown,
+                    tips: ends(model),
+                })?,
+        ),
     };
     let mut proposal = Proposal {
         robot: robot_name(model, request),
@@ -71,7 +71,7 @@ pub fn propose(
         bodies: Vec::new(),
         recordings: Vec::new(),
         skeleton: None,
-        facts: vec![joints(model)],
+        facts: of_robot(model),
     };
     if files.is_empty() {
         without_recordings(model, request, stated, longest, &mut proposal)?;
@@ -82,6 +82,7 @@ pub fn propose(
         Some(sigma) => About::Limits { sigma },
         None => About::NoLimits,
     };
+    tables::robot_profile(model, &proposal)?;
     debug_assert_eq!(
         limits::of(&proposal.noise).is_none(),
         about == About::NoLimits
@@ -111,12 +112,21 @@ fn robot_name(model: &RobotModel, request: &Request) -> String {
     }
 }
 
+fn of_robot(model: &RobotModel) -> Vec<Fact> {
+    let mut facts = vec![joints(model)];
+    let reach = doubt::reach(model);
+    if reach > doubt::LARGEST {
+        facts.push(Fact::new(Place::Robot, About::TooLarge { reach }));
+    }
+    facts
+}
+
 fn joints(model: &RobotModel) -> Fact {
     let moving: Vec<JointId> = model.independent_joints().collect();
     let unlimited = moving.iter().filter(|j| {
         let joint = model.joint(**j);
         // A joint that turns without end says so.
-        joint.limits.range().is_none()
+        doubt::range(joint).is_none()
             && !matches!(joint.kind, calib_urdf::JointKind::Continuous { .. })
     });
     let unlimited: Vec<JointId> = unlimited.copied().collect();
@@ -141,8 +151,15 @@ fn joints(model: &RobotModel) -> Fact {
         unlimited: names(&unlimited),
         endless: names(&endless),
         no_range: names(&no_range),
+        in_degrees: names(&doubt::limits_in_degrees(model)),
     };
     Fact::new(Place::Robot, about)
+}
+
+/// Names of the ends of all chains.
+fn ends(model: &RobotModel) -> Vec<String> {
+    let tips = robot::tips(model).into_iter();
+    tips.map(|tip| model.link(tip.link).name.clone()).collect()
 }
 
 /// A body at the end of the longest chain, and postures to record.
@@ -176,8 +193,14 @@ fn without_recordings(
         .facts
         .push(Fact::new(Place::Body(BODY.to_owned()), about));
     let joints = robot::movers(model, link);
+    if joints.is_empty() {
+        return Err(InitError::StillLink {
+            link: named(link),
+            tips: ends(model),
+        });
+    }
     let skeleton = skeleton::skeleton(model, &joints);
-    if skeleton.random.is_empty() && !joints.is_empty() {
+    if skeleton.random.is_empty() {
         let joints = robot::names(model, &joints).into_iter();
         return Err(InitError::NoRange {
             file: request.urdf_shown.clone(),
@@ -234,7 +257,7 @@ fn with_recordings(
     }
     let read = files.iter().map(|file| Source::read(model, file));
     let mut sources: Vec<Source> = read.collect::<Result<_, _>>()?;
-    let (mut drafts, of_files) = session::drafts(model, &sources)?;
+    let (mut drafts, mut of_files) = session::drafts(model, &sources)?;
     let (mut found, mut of_bodies) = bodies::bodies(&sources);
     if found.is_empty() {
         return Err(InitError::NothingSeen {
@@ -258,8 +281,9 @@ fn with_recordings(
         bodies: &found,
         tables: &poses,
     };
-    if let Some((scoped, residuals)) = scene.tracker_unit() {
-        let (fact, new) = apply_one(model, &sources, &drafts, &[], &scoped, (residuals, 0))?;
+    let lengths = of_lengths(&drafts, &sources);
+    if let Some((scoped, residuals)) = lengths.and_then(|unit| scene.tracker_unit(unit)) {
+        let (fact, new) = apply_one(model, &sources, &drafts, &[], &scoped, (residuals, &[]))?;
         corrections.push(fact);
         if let Some(new) = new {
             sources = new;
@@ -297,13 +321,8 @@ fn with_recordings(
         proposal.recordings = recordings(&drafts, &sources);
         poses = tables::tables(model, proposal, &drafts, &sources)?;
     }
-    for body in &proposal.bodies {
-        let place = Place::Body(body.name.clone());
-        if !of_links.iter().any(|fact| fact.place == place) {
-            let link = model.link(body.link).name.clone();
-            of_links.push(Fact::new(place, About::LinkUnknown { link }));
-        }
-    }
+    without_corrected(&mut of_files, &mut corrections);
+    without_a_word(model, &proposal.bodies, &mut of_links);
     let of_uses = session::uses(model, &mut drafts, &poses);
     proposal.recordings = recordings(&drafts, &sources);
     let missing = missing(model, proposal, &poses);
@@ -312,6 +331,67 @@ fn with_recordings(
         .facts
         .extend([of_files, of_uses, of_bodies, of_links, missing, corrections].concat());
     Ok(())
+}
+
+/// Bodies of which nothing shows the link say so.
+fn without_a_word(model: &RobotModel, bodies: &[Body], of_links: &mut Vec<Fact>) {
+    for body in bodies {
+        let place = Place::Body(body.name.clone());
+        if !of_links.iter().any(|fact| fact.place == place) {
+            let link = model.link(body.link).name.clone();
+            of_links.push(Fact::new(place, About::LinkUnknown { link }));
+        }
+    }
+}
+
+/// Removes guesses of a unit that the motion corrected; what agrees then agrees with the corrections.
+fn without_corrected(of_files: &mut Vec<Fact>, corrections: &mut [Fact]) {
+    let any = corrections
+        .iter()
+        .any(|f| matches!(f.about, About::Corrected { .. }));
+    for fact in corrections.iter_mut() {
+        if let About::Agrees { corrected, .. } = &mut fact.about {
+            *corrected = any;
+        }
+    }
+    for correction in corrections {
+        let About::Corrected { mistake, .. } = &correction.about else {
+            continue;
+        };
+        let is_wrong = |about: &About| match mistake {
+            Mistake::TrackerUnit { .. } => {
+                matches!(
+                    about,
+                    About::Lengths {
+                        how: LengthHow::Range { .. },
+                        ..
+                    }
+                )
+            }
+            Mistake::Unit { joint: None, unit } if matches!(*unit, "deg" | "rad") => {
+                matches!(
+                    about,
+                    About::Angles {
+                        how: AngleHow::Range { .. },
+                        ..
+                    }
+                )
+            }
+            _ => false,
+        };
+        let everywhere = !matches!(correction.place, Place::Recording(_));
+        let there = |fact: &Fact| everywhere || fact.place == correction.place;
+        of_files.retain(|fact| !(there(fact) && is_wrong(&fact.about)));
+    }
+}
+
+/// The unit of length that all tracked files are read in.
+fn of_lengths(drafts: &[Draft], sources: &[Source]) -> Option<LengthUnit> {
+    let mut units = drafts
+        .iter()
+        .map(|d| correct::lengths_of(&sources[d.source]));
+    let first = units.next()??;
+    units.all(|unit| unit == Some(first)).then_some(first)
 }
 
 /// The last link that recorded joints move.

@@ -100,22 +100,6 @@ pub fn tips(model: &RobotModel) -> Vec<Tip> {
     tips
 }
 
-/// Longest distance of a link from the root, m: an upper bound, over all positions of the joints.
-#[must_use]
-pub fn reach(model: &RobotModel) -> f64 {
-    let length = |joint: &JointId| {
-        let joint = model.joint(*joint);
-        let slide = match joint.kind {
-            JointKind::Prismatic { .. } => joint.limits.range(),
-            _ => None,
-        };
-        let slide = slide.map_or(0.0, |(low, high)| low.abs().max(high.abs()));
-        joint.parent_link_from_joint.translation.vector.norm() + slide
-    };
-    let of_link = |link| model.chain_to_root(link).iter().map(length).sum::<f64>();
-    model.link_ids().map(of_link).fold(0.0, f64::max)
-}
-
 /// Links rigidly connected with one, it first.
 #[must_use]
 pub fn links_of_group(model: &RobotModel, link: LinkId) -> Vec<LinkId> {

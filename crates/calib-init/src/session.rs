@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use calib_checks::sync::{HoldSettings, holds};
-use calib_recording::{Poses, Recording};
+use calib_recording::{Poses, Recording, Timeline};
 use calib_urdf::{JointId, RobotModel};
 
 use crate::error::InitError;
@@ -38,7 +38,7 @@ pub struct Draft {
     pub name: String,
     /// The tracker's file, or the only one: an index into the sources.
     pub source: usize,
-    /// The robot's own log.
+    /// The robot's own log. Without a stream its rows are the tracker's.
     pub log: Option<usize>,
     /// `None`: every row is a pose.
     pub stream: Option<Stream>,
@@ -109,13 +109,21 @@ pub fn drafts(
             .iter()
             .chain(log.iter().flat_map(|l| &sources[*l].facts));
         facts.extend(read.map(|about| Fact::new(place(), about.clone())));
+        let joints = &sources[log.unwrap_or(i)].recording;
+        let two = match log {
+            Some(log) => !is_by_rows(source, &sources[log])?,
+            None => false,
+        };
         if let Some(log) = log {
             let file = sources[log].file.path.clone();
             let named = pair.is_some_and(|pair| pair.2);
-            facts.push(Fact::new(place(), About::Log { file, named }));
+            let rows = (!two).then(|| rows_of(&sources[log].recording));
+            facts.push(Fact::new(place(), About::Log { file, named, rows }));
         }
-        let joints = &sources[log.unwrap_or(i)].recording;
-        let stream = stream(&source.recording, joints, log.is_some());
+        let stream = match log {
+            Some(_) if !two => None,
+            _ => stream(&source.recording, joints, two),
+        };
         if let Some((kind, holds)) = stream {
             let about = match kind {
                 Stream::Settle => About::Holds { holds },
@@ -173,18 +181,41 @@ fn paired(sources: &[Source], tracked: &[usize], logs: &[usize]) -> Vec<(usize, 
     pairs
 }
 
+/// Rows of the longest time line.
+fn rows_of(recording: &Recording) -> usize {
+    let lines = recording.timelines.iter().map(|line| line.len());
+    lines.max().unwrap_or(0)
+}
+
+/// Both files have one row for every posture; `false`: both flow, each by its own clock.
+fn is_by_rows(tracked: &Source, log: &Source) -> Result<bool, InitError> {
+    let flow = |source: &Source| source.recording.timelines.iter().any(flows);
+    if flow(tracked) || flow(log) {
+        return Ok(false);
+    }
+    let (rows, of_log) = (rows_of(&tracked.recording), rows_of(&log.recording));
+    match rows == of_log {
+        true => Ok(true),
+        false => Err(InitError::RowsDiffer {
+            file: tracked.file.shown.clone(),
+            log: log.file.shown.clone(),
+            rows: (rows, of_log),
+        }),
+    }
+}
+
+/// Many rows with steps of a fraction of a second.
+fn flows(line: &Timeline) -> bool {
+    let Some(t) = &line.t else { return false };
+    let span = t.last().copied().unwrap_or(0.0) - t.first().copied().unwrap_or(0.0);
+    t.len() >= STREAM_ROWS && span / t.len() as f64 <= STREAM_STEP
+}
+
 /// A stream has time, many rows, and steps of a fraction of a second; or two clocks.
 fn stream(tracked: &Recording, joints: &Recording, two: bool) -> Option<(Stream, usize)> {
     let timed = |r: &Recording| r.timelines.iter().any(|line| line.t.is_some());
-    let flows = |r: &Recording| {
-        r.timelines.iter().any(|line| {
-            let Some(t) = &line.t else { return false };
-            let span = t.last().copied().unwrap_or(0.0) - t.first().copied().unwrap_or(0.0);
-            t.len() >= STREAM_ROWS && span / t.len() as f64 <= STREAM_STEP
-        })
-    };
     let several = two || tracked.timelines.len() > 1;
-    if !timed(tracked) || !(several || flows(tracked)) {
+    if !timed(tracked) || !(several || tracked.timelines.iter().any(flows)) {
         return None;
     }
     let line = joints.joints.first().map(|s| s.timeline)?;

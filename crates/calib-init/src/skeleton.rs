@@ -1,6 +1,6 @@
 //! Before the first recording: postures to record, and a simulation of them.
 
-use calib_urdf::{JointId, RobotModel};
+use calib_urdf::{JointId, RobotModel, doubt};
 
 use crate::robot;
 
@@ -43,8 +43,10 @@ pub fn skeleton(model: &RobotModel, joints: &[JointId]) -> Skeleton {
 
 /// The middle of a joint's limits, at most [`WIDEST`] to either side.
 fn range(model: &RobotModel, joint: JointId) -> (f64, f64) {
+    let in_degrees = doubt::limits_in_degrees(model).contains(&joint);
     let joint = model.joint(joint);
-    let (low, high) = match (joint.limits.range(), joint.kind.turns()) {
+    let (low, high) = match (doubt::range(joint), joint.kind.turns()) {
+        (Some((low, high)), true) if in_degrees => (low.to_radians(), high.to_radians()),
         (Some(range), _) => range,
         (None, true) => (-WIDEST, WIDEST),
         (None, false) => (-SLIDE, SLIDE),

@@ -6,7 +6,7 @@ use calib_pipeline::error::{DataProblem, PipelineError};
 use calib_pipeline::prepare::align::align;
 use calib_pipeline::prepare::inputs::{RobotProfile, Written};
 use calib_pipeline::prepare::loads::Masses;
-use calib_pipeline::prepare::timelines::with_robot_log;
+use calib_pipeline::prepare::timelines::{with_robot_log, with_robot_rows};
 use calib_recording::{Filled, Poses};
 use calib_urdf::RobotModel;
 
@@ -55,7 +55,14 @@ pub fn tables(
         let source = &sources[draft.source];
         let mut recording = source.recording.clone();
         if let Some(log) = draft.log {
-            recording = with_robot_log(recording, sources[log].recording.clone());
+            let log = sources[log].recording.clone();
+            recording = match draft.stream {
+                Some(_) => with_robot_log(recording, log),
+                None => with_robot_rows(recording, log).map_err(|e| PipelineError::Data {
+                    file: source.file.shown.clone(),
+                    problem: Box::new(DataProblem::RowsDiffer(e)),
+                })?,
+            };
         }
         let spec = &robot.profile.recordings[&draft.name];
         match &spec.timing {

@@ -55,11 +55,22 @@ fn angle_unit(unit: AngleUnit) -> &'static str {
     }
 }
 
+/// A unit of length after a number or "in".
+fn length_unit(name: &str) -> &str {
+    match name {
+        "in" => "inches",
+        "ft" => "feet",
+        "um" => "micrometers",
+        other => other,
+    }
+}
+
 /// The sentence of a fact, without the word CHECK.
 #[must_use]
 pub fn sentence(about: &About) -> String {
     match about {
         About::Joints { .. }
+        | About::TooLarge { .. }
         | About::TipOfChain { .. }
         | About::LinkStated { .. }
         | About::Link { .. }
@@ -76,14 +87,22 @@ pub fn sentence(about: &About) -> String {
             mistake,
             residuals,
             equivalent,
-        } => corrected(mistake, residuals, *equivalent),
+        } => corrected(mistake, residuals, equivalent),
         About::NotCorrected { mistake, residuals } => format!(
             "{} It explains the recordings ({}), but no profile corrects it: correct the table, or see what `calib check` says.",
             found(mistake),
             improvement(residuals)
         ),
-        About::Agrees { rms, rows } => format!(
-            "Order, signs and units of the joints agree with the nominal robot: {} fit it to {} rms, and no mistake explains them better.",
+        About::Agrees {
+            rms,
+            rows,
+            corrected,
+        } => format!(
+            "{} agree with the nominal robot: {} fit it to {} rms, and no mistake explains them better.",
+            match corrected {
+                true => "With the corrections below, order, signs and units of the joints",
+                false => "Order, signs and units of the joints",
+            },
             plural(*rows, "pose", "poses"),
             mm(*rms)
         ),
@@ -105,10 +124,11 @@ fn of_joints(
     unlimited: &[String],
     endless: &[String],
     no_range: &[String],
+    in_degrees: &[String],
 ) -> String {
     let joints = plural(moving, "moving joint", "moving joints");
     let turn = |names: &[String]| if names.len() == 1 { "turns" } else { "turn" };
-    if unlimited.is_empty() && no_range.is_empty() {
+    if unlimited.is_empty() && no_range.is_empty() && in_degrees.is_empty() {
         return match endless {
             [] => format!("The URDF has {joints}, all with limits."),
             _ => format!(
@@ -128,6 +148,12 @@ fn of_joints(
             quoted(no_range)
         );
     }
+    if !in_degrees.is_empty() {
+        text += &format!(
+            " The limits of {} are more than two turns: probably degrees, where a URDF has radians. Correct them in the URDF; the ranges proposed here take them as degrees.",
+            quoted(in_degrees)
+        );
+    }
     text
 }
 
@@ -138,7 +164,12 @@ fn of_links(about: &About) -> String {
             unlimited,
             endless,
             no_range,
-        } => of_joints(*moving, unlimited, endless, no_range),
+            in_degrees,
+        } => of_joints(*moving, unlimited, endless, no_range, in_degrees),
+        About::TooLarge { reach } => format!(
+            "The robot of this URDF reaches {} m: probably its lengths are in millimeters, where a URDF has meters. Divide its origins, the limits of prismatic joints and the meshes by 1000 before anything else.",
+            number::fixed(*reach, 0)
+        ),
         About::TipOfChain {
             link,
             joints,
@@ -228,16 +259,10 @@ fn of_columns(about: &About) -> String {
                     let largest = number::fixed(*largest, 2);
                     format!("Angles are in {unit}: the largest is {largest}.")
                 }
-                AngleHow::Motion { times: t } => {
-                    format!(
-                        "Angles are in {unit}: the other unit leaves {} the residual.",
-                        times(*t)
-                    )
-                }
             }
         }
         About::Lengths { unit, how } => {
-            let unit = unit.name();
+            let unit = length_unit(unit.name());
             match how {
                 LengthHow::Named => {
                     format!("Lengths are in {unit}: the names of the columns say so.")
@@ -247,12 +272,6 @@ fn of_columns(about: &About) -> String {
                     number::fixed(*extent, 2),
                     number::fixed(*reach, 2)
                 ),
-                LengthHow::Motion { times: t } => {
-                    format!(
-                        "Lengths are in {unit}: the other unit leaves {} the residual.",
-                        times(*t)
-                    )
-                }
             }
         }
         About::Time {
@@ -327,8 +346,16 @@ fn of_session(about: &About) -> String {
         About::LeftOutInTurn => "No recording is held out: the report leaves every pose out in turn. Separate poses, recorded on another day, tell more.".to_owned(),
         About::Holds { holds } => format!("A stream in which the robot holds {}: each gives one pose.", plural(*holds, "time", "times")),
         About::Continuous => "A stream of a motion: rows are taken from it.".to_owned(),
-        About::Log { file, named: true } => format!("The joints are in the robot's own log `{file}`, with a clock of its own."),
-        About::Log { file, named: false } => format!("The joints are in the robot's own log `{file}`, with a clock of its own. The names of the files do not tell which log belongs to which recording: they are paired in their order."),
+        About::Log { file, named, rows } => {
+            let joints = match rows {
+                Some(rows) => format!("The joints are in the robot's own log `{file}`: both files have {}, which are taken to be the same postures in the same order.", plural(*rows, "row", "rows")),
+                None => format!("The joints are in the robot's own log `{file}`, with a clock of its own."),
+            };
+            match named {
+                true => joints,
+                false => format!("{joints} The names of the files do not tell which log belongs to which recording: they are paired in their order."),
+            }
+        }
         About::Limits { sigma } => format!(
             "The largest errors that you accept. Proposed: 5 and 14 times the noise of {}; your task decides.",
             mm(*sigma)
@@ -351,7 +378,9 @@ fn found(mistake: &Mistake) -> String {
             unit,
         } => format!("The column of `{joint}` is in {unit}."),
         Mistake::Unit { joint: None, unit } => format!("The joint columns are in {unit}."),
-        Mistake::TrackerUnit { unit } => format!("The tracker's lengths are in {unit}."),
+        Mistake::TrackerUnit { unit } => {
+            format!("The tracker's lengths are in {}.", length_unit(unit))
+        }
         Mistake::Offset { joint, degrees } => format!(
             "The zero of `{joint}` is off: {} must be added.",
             number::plain(degrees.to_radians(), Unit::Radian)
@@ -382,6 +411,10 @@ fn found(mistake: &Mistake) -> String {
                 number::plain(*value, unit)
             )
         }
+        Mistake::Link { body, link } => format!("`{body}` is on `{link}`."),
+        Mistake::Bodies { first, second } => {
+            format!("`{first}` and `{second}` are exchanged.")
+        }
         Mistake::Other => "A mistake in the recordings stands out.".to_owned(),
     }
 }
@@ -397,12 +430,21 @@ fn improvement(residuals: &Residuals) -> String {
     )
 }
 
-fn corrected(mistake: &Mistake, residuals: &Residuals, equivalent: usize) -> String {
-    let others = match equivalent {
-        0 => String::new(),
-        n => format!(
-            " These recordings do not distinguish {} from it.",
-            plural(n, "other correction", "other corrections")
+fn corrected(mistake: &Mistake, residuals: &Residuals, equivalent: &[Vec<Mistake>]) -> String {
+    const MOST: usize = 3;
+    let mut others: Vec<String> = equivalent
+        .iter()
+        .take(MOST)
+        .map(|all| all.iter().map(found).collect::<Vec<_>>().join(" "))
+        .collect();
+    if equivalent.len() > MOST {
+        others.push(format!("{} more.", equivalent.len() - MOST));
+    }
+    let others = match others.is_empty() {
+        true => String::new(),
+        false => format!(
+            " These recordings do not distinguish it from: {}",
+            others.join(" Or: ")
         ),
     };
     format!(

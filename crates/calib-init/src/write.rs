@@ -2,7 +2,7 @@
 
 use calib_recording::ColumnMap;
 use calib_report::terminal::wrapped;
-use calib_urdf::{JointId, RobotModel};
+use calib_urdf::{JointId, RobotModel, doubt};
 
 use crate::fact::{Fact, Place};
 use crate::limits;
@@ -158,6 +158,9 @@ impl Page<'_> {
             if let Some(columns) = &log.columns {
                 self.columns("      ", columns, known);
             }
+            if recording.stream.is_none() {
+                self.line("      rows: same");
+            }
         }
         match recording.stream {
             Some(Stream::Settle) => self.line("    timing: {poses: settle}"),
@@ -252,7 +255,10 @@ impl Page<'_> {
         let Some(skeleton) = &self.proposal.skeleton else {
             return;
         };
-        let open = |(joint, _): &&(JointId, _)| self.model.joint(*joint).limits.range().is_none();
+        let in_degrees = doubt::limits_in_degrees(self.model);
+        let open = |(joint, _): &&(JointId, _)| {
+            doubt::range(self.model.joint(*joint)).is_none() || in_degrees.contains(joint)
+        };
         let open: Vec<_> = skeleton.random.iter().filter(open).copied().collect();
         if open.is_empty() {
             return;

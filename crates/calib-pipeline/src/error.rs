@@ -10,7 +10,7 @@ mod seen;
 use std::error::Error as _;
 use std::path::Path;
 
-pub use data::{DataProblem, NotATrack};
+pub use data::{DataProblem, NotATrack, RowsDiffer};
 pub use file::{NamedBy, UnreadFile, WhyUnread};
 pub use seen::SeenInstead;
 

@@ -39,6 +39,22 @@ pub enum PlanError {
         /// The joint.
         joint: String,
     },
+    /// Limits of a joint are probably in degrees.
+    #[error(
+        "{file}: the limits of joint `{joint}` in the URDF are {low} and {high} rad, {turns} turns: probably degrees, where a URDF has radians\n  help: correct the URDF, or state the range: `plan: {{joints: {{{joint}_deg: [-170, 170]}}}}`"
+    )]
+    InDegrees {
+        /// The profile.
+        file: String,
+        /// The joint.
+        joint: String,
+        /// Lower limit as the URDF has it.
+        low: String,
+        /// Upper limit as the URDF has it.
+        high: String,
+        /// How many turns that would be.
+        turns: String,
+    },
     /// No joint that carries a body can move.
     #[error(
         "{file}: no joint that carries a body can move: {}\n  help: {}",
@@ -250,6 +266,7 @@ impl PlanError {
             Self::NoPosture { file, .. }
             | Self::TooFew { file, .. }
             | Self::NoRange { file, .. }
+            | Self::InDegrees { file, .. }
             | Self::NothingMoves { file, .. }
             | Self::NoSuchParameter { file, .. }
             | Self::NoRecording { profile: file }

@@ -1,7 +1,7 @@
 //! The joint box: what moves, how far, how fast; postures that fill it.
 
 use calib_profile::PlanSpec;
-use calib_urdf::{JointId, JointKind, RobotModel};
+use calib_urdf::{JointId, JointKind, RobotModel, doubt};
 
 /// A joint that planned postures move.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,7 +63,7 @@ impl JointBox {
             }
             let turns = joint.kind.turns();
             let endless = matches!(joint.kind, JointKind::Continuous { .. });
-            let limits = joint.limits.range().filter(|_| !endless);
+            let limits = doubt::range(joint).filter(|_| !endless);
             let turn = turns.then_some((-std::f64::consts::PI, std::f64::consts::PI));
             let (low, high) = stated.or(limits).or(turn).ok_or(id)?;
             if high <= low {

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeSet;
 
+use calib_finding::number;
 use calib_pipeline::output::shapes::collision_solids;
-use calib_urdf::{JointId, LinkId};
+use calib_urdf::{JointId, LinkId, doubt};
 use nalgebra::DMatrix;
 
 use crate::basis::{Basis, compressed, sigma};
@@ -251,10 +252,27 @@ impl Known {
         // A joint that follows another moves with it.
         let used: Vec<JointId> = chains.map(|joint| model.joint(joint).law.source).collect();
         let spec = &self.robot.profile.plan;
+        let doubtful = doubt::limits_in_degrees(model).into_iter();
+        let mut in_use = doubtful.filter(|j| used.contains(j) && !spec.joints.contains_key(j));
+        if let Some(joint) = in_use.find(|j| !spec.hold.contains_key(j)) {
+            return Err(self.in_degrees(joint));
+        }
         JointBox::new(model, spec, &used, &self.still).map_err(|joint| PlanError::NoRange {
             file: self.robot.file.clone(),
             joint: model.joint(joint).name.clone(),
         })
+    }
+
+    fn in_degrees(&self, joint: JointId) -> PlanError {
+        let joint = self.robot.model.joint(joint);
+        let (low, high) = joint.limits.range().unwrap_or_default();
+        PlanError::InDegrees {
+            file: self.robot.file.clone(),
+            joint: joint.name.clone(),
+            low: number::fixed(low, 1),
+            high: number::fixed(high, 1),
+            turns: number::fixed((high - low) / std::f64::consts::TAU, 0),
+        }
     }
 }
 

@@ -16,15 +16,34 @@ pub enum LengthUnit {
     Cm,
     /// Millimeters.
     Mm,
+    /// Micrometers.
+    Um,
+    /// Inches of 25.4 mm.
+    In,
+    /// Feet of 12 inches.
+    Ft,
 }
 
 impl LengthUnit {
+    /// All of them.
+    pub const ALL: [LengthUnit; 6] = [
+        LengthUnit::M,
+        LengthUnit::Cm,
+        LengthUnit::Mm,
+        LengthUnit::Um,
+        LengthUnit::In,
+        LengthUnit::Ft,
+    ];
+
     /// Units in a metre.
     pub fn per_meter(self) -> f64 {
         match self {
             LengthUnit::M => 1.0,
             LengthUnit::Cm => 1e2,
             LengthUnit::Mm => 1e3,
+            LengthUnit::Um => 1e6,
+            LengthUnit::In => 1.0 / 0.0254,
+            LengthUnit::Ft => 1.0 / 0.3048,
         }
     }
 
@@ -32,18 +51,35 @@ impl LengthUnit {
     pub fn from_text(text: &str) -> Option<Self> {
         match text.trim().to_ascii_lowercase().as_str() {
             "m" | "meter" | "meters" | "metre" | "metres" => Some(LengthUnit::M),
-            "cm" | "centimeter" | "centimeters" | "centimetres" => Some(LengthUnit::Cm),
-            "mm" | "millimeter" | "millimeters" | "millimetres" => Some(LengthUnit::Mm),
+            "cm" | "centimeter" | "centimeters" | "centimetre" | "centimetres" => {
+                Some(LengthUnit::Cm)
+            }
+            "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => {
+                Some(LengthUnit::Mm)
+            }
+            "um" | "µm" | "micrometer" | "micrometers" | "micron" | "microns" => {
+                Some(LengthUnit::Um)
+            }
+            "in" | "inch" | "inches" => Some(LengthUnit::In),
+            "ft" | "foot" | "feet" => Some(LengthUnit::Ft),
             _ => None,
         }
     }
 
-    /// Abbreviation.
+    /// The unit with this abbreviation.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|unit| unit.name() == name)
+    }
+
+    /// Abbreviation, as it stands behind `_` in a column's name.
     pub fn name(self) -> &'static str {
         match self {
             LengthUnit::M => "m",
             LengthUnit::Cm => "cm",
             LengthUnit::Mm => "mm",
+            LengthUnit::Um => "um",
+            LengthUnit::In => "in",
+            LengthUnit::Ft => "ft",
         }
     }
 }

@@ -40,6 +40,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod doubt;
 pub mod edit;
 pub mod error;
 pub mod kinematics;

@@ -2,7 +2,7 @@
 
 use super::correct::same_shape;
 use super::data::{Body, Data, Measured};
-use super::hypothesis::{Hypothesis, PoseMistake, QuarterTurns, Scope, UnitMistake};
+use super::hypothesis::{Hypothesis, PoseMistake, QuarterTurns, Scope, TRACKER_UNITS, UnitMistake};
 use super::ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex};
 
 /// A column whose values differ by less (rad or m) carries no information about its own sign or unit.
@@ -177,11 +177,11 @@ fn single(parts: &[Scope]) -> Vec<Scope> {
 }
 
 fn of_tracker(data: &Data, everywhere: &[Scope], parts: &[Scope], list: &mut Vec<Candidate>) {
-    for mistake in [
-        UnitMistake::MillimetersReadAsMeters,
-        UnitMistake::MetersReadAsMillimeters,
-    ] {
-        list.push((Hypothesis::TrackerUnit { mistake }, everywhere.to_vec()));
+    for (unit, read_as) in TRACKER_UNITS {
+        list.push((
+            Hypothesis::TrackerUnit { unit, read_as },
+            everywhere.to_vec(),
+        ));
     }
     list.push((Hypothesis::Mirrored, everywhere.to_vec()));
     let one = single(parts);

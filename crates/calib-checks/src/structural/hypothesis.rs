@@ -44,6 +44,50 @@ impl UnitMistake {
     }
 }
 
+/// A unit of length that a tracker may write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+pub enum Length {
+    /// 1 m.
+    Meter,
+    /// 0.01 m.
+    Centimeter,
+    /// 0.001 m.
+    Millimeter,
+    /// 1e-6 m.
+    Micrometer,
+    /// 0.0254 m.
+    Inch,
+    /// 0.3048 m.
+    Foot,
+}
+
+impl Length {
+    /// In meters.
+    #[must_use]
+    pub fn meters(self) -> f64 {
+        match self {
+            Self::Meter => 1.0,
+            Self::Centimeter => 0.01,
+            Self::Millimeter => 0.001,
+            Self::Micrometer => 1e-6,
+            Self::Inch => 0.0254,
+            Self::Foot => 0.3048,
+        }
+    }
+}
+
+/// Units of a tracker that are asked about: what the values are, and what they were read as. Each is another ratio.
+pub const TRACKER_UNITS: [(Length, Length); 8] = [
+    (Length::Millimeter, Length::Meter),
+    (Length::Meter, Length::Millimeter),
+    (Length::Centimeter, Length::Meter),
+    (Length::Meter, Length::Centimeter),
+    (Length::Centimeter, Length::Millimeter),
+    (Length::Millimeter, Length::Centimeter),
+    (Length::Inch, Length::Meter),
+    (Length::Inch, Length::Millimeter),
+];
+
 /// An error of a joint's zero by a multiple of 90°.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 pub enum QuarterTurns {
@@ -171,8 +215,10 @@ pub enum Hypothesis {
     },
     /// Tracker coordinates have another unit of length.
     TrackerUnit {
-        /// Only the two units of length.
-        mistake: UnitMistake,
+        /// What the values are.
+        unit: Length,
+        /// What they were read as.
+        read_as: Length,
     },
     /// The tracker frame is left-handed.
     Mirrored,
@@ -273,9 +319,10 @@ impl Hypothesis {
     }
 
     /// ln of the factor by which measured coordinates are multiplied.
-    pub(crate) fn log_scale(&self) -> f64 {
+    #[must_use]
+    pub fn log_scale(&self) -> f64 {
         match self {
-            Self::TrackerUnit { mistake } => mistake.factor().ln(),
+            Self::TrackerUnit { unit, read_as } => (unit.meters() / read_as.meters()).ln(),
             _ => 0.0,
         }
     }
@@ -283,7 +330,7 @@ impl Hypothesis {
     /// The corrected position of a tracked point, for hypotheses that change points one by one.
     pub(crate) fn point(&self, p: &Vector3<f64>) -> Option<Vector3<f64>> {
         match *self {
-            Self::TrackerUnit { mistake } => Some(p * mistake.factor()),
+            Self::TrackerUnit { unit, read_as } => Some(p * (unit.meters() / read_as.meters())),
             Self::Mirrored => Some(Vector3::new(p.x, -p.y, p.z)),
             Self::TrackerAxes { rotation } => Some(axes_rotation(rotation) * p),
             _ => None,
@@ -323,11 +370,9 @@ impl Hypothesis {
     /// The hypothesis that undoes the correction of the measured points or poses.
     pub(crate) fn undone(&self) -> Hypothesis {
         match *self {
-            Self::TrackerUnit { mistake } => Self::TrackerUnit {
-                mistake: match mistake {
-                    UnitMistake::MillimetersReadAsMeters => UnitMistake::MetersReadAsMillimeters,
-                    _ => UnitMistake::MillimetersReadAsMeters,
-                },
+            Self::TrackerUnit { unit, read_as } => Self::TrackerUnit {
+                unit: read_as,
+                read_as: unit,
             },
             Self::Poses { body, mistake } => Self::Poses {
                 body,

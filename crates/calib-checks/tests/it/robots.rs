@@ -426,13 +426,10 @@ pub fn fault(data: &Data, rng: &mut ChaCha8Rng) -> Scoped {
                 body: BodyIndex(0),
                 link: LinkIndex(n - rng.random_range(1..3)),
             },
-            7 => Hypothesis::TrackerUnit {
-                mistake: if rng.random_bool(0.5) {
-                    UnitMistake::MillimetersReadAsMeters
-                } else {
-                    UnitMistake::MetersReadAsMillimeters
-                },
-            },
+            7 => {
+                let (unit, read_as) = TRACKER_UNITS[rng.random_range(0..TRACKER_UNITS.len())];
+                Hypothesis::TrackerUnit { unit, read_as }
+            }
             8 => Hypothesis::Mirrored,
             9 if pose => Hypothesis::Poses {
                 body: None,
@@ -475,11 +472,9 @@ pub fn with_fault(setting: &Setting, data: &Data, fault: &Scoped) -> Data {
             };
             undo(Hypothesis::Unit { joint, mistake })
         }
-        Hypothesis::TrackerUnit { mistake } => undo(Hypothesis::TrackerUnit {
-            mistake: match mistake {
-                UnitMistake::MillimetersReadAsMeters => UnitMistake::MetersReadAsMillimeters,
-                _ => UnitMistake::MillimetersReadAsMeters,
-            },
+        Hypothesis::TrackerUnit { unit, read_as } => undo(Hypothesis::TrackerUnit {
+            unit: read_as,
+            read_as: unit,
         }),
         Hypothesis::Coupling {
             joint,

@@ -9,6 +9,12 @@ super::topic! {
         "limits_reversed": Warning,
             "In the URDF the limits of the joint are in the wrong order, {lower} and {upper}: it is taken to have none.",
             "Exchange the two numbers.";
+        "limits_in_degrees": Warning,
+            "In the URDF the limits of the joint are {lower:rad} and {upper:rad}: probably degrees were written where a URDF has radians.",
+            "Correct the limits in the URDF.";
+        "too_large": Warning,
+            "The robot of the URDF reaches {reach:m}: probably its lengths are not in meters.",
+            "Divide the origins, the limits of prismatic joints and the meshes by the ratio of the units: 1000 for millimeters.";
     }
     /// Fewer rows than the fit needs.
     TOO_FEW_POSES = "too-few-poses" {
@@ -64,11 +70,14 @@ super::topic! {
             "The recordings fit the nominal robot to {none} rms, but to {best} with joint `{joint}` read as meters[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Name the column `{joint}_m`.";
         "lengths_too_large": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with the tracker's lengths a thousand times smaller[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Correct the unit in the columns' names. Columns without a unit in their name follow `columns: {lengths: mm}`.";
+            "The recordings fit the nominal robot to {none} rms, but to {best} with the tracker's lengths {ratio} times smaller, as where {unit:code} was read as {read_as:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Correct the unit in the columns' names. Columns without a unit in their name follow `columns: {lengths: mm}`; the units are m, cm, mm, um, in and ft.";
         "lengths_too_small": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with the tracker's lengths a thousand times larger[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Correct the unit in the columns' names. Columns without a unit in their name follow `columns: {lengths: m}`.";
+            "The recordings fit the nominal robot to {none} rms, but to {best} with the tracker's lengths {ratio} times larger, as where {unit:code} was read as {read_as:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Correct the unit in the columns' names. Columns without a unit in their name follow `columns: {lengths: m}`; the units are m, cm, mm, um, in and ft.";
+        "robot_too_large": Error,
+            "The robot of the URDF reaches {reach:m}, and the recordings fit it to {none} rms, but to {best} with the tracker's lengths {ratio} times larger[[ and {other_correction:code}]][[; the next best explanation leaves {next}]]: the URDF is {ratio} times too large.[[ These recordings do not distinguish it from {equivalent:code}.]]",
+            "Lengths of a URDF are in meters: divide its origins, joint limits of prismatic joints and meshes by {ratio}. The recordings are right.";
     }
     /// A joint has values beyond its limits.
     JOINT_OUTSIDE_LIMITS = "joint-outside-limits" {

@@ -3,3 +3,4 @@
 mod designs;
 mod lab;
 mod refused;
+mod units;

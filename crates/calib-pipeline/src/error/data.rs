@@ -57,6 +57,9 @@ pub enum DataProblem {
     /// A robot's log without joints.
     #[error("the robot's log has no joints")]
     NoJointsInLog,
+    /// The robot's log has not one row for every row of the tracker.
+    #[error("{0}")]
+    RowsDiffer(RowsDiffer),
     /// A timed recording without a tracker.
     #[error("no stream of a marker or body")]
     NothingTracked,
@@ -145,6 +148,38 @@ pub enum DataProblem {
     },
 }
 
+/// Why rows of the robot's log are not those of the tracker's file.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RowsDiffer {
+    /// One of the files has no streams.
+    #[error("no markers, no bodies or no joints to pair by their rows")]
+    Nothing,
+    /// Another number of rows.
+    #[error(
+        "the tracker's file has {tracker} rows, the robot's log {robot}: rows cannot be paired"
+    )]
+    Count {
+        /// Rows of the tracker.
+        tracker: usize,
+        /// Rows of the robot.
+        robot: usize,
+    },
+    /// A column of both files names the rows otherwise.
+    #[error(
+        "row {row}: `{label}` is `{tracker}` in the tracker's file and `{robot}` in the robot's log"
+    )]
+    Label {
+        /// The column.
+        label: String,
+        /// The row of the tracker's file, as findings number them.
+        row: u64,
+        /// What it says.
+        tracker: String,
+        /// What the log says.
+        robot: String,
+    },
+}
+
 /// Why the tracker's streams make no table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NotATrack {
@@ -178,6 +213,9 @@ impl DataProblem {
             Self::HeldAndRecorded { .. } => "remove it from `hold`",
             Self::NoJointsInLog => {
                 "name the columns as the robot's joints with their unit (`elbow_rad`), or map them under `columns`"
+            }
+            Self::RowsDiffer(_) => {
+                "both files need one row for every posture, in the same order; for two clocks use `timing: {}` instead of `rows: same`"
             }
             Self::NothingTracked => "name the tracker's file under `file`",
             Self::NoTimeline => "correct the reader",

@@ -15,7 +15,7 @@ use crate::prepare::align::align;
 use crate::prepare::estimators::{Estimators, values};
 use crate::prepare::robot::urdf_warnings;
 use crate::prepare::rows::prepare;
-use crate::prepare::timelines::with_robot_log;
+use crate::prepare::timelines::{with_robot_log, with_robot_rows};
 use crate::prepare::{effects, named, readers};
 
 pub use crate::prepare::excluded::Excluded;
@@ -61,7 +61,11 @@ pub fn load_recordings_with(
         let mut recording = read(spec, &texts, &shown, &bytes, &estimators)?;
         if let Some(log) = &spec.robot_log {
             let of_robot = read_robot_log(&robot, name, spec, log, &estimators, &mut digests)?;
-            recording = with_robot_log(recording, of_robot);
+            recording = match &spec.timing {
+                Some(_) => with_robot_log(recording, of_robot),
+                None => with_robot_rows(recording, of_robot)
+                    .map_err(|e| PipelineError::data(&shown, DataProblem::RowsDiffer(e)))?,
+            };
         }
         recording.rename(&robot.profile.names);
         let loaded = match &spec.timing {

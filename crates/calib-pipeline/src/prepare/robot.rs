@@ -7,7 +7,7 @@ use calib_files::input;
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_plugin::OwnEntries;
 use calib_profile::Profile;
-use calib_urdf::{Problem, ReadError, ReadProblem, RobotModel, sha256_hex};
+use calib_urdf::{Problem, ReadError, ReadProblem, RobotModel, doubt, sha256_hex};
 
 use crate::error::{NamedBy, PipelineError, WhyUnread};
 use crate::prepare::estimators::Estimators;
@@ -127,7 +127,31 @@ pub(crate) fn urdf_warnings(robot: &RobotProfile) -> Vec<Finding> {
             _ => return None,
         })
     };
-    robot.model.warnings().iter().filter_map(finding).collect()
+    let mut findings: Vec<Finding> = robot.model.warnings().iter().filter_map(finding).collect();
+    findings.extend(doubts(&robot.model));
+    findings
+}
+
+/// Numbers of the URDF that are probably in another unit.
+fn doubts(model: &RobotModel) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for joint in doubt::limits_in_degrees(model) {
+        let joint = model.joint(joint);
+        if let Some((low, high)) = joint.limits.range() {
+            let about = About::Joint(joint.name.clone());
+            let finding = Finding::of_kind(catalog::URDF_INCONSISTENT, "limits_in_degrees", about)
+                .with("lower", Fact::radians(low))
+                .with("upper", Fact::radians(high));
+            findings.push(finding);
+        }
+    }
+    let reach = doubt::reach(model);
+    if reach > doubt::LARGEST {
+        let kind = "too_large";
+        let finding = Finding::of_kind(catalog::URDF_INCONSISTENT, kind, About::Lengths);
+        findings.push(finding.with("reach", Fact::meters(reach)));
+    }
+    findings
 }
 
 fn read_text(path: &Path, named_by: &NamedBy) -> Result<String, PipelineError> {

@@ -14,7 +14,7 @@ use calib_recording::{Filled, Poses, Recording};
 use calib_urdf::LinkId;
 use nalgebra::{Isometry3, Point3};
 
-use crate::error::NotATrack;
+use crate::error::{NotATrack, RowsDiffer};
 use crate::prepare::aligned::SAME_TIME;
 use crate::prepare::inputs::RobotProfile;
 use crate::prepare::streams::{Scalars, interpolated_body, interpolated_point};
@@ -51,6 +51,52 @@ pub fn with_robot_log(mut tracker: Recording, robot: Recording) -> Recording {
     tracker.meta.conversions.extend(robot.meta.conversions);
     tracker.meta.findings.extend(robot.meta.findings);
     tracker
+}
+
+/// The recording with the joints of the robot's own file, whose rows are the tracker's: both have one row for every posture.
+///
+/// # Errors
+/// [`RowsDiffer`] where the files have not the same number of rows, or columns that name the rows disagree.
+pub fn with_robot_rows(tracker: Recording, robot: Recording) -> Result<Recording, RowsDiffer> {
+    let (Some(of_tracker), Some(of_robot)) = (
+        tracker_timeline(&tracker),
+        robot.joints.first().map(|s| s.timeline),
+    ) else {
+        return Err(RowsDiffer::Nothing);
+    };
+    let (lines, joints) = (&tracker.timelines[of_tracker], &robot.timelines[of_robot]);
+    if lines.len() != joints.len() {
+        return Err(RowsDiffer::Count {
+            tracker: lines.len(),
+            robot: joints.len(),
+        });
+    }
+    for (label, texts) in &lines.labels {
+        let others = joints.labels.get(label).into_iter().flatten();
+        let pairs = texts.iter().zip(others).zip(&lines.rows);
+        let differ = |((a, b), _): &((&String, &String), &u64)| a != b;
+        if let Some(((tracker, robot), row)) = pairs.into_iter().find(differ) {
+            return Err(RowsDiffer::Label {
+                label: label.clone(),
+                row: *row,
+                tracker: tracker.clone(),
+                robot: robot.clone(),
+            });
+        }
+    }
+    let first = tracker.timelines.len();
+    let mut joined = with_robot_log(tracker, robot);
+    let to = |line: &mut usize| {
+        if *line == first + of_robot {
+            *line = of_tracker;
+        }
+    };
+    joined.joints.iter_mut().for_each(|s| to(&mut s.timeline));
+    joined.torques.iter_mut().for_each(|s| to(&mut s.timeline));
+    let temperatures = joined.temperatures.iter_mut();
+    temperatures.for_each(|s| to(&mut s.timeline));
+    joined.timelines.truncate(first);
+    Ok(joined)
 }
 
 /// The time line with most samples among those of markers and bodies.

@@ -34,12 +34,19 @@ impl Checker<'_> {
                 "add `joints: {<joint>_deg: [from, to]}`",
             );
         }
-        if raw.robot_log.is_some() && raw.timing.is_none() {
-            self.key_problem(
+        let rows = raw.robot_log.as_ref().map(|log| log.rows.is_some());
+        match (rows, raw.timing.is_some()) {
+            (Some(false), false) => self.key_problem(
                 &["recordings", name, "robot_log"],
                 "two files have two sets of rows",
-                "add `timing: {}`: holds become poses, and the clocks are brought together",
-            );
+                "add `timing: {}` for two clocks: holds become poses; or `rows: same` to the log if both have one row for every posture",
+            ),
+            (Some(true), true) => self.key_problem(
+                &["recordings", name, "robot_log", "rows"],
+                "with `timing` the clocks tell which rows belong together",
+                "remove `rows`, or `timing`",
+            ),
+            _ => {}
         }
         if raw.reader.is_none() && !raw.reader_parameters.is_empty() {
             self.key_problem(

@@ -20,7 +20,9 @@ pub(crate) use free::{ANGLE, MASS, MASS_CENTER, POSITION, PRIOR_KEYS};
 pub use free::{RawFree, RawJointFree, RawPrior};
 pub use origin::{RawLoop, RawOrientation, RawOrigin, RawPoint, RawTransform};
 pub use plan::{RawCamera, RawFacing, RawKeepOut, RawPlan};
-pub use recording::{RawClocks, RawRecording, RawRobotLog, RawTimedPoses, RawTiming, RawUse};
+pub use recording::{
+    RawClocks, RawRecording, RawRobotLog, RawRows, RawTimedPoses, RawTiming, RawUse,
+};
 pub use robot::{RawPayload, RawRobot};
 pub use simulate::{
     RawNoiseTimes, RawProtocol, RawSimErrors, RawSimMount, RawSimNoise, RawSimulate, RawSteps,

@@ -65,6 +65,17 @@ pub struct RawRobotLog {
     /// How to read columns that do not name their unit.
     #[serde(default)]
     pub columns: Option<calib_recording::ColumnMap>,
+    /// For recordings without `timing`: how rows of the log belong to rows of the tracker's file.
+    #[serde(default)]
+    pub rows: Option<RawRows>,
+}
+
+/// Which row of the robot's log belongs to a row of the tracker's file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawRows {
+    /// The row of the same number: both files have one row for every posture.
+    Same,
 }
 
 /// Where poses come from in a recording with time.

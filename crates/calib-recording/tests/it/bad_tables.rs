@@ -207,6 +207,49 @@ fn a_mapped_column_that_ends_in_a_unit_has_that_unit() {
 }
 
 #[test]
+fn units_of_length_at_the_end_of_names_count_with_and_without_a_map() {
+    for unit in LengthUnit::ALL {
+        let value = 0.25 * unit.per_meter();
+        let [x, y, z] = ["x", "y", "z"].map(|axis| format!("P_{axis}_{}", unit.name()));
+        let text = format!("{x},{y},{z}\n{value},{value},{value}\n");
+        let read = |columns: Option<ColumnMap>| {
+            let options = ReadOptions {
+                columns,
+                ..ReadOptions::default()
+            };
+            read_bytes("tracker.csv", text.as_bytes(), &options)
+        };
+        let map = |lengths: LengthUnit| ColumnMap {
+            lengths,
+            markers: [("P".to_owned(), [x.clone(), y.clone(), z.clone()])].into(),
+            ..ColumnMap::default()
+        };
+        for columns in [None, Some(map(LengthUnit::M)), Some(map(unit))] {
+            let poses =
+                read(columns).and_then(|r| Ok(r.poses(Filled::Exclude).expect("one table")));
+            let poses = poses.unwrap_or_else(|e| panic!("{unit:?}: {e}"));
+            let p = poses.markers["P"][0].expect("a place");
+            assert!((p.x - 0.25).abs() < 1e-12, "{unit:?}: {p}");
+        }
+        // A map that says another unit contradicts the names.
+        let other = if unit == LengthUnit::Cm {
+            LengthUnit::Mm
+        } else {
+            LengthUnit::Cm
+        };
+        let said = read(Some(map(other))).expect_err("two units").to_string();
+        assert!(
+            said.contains(&format!("`lengths: {}`", other.name())),
+            "{said}"
+        );
+    }
+    // Words that are units as well are units behind a coordinate only.
+    let options = ReadOptions::default();
+    let plug = read_bytes("log.csv", b"a_deg,plug_in\n1,2\n", &options);
+    assert!(plug.is_err() || plug.is_ok_and(|r| r.joints.iter().all(|j| j.name != "plug")));
+}
+
+#[test]
 fn a_column_map_that_does_not_fit_says_which_column() {
     let joints = |column: &str| ColumnMap {
         joint_columns: vec![column.into()],

@@ -1,7 +1,7 @@
 //! Short codes of hypotheses, for the values of findings: `sign(elbow)`, `exchange(elbow, wrist)@sweep`.
 
 use calib_checks::structural::{
-    Correction, Hypothesis, PoseMistake, QuarterTurns, Scope, Scoped, UnitMistake,
+    Correction, Hypothesis, Length, PoseMistake, QuarterTurns, Scope, Scoped, UnitMistake,
 };
 
 use super::layout::Layout;
@@ -62,7 +62,7 @@ fn of_hypothesis(layout: &Layout<'_>, hypothesis: &Hypothesis) -> String {
         Hypothesis::ExchangedBodies { first, second } => {
             format!("bodies({}, {})", layout.body(first), layout.body(second))
         }
-        Hypothesis::TrackerUnit { mistake } => format!("unit(tracker, {})", unit(mistake)),
+        Hypothesis::TrackerUnit { unit, .. } => format!("unit(tracker, {})", length(unit)),
         Hypothesis::Mirrored => "mirrored(tracker)".to_owned(),
         Hypothesis::TrackerAxes { rotation } => format!("axes(tracker, {rotation})"),
         Hypothesis::TrackerMoved => "moved(tracker)".to_owned(),
@@ -78,6 +78,18 @@ fn of_hypothesis(layout: &Layout<'_>, hypothesis: &Hypothesis) -> String {
             format!("poses({body}, {mistake})")
         }
         _ => "other".to_owned(),
+    }
+}
+
+/// A unit of length, as in names of columns.
+pub fn length(unit: Length) -> &'static str {
+    match unit {
+        Length::Meter => "m",
+        Length::Centimeter => "cm",
+        Length::Millimeter => "mm",
+        Length::Micrometer => "um",
+        Length::Inch => "in",
+        Length::Foot => "ft",
     }
 }
 

@@ -1,7 +1,7 @@
 //! A named mistake as findings: one for each correction, with the evidence and what is not distinguishable from it.
 
 use calib_checks::structural::{
-    Correction, Hypothesis, JointIndex, Named, Outcome, PoseMistake, Scoped, UnitMistake,
+    Correction, Hypothesis, JointIndex, Length, Named, Outcome, PoseMistake, Scoped, UnitMistake,
 };
 use calib_finding::{About, Fact, Finding, Id, Subject, catalog};
 
@@ -147,13 +147,7 @@ fn of_tracker(layout: &Layout<'_>, scoped: &Scoped) -> Finding {
                 .with("body", Fact::name(layout.body(first)))
                 .with("other", Fact::name(layout.body(second)))
         }
-        Hypothesis::TrackerUnit { mistake } => {
-            let kind = match mistake {
-                UnitMistake::MetersReadAsMillimeters => "lengths_too_small",
-                _ => "lengths_too_large",
-            };
-            Finding::of_kind(catalog::UNIT_MISMATCH, kind, About::Lengths)
-        }
+        Hypothesis::TrackerUnit { unit, read_as } => tracker_unit(layout, unit, read_as),
         Hypothesis::Mirrored => Finding::of_kind(catalog::MIRRORED, "tracker", About::Tracker),
         Hypothesis::TrackerMoved => {
             Finding::of_kind(catalog::TRACKER_MOVED, "moved", About::Tracker)
@@ -183,6 +177,25 @@ fn of_tracker(layout: &Layout<'_>, scoped: &Scoped) -> Finding {
         _ => Finding::of_kind(catalog::MODEL_DISAGREES, "undecided", About::Recording)
             .with("leading", Fact::names([codes::of(layout, scoped)])),
     }
+}
+
+/// The tracker's unit of length, or that of a robot which is larger than robots are.
+fn tracker_unit(layout: &Layout<'_>, unit: Length, read_as: Length) -> Finding {
+    let ratio = unit.meters() / read_as.meters();
+    let reach = calib_urdf::doubt::reach(&layout.inputs.robot.model);
+    if ratio > 1.0 && reach > calib_urdf::doubt::LARGEST {
+        return Finding::of_kind(catalog::UNIT_MISMATCH, "robot_too_large", About::Lengths)
+            .with("reach", Fact::meters(reach))
+            .with("ratio", Fact::ratio(ratio));
+    }
+    let (kind, ratio) = match ratio > 1.0 {
+        true => ("lengths_too_small", ratio),
+        false => ("lengths_too_large", ratio.recip()),
+    };
+    Finding::of_kind(catalog::UNIT_MISMATCH, kind, About::Lengths)
+        .with("ratio", Fact::ratio(ratio))
+        .with("unit", Fact::name(codes::length(unit)))
+        .with("read_as", Fact::name(codes::length(read_as)))
 }
 
 /// The axis of a joint in the URDF with the other sign, as a URDF writes it.

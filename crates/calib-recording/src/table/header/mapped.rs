@@ -1,5 +1,6 @@
 //! The columns that a column map names.
 
+use super::naming::length_unit;
 use super::{BodyPlan, Column, Layout, MarkerPlan, Rotation, SlotKind};
 use crate::column_map::{BodyColumns, ColumnMap, LongColumns};
 use crate::error::Problem;
@@ -124,14 +125,13 @@ impl Mapping<'_> {
 
     /// Units per meter of a column: of its name where that ends in a unit, else of the map.
     fn lengths(&self, column: &str) -> Result<f64, Problem> {
-        match column.rsplit_once('_').map(|(_, unit)| unit) {
-            Some("mm") if self.length == LengthUnit::Cm => Err(contradicts(column, "lengths: cm")),
-            Some("mm") => Ok(LengthUnit::Mm.per_meter()),
-            Some("m") if self.length != LengthUnit::M => {
+        match length_unit(column).map(|(_, unit)| unit) {
+            Some(own) if own == self.length || self.length == LengthUnit::M => Ok(own.per_meter()),
+            Some(_) => {
                 let stated = format!("lengths: {}", self.length.name());
                 Err(contradicts(column, &stated))
             }
-            _ => Ok(self.length.per_meter()),
+            None => Ok(self.length.per_meter()),
         }
     }
 

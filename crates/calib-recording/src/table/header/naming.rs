@@ -45,17 +45,18 @@ fn part(text: &str) -> Option<(Part, f64)> {
     }
     let (axis, unit) = text.split_once('_')?;
     let axis = ["x", "y", "z"].iter().position(|&a| a == axis)?;
-    let unit = length_suffix(unit)?;
+    let unit = LengthUnit::from_name(unit)?;
     Some((Part::Axis(axis), unit.per_meter()))
 }
 
-fn length_suffix(unit: &str) -> Option<LengthUnit> {
-    match unit {
-        "m" => Some(LengthUnit::M),
-        "cm" => Some(LengthUnit::Cm),
-        "mm" => Some(LengthUnit::Mm),
-        _ => None,
-    }
+/// The name of a column without its unit of length, and the unit. `in` and `ft` are words as well (`plug_in`): they are units behind a coordinate only.
+pub(super) fn length_unit(column: &str) -> Option<(&str, LengthUnit)> {
+    let (stem, unit) = column.rsplit_once('_')?;
+    let unit = LengthUnit::from_name(unit)?;
+    let word = matches!(unit, LengthUnit::In | LengthUnit::Ft);
+    let before = stem.strip_suffix(['x', 'y', 'z', 'X', 'Y', 'Z']);
+    let of_place = before.is_some_and(|b| !b.ends_with(char::is_alphabetic));
+    (!word || of_place).then_some((stem, unit))
 }
 
 /// How a column name reads by the rules of this module.
@@ -132,7 +133,7 @@ pub(super) fn meaning(name: &str) -> Meaning<'_> {
             dotted: false,
         };
     }
-    if let Some(unit) = length_suffix(last) {
+    if let Some((_, unit)) = length_unit(name) {
         if let Some((entity, axis)) = head.rsplit_once('_')
             && !entity.is_empty()
             && let Some(axis) = ["x", "y", "z"].iter().position(|&a| a == axis)
