@@ -142,14 +142,16 @@ pub enum PlanError {
         why: String,
     },
     /// A place of the task has no posture.
-    #[error("{file}, row {row}: {}", words::no_posture(*nearest_mm, *oriented, *touching))]
+    #[error("{file}, row {row}: {}", words::no_posture(*nearest_mm, *nearest_deg, *oriented, *touching))]
     PlaceOutOfReach {
         /// The list.
         file: String,
         /// Row from 1.
         row: usize,
-        /// How near the tool comes, mm; a radian counts as 300.
+        /// How near the tool comes, mm; for the least sum of squares with the angle, a radian as 300 mm.
         nearest_mm: f64,
+        /// Angle between the orientations there, deg; 0 where none is asked for.
+        nearest_deg: f64,
         /// Whether an orientation is asked for.
         oriented: bool,
         /// Whether there are postures that touch something.

@@ -2,10 +2,11 @@
 //!
 //! ```text
 //! e(q) = [p_goal − p(q);  ℓ log(R(q)ᵀ R_goal)]                  the second part where the goal has an orientation          (1)
-//! Δq = Jᵀ (J Jᵀ + λ² 1)⁻¹ e,   J = −∂e/∂q by differences,   q ← q + Δq, cut at the ranges                              (2)
+//! Δq = (JᵀJ + λ 1)⁻¹ Jᵀ e,   J = −∂e/∂q by differences,   q ← q + Δq, cut at the ranges                                 (2)
 //! ```
 //!
-//! Lengths m, angles rad, ℓ = 0.3 m per rad. Of the starts, postures that fill the joint ranges, those nearest to the goal are tried first. The robot is the nominal
+//! Lengths m, angles rad, ℓ = 0.3 m per rad. A step that makes |e| larger is not taken, and λ grows; joints at an end of their range that (2) would move out of it
+//! are left out of J. Of the starts, postures that fill the joint ranges, those nearest to the goal are tried first, then others. The robot is the nominal
 //! one: a task is where the robot works, and millimeters do not change what is seen there.
 
 use calib_recording::Poses;
@@ -38,13 +39,20 @@ pub struct Tool {
 const LEVER: f64 = 0.3;
 /// Nearer than this is there, m.
 const THERE: f64 = 1e-4;
-/// Postures that starts are chosen from, and how many are tried.
+/// Postures that starts are chosen from.
 const FILLING: usize = 1024;
-const STARTS: usize = 24;
+/// Starts that are tried: the nearest ones, then others in the order of the sequence.
+pub const STARTS: usize = 256;
+/// How many of them are the nearest.
+const NEAREST: usize = 32;
 /// Steps from one start.
-const STEPS: usize = 60;
-/// λ of equation (2), m: steps near singular postures stay short.
-const DAMPING: f64 = 1e-3;
+const STEPS: usize = 120;
+/// First λ of equation (2), m²: steps near singular postures stay short.
+const DAMPING: f64 = 1e-4;
+/// A start whose λ grows above is at its nearest place, m².
+const STUCK: f64 = 1e6;
+/// |e| that is as good as none, m.
+const EXACT: f64 = 1e-6;
 /// Difference for J, rad or m.
 const STEP: f64 = 1e-6;
 /// Seed of the starts.
@@ -135,7 +143,8 @@ pub fn postures(
         search.posture().map_err(|why| PlanError::PlaceOutOfReach {
             file: name.to_owned(),
             row: row + 1,
-            nearest_mm: why.nearest * 1e3,
+            nearest_mm: why.nearest.0 * 1e3,
+            nearest_deg: why.nearest.1.to_degrees(),
             oriented: goal.orientation.is_some(),
             touching: why.touching,
         })
@@ -147,8 +156,8 @@ pub fn postures(
 
 /// Why a place has no posture.
 struct Missed {
-    /// How near the tool comes by equation (1), m.
-    nearest: f64,
+    /// How near the tool comes: m, and rad where an orientation is asked for.
+    nearest: (f64, f64),
     /// Whether postures were found that touch something.
     touching: bool,
 }
@@ -162,15 +171,24 @@ struct Search<'a> {
 
 impl Search<'_> {
     fn posture(&self) -> Result<Vec<f64>, Missed> {
-        let mut starts = self.joints.postures(FILLING, SEED);
-        starts.sort_by_cached_key(|q| ordered(self.error(q).norm()));
+        let filling = self.joints.postures(FILLING, SEED);
+        let mut order: Vec<usize> = (0..filling.len()).collect();
+        order.sort_by_cached_key(|i| ordered(self.error(&filling[*i]).norm()));
+        let (near, mut rest) = (order[..NEAREST].to_vec(), order[NEAREST..].to_vec());
+        rest.sort_unstable();
+        let mut least = f64::INFINITY;
         let mut missed = Missed {
-            nearest: f64::INFINITY,
+            nearest: (f64::INFINITY, 0.0),
             touching: false,
         };
-        for start in starts.into_iter().take(STARTS) {
-            let (q, left) = self.approach(start);
-            missed.nearest = missed.nearest.min(left);
+        for start in near.into_iter().chain(rest).take(STARTS) {
+            let (q, e) = self.approach(filling[start].clone());
+            let left = e.norm();
+            if left < least {
+                least = left;
+                let turn = e.rows_range(3..).norm() / LEVER;
+                missed.nearest = (e.rows(0, 3).norm(), turn);
+            }
             if left > THERE {
                 continue;
             }
@@ -198,36 +216,66 @@ impl Search<'_> {
         )
     }
 
-    /// Equation (2) from a start: where it ends, and |e| there.
-    fn approach(&self, mut q: Vec<f64>) -> (Vec<f64>, f64) {
+    /// Equation (2) from a start: where it ends, and e there.
+    fn approach(&self, mut q: Vec<f64>) -> (Vec<f64>, DVector<f64>) {
         let mut e = self.error(&q);
+        let mut damping = DAMPING;
         for _ in 0..STEPS {
-            if e.norm() < 0.1 * THERE {
+            if e.norm() < EXACT || damping > STUCK {
                 break;
             }
-            let mut j = DMatrix::zeros(e.len(), self.joints.moved.len());
-            for (column, m) in self.joints.moved.iter().enumerate() {
-                let mut moved = q.clone();
-                moved[m.joint.index()] += STEP;
-                j.set_column(column, &((&e - self.error(&moved)) / STEP));
-            }
-            let damped =
-                &j * j.transpose() + DMatrix::identity(e.len(), e.len()) * (DAMPING * DAMPING);
-            let Some(step) = damped.cholesky().map(|root| j.transpose() * root.solve(&e)) else {
-                break;
-            };
-            let mut next = q.clone();
-            for (m, by) in self.joints.moved.iter().zip(step.iter()) {
-                let at = &mut next[m.joint.index()];
-                *at = (*at + by).clamp(m.low, m.high);
-            }
-            if next == q {
+            let j = self.jacobian(&q, &e);
+            let downhill = j.transpose() * &e;
+            let free: Vec<usize> = (0..downhill.len())
+                .filter(|i| {
+                    let (m, at) = (
+                        &self.joints.moved[*i],
+                        q[self.joints.moved[*i].joint.index()],
+                    );
+                    !(at <= m.low && downhill[*i] < 0.0 || at >= m.high && downhill[*i] > 0.0)
+                })
+                .collect();
+            if free.is_empty() {
                 break;
             }
-            q = next;
-            e = self.error(&q);
+            let (j, downhill) = (j.select_columns(&free), downhill.select_rows(&free));
+            let squared = j.transpose() * &j;
+            // λ until a step makes it better.
+            while damping <= STUCK {
+                let damped = &squared + DMatrix::identity(free.len(), free.len()) * damping;
+                let Some(step) = damped.cholesky().map(|root| root.solve(&downhill)) else {
+                    damping *= 10.0;
+                    continue;
+                };
+                let mut next = q.clone();
+                for (i, by) in free.iter().zip(step.iter()) {
+                    let m = &self.joints.moved[*i];
+                    let at = &mut next[m.joint.index()];
+                    *at = (*at + by).clamp(m.low, m.high);
+                }
+                let after = self.error(&next);
+                if after.norm() < e.norm() {
+                    (q, e) = (next, after);
+                    damping = (0.2 * damping).max(1e-12);
+                    break;
+                }
+                damping *= 10.0;
+            }
         }
-        (q, e.norm())
+        (q, e)
+    }
+
+    /// J of equation (2) for the moved joints.
+    fn jacobian(&self, q: &[f64], e: &DVector<f64>) -> DMatrix<f64> {
+        let mut j = DMatrix::zeros(e.len(), self.joints.moved.len());
+        let mut moved = q.to_vec();
+        for (column, m) in self.joints.moved.iter().enumerate() {
+            let at = m.joint.index();
+            moved[at] = q[at] + STEP;
+            j.set_column(column, &((e - self.error(&moved)) / STEP));
+            moved[at] = q[at];
+        }
+        j
     }
 }
 

@@ -298,19 +298,24 @@ pub fn parameter_sigma(sigma: Option<f64>, unit: calib_core::Unit) -> String {
 
 /// Why a place of the task has no posture.
 #[must_use]
-pub fn no_posture(nearest_mm: f64, oriented: bool, touching: bool) -> String {
+pub fn no_posture(nearest_mm: f64, nearest_deg: f64, oriented: bool, touching: bool) -> String {
     let orientation = if oriented {
         " with this orientation"
     } else {
         ""
     };
+    let angle = match oriented {
+        true => format!(" and {nearest_deg:.1}°"),
+        false => String::new(),
+    };
     if touching {
         return format!(
-            "the postures that bring the tool there{orientation} touch the robot itself, the ground or a keep-out\n  help: change the place, `plan.keep_outs` or `plan.clearance_mm`"
+            "the postures found that bring the tool there{orientation} touch the robot itself, the ground or a keep-out\n  help: change the place, `plan.keep_outs` or `plan.clearance_mm`"
         );
     }
     format!(
-        "no posture brings the tool there{orientation}; the nearest is {nearest_mm:.1} mm off\n  help: places are in the frame of the robot's root, in meters; widen `plan.joints` if the ranges are narrower than the robot's"
+        "of {} searches from other postures none brings the tool there{orientation}; the nearest ends {nearest_mm:.1} mm{angle} off\n  help: places are in the frame of the robot's root, in meters; widen `plan.joints` if the ranges are narrower than the robot's",
+        crate::places::STARTS
     )
 }
 

@@ -76,7 +76,7 @@ super::topic! {
             "The recordings fit the nominal robot to {none} rms, but to {best} with the tracker's lengths {ratio} times larger, as where {unit:code} was read as {read_as:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Correct the unit in the columns' names. Columns without a unit in their name follow `columns: {lengths: m}`; the units are m, cm, mm, um, in and ft.";
         "robot_too_large": Error,
-            "The robot of the URDF reaches {reach:m}, and the recordings fit it to {none} rms, but to {best} with the tracker's lengths {ratio} times larger[[ and {other_correction:code}]][[; the next best explanation leaves {next}]]: the URDF is {ratio} times too large.[[ These recordings do not distinguish it from {equivalent:code}.]]",
+            "The robot of the URDF reaches {reach:m}, and the recordings fit it to {none} rms, but to {best} with the tracker's lengths {ratio} times larger[[ and {other_correction:code}]]: the URDF is {ratio} times too large, and so is this residual.[[ These recordings do not distinguish it from {equivalent:code}.]]",
             "Lengths of a URDF are in meters: divide its origins, joint limits of prismatic joints and meshes by {ratio}. The recordings are right.";
     }
     /// A joint has values beyond its limits.

@@ -604,6 +604,70 @@ fn places_of_the_tool_are_a_task() {
     }
 }
 
+#[test]
+fn every_place_that_a_posture_reaches_is_found() {
+    let sliding: Vec<_> = (SIX.iter().copied().enumerate())
+        .map(|(i, mut joint)| {
+            if i == 1 {
+                (joint.1, joint.4, joint.5) = ("prismatic", -0.2, 0.3);
+            }
+            joint
+        })
+        .collect();
+    let arms = [
+        ("six", SIX),
+        ("seven", SEVEN),
+        ("three", &SIX[..3]),
+        ("SCARA", SCARA),
+        ("six, one of them slides", sliding.as_slice()),
+    ];
+    let places = if skipped_tests::thorough() { 400 } else { 60 };
+    for (name, joints) in arms {
+        let link = format!("l{}", joints.len());
+        let known = known(robot(joints, Seen::Markers(4), false, ""));
+        let model = &known.robot.model;
+        let last = model.link_id(&link).expect("the last link").index();
+        let joints = known.joint_box().expect("ranges");
+        let mut with =
+            format!("{link}.x_m,{link}.y_m,{link}.z_m,{link}.qx,{link}.qy,{link}.qz,{link}.qw\n");
+        let mut without = format!("{link}.x_m,{link}.y_m,{link}.z_m\n");
+        for q in joints.postures(places, 11) {
+            let pose = model.forward_kinematics(&q)[last];
+            let (p, r) = (pose.translation.vector, pose.rotation);
+            with += &format!("{},{},{},{},{},{},{}\n", p.x, p.y, p.z, r.i, r.j, r.k, r.w);
+            without += &format!("{},{},{}\n", p.x, p.y, p.z);
+        }
+        for table in [&with, &without] {
+            let task = write::read_task(table.as_bytes(), "task.csv", &known);
+            let task = task.unwrap_or_else(|e| panic!("{name}: {e}"));
+            assert_eq!(task.len(), places);
+        }
+    }
+    // One that is out of reach says how far the tool stays away: the arm stretched towards it.
+    let known = six(Seen::Markers(4), "");
+    let model = &known.robot.model;
+    let last = model.link_id("l6").expect("the last link").index();
+    let joints = known.joint_box().expect("ranges");
+    let goal = Vector3::new(3.0, 0.5, 0.8);
+    let off = |q: &Vec<f64>| (model.forward_kinematics(q)[last].translation.vector - goal).norm();
+    let sampled = joints
+        .postures(20_000, 5)
+        .iter()
+        .map(off)
+        .fold(f64::INFINITY, f64::min);
+    let table = format!("l6.x_m,l6.y_m,l6.z_m\n{},{},{}\n", goal.x, goal.y, goal.z);
+    let error = write::read_task(table.as_bytes(), "task.csv", &known).expect_err("too far");
+    match error {
+        calib_plan::PlanError::PlaceOutOfReach { nearest_mm, .. } => {
+            assert!(
+                nearest_mm * 1e-3 < sampled && nearest_mm * 1e-3 > sampled - 0.1,
+                "{nearest_mm} {sampled}"
+            );
+        }
+        other => panic!("{other}"),
+    }
+}
+
 /// An arm of three joints whose second one has these limits, without shapes.
 fn held(low: f64, high: f64, extra: &str) -> Known {
     let mut joints = SIX[..3].to_vec();

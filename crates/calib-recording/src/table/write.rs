@@ -1,6 +1,6 @@
 //! The canonical table, always the same bytes for the same poses.
 
-use super::header::Layout;
+use super::header::{JOINT, Layout, reads_as_joint};
 use crate::column_map::ColumnMap;
 use crate::model::{self, JointUnit, MarkerSample, Recording, Timeline, WHOLE_ROBOT};
 use crate::poses::{NotOneTable, Poses};
@@ -137,29 +137,19 @@ pub fn write_recording(
 
 fn write(poses: &Poses, filled: &Filled, options: &WriteOptions) -> Result<String, NotWritten> {
     check_lengths(poses)?;
-    let columns = columns(poses, options);
+    let mut columns = columns(poses, options);
+    if misread(poses, &header(poses, filled, options, &columns).0).is_some() {
+        state_joints(poses, &mut columns);
+    }
     let mut out = String::new();
     for comment in &options.comments {
         let one_line = comment.replace(['\n', '\r'], " ");
         let _ = writeln!(out, "# {one_line}");
     }
-    // A table of one column needs the counter: a row in which it is lost would be a blank line.
-    let one_column = columns.len() + poses.labels.len() < 2;
-    let count = (options.count || one_column) && poses.t.is_none();
-    let mut header: Vec<&str> = Vec::new();
-    if count {
-        header.push("pose");
-    }
-    header.extend(poses.labels.keys().map(String::as_str));
-    header.extend(columns.iter().map(|column| column.name.as_str()));
-    let states: Vec<String> = filled
-        .keys()
-        .map(|marker| format!("{marker}.state"))
-        .collect();
-    header.extend(states.iter().map(String::as_str));
+    let (header, count) = header(poses, filled, options, &columns);
     for text in header
         .iter()
-        .copied()
+        .map(String::as_str)
         .chain(poses.labels.values().flatten().map(String::as_str))
     {
         if text.contains([',', ';', '\t', '\n', '\r'])
@@ -174,7 +164,7 @@ fn write(poses: &Poses, filled: &Filled, options: &WriteOptions) -> Result<Strin
     if let Some(name) = misread(poses, &header) {
         return Err(NotWritten::Misread { name });
     }
-    let header: Vec<Cow<'_, str>> = header.into_iter().map(cell).collect();
+    let header: Vec<Cow<'_, str>> = header.iter().map(|name| cell(name)).collect();
     let _ = writeln!(out, "{}", header.join(","));
     for row in 0..poses.len() {
         let mut first = true;
@@ -211,6 +201,37 @@ fn write(poses: &Poses, filled: &Filled, options: &WriteOptions) -> Result<Strin
         out.push('\n');
     }
     Ok(out)
+}
+
+/// The names of all columns, and whether the first one counts the rows.
+fn header(
+    poses: &Poses,
+    filled: &Filled,
+    options: &WriteOptions,
+    columns: &[OutColumn<'_>],
+) -> (Vec<String>, bool) {
+    // A table of one column needs the counter: a row in which it is lost would be a blank line.
+    let one_column = columns.len() + poses.labels.len() < 2;
+    let count = (options.count || one_column) && poses.t.is_none();
+    let mut header: Vec<String> = Vec::new();
+    if count {
+        header.push("pose".to_owned());
+    }
+    header.extend(poses.labels.keys().cloned());
+    header.extend(columns.iter().map(|column| column.name.clone()));
+    header.extend(filled.keys().map(|marker| format!("{marker}.state")));
+    (header, count)
+}
+
+/// States which columns are joints, where their names alone say something else.
+fn state_joints(poses: &Poses, columns: &mut [OutColumn<'_>]) {
+    for column in columns {
+        let name = column.name.rsplit_once('_').map(|(joint, _)| joint);
+        let of_joint = name.filter(|joint| poses.joints.contains_key(*joint));
+        if of_joint.is_some_and(|joint| !reads_as_joint(&column.name, joint)) {
+            column.name.insert_str(0, JOINT);
+        }
+    }
 }
 
 fn columns<'a>(poses: &'a Poses, options: &WriteOptions) -> Vec<OutColumn<'a>> {
@@ -304,8 +325,8 @@ fn columns<'a>(poses: &'a Poses, options: &WriteOptions) -> Vec<OutColumn<'a>> {
 }
 
 /// The first name that the header does not give back.
-fn misread(poses: &Poses, header: &[&str]) -> Option<String> {
-    let names = header.iter().copied().map(str::to_string).collect();
+fn misread(poses: &Poses, header: &[String]) -> Option<String> {
+    let names = header.to_vec();
     // A label of any name is read where the profile or a column map names it.
     let map = ColumnMap {
         labels: poses.labels.keys().cloned().collect(),

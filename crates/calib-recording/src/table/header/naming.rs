@@ -83,7 +83,27 @@ pub(super) enum Meaning<'a> {
     Unknown,
 }
 
+/// Before the name of a joint that would read as something else: joints `x`, `y` and `z` are no marker.
+pub(crate) const JOINT: &str = "joint:";
+
+/// A joint's column: its name behind [`JOINT`], and a unit.
+fn stated_joint(name: &str) -> Option<Meaning<'_>> {
+    let (name, unit) = name.strip_prefix(JOINT)?.rsplit_once('_')?;
+    let (unit, scale) = match unit {
+        "rad" => (JointUnit::Angle, AngleUnit::Rad.per_radian()),
+        "deg" => (JointUnit::Angle, AngleUnit::Deg.per_radian()),
+        _ => {
+            let length = LengthUnit::from_name(unit)?;
+            (JointUnit::Length, length.per_meter())
+        }
+    };
+    (!name.is_empty()).then_some(Meaning::Joint { name, unit, scale })
+}
+
 pub(super) fn meaning(name: &str) -> Meaning<'_> {
+    if let Some(joint) = stated_joint(name) {
+        return joint;
+    }
     match name {
         "t_s" => return Meaning::Time(TimeUnit::S),
         "t_ms" => return Meaning::Time(TimeUnit::Ms),
@@ -203,4 +223,9 @@ pub(crate) fn is_canonical<'a>(names: impl Iterator<Item = &'a str>) -> bool {
         }
     }
     known > 0 && known >= unknown
+}
+
+/// Whether a column's name alone reads as this joint.
+pub(crate) fn reads_as_joint(column: &str, joint: &str) -> bool {
+    matches!(meaning(column), Meaning::Joint { name, .. } if name == joint)
 }
