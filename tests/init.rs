@@ -221,6 +221,53 @@ fn two_files_of_postures_and_a_wrong_unit_of_length_are_told() {
 }
 
 #[test]
+fn simulated_streams_and_logs_are_read_by_the_profile_that_asks_for_them() {
+    let urdf = std::fs::read(root().join("book/src/tutorial/arm.urdf")).expect("committed");
+    let dir = Scratch::new().file("arm.urdf", urdf);
+    let made = dir.calib_with(&["init", "arm.urdf", "--out", "robots/arm.yaml"]);
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    let profile = dir.read("robots/arm.yaml");
+    let settle = "timing: {poses: settle}";
+    for (name, poses) in [
+        ("one", format!("use: static\n    {settle}")),
+        (
+            "two",
+            format!("use: static\n    {settle}\n    robot_log: {{file: arm/joints.csv}}"),
+        ),
+        (
+            "rows",
+            "use: static\n    robot_log: {file: arm/joints.csv, rows: same}".to_owned(),
+        ),
+        (
+            "motion",
+            "use: static\n    timing: {poses: continuous}".to_owned(),
+        ),
+    ] {
+        // The recording of random postures, as the profile would have it.
+        let timed = profile.replacen("use: static", &poses, 1);
+        assert_ne!(timed, profile);
+        let folder = format!("cells/{name}");
+        let at = format!("{folder}/arm.yaml");
+        let timed = timed.replace("../arm.urdf", "../../arm.urdf");
+        std::fs::create_dir_all(dir.path(&folder)).expect("a folder");
+        std::fs::write(dir.path(&at), timed).expect("a file");
+        let simulated = dir.calib_with(&["simulate", &at, "--out", &format!("{folder}/arm")]);
+        assert_eq!(simulated.code, 0, "{name}: {}", simulated.stderr);
+        let out = format!("results/{name}");
+        let ran = dir.calib_with(&["run", &at, "--out", &out]);
+        assert!(ran.code < 2, "{name}: {}{}", ran.stdout, ran.stderr);
+        let report = dir.json(&format!("{out}/report.json"));
+        let rms = report["verification"]["held_out"]["calibrated"]["rms_m"].as_f64();
+        assert!(rms.is_some_and(|rms| rms < 1.5e-3), "{name}: {rms:?}");
+        if name == "one" {
+            // The twin of these results finds the profile, which lies in a folder of another name.
+            let twin = dir.calib_with(&["twin", &out, "--trials", "1", "--out", "twin"]);
+            assert_eq!(twin.code, 0, "{}", twin.stderr);
+        }
+    }
+}
+
+#[test]
 fn limits_in_degrees_are_warned_of_and_not_planned() {
     let urdf =
         std::fs::read_to_string(root().join("book/src/tutorial/arm.urdf")).expect("committed");

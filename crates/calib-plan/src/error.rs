@@ -69,6 +69,14 @@ pub enum PlanError {
         /// Joints whose limits leave no range.
         fixed: Vec<String>,
     },
+    /// Parameters are named for a goal that is none of parameters.
+    #[error(
+        "{file}: `--of` names parameters, `--goal task` is the position of the tool\n  help: use `--goal parameters` or `--goal variances`, or leave out `--of`"
+    )]
+    OfWithoutParameters {
+        /// The profile.
+        file: String,
+    },
     /// No free parameter has the name that was asked for.
     #[error(
         "{file}: `--of {part}` names no free parameter{}\n  help: give a part of one of their names: {}", words::nearest(nearest.as_deref()), words::some_of(known)
@@ -142,7 +150,7 @@ pub enum PlanError {
         why: String,
     },
     /// A place of the task has no posture.
-    #[error("{file}, row {row}: {}", words::no_posture(*nearest_mm, *nearest_deg, *oriented, *touching))]
+    #[error("{file}, row {row}: {}", words::no_posture(*nearest_mm, *nearest_deg, *starts, *oriented, *touching))]
     PlaceOutOfReach {
         /// The list.
         file: String,
@@ -152,6 +160,8 @@ pub enum PlanError {
         nearest_mm: f64,
         /// Angle between the orientations there, deg; 0 where none is asked for.
         nearest_deg: f64,
+        /// Searches from other postures.
+        starts: usize,
         /// Whether an orientation is asked for.
         oriented: bool,
         /// Whether there are postures that touch something.
@@ -271,6 +281,7 @@ impl PlanError {
             | Self::InDegrees { file, .. }
             | Self::NothingMoves { file, .. }
             | Self::NoSuchParameter { file, .. }
+            | Self::OfWithoutParameters { file }
             | Self::NoRecording { profile: file }
             | Self::NoPlace { file }
             | Self::OutOfReach { file, .. }

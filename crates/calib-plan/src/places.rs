@@ -42,7 +42,7 @@ const THERE: f64 = 1e-4;
 /// Postures that starts are chosen from.
 const FILLING: usize = 1024;
 /// Starts that are tried: the nearest ones, then others in the order of the sequence.
-pub const STARTS: usize = 256;
+const STARTS: usize = 256;
 /// How many of them are the nearest.
 const NEAREST: usize = 32;
 /// Steps from one start.
@@ -145,6 +145,7 @@ pub fn postures(
             row: row + 1,
             nearest_mm: why.nearest.0 * 1e3,
             nearest_deg: why.nearest.1.to_degrees(),
+            starts: STARTS,
             oriented: goal.orientation.is_some(),
             touching: why.touching,
         })

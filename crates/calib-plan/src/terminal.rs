@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use calib_report::terminal::wrapped;
 
 use crate::list::{Plan, Why};
+use crate::note::Note;
 use crate::words;
 
 /// Lines for notes at the most.
@@ -74,7 +75,10 @@ pub fn summary(plan: &Plan, folder: &str) -> String {
         text += &wrapped(&line, "weak           ", "               ");
     }
     let mut notes = String::new();
-    for (k, note) in plan.notes.iter().enumerate() {
+    // First what is not written, or not determined: the rest may stand on the page alone.
+    let first = |note: &Note| matches!(note, Note::NoClearMotion { .. } | Note::TaskOpen);
+    let (first, rest): (Vec<&Note>, Vec<&Note>) = plan.notes.iter().partition(|n| first(n));
+    for (k, note) in first.into_iter().chain(rest).enumerate() {
         let one = wrapped(&words::note(note), "note: ", "      ");
         if notes.lines().count() + one.lines().count() > NOTES {
             let _ = writeln!(notes, "note: {} more in plan.html", plan.notes.len() - k);

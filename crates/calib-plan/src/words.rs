@@ -298,7 +298,13 @@ pub fn parameter_sigma(sigma: Option<f64>, unit: calib_core::Unit) -> String {
 
 /// Why a place of the task has no posture.
 #[must_use]
-pub fn no_posture(nearest_mm: f64, nearest_deg: f64, oriented: bool, touching: bool) -> String {
+pub fn no_posture(
+    nearest_mm: f64,
+    nearest_deg: f64,
+    starts: usize,
+    oriented: bool,
+    touching: bool,
+) -> String {
     let orientation = if oriented {
         " with this orientation"
     } else {
@@ -314,8 +320,7 @@ pub fn no_posture(nearest_mm: f64, nearest_deg: f64, oriented: bool, touching: b
         );
     }
     format!(
-        "of {} searches from other postures none brings the tool there{orientation}; the nearest ends {nearest_mm:.1} mm{angle} off\n  help: places are in the frame of the robot's root, in meters; widen `plan.joints` if the ranges are narrower than the robot's",
-        crate::places::STARTS
+        "of {starts} searches from other postures none brings the tool there{orientation}; the nearest ends {nearest_mm:.1} mm{angle} off\n  help: places are in the frame of the robot's root, in meters; widen `plan.joints` if the ranges are narrower than the robot's"
     )
 }
 

@@ -34,6 +34,7 @@
 mod protocol;
 mod robot;
 mod streams;
+mod timed;
 mod tracker;
 mod truth;
 
@@ -51,6 +52,7 @@ pub use nalgebra;
 pub use protocol::{Commanded, commanded_poses};
 pub use robot::TrueRobot;
 pub use streams::{Motion, StreamPlan, Streams, simulate_streams};
+pub use timed::timed;
 pub use truth::{Truth, TruthTransform};
 
 use tracker::Tracker;

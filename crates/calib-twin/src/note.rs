@@ -3,6 +3,18 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Where the noise of planned postures is taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseOf {
+    /// Recordings that exist show it.
+    Recordings,
+    /// The profile states it.
+    Profile,
+    /// Nothing tells it: what the program takes for a tracker.
+    Program,
+}
+
 /// One assumption or limit of a twin.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "id", rename_all = "snake_case")]
@@ -19,10 +31,14 @@ pub enum Note {
     },
     /// Nothing is recorded: one draw of the profile's `simulate` section stands for the recordings.
     FromSimulation,
-    /// The postures are those of a plan, with the stated noise.
+    /// The postures are those of a plan.
     FromPlan {
         /// How many are fitted.
         postures: usize,
+        /// Rows of recordings that exist, and are fitted with them.
+        beside: usize,
+        /// Whose noise they have.
+        noise: NoiseOf,
     },
     /// Origins whose sweeps are not recorded are left out.
     OriginsWithoutSweep {

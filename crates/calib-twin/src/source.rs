@@ -15,7 +15,7 @@ use calib_plan::Known;
 use calib_plan::known::without_missing;
 use calib_plan::linear::{joint_table, planned_recording};
 use calib_plan::write::PlanFile;
-use calib_profile::Usage;
+use calib_profile::{Profile, Usage};
 use calib_report::{read_report, report_path};
 use nalgebra::{Isometry3, Point3};
 use schemars::JsonSchema;
@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::TwinError;
 use crate::noise::Noise;
-use crate::note::Note;
+use crate::note::{NoiseOf, Note};
 use crate::replay::Replay;
 use crate::session::Session;
 use crate::truth::About;
@@ -99,6 +99,22 @@ fn without_sweep(robot: &mut RobotProfile, notes: &mut Vec<Note>) {
     notes.push(Note::OriginsWithoutSweep { origins: lost });
 }
 
+/// What stands beside planned postures, and whose noise they have.
+fn from_plan(known: &Known, postures: usize) -> Note {
+    let before = known.inputs.iter().flat_map(|i| i.recordings.values());
+    let fitted = before.filter(|r| r.spec.usage != Usage::Validation);
+    let noise = match (known.noise.is_empty(), has_noise(&known.robot.profile)) {
+        (false, _) => NoiseOf::Recordings,
+        (true, true) => NoiseOf::Profile,
+        (true, false) => NoiseOf::Program,
+    };
+    Note::FromPlan {
+        postures,
+        beside: fitted.map(|r| r.poses.len()).sum(),
+        noise,
+    }
+}
+
 /// The postures of a plan, recorded by the robot as it is known.
 fn planned(
     robot: RobotProfile,
@@ -115,9 +131,7 @@ fn planned(
     let known = Known::of(robot, plugins)?;
     let joints = known.joint_box()?;
     let [fitted, held_out] = plan.positions(&known.robot.model, &joints.base);
-    let mut notes = vec![Note::FromPlan {
-        postures: fitted.len(),
-    }];
+    let mut notes = vec![from_plan(&known, fitted.len())];
     let mut robot = known.robot.clone();
     let recorded = std::mem::take(&mut robot.profile.recordings);
     let usages = [Usage::Static, Usage::Validation];
@@ -194,6 +208,31 @@ fn planned(
     Ok((inputs, noise, notes))
 }
 
+/// A file in the folders beside and in theirs, in the order of their names; of folders with very many, only in `robots`.
+fn in_folders(at: &Path, file: &str) -> Vec<PathBuf> {
+    const MOST: usize = 1000;
+    let inside = |folder: &Path| -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(folder).into_iter().flatten();
+        let entries = entries.take(MOST + 1).filter_map(Result::ok);
+        let folders = entries.filter(|e| e.file_type().is_ok_and(|t| t.is_dir()));
+        let mut folders: Vec<PathBuf> = folders.map(|e| e.path()).collect();
+        folders.sort();
+        folders
+    };
+    let beside = inside(at);
+    if beside.len() > MOST {
+        return vec![at.join("robots").join(file)];
+    }
+    let below: Vec<PathBuf> = beside.iter().flat_map(|f| inside(f)).take(MOST).collect();
+    let folders = beside.into_iter().chain(below);
+    folders.map(|folder| folder.join(file)).collect()
+}
+
+/// The profile states the tracker's noise.
+fn has_noise(profile: &Profile) -> bool {
+    profile.tracker.marker_sigma.is_some() || profile.tracker.body_sigma.is_some()
+}
+
 /// The profile that was given, or the one that a folder of results was made from.
 ///
 /// # Errors
@@ -211,10 +250,8 @@ pub fn profile_of(given: &Path) -> Result<PathBuf, TwinError> {
     const UP: usize = 4;
     let around = absolute.ancestors().take(UP);
     let candidates = around.flat_map(|at| {
-        [
-            at.join(&report.profile),
-            at.join("robots").join(&report.profile),
-        ]
+        let own = at.join(&report.profile);
+        std::iter::once(own).chain(in_folders(at, &report.profile))
     });
     let digest = |name: &str| {
         let input = report.inputs.iter().find(|input| input.path == name);

@@ -4,7 +4,7 @@ use calib_finding::Unit;
 use calib_report::number;
 
 use crate::likeness::Mark;
-use crate::note::Note;
+use crate::note::{NoiseOf, Note};
 use crate::power::Power;
 use crate::quantity::Quantity;
 use crate::source::Source;
@@ -89,8 +89,23 @@ pub fn note(note: &Note) -> String {
             "Nothing is recorded: one draw of the `simulate` section stands for the recordings."
                 .to_owned()
         }
-        Note::FromPlan { postures } => {
-            format!("The postures are the {postures} of the plan, with the stated noise.")
+        Note::FromPlan {
+            postures,
+            beside,
+            noise,
+        } => {
+            let beside = match beside {
+                0 => String::new(),
+                rows => format!(", recorded beside the {rows} rows that exist"),
+            };
+            let noise = match noise {
+                NoiseOf::Recordings => "the noise that the recordings show",
+                NoiseOf::Profile => "the noise that the profile states",
+                NoiseOf::Program => {
+                    "the noise that the program takes where none is stated or recorded"
+                }
+            };
+            format!("The postures are the {postures} of the plan{beside}, with {noise}.")
         }
         Note::OriginsWithoutSweep { origins } => format!(
             "Left out, because their sweeps are not recorded: {}.",

@@ -23,10 +23,10 @@ pub struct PlanPostures {
     /// As many postures as this σ of the tool's position needs, mm
     #[arg(long, conflicts_with = "poses")]
     sigma_mm: Option<f64>,
-    /// What the postures are chosen for
-    #[arg(long, value_enum, default_value_t = GoalName::Task)]
-    goal: GoalName,
-    /// Only these parameters, by a part of their names; with `--goal parameters` or `variances`
+    /// What the postures are chosen for [default: task; with `--of` parameters]
+    #[arg(long, value_enum)]
+    goal: Option<GoalName>,
+    /// Only these parameters, by a part of their names; for the goals `parameters` and `variances`
     #[arg(long, value_delimiter = ',')]
     of: Vec<String>,
     /// Table of joint positions, or of places of one link, body or marker (`flange.x_m,flange.y_m,flange.z_m`), where the robot is to be accurate [default: `plan.task_box_mm`, else all postures]
@@ -85,10 +85,16 @@ pub fn run(console: &Console, options: &PlanPostures) -> Result<ExitCode, CliErr
     let mut asked = Options {
         poses: options.poses.map(usize::from),
         sigma: options.sigma_mm.map(|mm| mm * 1e-3),
-        goal: match options.goal {
-            GoalName::Task => Goal::Task,
-            GoalName::Parameters => Goal::Parameters,
-            GoalName::Variances => Goal::Variances,
+        goal: match (options.goal, options.of.is_empty()) {
+            (Some(GoalName::Task), false) => {
+                return Err(PlanError::OfWithoutParameters {
+                    file: options.profile.display().to_string(),
+                }
+                .into());
+            }
+            (Some(GoalName::Task) | None, true) => Goal::Task,
+            (Some(GoalName::Parameters), _) | (None, false) => Goal::Parameters,
+            (Some(GoalName::Variances), _) => Goal::Variances,
         },
         of: options.of.clone(),
         candidates: options.candidates as usize,

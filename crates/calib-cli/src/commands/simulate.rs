@@ -8,7 +8,7 @@ use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::load::{RobotProfile, load_robot};
 use calib_plan::PlanError;
 use calib_profile::{RecordingSpec, Usage};
-use calib_recording::WriteOptions;
+use calib_recording::{Poses, WriteOptions};
 use clap::Args;
 
 use super::plan_file::plan_of;
@@ -56,12 +56,22 @@ fn simulate(
 ) -> Result<Vec<OutputFile>, CliError> {
     let (profile, model) = (&robot.profile, &robot.model);
     let simulated = calib_sim::simulate_postures(profile, model, seed, postures);
-    let simulated = simulated.map_err(|source| CliError::Simulation {
+    let failed = |source| CliError::Simulation {
         file: robot.file.clone(),
         source: Box::new(source),
-    })?;
+    };
+    let simulated = simulated.map_err(failed)?;
     let mut files = Vec::new();
     for (name, poses) in &simulated.recordings {
+        let spec = profile.recordings.get(name);
+        let stream = spec.and_then(|spec| spec.timing.as_ref());
+        let stream = stream.map(|timing| {
+            calib_sim::timed(profile, model, seed, name, poses, timing).map_err(failed)
+        });
+        let mut poses = match stream {
+            Some(stream) => stream?,
+            None => poses.clone(),
+        };
         let options = WriteOptions {
             comments: vec![
                 format!(
@@ -73,14 +83,25 @@ fn simulate(
             degrees: true,
             ..WriteOptions::micro()
         };
-        let text =
+        let written = |poses: &Poses| {
             calib_recording::write_poses(poses, &options).map_err(|source| CliError::Table {
                 file: format!("recording `{name}`"),
                 source,
                 remedy: "use names without commas, quotes and line breaks",
                 code: ExitCode::Usage,
-            })?;
-        files.push(OutputFile::text(file_name(robot, name), text));
+            })
+        };
+        // The robot's own log, where the profile has one.
+        if let Some(log) = spec.and_then(|spec| spec.robot_log.as_ref()) {
+            let joints = Poses {
+                markers: BTreeMap::new(),
+                bodies: BTreeMap::new(),
+                ..poses.clone()
+            };
+            poses.joints.clear();
+            files.push(OutputFile::text(file_name_of(&log.file), written(&joints)?));
+        }
+        files.push(OutputFile::text(file_name(robot, name), written(&poses)?));
     }
     let mut truth =
         serde_json::to_string_pretty(&simulated.truth).map_err(|source| CliError::Json {
@@ -121,5 +142,9 @@ fn postures(
 fn file_name(robot: &RobotProfile, recording: &str) -> String {
     let spec = robot.profile.recordings.get(recording);
     let path = spec.map_or_else(|| format!("{recording}.csv"), |s| s.file.clone());
-    path.rsplit(['/', '\\']).next().unwrap_or(&path).to_owned()
+    file_name_of(&path)
+}
+
+fn file_name_of(path: &str) -> String {
+    path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned()
 }

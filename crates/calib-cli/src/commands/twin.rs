@@ -27,7 +27,7 @@ pub struct TwinArguments {
     /// Seed of the random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Postures of `calib plan` in place of a session that was recorded
+    /// Postures of `calib plan`, recorded after what exists already
     #[arg(long)]
     plan: Option<PathBuf>,
     /// Where true robots are drawn [default: found where something is recorded, else prior]

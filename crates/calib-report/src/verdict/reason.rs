@@ -92,6 +92,8 @@ reasons! {
     NoiseBelowStated = "noise-below-stated": Warns,
     /// Held-out errors after registration only are not significantly higher.
     NotBetterThanRegistration = "not-better-than-registration": Warns,
+    /// Too few held-out postures to tell whether the calibration is better than registration only.
+    TooFewToCompare = "too-few-to-compare": Warns,
     /// No recording is held out: every pose was left out in turn.
     LeaveOneOut = "leave-one-out": Warns,
     /// The orientation of the last body is not measured.

@@ -158,6 +158,9 @@ fn of_reason(report: &Report, id: &str, again: &str) -> Option<[String; 2]> {
                 "Check that joints and tracker recorded the same motion at the same times, and record more poses; then run `{again}`."
             )
         }
+        ReasonId::TooFewToCompare => {
+            format!("Record at least five validation poses, then run `{again}`.")
+        }
         ReasonId::HeldOutBeyondStated => {
             format!(
                 "Look at the poses with the largest errors in the report; if they are right, let `{again} --select` try the effects that the model lacks."

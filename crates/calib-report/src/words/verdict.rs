@@ -357,6 +357,12 @@ fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
             postures(),
             v.number("p")
         ),
+        ReasonId::TooFewToCompare => format!(
+            "Calibrated {} rms, with registration only {} rms: {} are too few to tell whether that is an improvement. Five that all are better would show it.",
+            v.number("calibrated"),
+            v.number("registration"),
+            postures()
+        ),
         ReasonId::UrdfAlone => {
             let error = format!(
                 "The URDF alone, without the joint effects that it cannot hold: {} rms; with them {} rms",

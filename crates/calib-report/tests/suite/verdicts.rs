@@ -314,6 +314,17 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
             }),
         ),
         (
+            ReasonId::TooFewToCompare,
+            Warns,
+            with(|f| {
+                let few = Improvement {
+                    postures: 3,
+                    ..improvement(0.0009, 0.0005, 0.125, 0.99)
+                };
+                f.improvements = vec![few];
+            }),
+        ),
+        (
             ReasonId::RejectedPart,
             Rejects,
             with(|f| f.rejected_parts = part(Part::Recording("sweep".into()))),

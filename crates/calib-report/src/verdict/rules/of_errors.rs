@@ -65,6 +65,11 @@ pub(super) fn enough(facts: &Facts, limit: &Limit) -> Option<usize> {
 /// Chance makes a robot look better (or worse) so clearly in at most this share of the cases.
 pub(super) const SIGNIFICANT: f64 = 0.05;
 
+/// The smallest p of a test that exchanges the signs of so many differences.
+fn least_p(postures: usize) -> f64 {
+    0.5_f64.powi(postures.try_into().unwrap_or(i32::MAX))
+}
+
 pub(super) fn registration(facts: &Facts) -> Vec<Reason> {
     if !facts.freed || facts.improvements.is_empty() {
         return Vec::new();
@@ -74,6 +79,19 @@ pub(super) fn registration(facts: &Facts) -> Vec<Reason> {
     let (id, effect, shown) = match (worse, better) {
         (Some(worse), _) => (ReasonId::WorseThanRegistration, Effect::Rejects, worse),
         (None, true) => return Vec::new(),
+        // Of fewer postures the smallest p, all of them better, is larger: nothing could have been significant.
+        (None, false)
+            if facts
+                .improvements
+                .iter()
+                .all(|i| least_p(i.postures) >= SIGNIFICANT) =>
+        {
+            (
+                ReasonId::TooFewToCompare,
+                Effect::Warns,
+                &facts.improvements[0],
+            )
+        }
         (None, false) => (
             ReasonId::NotBetterThanRegistration,
             Effect::Warns,
