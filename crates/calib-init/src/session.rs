@@ -183,7 +183,7 @@ fn paired(sources: &[Source], tracked: &[usize], logs: &[usize]) -> Vec<(usize, 
 
 /// Rows of the longest time line.
 fn rows_of(recording: &Recording) -> usize {
-    let lines = recording.timelines.iter().map(|line| line.len());
+    let lines = recording.timelines.iter().map(Timeline::len);
     lines.max().unwrap_or(0)
 }
 

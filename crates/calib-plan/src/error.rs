@@ -41,19 +41,18 @@ pub enum PlanError {
     },
     /// Limits of a joint are probably in degrees.
     #[error(
-        "{file}: the limits of joint `{joint}` in the URDF are {low} and {high} rad, {turns} turns: probably degrees, where a URDF has radians\n  help: correct the URDF, or state the range: `plan: {{joints: {{{joint}_deg: [-170, 170]}}}}`"
+        "{file}: the limits of joint `{joint}` in the URDF are {}: probably degrees, where a URDF has radians\n  help: correct the URDF, or state the range: `plan: {{joints: {{{joint}_deg: [-170, 170]}}}}`",
+        words::many_turns(*low, *high)
     )]
     InDegrees {
         /// The profile.
         file: String,
         /// The joint.
         joint: String,
-        /// Lower limit as the URDF has it.
-        low: String,
-        /// Upper limit as the URDF has it.
-        high: String,
-        /// How many turns that would be.
-        turns: String,
+        /// Lower limit as the URDF has it, rad.
+        low: f64,
+        /// Upper limit as the URDF has it, rad.
+        high: f64,
     },
     /// No joint that carries a body can move.
     #[error(

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use calib_finding::number;
 use calib_pipeline::output::shapes::collision_solids;
 use calib_urdf::{JointId, LinkId, doubt};
 use nalgebra::DMatrix;
@@ -269,9 +268,8 @@ impl Known {
         PlanError::InDegrees {
             file: self.robot.file.clone(),
             joint: joint.name.clone(),
-            low: number::fixed(low, 1),
-            high: number::fixed(high, 1),
-            turns: number::fixed((high - low) / std::f64::consts::TAU, 0),
+            low,
+            high,
         }
     }
 }

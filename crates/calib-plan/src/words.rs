@@ -296,6 +296,13 @@ pub fn parameter_sigma(sigma: Option<f64>, unit: calib_core::Unit) -> String {
     number::sigma(sigma, unit)
 }
 
+/// Limits of a joint that turns more often than cables allow, rad.
+#[must_use]
+pub fn many_turns(low: f64, high: f64) -> String {
+    let turns = (high - low) / std::f64::consts::TAU;
+    format!("{low:.1} and {high:.1} rad ({turns:.0} turns)")
+}
+
 /// Why a place of the task has no posture.
 #[must_use]
 pub fn no_posture(

@@ -11,6 +11,9 @@ use crate::lab::{
 
 const HAND: [(&str, &str, Kind); 1] = [("hand", "flange", Kind::Markers(4))];
 
+/// What a column of a place is called.
+type Naming<'a> = &'a dyn Fn(&str) -> String;
+
 /// A table whose places are in a unit, and whose joints' columns have no unit.
 fn in_unit(table: &str, unit: LengthUnit, name: impl Fn(&str) -> String) -> String {
     let is_place = |name: &str| name.starts_with("hand");
@@ -62,7 +65,7 @@ fn every_unit_of_length_is_read_however_its_columns_state_it() {
             LengthUnit::In => "inches",
             LengthUnit::Ft => "feet",
         };
-        let ways: [(&str, &dyn Fn(&str) -> String); 4] = [
+        let ways: [(&str, Naming<'_>); 4] = [
             ("dotted", &|n| format!("{n}_{short}")),
             ("joined", &|n| format!("{}_{short}", n.replace('.', "_"))),
             ("bracket", &|n| format!("{} [{short}]", n.replace('.', "_"))),

@@ -225,8 +225,7 @@ fn units_of_length_at_the_end_of_names_count_with_and_without_a_map() {
             ..ColumnMap::default()
         };
         for columns in [None, Some(map(LengthUnit::M)), Some(map(unit))] {
-            let poses =
-                read(columns).and_then(|r| Ok(r.poses(Filled::Exclude).expect("one table")));
+            let poses = read(columns).map(|r| r.poses(Filled::Exclude).expect("one table"));
             let poses = poses.unwrap_or_else(|e| panic!("{unit:?}: {e}"));
             let p = poses.markers["P"][0].expect("a place");
             assert!((p.x - 0.25).abs() < 1e-12, "{unit:?}: {p}");
