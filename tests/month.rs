@@ -142,9 +142,11 @@ fn simulated(dir: &Scratch, visit: &Visit, edit: Edit) {
         format!("robots/ripley/{name}.urdf"),
         true_robot(&nominal, visit.since),
     );
+    // Rows that are postures: what is recorded of them live has times of its own.
+    write(format!("{name}_postures.yaml"), without_times(text.clone()));
     write(format!("{name}.yaml"), text);
     let (from, seed, to) = (
-        format!("{name}.yaml"),
+        format!("{name}_postures.yaml"),
         visit.seed.to_string(),
         format!("{name}_true"),
     );
