@@ -515,11 +515,36 @@ fn a_slurm_controller_runs_the_array() {
     assert!(dir.path("slurm/work/results/aor.csv").is_file());
 }
 
-/// The pods of the manifest ask for each shard once.
+/// Built without stores, the program says so before it calculates anything.
+#[cfg(not(feature = "object-store"))]
+#[test]
+fn a_store_is_refused_where_the_program_knows_none() {
+    let dir = Scratch::new();
+    let shard = "study aor --trials 1 --seed 1 --shard 1/3 --out shards --store s3://bucket/run";
+    for call in [shard, "merge --store s3://bucket/run --out all.parquet"] {
+        let words: Vec<&str> = call.split_whitespace().collect();
+        let ran = dir.calib_with(&words);
+        assert_eq!(ran.code, 2, "{}", ran.stderr);
+        let said = "s3://bucket/run: this program was built without object stores";
+        assert!(ran.stderr.contains(said), "{}", ran.stderr);
+        let remedy = "--features object-store";
+        assert!(ran.stderr.contains(remedy), "{}", ran.stderr);
+        assert!(dir.files("").is_empty(), "{call}");
+    }
+}
+
+/// The pods of both manifests ask for each shard once.
 #[cfg(unix)]
 #[test]
-fn the_kubernetes_manifest_asks_for_every_shard() {
-    let path = crate::scratch::root().join("examples/kubernetes/study.yaml");
+fn the_kubernetes_manifests_ask_for_every_shard() {
+    for name in ["study", "store"] {
+        manifest(&format!("examples/kubernetes/{name}.yaml"));
+    }
+}
+
+#[cfg(unix)]
+fn manifest(path: &str) {
+    let path = crate::scratch::root().join(path);
     let faults = crate::outputs::faults("kubernetes", &path).unwrap_or_default();
     assert!(faults.is_empty(), "{faults:#?}");
     let text = std::fs::read_to_string(path).expect("the manifest");

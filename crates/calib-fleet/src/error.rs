@@ -6,6 +6,7 @@ use calib_files::FileError;
 use calib_pipeline::ExitCode;
 
 use crate::shard::{Difference, Shard};
+use crate::store::error::StoreError;
 use crate::table::TableFault;
 
 /// What is wrong with the file of a shard.
@@ -116,6 +117,9 @@ pub enum FleetError {
     /// The file of a shard cannot be used.
     #[error(transparent)]
     Shard(#[from] ShardError),
+    /// A store cannot be used.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// A table cannot be made.
     #[error("a table {0}\n  help: report this as a defect")]
     Table(TableFault),
@@ -168,6 +172,7 @@ impl FleetError {
                 ExitCode::NotWritten
             }
             Self::Shard(_) | Self::Missing { .. } => ExitCode::Data,
+            Self::Store(error) => error.exit_code(),
             _ => ExitCode::Usage,
         }
     }

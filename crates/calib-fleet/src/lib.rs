@@ -5,6 +5,7 @@ mod error;
 pub mod merge;
 pub mod shard;
 pub mod shard_file;
+pub mod store;
 pub mod table;
 pub mod work;
 

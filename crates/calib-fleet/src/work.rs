@@ -6,6 +6,8 @@
 //!     cor-3-of-64.parquet               all of them, whole or not there
 //! ```
 //!
+//! Where machines have no disk in common, the file is also left in a store: `STORE/cor-3-of-64.parquet`.
+//!
 //! A unit's result depends on its number and the settings only, so a shard that was stopped anywhere and runs again ends with the same
 //! bytes as one that was not stopped.
 
@@ -21,6 +23,7 @@ use serde::Serialize;
 use crate::error::{FleetError, ShardError, ShardFault};
 use crate::shard::{Identity, Shard};
 use crate::shard_file::{Finished, ShardFile, file_name, write_shard};
+use crate::store::{Store, StoreError, StoreFault};
 
 /// Name of the file of finished units.
 const STATE: &str = "state.jsonl";
@@ -38,6 +41,8 @@ pub struct Asked<'a> {
     pub resume: bool,
     /// Threads; `None`: as many as there are processors.
     pub threads: Option<usize>,
+    /// Where the file is left as well, and taken from if it is there already.
+    pub store: Option<&'a Store>,
 }
 
 /// What must be the same for finished units to be kept.
@@ -68,11 +73,12 @@ impl Asked<'_> {
     }
 }
 
-/// Makes a shard and returns its file; a shard that is there already is only checked. `progress(done, total)` counts units and is called
-/// from any thread.
+/// Makes a shard and returns its file; a shard that is there already, or in the store, is only checked. `progress(done, total)` counts units and
+/// is called from any thread.
 ///
 /// # Errors
-/// [`FileError::Busy`] while another process makes this shard; [`FileError::OtherState`] where the folder holds one of another work.
+/// [`FileError::Busy`] while another process makes this shard; [`FileError::OtherState`] where the folder holds one of another work;
+/// [`FleetError::Store`].
 pub fn run_shard(
     asked: &Asked<'_>,
     one: Unit<'_>,
@@ -81,15 +87,16 @@ pub fn run_shard(
     let (folder, path) = (asked.folder(), asked.file());
     let _locked = ResultsFolder::open(&folder)?;
     let state = folder.join(STATE);
-    if !asked.resume && path.exists() {
-        calib_files::remove(&path)?;
-    }
-    if path.exists() {
-        is_this(asked, &path)?;
-    } else {
+    let kept = Kept {
+        path: &path,
+        identity: asked.identity,
+        store: asked.store,
+    };
+    if !kept.is_there(asked.resume)? {
         let units = finished(asked, &state, one, progress)?;
         let units = units.into_values().map(Ok);
         write_shard(&path, (asked.identity, asked.shard), units)?;
+        kept.leave()?;
     }
     if state.exists() {
         calib_files::remove(&state)?;
@@ -97,10 +104,64 @@ pub fn run_shard(
     Ok(path)
 }
 
+/// Where the file of a shard is kept.
+pub(crate) struct Kept<'a> {
+    /// The file.
+    pub(crate) path: &'a Path,
+    /// The work.
+    pub(crate) identity: &'a Identity,
+    /// See [`Asked::store`].
+    pub(crate) store: Option<&'a Store>,
+}
+
+impl Kept<'_> {
+    fn name(&self) -> String {
+        let name = self.path.file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    }
+
+    /// Whether the shard is there, here and in the store; one of another work is refused. Not to `resume` removes it here first.
+    pub(crate) fn is_there(&self, resume: bool) -> Result<bool, FleetError> {
+        if !resume && self.path.exists() {
+            calib_files::remove(self.path)?;
+        }
+        if self.path.exists() {
+            is_this(self.identity, self.path)?;
+            // A call that was stopped between file and store is repeated.
+            self.leave()?;
+            return Ok(true);
+        }
+        let name = self.name();
+        let Some(store) = self.store.filter(|_| resume) else {
+            return Ok(false);
+        };
+        if !store.holds(&name)? {
+            return Ok(false);
+        }
+        store.fetch(&name, self.path)?;
+        if let Err(error) = is_this(self.identity, self.path) {
+            calib_files::remove(self.path)?;
+            let why = error.to_string();
+            let why = why.lines().next().unwrap_or_default();
+            let here = format!("{}: ", self.path.display());
+            let why = why.strip_prefix(&here).unwrap_or(why).to_owned();
+            let fault = StoreFault::Foreign(why);
+            return Err(StoreError::new(&store.address(&name), fault).into());
+        }
+        Ok(true)
+    }
+
+    /// Leaves the file in the store.
+    pub(crate) fn leave(&self) -> Result<(), FleetError> {
+        let left = self.store.map(|store| store.put(self.path, &self.name()));
+        Ok(left.unwrap_or(Ok(()))?)
+    }
+}
+
 /// Reads the file that is there to its end.
-fn is_this(asked: &Asked<'_>, path: &Path) -> Result<(), FleetError> {
+fn is_this(identity: &Identity, path: &Path) -> Result<(), FleetError> {
     let file = ShardFile::open(path)?;
-    if let Some(difference) = file.identity.difference(asked.identity) {
+    if let Some(difference) = file.identity.difference(identity) {
         return Err(FileError::OtherState {
             path: path.to_path_buf(),
             found: format!("the {} `{}`", difference.of.word(), difference.found),

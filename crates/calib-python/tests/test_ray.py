@@ -64,3 +64,17 @@ def test_a_node_that_is_killed_changes_nothing(cluster: Any, program: Any, tmp_p
 def test_what_the_program_refuses_is_raised(cluster: Any, tmp_path: Path) -> None:
     with pytest.raises(calib.CalibError, match="no-such-option"):
         calib.ray.study("aor", shards=2, out=tmp_path, program=os.environ.get("CALIB_PROGRAM"), no_such_option=1)
+
+
+def test_nodes_need_no_common_disk_with_a_store(cluster: Any, program: Any, tmp_path: Path) -> None:
+    store = f"file://{tmp_path}/store"
+    probe = program(*ARGUMENTS, "--shard", "1/1", "--out", tmp_path / "probe", "--store", f"{store}-probe")
+    if "built without object stores" in probe.stderr:
+        pytest.skip("the program was built without object stores")
+    quiet, out = tmp_path / "quiet", tmp_path / "out"
+    assert program(*ARGUMENTS, "--out", quiet).returncode == 0
+    assert calib.ray.study("aor", shards=4, out=out, program=os.environ.get("CALIB_PROGRAM"), store=store, **STUDY) == out
+    assert files(out) == files(quiet)
+    # The shards are in the store, and nowhere else.
+    assert not list(out.glob("*/*.parquet"))
+    assert len(list((tmp_path / "store").glob("*.parquet"))) == 4

@@ -78,7 +78,8 @@ pub fn run(console: &Console, options: &BatchArguments) -> Result<ExitCode, CliE
     let bar = Counted::new(console, "robots");
     let progress = |done, total| bar.at(done, total);
     if let Some(shard) = options.shards.shard {
-        let path = batch.shard(shard, &progress)?;
+        let store = options.shards.store()?;
+        let path = batch.shard(shard, store.as_ref(), &progress)?;
         bar.end();
         emit_paths(console.json, &[path])?;
         return Ok(ExitCode::Accepted);

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use calib_fleet::FleetError;
 use calib_fleet::shard::{Identity, Shard};
+use calib_fleet::store::Store;
 use calib_fleet::work::{Asked, Unit, run_shard};
 use calib_pipeline::ExitCode;
 use calib_urdf::sha256_hex;
@@ -20,6 +22,17 @@ pub struct ShardOptions {
     /// Take the results from a file of `calib merge` instead of computing them
     #[arg(long, value_name = "FILE")]
     pub from: Option<PathBuf>,
+    /// Leave the file of the shard in an object store as well, s3://BUCKET/PREFIX, or take it from there
+    #[arg(long, value_name = "URL", requires = "shard")]
+    store: Option<String>,
+}
+
+impl ShardOptions {
+    /// The store, where there is one.
+    pub fn store(&self) -> Result<Option<Store>, CliError> {
+        let store = self.store.as_deref().map(Store::open).transpose();
+        Ok(store.map_err(FleetError::from)?)
+    }
 }
 
 /// The work that shards belong to.
@@ -43,6 +56,8 @@ pub struct Making<'a> {
     pub resume: bool,
     /// Threads.
     pub threads: Option<usize>,
+    /// Where the file is left as well.
+    pub store: Option<&'a Store>,
     /// What is counted, in words.
     pub counted: &'static str,
 }
@@ -60,6 +75,7 @@ pub fn make(
         out: making.out,
         resume: making.resume,
         threads: making.threads,
+        store: making.store,
     };
     let bar = Counted::new(console, making.counted);
     let path = run_shard(&asked, one, &|done, total| bar.at(done, total))?;

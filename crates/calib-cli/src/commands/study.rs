@@ -96,11 +96,13 @@ impl StudyRun {
     ) -> Result<ExitCode, CliError> {
         let out = self.out.clone();
         let out = out.unwrap_or_else(|| PathBuf::from("results").join(&identity.kind));
+        let store = self.shards.store()?;
         let making = Making {
             identity,
             out: &out,
             resume: !self.restart,
             threads: self.threads,
+            store: store.as_ref(),
             counted,
         };
         make(console, shard, &making, one)

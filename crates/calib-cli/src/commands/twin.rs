@@ -110,11 +110,13 @@ pub fn run(console: &Console, options: &TwinArguments) -> Result<ExitCode, CliEr
             let trial = session.trial(asked.seed, unit, asked.noise);
             Ok((unit.to_string(), serde_json::to_string(&trial)?))
         };
+        let store = options.shards.store()?;
         let making = Making {
             identity: &work()?,
             out: &out,
             resume: asked.resume,
             threads: asked.threads,
+            store: store.as_ref(),
             counted: "trials",
         };
         return make(console, shard, &making, &one);

@@ -8,17 +8,17 @@ use serde::Deserialize;
 
 use super::error::{BatchError, FleetFault};
 
-/// One robot of a fleet.
+/// One robot of a fleet. All of them are in memory for as long as the batch runs: each text takes what it is long, and no more.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Member {
     /// Unique in the fleet; the name of its folder of results.
-    pub name: String,
+    pub name: Box<str>,
     /// Robots of one series are compared; none: the robot's name in its profile.
-    pub series: Option<String>,
+    pub series: Option<Box<str>>,
     /// Its profile.
-    pub profile: PathBuf,
+    pub profile: Box<Path>,
     /// Results of its last calibration.
-    pub earlier: Option<PathBuf>,
+    pub earlier: Option<Box<Path>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -54,12 +54,12 @@ pub fn members(fleet: &str, earlier: Option<&Path>) -> Result<Vec<Member>, Batch
     let failed = |fault| BatchError::fleet(fleet, fault);
     let mut known: BTreeMap<String, &Path> = BTreeMap::new();
     for member in &members {
-        check_name(&member.name).map_err(|_| failed(FleetFault::Name(member.name.clone())))?;
+        check_name(&member.name).map_err(|_| failed(FleetFault::Name(member.name.to_string())))?;
         // One folder on file systems that do not see capitals.
         let folder = member.name.to_lowercase();
         if let Some(first) = known.insert(folder, &member.profile) {
             return Err(failed(FleetFault::SameName {
-                name: member.name.clone(),
+                name: member.name.to_string(),
                 profiles: [first, &member.profile].map(Path::to_path_buf),
             }));
         }
@@ -68,9 +68,10 @@ pub fn members(fleet: &str, earlier: Option<&Path>) -> Result<Vec<Member>, Batch
         return Err(failed(FleetFault::Empty));
     }
     for member in &mut members {
-        let last = earlier.map(|folder| folder.join(super::ROBOTS).join(&member.name));
+        let last = earlier.map(|folder| folder.join(super::ROBOTS).join(&*member.name));
         let there = |folder: &PathBuf| folder.join(calib_report::REPORT).is_file();
-        member.earlier = member.earlier.take().or(last.filter(there));
+        let last = last.filter(there).map(PathBuf::into_boxed_path);
+        member.earlier = member.earlier.take().or(last);
     }
     Ok(members)
 }
@@ -88,10 +89,10 @@ fn of_list(fleet: &str) -> Result<Vec<Member>, BatchError> {
     let member = |raw: RawMember| {
         let profile = joined(folder, &raw.profile);
         Member {
-            name: raw.name.unwrap_or_else(|| stem(&profile)),
-            series: raw.series,
-            earlier: raw.earlier.map(|earlier| joined(folder, &earlier)),
-            profile,
+            name: raw.name.unwrap_or_else(|| stem(&profile)).into(),
+            series: raw.series.map(String::into_boxed_str),
+            earlier: raw.earlier.map(|earlier| joined(folder, &earlier).into()),
+            profile: profile.into(),
         }
     };
     Ok(raw.robots.into_iter().map(member).collect())
@@ -120,9 +121,9 @@ fn of_pattern(pattern: &str) -> Result<Vec<Member>, BatchError> {
         false => stem(profile),
     };
     let member = |profile: PathBuf| Member {
-        name: name(&profile),
+        name: name(&profile).into(),
         series: None,
-        profile,
+        profile: profile.into(),
         earlier: None,
     };
     Ok(profiles.into_iter().map(member).collect())

@@ -31,12 +31,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use calib_files::{FileError, ResultsFolder};
+use calib_files::ResultsFolder;
 
 use crate::error::FleetError;
 use crate::shard::{Identity, Shard};
-use crate::shard_file::{Finished, ShardFile, file_name, write_shard};
-use crate::work::results;
+use crate::shard_file::{Finished, file_name, write_shard};
+use crate::store::Store;
+use crate::work::{Kept, results};
 
 /// The folder of the robots' folders.
 const ROBOTS: &str = "robots";
@@ -109,32 +110,28 @@ impl Batch<'_> {
         files.write()
     }
 
-    /// Calibrates the robots of one shard and writes its file, which is returned.
+    /// Calibrates the robots of one shard and writes its file, which is returned, and which is left in the `store` as well.
     ///
     /// # Errors
     /// [`BatchError`]; robots that are finished are kept.
-    pub fn shard(&self, shard: Shard, progress: Progress<'_>) -> Result<PathBuf, BatchError> {
+    pub fn shard(
+        &self,
+        shard: Shard,
+        store: Option<&Store>,
+        progress: Progress<'_>,
+    ) -> Result<PathBuf, BatchError> {
         let identity = self.identity();
         let name = file_name(KIND, shard);
         let folder = self.out.join(&name).with_extension("");
         let path = folder.join(name);
         let _locked = ResultsFolder::open(&folder)?;
-        if path.exists() && !self.how.restart {
-            let file = ShardFile::open(&path)?;
-            if let Some(difference) = file.identity.difference(&identity) {
-                return Err(BatchError::Work(FleetError::File(FileError::OtherState {
-                    path,
-                    found: format!("the {} `{}`", difference.of.word(), difference.found),
-                    expected: format!("`{}`", difference.expected),
-                })));
-            }
-            for unit in file {
-                unit?;
-            }
+        let kept = Kept {
+            path: &path,
+            identity: &identity,
+            store,
+        };
+        if kept.is_there(!self.how.restart)? {
             return Ok(path);
-        }
-        if path.exists() {
-            calib_files::remove(&path)?;
         }
         let range = shard.range(identity.units);
         let place = |unit: u64| usize::try_from(unit).unwrap_or(usize::MAX);
@@ -152,6 +149,7 @@ impl Batch<'_> {
             })
         });
         write_shard(&path, (&identity, shard), units)?;
+        kept.leave()?;
         Ok(path)
     }
 

@@ -124,7 +124,7 @@ impl How<'_> {
         let Some(kept) = kept(folder) else {
             return false;
         };
-        let own = kept.robot.name == member.name
+        let own = kept.robot.name == *member.name
             && kept.version == env!("CARGO_PKG_VERSION")
             && kept.keep == self.keep
             && kept.options == self.settings()
@@ -132,8 +132,8 @@ impl How<'_> {
             && kept.robot.failure.is_none()
             && member
                 .series
-                .as_ref()
-                .is_none_or(|s| *s == kept.robot.series);
+                .as_deref()
+                .is_none_or(|s| s == kept.robot.series);
         let beside = folder_of(&member.profile);
         let same = |input: &calib_report::Input| {
             sha256_of(&beside.join(&input.path)).as_deref() == Some(&*input.sha256)
@@ -191,7 +191,7 @@ pub(super) fn row(folder: &Path) -> Option<Robot> {
 
 /// The folder of a robot.
 pub(super) fn folder(out: &Path, member: &Member) -> PathBuf {
-    out.join(super::ROBOTS).join(&member.name)
+    out.join(super::ROBOTS).join(&*member.name)
 }
 
 /// SHA-256 of a file; none where it cannot be read.

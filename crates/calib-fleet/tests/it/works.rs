@@ -25,6 +25,7 @@ fn asked<'a>(identity: &'a Identity, out: &'a Path) -> Asked<'a> {
         out,
         resume: true,
         threads: Some(2),
+        store: None,
     }
 }
 

@@ -3,7 +3,8 @@
 Each task runs one shard with the program ``calib``: ``--shard I/N``. A task whose worker is lost runs again, on another node if need be, and continues
 with what the shard has finished. At the end the shards are merged, and the results are those of the command that was not divided, byte for byte.
 
-The folder ``out`` must be on a disk that all nodes share and that knows file locks. Ray itself is not installed with ``calib``: ``pip install ray``.
+The folder ``out`` must be on a disk that all nodes share and that knows file locks; with ``store``, the address of an object store, the nodes need no
+common disk, only the files that the work reads at the same places. Ray itself is not installed with ``calib``: ``pip install ray``.
 
 >>> import calib.ray
 >>> calib.ray.words(trials=20, noise_times=1.5, jobs=None, force=True)
@@ -14,6 +15,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -48,7 +50,7 @@ def _program(given: str | os.PathLike[str] | None) -> list[str]:
     return [named] if named else [sys.executable, "-m", "calib"]
 
 
-def _run(command: Sequence[str], folder: str) -> str:
+def _run(command: Sequence[str], folder: str | None) -> str:
     """What the program prints.
 
     The program ends with the process that started it: a worker that is killed leaves none behind that holds the lock of its shard.
@@ -80,6 +82,7 @@ def _divided(
     out: str | os.PathLike[str],
     program: str | os.PathLike[str] | None,
     retries: int,
+    store: str | None,
     threads: Literal["--threads", "--jobs"],
 ) -> Path:
     """Makes the shards of a command in tasks, merges them, and writes the results to ``out``."""
@@ -95,8 +98,12 @@ def _divided(
     calib = [*_program(program), *command]
 
     def shard(number: int) -> str:
-        part = ["--shard", f"{number}/{shards}", "--out", os.fspath(results), threads, "1", "--quiet"]
-        return _run([*calib, *part], here).strip()
+        part = [*calib, "--shard", f"{number}/{shards}", threads, "1", "--quiet"]
+        if store is None:
+            return _run([*part, "--out", os.fspath(results)], here).strip()
+        # A node without the caller's disk may lack the caller's folder as well.
+        with tempfile.TemporaryDirectory(prefix="calib-") as own:
+            return _run([*part, "--out", own, "--store", store], here if os.path.isdir(here) else None).strip()
 
     if not ray.is_initialized():
         ray.init()
@@ -109,7 +116,8 @@ def _divided(
         raise CalibError(str(error.cause)) from error
     # Its bytes do not depend on the division; one that is there with other bytes is refused.
     merged = results / "merged.parquet"
-    _run([*_program(program), "merge", *files, "--out", os.fspath(merged), "--quiet"], here)
+    shards_of = files if store is None else ["--store", store]
+    _run([*_program(program), "merge", *shards_of, "--out", os.fspath(merged), "--quiet"], here)
     _run([*calib, "--from", os.fspath(merged), "--out", os.fspath(results), "--quiet"], here)
     return results
 
@@ -121,15 +129,17 @@ def study(
     out: str | os.PathLike[str],
     program: str | os.PathLike[str] | None = None,
     retries: int = 20,
+    store: str | None = None,
     **options: Option,
 ) -> Path:
     """``calib study KIND`` in ``shards`` tasks; ``options`` are the command's, as ``trials=100``. Returns ``out``.
 
     ``program`` is the program on every node, else that of ``CALIB``, of the path, or of this package. ``retries``: how often a task is started again
-    after its worker was lost. Raises :class:`calib.CalibError` with what the program says.
+    after its worker was lost. ``store``: the address of an object store, ``s3://BUCKET/PREFIX``, for shards of this work alone; a ``program`` other than
+    that of this package must be built with the feature ``object-store``. Raises :class:`calib.CalibError` with what the program says.
     """
     command = ["study", kind, *words(**options)]
-    return _divided(command, shards=shards, out=out, program=program, retries=retries, threads="--threads")
+    return _divided(command, shards=shards, out=out, program=program, retries=retries, store=store, threads="--threads")
 
 
 def batch(
@@ -139,11 +149,12 @@ def batch(
     out: str | os.PathLike[str],
     program: str | os.PathLike[str] | None = None,
     retries: int = 20,
+    store: str | None = None,
     **options: Option,
 ) -> Path:
     """``calib batch FLEET`` in ``shards`` tasks, as :func:`study`; ``fleet`` is a list of robots or a pattern of profiles."""
     command = ["batch", os.fspath(fleet), *words(**options)]
-    return _divided(command, shards=shards, out=out, program=program, retries=retries, threads="--jobs")
+    return _divided(command, shards=shards, out=out, program=program, retries=retries, store=store, threads="--jobs")
 
 
 def twin(
@@ -153,8 +164,9 @@ def twin(
     out: str | os.PathLike[str],
     program: str | os.PathLike[str] | None = None,
     retries: int = 20,
+    store: str | None = None,
     **options: Option,
 ) -> Path:
     """``calib twin PROFILE`` in ``shards`` tasks, as :func:`study`. Trials with effects are made at the end, in the calling process."""
     command = ["twin", os.fspath(profile), *words(**options)]
-    return _divided(command, shards=shards, out=out, program=program, retries=retries, threads="--threads")
+    return _divided(command, shards=shards, out=out, program=program, retries=retries, store=store, threads="--threads")
