@@ -225,6 +225,43 @@ fn a_fleet_is_calibrated_and_compared_with_last_time() {
     }
 }
 
+/// Robots that were calibrated on machines without a common disk: the bytes of the batch on one.
+#[cfg(all(unix, feature = "object-store"))]
+#[test]
+fn a_batch_by_way_of_a_store_is_that_of_one_machine() {
+    let dir = Scratch::new();
+    fleet(&dir, "old", 5, &[]);
+    let batch = ["batch", "old/*/r.yaml", "--out"];
+    dir.calib_with(&[&batch[..], &["quiet"]].concat()).expect(0);
+    let url = format!("file://{}", dir.path("store").display());
+    for i in 1..=2 {
+        let (out, shard) = (format!("machine-{i}"), format!("{i}/2"));
+        let more = [&out[..], "--shard", &shard, "--store", &url];
+        dir.calib_with(&[&batch[..], &more].concat()).expect(0);
+        std::fs::remove_dir_all(dir.path(&out)).expect("the machine is gone");
+    }
+    dir.calib(["merge", "--store", &url, "--out", "all/all.parquet"])
+        .expect(0);
+    let from = ["again", "--from", "all/all.parquet"];
+    dir.calib_with(&[&batch[..], &from].concat()).expect(0);
+    let mut quiet = results(&dir, "quiet");
+    quiet.retain(|name, _| !name.starts_with("robots/"));
+    same(&quiet, &results(&dir, "again"));
+    // What was fetched is gone, and errors name where it came from.
+    assert_eq!(dir.files("all").len(), 1);
+    let store = dir.path("store");
+    std::fs::copy(
+        store.join("batch-1-of-2.parquet"),
+        store.join("copy.parquet"),
+    )
+    .expect("copied");
+    let ran = dir.calib(["merge", "--store", &url, "--out", "all/twice.parquet"]);
+    let ran = ran.expect(3);
+    let said = format!("{url}/copy.parquet: is shard 1/2, and so is {url}/batch-1-of-2.parquet");
+    assert!(ran.stderr.contains(&said), "{}", ran.stderr);
+    assert_eq!(dir.files("all").len(), 1);
+}
+
 #[test]
 fn a_second_batch_into_a_folder_ends_with_seven() {
     let dir = Scratch::new();
