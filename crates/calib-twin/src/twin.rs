@@ -103,8 +103,12 @@ pub struct Twin {
     pub notes: Vec<Note>,
 }
 
-/// Trials with effects: one for so many without.
+/// Trials with effects: one for so many without, at the most.
 const EFFECTS_PER: u64 = 5;
+/// They are made in rounds of so many, a multiple of the sizes that are tried.
+const ROUND: u64 = 5 * TRIED.len() as u64;
+/// A round is the last where the 95 % interval of the factor ends below so many times where it begins: the sizes that it corrects are not known better.
+const KNOWN: f64 = 1.2;
 /// Trials with slips of each body: one for so many without, and no more than [`SLIPS`].
 const SLIPS_PER: u64 = 10;
 /// See [`SLIPS_PER`].
@@ -158,17 +162,19 @@ pub fn twin_of(
     let done: Vec<&Done> = trials.iter().filter_map(|t| t.done.as_ref()).collect();
     let model = &session.rows.robot.model;
     let mut powers = powers(model, &done);
-    let mut faults = with_effect(session, &powers, with_effects);
-    faults.extend(with_slip(
-        session,
-        &bodies,
-        slips,
-        options.seed,
-        with_effects,
-    ));
-    let injected = pool.install(|| run.injected(&faults))?;
+    let slipped = with_slip(session, &bodies, slips, options.seed, with_effects);
+    let mut injected = pool.install(|| run.injected(&slipped))?;
+    let mut size_factor = None;
+    for round in rounds(with_effect(session, &powers, with_effects)) {
+        injected.extend(pool.install(|| run.injected(&round))?);
+        size_factor = factor(&powers, &injected);
+        if size_factor.is_some_and(|[_, low, high]| high <= KNOWN * low) {
+            break;
+        }
+    }
+    run.end();
+    injected.sort_by_key(|one| one.number);
     verify(&mut powers, &injected);
-    let size_factor = factor(&powers, &injected);
     if let Some([factor, ..]) = size_factor {
         correct(&mut powers, factor);
     }
@@ -254,6 +260,11 @@ impl Run<'_> {
         (self.progress)(done, self.total);
     }
 
+    /// Trials that are not needed count as done.
+    fn end(&self) {
+        (self.progress)(self.total, self.total);
+    }
+
     fn state(&self) -> std::sync::MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -313,6 +324,17 @@ fn with_effect(session: &Session, powers: &[Power], count: u64) -> Vec<Planned> 
     planned.collect()
 }
 
+/// Trials with effects in rounds, each with all sizes and with effects from the whole list.
+fn rounds(all: Vec<Planned>) -> Vec<Vec<Planned>> {
+    let sizes = TRIED.len() as u64;
+    let count = (all.len() as u64).div_ceil(ROUND).max(1);
+    let mut rounds = vec![Vec::new(); count as usize];
+    for planned in all {
+        rounds[(planned.0 / sizes % count) as usize].push(planned);
+    }
+    rounds
+}
+
 /// Trials in which a body slips.
 fn with_slip(
     session: &Session,
@@ -330,4 +352,35 @@ fn with_slip(
         Some((first + k, fault, body.clone(), length))
     });
     planned.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_divide_the_trials_and_each_tries_all_sizes() {
+        for count in [0, 3, 20, 40, 66, 200] {
+            let one = |k: u64| {
+                let fault = Fault::Slip {
+                    body: String::new(),
+                    recording: String::new(),
+                    row: 0,
+                    by: nalgebra::Vector3::zeros(),
+                };
+                (k, fault, String::new(), TRIED[k as usize % TRIED.len()])
+            };
+            let rounds = rounds((0..count).map(one).collect());
+            let mut numbers: Vec<u64> = rounds.iter().flatten().map(|p| p.0).collect();
+            numbers.sort_unstable();
+            assert_eq!(numbers, (0..count).collect::<Vec<_>>());
+            for round in &rounds {
+                assert!(round.len() as u64 <= ROUND, "{count}");
+                let of = |size: f64| round.iter().filter(|p| p.3 == size).count();
+                let counts = TRIED.map(of);
+                let (most, least) = (counts.iter().max(), counts.iter().min());
+                assert!(most.zip(least).is_some_and(|(m, l)| m - l <= 1), "{count}");
+            }
+        }
+    }
 }
