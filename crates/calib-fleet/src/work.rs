@@ -243,11 +243,11 @@ pub fn whole(
 pub fn results<T: serde::de::DeserializeOwned>(
     path: &Path,
     identity: &Identity,
-) -> Result<Vec<T>, ShardError> {
+) -> Result<impl Iterator<Item = Result<T, ShardError>>, ShardError> {
     let read = |unit: Result<Finished, ShardError>| {
         let Finished { unit, result, .. } = unit?;
         serde_json::from_str(&result)
             .map_err(|source| ShardError::new(path, ShardFault::Result { unit, source }))
     };
-    whole(path, identity)?.map(read).collect()
+    Ok(whole(path, identity)?.map(read))
 }

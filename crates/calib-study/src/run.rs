@@ -1,4 +1,4 @@
-//! Runs a study: scenes and blocks of trials in parallel, the same result for any number of threads.
+//! Runs a study: scenes and pieces of them in parallel, the same result for any number of threads.
 
 use std::sync::{
     Mutex,
@@ -15,15 +15,11 @@ use crate::{
     cor,
     experiment::Experiment,
     held::{self, Standard},
-    noise::Noise,
+    pieces::{Sums, cells, pieces, sums},
     settings::{Study, StudyError, StudyOptions},
     state::State,
-    tally::Tally,
     tried::Tried,
 };
-
-/// Trials that one thread does at a stretch: sums are joined block by block, whoever ran them.
-const BLOCK: u64 = 50;
 
 /// A finished study, as data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -104,7 +100,7 @@ pub fn run_with(
                     advance(experiment.trials(options.trials));
                     return Ok(cells);
                 }
-                let cells = cells_of(experiment.as_ref(), &id, options, &advance);
+                let cells = cells_of(experiment.as_ref(), options, &advance);
                 lock(&state).append(&id, &cells)?;
                 Ok(cells)
             })
@@ -148,44 +144,17 @@ pub(crate) fn plan(study: Study, tried: &Tried) -> Vec<Box<dyn Experiment>> {
 }
 
 /// All trials of one scene.
-pub(crate) fn cells_of(
+fn cells_of(
     experiment: &dyn Experiment,
-    id: &str,
     options: &StudyOptions,
     advance: &(dyn Fn(u64) + Sync),
 ) -> Vec<Cell> {
-    let trials = experiment.trials(options.trials);
-    let rows = experiment.rows();
-    let blocks: Vec<Vec<Tally>> = (0..trials.div_ceil(BLOCK))
-        .into_par_iter()
-        .map(|block| {
-            let mut tallies = vec![Tally::default(); rows.len()];
-            let range = block * BLOCK..trials.min((block + 1) * BLOCK);
-            let length = range.end - range.start;
-            for number in range {
-                let mut noise = Noise::of_trial(options.seed, id, number);
-                experiment.trial(number, &mut noise, &mut tallies);
-            }
-            advance(length);
-            tallies
-        })
+    let pieces = pieces(experiment.trials(options.trials));
+    let made: Vec<Sums> = pieces
+        .par_iter()
+        .map(|piece| sums(experiment, options.seed, piece, advance))
         .collect();
-    let mut sums = vec![Tally::default(); rows.len()];
-    for block in &blocks {
-        for (sum, tally) in sums.iter_mut().zip(block) {
-            sum.join(tally);
-        }
-    }
-    rows.iter()
-        .zip(&sums)
-        .map(|(row, sum)| {
-            let mut cell = sum.cell(experiment.scene(), row);
-            let limits = experiment.limits();
-            cell.unbiased_limit = limits.unbiased;
-            cell.second_order_limit = limits.second_order;
-            cell
-        })
-        .collect()
+    cells(experiment, made.iter())
 }
 
 /// An axis has two quantities, a frame too: one fit.

@@ -11,6 +11,7 @@
 //! linear function of the noise with a known mean square will do, the closer the better.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::cell::{Cell, Quantity, Scene};
 
@@ -18,7 +19,8 @@ use crate::cell::{Cell, Quantity, Scene};
 const ENOUGH_FOR_CONTROL: u64 = 20;
 
 /// Sums over the trials of one cell.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(into = "Kept", from = "Kept")]
 pub(crate) struct Tally {
     pub trials: u64,
     pub answered: u64,
@@ -172,6 +174,77 @@ impl Tally {
     }
 }
 
+/// A tally as a shard keeps it: trials, answers, observable, with a control variate; then the sums, in the order of the fields.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    counts: [u64; 4],
+    sums: [Number; 7],
+    vectors: [[Number; 3]; 5],
+}
+
+/// JSON has no words for what is not finite: `"NaN"`, `"inf"`.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum Number {
+    Finite(f64),
+    Other(String),
+}
+
+impl From<f64> for Number {
+    fn from(value: f64) -> Self {
+        match value.is_finite() {
+            true => Self::Finite(value),
+            false => Self::Other(value.to_string()),
+        }
+    }
+}
+
+impl From<Number> for f64 {
+    fn from(number: Number) -> Self {
+        match number {
+            Number::Finite(value) => value,
+            Number::Other(word) => word.parse().unwrap_or(Self::NAN),
+        }
+    }
+}
+
+impl From<Tally> for Kept {
+    fn from(t: Tally) -> Self {
+        let vectors = [t.e, t.l, t.el, t.ee, t.ll];
+        Self {
+            counts: [t.trials, t.answered, t.observable, t.controlled],
+            sums: [t.abs, t.e2, t.e4, t.l2, t.l4, t.e2l2, t.predicted].map(Number::from),
+            vectors: vectors.map(|v| [v.x, v.y, v.z].map(Number::from)),
+        }
+    }
+}
+
+impl From<Kept> for Tally {
+    fn from(kept: Kept) -> Self {
+        let [trials, answered, observable, controlled] = kept.counts;
+        let [abs, e2, e4, l2, l4, e2l2, predicted] = kept.sums.map(f64::from);
+        let [e, l, el, ee, ll] = kept.vectors.map(|v| Vector3::from(v.map(f64::from)));
+        Self {
+            trials,
+            answered,
+            observable,
+            abs,
+            e,
+            e2,
+            e4,
+            controlled,
+            l,
+            l2,
+            l4,
+            e2l2,
+            el,
+            ee,
+            ll,
+            predicted,
+        }
+    }
+}
+
 /// One line of an experiment: a method and a quantity of it.
 #[derive(Debug, Clone)]
 pub(crate) struct Row {
@@ -224,6 +297,19 @@ mod tests {
             tally.error(true, e, 12.27, control.then_some(l));
         }
         tally
+    }
+
+    #[test]
+    fn sums_are_kept_to_the_bit() {
+        let mut tally = Tally::default();
+        let error = Vector3::new(0.1, 1.0 / 3.0, -2e-300);
+        tally.error(true, error, f64::INFINITY, Some(error * 0.7));
+        tally.error(false, -error * 1e9, 3e-5, None);
+        tally.verdict(false, true);
+        let text = serde_json::to_string(&tally).expect("written");
+        let read: Tally = serde_json::from_str(&text).expect("read");
+        assert_eq!(format!("{read:?}"), format!("{tally:?}"));
+        assert!(text.contains("\"inf\""), "{text}");
     }
 
     #[test]

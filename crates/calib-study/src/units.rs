@@ -1,23 +1,28 @@
-//! A study of estimators as units of work that do not depend on each other: its scenes. Other machines can make them.
+//! A study of estimators as units of work that do not depend on each other: pieces of its scenes. Other machines can make them.
+
+use std::ops::Range;
 
 use crate::{
     cell::Cell,
     experiment::Experiment,
-    run::{StudyResult, cells_of, plan, result},
+    pieces::{Sums, cells, pieces, sums},
+    run::{StudyResult, plan, result},
     settings::{Study, StudyError, StudyOptions},
     tried::Tried,
 };
 
-/// The scenes of a study, each with all of its trials.
+/// The pieces of all scenes of a study.
 pub struct Units<'a> {
     study: Study,
     tried: &'a Tried,
     options: &'a StudyOptions,
     plan: Vec<Box<dyn Experiment>>,
+    /// Scene, and its trials.
+    units: Vec<(usize, Range<u64>)>,
 }
 
 impl<'a> Units<'a> {
-    /// The scenes in the order of the report.
+    /// The pieces, the scenes in the order of the report.
     ///
     /// # Errors
     /// [`StudyError::NoTrials`].
@@ -29,18 +34,24 @@ impl<'a> Units<'a> {
         if options.trials == 0 {
             return Err(StudyError::NoTrials { got: 0 });
         }
+        let plan = plan(study, tried);
+        let pieces = plan.iter().map(|e| pieces(e.trials(options.trials)));
+        let numbered = pieces.enumerate();
+        let of = |(scene, all): (usize, Vec<Range<u64>>)| all.into_iter().map(move |p| (scene, p));
+        let units = numbered.flat_map(of).collect();
         Ok(Self {
             study,
             tried,
             options,
-            plan: plan(study, tried),
+            plan,
+            units,
         })
     }
 
     /// How many there are.
     #[must_use]
     pub fn count(&self) -> u64 {
-        self.plan.len() as u64
+        self.units.len() as u64
     }
 
     /// Everything that the results depend on besides their number, as one text.
@@ -50,19 +61,30 @@ impl<'a> Units<'a> {
         format!("{} trials, plugins: {plugins}", self.options.trials)
     }
 
-    /// Name and cells of a scene; `None` beyond the last.
+    /// Scene, first and last trial from 1, and the sums; `None` beyond the last.
     #[must_use]
-    pub fn one(&self, unit: u64) -> Option<(String, Vec<Cell>)> {
+    pub fn one(&self, unit: u64) -> Option<(String, Sums)> {
         let place = usize::try_from(unit).ok()?;
-        let experiment = self.plan.get(place)?;
+        let (scene, trials) = self.units.get(place)?;
+        let experiment = self.plan[*scene].as_ref();
         let id = experiment.scene().id();
-        let cells = cells_of(experiment.as_ref(), &id, self.options, &|_| {});
-        Some((id, cells))
+        let name = format!("{id}, trials {} to {}", trials.start + 1, trials.end);
+        let made = sums(experiment, self.options.seed, trials, &|_| {});
+        Some((name, made))
     }
 
-    /// The study from the cells of all scenes, in their order: what [`run_with`](crate::run_with) gives.
-    #[must_use]
-    pub fn result(&self, cells: Vec<Vec<Cell>>) -> StudyResult {
-        result(self.study, self.tried, self.options, cells)
+    /// The study from the sums of all units, in their order: what [`run_with`](crate::run_with) gives. One scene's are held at a time.
+    ///
+    /// # Errors
+    /// Those of `made`.
+    pub fn result<E>(&self, made: impl Iterator<Item = Result<Sums, E>>) -> Result<StudyResult, E> {
+        let mut left = self.units.iter().zip(made).peekable();
+        let mut all: Vec<Vec<Cell>> = Vec::with_capacity(self.plan.len());
+        for (scene, experiment) in self.plan.iter().enumerate() {
+            let own = std::iter::from_fn(|| left.next_if(|((of, _), _)| *of == scene));
+            let own: Vec<Sums> = own.map(|(_, sums)| sums).collect::<Result<_, E>>()?;
+            all.push(cells(experiment.as_ref(), own.iter()));
+        }
+        Ok(result(self.study, self.tried, self.options, all))
     }
 }

@@ -128,13 +128,13 @@ fn estimators(console: &Console, study: &StudyRun, which: Study) -> Result<ExitC
     let work = || identity(which.word(), options.seed, units.count(), &units.settings());
     if let Some(shard) = study.shards.shard {
         let one = |unit| {
-            let (name, cells) = units.one(unit).unwrap_or_default();
-            Ok((name, serde_json::to_string(&cells)?))
+            let (name, sums) = units.one(unit).unzip();
+            Ok((name.unwrap_or_default(), serde_json::to_string(&sums)?))
         };
-        return study.make(console, (shard, &work(), "scenes"), &one);
+        return study.make(console, (shard, &work(), "parts of scenes"), &one);
     }
     let result = match &study.shards.from {
-        Some(file) => units.result(results(file, &work())?),
+        Some(file) => units.result(results(file, &work())?)?,
         None => {
             let bar = Counted::new(console, "trials");
             let progress = |done, total| bar.at(done, total);
@@ -183,7 +183,7 @@ fn robots(console: &Console, study: &StudyRun, name: &str) -> Result<ExitCode, C
         return study.make(console, (shard, &work(), "robots"), &one);
     }
     let result = match &study.shards.from {
-        Some(file) => units.result(results(file, &work())?),
+        Some(file) => units.result(results(file, &work())?.collect::<Result<_, _>>()?),
         None => {
             let bar = Counted::new(console, "robots");
             let result = cases::run_cases(&units, &|done, total| bar.at(done, total))?;
@@ -235,7 +235,7 @@ fn of_faults(console: &Console, study: &StudyRun) -> Result<ExitCode, CliError> 
         return study.make(console, (shard, &work(), "cases"), &one);
     }
     let result = match &study.shards.from {
-        Some(file) => units.result(results(file, &work())?),
+        Some(file) => units.result(results(file, &work())?.collect::<Result<_, _>>()?),
         None => {
             let bar = Counted::new(console, "cases");
             let result = faults::run_faults(&options, &|done, total| bar.at(done, total))?;

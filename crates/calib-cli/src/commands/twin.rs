@@ -122,7 +122,7 @@ pub fn run(console: &Console, options: &TwinArguments) -> Result<ExitCode, CliEr
         return make(console, shard, &making, &one);
     }
     let made = match &options.shards.from {
-        Some(file) => results(file, &work()?)?,
+        Some(file) => results(file, &work()?)?.collect::<Result<_, _>>()?,
         None => Vec::new(),
     };
     let bar = Counted::new(console, "trials");

@@ -105,7 +105,7 @@ impl Batch<'_> {
         let folder = ResultsFolder::open(self.out)?;
         let mut files = files::Writing::new(folder, self.out)?;
         for robot in results::<Robot>(merged, &self.identity())? {
-            files.add(&robot)?;
+            files.add(&robot?)?;
         }
         files.write()
     }

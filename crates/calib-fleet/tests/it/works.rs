@@ -120,7 +120,7 @@ fn only_a_whole_work_has_results() {
     let out = tempfile::tempdir().expect("a folder");
     let mut asked = asked(&work, out.path());
     let part = run_shard(&asked, &square, &|_, _| {}).expect("made");
-    let error = results::<u64>(&part, &work).expect_err("a part");
+    let error = results::<u64>(&part, &work).map(drop).expect_err("a part");
     assert!(
         error.to_string().contains("is shard 2/3, not a whole work"),
         "{error}"
@@ -128,8 +128,13 @@ fn only_a_whole_work_has_results() {
     asked.shard = Shard::WHOLE;
     let whole = run_shard(&asked, &square, &|_, _| {}).expect("made");
     let squares: Vec<u64> = (0..40).map(|k| k * k).collect();
-    assert_eq!(results::<u64>(&whole, &work).expect("whole"), squares);
-    let error = results::<String>(&whole, &work).expect_err("numbers");
+    let read = results::<u64>(&whole, &work).expect("whole");
+    assert_eq!(
+        read.map(|unit| unit.expect("read")).collect::<Vec<_>>(),
+        squares
+    );
+    let mut read = results::<String>(&whole, &work).expect("whole");
+    let error = read.find_map(Result::err).expect("numbers");
     assert!(
         error
             .to_string()
