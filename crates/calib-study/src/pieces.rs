@@ -1,7 +1,7 @@
 //! The trials of a scene in pieces that do not depend on each other, and the cells from their sums.
 //!
 //! ```text
-//! scene = piece 1 … piece P,   P ≤ 1024;   piece = block 1 … block B;   block = 50 trials                  (1)
+//! scene = piece 1 … piece P;   piece = block 1 … block B;   block = 50 trials;   P ≤ 1024 of an ordinary scene      (1)
 //! ```
 //!
 //! Sums are joined block by block within a piece, then piece by piece, whoever made them: the same bits for any number of threads and machines.
@@ -15,7 +15,7 @@ use crate::{cell::Cell, experiment::Experiment, noise::Noise, tally::Tally};
 
 /// Trials that one thread does at a stretch.
 const BLOCK: u64 = 50;
-/// Pieces of a scene at the most: many trials are divided, and few sums are kept.
+/// Pieces of an ordinary scene at the most: many trials are divided, and few sums are kept.
 const PIECES: u64 = 1024;
 
 /// The sums of a piece, for each row of its scene.
@@ -23,9 +23,9 @@ const PIECES: u64 = 1024;
 #[serde(transparent)]
 pub struct Sums(Vec<Tally>);
 
-/// The pieces of a scene: ranges of trials that follow each other.
-pub(crate) fn pieces(trials: u64) -> Vec<Range<u64>> {
-    let length = trials.div_ceil(BLOCK).div_ceil(PIECES).max(1) * BLOCK;
+/// The pieces of a scene: ranges of its trials that follow each other, in all scenes of a study of `base` trials equally long.
+pub(crate) fn pieces(trials: u64, base: u64) -> Vec<Range<u64>> {
+    let length = base.div_ceil(BLOCK).div_ceil(PIECES).max(1) * BLOCK;
     let starts = (0..trials.div_ceil(length)).map(|piece| piece * length);
     starts
         .map(|start| start..trials.min(start + length))
@@ -95,9 +95,10 @@ mod tests {
 
     #[test]
     fn pieces_are_whole_blocks_that_follow_each_other() {
-        for trials in [0, 1, 49, 50, 51, 1500, 51_200, 51_201, 1_000_003] {
-            let all = pieces(trials);
-            assert!(all.len() as u64 <= PIECES);
+        for trials in [0_u64, 1, 49, 50, 51, 1500, 51_200, 51_201, 1_000_003] {
+            let base = trials.div_ceil(3);
+            let all = pieces(trials, base);
+            assert!(all.len() as u64 <= 3 * PIECES);
             assert!(all.windows(2).all(|w| w[0].end == w[1].start));
             assert!(all.iter().all(|p| p.start % BLOCK == 0 && p.start < p.end));
             assert_eq!(all.first().map_or(0, |p| p.start), 0);

@@ -149,7 +149,7 @@ fn cells_of(
     options: &StudyOptions,
     advance: &(dyn Fn(u64) + Sync),
 ) -> Vec<Cell> {
-    let pieces = pieces(experiment.trials(options.trials));
+    let pieces = pieces(experiment.trials(options.trials), options.trials);
     let made: Vec<Sums> = pieces
         .par_iter()
         .map(|piece| sums(experiment, options.seed, piece, advance))

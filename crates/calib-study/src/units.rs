@@ -35,7 +35,9 @@ impl<'a> Units<'a> {
             return Err(StudyError::NoTrials { got: 0 });
         }
         let plan = plan(study, tried);
-        let pieces = plan.iter().map(|e| pieces(e.trials(options.trials)));
+        let pieces = plan
+            .iter()
+            .map(|e| pieces(e.trials(options.trials), options.trials));
         let numbered = pieces.enumerate();
         let of = |(scene, all): (usize, Vec<Range<u64>>)| all.into_iter().map(move |p| (scene, p));
         let units = numbered.flat_map(of).collect();
