@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import calib
 import calib.ray
@@ -31,7 +32,7 @@ def halves(program: str, trials: int, out: Path) -> float:
 
 def cluster(program: str, trials: int, shards: int, out: Path) -> float:
     os.environ.setdefault("PYTHONPATH", str(Path(calib.__file__).parents[1]))
-    made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    made: Any = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
     made.add_node(num_cpus=1)
     ray.init(address=made.address, log_to_driver=False)
     # Nodes, their workers and the function are there before the clock runs.

@@ -104,11 +104,24 @@ def busy_threads() -> int:
     return len(os.listdir("/proc/self/task"))
 
 
+@pytest.fixture(scope="module")
+def selection_s() -> float:
+    """How long a selection takes on this machine, which fits many models: the shorter of two."""
+
+    def once() -> float:
+        started = time.monotonic()
+        calib.run("robots/ripley.yaml", select=True)
+        return time.monotonic() - started
+
+    return min(once(), once())
+
+
 @pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are counted on Linux")
-@pytest.mark.parametrize("after", [0.1, 0.35, 0.6, 0.85, 1.1])
+@pytest.mark.parametrize("part", [0.05, 0.2, 0.35, 0.5, 0.6])
 def test_an_interrupt_is_answered_within_100_ms(
-    after: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    part: float, selection_s: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    after = part * selection_s
     calib.run("robots/ripley.yaml", method="paper")  # The pool of threads is there from now on.
     time.sleep(0.2)  # The thread of that run is gone.
     before = busy_threads()
@@ -121,7 +134,6 @@ def test_an_interrupt_is_answered_within_100_ms(
     timer = threading.Timer(after, interrupt)
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        # Long enough for every delay: the selection fits many models.
         calib.run("robots/ripley.yaml", select=True, out=tmp_path / "out")
     answered = time.monotonic() - sent[0]
     timer.join()
@@ -129,7 +141,7 @@ def test_an_interrupt_is_answered_within_100_ms(
         time.sleep(0.002)
     ended = time.monotonic() - sent[0]
     with capsys.disabled():
-        print(f"\ninterrupted after {after} s: answered in {answered * 1e3:.0f} ms, computation ended in {ended * 1e3:.0f} ms")
+        print(f"\ninterrupted after {after:.2f} s: answered in {answered * 1e3:.0f} ms, computation ended in {ended * 1e3:.0f} ms")
     assert answered < 0.1
     assert ended < 10
     left = [p.name for p in tmp_path.rglob("*") if p.suffix in (".json", ".html", ".urdf")]
