@@ -71,7 +71,7 @@ pub struct Identity {
     pub seed: u64,
     /// SHA-256 of the settings and of everything that is read.
     pub inputs: String,
-    /// Units of the whole work: scenes, cases, trials, robots.
+    /// Units of the whole work: parts of scenes, cases, trials, robots.
     pub units: u64,
     /// Version of the program.
     pub version: String,

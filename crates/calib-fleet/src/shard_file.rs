@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! unit   number of the unit in the whole work, from 0
-//! name   what it is: a scene, a case, a trial, a robot
+//! name   what it is: a part of a scene, a case, a trial, a robot
 //! result its result as JSON
 //! ```
 
