@@ -242,6 +242,11 @@ fn simulated_streams_and_logs_are_read_by_the_profile_that_asks_for_them() {
             "motion",
             "use: static\n    timing: {poses: continuous}".to_owned(),
         ),
+        // Names, units and separators of another table: the map reads them.
+        (
+            "mapped",
+            "use: static\n    columns: {joints: {joint_1: A1, joint_2: A2}, reversed: [joint_2], angles: deg, delimiter: semicolon, decimal_comma: true}".to_owned(),
+        ),
     ] {
         // The recording of random postures, as the profile would have it.
         let timed = profile.replacen("use: static", &poses, 1);
@@ -253,6 +258,10 @@ fn simulated_streams_and_logs_are_read_by_the_profile_that_asks_for_them() {
         std::fs::write(dir.path(&at), timed).expect("a file");
         let simulated = dir.calib_with(&["simulate", &at, "--out", &format!("{folder}/arm")]);
         assert_eq!(simulated.code, 0, "{name}: {}", simulated.stderr);
+        if name == "mapped" {
+            let table = dir.read(&format!("{folder}/arm/poses.csv"));
+            assert!(table.lines().any(|line| line.starts_with("A1;A2;")), "{table}");
+        }
         let out = format!("results/{name}");
         let ran = dir.calib_with(&["run", &at, "--out", &out]);
         assert!(ran.code < 2, "{name}: {}{}", ran.stdout, ran.stderr);
@@ -384,13 +393,25 @@ fn from_a_urdf_alone_to_a_plan_and_a_run() {
     assert!(ran.code < 2, "{}{}", ran.stdout, ran.stderr);
 }
 
+/// Poses of a flange and of a tracked body, and no joints.
+const PAIRS: &str = "flange_x,flange_y,flange_z,flange_qx,flange_qy,flange_qz,flange_qw,meas_x,meas_y,meas_z,meas_qx,meas_qy,meas_qz,meas_qw
+1,2,3,0,0,0,1,1,2,3,0,0,0,1
+1.1,2,3,0,0,0,1,1,2.1,3,0,0,0,1
+";
+
 #[test]
 fn bad_calls_are_refused_and_write_nothing() {
     let urdf = std::fs::read(root().join("book/src/tutorial/arm.urdf")).expect("committed");
     let dir = Scratch::new()
         .file("arm.urdf", urdf)
         .file("empty.csv", "")
-        .file("joints.csv", "pose,joint_1_deg\n0,1\n1,2\n");
+        .file("joints.csv", "pose,joint_1_deg\n0,1\n1,2\n")
+        .file("trial.c3d", [&[2, 80][..], &[7; 1024]].concat())
+        .file("bytes.bin", [&[200, 1, 0, 3][..], &[0; 64]].concat())
+        .file("notes.txt", "The arm was recorded in May.\n")
+        .file("pairs.csv", PAIRS)
+        .file("open.urdf", "<robot name=\"a\"><link name=\"b\"></robot>")
+        .file("latin.urdf", &b"<robot name=\"caf\xe9\"/>"[..]);
     for (call, code, said) in [
         (["init", "no.urdf"].as_slice(), 2, "no.urdf"),
         (&["init", "arm.urdf", "no.csv"], 2, "no.csv"),
@@ -401,6 +422,31 @@ fn bad_calls_are_refused_and_write_nothing() {
             "nothing was tracked",
         ),
         (&["init", "empty.csv"], 2, "empty.csv"),
+        (
+            &["init", "joints.csv"],
+            2,
+            "this is a recording (a table with the columns `pose`, `joint_1_deg`), not a URDF",
+        ),
+        (
+            &["init", "joints.csv", "arm.urdf"],
+            2,
+            "`calib init robot.urdf joints.csv`",
+        ),
+        (&["init", "trial.c3d"], 2, "this is a recording (C3D)"),
+        (
+            &["init", "bytes.bin"],
+            2,
+            "this is a binary file, not a URDF",
+        ),
+        (&["init", "notes.txt"], 2, "this is text that is not XML"),
+        (
+            &["init", "pairs.csv"],
+            2,
+            "calib fit handeye pairs.csv --robot flange --measured meas",
+        ),
+        // A URDF with a fault stays one.
+        (&["init", "open.urdf"], 2, "not well-formed XML"),
+        (&["init", "latin.urdf"], 2, "is not UTF-8"),
         (
             &["init", "arm.urdf", "--markers-on", "flansh"],
             2,
@@ -516,6 +562,10 @@ fn pairs_of_poses_lead_to_the_hand_eye_solver() {
     assert_eq!(refused.code, 3);
     let named = "calib fit handeye pairs.csv --robot flange --measured meas";
     assert!(refused.stderr.contains(named), "{}", refused.stderr);
+    // Nor is a URDF needed.
+    let alone = dir.calib(["init", "pairs.csv"]);
+    assert_eq!(alone.code, 2);
+    assert!(alone.stderr.contains(named), "{}", alone.stderr);
     let call: Vec<&str> = named.split(' ').skip(1).collect();
     let solved = dir.calib_with(&call);
     assert_eq!(solved.code, 0, "{}{}", solved.stdout, solved.stderr);

@@ -6,6 +6,8 @@ use calib_pipeline::error::ExitCode;
 use calib_profile::ProfileError;
 use calib_urdf::ReadError;
 
+use crate::instead::Instead;
+
 /// Why there is no profile.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -13,6 +15,18 @@ pub enum InitError {
     /// The URDF.
     #[error(transparent)]
     Urdf(#[from] ReadError),
+    /// The first file is a recording, or no XML at all.
+    #[error(
+        "{file}: this is {}, not a URDF\n  help: {}",
+        instead(found),
+        instead_of_urdf(found, file)
+    )]
+    NotAUrdf {
+        /// The file.
+        file: String,
+        /// What it is.
+        found: Instead,
+    },
     /// A recording cannot be read, and is no table with a header either.
     #[error(transparent)]
     Recording(#[from] calib_recording::Error),
@@ -166,12 +180,43 @@ fn listed(names: &[String]) -> String {
     shown.join(", ")
 }
 
+/// What was given in place of a URDF.
+fn instead(found: &Instead) -> String {
+    match found {
+        Instead::Recording(format) => format!("a recording ({format})"),
+        Instead::Table(columns) => {
+            format!("a recording (a table with the columns {})", listed(columns))
+        }
+        Instead::Pairs([first, second]) => {
+            format!("a recording (a table of poses of `{first}` and `{second}`, without joints)")
+        }
+        Instead::Binary => "a binary file".to_owned(),
+        Instead::Text => "text that is not XML".to_owned(),
+    }
+}
+
+fn instead_of_urdf(found: &Instead, file: &str) -> String {
+    let order = format!("`calib init robot.urdf {file}`");
+    match found {
+        Instead::Recording(_) | Instead::Table(_) => {
+            format!("give the URDF of the robot first, then its recordings: {order}")
+        }
+        Instead::Pairs([first, second]) => format!(
+            "where both are fixed needs no URDF: `calib fit handeye {file} --robot {first} --measured {second}`; for a profile give the URDF of the robot first, and a recording of its joints"
+        ),
+        Instead::Binary | Instead::Text => {
+            "give the URDF of the robot: an XML file that begins with `<robot name=…>`".to_owned()
+        }
+    }
+}
+
 impl InitError {
     /// The file that it is about; `None`: the error inside knows.
     #[must_use]
     pub fn file(&self) -> Option<&str> {
         match self {
-            Self::NothingMoves { file }
+            Self::NotAUrdf { file, .. }
+            | Self::NothingMoves { file }
             | Self::NoRange { file, .. }
             | Self::Unread { file, .. }
             | Self::NoJoints { file, .. }

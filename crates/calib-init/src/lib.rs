@@ -7,6 +7,7 @@ pub mod correct;
 mod error;
 pub mod fact;
 pub mod header;
+mod instead;
 pub mod json;
 pub mod limits;
 pub mod links;
@@ -25,6 +26,7 @@ mod yaml;
 
 pub use error::InitError;
 pub use fact::{About, Fact, Place};
+pub use instead::{HEAD, Instead, not_a_urdf};
 pub use nalgebra;
 pub use proposal::Proposal;
 pub use propose::{Request, propose};

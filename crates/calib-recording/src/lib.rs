@@ -43,5 +43,7 @@ pub use model::{
 };
 pub use poses::{NotOneTable, Poses};
 pub use readers::{ReadOptions, RotationForm, read_bytes, read_path, read_path_with};
-pub use table::{NotWritten, WRITTEN_LIVE, WriteOptions, write_poses, write_recording};
+pub use table::{
+    NotWritten, WRITTEN_LIVE, WriteOptions, write_mapped, write_poses, write_recording,
+};
 pub use units::{AngleUnit, LengthUnit, TimeUnit};

@@ -1,9 +1,10 @@
 //! `calib init`.
 
+use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use calib_files::{FileError, OutputFile, folder_of, input, make_folder, write_new};
-use calib_init::{File, InitError, Request, json, propose, terminal, write};
+use calib_init::{File, HEAD, InitError, Request, json, not_a_urdf, propose, terminal, write};
 use calib_pipeline::ExitCode;
 use calib_pipeline::check;
 use calib_pipeline::options::Plugins;
@@ -34,7 +35,7 @@ pub fn run(console: &Console, options: &Init) -> Result<ExitCode, CliError> {
     let bar = spinner(console.quiet);
     bar.set_message("read the URDF");
     let shown = options.urdf.display().to_string();
-    let model = RobotModel::from_urdf_file(&options.urdf).map_err(InitError::from)?;
+    let model = robot(&options.urdf, &shown)?;
     let out = options
         .out
         .clone()
@@ -83,6 +84,18 @@ pub fn run(console: &Console, options: &Init) -> Result<ExitCode, CliError> {
     Ok(checked
         .as_ref()
         .map_or(ExitCode::Accepted, check::exit_code))
+}
+
+/// The robot; where the file is none, what it is instead.
+fn robot(path: &Path, shown: &str) -> Result<RobotModel, InitError> {
+    RobotModel::from_urdf_file(path).map_err(|error| {
+        let mut head = Vec::new();
+        // What cannot be read is told by the error that there is.
+        if let Ok(file) = input::open(path) {
+            let _ = file.take(HEAD as u64).read_to_end(&mut head);
+        }
+        not_a_urdf(shown, error, &head)
+    })
 }
 
 fn default_profile(model: &RobotModel, urdf: &Path) -> PathBuf {

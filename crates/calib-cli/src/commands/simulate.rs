@@ -8,7 +8,7 @@ use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::load::{RobotProfile, load_robot};
 use calib_plan::PlanError;
 use calib_profile::{RecordingSpec, Usage};
-use calib_recording::{Poses, WriteOptions};
+use calib_recording::{ColumnMap, NotWritten, Poses, WriteOptions, write_mapped, write_poses};
 use clap::Args;
 
 use super::plan_file::plan_of;
@@ -83,11 +83,16 @@ fn simulate(
             degrees: true,
             ..WriteOptions::micro()
         };
-        let written = |poses: &Poses| {
-            calib_recording::write_poses(poses, &options).map_err(|source| CliError::Table {
+        let written = |poses: &Poses, columns: Option<&ColumnMap>| {
+            table(poses, columns, &options).map_err(|source| CliError::Table {
                 file: format!("recording `{name}`"),
+                remedy: match source {
+                    NotWritten::Mapped { .. } | NotWritten::Misread { .. } if columns.is_some() => {
+                        "correct `columns` of this recording, or remove it while the recording is a simulated one"
+                    }
+                    _ => "use names without commas, quotes and line breaks",
+                },
                 source,
-                remedy: "use names without commas, quotes and line breaks",
                 code: ExitCode::Usage,
             })
         };
@@ -99,9 +104,14 @@ fn simulate(
                 ..poses.clone()
             };
             poses.joints.clear();
-            files.push(OutputFile::text(file_name_of(&log.file), written(&joints)?));
+            files.push(OutputFile::text(
+                file_name_of(&log.file),
+                written(&joints, log.columns.as_ref())?,
+            ));
         }
-        files.push(OutputFile::text(file_name(robot, name), written(&poses)?));
+        let columns = spec.and_then(|spec| spec.columns.as_ref());
+        let text = written(&poses, columns)?;
+        files.push(OutputFile::text(file_name(robot, name), text));
     }
     let mut truth =
         serde_json::to_string_pretty(&simulated.truth).map_err(|source| CliError::Json {
@@ -112,6 +122,25 @@ fn simulate(
     truth.push('\n');
     files.push(OutputFile::text("truth.json", truth));
     Ok(files)
+}
+
+/// A table as the profile reads it: with the names and units of its column map, where it has one.
+fn table(
+    poses: &Poses,
+    columns: Option<&ColumnMap>,
+    options: &WriteOptions,
+) -> Result<String, NotWritten> {
+    let Some(map) = columns else {
+        return write_poses(poses, options);
+    };
+    let mut map = map.clone();
+    let texts = poses
+        .labels
+        .keys()
+        .filter(|text| !map.labels.contains(text));
+    let texts: Vec<String> = texts.cloned().collect();
+    map.labels.extend(texts);
+    write_mapped(poses, &map, options)
 }
 
 /// The postures of a plan by recording.

@@ -4,9 +4,11 @@ mod header;
 mod read;
 mod rows;
 mod write;
+mod write_mapped;
 
 pub(crate) use header::is_canonical;
 pub use read::WRITTEN_LIVE;
 pub(crate) use read::read_table;
 pub(crate) use rows::UNIT_TOLERANCE;
 pub use write::{NotWritten, WriteOptions, write_poses, write_recording};
+pub use write_mapped::write_mapped;

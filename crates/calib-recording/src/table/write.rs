@@ -62,6 +62,12 @@ pub enum NotWritten {
         /// The name.
         name: String,
     },
+    /// A column map that cannot read a table of one row for every posture.
+    #[error("the profile's `columns` do not read such a table: {why}")]
+    Mapped {
+        /// Why.
+        why: String,
+    },
     /// Two streams of one name.
     #[error(transparent)]
     NotOneTable(#[from] NotOneTable),
@@ -91,8 +97,8 @@ pub enum NotWritten {
 type Filled = BTreeMap<String, Vec<bool>>;
 
 /// One output column.
-struct OutColumn<'a> {
-    name: String,
+pub(super) struct OutColumn<'a> {
+    pub name: String,
     decimals: Option<usize>,
     value: Box<dyn Fn(usize) -> Option<f64> + 'a>,
 }
@@ -224,7 +230,7 @@ fn header(
 }
 
 /// States which columns are joints, where their names alone say something else.
-fn state_joints(poses: &Poses, columns: &mut [OutColumn<'_>]) {
+pub(super) fn state_joints(poses: &Poses, columns: &mut [OutColumn<'_>]) {
     for column in columns {
         let name = column.name.rsplit_once('_').map(|(joint, _)| joint);
         let of_joint = name.filter(|joint| poses.joints.contains_key(*joint));
@@ -234,7 +240,7 @@ fn state_joints(poses: &Poses, columns: &mut [OutColumn<'_>]) {
     }
 }
 
-fn columns<'a>(poses: &'a Poses, options: &WriteOptions) -> Vec<OutColumn<'a>> {
+pub(super) fn columns<'a>(poses: &'a Poses, options: &WriteOptions) -> Vec<OutColumn<'a>> {
     let decimals = options.decimals;
     let mut columns: Vec<OutColumn<'a>> = Vec::new();
     if let Some(t) = &poses.t {
@@ -382,7 +388,7 @@ fn cell(name: &str) -> Cow<'_, str> {
 }
 
 /// Shortest exact text, or fixed decimals without trailing zeros; never `-0`.
-fn push_number(out: &mut String, value: f64, decimals: Option<usize>) {
+pub(super) fn push_number(out: &mut String, value: f64, decimals: Option<usize>) {
     let value = if value == 0.0 { 0.0 } else { value };
     let Some(decimals) = decimals else {
         let _ = write!(out, "{value}");

@@ -4,6 +4,7 @@ mod bad_tables;
 mod bags;
 mod fixtures;
 mod fuzz_seeds;
+mod mapped;
 mod mutations;
 mod real_formats;
 mod real_tables;

@@ -1,0 +1,100 @@
+//! Tables that are written for a column map: the map reads back what was written, or the reason is told.
+
+use calib_recording::{
+    ColumnMap, Filled, Poses, ReadOptions, WriteOptions, read_bytes, write_mapped,
+};
+
+fn poses() -> Poses {
+    let text = "elbow_deg,lift_mm,wrist_deg,elbow_nm,m1.x_mm,m1.y_mm,m1.z_mm,m2.x_mm,m2.y_mm,m2.z_mm,hand.x_m,hand.y_m,hand.z_m,hand.qx,hand.qy,hand.qz,hand.qw\n\
+                10,250,-20,1.5,1000,2000,3000,5,6,7,0.1,0.2,0.3,0.5,0.5,0.5,0.5\n\
+                -90,1,30,-2,,,,5,6,8,0.4,0.2,0.3,0,0,0,1\n";
+    let read = read_bytes("poses.csv", text.as_bytes(), &ReadOptions::default());
+    let read = read.unwrap_or_else(|e| panic!("{e}"));
+    read.poses(Filled::Exclude).expect("one table")
+}
+
+fn map(json: &str) -> ColumnMap {
+    serde_json::from_str(json).unwrap_or_else(|e| panic!("{e}: {json}"))
+}
+
+fn options() -> WriteOptions {
+    WriteOptions {
+        comments: vec!["simulated".to_owned()],
+        degrees: true,
+        ..WriteOptions::micro()
+    }
+}
+
+#[test]
+fn a_map_reads_back_what_was_written_for_it() {
+    let poses = poses();
+    for json in [
+        r#"{"joints": {"elbow": "A1", "wrist": "A2"}, "angles": "deg", "reversed": ["wrist"]}"#,
+        r#"{"joint_columns": ["elbow"], "prismatic": {"lift": "Z [mm]"}, "lengths": "in"}"#,
+        r#"{"markers": {"m1": ["X", "Y", "Z"], "m2": ["X2", "Y2", "Z2"]}, "lengths": "cm", "torques": {"elbow": "T1"}}"#,
+        r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "fixed_xyz": ["a", "b", "c"]}}, "angles": "deg", "delimiter": "semicolon"}"#,
+        r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "rotation_vector": ["a", "b", "c"]}}, "decimal_comma": true}"#,
+        r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "quaternion_wxyz": ["a", "b", "c", "d"]}}, "delimiter": "space", "skip_lines": 3}"#,
+        r#"{"joints": {"elbow": "A1"}, "time": {"column": "t", "unit": "ms"}, "delimiter": "tab"}"#,
+        r#"{"names": ["e", "l", "w", "x", "y", "z", "u", "v", "s", "p", "q", "r", "a", "b", "c", "d", "n"],
+            "joints": {"elbow": "e", "wrist": "w"}, "prismatic": {"lift": "l"}, "torques": {"elbow": "n"},
+            "markers": {"m1": ["x", "y", "z"], "m2": ["u", "v", "s"]},
+            "bodies": {"hand": {"position": ["p", "q", "r"], "quaternion_xyzw": ["a", "b", "c", "d"]}}}"#,
+    ] {
+        let map = map(json);
+        let text = write_mapped(&poses, &map, &options()).unwrap_or_else(|e| panic!("{json}: {e}"));
+        let read = ReadOptions {
+            columns: Some(map),
+            ..ReadOptions::default()
+        };
+        let read = read_bytes("t.csv", text.as_bytes(), &read);
+        let read = read.unwrap_or_else(|e| panic!("{json}: {e}\n{text}"));
+        let read = read.poses(Filled::Exclude).expect("one table");
+        for (joint, q) in &poses.joints {
+            for (a, b) in q.iter().zip(&read.joints[joint]) {
+                let (a, b) = (a.expect("given"), b.expect("given"));
+                assert!((a - b).abs() < 1e-6, "{json}: {joint} {a} {b}\n{text}");
+            }
+        }
+        assert_eq!(read.markers["m1"][1], None, "{json}\n{text}");
+        let there = |p: &Poses| p.markers["m2"][1].expect("given").z;
+        assert!((there(&read) - there(&poses)).abs() < 2e-6, "{text}");
+        let off = poses.bodies["hand"][0].expect("given").inverse()
+            * read.bodies["hand"][0].expect("given");
+        assert!(off.rotation.angle() < 1e-6 && off.translation.vector.norm() < 1e-6);
+        assert!((read.torques["elbow"][1].expect("given") + 2.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_map_that_cannot_read_such_a_table_is_refused_with_the_reason() {
+    let poses = poses();
+    for (json, said) in [
+        (
+            r#"{"long": {"name": "n", "frame": "f", "marker": ["x", "y", "z"]}}"#,
+            "one row for every body or marker",
+        ),
+        (
+            r#"{"decimal_comma": true, "delimiter": "comma"}"#,
+            "decimal_comma",
+        ),
+        (
+            r#"{"joints": {"elbow": "A 1"}, "delimiter": "space"}"#,
+            "A 1",
+        ),
+        // Nothing of this table is among the names.
+        (
+            r#"{"names": ["a", "b"], "joints": {"elbow": "a"}}"#,
+            "`lift`",
+        ),
+        // A name that says another unit than the map.
+        (
+            r#"{"joints": {"wrist": "A2_rad"}, "angles": "deg"}"#,
+            "A2_rad",
+        ),
+    ] {
+        let refused = write_mapped(&poses, &map(json), &options());
+        let why = refused.err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(why.contains(said), "{json}: {why}");
+    }
+}
