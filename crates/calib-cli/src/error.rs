@@ -75,6 +75,12 @@ pub enum CliError {
         /// What was given.
         sigma: f64,
     },
+    /// A time that is asked for is none.
+    #[error("{time} is not a time\n  help: give a number of seconds above 0: `--path-time-s 120`")]
+    NotATime {
+        /// What was given.
+        time: f64,
+    },
     /// A factor of the noise that is none.
     #[error(
         "the noise cannot be multiplied by {factor}\n  help: give a number above 0: `--noise-times 2`"
@@ -224,6 +230,7 @@ impl CliError {
             Self::Capture(CaptureError::Source(_)) => ExitCode::Data,
             Self::Capture(CaptureError::Table(_)) => ExitCode::NotWritten,
             Self::NotASigma { .. }
+            | Self::NotATime { .. }
             | Self::NotANoiseFactor { .. }
             | Self::NotABound { .. }
             | Self::OtherPlugin { .. }

@@ -30,9 +30,12 @@ const STEPS: usize = 50;
 
 impl Question<'_> {
     /// The share of the best possible choice of as many different postures that some postures reach at least: equation (3) at the best
-    /// weights, and (4) from there to the postures. Per parameter; of a trace in σ. `None` where M is singular.
+    /// weights, and (4) from there to the postures. Per parameter; of a trace and of the least determined combination in σ. `None` where M is singular.
     #[must_use]
     pub fn certificate(&self, chosen: &[usize]) -> Option<f64> {
+        if let Criterion::Smallest(s) = self.criterion {
+            return self.certificate_smallest(s, chosen);
+        }
         let own = self.information(chosen);
         let mixture = self.mixture(chosen)?;
         let mut best = 0.0_f64;
@@ -195,6 +198,7 @@ impl Criterion {
             Self::Determinant => ((own - best) / k.nrows() as f64).exp(),
             Self::Subset(s) => ((own - best) / s.nrows() as f64).exp(),
             Self::Trace(_) => best / own,
+            Self::Smallest(_) => own / best,
         })
     }
 }

@@ -50,7 +50,11 @@ pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError>
     let of = |i: &usize| prepared.candidates[*i].clone();
     let postures: Vec<Candidate> = chosen.iter().map(of).collect();
     let rows: Vec<_> = chosen.iter().map(|i| prepared.rows[*i].clone()).collect();
-    let first = (BY_INFORMATION, None);
+    // Where the time is short, the way alone decides the order.
+    let first = match prepared.options.path_time {
+        None => (BY_INFORMATION, None),
+        Some(_) => (0, None),
+    };
     let order = in_order(prepared, (&postures, &rows), &prepared.before, first);
     let mut list: Vec<Listed> = order
         .into_iter()
@@ -111,6 +115,7 @@ pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError>
         joints: prepared.joints.clone(),
         asked: Asked {
             sigma: prepared.options.sigma,
+            path_time: prepared.options.path_time,
             of: prepared.options.of.clone(),
             seed: prepared.options.seed,
             task: prepared.options.task.clone().unwrap_or_default(),

@@ -5,6 +5,7 @@
 //! determinant   log det M                    H = K                                                                     (2)
 //! subset        −log det S K Sᵀ              H = K Sᵀ (S K Sᵀ)⁻¹ S K     the others are nuisances                      (3)
 //! trace         −tr(L K)                     H = K L K                                                                 (4)
+//! smallest      1/λ_max(S K Sᵀ)              in `smallest`
 //! ```
 //!
 //! H is the derivative by M. A posture changes K by a matrix of its rows' rank (Woodbury, with `C = 1 ± Y K Yᵀ`):
@@ -16,6 +17,7 @@
 //!
 //! How far the choice is from the best possible is the subject of `bound`.
 
+use calib_geometry::decompose;
 use nalgebra::{Cholesky, DMatrix};
 use rayon::prelude::*;
 
@@ -28,6 +30,8 @@ pub enum Criterion {
     Subset(DMatrix<f64>),
     /// The mean variance of a task, equation (4), L ≥ 0: I-optimal; with L = 1 A-optimal.
     Trace(DMatrix<f64>),
+    /// The least determined combination of some, the rows of the matrix: E-optimal.
+    Smallest(DMatrix<f64>),
 }
 
 /// What is to be chosen from.
@@ -57,6 +61,9 @@ impl Question<'_> {
     /// largest of the best weights (`bound`); the better end is taken.
     #[must_use]
     pub fn choose(&self, count: usize, taken: &[usize]) -> Vec<usize> {
+        if let Criterion::Smallest(s) = self.criterion {
+            return self.choose_smallest(s, count, taken);
+        }
         let greedy = self.quick(count, taken);
         let Some(best) = self.mixture(&greedy) else {
             return greedy;
@@ -78,6 +85,13 @@ impl Question<'_> {
     /// [`Question::choose`] from the greedy choice only: a few percent worse, in a fraction of the time.
     #[must_use]
     pub fn quick(&self, count: usize, taken: &[usize]) -> Vec<usize> {
+        if let Some(mean) = self.criterion.smooth() {
+            let question = Question {
+                criterion: &mean,
+                ..*self
+            };
+            return question.quick(count, taken);
+        }
         let mut state = State::new(self);
         let mut free = vec![true; self.rows.len()];
         for &i in taken {
@@ -128,6 +142,13 @@ impl Question<'_> {
     /// The postures one after the other, each the best beside those before it.
     #[must_use]
     pub fn greedy(&self, count: usize) -> Vec<usize> {
+        if let Some(mean) = self.criterion.smooth() {
+            let question = Question {
+                criterion: &mean,
+                ..*self
+            };
+            return question.greedy(count);
+        }
         State::new(self).greedy(count, &mut vec![true; self.rows.len()])
     }
 
@@ -156,12 +177,26 @@ impl Question<'_> {
 }
 
 impl Criterion {
+    /// The mean variance in place of the largest: what a single posture changes shows in it also before all directions are determined.
+    fn smooth(&self) -> Option<Self> {
+        match self {
+            Self::Smallest(s) => Some(Self::Trace(s.transpose() * s)),
+            _ => None,
+        }
+    }
+
     /// Equations (2) to (4) from K.
     pub(crate) fn value(&self, k: &DMatrix<f64>) -> Option<f64> {
         match self {
             Self::Determinant => Some(-log_det(k)?),
             Self::Subset(s) => Some(-log_det(&(s * k * s.transpose()))?),
             Self::Trace(l) => Some(-l.dot(k)),
+            Self::Smallest(s) => {
+                let largest = decompose::symmetric_eigen(&(s * k * s.transpose()))
+                    .values
+                    .max();
+                (largest > 0.0).then(|| 1.0 / largest)
+            }
         }
     }
 
@@ -175,6 +210,13 @@ impl Criterion {
                 Some(sk.transpose() * inner * sk)
             }
             Self::Trace(l) => Some(k * l * k),
+            // Of the largest μ = uᵀ S K Sᵀ u: K Sᵀ u uᵀ S K / μ²
+            Self::Smallest(s) => {
+                let spectrum = decompose::symmetric_eigen(&(s * k * s.transpose()));
+                let (place, largest) = spectrum.values.argmax();
+                let along = k * s.transpose() * spectrum.vectors.column(place);
+                (largest > 0.0).then(|| &along * along.transpose() / (largest * largest))
+            }
         }
     }
 }
@@ -240,6 +282,8 @@ impl<'a> State<'a> {
                 None => f64::NEG_INFINITY,
             },
             Criterion::Trace(_) => sign * root.solve(&self.t[i]).trace(),
+            // Its exchanges are those of `smallest`.
+            Criterion::Smallest(_) => f64::NEG_INFINITY,
         }
     }
 
@@ -266,37 +310,46 @@ impl<'a> State<'a> {
         let w = w.transpose();
         let rows = self.question.rows;
         self.k -= &w * w.transpose() * sign;
+        if let Criterion::Trace(l) = self.question.criterion {
+            // H± = H ∓ W (K L W)ᵀ ∓ (K L W) Wᵀ + W (Wᵀ L W) Wᵀ, with K before the change
+            let lw = l * &w;
+            let g = w.transpose() * &lw;
+            let klw = (&self.k + &w * w.transpose() * sign) * lw;
+            let half = &klw - &w * &g * (0.5 * sign);
+            self.h -= (&half * w.transpose() + &w * half.transpose()) * sign;
+            let rank = w.ncols();
+            // One product for both: most of the time of a choice is spent here.
+            let mut both = w.clone().resize_horizontally(2 * rank, 0.0);
+            both.columns_mut(rank, rank).copy_from(&half);
+            let streams = self.s.par_iter_mut().zip(&mut self.t).zip(rows);
+            streams.for_each(|((s, t), y)| {
+                let along = y * &both;
+                let yw = along.columns(0, rank);
+                let back = yw.transpose();
+                s.gemm(-sign, &yw, &back, 1.0);
+                let mixed = along.columns(rank, rank) * back;
+                for j in 0..mixed.ncols() {
+                    for i in 0..mixed.nrows() {
+                        t[(i, j)] -= sign * (mixed[(i, j)] + mixed[(j, i)]);
+                    }
+                }
+            });
+            return;
+        }
         let of_k = |(s, y): (&mut DMatrix<f64>, &DMatrix<f64>)| {
             let yw = y * &w;
             s.gemm(-sign, &yw, &yw.transpose(), 1.0);
         };
         self.s.par_iter_mut().zip(rows).for_each(of_k);
-        match self.question.criterion {
-            Criterion::Determinant => {}
-            Criterion::Trace(l) => {
-                // H± = H ∓ W (K L W)ᵀ ∓ (K L W) Wᵀ + W (Wᵀ L W) Wᵀ, with K before the change
-                let lw = l * &w;
-                let g = w.transpose() * &lw;
-                let klw = (&self.k + &w * w.transpose() * sign) * lw;
-                let half = &klw - &w * &g * (0.5 * sign);
-                self.h -= (&half * w.transpose() + &w * half.transpose()) * sign;
-                let of_h = |(t, y): (&mut DMatrix<f64>, &DMatrix<f64>)| {
-                    let (yw, yh) = (y * &w, y * &half);
-                    t.gemm(-sign, &yh, &yw.transpose(), 1.0);
-                    t.gemm(-sign, &yw, &yh.transpose(), 1.0);
-                };
-                self.t.par_iter_mut().zip(rows).for_each(of_h);
-            }
-            Criterion::Subset(_) => {
-                if let Some(h) = self.question.criterion.derivative(&self.k) {
-                    self.h = h;
-                    let h = &self.h;
-                    let of_h = |(t, y): (&mut DMatrix<f64>, &DMatrix<f64>)| {
-                        *t = y * h * y.transpose();
-                    };
-                    self.t.par_iter_mut().zip(rows).for_each(of_h);
-                }
-            }
+        if let Criterion::Subset(_) = self.question.criterion
+            && let Some(h) = self.question.criterion.derivative(&self.k)
+        {
+            self.h = h;
+            let h = &self.h;
+            let of_h = |(t, y): (&mut DMatrix<f64>, &DMatrix<f64>)| {
+                *t = y * h * y.transpose();
+            };
+            self.t.par_iter_mut().zip(rows).for_each(of_h);
         }
     }
 

@@ -1,5 +1,6 @@
 //! Why there is no plan.
 
+use calib_finding::number;
 use calib_pipeline::{ExitCode, PipelineError};
 
 use crate::candidates::Counts;
@@ -70,7 +71,7 @@ pub enum PlanError {
     },
     /// Parameters are named for a goal that is none of parameters.
     #[error(
-        "{file}: `--of` names parameters, `--goal task` is the position of the tool\n  help: use `--goal parameters` or `--goal variances`, or leave out `--of`"
+        "{file}: `--of` names parameters, `--goal task` is the position of the tool\n  help: use `--goal parameters`, `--goal variances` or `--goal weakest`, or leave out `--of`"
     )]
     OfWithoutParameters {
         /// The profile.
@@ -248,6 +249,36 @@ pub enum PlanError {
         /// What they reach.
         reached: String,
     },
+    /// The motions of the shortest plan take longer than they may.
+    #[error(
+        "{file}: the motions between {fewest} postures take {} s, {} s are asked for\n  help: allow more time, or make the ranges of `plan.joints` smaller", number::fixed(*least, 1), number::fixed(*asked, 1)
+    )]
+    TooLong {
+        /// The profile.
+        file: String,
+        /// Time that they may take, s.
+        asked: f64,
+        /// Postures of the shortest plan.
+        fewest: usize,
+        /// Time that they take, s.
+        least: f64,
+    },
+    /// The σ that was asked for is not reached in the time that the motions may take.
+    #[error(
+        "{file}: σ of {asked} is not reached in {} s of motion: {postures} postures fit, and reach {reached}\n  help: allow more time, or a larger σ", number::fixed(*most_s, 1)
+    )]
+    NotReachedInTime {
+        /// The profile.
+        file: String,
+        /// Asked for.
+        asked: String,
+        /// Time that the motions may take, s.
+        most_s: f64,
+        /// Postures that fit.
+        postures: usize,
+        /// What they reach.
+        reached: String,
+    },
     /// A posture of the profile's robot tells nothing.
     #[error(
         "{file}: nothing is free, so no posture tells anything\n  help: name what is to be found under `solve.free`"
@@ -294,6 +325,8 @@ impl PlanError {
             | Self::Impossible { file, .. }
             | Self::Outdated { file, .. }
             | Self::NotReached { file, .. }
+            | Self::NotReachedInTime { file, .. }
+            | Self::TooLong { file, .. }
             | Self::NothingFree { file }
             | Self::Table { file, .. } => Some(file),
         }
@@ -304,7 +337,7 @@ impl PlanError {
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Pipeline(error) => error.exit_code(),
-            Self::NotReached { .. } => ExitCode::VerdictFail,
+            Self::NotReached { .. } | Self::NotReachedInTime { .. } => ExitCode::VerdictFail,
             Self::OutOfReach { .. }
             | Self::NotJoints { .. }
             | Self::NotPlaces { .. }

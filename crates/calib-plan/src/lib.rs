@@ -20,6 +20,7 @@ pub mod prepare;
 pub mod scene;
 pub mod shape;
 pub mod sight;
+mod smallest;
 pub mod terminal;
 pub mod view;
 mod words;

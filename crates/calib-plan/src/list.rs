@@ -18,6 +18,8 @@ pub enum Goal {
     Parameters,
     /// All parameters, the sum of their variances in units of their priors.
     Variances,
+    /// The least determined combination of the parameters in units of their priors.
+    Weakest,
 }
 
 /// Why a posture is in the list.
@@ -56,6 +58,8 @@ pub struct Posture {
 pub struct Asked {
     /// σ of the task, m; `None`: a number of postures.
     pub sigma: Option<f64>,
+    /// Time of all motions at the most, s.
+    pub path_time: Option<f64>,
     /// Wanted parameters, by a part of their names.
     pub of: Vec<String>,
     /// Seed of the candidates.
@@ -119,6 +123,13 @@ impl Plan {
         let of = self.postures.get(place)?;
         let before = self.postures[..place].iter();
         (of.why != Why::Detour).then(|| before.filter(|p| p.why != Why::Detour).count())
+    }
+
+    /// Postures that are recorded: those on the way are not.
+    #[must_use]
+    pub fn recorded(&self) -> usize {
+        let recorded = self.postures.iter().filter(|p| p.why != Why::Detour);
+        recorded.count()
     }
 
     /// Parameters with a prior that the plan hardly narrows: by less than 30 %.

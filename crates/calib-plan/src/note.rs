@@ -83,6 +83,15 @@ pub enum Note {
         /// How many there are.
         found: usize,
     },
+    /// Fewer postures than asked for: the time of all motions allows no more.
+    PathTime {
+        /// How many were asked for.
+        asked: usize,
+        /// How many there are.
+        found: usize,
+        /// Time that they were to take at the most, whole seconds.
+        most_s: u64,
+    },
     /// The task depends on something that neither plan nor prior determines.
     TaskOpen,
 }

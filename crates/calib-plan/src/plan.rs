@@ -5,6 +5,7 @@ use crate::compose::{Effort, choice, compose};
 use crate::error::PlanError;
 use crate::known::Known;
 use crate::list::Plan;
+use crate::note::Note;
 use crate::prepare::{Options, Prepared, prepare};
 use crate::view::view;
 use crate::words;
@@ -26,8 +27,59 @@ pub fn plan(known: &Known, options: &Options) -> Result<Plan, PlanError> {
         None => compose(&prepared, options.poses.unwrap_or(POSES).max(FEWEST)),
         Some(asked) => for_sigma(&prepared, asked),
     }?;
+    if let Some(most) = options.path_time.filter(|most| plan.motion_time > *most) {
+        plan = within(&prepared, &plan, most)?;
+    }
     plan.view = view(&prepared, &plan);
     Ok(plan)
+}
+
+/// The plan with the most postures, fewer than those of another one, whose motions take no longer than a time, s. More postures take longer,
+/// but for what their choice and the detours change: the number is found by halving, and what is returned does fit.
+fn within(prepared: &Prepared<'_>, whole: &Plan, most: f64) -> Result<Plan, PlanError> {
+    let asked = whole.recorded();
+    let fits = |plan: &Plan| plan.motion_time <= most;
+    let mut best = compose(prepared, FEWEST)?;
+    if !fits(&best) {
+        return Err(PlanError::TooLong {
+            file: prepared.known.robot.file.clone(),
+            asked: most,
+            fewest: FEWEST,
+            least: best.motion_time,
+        });
+    }
+    let (mut low, mut high) = (FEWEST, asked);
+    while high - low > 1 {
+        let middle = low.midpoint(high);
+        let plan = compose(prepared, middle)?;
+        if fits(&plan) {
+            (low, best) = (middle, plan);
+        } else {
+            high = middle;
+        }
+    }
+    best.notes.push(Note::PathTime {
+        asked,
+        found: best.recorded(),
+        most_s: most.round() as u64,
+    });
+    let needed = prepared
+        .options
+        .sigma
+        .filter(|_| prepared.options.poses.is_none());
+    match needed {
+        // The time does not allow what the σ needs.
+        Some(sigma) if best.sigma.is_none_or(|reached| reached > sigma) => {
+            Err(PlanError::NotReachedInTime {
+                file: prepared.known.robot.file.clone(),
+                asked: words::length(Some(sigma)),
+                most_s: most,
+                postures: best.recorded(),
+                reached: words::length(best.sigma),
+            })
+        }
+        _ => Ok(best),
+    }
 }
 
 /// The plan with the fewest postures that reaches a σ.

@@ -26,6 +26,8 @@ pub struct Options {
     pub poses: Option<usize>,
     /// σ of the tool's position to be reached, m.
     pub sigma: Option<f64>,
+    /// Time of all motions at the most, s: fewer postures are taken where they take longer, and the way decides their order.
+    pub path_time: Option<f64>,
     /// What the postures are to be good at.
     pub goal: Goal,
     /// Parameters that the plan is to determine, by a part of their names; all when empty.
@@ -43,6 +45,7 @@ impl Default for Options {
         Self {
             poses: None,
             sigma: None,
+            path_time: None,
             goal: Goal::Task,
             of: Vec::new(),
             candidates: CANDIDATES,
@@ -221,6 +224,7 @@ fn criterion(options: &Options, basis: &Basis, linear: &Linear, b: &DMatrix<f64>
         Goal::Variances => Criterion::Trace(s.transpose() * s),
         Goal::Parameters if options.of.is_empty() => Criterion::Determinant,
         Goal::Parameters => Criterion::Subset(s),
+        Goal::Weakest => Criterion::Smallest(s),
     }
 }
 

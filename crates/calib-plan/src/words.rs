@@ -143,6 +143,7 @@ pub fn goal(goal: Goal) -> &'static str {
         Goal::Task => "the tool's position over the task postures (I-optimal)",
         Goal::Parameters => "all parameters together (D-optimal)",
         Goal::Variances => "the mean variance of the parameters (A-optimal)",
+        Goal::Weakest => "the least determined combination of the parameters (E-optimal)",
     }
 }
 
@@ -150,7 +151,7 @@ pub fn goal(goal: Goal) -> &'static str {
 #[must_use]
 pub fn efficiency_of(goal: Goal) -> &'static str {
     match goal {
-        Goal::Task | Goal::Variances => "in σ",
+        Goal::Task | Goal::Variances | Goal::Weakest => "in σ",
         Goal::Parameters => "per parameter",
     }
 }
@@ -227,6 +228,13 @@ pub fn note(note: &Note) -> String {
         }
         Note::FewerPairs { planned, found } => format!(
             "{found} of {planned} postures could be planned from both sides: obstacles or joint limits are in the way."
+        ),
+        Note::PathTime {
+            asked,
+            found,
+            most_s,
+        } => format!(
+            "{found} postures in place of {asked}: the motions between more of them take longer than {most_s} s."
         ),
         Note::TaskOpen => {
             "The tool's position depends on something that neither the plan nor a prior determines; its σ is not stated. Fix it in the profile or state a prior.".to_owned()

@@ -53,6 +53,9 @@ pub struct PlanFile {
 pub struct AskedLine {
     /// σ of the task, mm; absent: a number of postures.
     pub sigma_mm: Option<f64>,
+    /// Time of all motions at the most, s; absent: any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub path_time_s: Option<f64>,
     /// Wanted parameters, by a part of their names.
     pub of: Vec<String>,
     /// Seed of the candidates.
@@ -65,6 +68,7 @@ impl Default for AskedLine {
     fn default() -> Self {
         Self {
             sigma_mm: None,
+            path_time_s: None,
             of: Vec::new(),
             seed: 1,
             task: Vec::new(),
@@ -110,6 +114,7 @@ impl Plan {
             goal: self.goal,
             asked: AskedLine {
                 sigma_mm: mm(self.asked.sigma),
+                path_time_s: self.asked.path_time,
                 of: self.asked.of.clone(),
                 seed: self.asked.seed,
                 task: (self.asked.task.iter())

@@ -58,6 +58,7 @@ pub(crate) fn plan<'py>(
         match key.extract::<String>()?.as_str() {
             "poses" => asked.poses = value.extract()?,
             "sigma_m" => asked.sigma = value.extract()?,
+            "path_time_s" => asked.path_time = value.extract()?,
             "of" => asked.of = value.extract()?,
             "candidates" => asked.candidates = value.extract()?,
             "seed" => asked.seed = value.extract()?,
@@ -67,9 +68,11 @@ pub(crate) fn plan<'py>(
                     "task" => Goal::Task,
                     "parameters" => Goal::Parameters,
                     "variances" => Goal::Variances,
+                    "weakest" => Goal::Weakest,
                     other => {
-                        let text =
-                            format!("goal: found {other}; expected task, parameters or variances");
+                        let text = format!(
+                            "goal: found {other}; expected task, parameters, variances or weakest"
+                        );
                         return Err(misused(py, &text));
                     }
                 }

@@ -23,10 +23,13 @@ pub struct PlanPostures {
     /// As many postures as this σ of the tool's position needs, mm
     #[arg(long, conflicts_with = "poses")]
     sigma_mm: Option<f64>,
+    /// Longest time of all motions, s: fewer postures are taken where they take longer
+    #[arg(long)]
+    path_time_s: Option<f64>,
     /// What the postures are chosen for [default: task; with `--of` parameters]
     #[arg(long, value_enum)]
     goal: Option<GoalName>,
-    /// Only these parameters, by a part of their names; for the goals `parameters` and `variances`
+    /// Only these parameters, by a part of their names; for the goals `parameters`, `variances` and `weakest`
     #[arg(long, value_delimiter = ',')]
     of: Vec<String>,
     /// Table of joint positions, or of places of one link, body or marker (`flange.x_m,flange.y_m,flange.z_m`), where the robot is to be accurate [default: `plan.task_box_mm`, else all postures]
@@ -55,6 +58,8 @@ enum GoalName {
     Parameters,
     /// The mean variance of the parameters
     Variances,
+    /// The least determined combination of the parameters
+    Weakest,
 }
 
 /// Largest table of task postures, bytes.
@@ -72,6 +77,9 @@ pub fn run(console: &Console, options: &PlanPostures) -> Result<ExitCode, CliErr
     if let Some(sigma) = options.sigma_mm.filter(|s| !(*s > 0.0 && s.is_finite())) {
         return Err(CliError::NotASigma { sigma });
     }
+    if let Some(time) = options.path_time_s.filter(|t| !(*t > 0.0 && t.is_finite())) {
+        return Err(CliError::NotATime { time });
+    }
     progress("read profile and robot");
     let robot = load_robot(&options.profile)?;
     let out = options
@@ -85,6 +93,7 @@ pub fn run(console: &Console, options: &PlanPostures) -> Result<ExitCode, CliErr
     let mut asked = Options {
         poses: options.poses.map(usize::from),
         sigma: options.sigma_mm.map(|mm| mm * 1e-3),
+        path_time: options.path_time_s,
         goal: match (options.goal, options.of.is_empty()) {
             (Some(GoalName::Task), false) => {
                 return Err(PlanError::OfWithoutParameters {
@@ -95,6 +104,7 @@ pub fn run(console: &Console, options: &PlanPostures) -> Result<ExitCode, CliErr
             (Some(GoalName::Task) | None, true) => Goal::Task,
             (Some(GoalName::Parameters), _) | (None, false) => Goal::Parameters,
             (Some(GoalName::Variances), _) => Goal::Variances,
+            (Some(GoalName::Weakest), _) => Goal::Weakest,
         },
         of: options.of.clone(),
         candidates: options.candidates as usize,

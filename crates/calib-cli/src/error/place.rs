@@ -63,7 +63,10 @@ impl CliError {
             Self::Init(InitError::Urdf(_)) => "urdf",
             Self::Init(InitError::Recording(_)) => "recording",
             Self::Init(_) => "init",
-            Self::Plan(_) | Self::NotASigma { .. } | Self::Twin(TwinError::Plan(_)) => "plan",
+            Self::Plan(_)
+            | Self::NotASigma { .. }
+            | Self::NotATime { .. }
+            | Self::Twin(TwinError::Plan(_)) => "plan",
             Self::Twin(TwinError::State(error)) => of_file(error),
             Self::Twin(_) | Self::NotANoiseFactor { .. } => "twin",
             Self::Apply(error) => of_apply(error),

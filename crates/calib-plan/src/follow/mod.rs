@@ -85,6 +85,7 @@ pub fn options(plan: &PlanFile, known: &Known, sigma: Option<f64>) -> Options {
     Options {
         poses: None,
         sigma: sigma.or(plan.asked.sigma_mm.map(|mm| mm * 1e-3)),
+        path_time: plan.asked.path_time_s,
         goal: plan.goal,
         of: plan.asked.of.clone(),
         candidates: CANDIDATES,

@@ -99,17 +99,23 @@ fn plans_beat_random_postures_and_sweeps_of_single_joints_on_five_robots() {
         let sigma = found.sigma.expect("determined");
         let drawn = random(&prepared, 36, 6);
         let swept = one_at_a_time(&prepared, 36);
+        // No plan of as many of these candidates is better than the certified one by more than its efficiency.
+        let least = found.efficiency * sigma / swept;
         println!(
-            "{name}: {:.4} mm, /random {:.3}, /one at a time {:.3}, I-efficiency {:.4}",
+            "{name}: {:.4} mm, /random {:.3}, /one at a time {:.3}, of any plan {least:.3} at least, I-efficiency {:.4}",
             sigma * 1e3,
             sigma / drawn,
             sigma / swept,
             found.efficiency
         );
         assert!(sigma <= 0.95 * drawn, "{name}: {sigma} {drawn}");
-        // Four joints swept by nine postures each: the SCARA arm leaves a sweep of single joints less to miss.
-        let of_sweep = if name.starts_with("SCARA") { 0.6 } else { 0.5 };
-        assert!(sigma <= of_sweep * swept, "{name}: {sigma} {swept}");
+        // Half of a sweep's σ, where the certificate does not say that no plan has it: four joints swept by nine postures each leave a
+        // sweep of single joints of the SCARA arm less to miss.
+        assert!(
+            sigma <= 0.5 * swept || least > 0.5,
+            "{name}: {sigma} {swept}"
+        );
+        assert!(sigma <= 0.6 * swept, "{name}: {sigma} {swept}");
         assert!(found.efficiency >= 0.97, "{name}: {}", found.efficiency);
     }
 }
@@ -125,6 +131,87 @@ fn designs_for_all_parameters_are_certified() {
         let found = planned(&known, &options);
         println!("{name}: D-efficiency {:.4}", found.efficiency);
         assert!(found.efficiency >= 0.98, "{name}: {}", found.efficiency);
+    }
+}
+
+/// The motions take no longer than they may, with fewer postures where more take longer; and where no plan is that short, or none that
+/// short is good enough, the error says so.
+#[test]
+fn a_path_time_that_is_asked_for_is_kept_or_refused() {
+    let known = six(Seen::Markers(4), "");
+    let free = planned(&known, &few(24));
+    let within = |time: f64| Options {
+        path_time: Some(time),
+        ..few(24)
+    };
+    let most = 0.5 * free.motion_time;
+    let found = planned(&known, &within(most));
+    assert!(found.motion_time <= most, "{} {most}", found.motion_time);
+    // The way alone decides the order, so that half of the time is enough for more than half of the postures.
+    let recorded = found.recorded();
+    assert!((12..=24).contains(&recorded), "{recorded}");
+    let is_told =
+        |note: &Note| matches!(note, Note::PathTime { asked: 24, found, .. } if *found == recorded);
+    assert_eq!(recorded < 24, found.notes.iter().any(is_told));
+    let file = found.file(&known.robot.model);
+    assert_eq!(file.asked.path_time_s, Some(most));
+    let said = plan_error(&known, &within(0.5));
+    assert!(said.contains("6 postures take"), "{said}");
+    let sigma = Options {
+        poses: None,
+        sigma: free.sigma,
+        ..within(0.3 * free.motion_time)
+    };
+    let said = plan_error(&known, &sigma);
+    assert!(said.contains("is not reached in"), "{said}");
+}
+
+/// The goal of the least determined combination makes it better than the other goals do, and is certified.
+#[test]
+fn a_plan_for_the_least_determined_combination_determines_it_best() {
+    let known = six(Seen::Markers(4), "");
+    let of = |goal: Goal| Options { goal, ..few(24) };
+    let options = of(Goal::Weakest);
+    let prepared = prepare(&known, &options).unwrap_or_else(|e| panic!("{e}"));
+    let smallest = |goal: Goal| {
+        let found = planned(&known, &of(goal));
+        let postures: Vec<Candidate> = found
+            .postures
+            .iter()
+            .filter(|p| p.why != Why::Detour)
+            .map(|p| Candidate {
+                q: p.q.clone(),
+                seen: prepared.candidates[0].seen.clone(),
+            })
+            .collect();
+        let subjects = &prepared.feasible.sight.subjects;
+        let linear = known.linearize(&postures, subjects, &prepared.task);
+        let linear = linear.unwrap_or_else(|e| panic!("{e}"));
+        let mut m = prepared.before.clone();
+        for y in &linear.planned {
+            let y = prepared.basis.of(y);
+            m += y.transpose() * &y;
+        }
+        (m.symmetric_eigenvalues().min(), found.efficiency)
+    };
+    let (own, efficiency) = smallest(Goal::Weakest);
+    for other in [Goal::Task, Goal::Variances] {
+        assert!(own >= smallest(other).0, "{other:?}");
+    }
+    assert!(efficiency > 0.9, "{efficiency}");
+}
+
+#[test]
+#[ignore = "five robots: a minute"]
+fn designs_for_the_least_determined_combination_are_certified() {
+    for (name, known) in five() {
+        let options = Options {
+            goal: Goal::Weakest,
+            ..many(36)
+        };
+        let found = planned(&known, &options);
+        println!("{name}: E-efficiency {:.4}", found.efficiency);
+        assert!(found.efficiency >= 0.9, "{name}: {}", found.efficiency);
     }
 }
 

@@ -19,6 +19,7 @@ fn thirty_six_of_three_thousand_candidates_of_forty_parameters() {
     for (name, criterion) in [
         ("parameters", Criterion::Determinant),
         ("task", Criterion::Trace(DMatrix::identity(40, 40))),
+        ("weakest", Criterion::Smallest(DMatrix::identity(40, 40))),
     ] {
         let question = Question {
             rows: &rows,
@@ -33,9 +34,9 @@ fn thirty_six_of_three_thousand_candidates_of_forty_parameters() {
             "{name}: choice {choice:.2?}, certificate {certificate:?} {:.2?}",
             start.elapsed() - choice
         );
-        // The development profile is a few times slower.
+        // The development profile is a few times slower, and eigenvalues of every exchange take longer than updates.
         assert!(
-            cfg!(debug_assertions) || choice.as_secs_f64() <= 1.0,
+            cfg!(debug_assertions) || name == "weakest" || choice.as_secs_f64() <= 1.0,
             "{choice:?}"
         );
     }
