@@ -4,3 +4,4 @@ mod replays;
 mod robots;
 mod studies;
 mod twins;
+mod unlike;

@@ -48,14 +48,15 @@ pub fn arm(seed: u64) -> Vec<Line> {
     (0..n).map(joint).collect()
 }
 
-fn urdf(joints: &[Line]) -> String {
+/// `inside`: what every moved link holds.
+fn urdf(joints: &[Line], inside: &str) -> String {
     let mut text = String::from("<robot name=\"arm\">\n<link name=\"l0\"/>\n");
     for (i, (at, axis)) in joints.iter().enumerate() {
         let k = i + 1;
         let of = |v: &[f64; 3]| format!("{} {} {}", v[0], v[1], v[2]);
         let _ = writeln!(
             text,
-            "<link name=\"l{k}\"/><joint name=\"j{k}\" type=\"revolute\"><parent link=\"l{i}\"/><child link=\"l{k}\"/>\
+            "<link name=\"l{k}\">{inside}</link><joint name=\"j{k}\" type=\"revolute\"><parent link=\"l{i}\"/><child link=\"l{k}\"/>\
              <origin xyz=\"{}\"/><axis xyz=\"{}\"/><limit lower=\"-2.5\" upper=\"2.5\" effort=\"50\" velocity=\"2\"/></joint>",
             of(at),
             of(axis)
@@ -101,7 +102,17 @@ pub fn profile(joints: usize, seen: Seen, poses: usize, seed: u64) -> String {
 
 /// A robot, as the program would read it.
 pub fn robot(joints: &[Line], text: &str) -> RobotProfile {
-    let urdf_text = urdf(joints);
+    read(urdf(joints, ""), text)
+}
+
+/// A robot whose links have masses, so that compliance is tested for.
+pub fn weighted(joints: &[Line], text: &str) -> RobotProfile {
+    let inside = "<inertial><origin xyz=\"0.05 0.02 0.1\"/><mass value=\"3\"/>\
+                  <inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" iyz=\"0\" izz=\"0.01\"/></inertial>";
+    read(urdf(joints, inside), text)
+}
+
+fn read(urdf_text: String, text: &str) -> RobotProfile {
     let model = RobotModel::from_urdf_text(&urdf_text, "arm.urdf").expect("a robot");
     let raw = calib_profile::parse(text, "arm.yaml").unwrap_or_else(|e| panic!("{e}"));
     let profile = calib_profile::check(&raw, text, "arm.yaml", &model);

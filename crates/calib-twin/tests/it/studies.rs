@@ -17,9 +17,9 @@ fn made(session: &Session, trials: u64) -> Twin {
     made.unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Robots, and trials of each, from the variable `CALIB_STUDY`: `20x200`.
-fn sizes() -> (u64, u64) {
-    let stated = std::env::var("CALIB_STUDY").unwrap_or_else(|_| "20x200".to_owned());
+/// Robots, and trials of each, from the variable `CALIB_STUDY`, as `20x200`.
+pub fn sizes(usual: &str) -> (u64, u64) {
+    let stated = std::env::var("CALIB_STUDY").unwrap_or_else(|_| usual.to_owned());
     let (robots, trials) = stated.split_once('x').expect("ROBOTSxTRIALS");
     let number = |text: &str| text.parse().expect("a number");
     (number(robots), number(trials))
@@ -28,7 +28,7 @@ fn sizes() -> (u64, u64) {
 #[test]
 #[ignore = "20 robots of 200 trials: half an hour"]
 fn promised_sigma_is_kept_on_random_robots() {
-    let (robots, trials) = sizes();
+    let (robots, trials) = sizes("20x200");
     let designs = [
         Seen::Markers(4),
         Seen::Pose,
