@@ -31,7 +31,7 @@ solve:
   limits: {held_out_rms_mm: 3.07}
 ";
 
-fn data() -> Option<PathBuf> {
+pub fn data() -> Option<PathBuf> {
     skipped_tests::real_data("tiago_frozen")?
         .parent()
         .map(Into::into)
@@ -209,7 +209,7 @@ fn the_spoiled_table_is_named_line_by_line_and_still_fits() {
 
 /// DLR Agile Justin, torso and two arms with one marker on each hand; its URDF has no masses. 45 kg is all that is stated.
 /// `all` and `own` are what is free of every joint and, beside its whole origin, of the two whose place is an estimate.
-fn justin(all: &str, own: &str) -> String {
+pub fn justin(all: &str, own: &str) -> String {
     let joints: Vec<String> = (0..4)
         .map(|i| format!("torso_{i}"))
         .chain((0..7).map(|i| format!("right_{i}")))

@@ -11,6 +11,7 @@ mod clocks;
 mod contacts;
 mod data_faults;
 mod default_run;
+mod designs;
 mod drift;
 mod effects;
 mod facts;
