@@ -310,46 +310,37 @@ impl<'a> State<'a> {
         let w = w.transpose();
         let rows = self.question.rows;
         self.k -= &w * w.transpose() * sign;
-        if let Criterion::Trace(l) = self.question.criterion {
-            // H± = H ∓ W (K L W)ᵀ ∓ (K L W) Wᵀ + W (Wᵀ L W) Wᵀ, with K before the change
-            let lw = l * &w;
-            let g = w.transpose() * &lw;
-            let klw = (&self.k + &w * w.transpose() * sign) * lw;
-            let half = &klw - &w * &g * (0.5 * sign);
-            self.h -= (&half * w.transpose() + &w * half.transpose()) * sign;
-            let rank = w.ncols();
-            // One product for both: most of the time of a choice is spent here.
-            let mut both = w.clone().resize_horizontally(2 * rank, 0.0);
-            both.columns_mut(rank, rank).copy_from(&half);
-            let streams = self.s.par_iter_mut().zip(&mut self.t).zip(rows);
-            streams.for_each(|((s, t), y)| {
-                let along = y * &both;
-                let yw = along.columns(0, rank);
-                let back = yw.transpose();
-                s.gemm(-sign, &yw, &back, 1.0);
-                let mixed = along.columns(rank, rank) * back;
-                for j in 0..mixed.ncols() {
-                    for i in 0..mixed.nrows() {
-                        t[(i, j)] -= sign * (mixed[(i, j)] + mixed[(j, i)]);
-                    }
-                }
-            });
-            return;
-        }
         let of_k = |(s, y): (&mut DMatrix<f64>, &DMatrix<f64>)| {
             let yw = y * &w;
             s.gemm(-sign, &yw, &yw.transpose(), 1.0);
         };
         self.s.par_iter_mut().zip(rows).for_each(of_k);
-        if let Criterion::Subset(_) = self.question.criterion
-            && let Some(h) = self.question.criterion.derivative(&self.k)
-        {
-            self.h = h;
-            let h = &self.h;
-            let of_h = |(t, y): (&mut DMatrix<f64>, &DMatrix<f64>)| {
-                *t = y * h * y.transpose();
-            };
-            self.t.par_iter_mut().zip(rows).for_each(of_h);
+        match self.question.criterion {
+            Criterion::Determinant | Criterion::Smallest(_) => {}
+            Criterion::Trace(l) => {
+                // H± = H ∓ W (K L W)ᵀ ∓ (K L W) Wᵀ + W (Wᵀ L W) Wᵀ, with K before the change
+                let lw = l * &w;
+                let g = w.transpose() * &lw;
+                let klw = (&self.k + &w * w.transpose() * sign) * lw;
+                let half = &klw - &w * &g * (0.5 * sign);
+                self.h -= (&half * w.transpose() + &w * half.transpose()) * sign;
+                let of_h = |(t, y): (&mut DMatrix<f64>, &DMatrix<f64>)| {
+                    let (yw, yh) = (y * &w, y * &half);
+                    t.gemm(-sign, &yh, &yw.transpose(), 1.0);
+                    t.gemm(-sign, &yw, &yh.transpose(), 1.0);
+                };
+                self.t.par_iter_mut().zip(rows).for_each(of_h);
+            }
+            Criterion::Subset(_) => {
+                if let Some(h) = self.question.criterion.derivative(&self.k) {
+                    self.h = h;
+                    let h = &self.h;
+                    let of_h = |(t, y): (&mut DMatrix<f64>, &DMatrix<f64>)| {
+                        *t = y * h * y.transpose();
+                    };
+                    self.t.par_iter_mut().zip(rows).for_each(of_h);
+                }
+            }
         }
     }
 
