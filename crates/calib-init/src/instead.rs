@@ -72,7 +72,7 @@ fn instead(head: &[u8]) -> Option<Instead> {
     }
     let is_text = |bytes: &[u8]| match std::str::from_utf8(bytes) {
         Ok(_) => true,
-        // The last letter may be cut.
+        // The last character may be cut.
         Err(e) => e.error_len().is_none(),
     };
     Some(match is_text(text) {

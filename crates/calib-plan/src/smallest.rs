@@ -316,7 +316,7 @@ impl<'a> Barrier<'a> {
                 }
                 part *= 0.5;
                 if part < 1e-9 {
-                    // Rounding: the point is as good as can be told.
+                    // Rounding: the point is as good as numbers allow.
                     return Some(());
                 }
             }

@@ -90,7 +90,7 @@ pub fn run(console: &Console, options: &Init) -> Result<ExitCode, CliError> {
 fn robot(path: &Path, shown: &str) -> Result<RobotModel, InitError> {
     RobotModel::from_urdf_file(path).map_err(|error| {
         let mut head = Vec::new();
-        // What cannot be read is told by the error that there is.
+        // What cannot be read has its error already.
         if let Ok(file) = input::open(path) {
             let _ = file.take(HEAD as u64).read_to_end(&mut head);
         }

@@ -150,9 +150,9 @@ fn a_path_time_that_is_asked_for_is_kept_or_refused() {
     // The way alone decides the order, so that half of the time is enough for more than half of the postures.
     let recorded = found.recorded();
     assert!((12..=24).contains(&recorded), "{recorded}");
-    let is_told =
+    let is_stated =
         |note: &Note| matches!(note, Note::PathTime { asked: 24, found, .. } if *found == recorded);
-    assert_eq!(recorded < 24, found.notes.iter().any(is_told));
+    assert_eq!(recorded < 24, found.notes.iter().any(is_stated));
     let file = found.file(&known.robot.model);
     assert_eq!(file.asked.path_time_s, Some(most));
     let said = plan_error(&known, &within(0.5));

@@ -1,4 +1,4 @@
-//! Tables that are written for a column map: the map reads back what was written, or the reason is told.
+//! Tables that are written for a column map: the map reads back what was written, or the reason is stated.
 
 use calib_recording::{
     ColumnMap, Filled, Poses, ReadOptions, WriteOptions, read_bytes, write_mapped,
