@@ -6,7 +6,20 @@ use calib_pipeline::error::ExitCode;
 use calib_profile::ProfileError;
 use calib_urdf::ReadError;
 
-use crate::instead::Instead;
+/// What was given in place of a URDF.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Instead {
+    /// A recording in a format that a reader knows by its first bytes: the reader's name.
+    Recording(&'static str),
+    /// A table of numbers with these columns.
+    Table(Vec<String>),
+    /// A table of two sets of poses, as the poses of a flange and of a tracked body.
+    Pairs([String; 2]),
+    /// Bytes that are no text.
+    Binary,
+    /// Text that is no XML.
+    Text,
+}
 
 /// Why there is no profile.
 #[derive(Debug, thiserror::Error)]

@@ -4,23 +4,8 @@ use calib_recording::readers::{HEAD_BYTES, readers};
 use calib_urdf::{Problem, ReadError, RobotModel};
 
 use crate::columns::guess;
-use crate::error::InitError;
+use crate::error::{InitError, Instead};
 use crate::header::header;
-
-/// What was given in place of a URDF.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Instead {
-    /// A recording in a format that a reader knows by its first bytes: the reader's name.
-    Recording(&'static str),
-    /// A table of numbers with these columns.
-    Table(Vec<String>),
-    /// A table of two sets of poses, as the poses of a flange and of a tracked body.
-    Pairs([String; 2]),
-    /// Bytes that are no text.
-    Binary,
-    /// Text that is no XML.
-    Text,
-}
 
 /// Bytes of the file that are looked at.
 pub const HEAD: usize = 1 << 20;

@@ -24,9 +24,9 @@ pub mod words;
 pub mod write;
 mod yaml;
 
-pub use error::InitError;
+pub use error::{InitError, Instead};
 pub use fact::{About, Fact, Place};
-pub use instead::{HEAD, Instead, not_a_urdf};
+pub use instead::{HEAD, not_a_urdf};
 pub use nalgebra;
 pub use proposal::Proposal;
 pub use propose::{Request, propose};

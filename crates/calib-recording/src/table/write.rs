@@ -233,6 +233,10 @@ fn header(
 pub(super) fn state_joints(poses: &Poses, columns: &mut [OutColumn<'_>]) {
     for column in columns {
         let name = column.name.rsplit_once('_').map(|(joint, _)| joint);
+        let torque = column.name.strip_suffix("_nm");
+        if torque.is_some_and(|joint| poses.torques.contains_key(joint)) {
+            continue;
+        }
         let of_joint = name.filter(|joint| poses.joints.contains_key(*joint));
         if of_joint.is_some_and(|joint| !reads_as_joint(&column.name, joint)) {
             column.name.insert_str(0, JOINT);
