@@ -50,11 +50,13 @@ pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError>
     let of = |i: &usize| prepared.candidates[*i].clone();
     let postures: Vec<Candidate> = chosen.iter().map(of).collect();
     let rows: Vec<_> = chosen.iter().map(|i| prepared.rows[*i].clone()).collect();
-    let first = (
-        prepared.options.path_time.map_or(BY_INFORMATION, |_| 0),
-        None,
+    let first = prepared.options.path_time.map_or(BY_INFORMATION, |_| 0);
+    let order = in_order(
+        prepared,
+        (&postures, &rows),
+        &prepared.before,
+        (first, None),
     );
-    let order = in_order(prepared, (&postures, &rows), &prepared.before, first);
     let mut list: Vec<Listed> = order
         .into_iter()
         .map(|k| {
