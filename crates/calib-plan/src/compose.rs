@@ -25,6 +25,15 @@ const DETOURS: usize = 300;
 /// A posture of a list: why it is there, and the place of the one that it repeats.
 pub(crate) type Listed = (Candidate, Why, Option<usize>);
 
+/// Why a candidate was chosen that is no other visit.
+fn why(filling: &[usize], candidate: usize) -> Why {
+    if filling.contains(&candidate) {
+        Why::SpaceFilling
+    } else {
+        Why::Information
+    }
+}
+
 /// A plan of so many postures.
 ///
 /// # Errors
@@ -61,12 +70,7 @@ pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError>
         .into_iter()
         .map(|k| {
             let i = chosen[k];
-            let why = if filling.contains(&i) {
-                Why::SpaceFilling
-            } else {
-                Why::Information
-            };
-            (postures[k].clone(), why, None)
+            (postures[k].clone(), why(&filling, i), None)
         })
         .collect();
     // First the ways around, so that it is known from where each posture is approached.
