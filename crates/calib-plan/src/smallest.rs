@@ -201,18 +201,13 @@ fn merit(s: &DMatrix<f64>, k: &DMatrix<f64>, power: f64) -> f64 {
     if !(largest > 0.0) {
         return f64::NEG_INFINITY;
     }
-    let relative = values.iter().map(|v| (v / largest).max(0.0).powf(power));
-    let sum: f64 = if power.is_finite() {
-        relative.sum()
+    let beside = if power.is_finite() {
+        let relative = values.iter().map(|v| (v / largest).max(0.0).powf(power));
+        relative.sum::<f64>().ln() / power
     } else {
-        1.0
+        0.0
     };
-    -largest.ln()
-        - if power.is_finite() {
-            sum.ln() / power
-        } else {
-            0.0
-        }
+    -largest.ln() - beside
 }
 
 /// Equation (5) for some postures.

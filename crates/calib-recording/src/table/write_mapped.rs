@@ -3,14 +3,17 @@
 //! The layout is the one that reading has: every slot of it says from which column and by which factor a number comes, so that what is
 //! written is `value · factor`. What is written is read again, and refused where something else comes back.
 
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use nalgebra::{Isometry3, Point3};
+
 use super::header::{Column, Layout, Rotation};
 use super::write::{NotWritten, WriteOptions, columns, push_number, state_joints};
 use crate::column_map::{ColumnMap, Delimiter};
 use crate::model::Filled;
 use crate::poses::Poses;
 use crate::readers::{ReadOptions, read_bytes};
-use std::collections::BTreeMap;
-use std::fmt::Write;
 
 /// The table as text, with the names, units and separators of a map; streams that the map does not mention have their canonical names.
 /// Poses without times get one second each where the map names a column of time.
@@ -244,10 +247,8 @@ fn number(value: Option<f64>, map: &ColumnMap, separator: char, options: &WriteO
     }
 }
 
-/// Whether reading gives the same poses.
+/// Whether reading gives the same poses: every stream, at every row.
 fn reads_back(poses: &Poses, map: &ColumnMap, text: &str) -> Result<(), NotWritten> {
-    /// Written decimals round by less than this, m and rad.
-    const ROUNDED: f64 = 1e-5;
     let refused = |why: String| NotWritten::Mapped { why };
     let options = ReadOptions {
         columns: Some(map.clone()),
@@ -256,43 +257,43 @@ fn reads_back(poses: &Poses, map: &ColumnMap, text: &str) -> Result<(), NotWritt
     let read = read_bytes("the table", text.as_bytes(), &options);
     let read = read.map_err(|error| refused(error.to_string()))?;
     let read = read.poses(Filled::Include)?;
-    let misread = |name: &String| NotWritten::Misread { name: name.clone() };
     if read.len() != poses.len() {
         let (got, wrote) = (read.len(), poses.len());
         return Err(refused(format!("it reads {got} rows of {wrote}")));
     }
-    for (name, own) in &poses.joints {
-        let same = |(a, b): (&Option<f64>, &Option<f64>)| match (a, b) {
-            (Some(a), Some(b)) => (a - b).abs() < ROUNDED,
-            (a, b) => a.is_none() && b.is_none(),
-        };
-        let other = read.joints.get(name);
-        if !other.is_some_and(|other| own.iter().zip(other).all(same)) {
-            return Err(misread(name));
-        }
+    let number = |a: &f64, b: &f64| (a - b).abs();
+    let place = |a: &Point3<f64>, b: &Point3<f64>| (a - b).norm();
+    let pose = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
+        let off = a.inverse() * b;
+        off.translation.vector.norm().max(off.rotation.angle())
+    };
+    let other = differing(&poses.joints, &read.joints, number)
+        .or_else(|| differing(&poses.torques, &read.torques, number))
+        .or_else(|| differing(&poses.temperatures, &read.temperatures, number))
+        .or_else(|| differing(&poses.markers, &read.markers, place))
+        .or_else(|| differing(&poses.bodies, &read.bodies, pose));
+    match other {
+        Some(name) => Err(NotWritten::Misread { name }),
+        None => Ok(()),
     }
-    for (name, own) in &poses.markers {
-        let same = |k: usize, other: &[Option<nalgebra::Point3<f64>>]| match (own[k], other[k]) {
-            (Some(a), Some(b)) => (a - b).norm() < ROUNDED,
-            (a, b) => a.is_none() && b.is_none(),
-        };
-        let other = read.markers.get(name);
-        if !other.is_some_and(|other| (0..own.len()).all(|k| same(k, other))) {
-            return Err(misread(name));
-        }
-    }
-    for (name, own) in &poses.bodies {
-        let same = |k: usize, other: &[Option<nalgebra::Isometry3<f64>>]| match (own[k], other[k]) {
-            (Some(a), Some(b)) => {
-                let off = a.inverse() * b;
-                off.translation.vector.norm() < ROUNDED && off.rotation.angle() < ROUNDED
-            }
-            (a, b) => a.is_none() && b.is_none(),
-        };
-        let other = read.bodies.get(name);
-        if !other.is_some_and(|other| (0..own.len()).all(|k| same(k, other))) {
-            return Err(misread(name));
-        }
-    }
-    Ok(())
+}
+
+/// The first stream that does not come back, by how far values lie from each other.
+fn differing<T>(
+    own: &BTreeMap<String, Vec<Option<T>>>,
+    read: &BTreeMap<String, Vec<Option<T>>>,
+    off: impl Fn(&T, &T) -> f64,
+) -> Option<String> {
+    /// Written decimals round by less than this: m, rad, N·m and °C.
+    const ROUNDED: f64 = 1e-5;
+    let same = |(a, b): (&Option<T>, &Option<T>)| match (a, b) {
+        (Some(a), Some(b)) => off(a, b) < ROUNDED,
+        (a, b) => a.is_none() && b.is_none(),
+    };
+    let comes_back = |name: &String, own: &[Option<T>]| {
+        let read = read.get(name);
+        read.is_some_and(|read| own.iter().zip(read).all(same))
+    };
+    let lost = own.iter().find(|(name, own)| !comes_back(name, own));
+    lost.map(|(name, _)| name.clone())
 }
