@@ -198,7 +198,7 @@ impl Question<'_> {
 fn merit(s: &DMatrix<f64>, k: &DMatrix<f64>, power: f64) -> f64 {
     let values = decompose::symmetric_eigen(&(s * k * s.transpose())).values;
     let largest = values.max();
-    if !(largest > 0.0) {
+    if largest.is_nan() || largest <= 0.0 {
         return f64::NEG_INFINITY;
     }
     let beside = if power.is_finite() {
