@@ -99,10 +99,10 @@ fn greedy_steps_are_the_best_single_steps_of_whole_matrices() {
             of(*a).total_cmp(&of(*b))
         });
         let (best, chosen) = (best.expect("postures"), question.choose(1, &[]));
-        // One posture changes the smallest eigenvalue hardly: many are equally good.
+        // Three rows leave four directions as they were: where all seven count, all postures are equally good. Exchanges end at a gain of 1e-5.
         let value = |of: &[usize]| dense(criterion, &question.information(of));
         match criterion {
-            Criterion::Smallest(_) => assert!(value(&chosen) > value(&[best]) * 0.99),
+            Criterion::Smallest(_) => assert!(value(&chosen) > value(&[best]) * (1.0 - 2e-5)),
             _ => assert_eq!(chosen, [best]),
         }
     }
