@@ -215,7 +215,7 @@ fn instead_of_urdf(found: &Instead, file: &str) -> String {
             format!("give the URDF of the robot first, then its recordings: {order}")
         }
         Instead::Pairs([first, second]) => format!(
-            "where both are fixed needs no URDF: `calib fit handeye {file} --robot {first} --measured {second}`; for a profile give the URDF of the robot first, and a recording of its joints"
+            "hand-eye calibration needs no URDF: `calib fit handeye {file} --robot {first} --measured {second}`; for a profile give the URDF of the robot first, and a recording of its joints"
         ),
         Instead::Binary | Instead::Text => {
             "give the URDF of the robot: an XML file that begins with `<robot name=…>`".to_owned()
