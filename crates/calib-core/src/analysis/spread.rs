@@ -183,17 +183,21 @@ impl Solution {
         moved.column_iter().any(|c| c.norm() / root > OPEN)
     }
 
-    /// The parameters that a direction moves most, in units of their scale.
+    /// The parameters that a direction moves most, in units of their scale, the first of them forward.
     fn terms(&self, v: &DVector<f64>) -> Vec<(ParameterId, f64)> {
         /// A part of the direction below this needs no name.
         const SMALL: f64 = 0.05;
+        /// Parts that differ by less of the largest are equal, whatever their last bits: the parameter that comes first goes first.
+        const EQUAL: f64 = 1e-6;
         let part = |c: usize| (v[c] / self.information.scale[c]).abs();
         let all = (0..v.len()).map(part).fold(0.0, f64::max);
         let mut columns: Vec<usize> = (0..v.len()).filter(|c| part(*c) > SMALL * all).collect();
-        columns.sort_by(|a, b| part(*b).total_cmp(&part(*a)));
+        let rank = |c: &usize| -(part(*c) / (EQUAL * all)).round();
+        columns.sort_by(|a, b| rank(a).total_cmp(&rank(b)).then(a.cmp(b)));
         columns.truncate(TERMS);
+        let sign = columns.first().map_or(1.0, |c| v[*c].signum());
         let free = self.model.free_parameters();
-        let term = |c: usize| (ParameterId::of(free[c]), v[c]);
+        let term = |c: usize| (ParameterId::of(free[c]), sign * v[c]);
         columns.into_iter().map(term).collect()
     }
 }

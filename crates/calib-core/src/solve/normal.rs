@@ -197,7 +197,7 @@ impl Pass<'_> {
             let m = rows.m;
             match of {
                 RandomAt::Here => rows.random_part(random)?,
-                RandomAt::Kept(factors) => next += random.load(&factors[next..], m, rows.k),
+                RandomAt::Kept(factors) => next += random.load(&factors[next..], m),
                 RandomAt::There(_) => {}
             }
             random.whiten(&mut rows.r[..m]);

@@ -7,7 +7,8 @@
 //! V⁻¹ = L_D⁻ᵀ (I − Q S Qᵀ) L_D⁻¹,            S = I − L⁻ᵀ L⁻¹                                 (3)
 //! ```
 //!
-//! Orthogonal Q instead of Woodbury's formula: nothing cancels, however large the random effects are.
+//! Orthogonal Q instead of Woodbury's formula: nothing cancels, however large the random effects are. Where there are no fewer random
+//! effects than rows, Q is the unit matrix, R = L_D⁻¹ U, and L is as small as the sample.
 
 use nalgebra::{DMatrixView, DMatrixViewMut};
 
@@ -18,6 +19,7 @@ use crate::solve::rows::{SampleRows, add_block};
 #[derive(Debug, Clone, Default)]
 pub(crate) struct RandomPart {
     m: usize,
+    /// Columns of Q: the random effects, or the rows where those are no more.
     k: usize,
     /// m × k
     q: Vec<f64>,
@@ -100,18 +102,39 @@ impl SampleRows {
 
     /// Equation (1) from the block-whitened G; `None` when a number is not finite.
     pub(crate) fn random_part(&self, out: &mut RandomPart) -> Option<()> {
+        out.of_columns(&self.g[..self.m * self.k], self.m, self.k)
+    }
+}
+
+impl RandomPart {
+    /// Equation (1) from L_D⁻¹ U, m × `effects`; `None` when a number is not finite.
+    fn of_columns(&mut self, columns: &[f64], m: usize, effects: usize) -> Option<()> {
+        self.m = m;
+        self.k = m.min(effects);
+        if m <= effects {
+            self.q.clear();
+            self.q.resize(m * m, 0.0);
+            self.q.iter_mut().step_by(m + 1).for_each(|q| *q = 1.0);
+            self.factor(columns, effects)
+        } else {
+            let r = self.orthogonalize(columns);
+            self.factor(&r, effects)
+        }
+    }
+
+    /// Q from m rows of k columns; returns R.
+    fn orthogonalize(&mut self, columns: &[f64]) -> Vec<f64> {
         let (m, k) = (self.m, self.k);
-        out.m = m;
-        out.k = k;
-        out.q.clear();
-        out.q.extend_from_slice(&self.g[..m * k]);
+        self.q.clear();
+        self.q.extend_from_slice(columns);
+        let q = &mut self.q;
         let mut r = vec![0.0; k * k];
         let mut again = vec![0.0; k];
-        let before: Vec<f64> = (0..k).map(|c| norm(&out.q, m, k, c)).collect();
+        let before: Vec<f64> = (0..k).map(|c| norm(q, m, k, c)).collect();
         for c in 0..k {
             // Its first projection was taken when each of the earlier columns was finished.
             again.fill(0.0);
-            for row in out.q.chunks_exact(k) {
+            for row in q.chunks_exact(k) {
                 let own = row[c];
                 again[..c]
                     .iter_mut()
@@ -121,25 +144,31 @@ impl SampleRows {
             for (p, x) in again[..c].iter().enumerate() {
                 r[p * k + c] += x;
             }
-            for row in out.q.chunks_exact_mut(k) {
+            for row in q.chunks_exact_mut(k) {
                 row[c] -= along(&row[..c], &again);
             }
-            let size = norm(&out.q, m, k, c);
+            let size = norm(q, m, k, c);
             let new = size > DEPENDENT * before[c];
             r[c * k + c] = if new { size } else { 0.0 };
             let factor = if new { 1.0 / size } else { 0.0 };
             for i in 0..m {
-                out.q[i * k + c] *= factor;
+                q[i * k + c] *= factor;
             }
-            project_later(&mut out.q, k, c, &mut r[c * k..(c + 1) * k]);
+            project_later(q, k, c, &mut r[c * k..(c + 1) * k]);
         }
+        r
+    }
+
+    /// T and S of equations (1) and (3) from R, k × `effects`; `None` when a number is not finite.
+    fn factor(&mut self, r: &[f64], effects: usize) -> Option<()> {
+        let k = self.k;
         // L of I + R Rᵀ
         let mut l = vec![0.0; k * k];
         for i in 0..k {
             for j in 0..=i {
                 let mut sum = if i == j { 1.0 } else { 0.0 };
-                for c in i..k {
-                    sum += r[i * k + c] * r[j * k + c];
+                for c in 0..effects {
+                    sum += r[i * effects + c] * r[j * effects + c];
                 }
                 for c in 0..j {
                     sum -= l[i * k + c] * l[j * k + c];
@@ -164,38 +193,39 @@ impl SampleRows {
                 inverse[i * k + c] = sum / l[i * k + i];
             }
         }
-        out.t.clear();
-        out.s.clear();
+        self.t.clear();
+        self.s.clear();
         for i in 0..k {
             for j in 0..k {
                 let unit = if i == j { 1.0 } else { 0.0 };
                 let square: f64 = (i.max(j)..k)
                     .map(|c| inverse[c * k + i] * inverse[c * k + j])
                     .sum();
-                out.t.push(unit - inverse[i * k + j]);
-                out.s.push(unit - square);
+                self.t.push(unit - inverse[i * k + j]);
+                self.s.push(unit - square);
             }
         }
         Some(())
     }
-}
 
-impl RandomPart {
     /// What a later [`RandomPart::load`] needs to whiten another residual with the same V, in rows that are not turned.
     pub(crate) fn store(&self, rows: &SampleRows, into: &mut Vec<f64>) {
+        into.push(self.k as f64);
         rows.append_unturned(&self.q, self.k, into);
         into.extend_from_slice(&self.t);
     }
 
-    /// Reads back what [`RandomPart::store`] wrote for a sample of m rows and k effects; returns its length.
-    pub(crate) fn load(&mut self, from: &[f64], m: usize, k: usize) -> usize {
+    /// Reads back what [`RandomPart::store`] wrote for a sample of m rows; returns its length.
+    pub(crate) fn load(&mut self, from: &[f64], m: usize) -> usize {
+        let k = from[0] as usize;
+        let (q, t) = (1 + m * k, 1 + m * k + k * k);
         self.m = m;
         self.k = k;
         self.q.clear();
-        self.q.extend_from_slice(&from[..m * k]);
+        self.q.extend_from_slice(&from[1..q]);
         self.t.clear();
-        self.t.extend_from_slice(&from[m * k..m * k + k * k]);
-        m * k + k * k
+        self.t.extend_from_slice(&from[q..t]);
+        t
     }
 
     /// Equation (2) without L_D⁻¹ of one column: x ← (I − Q T Qᵀ) x.
@@ -336,33 +366,49 @@ fn norm(q: &[f64], m: usize, k: usize, c: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::DMatrix;
+
     use super::*;
 
-    /// Few and many random effects beside the rows: column by column, all columns at once, and the matrix itself.
+    fn numbers(count: usize, seed: f64) -> Vec<f64> {
+        (0..count).map(|i| (seed + 1.7 * i as f64).sin()).collect()
+    }
+
+    /// Few and many random effects beside the rows, dependent ones too: a column, all columns at once, the matrix itself, and the dense V.
     #[test]
-    fn all_ways_to_take_random_effects_out_agree() {
+    fn whitened_rows_have_the_unit_matrix_as_covariance() {
         for (m, k, columns) in [
             (6, 7, 20),
+            (6, 40, 20),
+            (12, 12, 61),
             (12, 7, 61),
             (12, 3, 5),
             (36, 7, 61),
             (9, 0, 4),
             (6, 2, 0),
+            (0, 3, 2),
         ] {
-            let numbers = |count: usize, seed: f64| -> Vec<f64> {
-                (0..count).map(|i| (seed + 1.7 * i as f64).sin()).collect()
-            };
-            let random = RandomPart {
-                m,
-                k,
-                q: numbers(m * k, 1.0),
-                t: numbers(k * k, 2.0),
-                s: numbers(k * k, 3.0),
+            let mut g = numbers(m * k, 1.0);
+            if k > 2 {
+                // The last column is twice the first.
+                g.chunks_exact_mut(k)
+                    .for_each(|row| row[k - 1] = 2.0 * row[0]);
+            }
+            let mut random = RandomPart::default();
+            assert!(random.of_columns(&g, m, k).is_some());
+            let dense = {
+                let g = DMatrix::from_row_slice(m, k, &g);
+                DMatrix::identity(m, m) + &g * g.transpose()
             };
             let x = numbers(m * columns, 4.0);
             let (mut whitened, mut weighed) = (x.clone(), x.clone());
             random.whiten_rows(&x, columns, &mut whitened);
             random.weigh_rows(&x, columns, &mut weighed);
+            let all = DMatrix::from_row_slice(m, columns, &x);
+            let expected = dense.cholesky().unwrap().solve(&all);
+            let whole = DMatrix::from_row_slice(m, columns, &whitened);
+            let gram = whole.transpose() * &whole;
+            assert!((gram - all.transpose() * &expected).amax() < 1e-11);
             let weight = random.weight();
             for c in 0..columns {
                 let column: Vec<f64> = (0..m).map(|i| x[i * columns + c]).collect();
@@ -370,10 +416,11 @@ mod tests {
                 random.whiten(&mut one);
                 random.weigh(&mut other);
                 for i in 0..m {
-                    let dense = along(&weight[i * m..(i + 1) * m], &column);
+                    let by_matrix = along(&weight[i * m..(i + 1) * m], &column);
                     assert!((whitened[i * columns + c] - one[i]).abs() < 1e-12);
                     assert!((weighed[i * columns + c] - other[i]).abs() < 1e-12);
-                    assert!((dense - other[i]).abs() < 1e-12);
+                    assert!((by_matrix - other[i]).abs() < 1e-12);
+                    assert!((other[i] - expected[(i, c)]).abs() < 1e-11);
                 }
             }
         }
