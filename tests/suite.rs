@@ -26,6 +26,7 @@ mod interruptions;
 mod laboratory;
 mod layering;
 mod loads;
+mod many_markers;
 mod month;
 mod occluded;
 mod outputs;

@@ -24,6 +24,7 @@
 pub mod decompose;
 pub mod line;
 pub mod mean;
+pub mod pairs;
 pub mod plausible;
 pub mod registration;
 pub mod row_qr;

@@ -21,6 +21,7 @@ use crate::options::Plugins;
 use crate::output::of_data::{coverage, lost, used_for};
 use crate::prepare::aligned::Alignment;
 use crate::prepare::checks;
+use crate::prepare::condensed::condense;
 use crate::prepare::effects;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
@@ -48,6 +49,7 @@ pub fn check(profile: &Path, plugins: Plugins) -> Result<DataChecks, PipelineErr
     findings.extend(of_data);
     let mut noise = Vec::new();
     let mut moved = false;
+    findings.extend(condense(&mut inputs));
     match body_tracks(&inputs, &mut findings) {
         Ok(tracks) => {
             noise = noise_of(&inputs, &tracks);

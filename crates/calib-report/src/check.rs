@@ -159,6 +159,7 @@ impl DataCheck {
                 catalog::NOT_RIGID,
                 catalog::BODY_NOT_RIGID,
                 catalog::BODY_REDEFINED,
+                catalog::BODY_CONDENSED,
                 catalog::MARKER_SWAP,
                 catalog::MARKER_SWAP_REPAIRED,
                 catalog::MARKER_OUTLIER,

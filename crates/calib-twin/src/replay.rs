@@ -14,6 +14,7 @@ use calib_geometry::{Twist, se3};
 use calib_pipeline::formulate::kinematics::Calibration;
 use calib_pipeline::prepare::conditions::conditions;
 use calib_pipeline::prepare::inputs::{Inputs, Loaded};
+use calib_pipeline::prepare::mixed::Mixed;
 use calib_pipeline::prepare::tracks::BodyTrack;
 use calib_profile::{Body, BodyKind};
 use nalgebra::{Cholesky, Isometry3, Matrix3, Point3, Vector3};
@@ -108,6 +109,8 @@ impl Replay<'_> {
                     // Of markers that were computed from a fitted body, the noise is the body's.
                     let levels = self.noise.poses.get(name).or(self.noise.bodies.get(name));
                     let moved = frame * slip * drawn(levels.copied(), rng) * frame.inverse();
+                    let mixed = loaded.mixed.get(name).and_then(|m| m.get(row)?.as_ref());
+                    let errors = mixed.and_then(|m| self.of_mixed(m, names, rng));
                     for (i, marker) in names.iter().enumerate() {
                         let shape = shape(loaded, marker, row);
                         let track = loaded.poses.markers.get_mut(marker);
@@ -115,13 +118,29 @@ impl Replay<'_> {
                         let at = self.on_link(robot, (name, body), (i, marker));
                         if let (Some(seen), Some(at)) = (seen, at) {
                             let sigma = self.noise.markers.get(marker).copied();
-                            let error = vector(rng) * sigma.unwrap_or(0.0);
-                            *seen = link * (moved * at) + shape * error;
+                            let own = || shape * vector(rng) * sigma.unwrap_or(0.0);
+                            let error = errors.as_ref().map_or_else(own, |all| all[i]);
+                            *seen = link * (moved * at) + error;
                         }
                     }
                 }
             }
         }
+    }
+
+    /// Errors of the points of a body of very many markers in a row that shows some of them.
+    fn of_mixed(
+        &self,
+        mixed: &Mixed,
+        names: &[String],
+        rng: &mut ChaCha12Rng,
+    ) -> Option<Vec<Vector3<f64>>> {
+        let root = Cholesky::new(mixed.shape)?.l();
+        let drawn = names.iter().map(|marker| {
+            let sigma = self.noise.markers.get(marker).copied();
+            root * vector(rng) * sigma.unwrap_or(0.0)
+        });
+        mixed.back(&drawn.collect::<Vec<_>>())
     }
 
     /// A marker in the frame of its link.

@@ -8,6 +8,7 @@ use super::Expectations;
 use crate::rigid_body::Template;
 use crate::statistics::{median, robust_sigma};
 use calib_finding::{Fact, Finding, Id, Subject, catalog, nearest_word};
+use calib_geometry::pairs::is_compared;
 use calib_geometry::registration::rigid_registration;
 use calib_recording::Poses;
 use nalgebra::Point3;
@@ -123,7 +124,7 @@ impl<'a> Body<'a> {
             .collect();
         let mut pairs = Vec::new();
         for i in 0..tracks.len() {
-            for j in 0..i {
+            for j in (0..i).filter(|j| is_compared(i, *j, tracks.len())) {
                 let distances: Vec<f64> = distances(tracks[i], tracks[j]).map(|(_, d)| d).collect();
                 if distances.len() < ROWS {
                     continue;

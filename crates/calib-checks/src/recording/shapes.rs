@@ -1,5 +1,7 @@
 //! Bodies whose shape is another one in another recording.
 
+use std::collections::BTreeMap;
+
 use calib_finding::{Fact, Finding, catalog};
 use calib_recording::Poses;
 
@@ -52,9 +54,11 @@ pub fn other_shapes(recordings: &[(&str, &Poses)], expected: &Expectations) -> V
 impl<'a> Body<'a> {
     /// The distance that differs most from that of the same body elsewhere, by how much, m, and its markers; `None` where all are alike.
     fn unlike(&self, other: &Self) -> Option<(f64, &'a str, &'a str)> {
-        let same = |i: usize, j: usize| other.pairs.iter().find(move |p| (p.i, p.j) == (i, j));
+        let same: BTreeMap<_, _> = other.pairs.iter().map(|p| ((p.i, p.j), p)).collect();
         let both = self.pairs.iter();
-        let both: Vec<_> = both.filter_map(|p| Some((p, same(p.i, p.j)?))).collect();
+        let both: Vec<_> = both
+            .filter_map(|p| Some((p, *same.get(&(p.i, p.j))?)))
+            .collect();
         let ratio = median(both.iter().map(|(a, b)| a.distance / b.distance).collect())?;
         // Another unit is said to be one.
         if !(1.0 - UNIT..1.0 + UNIT).contains(&ratio) {

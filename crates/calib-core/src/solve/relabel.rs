@@ -4,6 +4,7 @@
 //! samples is the reference; a sample whose distances disagree is compared under every permutation of
 //! its labels. A layout with equal distances cannot be resolved and is left alone.
 
+use calib_geometry::pairs::{self, is_compared};
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
@@ -79,7 +80,8 @@ pub fn relabel(problem: &mut Problem, tolerance: f64) -> Vec<Relabeled> {
 /// Median distances between the points of a body.
 struct Reference {
     points: Vec<PointId>,
-    distance: Vec<Vec<Option<f64>>>,
+    /// Places of two points among `points`, and their distance, m.
+    distances: Vec<(usize, usize, f64)>,
 }
 
 impl Reference {
@@ -92,47 +94,53 @@ impl Reference {
         }
         let n = points.len();
         let index = |p: PointId| points.binary_search(&p).unwrap_or(0);
-        let mut all = vec![vec![Vec::new(); n]; n];
-        for markers in seen {
-            for (i, a) in markers.iter().enumerate() {
-                for b in &markers[i + 1..] {
-                    let (p, q) = (index(a.1).min(index(b.1)), index(a.1).max(index(b.1)));
-                    all[p][q].push((a.2 - b.2).norm());
+        // Position of each point in each sample.
+        let at: Vec<Vec<Option<Point3<f64>>>> = seen
+            .iter()
+            .map(|markers| {
+                let mut at = vec![None; n];
+                for (_, point, position) in markers {
+                    at[index(*point)] = Some(*position);
                 }
-            }
-        }
-        let distance = all
-            .iter_mut()
-            .map(|row| {
-                row.iter_mut()
-                    .map(|d| {
-                        if d.is_empty() {
-                            return None;
-                        }
-                        let middle = d.len() / 2;
-                        Some(*d.select_nth_unstable_by(middle, f64::total_cmp).1)
-                    })
-                    .collect()
+                at
             })
             .collect();
-        Some(Self { points, distance })
+        let mut distances = Vec::new();
+        for p in 0..n {
+            for q in (p + 1..n).filter(|q| is_compared(p, *q, n)) {
+                let all = at.iter().filter_map(|at| Some((at[p]? - at[q]?).norm()));
+                let mut all: Vec<f64> = all.collect();
+                if all.is_empty() {
+                    continue;
+                }
+                let middle = all.len() / 2;
+                let median = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
+                distances.push((p, q, median));
+            }
+        }
+        Some(Self { points, distances })
     }
 
-    fn between(&self, a: usize, b: usize) -> Option<f64> {
-        self.distance[a.min(b)][a.max(b)]
-    }
-
-    /// Largest deviation from the reference when marker i carries label `labels[i]`.
-    fn misfit(&self, positions: &[Point3<f64>], labels: &[usize]) -> f64 {
-        let mut worst: f64 = 0.0;
-        for i in 0..positions.len() {
-            for j in i + 1..positions.len() {
-                if let Some(d) = self.between(labels[i], labels[j]) {
-                    worst = worst.max(((positions[i] - positions[j]).norm() - d).abs());
+    /// Largest deviation from the reference when marker i carries label `labels[i]`, and the labels between which it is.
+    fn worst(&self, positions: &[Point3<f64>], labels: &[usize]) -> (f64, [usize; 2]) {
+        let mut at = vec![None; self.points.len()];
+        for (label, position) in labels.iter().zip(positions) {
+            at[*label] = Some(*position);
+        }
+        let mut worst = (0.0, [0, 0]);
+        for &(p, q, distance) in &self.distances {
+            if let (Some(a), Some(b)) = (at[p], at[q]) {
+                let off = ((a - b).norm() - distance).abs();
+                if off > worst.0 {
+                    worst = (off, [p, q]);
                 }
             }
         }
         worst
+    }
+
+    fn misfit(&self, positions: &[Point3<f64>], labels: &[usize]) -> f64 {
+        self.worst(positions, labels).0
     }
 
     /// New labels when the given ones do not fit and exactly one arrangement does.
@@ -150,7 +158,8 @@ impl Reference {
             .iter()
             .map(|m| self.points.binary_search(&m.1).unwrap_or(0))
             .collect();
-        if self.misfit(&positions, &given) <= tolerance {
+        let (off, between) = self.worst(&positions, &given);
+        if off <= tolerance {
             return None;
         }
         let mut best: Option<(f64, Vec<usize>)> = None;
@@ -167,17 +176,23 @@ impl Reference {
                 }
             }
         };
+        let many = n > pairs::ALL;
         if n <= ALL_PERMUTATIONS {
             let mut labels = given.clone();
             permute(&mut labels, 0, &mut consider);
         } else {
             for i in 0..n {
-                for j in i + 1..n {
+                // An exchange of two others leaves the worst distance as it is.
+                let is_worst = |k: usize| between.contains(&given[k]);
+                for j in (i + 1..n).filter(|j| !many || is_worst(i) || is_worst(*j)) {
                     let mut labels = given.clone();
                     labels.swap(i, j);
                     consider(&labels);
                 }
             }
+        }
+        if many {
+            second = second.min(off);
         }
         let (misfit, labels) = best?;
         (misfit <= tolerance && second > UNAMBIGUOUS * misfit.max(tolerance / UNAMBIGUOUS))

@@ -426,8 +426,11 @@ fn swapped(
     // Twice the gate: the joints' noise adds to the marker's.
     let noise = markers.noise_of(seen.point);
     let limit = (4.0 * limits.gate[3] * theta[noise.index()]).sqrt();
-    (0..model.problem.points.len()).any(|p| {
-        if p == seen.point.index() || model.problem.points[p].frame != frame {
+    let points = &model.problem.points;
+    let name = &points[seen.point.index()].name;
+    (0..points.len()).any(|p| {
+        // Points of one name stand for one another in different samples.
+        if points[p].frame != frame || points[p].name == *name {
             return false;
         }
         let at = pose.r * model.point_position(p, values).coords + pose.t;

@@ -40,6 +40,15 @@ super::topic! {
             "A marker is out of place in {rows:row}; the worst is `{marker}`, by {off}.",
             "Drop these samples: a reflection or a neighboring marker was taken for the marker.";
     }
+    /// A body of very many markers, as a few points.
+    BODY_CONDENSED = "body-condensed" {
+        "": Info,
+            "Its {markers} markers take part in the fit as {points} points, which say as much of its pose.",
+            "Nothing is to be done. Residuals are those of the points.";
+        "some_lost": Warning,
+            "Its {markers} markers take part in the fit as {points} points, which say as much of its pose. {rows:row} with too few of them, or only with markers near one plane, {rows:is|are} left out.",
+            "Show the cameras markers on more than one side of the body.";
+    }
     /// The mirror image fits.
     MIRRORED = "mirrored" {
         "template": Error,

@@ -8,6 +8,7 @@ use crate::error::PipelineError;
 use crate::estimate::start::{Start, start};
 use crate::formulate::model_checks;
 use crate::prepare::checks;
+use crate::prepare::condensed::condense;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::relabel::relabel;
 use crate::prepare::split::split;
@@ -40,6 +41,7 @@ pub fn check_data(
     }
     findings.extend(checks::check(inputs));
     split(inputs);
+    findings.extend(condense(inputs));
     findings.extend(of_shapes);
     let stops = |findings: &[Finding]| checks::stops(findings) && !force;
     let tracks = match body_tracks(inputs, &mut findings) {

@@ -14,6 +14,7 @@ use crate::prepare::aligned::Alignment;
 use crate::prepare::estimators::Estimators;
 use crate::prepare::excluded::Excluded;
 use crate::prepare::loads::Masses;
+use crate::prepare::mixed::Mixed;
 
 /// A profile as it was written, for messages with their place.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -76,6 +77,8 @@ pub struct Loaded {
     pub starts: BTreeMap<usize, f64>,
     /// Shape of each marker's covariance per row, in units of the usual variance; empty where no scatter is known.
     pub shapes: BTreeMap<String, Vec<Option<Matrix3<f64>>>>,
+    /// Body → row → what makes the errors of its points independent there; `None` where they are.
+    pub mixed: BTreeMap<String, Vec<Option<Mixed>>>,
 }
 
 /// Everything the estimation needs.
@@ -91,6 +94,8 @@ pub struct Inputs {
     pub excluded: Vec<Excluded>,
     /// The measurements that this took out: recording, row from 0, marker or body.
     pub taken_out: BTreeSet<(String, usize, String)>,
+    /// Body → (markers it has, points that stand for them).
+    pub condensed: BTreeMap<String, (usize, usize)>,
     /// Digests of all files read, profile first.
     pub digests: Vec<Digest>,
     /// Estimators, readers and writers that the profile can name.

@@ -97,6 +97,7 @@ pub fn load_recordings_with(
         findings,
         excluded: Vec::new(),
         taken_out: BTreeSet::new(),
+        condensed: BTreeMap::new(),
         digests,
         estimators: Arc::new(estimators),
     };
@@ -199,6 +200,7 @@ pub fn of_tables(
     let inputs = Inputs {
         excluded: Vec::new(),
         taken_out: BTreeSet::new(),
+        condensed: BTreeMap::new(),
         digests: robot.digests.clone(),
         robot,
         recordings,

@@ -3,6 +3,7 @@
 pub mod align;
 pub mod aligned;
 pub mod checks;
+pub(crate) mod condensed;
 pub mod conditions;
 pub(crate) mod effects;
 pub mod estimators;
@@ -10,6 +11,7 @@ pub mod excluded;
 pub mod inputs;
 pub mod load;
 pub mod loads;
+pub mod mixed;
 pub(crate) mod named;
 pub mod plugin_effect;
 pub mod readers;

@@ -69,6 +69,7 @@ pub(crate) fn prepare(
         velocities,
         starts: BTreeMap::new(),
         shapes: BTreeMap::new(),
+        mixed: BTreeMap::new(),
     })
 }
 

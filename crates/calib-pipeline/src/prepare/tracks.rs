@@ -69,7 +69,7 @@ pub fn body_tracks(
 }
 
 /// Marker tracks of one body over some recordings, one vector per marker, rows one after the other.
-fn gather(names: &[String], recordings: &[&Loaded]) -> Vec<Vec<Option<Point3<f64>>>> {
+pub(super) fn gather(names: &[String], recordings: &[&Loaded]) -> Vec<Vec<Option<Point3<f64>>>> {
     names
         .iter()
         .map(|marker| {
@@ -84,7 +84,7 @@ fn gather(names: &[String], recordings: &[&Loaded]) -> Vec<Vec<Option<Point3<f64
         .collect()
 }
 
-fn slices(tracks: &[Vec<Option<Point3<f64>>>]) -> Vec<&[Option<Point3<f64>>]> {
+pub(super) fn slices(tracks: &[Vec<Option<Point3<f64>>>]) -> Vec<&[Option<Point3<f64>>]> {
     tracks.iter().map(Vec::as_slice).collect()
 }
 
@@ -268,7 +268,10 @@ fn body_track(
         }
     }
     track.learned = given.is_none();
-    track.marker_sigma = all.sigma;
+    // Points that stand for more markers scatter less than each of these.
+    let fewer = inputs.condensed.get(name);
+    let more = fewer.map_or(1.0, |(markers, points)| *markers as f64 / *points as f64);
+    track.marker_sigma = all.sigma.map(|sigma| sigma * more.sqrt());
     track.template = Some(all.template);
     Ok(track)
 }

@@ -29,10 +29,18 @@ impl<'a> TrackerNoise<'a> {
         for measurement in fit.formulation.problem.measurements() {
             match &measurement.kind {
                 MeasurementKind::Markers(seen) => {
+                    // A point that stands for several markers, or the mean of a hold, has a shape of its own in each row.
+                    let mut shapes: BTreeMap<PointId, (f64, f64)> = BTreeMap::new();
                     for observation in &seen.observations {
-                        let name = markers.get(&observation.point).copied();
-                        let variance = level(seen.noise_of(observation.point));
-                        by_subject.extend(name.zip(variance));
+                        let shape = observation.shape.as_ref();
+                        let (sum, count) = shapes.entry(observation.point).or_default();
+                        *sum += shape.map_or(1.0, |s| s.trace() / 3.0);
+                        *count += 1.0;
+                    }
+                    for (point, (sum, count)) in shapes {
+                        let name = markers.get(&point).copied();
+                        let variance = level(seen.noise_of(point));
+                        by_subject.extend(name.zip(variance.map(|v| v * sum / count)));
                     }
                 }
                 MeasurementKind::Poses(seen) => {

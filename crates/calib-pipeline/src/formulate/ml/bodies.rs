@@ -11,7 +11,8 @@ use nalgebra::{Isometry3, Point3};
 
 use crate::estimate::start::Start;
 use crate::formulate::formulation::Formulation;
-use crate::prepare::inputs::Inputs;
+use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::mixed::Mixed;
 use crate::prepare::tracks::BodyTrack;
 
 /// Marker noise that estimation starts from where the profile states none, m.
@@ -83,20 +84,15 @@ pub(super) fn add_bodies(
                 let points = add_points(&mut formulation.problem, names, &places, name, frame);
                 let mut seen = Vec::new();
                 for (sample, (recording, row)) in formulation.samples.iter().enumerate() {
-                    for (marker, point) in &points {
-                        let loaded = &inputs.recordings[recording];
-                        let track = loaded.poses.markers.get(marker);
-                        if let Some(position) = track.and_then(|t| t[*row]) {
-                            let shapes = loaded.shapes.get(marker);
-                            seen.push(MarkerObservation {
-                                sample,
-                                point: *point,
-                                position,
-                                shape: shapes
-                                    .and_then(|s| s.get(*row).copied().flatten())
-                                    .map(Box::new),
-                            });
+                    let loaded = &inputs.recordings[recording];
+                    let at = (loaded, *row, sample);
+                    let mixed = loaded.mixed.get(name).and_then(|m| m.get(*row)?.as_ref());
+                    match mixed {
+                        Some(mixed) => {
+                            let places = (track, frame, mixed);
+                            seen.extend(mixed_seen(&mut formulation.problem, names, places, at));
                         }
+                        None => seen.extend(points.iter().filter_map(|p| marker_seen(p, at))),
                     }
                 }
                 seen.shrink_to_fit();
@@ -110,6 +106,46 @@ pub(super) fn add_bodies(
             _ => {}
         }
     }
+}
+
+/// A marker in one row.
+fn marker_seen(
+    (marker, point): &(String, PointId),
+    (loaded, row, sample): (&Loaded, usize, usize),
+) -> Option<MarkerObservation> {
+    let position = loaded.poses.markers.get(marker)?[row]?;
+    let shapes = loaded.shapes.get(marker);
+    let shape = shapes.and_then(|s| s.get(row).copied().flatten());
+    Some(MarkerObservation {
+        sample,
+        point: *point,
+        position,
+        shape: shape.map(Box::new),
+    })
+}
+
+/// The points of a condensed body in a row that does not show all its markers: other points, whose errors are independent there.
+fn mixed_seen(
+    problem: &mut Problem,
+    names: &[String],
+    (track, frame, mixed): (&BodyTrack, FrameId, &Mixed),
+    (loaded, row, sample): (&Loaded, usize, usize),
+) -> Vec<MarkerObservation> {
+    let positions = names.iter().map(|m| loaded.poses.markers.get(m)?[row]);
+    let positions: Option<Vec<Point3<f64>>> = positions.collect();
+    let (Some(positions), Some(template)) = (positions, &track.template) else {
+        return Vec::new();
+    };
+    let places = mixed.of(&template.points);
+    let seen = names.iter().zip(places).zip(mixed.of(&positions));
+    let one =
+        |((name, place), position): ((&String, Point3<f64>), Point3<f64>)| MarkerObservation {
+            sample,
+            point: problem.known_point(name, frame, place),
+            position,
+            shape: Some(Box::new(mixed.shape)),
+        };
+    seen.map(one).collect()
 }
 
 /// Noise of markers and of body poses, where some body is seen so.
