@@ -42,11 +42,11 @@ super::topic! {
     }
     /// A body of very many markers, as a few points.
     BODY_CONDENSED = "body-condensed" {
-        "": Info,
+        "all_rows": Info,
             "Its {markers} markers take part in the fit as {points} points, which say as much of its pose.",
             "Nothing is to be done. Residuals are those of the points.";
         "some_lost": Warning,
-            "Its {markers} markers take part in the fit as {points} points, which say as much of its pose. {rows:row} with too few of them, or only with markers near one plane, {rows:is|are} left out.",
+            "Its {markers} markers take part in the fit as {points} points, which say as much of its pose. Too few of them, or only markers near one plane, were seen in {rows:row}: left out.",
             "Show the cameras markers on more than one side of the body.";
     }
     /// The mirror image fits.

@@ -199,7 +199,7 @@ fn condense_body(
         let share = (count as f64 / names.len() as f64).sqrt();
         changed.template_sigma = body.template_sigma.map(|sigma| sigma * share);
     }
-    let kind = if lost > 0 { "some_lost" } else { "" };
+    let kind = if lost > 0 { "some_lost" } else { "all_rows" };
     let finding = Finding::of_kind(catalog::BODY_CONDENSED, kind, Subject::body(name))
         .with("markers", Fact::count(names.len()))
         .with("points", Fact::count(count));
