@@ -4,7 +4,8 @@
 pub const ALL: usize = 24;
 
 /// Whether the distance between two of `count` points is looked at: with more than [`ALL`] of them, that of each to those 1, 2, 4, 8, … places
-/// before and behind it. A dozen or more tell a point that is out of place, and what they cost grows with the points, not with their square.
+/// before and behind it. These are five or more, enough to tell a point that is out of place, and what they cost
+/// grows little faster than the number of points.
 #[must_use]
 pub fn is_compared(first: usize, second: usize, count: usize) -> bool {
     first != second && (count <= ALL || first.abs_diff(second).is_power_of_two())

@@ -46,7 +46,7 @@ super::topic! {
             "Its {markers} markers take part in the fit as {points} points, which say as much of its pose.",
             "Nothing is to be done. Residuals are those of the points.";
         "some_lost": Warning,
-            "Its {markers} markers take part in the fit as {points} points, which say as much of its pose. Too few of them, or only markers near one plane, were seen in {rows:row}: left out.",
+            "Its {markers} markers take part in the fit as {points} points, which say as much of its pose. Too few of them, or only markers near one plane, were seen in {rows:row}, which the fit leaves out.",
             "Show the cameras markers on more than one side of the body.";
     }
     /// The mirror image fits.
