@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
 
-/// What makes the errors of a body's points independent in one row: equation (3) of [`condensed`](crate::prepare::condensed).
+/// What makes the errors of a body's points independent in one row: equation (3) of `condensed.rs`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mixed {
     /// a of equation (3), row by row.
