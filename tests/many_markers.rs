@@ -131,6 +131,12 @@ fn the_noise_of_many_markers_is_found_whether_all_are_seen_or_half() {
             assert_eq!(found["severity"], "info", "{found:#}");
         }
         half.push(sigma);
+        // The checks see the markers themselves.
+        let checked = dir.calib(["check", "three.yaml", "--json"]).json();
+        let bodies = checked["noise"].as_array().expect("a list");
+        let ball = bodies.iter().find(|b| b["body"] == "ball");
+        let scatter = ball.and_then(|b| b["sigma_m"].as_f64()).expect("a scatter");
+        assert!((1e3 * scatter / SIGMA_MM - 1.0).abs() < 0.04, "{scatter}");
     }
     // 40 rows of 24 coordinates less the unknowns: 2.5 % each, 1.3 % the mean of four.
     for found in [&all, &half] {

@@ -170,15 +170,11 @@ fn condense_body(
         &slices(&gathered),
         inputs.robot.profile.tracker.marker_sigma,
     );
-    let places = match template {
-        Some(points) => points.to_vec(),
-        None => {
-            let good = distances.without_gross(&slices(&gathered));
-            let learned: Template = body_poses(names, &slices(&good), None, None).ok()?.template;
-            learned.points
-        }
-    };
-    let condensed = Condensed::of(&places)?;
+    let given = template.map(|points| Template::given(names.to_vec(), points.to_vec()));
+    let given = given.transpose().ok()?;
+    let good = distances.without_gross(&slices(&gathered));
+    let all = body_poses(names, &slices(&good), given, None).ok()?;
+    let condensed = Condensed::of(&all.template.points)?;
     let count = condensed.points.len();
     let own: Vec<String> = (1..=count)
         .map(|i| format!("{name} {i} of {count}"))
@@ -187,9 +183,7 @@ fn condense_body(
     for loaded in inputs.recordings.values_mut() {
         lost += condense_recording(loaded, (name, names), &own, &condensed, &distances);
     }
-    inputs
-        .condensed
-        .insert(name.to_owned(), (names.len(), count));
+    inputs.condensed.insert(name.to_owned(), all.sigma);
     if let Some(changed) = inputs.robot.profile.bodies.get_mut(name) {
         changed.kind = BodyKind::Markers {
             names: own,

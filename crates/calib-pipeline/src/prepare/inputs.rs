@@ -94,8 +94,8 @@ pub struct Inputs {
     pub excluded: Vec<Excluded>,
     /// The measurements that this took out: recording, row from 0, marker or body.
     pub taken_out: BTreeSet<(String, usize, String)>,
-    /// Body → (markers it has, points that stand for them).
-    pub condensed: BTreeMap<String, (usize, usize)>,
+    /// Bodies of very many markers, for which a few points stand: scatter of a marker coordinate about the rigid body, m, where it can be told.
+    pub condensed: BTreeMap<String, Option<f64>>,
     /// Digests of all files read, profile first.
     pub digests: Vec<Digest>,
     /// Estimators, readers and writers that the profile can name.

@@ -268,10 +268,9 @@ fn body_track(
         }
     }
     track.learned = given.is_none();
-    // Points that stand for more markers scatter less than each of these.
-    let fewer = inputs.condensed.get(name);
-    let more = fewer.map_or(1.0, |(markers, points)| *markers as f64 / *points as f64);
-    track.marker_sigma = all.sigma.map(|sigma| sigma * more.sqrt());
+    // Points that stand for many markers scatter less than each of these.
+    let of_markers = inputs.condensed.get(name).copied();
+    track.marker_sigma = of_markers.unwrap_or(all.sigma);
     track.template = Some(all.template);
     Ok(track)
 }
