@@ -18,6 +18,7 @@ mod facts;
 mod fit;
 mod fleet;
 mod fleet_faults;
+mod holds_and_rows;
 mod hostile;
 mod hygiene;
 mod init;

@@ -164,7 +164,7 @@ pub use analysis::standardized::StandardizedResiduals;
 pub use analysis::starts::StartDirection;
 pub use analysis::tails::{ResidualVector, Tails};
 pub use analysis::untested::{MovedPoint, Moves, OpenCause, OpenError, OpenErrors, UntestedEffect};
-pub use analysis::validate::{CrossValidation, ErrorSummary, SamplePrediction, VectorError};
+pub use analysis::validate::{CrossValidation, ErrorSummary, Level, SamplePrediction, VectorError};
 pub use analysis::weigh::{NoiseCandidate, NoiseChoice, NoiseLevel, Weighed};
 pub use analysis::widths::{Widened, WidthEstimate, WidthKind};
 pub use calib_geometry::plausible::Unlikely;

@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -116,7 +117,16 @@ def selection_s() -> float:
     return min(once(), once())
 
 
+@pytest.fixture
+def heard_interrupts() -> Iterator[None]:
+    """Python raises an interrupt as in a terminal: what a shell starts in the background ignores it from birth."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are counted on Linux")
+@pytest.mark.usefixtures("heard_interrupts")
 @pytest.mark.parametrize("part", [0.05, 0.2, 0.35, 0.5, 0.6])
 def test_an_interrupt_is_answered_within_100_ms(
     part: float, selection_s: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]

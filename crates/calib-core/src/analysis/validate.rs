@@ -16,10 +16,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::analysis::solution::Solution;
 use crate::graph::ids::MeasurementId;
-use crate::model::layout::Model;
+use crate::graph::problem::NoiseKind;
+use crate::model::layout::{Model, Observation};
 use crate::model::values::Values;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::accumulate;
+use crate::solve::rows::add_block;
 use crate::solve::whitened::{covariance_of, whitened};
 
 /// Prediction of one sample from the others.
@@ -118,6 +120,9 @@ pub struct CrossValidation {
     pub indispensable: Vec<usize>,
 }
 
+/// σ² of a level of noise in a sample, from its kind and the σ² that was found, m² or rad²; at least that.
+pub type Level<'a> = &'a dyn Fn(usize, NoiseKind, f64) -> f64;
+
 /// An eigenvalue of I − Q below this means the sample alone determines something.
 const LEVERAGE_LEFT: f64 = 1e-9;
 
@@ -137,26 +142,55 @@ impl Solution {
     /// Predictions of the held-out samples by equation (2), whatever their weight in the fit was.
     #[must_use]
     pub fn held_out(&self) -> Option<CrossValidation> {
-        let held: Vec<f64> = self
-            .model
-            .observations
-            .iter()
-            .map(|o| f64::from(u8::from(self.model.is_held_out(o.sample))))
-            .collect();
+        self.held_out_at(&|_, _, found| found)
+    }
+
+    /// The same where held-out samples have other levels of noise than those of the fit, as rows have that are not averaged beside a fit of
+    /// means.
+    #[must_use]
+    pub fn held_out_at(&self, level: Level<'_>) -> Option<CrossValidation> {
+        let held = self.held_out_weights(level);
         predictions(self.objective(), &self.values, &held, false, &|_| true)
     }
 
+    /// w of the held-out observations, so that V/w is their covariance; 0 of all others. Where one kind of noise grows more than another,
+    /// the whole observation counts as that.
+    fn held_out_weights(&self, level: Level<'_>) -> Vec<f64> {
+        let model = &self.model;
+        let weight = |(o, observation): (usize, &Observation)| {
+            if !model.is_held_out(observation.sample) {
+                return 0.0;
+            }
+            let mut weight = 1.0_f64;
+            add_block(model, o, |_, _, group, _| {
+                let found = self.theta[group];
+                let kind = model.problem.groups[group].kind;
+                let there = level(observation.sample, kind, found);
+                if there > found {
+                    weight = weight.min(found / there);
+                }
+            });
+            weight
+        };
+        model.observations.iter().enumerate().map(weight).collect()
+    }
+
     /// χ² of all held-out samples together but those of `without`, against what is stated of their prediction, with its degrees of
-    /// freedom: equation (4). `None` where nothing is held out, or the model cannot be evaluated.
+    /// freedom: equation (4), levels as of [`Self::held_out_at`]. `None` where nothing is held out, or the model cannot be
+    /// evaluated.
     #[must_use]
-    pub fn held_out_chi2(&self, without: &BTreeSet<usize>) -> Option<(f64, usize)> {
+    pub fn held_out_chi2(
+        &self,
+        without: &BTreeSet<usize>,
+        level: Level<'_>,
+    ) -> Option<(f64, usize)> {
         let model = &self.model;
         let n = model.free();
         let mut work = Workspace::new(model);
         work.cache.update(&model.problem, &self.values);
-        let everything = vec![1.0; model.observations.len()];
+        let held = self.held_out_weights(level);
         let objective = Objective {
-            weights: &everything,
+            weights: &held,
             ..self.objective()
         };
         let (mut rows, mut squares) = (0, 0.0);

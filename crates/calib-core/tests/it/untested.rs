@@ -312,7 +312,10 @@ fn held_out_errors_have_the_distribution_that_is_stated() {
     let of = |gain: f64| -> f64 {
         let mean = (200..230).map(|seed| {
             let rig = rig(seed, gain);
-            let (chi2, rows) = rig.solution.held_out_chi2(&none).expect("held out");
+            let (chi2, rows) = rig
+                .solution
+                .held_out_chi2(&none, &|_, _, found| found)
+                .expect("held out");
             assert_eq!(rows, HELD_OUT * 4 * 3);
             chi2 / rows as f64
         });
@@ -325,7 +328,17 @@ fn held_out_errors_have_the_distribution_that_is_stated() {
     // Samples that are left out do not count.
     let rig = rig(1, 0.0);
     let half: BTreeSet<usize> = (FITTED..FITTED + HELD_OUT / 2).collect();
-    assert_eq!(rig.solution.held_out_chi2(&half).expect("held out").1, 36);
+    assert_eq!(
+        rig.solution
+            .held_out_chi2(&half, &|_, _, found| found)
+            .expect("held out")
+            .1,
+        36
+    );
     let every: BTreeSet<usize> = (0..FITTED + HELD_OUT).collect();
-    assert!(rig.solution.held_out_chi2(&every).is_none());
+    assert!(
+        rig.solution
+            .held_out_chi2(&every, &|_, _, found| found)
+            .is_none()
+    );
 }

@@ -1,7 +1,9 @@
 //! Left-out and held-out predictions.
 
 use crate::common::{Chain, Free, Handles, rng, six_r};
-use calib_core::{ErrorSummary, NoiseKind, Settings, solve};
+use std::collections::BTreeSet;
+
+use calib_core::{ErrorSummary, Level, MeasurementKind, NoiseKind, Settings, solve};
 
 fn fitted(seed: u64, poses: usize, joint: bool) -> (Chain, Handles) {
     let mut r = rng(seed);
@@ -60,6 +62,46 @@ fn held_out_z_scores_are_standard() {
     let errors = ErrorSummary::positions(&held.samples);
     assert_eq!(errors.n, 240);
     assert!(errors.mean < errors.rms && errors.rms < errors.p95 && errors.p95 < errors.max);
+}
+
+#[test]
+fn rows_with_more_noise_than_the_fit_are_standard_at_their_own_level() {
+    let mut r = rng(8);
+    let free = Free::frames_and_offsets(6);
+    let chain = Chain::nominal(six_r())
+        .posed(&mut r, 120, 1.4)
+        .deviate(&mut r, &free, 0.01, 0.005);
+    let (mut means, mut rows) = (chain.problem(&free, 1e-4), chain.problem(&free, 4e-4));
+    chain.observe(&mut r, &mut means, 1e-4, 0.0);
+    chain.observe(&mut r, &mut rows, 4e-4, 0.0);
+    let markers = |h: &Handles| match &h.problem.measurements()[0].kind {
+        MeasurementKind::Markers(markers) => markers.observations.clone(),
+        _ => panic!("markers"),
+    };
+    // Means of the first sixty poses, single rows of the others.
+    let (fitted, held) = (markers(&means), markers(&rows));
+    let seen = fitted.into_iter().filter(|o| o.sample < 60);
+    let seen = seen.chain(held.into_iter().filter(|o| o.sample >= 60));
+    let seen = seen.collect();
+    if let MeasurementKind::Markers(markers) = &mut means.problem.measurements_mut()[0].kind {
+        markers.observations = seen;
+    }
+    means.problem.held_out = (60..120).collect();
+    let s = solve(&means.problem, &Settings::plain()).unwrap();
+    let ratio = |level: Level<'_>| {
+        let held = s.held_out_at(level).unwrap();
+        let z2: f64 = held.samples.iter().map(|p| p.z2).sum();
+        let rows: usize = held.samples.iter().map(|p| p.rows).sum();
+        let (chi2, all) = s.held_out_chi2(&BTreeSet::new(), level).unwrap();
+        assert_eq!(all, rows);
+        (z2 / rows as f64, chi2 / rows as f64)
+    };
+    let (of_means, together) = ratio(&|_, _, found| found);
+    assert!(of_means > 10.0 && together > 10.0, "{of_means} {together}");
+    // 720 rows: σ of the ratio 5 %.
+    let (own, together) = ratio(&|_, _, found| found + 15e-8);
+    assert!((own - 1.0).abs() < 0.2, "{own}");
+    assert!((together - 1.0).abs() < 0.2, "{together}");
 }
 
 #[test]

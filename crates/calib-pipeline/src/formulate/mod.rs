@@ -24,6 +24,7 @@ pub mod realign;
 pub(crate) mod repeated;
 pub mod row_checks;
 pub mod selection;
+pub(crate) mod single_rows;
 pub mod solved;
 pub(crate) mod starts;
 pub mod structural;

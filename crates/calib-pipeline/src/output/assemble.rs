@@ -147,7 +147,7 @@ fn held_out(e: &Evidence<'_>) -> Option<HeldOut> {
     let mut held_out = e.held_out.clone()?;
     let tracker_m = e
         .fit
-        .and_then(|fit| TrackerNoise::of(fit, e.causes.lacks_effects()).over(&held_out));
+        .and_then(|fit| TrackerNoise::of(fit, e.causes.lacks_effects()).over(e.inputs, &held_out));
     if let Some(expected) = &mut held_out.expected {
         expected.tracker_m = tracker_m;
     }

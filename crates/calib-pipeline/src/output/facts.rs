@@ -13,12 +13,14 @@ use nalgebra::UnitVector3;
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::motion_axis;
+use crate::formulate::single_rows::SingleRows;
 use crate::output::counts::{Tracks, rejected_parts, rejected_share};
 use crate::output::evidence::{Evidence, fit_end};
 use crate::output::of_fit::{stated_sigma, unit};
 use crate::output::open;
 use crate::verify::accuracy::{ToolBody, tool_bodies};
 use crate::verify::motions::Motions;
+use crate::verify::tracker_noise::recording_of;
 
 /// Everything that the rules of the verdict look at.
 pub(crate) fn facts(
@@ -167,11 +169,17 @@ fn orientation(e: &Evidence<'_>) -> Orientation {
         .filter_map(|pose| pose.calibrated_rad)
         .collect();
     let squares: f64 = angles.iter().map(|angle| angle * angle).sum();
+    let expected = |fit: &MlFit| {
+        let rows = SingleRows::of(e.inputs, &fit.formulation.samples);
+        let first = e.held_out.iter().flat_map(|h| &h.poses).next();
+        let recording = first.and_then(|error| recording_of(e.inputs, error));
+        let level = |kind, found| recording.map_or(found, |r| rows.level(r, kind, found));
+        let mut tools = tools.iter();
+        tools.find_map(|tool| tool.orientation_noise(e.tracks, fit, &level))
+    };
     Orientation {
         rms: (!angles.is_empty()).then(|| (squares / angles.len() as f64).sqrt()),
-        expected: tools
-            .iter()
-            .find_map(|tool| tool.orientation_noise(e.tracks, e.fit)),
+        expected: e.fit.and_then(expected),
     }
 }
 
@@ -181,12 +189,15 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
     const ENOUGH: usize = 20;
     let of_markers = e.tracks.values().filter_map(|track| track.marker_sigma);
     let rigid = median(of_markers.collect());
+    // Means of holds have less noise than the rows that a profile states it of: those are no less certain than stated for it.
+    let within = SingleRows::of(e.inputs, &fit.formulation.samples).within;
     let beside = s.noise.iter().filter_map(|n| {
         let stated = stated_sigma(&e.inputs.robot.profile, &n.name).filter(|s| *s > 0.0)?;
         let known = n.estimated && n.samples >= ENOUGH && n.kind != NoiseKind::Scale;
         known.then(|| FoundNoise {
             group: n.name.clone(),
             factor: n.sigma / stated,
+            of_rows: n.sigma.max(within.of_kind(n.kind).sqrt()) / stated,
             rigid: rigid
                 .filter(|_| n.kind == NoiseKind::Position)
                 .map(|sigma| sigma / stated),
@@ -194,10 +205,11 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
     });
     let beside: Vec<FoundNoise> = beside.collect();
     let by_factor = |a: &&FoundNoise, b: &&FoundNoise| a.factor.total_cmp(&b.factor);
+    let by_rows = |a: &&FoundNoise, b: &&FoundNoise| a.of_rows.total_cmp(&b.of_rows);
     Goodness {
         used: s.chi2 / s.degrees_of_freedom.max(1.0),
         band: Goodness::band_of(s.degrees_of_freedom),
         above_stated: beside.iter().max_by(by_factor).cloned(),
-        below_stated: beside.iter().min_by(by_factor).cloned(),
+        below_stated: beside.iter().min_by(by_rows).cloned(),
     }
 }

@@ -26,6 +26,7 @@ use calib_urdf::{JointId, RobotModel};
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::joint_state;
+use crate::formulate::single_rows::SingleRows;
 use crate::output::weak::{postures, tool};
 use crate::prepare::conditions::Conditions;
 use crate::prepare::inputs::Inputs;
@@ -135,7 +136,11 @@ pub(crate) fn agreement(
     held_out: Option<&HeldOut>,
 ) -> Option<Agreement> {
     let without = screened(inputs, fit, held_out);
-    let (chi2, rows) = fit.solution.held_out_chi2(&without)?;
+    let samples = &fit.formulation.samples;
+    let rows = SingleRows::of(inputs, samples);
+    let recording = |sample: usize| &inputs.recordings[&samples[sample].0];
+    let level = |sample, kind, found| rows.level(recording(sample), kind, found);
+    let (chi2, rows) = fit.solution.held_out_chi2(&without, &level)?;
     let freedom = fit.solution.degrees_of_freedom;
     Some(Agreement::of(chi2, rows, freedom))
 }

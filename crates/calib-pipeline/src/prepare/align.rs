@@ -24,6 +24,7 @@ use calib_recording::{Poses, Recording};
 use crate::error::{DataProblem, PipelineError};
 use crate::prepare::aligned::{Aligned, Alignment, ClockState, SAME_TIME};
 use crate::prepare::inputs::RobotProfile;
+use crate::prepare::row_noise::RowNoise;
 use crate::prepare::settled::settle;
 use crate::prepare::streams::Scalars;
 use crate::prepare::timelines::{estimate, tracker_table, tracker_timeline};
@@ -108,6 +109,7 @@ fn aligned(
         poses: Poses::default(),
         velocities: BTreeMap::new(),
         shapes: BTreeMap::new(),
+        row_noise: RowNoise::default(),
         alignment: Alignment {
             tracker_clock: streams.tracker_clock.to_owned(),
             robot_clock: streams.robot_clock.to_owned(),

@@ -10,6 +10,7 @@ use calib_report::{Unit, number};
 use nalgebra::Matrix3;
 
 use crate::prepare::excluded::Excluded;
+use crate::prepare::row_noise::RowNoise;
 use crate::prepare::streams::Scalars;
 
 /// An offset below this, s, is none: at 0.5 rad/s and 1 m it is a tenth of a millimeter.
@@ -132,6 +133,8 @@ pub struct Aligned {
     pub velocities: BTreeMap<String, Vec<Option<f64>>>,
     /// Shape of each marker's covariance per row, in units of the usual variance; only for holds.
     pub shapes: BTreeMap<String, Vec<Option<Matrix3<f64>>>>,
+    /// Usual variances of single rows about the mean of their hold; only for holds.
+    pub row_noise: RowNoise,
     /// How the clocks go together.
     pub alignment: Alignment,
     /// What was noticed on the way.

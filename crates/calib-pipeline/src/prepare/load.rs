@@ -85,6 +85,7 @@ pub fn load_recordings_with(
                 loaded.alignment = Some(aligned.alignment);
                 loaded.velocities = aligned.velocities;
                 loaded.shapes = aligned.shapes;
+                loaded.row_noise = aligned.row_noise;
                 excluded.extend(aligned.excluded);
                 loaded
             }

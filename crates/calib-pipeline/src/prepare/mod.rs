@@ -18,6 +18,7 @@ pub mod readers;
 pub mod relabel;
 pub mod repeats;
 pub mod robot;
+pub mod row_noise;
 pub mod rows;
 pub mod settled;
 mod speeds;

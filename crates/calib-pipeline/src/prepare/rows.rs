@@ -9,6 +9,7 @@ use calib_urdf::RobotModel;
 
 use crate::error::{DataProblem, PipelineError};
 use crate::prepare::inputs::{Loaded, RobotProfile};
+use crate::prepare::row_noise::RowNoise;
 use crate::prepare::speeds::speeds;
 
 /// Checks the names of a table against robot and profile and makes its joint vectors.
@@ -69,6 +70,7 @@ pub(crate) fn prepare(
         velocities,
         starts: BTreeMap::new(),
         shapes: BTreeMap::new(),
+        row_noise: RowNoise::default(),
         mixed: BTreeMap::new(),
     })
 }

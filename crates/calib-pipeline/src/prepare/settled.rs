@@ -11,6 +11,7 @@ use nalgebra::Matrix3;
 
 use crate::prepare::aligned::Aligned;
 use crate::prepare::excluded::Excluded;
+use crate::prepare::row_noise::RowNoise;
 
 /// Variance of a hold, in units of the usual, from which it had not settled.
 const RESTLESS: f64 = 16.0;
@@ -82,6 +83,10 @@ pub(crate) fn settle(
         let stream = (body.as_str(), step);
         note_scatter(stream, traces.collect(), &mut Vec::new(), &mut restless);
     }
+    aligned.row_noise = RowNoise::of(
+        table.marker_covariance.values(),
+        table.body_covariance.values(),
+    );
     // The part that changes from hold to hold and is constant within one (distortion, refraction) does not show in the
     // scatter: half of the weight is the same for all.
     usual.sort_by(f64::total_cmp);

@@ -122,7 +122,9 @@ pub(crate) fn accuracy_limits(
     };
     let of_errors = OfErrors::of(inputs, held_out, fit);
     let parameters = of_errors.parameters;
-    let tracker = TrackerNoise::of(fit, lacking).over(held_out).unwrap_or(0.0);
+    let tracker = TrackerNoise::of(fit, lacking)
+        .over(inputs, held_out)
+        .unwrap_or(0.0);
     let joints = fit.joint_sigma().unwrap_or(0.0) * of_errors.lever;
     let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
     let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
@@ -262,19 +264,21 @@ impl ToolBody<'_> {
         }
     }
 
-    /// rms angle that the noise of one measurement of its orientation makes, rad; `None` where none is measured.
+    /// rms angle that the noise of one measurement of its orientation makes, rad, where a level of noise is as `level` says; `None` where
+    /// none is measured.
     pub(crate) fn orientation_noise(
         &self,
         tracks: &BTreeMap<String, BodyTrack>,
-        fit: Option<&MlFit>,
+        fit: &MlFit,
+        level: &dyn Fn(NoiseKind, f64) -> f64,
     ) -> Option<f64> {
-        let fit = fit?;
         let noise = TrackerNoise::of(fit, false);
         let track = tracks.get(self.name)?;
         if *self.kind == BodyKind::Pose || track.is_computed() {
             let mut noise = fit.solution.noise.iter();
-            let level = noise.find(|n| n.kind == NoiseKind::Orientation)?;
-            return Some(level.sigma * 3.0_f64.sqrt());
+            let found = noise.find(|n| n.kind == NoiseKind::Orientation)?;
+            let variance = level(NoiseKind::Orientation, found.sigma.powi(2));
+            return Some((3.0 * variance).sqrt());
         }
         // Fit of a pose to n markers: information Σ J_iᵀJ_i/σ_i² with J_i = [−[p_i]ₓ, 1], and the part of the rotation.
         let template = track.template.as_ref()?;
@@ -285,7 +289,7 @@ impl ToolBody<'_> {
                 j.fixed_view_mut::<3, 3>(0, 0)
                     .copy_from(&-so3::skew(&p.coords));
                 j.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
-                Some(j.transpose() * j / noise.variance(name)?)
+                Some(j.transpose() * j / level(NoiseKind::Position, noise.variance(name)?))
             })
             .sum();
         let covariance = nalgebra::Cholesky::new(information?)?.inverse();

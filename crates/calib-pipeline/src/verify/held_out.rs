@@ -11,6 +11,7 @@ use calib_report::{Distance, HeldOut, PoseError};
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::Calibration;
+use crate::formulate::single_rows::SingleRows;
 use crate::formulate::starts::rows_of_no_side;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
@@ -49,7 +50,7 @@ pub fn held_out(
     let (nominal, registered) = (of(robots.nominal), of(robots.registered));
     let urdf_alone = of(robots.urdf_alone);
     let refitted = of(robots.refitted);
-    let distances = fit.map(distances).unwrap_or_default();
+    let distances = fit.map(|fit| distances(inputs, fit)).unwrap_or_default();
     let best = deviations(inputs, tracks, robots.calibrated, validation);
     if best.is_empty() {
         return None;
@@ -143,8 +144,12 @@ pub(crate) fn by_key(deviations: Vec<Deviation>) -> BTreeMap<Key, Deviation> {
 }
 
 /// Errors of the held-out samples in units of what the fit predicts: noise and parameters.
-fn distances(fit: &MlFit) -> BTreeMap<Key, Distance> {
-    let predicted = fit.solution.held_out().into_iter();
+fn distances(inputs: &Inputs, fit: &MlFit) -> BTreeMap<Key, Distance> {
+    let samples = &fit.formulation.samples;
+    let rows = SingleRows::of(inputs, samples);
+    let recording = |sample: usize| &inputs.recordings[&samples[sample].0];
+    let level = |sample, kind, found| rows.level(recording(sample), kind, found);
+    let predicted = fit.solution.held_out_at(&level).into_iter();
     let samples = predicted.flat_map(|p| p.samples);
     let mut out = BTreeMap::new();
     for sample in samples {

@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::{FrameId, GroupId, MeasurementKind, PointId, PoseNoise};
-use calib_report::HeldOut;
+use calib_core::{FrameId, GroupId, MeasurementKind, NoiseKind, PointId, PoseNoise};
+use calib_report::{HeldOut, PoseError};
 
 use crate::formulate::formulation::MlFit;
+use crate::formulate::single_rows::SingleRows;
+use crate::prepare::inputs::{Inputs, Loaded};
 
 /// Variances of one coordinate of a measured position, m².
 #[derive(Debug, Clone, Default)]
@@ -14,6 +16,8 @@ pub(crate) struct TrackerNoise<'a> {
     by_subject: BTreeMap<&'a str, f64>,
     /// Of everything else that was measured: markers first.
     common: Option<f64>,
+    /// Recording and row of the fit's samples.
+    samples: &'a [(String, usize)],
 }
 
 impl<'a> TrackerNoise<'a> {
@@ -26,7 +30,10 @@ impl<'a> TrackerNoise<'a> {
         };
         let (markers, bodies) = (markers(fit), bodies(fit));
         let mut by_subject = BTreeMap::new();
-        for measurement in fit.formulation.problem.measurements() {
+        // Single rows and means of holds have levels of their own: what is held out counts, else single rows, which come first.
+        let measurements = fit.formulation.problem.measurements().iter().rev();
+        let (with, without): (Vec<_>, Vec<_>) = measurements.partition(|m| held_out(fit, &m.kind));
+        for measurement in without.into_iter().chain(with) {
             match &measurement.kind {
                 MeasurementKind::Markers(seen) => {
                     // A point that stands for several markers, or the mean of a hold, has a shape of its own in each row.
@@ -57,6 +64,7 @@ impl<'a> TrackerNoise<'a> {
         Self {
             by_subject,
             common: of_markers.or_else(|| groups.body_position.and_then(level)),
+            samples: &fit.formulation.samples,
         }
     }
 
@@ -66,15 +74,37 @@ impl<'a> TrackerNoise<'a> {
     }
 
     /// rms length of the noise in the positions that were held out, m.
-    pub(crate) fn over(&self, held_out: &HeldOut) -> Option<f64> {
+    pub(crate) fn over(&self, inputs: &Inputs, held_out: &HeldOut) -> Option<f64> {
+        let rows = SingleRows::of(inputs, self.samples);
         let errors = held_out.poses.iter().filter(|p| !p.screened);
         let (mut sum, mut n) = (0.0, 0.0);
         for error in errors {
-            sum += 3.0 * self.variance(&error.subject)?;
+            let variance = self.variance(&error.subject)?;
+            let recording = recording_of(inputs, error);
+            let level = recording.map(|r| rows.level(r, NoiseKind::Position, variance));
+            sum += 3.0 * level.unwrap_or(variance);
             n += 1.0;
         }
         (n > 0.0).then(|| f64::sqrt(sum / n))
     }
+}
+
+/// Whether some of what was measured is held out.
+fn held_out(fit: &MlFit, kind: &MeasurementKind) -> bool {
+    let held_out = &fit.formulation.problem.held_out;
+    match kind {
+        MeasurementKind::Markers(of) => {
+            of.observations.iter().any(|o| held_out.contains(&o.sample))
+        }
+        MeasurementKind::Poses(of) => of.observations.iter().any(|o| held_out.contains(&o.sample)),
+        _ => false,
+    }
+}
+
+/// The recording that an error was seen in.
+pub(crate) fn recording_of<'a>(inputs: &'a Inputs, error: &PoseError) -> Option<&'a Loaded> {
+    let (recording, _) = error.pose.rsplit_once(':')?;
+    inputs.recordings.get(recording)
 }
 
 /// Names of the markers.

@@ -361,6 +361,8 @@ pub struct FoundNoise {
     pub group: String,
     /// Found over stated.
     pub factor: f64,
+    /// The same of single rows, where what was fitted are their means over holds; at least `factor`.
+    pub of_rows: f64,
     /// Scatter of the markers about their own rigid bodies over the stated noise: no model of the robot is in it.
     pub rigid: Option<f64>,
 }

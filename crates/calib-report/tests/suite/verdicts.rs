@@ -52,6 +52,7 @@ fn found(factor: f64, rigid: Option<f64>) -> FoundNoise {
     FoundNoise {
         group: "marker".into(),
         factor,
+        of_rows: factor,
         rigid,
     }
 }
@@ -542,6 +543,22 @@ fn verdict_of(effect: Effect) -> Verdict {
         Effect::LeavesOpen => Verdict::NotEvaluated,
         Effect::Rejects => Verdict::Rejected,
     }
+}
+
+#[test]
+fn the_stated_noise_of_rows_is_not_held_against_their_means() {
+    let below = |of_rows| {
+        let facts = with(|f| {
+            let found = FoundNoise {
+                of_rows,
+                ..found(0.25, None)
+            };
+            f.goodness.as_mut().expect("there").below_stated = Some(found);
+        });
+        let reasons = judge(&facts).reasons;
+        reasons.iter().any(|r| r.id == ReasonId::NoiseBelowStated)
+    };
+    assert!(!below(0.9) && below(0.4));
 }
 
 #[test]

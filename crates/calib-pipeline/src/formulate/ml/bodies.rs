@@ -11,6 +11,7 @@ use nalgebra::{Isometry3, Point3};
 
 use crate::estimate::start::Start;
 use crate::formulate::formulation::Formulation;
+use crate::formulate::single_rows::{of_means, own_levels};
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::mixed::Mixed;
 use crate::prepare::tracks::BodyTrack;
@@ -30,7 +31,7 @@ pub(super) fn add_bodies(
     let profile = &inputs.robot.profile;
     let as_pose =
         |name: &String| profile.bodies[name].kind == BodyKind::Pose || tracks[name].is_computed();
-    let (marker_noise, body_noise) = noise_groups(formulation, profile, &as_pose);
+    let levels = levels(formulation, inputs, &as_pose);
     for (name, body) in &profile.bodies {
         let Some(link) = formulation.links[body.link.index()] else {
             continue;
@@ -61,51 +62,110 @@ pub(super) fn add_bodies(
         } else {
             link
         };
-        match (&body.kind, marker_noise, body_noise) {
-            (_, _, Some(noise)) if as_pose(name) => {
-                let seen = formulation.samples.iter().enumerate().filter_map(
+        let seen = |level: &Level, formulation: &Formulation| -> Vec<(usize, (String, usize))> {
+            let samples = formulation.samples.iter().cloned().enumerate();
+            let of_level = |(_, (recording, _)): &(usize, (String, usize))| {
+                level.has(&inputs.recordings[recording])
+            };
+            samples.filter(of_level).collect()
+        };
+        if as_pose(name) {
+            for level in &levels {
+                let Some(noise) = &level.bodies else { continue };
+                let poses = seen(level, formulation).into_iter().filter_map(
                     |(sample, (recording, row))| {
-                        let pose = (*track.in_recording(recording).get(*row)?)?;
+                        let pose = (*track.in_recording(&recording).get(row)?)?;
                         Some(PoseObservation { sample, pose })
                     },
                 );
-                let seen = seen.collect();
-                formulation
-                    .problem
-                    .poses(name, formulation.tracker, frame, noise, seen);
+                let poses: Vec<PoseObservation> = poses.collect();
+                if level.of_means.is_none() || !poses.is_empty() {
+                    let (problem, tracker) = (&mut formulation.problem, formulation.tracker);
+                    problem.poses(name, tracker, frame, noise.clone(), poses);
+                }
             }
-            (BodyKind::Markers { names, .. }, Some(noise), _) => {
-                let sigma = body.template_sigma;
-                let places = Places {
-                    track,
-                    start,
-                    sigma,
-                };
-                let points = add_points(&mut formulation.problem, names, &places, name, frame);
-                let mut seen = Vec::new();
-                for (sample, (recording, row)) in formulation.samples.iter().enumerate() {
-                    let loaded = &inputs.recordings[recording];
-                    let at = (loaded, *row, sample);
-                    let mixed = loaded.mixed.get(name).and_then(|m| m.get(*row)?.as_ref());
+        } else if let BodyKind::Markers { names, .. } = &body.kind {
+            let sigma = body.template_sigma;
+            let places = Places {
+                track,
+                start,
+                sigma,
+            };
+            let points = add_points(&mut formulation.problem, names, &places, name, frame);
+            for level in &levels {
+                let Some(noise) = level.markers else { continue };
+                let mut markers = Vec::new();
+                for (sample, (recording, row)) in seen(level, formulation) {
+                    let loaded = &inputs.recordings[&recording];
+                    let at = (loaded, row, sample);
+                    let mixed = loaded.mixed.get(name).and_then(|m| m.get(row)?.as_ref());
                     match mixed {
                         Some(mixed) => {
                             let places = (track, frame, mixed);
-                            seen.extend(mixed_seen(&mut formulation.problem, names, places, at));
+                            let problem = &mut formulation.problem;
+                            markers.extend(mixed_seen(problem, names, places, at));
                         }
-                        None => seen.extend(points.iter().filter_map(|p| marker_seen(p, at))),
+                        None => markers.extend(points.iter().filter_map(|p| marker_seen(p, at))),
                     }
                 }
-                seen.shrink_to_fit();
-                formulation
-                    .problem
-                    .markers(name, formulation.tracker, frame, noise, seen);
-                formulation
-                    .points
-                    .insert(name.clone(), points.into_iter().collect());
+                markers.shrink_to_fit();
+                if level.of_means.is_none() || !markers.is_empty() {
+                    let (problem, tracker) = (&mut formulation.problem, formulation.tracker);
+                    problem.markers(name, tracker, frame, noise, markers);
+                }
             }
-            _ => {}
+            let points = points.into_iter().collect();
+            formulation.points.insert(name.clone(), points);
         }
     }
+}
+
+/// Noise that rows of one kind have in common.
+struct Level {
+    /// Whether these are means of holds; `None` for all rows.
+    of_means: Option<bool>,
+    /// Of markers, where some body is seen so.
+    markers: Option<GroupId>,
+    /// Of bodies, where the pose of some is seen.
+    bodies: Option<PoseNoise>,
+}
+
+impl Level {
+    /// Whether the rows of a recording have this noise.
+    fn has(&self, recording: &Loaded) -> bool {
+        self.of_means
+            .is_none_or(|means| means == of_means(recording))
+    }
+}
+
+/// One level for all rows, or one for single rows and one for means of holds where both are fitted.
+fn levels(
+    formulation: &mut Formulation,
+    inputs: &Inputs,
+    as_pose: &dyn Fn(&String) -> bool,
+) -> Vec<Level> {
+    let profile = &inputs.robot.profile;
+    let kinds = if own_levels(inputs, &formulation.samples) {
+        vec![(Some(false), ""), (Some(true), " in holds")]
+    } else {
+        vec![(None, "")]
+    };
+    let mut levels = Vec::new();
+    for (of_means, name) in kinds {
+        let (markers, bodies) = noise_groups(formulation, profile, as_pose, name);
+        levels.push(Level {
+            of_means,
+            markers,
+            bodies,
+        });
+    }
+    // Of all that has no level of its own, the first tells.
+    let first = &levels[0];
+    formulation.noise.marker = first.markers;
+    if let Some(PoseNoise::Split { position, .. }) = &first.bodies {
+        formulation.noise.body_position = Some(*position);
+    }
+    levels
 }
 
 /// A marker in one row.
@@ -148,11 +208,12 @@ fn mixed_seen(
     seen.map(one).collect()
 }
 
-/// Noise of markers and of body poses, where some body is seen so.
+/// Noise of markers and of body poses, where some body is seen so; `of` follows its name.
 fn noise_groups(
     formulation: &mut Formulation,
     profile: &Profile,
     as_pose: &dyn Fn(&String) -> bool,
+    of: &str,
 ) -> (Option<GroupId>, Option<PoseNoise>) {
     let known = profile.solve.noise.known;
     let tracker = &profile.tracker;
@@ -160,7 +221,7 @@ fn noise_groups(
     let problem = &mut formulation.problem;
     let marker_noise = uses(false).then(|| {
         problem.noise_group(
-            "marker",
+            &format!("marker{of}"),
             NoiseKind::Position,
             tracker.marker_sigma.unwrap_or(MARKER_SIGMA),
             !known,
@@ -168,22 +229,18 @@ fn noise_groups(
     });
     let body_noise = uses(true).then(|| PoseNoise::Split {
         orientation: problem.noise_group(
-            "body orientation",
+            &format!("body orientation{of}"),
             NoiseKind::Orientation,
             tracker.body_sigma_rad.unwrap_or(BODY_SIGMA_RAD),
             !known,
         ),
         position: problem.noise_group(
-            "body position",
+            &format!("body position{of}"),
             NoiseKind::Position,
             tracker.body_sigma.unwrap_or(BODY_SIGMA),
             !known,
         ),
     });
-    formulation.noise.marker = marker_noise;
-    if let Some(PoseNoise::Split { position, .. }) = &body_noise {
-        formulation.noise.body_position = Some(*position);
-    }
     (marker_noise, body_noise)
 }
 

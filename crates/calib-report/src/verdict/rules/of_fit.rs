@@ -112,19 +112,20 @@ pub(super) fn stated_noise(facts: &Facts) -> Vec<Reason> {
     let Some(goodness) = &facts.goodness else {
         return Vec::new();
     };
-    let reason = |id: ReasonId, found: &FoundNoise| {
+    let reason = |id: ReasonId, found: &FoundNoise, factor: f64| {
         Reason::new(id, Effect::Warns)
             .with("group", Fact::name(&found.group))
-            .with("factor", Fact::ratio(found.factor))
+            .with("factor", Fact::ratio(factor))
     };
     let above = goodness.above_stated.as_ref();
     let above = above.filter(|found| found.factor > ABOVE_STATED);
     let above = above.map(|found| {
         let rigid = found.rigid.filter(|rigid| *rigid > EXPLAINS * found.factor);
-        reason(ReasonId::NoiseAboveStated, found).with_some("rigid", rigid.map(Fact::ratio))
+        reason(ReasonId::NoiseAboveStated, found, found.factor)
+            .with_some("rigid", rigid.map(Fact::ratio))
     });
     let below = goodness.below_stated.as_ref();
-    let below = below.filter(|found| found.factor < BELOW_STATED);
-    let below = below.map(|found| reason(ReasonId::NoiseBelowStated, found));
+    let below = below.filter(|found| found.of_rows < BELOW_STATED);
+    let below = below.map(|found| reason(ReasonId::NoiseBelowStated, found, found.of_rows));
     above.into_iter().chain(below).collect()
 }
