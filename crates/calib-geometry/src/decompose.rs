@@ -196,6 +196,59 @@ pub fn pencil_eigen(d: &DMatrix<f64>, c: &DMatrix<f64>) -> Vec<PencilPair> {
         .collect()
 }
 
+/// Rows Z with `ZᵀZ = AᵀA`, no more than the rank of A: those of R of a Householder QR decomposition with column pivoting, columns in their
+/// places. What remains below `relative_tolerance` times the longest column counts as nothing.
+#[must_use]
+pub fn row_factor(a: &DMatrix<f64>, relative_tolerance: f64) -> DMatrix<f64> {
+    let (m, n) = a.shape();
+    let mut work = a.clone();
+    let data = work.as_mut_slice();
+    // Columns that were not taken as pivots yet, in their order.
+    let mut left: Vec<usize> = (0..n).collect();
+    let mut longest = 0.0;
+    let mut reflector = vec![0.0; m];
+    let mut rank = 0;
+    while rank < m && !left.is_empty() {
+        let tail = |data: &[f64], c: usize| {
+            let tail = &data[c * m + rank..(c + 1) * m];
+            dot(tail, tail)
+        };
+        let (mut place, mut norm2) = (0, -1.0);
+        for (i, &c) in left.iter().enumerate() {
+            let of_column = tail(data, c);
+            if of_column > norm2 {
+                (place, norm2) = (i, of_column);
+            }
+        }
+        let norm = norm2.sqrt();
+        if rank == 0 {
+            longest = norm;
+        }
+        // Also where a number is not finite.
+        if !(norm > relative_tolerance * longest) {
+            break;
+        }
+        let pivot = left.remove(place);
+        // v = x ± ‖x‖ e₁,  x ← x − v (2 vᵀx / vᵀv)
+        let v = &mut reflector[rank..];
+        v.copy_from_slice(&data[pivot * m + rank..(pivot + 1) * m]);
+        let first = v[0];
+        let reflected = if first > 0.0 { -norm } else { norm };
+        v[0] -= reflected;
+        let half = norm * (norm + first.abs());
+        for &c in &left {
+            let x = &mut data[c * m + rank..(c + 1) * m];
+            let factor = dot(v, x) / half;
+            x.iter_mut().zip(&*v).for_each(|(x, v)| *x -= factor * v);
+        }
+        let column = &mut data[pivot * m + rank..(pivot + 1) * m];
+        column.fill(0.0);
+        column[0] = reflected;
+        rank += 1;
+    }
+    work.rows(0, rank).into_owned()
+}
+
 /// Number of singular values above `relative_tolerance` times the largest.
 #[must_use]
 pub fn rank(singular_values: &DVector<f64>, relative_tolerance: f64) -> usize {

@@ -123,7 +123,7 @@ pub fn sigma(information: &DMatrix<f64>, b: &DMatrix<f64>) -> Option<f64> {
     Some(variance.sqrt())
 }
 
-/// Rows with the same YᵀY, at most as many as there are columns: Q of a QR decomposition says nothing.
+/// Rows with the same YᵀY, at most as many as their rank: Q of a QR decomposition says nothing.
 #[must_use]
 pub fn compressed(rows: &DMatrix<f64>) -> DMatrix<f64> {
     /// Relative to the largest: rounding.
@@ -131,12 +131,5 @@ pub fn compressed(rows: &DMatrix<f64>) -> DMatrix<f64> {
     if rows.nrows() <= 6 {
         return rows.clone();
     }
-    let svd = decompose::svd(&rows.transpose());
-    let rank = decompose::rank(&svd.s, NOTHING);
-    // Y = V diag(s) Uᵀ
-    let mut kept = svd.u.columns(0, rank).into_owned();
-    for k in 0..rank {
-        kept.column_mut(k).scale_mut(svd.s[k]);
-    }
-    kept.transpose()
+    decompose::row_factor(rows, NOTHING)
 }

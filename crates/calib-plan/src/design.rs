@@ -53,6 +53,11 @@ const WEAKEST: usize = 12;
 const ROUNDS: usize = 20;
 /// Postures that exchanges choose from: those with the largest derivative of the criterion.
 const PROMISING: usize = 300;
+/// Postures that the greedy choice is made from, the first of a sequence that fills the space: of more, the derivative tells which to exchange
+/// them for.
+const GREEDY: usize = 4096;
+/// Postures whose rows are multiplied together.
+const TOGETHER: usize = 64;
 /// An exchange that gains less of the criterion ends the rounds: log of a determinant, relative for a trace.
 const GAIN: f64 = 1e-6;
 
@@ -92,13 +97,16 @@ impl Question<'_> {
             };
             return question.quick(count, taken);
         }
-        let mut state = State::new(self);
-        let mut free = vec![true; self.rows.len()];
-        for &i in taken {
+        let among = self.rows.len().min(GREEDY.max(8 * (count + taken.len())));
+        let first = Question {
+            rows: &self.rows[..among],
+            ..*self
+        };
+        let mut free = vec![true; among];
+        for &i in taken.iter().filter(|i| **i < among) {
             free[i] = false;
         }
-        let mut chosen = state.greedy(count, &mut free);
-        drop(state);
+        let mut chosen = State::new(&first).greedy(count, &mut free);
         self.exchanged(&mut chosen, taken);
         chosen
     }
@@ -164,9 +172,30 @@ impl Question<'_> {
 
     /// tr(H Y_iᵀ Y_i) of all postures at M.
     pub(crate) fn gains(&self, m: &DMatrix<f64>) -> Option<Vec<f64>> {
-        let h = self.criterion.derivative(&inverse(m)?)?;
-        let rows = self.rows.par_iter();
-        Some(rows.map(|y| (y * &h).dot(y)).collect())
+        Some(self.along(&self.criterion.derivative(&inverse(m)?)?))
+    }
+
+    /// tr(Y_i H Y_iᵀ) of all postures.
+    pub(crate) fn along(&self, h: &DMatrix<f64>) -> Vec<f64> {
+        // One product for many postures: their rows side by side.
+        let parts = self.rows.par_chunks(TOGETHER).map(|part| {
+            let count = part.iter().map(DMatrix::nrows).sum();
+            let mut rows = DMatrix::zeros(count, h.nrows());
+            let mut at = 0;
+            for y in part {
+                rows.rows_mut(at, y.nrows()).copy_from(y);
+                at += y.nrows();
+            }
+            let along = &rows * h;
+            let mut at = 0;
+            let gain = |y: &DMatrix<f64>| {
+                let gain = along.rows(at, y.nrows()).dot(&rows.rows(at, y.nrows()));
+                at += y.nrows();
+                gain
+            };
+            part.iter().map(gain).collect::<Vec<f64>>()
+        });
+        parts.collect::<Vec<_>>().concat()
     }
 
     /// The criterion of some postures, the larger the better; `None` where M is singular.
@@ -271,17 +300,18 @@ impl<'a> State<'a> {
     fn change(&self, i: usize, sign: f64) -> f64 {
         let s = &self.s[i];
         let c = DMatrix::identity(s.nrows(), s.nrows()) + s * sign;
-        let Some(root) = Cholesky::new(c.clone()) else {
-            return f64::NEG_INFINITY;
-        };
-        let log_det_c = 2.0 * root.l_dirty().diagonal().map(f64::ln).sum();
         match self.question.criterion {
-            Criterion::Determinant => log_det_c,
-            Criterion::Subset(_) => match log_det(&(c - &self.t[i] * sign)) {
-                Some(rest) => log_det_c - rest,
-                None => f64::NEG_INFINITY,
-            },
-            Criterion::Trace(_) => sign * root.solve(&self.t[i]).trace(),
+            Criterion::Determinant => log_det(&c).unwrap_or(f64::NEG_INFINITY),
+            Criterion::Subset(_) => {
+                let rest = log_det(&(&c - &self.t[i] * sign));
+                match (log_det(&c), rest) {
+                    (Some(all), Some(rest)) => all - rest,
+                    _ => f64::NEG_INFINITY,
+                }
+            }
+            Criterion::Trace(_) => {
+                trace_of_solved(c, &self.t[i]).map_or(f64::NEG_INFINITY, |t| sign * t)
+            }
             // Its exchanges are those of `smallest`.
             Criterion::Smallest(_) => f64::NEG_INFINITY,
         }
@@ -389,4 +419,49 @@ fn log_det(m: &DMatrix<f64>) -> Option<f64> {
     let root = Cholesky::new(m.clone())?;
     let log_det = 2.0 * root.l_dirty().diagonal().map(f64::ln).sum();
     log_det.is_finite().then_some(log_det)
+}
+
+/// tr(C⁻¹ T) of symmetric C > 0 and T; `None` where C is not. The lower triangle of C becomes L, C = L Lᵀ.
+fn trace_of_solved(mut c: DMatrix<f64>, t: &DMatrix<f64>) -> Option<f64> {
+    let n = c.nrows();
+    let data = c.as_mut_slice();
+    for j in 0..n {
+        let (before, column) = data.split_at_mut(j * n);
+        for k in 0..j {
+            let factor = before[k * n + j];
+            let known = &before[k * n + j..(k + 1) * n];
+            let rest = column[j..n].iter_mut().zip(known);
+            rest.for_each(|(x, l)| *x -= factor * l);
+        }
+        let pivot = column[j];
+        if !(pivot > 0.0 && pivot.is_finite()) {
+            return None;
+        }
+        let root = pivot.sqrt();
+        column[j..n].iter_mut().for_each(|x| *x /= root);
+    }
+    let mut total = 0.0;
+    let mut column = vec![0.0; n];
+    for j in 0..n {
+        // From j down, column j of C⁻¹ is that of L⁻ᵀ L⁻¹.
+        column[j..].fill(0.0);
+        column[j] = 1.0;
+        for k in j..n {
+            let l = &data[k * n..(k + 1) * n];
+            let x = column[k] / l[k];
+            column[k] = x;
+            let rest = column[k + 1..].iter_mut().zip(&l[k + 1..]);
+            rest.for_each(|(y, l)| *y -= x * l);
+        }
+        for i in (j..n).rev() {
+            let l = &data[i * n..(i + 1) * n];
+            let below = l[i + 1..].iter().zip(&column[i + 1..]);
+            let below: f64 = below.map(|(a, b)| a * b).sum();
+            column[i] = (column[i] - below) / l[i];
+        }
+        let of_t = &t.as_slice()[j * n..(j + 1) * n];
+        let below = column[j + 1..].iter().zip(&of_t[j + 1..]);
+        total += column[j] * of_t[j] + 2.0 * below.map(|(a, b)| a * b).sum::<f64>();
+    }
+    Some(total)
 }

@@ -17,13 +17,17 @@ use calib_profile::{RecordingSpec, Usage};
 use calib_recording::{JointUnit, Poses};
 use calib_urdf::{LinkId, RobotModel};
 use nalgebra::{DMatrix, DVector, Isometry3};
+use rayon::prelude::*;
 
+use crate::basis::compressed;
 use crate::candidates::Candidate;
 use crate::known::Known;
 use crate::sight::Subject;
 
 /// Name of the recording of the planned postures; a profile's own name has no such letters.
 const PLANNED: &str = "\u{2}planned";
+/// Candidates that are linearized together: their whole rows are in memory at once.
+const PART: usize = 8192;
 /// Name of the recording of the task postures.
 const TASK: &str = "\u{2}task";
 
@@ -45,6 +49,23 @@ pub struct Linear {
     /// Derivatives of the tool's position in the tracker's frame over the task postures, divided by the root of their number:
     /// (3 × postures) × parameters.
     pub task: DMatrix<f64>,
+}
+
+impl Linear {
+    /// With no more rows of each planned posture than their rank, in units of the scale.
+    fn compressed(mut self) -> Self {
+        let scale = &self.scale;
+        let of = |mut y: DMatrix<f64>| {
+            let scaled = y.column_iter_mut().zip(scale.iter());
+            scaled.for_each(|(mut column, s)| column *= *s);
+            let mut y = compressed(&y);
+            let back = y.column_iter_mut().zip(scale.iter());
+            back.for_each(|(mut column, s)| column /= *s);
+            y
+        };
+        self.planned = self.planned.into_par_iter().map(of).collect();
+        self
+    }
 }
 
 impl Known {
@@ -159,6 +180,30 @@ impl Known {
             planned,
             task: b,
         })
+    }
+
+    /// The same for many candidates, a part after the other, with no more rows of each than their rank.
+    ///
+    /// # Errors
+    /// [`PipelineError`] where the problem cannot be stated.
+    pub fn linearize_in_parts(
+        &self,
+        planned: &[Candidate],
+        subjects: &[Subject],
+        task: &[Vec<f64>],
+    ) -> Result<Linear, PipelineError> {
+        let mut parts = planned.chunks(PART);
+        let first = parts.next().unwrap_or_default();
+        let mut all = self.linearize(first, subjects, task)?.compressed();
+        for part in parts {
+            let part = self.linearize(part, subjects, task)?.compressed();
+            // What a part does not show may be no parameter of it.
+            if part.names != all.names {
+                return Ok(self.linearize(planned, subjects, task)?.compressed());
+            }
+            all.planned.extend(part.planned);
+        }
+        Ok(all)
     }
 
     /// What a fit found, by name; start values of the rest.

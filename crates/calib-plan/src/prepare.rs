@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use calib_pipeline::output::shapes::collision_solids;
 use calib_urdf::{JointId, LinkId, doubt};
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use crate::basis::{Basis, compressed, sigma};
 use crate::candidates::{Candidate, Counts, Feasible};
@@ -130,7 +131,7 @@ pub fn prepare<'a>(known: &'a Known, options: &'a Options) -> Result<Prepared<'a
         Some(task) => task.clone(),
         None => task_postures(known, &joints, &feasible, options.seed)?,
     };
-    let linear = known.linearize(&candidates, &feasible.sight.subjects, &task)?;
+    let mut linear = known.linearize_in_parts(&candidates, &feasible.sight.subjects, &task)?;
     if linear.names.is_empty() {
         return Err(PlanError::NothingFree { file: file() });
     }
@@ -146,9 +147,8 @@ pub fn prepare<'a>(known: &'a Known, options: &'a Options) -> Result<Prepared<'a
         notes.push(Note::TaskOpen);
     }
     let criterion = criterion(options, &basis, &linear, &b);
-    use rayon::prelude::*;
-    let rows = linear.planned.par_iter();
-    let rows = rows.map(|y| compressed(&basis.of(y))).collect();
+    let planned = std::mem::take(&mut linear.planned).into_par_iter();
+    let rows = planned.map(|y| basis.of(&y)).collect();
     Ok(Prepared {
         known,
         options,

@@ -99,11 +99,6 @@ impl Question<'_> {
         z.dot(self.before) + gains.iter().take(n).sum::<f64>()
     }
 
-    /// tr(Y Z Yᵀ) of all postures.
-    fn along(&self, z: &DMatrix<f64>) -> Vec<f64> {
-        self.rows.par_iter().map(|y| (y * z).dot(y)).collect()
-    }
-
     fn promising(&self, z: &DMatrix<f64>, taken: &[usize]) -> Vec<usize> {
         let gains = self.along(z);
         let mut all: Vec<usize> = (0..gains.len()).filter(|i| !taken.contains(i)).collect();

@@ -282,9 +282,39 @@ fn what_nothing_determines_is_no_part_of_the_question() {
 #[test]
 fn compressed_rows_say_the_same() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
-    let y = normal(&mut rng, 20, 3) * normal(&mut rng, 3, 9);
-    let short = compressed(&y);
-    assert_eq!(short.nrows(), 3);
-    let difference = y.transpose() * &y - short.transpose() * &short;
-    assert!(difference.amax() < 1e-10 * y.norm_squared());
+    let cases = [
+        (20, 3, 9, 3),
+        (8, 8, 30, 8),
+        (9, 40, 30, 9),
+        (40, 40, 7, 7),
+        (12, 0, 5, 0),
+    ];
+    for (rows, inner, columns, rank) in cases {
+        let y = normal(&mut rng, rows, inner) * normal(&mut rng, inner, columns);
+        let short = compressed(&y);
+        assert_eq!(short.nrows(), rank, "{rows} × {columns}");
+        let difference = y.transpose() * &y - short.transpose() * &short;
+        assert!(difference.amax() <= 1e-12 * y.norm_squared());
+    }
+}
+
+/// More postures than the greedy choice looks at: those beyond are exchanged in, and the bound is that of all.
+#[test]
+fn the_last_of_very_many_postures_are_found() {
+    let (mut rows, prior) = postures(21, 5000, 6);
+    for y in rows.iter_mut().skip(4900).step_by(10) {
+        *y *= 8.0;
+    }
+    for criterion in criteria(6) {
+        let question = Question {
+            rows: &rows,
+            before: &prior,
+            criterion: &criterion,
+        };
+        let chosen = question.choose(8, &[]);
+        let strong = |i: &&usize| **i >= 4900 && (**i - 4900) % 10 == 0;
+        assert_eq!(chosen.iter().filter(strong).count(), 8, "{chosen:?}");
+        let least = question.certificate(&chosen).expect("regular");
+        assert!(least > 0.9, "{least}");
+    }
 }
