@@ -121,6 +121,15 @@ super::topic! {
             "Marker `{marker}` of body `{body}` scatters by {sigma} per coordinate, the other markers by {others}: left-out poses are predicted better with a noise level of its own.",
             "Check the marker if it scatters more than the others: it may be loose, damaged, or partly hidden from the cameras.";
     }
+    /// The tracker's noise in a recording is another one than in the others.
+    RECORDING_NOISE = "recording-noise" {
+        "": Info,
+            "The tracker scatters by {sigma} per coordinate in this recording, by {others} in the others: it is fitted with a noise level of its own.",
+            "Where it scatters more, look at distance, cameras in view and exposure. The weights are right.";
+        "held_out": Info,
+            "The tracker scatters by {sigma} per coordinate in this held-out recording, by {others} in those that were fitted: its errors are judged by its own noise.",
+            "Where it scatters more, look at distance, cameras in view and exposure.";
+    }
     /// Shapes that the 3-D view lacks.
     SHAPE_NOT_DRAWN = "shape-not-drawn" {
         "format": Info,

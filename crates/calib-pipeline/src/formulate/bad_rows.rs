@@ -18,6 +18,7 @@ use calib_profile::Usage;
 use nalgebra::{Isometry3, Vector6};
 
 use crate::formulate::formulation::MlFit;
+use crate::formulate::row_levels::row_levels;
 use crate::formulate::starts::rows_of_no_side;
 use crate::prepare::conditions::{Conditions, conditions};
 use crate::prepare::excluded::Excluded;
@@ -63,6 +64,7 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
         .map(|(name, r)| (name.as_str(), conditions(r, &inputs.robot, load)))
         .collect();
     let of_no_side = rows_of_no_side(inputs);
+    let levels = row_levels(inputs, &fit.formulation.samples);
     for name in inputs.robot.profile.bodies.keys() {
         let off = BodyError {
             inputs,
@@ -71,10 +73,17 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
             track: &tracks[name],
             conditions: &conditions,
         };
-        let Some(usual) = off.usual(&rejected) else {
-            continue;
-        };
+        // What is usual where the tracker has the same noise, else in all rows.
+        let usual: Vec<Option<Usual>> = levels
+            .iter()
+            .map(|level| off.usual(&rejected, &|r| level.recordings.contains(r)))
+            .collect();
+        let of_all = off.usual(&rejected, &|_| true);
         for (recording, loaded) in inputs.recordings.iter().filter(|(_, r)| is_judged(r)) {
+            let level = levels.iter().position(|l| l.recordings.contains(recording));
+            let Some(usual) = level.and_then(|level| usual[level]).or(of_all) else {
+                continue;
+            };
             let (mut moving, mut others) = (Vec::new(), Vec::new());
             for row in 0..loaded.q.len() {
                 if !rejected.contains(&(recording.clone(), row, name.clone())) {
@@ -257,10 +266,14 @@ impl<'a> BodyError<'a> {
         })
     }
 
-    /// Robust size of the errors of the rows that take part; `None` below eight of them, or without a body frame.
-    fn usual(&self, rejected: &BTreeSet<(String, usize, String)>) -> Option<Usual> {
+    /// Robust size of the errors of the rows of some recordings that take part; `None` below eight of them, or without a body frame.
+    fn usual(
+        &self,
+        rejected: &BTreeSet<(String, usize, String)>,
+        of: &dyn Fn(&String) -> bool,
+    ) -> Option<Usual> {
         let (mut turns, mut shifts) = (Vec::new(), Vec::new());
-        for loaded in fitted(self.inputs) {
+        for loaded in fitted(self.inputs).filter(|loaded| of(&loaded.name)) {
             for row in 0..loaded.q.len() {
                 let key = (loaded.name.clone(), row, self.name.to_owned());
                 if rejected.contains(&key) {

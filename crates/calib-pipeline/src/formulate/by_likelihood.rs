@@ -15,7 +15,7 @@ use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
-use crate::formulate::{clock, gear_ratio, noise, priors, starts, wanted};
+use crate::formulate::{clock, gear_ratio, noise, priors, row_levels, starts, wanted};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
 use crate::prepare::tracks::body_tracks;
@@ -72,6 +72,8 @@ pub fn likelihood(
         priors::by_evidence(&mut fit, inputs, &settings);
     }
     checked.findings.extend(noise::of_markers(&fit));
+    let of_rows = row_levels::findings(inputs, &fit.formulation.samples);
+    checked.findings.extend(of_rows);
     checked.findings.extend(noise::meaning(&mut fit));
     checked.findings.extend(on_their_limit(&fit));
     checked.findings.extend(of_the_wrong_sign(&fit));

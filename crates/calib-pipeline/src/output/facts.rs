@@ -13,7 +13,7 @@ use nalgebra::UnitVector3;
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::motion_axis;
-use crate::formulate::single_rows::SingleRows;
+use crate::formulate::row_levels::{HeldOutLevels, row_levels};
 use crate::output::counts::{Tracks, rejected_parts, rejected_share};
 use crate::output::evidence::{Evidence, fit_end};
 use crate::output::of_fit::{stated_sigma, unit};
@@ -170,7 +170,7 @@ fn orientation(e: &Evidence<'_>) -> Orientation {
         .collect();
     let squares: f64 = angles.iter().map(|angle| angle * angle).sum();
     let expected = |fit: &MlFit| {
-        let rows = SingleRows::of(e.inputs, &fit.formulation.samples);
+        let rows = HeldOutLevels::of(e.inputs, &fit.formulation.samples);
         let first = e.held_out.iter().flat_map(|h| &h.poses).next();
         let recording = first.and_then(|error| recording_of(e.inputs, error));
         let level = |kind, found| recording.map_or(found, |r| rows.level(r, kind, found));
@@ -190,7 +190,15 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
     let of_markers = e.tracks.values().filter_map(|track| track.marker_sigma);
     let rigid = median(of_markers.collect());
     // Means of holds have less noise than the rows that a profile states it of: those are no less certain than stated for it.
-    let within = SingleRows::of(e.inputs, &fit.formulation.samples).within;
+    let samples = &fit.formulation.samples;
+    let within = HeldOutLevels::of(e.inputs, samples).within;
+    let levels = row_levels(e.inputs, samples);
+    // Where recordings have levels of their own, each has a scatter of its own.
+    let rigid_of = |group: &str| {
+        let own = levels.iter().skip(1).find(|l| group.contains(&l.name));
+        let level = own.or(levels.first()).filter(|_| levels.len() > 1);
+        level.map_or(rigid, |level| level.scatter(e.inputs))
+    };
     let beside = s.noise.iter().filter_map(|n| {
         let stated = stated_sigma(&e.inputs.robot.profile, &n.name).filter(|s| *s > 0.0)?;
         let known = n.estimated && n.samples >= ENOUGH && n.kind != NoiseKind::Scale;
@@ -198,7 +206,7 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
             group: n.name.clone(),
             factor: n.sigma / stated,
             of_rows: n.sigma.max(within.of_kind(n.kind).sqrt()) / stated,
-            rigid: rigid
+            rigid: rigid_of(&n.name)
                 .filter(|_| n.kind == NoiseKind::Position)
                 .map(|sigma| sigma / stated),
         })

@@ -26,7 +26,7 @@ use calib_urdf::{JointId, RobotModel};
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::joint_state;
-use crate::formulate::single_rows::SingleRows;
+use crate::formulate::row_levels::HeldOutLevels;
 use crate::output::weak::{postures, tool};
 use crate::prepare::conditions::Conditions;
 use crate::prepare::inputs::Inputs;
@@ -137,7 +137,7 @@ pub(crate) fn agreement(
 ) -> Option<Agreement> {
     let without = screened(inputs, fit, held_out);
     let samples = &fit.formulation.samples;
-    let rows = SingleRows::of(inputs, samples);
+    let rows = HeldOutLevels::of(inputs, samples);
     let recording = |sample: usize| &inputs.recordings[&samples[sample].0];
     let level = |sample, kind, found| rows.level(recording(sample), kind, found);
     let (chi2, rows) = fit.solution.held_out_chi2(&without, &level)?;

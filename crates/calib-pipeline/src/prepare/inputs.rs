@@ -16,6 +16,7 @@ use crate::prepare::excluded::Excluded;
 use crate::prepare::loads::Masses;
 use crate::prepare::mixed::Mixed;
 use crate::prepare::row_noise::RowNoise;
+use crate::prepare::scatter::Scatter;
 
 /// A profile as it was written, for messages with their place.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -78,6 +79,8 @@ pub struct Loaded {
     pub starts: BTreeMap<usize, f64>,
     /// Shape of each marker's covariance per row, in units of the usual variance; empty where no scatter is known.
     pub shapes: BTreeMap<String, Vec<Option<Matrix3<f64>>>>,
+    /// Scatter of markers about their bodies, and of bodies that nothing moves; `None` where nothing tells.
+    pub scatter: Option<Scatter>,
     /// Usual variances of single rows about the mean of their hold; zero where the rows are no means of holds.
     pub row_noise: RowNoise,
     /// Body → row → what makes the errors of its points independent there; `None` where they are.

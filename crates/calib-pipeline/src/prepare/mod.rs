@@ -20,6 +20,7 @@ pub mod repeats;
 pub mod robot;
 pub mod row_noise;
 pub mod rows;
+pub mod scatter;
 pub mod settled;
 mod speeds;
 pub mod split;

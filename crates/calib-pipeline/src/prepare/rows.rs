@@ -10,6 +10,7 @@ use calib_urdf::RobotModel;
 use crate::error::{DataProblem, PipelineError};
 use crate::prepare::inputs::{Loaded, RobotProfile};
 use crate::prepare::row_noise::RowNoise;
+use crate::prepare::scatter::scatter;
 use crate::prepare::speeds::speeds;
 
 /// Checks the names of a table against robot and profile and makes its joint vectors.
@@ -60,6 +61,7 @@ pub(crate) fn prepare(
     touched_by_row(&robot.profile, name, &poses).map_err(error)?;
     let q = joint_vectors(model, spec, &poses);
     let velocities = speeds(&poses);
+    let scatter = scatter(&robot.profile, model, &poses);
     Ok(Loaded {
         name: name.to_owned(),
         spec: spec.clone(),
@@ -71,6 +73,7 @@ pub(crate) fn prepare(
         starts: BTreeMap::new(),
         shapes: BTreeMap::new(),
         row_noise: RowNoise::default(),
+        scatter,
         mixed: BTreeMap::new(),
     })
 }

@@ -11,7 +11,7 @@ use calib_report::{Distance, HeldOut, PoseError};
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::Calibration;
-use crate::formulate::single_rows::SingleRows;
+use crate::formulate::row_levels::HeldOutLevels;
 use crate::formulate::starts::rows_of_no_side;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
@@ -146,7 +146,7 @@ pub(crate) fn by_key(deviations: Vec<Deviation>) -> BTreeMap<Key, Deviation> {
 /// Errors of the held-out samples in units of what the fit predicts: noise and parameters.
 fn distances(inputs: &Inputs, fit: &MlFit) -> BTreeMap<Key, Distance> {
     let samples = &fit.formulation.samples;
-    let rows = SingleRows::of(inputs, samples);
+    let rows = HeldOutLevels::of(inputs, samples);
     let recording = |sample: usize| &inputs.recordings[&samples[sample].0];
     let level = |sample, kind, found| rows.level(recording(sample), kind, found);
     let predicted = fit.solution.held_out_at(&level).into_iter();

@@ -6,7 +6,7 @@ use calib_core::{FrameId, GroupId, MeasurementKind, NoiseKind, PointId, PoseNois
 use calib_report::{HeldOut, PoseError};
 
 use crate::formulate::formulation::MlFit;
-use crate::formulate::single_rows::SingleRows;
+use crate::formulate::row_levels::HeldOutLevels;
 use crate::prepare::inputs::{Inputs, Loaded};
 
 /// Variances of one coordinate of a measured position, m².
@@ -75,7 +75,7 @@ impl<'a> TrackerNoise<'a> {
 
     /// rms length of the noise in the positions that were held out, m.
     pub(crate) fn over(&self, inputs: &Inputs, held_out: &HeldOut) -> Option<f64> {
-        let rows = SingleRows::of(inputs, self.samples);
+        let rows = HeldOutLevels::of(inputs, self.samples);
         let errors = held_out.poses.iter().filter(|p| !p.screened);
         let (mut sum, mut n) = (0.0, 0.0);
         for error in errors {

@@ -1,6 +1,6 @@
 //! Bodies: where they are mounted, their markers, and what the tracker says of them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_core::{
     Chart, FrameId, GroupId, MarkerObservation, NoiseKind, PointId, PoseNoise, PoseObservation,
@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Point3};
 
 use crate::estimate::start::Start;
 use crate::formulate::formulation::Formulation;
-use crate::formulate::single_rows::{of_means, own_levels};
+use crate::formulate::row_levels::row_levels;
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::mixed::Mixed;
 use crate::prepare::tracks::BodyTrack;
@@ -32,6 +32,7 @@ pub(super) fn add_bodies(
     let as_pose =
         |name: &String| profile.bodies[name].kind == BodyKind::Pose || tracks[name].is_computed();
     let levels = levels(formulation, inputs, &as_pose);
+    let only = levels.len() == 1;
     for (name, body) in &profile.bodies {
         let Some(link) = formulation.links[body.link.index()] else {
             continue;
@@ -65,7 +66,7 @@ pub(super) fn add_bodies(
         let seen = |level: &Level, formulation: &Formulation| -> Vec<(usize, (String, usize))> {
             let samples = formulation.samples.iter().cloned().enumerate();
             let of_level = |(_, (recording, _)): &(usize, (String, usize))| {
-                level.has(&inputs.recordings[recording])
+                level.recordings.contains(recording)
             };
             samples.filter(of_level).collect()
         };
@@ -79,7 +80,7 @@ pub(super) fn add_bodies(
                     },
                 );
                 let poses: Vec<PoseObservation> = poses.collect();
-                if level.of_means.is_none() || !poses.is_empty() {
+                if only || !poses.is_empty() {
                     let (problem, tracker) = (&mut formulation.problem, formulation.tracker);
                     problem.poses(name, tracker, frame, noise.clone(), poses);
                 }
@@ -109,7 +110,7 @@ pub(super) fn add_bodies(
                     }
                 }
                 markers.shrink_to_fit();
-                if level.of_means.is_none() || !markers.is_empty() {
+                if only || !markers.is_empty() {
                     let (problem, tracker) = (&mut formulation.problem, formulation.tracker);
                     problem.markers(name, tracker, frame, noise, markers);
                 }
@@ -120,49 +121,34 @@ pub(super) fn add_bodies(
     }
 }
 
-/// Noise that rows of one kind have in common.
+/// Noise that the rows of some recordings have in common.
 struct Level {
-    /// Whether these are means of holds; `None` for all rows.
-    of_means: Option<bool>,
+    /// Their names.
+    recordings: BTreeSet<String>,
     /// Of markers, where some body is seen so.
     markers: Option<GroupId>,
     /// Of bodies, where the pose of some is seen.
     bodies: Option<PoseNoise>,
 }
 
-impl Level {
-    /// Whether the rows of a recording have this noise.
-    fn has(&self, recording: &Loaded) -> bool {
-        self.of_means
-            .is_none_or(|means| means == of_means(recording))
-    }
-}
-
-/// One level for all rows, or one for single rows and one for means of holds where both are fitted.
 fn levels(
     formulation: &mut Formulation,
     inputs: &Inputs,
     as_pose: &dyn Fn(&String) -> bool,
 ) -> Vec<Level> {
-    let profile = &inputs.robot.profile;
-    let kinds = if own_levels(inputs, &formulation.samples) {
-        vec![(Some(false), ""), (Some(true), " in holds")]
-    } else {
-        vec![(None, "")]
-    };
     let mut levels = Vec::new();
-    for (of_means, name) in kinds {
-        let (markers, bodies) = noise_groups(formulation, profile, as_pose, name);
+    for of in row_levels(inputs, &formulation.samples) {
+        let profile = &inputs.robot.profile;
+        let (markers, bodies) = noise_groups(formulation, profile, as_pose, (&of.name, of.times));
         levels.push(Level {
-            of_means,
+            recordings: of.recordings,
             markers,
             bodies,
         });
     }
     // Of all that has no level of its own, the first tells.
-    let first = &levels[0];
-    formulation.noise.marker = first.markers;
-    if let Some(PoseNoise::Split { position, .. }) = &first.bodies {
+    formulation.noise.marker = levels[0].markers;
+    if let Some(PoseNoise::Split { position, .. }) = &levels[0].bodies {
         formulation.noise.body_position = Some(*position);
     }
     levels
@@ -208,12 +194,12 @@ fn mixed_seen(
     seen.map(one).collect()
 }
 
-/// Noise of markers and of body poses, where some body is seen so; `of` follows its name.
+/// Noise of markers and of body poses, where some body is seen so; `of` follows its name, and σ begins `times` as high.
 fn noise_groups(
     formulation: &mut Formulation,
     profile: &Profile,
     as_pose: &dyn Fn(&String) -> bool,
-    of: &str,
+    (of, times): (&str, f64),
 ) -> (Option<GroupId>, Option<PoseNoise>) {
     let known = profile.solve.noise.known;
     let tracker = &profile.tracker;
@@ -223,7 +209,7 @@ fn noise_groups(
         problem.noise_group(
             &format!("marker{of}"),
             NoiseKind::Position,
-            tracker.marker_sigma.unwrap_or(MARKER_SIGMA),
+            times * tracker.marker_sigma.unwrap_or(MARKER_SIGMA),
             !known,
         )
     });
@@ -231,13 +217,13 @@ fn noise_groups(
         orientation: problem.noise_group(
             &format!("body orientation{of}"),
             NoiseKind::Orientation,
-            tracker.body_sigma_rad.unwrap_or(BODY_SIGMA_RAD),
+            times * tracker.body_sigma_rad.unwrap_or(BODY_SIGMA_RAD),
             !known,
         ),
         position: problem.noise_group(
             &format!("body position{of}"),
             NoiseKind::Position,
-            tracker.body_sigma.unwrap_or(BODY_SIGMA),
+            times * tracker.body_sigma.unwrap_or(BODY_SIGMA),
             !known,
         ),
     });
