@@ -224,8 +224,7 @@ pub fn row_factor(a: &DMatrix<f64>, relative_tolerance: f64) -> DMatrix<f64> {
         if rank == 0 {
             longest = norm;
         }
-        // Also where a number is not finite.
-        if !(norm > relative_tolerance * longest) {
+        if norm <= relative_tolerance * longest || !norm.is_finite() {
             break;
         }
         let pivot = left.remove(place);

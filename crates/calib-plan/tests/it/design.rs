@@ -312,7 +312,7 @@ fn the_last_of_very_many_postures_are_found() {
             criterion: &criterion,
         };
         let chosen = question.choose(8, &[]);
-        let strong = |i: &&usize| **i >= 4900 && (**i - 4900) % 10 == 0;
+        let strong = |i: &&usize| **i >= 4900 && (**i - 4900).is_multiple_of(10);
         assert_eq!(chosen.iter().filter(strong).count(), 8, "{chosen:?}");
         let least = question.certificate(&chosen).expect("regular");
         assert!(least > 0.9, "{least}");

@@ -82,7 +82,7 @@ pub(super) fn add_bodies(
                 let poses: Vec<PoseObservation> = poses.collect();
                 if only || !poses.is_empty() {
                     let (problem, tracker) = (&mut formulation.problem, formulation.tracker);
-                    problem.poses(name, tracker, frame, noise.clone(), poses);
+                    problem.poses(name, tracker, frame, *noise, poses);
                 }
             }
         } else if let BodyKind::Markers { names, .. } = &body.kind {
