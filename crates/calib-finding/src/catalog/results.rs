@@ -123,7 +123,7 @@ super::topic! {
     }
     /// The tracker's noise in a recording is another one than in the others.
     RECORDING_NOISE = "recording-noise" {
-        "": Info,
+        "fitted": Info,
             "The tracker scatters by {sigma} per coordinate in this recording, by {others} in the others: it is fitted with a noise level of its own.",
             "Where it scatters more, look at distance, cameras in view and exposure. The weights are right.";
         "held_out": Info,

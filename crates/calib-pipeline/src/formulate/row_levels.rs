@@ -231,7 +231,7 @@ pub(crate) fn findings(inputs: &Inputs, samples: &[(String, usize)]) -> Vec<Find
     for level in row_levels(inputs, samples) {
         for recording in level.recordings.iter().filter(|_| level.times != 1.0) {
             if let Some(own) = sigma(recording) {
-                findings.push(finding(recording, "", [own, own / level.times]));
+                findings.push(finding(recording, "fitted", [own, own / level.times]));
             }
         }
     }
