@@ -5,13 +5,13 @@
 //! σ² = ½ var(|p_j − p_k|) of two markers of a body,   ½ var(y_i − y_(i−1)) of a coordinate that nothing moves          (1)
 //! ```
 //!
-//! Outliers by the median of absolute deviations are left out: a marker that jumps, or a body that slips, changes it little.
+//! Without outliers by the median of absolute deviations, and the middle one of all pairs: one marker that slips or is loose changes it little.
 
 use calib_geometry::statistics::median;
 use calib_profile::{BodyKind, Profile};
 use calib_recording::Poses;
 use calib_urdf::RobotModel;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 /// Variance of a coordinate in one recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,19 +32,15 @@ const ROWS: usize = 2000;
 const FEWEST: usize = 5;
 /// What a difference of successive values tells, in independent values: each value is in two of them.
 const SUCCESSIVE: f64 = 2.0 / 3.0;
+/// Efficiency of a median against the mean.
+const OF_MEDIAN: f64 = 0.64;
 /// σ below this, m, is computed, not measured.
 const COMPUTED: f64 = 1e-7;
 
-/// Equation (1) over all bodies, weighted by how many values tell each; `None` where nothing tells.
+/// Equation (1): the median over all pairs and places, so that a loose marker is not taken for the tracker; `None` where nothing
+/// shows it.
 pub(crate) fn scatter(profile: &Profile, model: &RobotModel, poses: &Poses) -> Option<Scatter> {
-    let (mut sum, mut values) = (0.0, 0.0);
-    let mut add = |all: Vec<f64>, share: f64| {
-        if let Some(variance) = variance(&all) {
-            let n = all.len() as f64 * share;
-            sum += n * variance;
-            values += n;
-        }
-    };
+    let (mut found, mut values) = (Vec::new(), 0.0);
     let step = poses.rows.len().div_ceil(ROWS).max(1);
     for (name, body) in &profile.bodies {
         let chain = model.chain_to_root(body.link);
@@ -68,41 +64,50 @@ pub(crate) fn scatter(profile: &Profile, model: &RobotModel, poses: &Poses) -> O
                     let distance = |(a, b): (&Option<Point3<f64>>, &Option<Point3<f64>>)| {
                         Some((a.as_ref()? - b.as_ref()?).norm())
                     };
-                    add(rows.filter_map(distance).collect(), share);
+                    let distances: Vec<f64> = rows.filter_map(distance).collect();
+                    if let Some(variance) = variance(&distances) {
+                        found.push(0.5 * variance);
+                        values += distances.len() as f64 * share;
+                    }
                 }
-                if still && m < 3 {
-                    for track in tracks {
-                        for axis in 0..3 {
-                            add(
-                                differences(track.iter().map(|p| p.map(|p| p[axis])), step),
-                                1.0,
-                            );
-                        }
+                for track in tracks.iter().filter(|_| still && m < 3) {
+                    let seen = track.iter().step_by(step).flatten();
+                    let seen: Vec<Vector3<f64>> = seen.map(|p| p.coords).collect();
+                    if let Some(variance) = at_rest(&seen) {
+                        found.push(variance);
+                        values += 3.0 * seen.len() as f64 * SUCCESSIVE;
                     }
                 }
             }
             BodyKind::Pose if still => {
-                if let Some(track) = poses.bodies.get(name) {
-                    for axis in 0..3 {
-                        let along = track.iter().map(|p| p.map(|p| p.translation.vector[axis]));
-                        add(differences(along, step), SUCCESSIVE);
-                    }
+                let seen = poses.bodies.get(name).into_iter().flatten();
+                let seen = seen.step_by(step).flatten();
+                let seen: Vec<Vector3<f64>> = seen.map(|p| p.translation.vector).collect();
+                if let Some(variance) = at_rest(&seen) {
+                    found.push(variance);
+                    values += 3.0 * seen.len() as f64 * SUCCESSIVE;
                 }
             }
             BodyKind::Pose => {}
         }
     }
-    let variance = sum / values;
-    (values > 0.0 && variance > COMPUTED * COMPUTED).then_some(Scatter { variance, values })
+    if found.len() > 2 {
+        values *= OF_MEDIAN;
+    }
+    let variance = median(found)?;
+    (variance > COMPUTED * COMPUTED).then_some(Scatter { variance, values })
 }
 
-/// Differences of successive values.
-fn differences(track: impl Iterator<Item = Option<f64>>, step: usize) -> Vec<f64> {
-    let seen: Vec<f64> = track.step_by(step).flatten().collect();
-    seen.windows(2).map(|w| w[1] - w[0]).collect()
+/// Equation (1) of a place that nothing moves, the mean over its coordinates.
+fn at_rest(seen: &[Vector3<f64>]) -> Option<f64> {
+    let along = |axis: usize| {
+        let differences = seen.windows(2).map(|w| w[1][axis] - w[0][axis]);
+        variance(&differences.collect::<Vec<f64>>())
+    };
+    Some((along(0)? + along(1)? + along(2)?) / 6.0)
 }
 
-/// Half of the variance of the values that are no outliers, by the median of absolute deviations; of a normal distribution it misses 0.1 %.
+/// The variance of the values that are no outliers, by the median of absolute deviations; of a normal distribution it misses 0.1 %.
 fn variance(values: &[f64]) -> Option<f64> {
     /// Values farther out than this many σ are outliers.
     const OUTLIER: f64 = 4.0;
@@ -116,5 +121,5 @@ fn variance(values: &[f64]) -> Option<f64> {
     let sigma = NORMAL * median(off.clone())? * (1.0 + 1.0 / n);
     let kept = off.iter().filter(|off| **off <= OUTLIER * sigma);
     let (sum, count) = kept.fold((0.0, 0.0), |(sum, n), off| (sum + off * off, n + 1.0));
-    (count > 1.0).then(|| 0.5 * sum / (count - 1.0))
+    (count > 1.0).then(|| sum / (count - 1.0))
 }
