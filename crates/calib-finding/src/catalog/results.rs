@@ -124,11 +124,11 @@ super::topic! {
     /// The tracker's noise in a recording is another one than in the others.
     RECORDING_NOISE = "recording-noise" {
         "fitted": Info,
-            "The tracker scatters by {sigma} per coordinate in this recording, by {others} in the others: it is fitted with a noise level of its own.",
-            "Where it scatters more, look at distance, cameras in view and exposure. The weights are right.";
+            "The tracker noise is {sigma} per coordinate in this recording and {others} in the others: the recording has its own noise level in the fit.",
+            "If the noise is higher, check the distance, the cameras in view and the exposure. The weights are right.";
         "held_out": Info,
-            "The tracker scatters by {sigma} per coordinate in this held-out recording, by {others} in those that were fitted: its errors are judged by its own noise.",
-            "Where it scatters more, look at distance, cameras in view and exposure.";
+            "The tracker noise is {sigma} per coordinate in this held-out recording and {others} in the fitted ones: its errors are judged by its own noise.",
+            "If the noise is higher, check the distance, the cameras in view and the exposure.";
     }
     /// Shapes that the 3-D view lacks.
     SHAPE_NOT_DRAWN = "shape-not-drawn" {
