@@ -50,6 +50,8 @@ pub(super) struct Pair {
     pub distance: f64,
     /// Robust σ of the distance, m.
     pub sigma: f64,
+    /// In which both markers are seen.
+    pub rows: usize,
 }
 
 pub(super) fn rigidity(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
@@ -72,11 +74,14 @@ pub(super) fn rigidity(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
         }
         if let Some(finding) = body.redefined(poses) {
             findings.push(finding);
-        } else if let Some(finding) = body.loose_marker() {
-            findings.push(finding);
-        } else {
-            findings.extend(body.bad_rows(poses));
+            continue;
         }
+        let loose = body.loose_markers();
+        findings.extend(if loose.is_empty() {
+            body.bad_rows(poses)
+        } else {
+            loose
+        });
     }
     findings
 }
@@ -129,6 +134,7 @@ impl<'a> Body<'a> {
                 if distances.len() < ROWS {
                     continue;
                 }
+                let rows = distances.len();
                 let distance = median(distances.clone())?;
                 let sigma = robust_sigma(distances.into_iter(), distance)?;
                 pairs.push(Pair {
@@ -136,6 +142,7 @@ impl<'a> Body<'a> {
                     j,
                     distance,
                     sigma,
+                    rows,
                 });
             }
         }
@@ -170,79 +177,137 @@ impl<'a> Body<'a> {
         (STEADY * self.tolerance).max(SMALLEST_FAULT)
     }
 
+    /// The only marker whose distances are among those that changed, at least two of them.
+    pub(super) fn only_of_one(changed: &[&Pair]) -> Option<usize> {
+        let first = changed.first().filter(|_| changed.len() > 1)?;
+        let of_all = |k: &usize| changed.iter().all(|pair| pair.i == *k || pair.j == *k);
+        [first.i, first.j].into_iter().find(of_all)
+    }
+
     /// Another shape from some row on: distances that are steady on both sides of it and differ.
     fn redefined(&self, poses: &Poses) -> Option<Finding> {
-        let mut best: Option<(f64, usize, &Pair)> = None;
-        for pair in &self.pairs {
-            let series: Vec<(usize, f64)> =
-                distances(self.tracks[pair.i], self.tracks[pair.j]).collect();
-            let mean = series.iter().map(|(_, d)| d).sum::<f64>() / series.len() as f64;
-            // The largest cumulative sum marks the change.
-            let mut sum = 0.0;
-            let mut at = (0.0, 0);
-            for (k, (_, d)) in series.iter().enumerate() {
-                sum += d - mean;
-                if f64::abs(sum) > at.0 {
-                    at = (f64::abs(sum), k + 1);
-                }
-            }
-            let (before, after) = series.split_at(at.1);
-            if before.len() < ROWS || after.len() < ROWS {
-                continue;
-            }
-            let level = |part: &[(usize, f64)]| median(part.iter().map(|(_, d)| *d).collect());
-            let (Some(a), Some(b)) = (level(before), level(after)) else {
-                continue;
-            };
-            let close = |part: &[(usize, f64)], level: f64| {
-                part.iter()
-                    .filter(|(_, d)| (d - level).abs() < self.tolerance / 2.0)
-                    .count()
-                    * 10
-                    >= part.len() * 9
-            };
-            let change = (a - b).abs();
-            // A row is a fault from the tolerance on, rows that agree with each other before.
-            let rows = 1.0 / before.len() as f64 + 1.0 / after.len() as f64;
-            if change > self.least_step().max(self.tolerance * rows.sqrt())
-                && close(before, a)
-                && close(after, b)
-                && best.is_none_or(|(most, _, _)| change > most)
-            {
-                best = Some((change, after[0].0, pair));
-            }
-        }
-        let (change, row, pair) = best?;
+        let steps = self.pairs.iter().filter_map(|pair| self.step(pair));
+        let worst = steps.max_by(|a, b| a.change.total_cmp(&b.change))?;
+        let changed: Vec<&Pair> = self
+            .pairs
+            .iter()
+            .filter(|pair| self.changes_at(pair, worst.row))
+            .collect();
+        let finding = match Self::only_of_one(&changed) {
+            Some(marker) => self
+                .finding_of(catalog::BODY_REDEFINED, "marker_from_row")
+                .with("marker", Fact::name(self.markers[marker])),
+            None => self
+                .finding_of(catalog::BODY_REDEFINED, "from_row")
+                .with("first", Fact::name(self.markers[worst.pair.j]))
+                .with("second", Fact::name(self.markers[worst.pair.i])),
+        };
+        let row = poses.rows[worst.row];
         Some(
-            self.finding_of(catalog::BODY_REDEFINED, "from_row")
-                .with("first", Fact::name(self.markers[pair.j]))
-                .with("second", Fact::name(self.markers[pair.i]))
-                .with("change", Fact::meters(change))
-                .with("row", Fact::Count(poses.rows[row]))
-                .at_rows([poses.rows[row]]),
+            finding
+                .with("change", Fact::meters(worst.change))
+                .with("row", Fact::Count(row))
+                .at_rows([row]),
         )
     }
 
-    /// A marker whose distances to the others are unsteady while those of the others are not.
-    fn loose_marker(&self) -> Option<Finding> {
-        let (worst, sigma) = (0..self.markers.len())
-            .map(|k| (k, self.scatter(k)))
-            .max_by(|a, b| a.1.total_cmp(&b.1))?;
-        if sigma <= self.tolerance / 2.0 {
+    /// A step of a distance that is steady before and after it.
+    fn step<'b>(&self, pair: &'b Pair) -> Option<Step<'b>> {
+        let series: Vec<(usize, f64)> =
+            distances(self.tracks[pair.i], self.tracks[pair.j]).collect();
+        let mean = series.iter().map(|(_, d)| d).sum::<f64>() / series.len() as f64;
+        // The largest cumulative sum marks the change.
+        let mut sum = 0.0;
+        let mut at = (0.0, 0);
+        for (k, (_, d)) in series.iter().enumerate() {
+            sum += d - mean;
+            if f64::abs(sum) > at.0 {
+                at = (f64::abs(sum), k + 1);
+            }
+        }
+        let (before, after) = series.split_at(at.1);
+        let (change, threshold) = self.change_between(before, after)?;
+        let (a, b) = (level(before)?, level(after)?);
+        let close = |part: &[(usize, f64)], level: f64| {
+            let near = |(_, d): &&(usize, f64)| (d - level).abs() < self.tolerance / 2.0;
+            part.iter().filter(near).count() * 10 >= part.len() * 9
+        };
+        let steady = close(before, a) && close(after, b);
+        (steady && change > threshold.max(self.least_step())).then(|| Step {
+            change,
+            row: after[0].0,
+            pair,
+        })
+    }
+
+    /// A distance has another median from a row on.
+    fn changes_at(&self, pair: &Pair, row: usize) -> bool {
+        let series: Vec<(usize, f64)> =
+            distances(self.tracks[pair.i], self.tracks[pair.j]).collect();
+        let (before, after) = series.split_at(series.partition_point(|(at, _)| *at < row));
+        let changed = self.change_between(before, after);
+        changed.is_some_and(|(change, threshold)| change > threshold)
+    }
+
+    /// By how much two medians of a distance differ, and the limit of what noise does, m; `None` where rows are too few.
+    fn change_between(
+        &self,
+        before: &[(usize, f64)],
+        after: &[(usize, f64)],
+    ) -> Option<(f64, f64)> {
+        if before.len() < ROWS || after.len() < ROWS {
             return None;
         }
-        Some(
-            self.finding_of(catalog::NOT_RIGID, "loose")
-                .with("marker", Fact::name(self.markers[worst]))
-                .with("scatter", Fact::meters(sigma)),
-        )
+        let change = (level(before)? - level(after)?).abs();
+        Some((change, self.limit(before.len(), after.len())))
     }
 
-    /// Robust σ of the distances of a marker from the others, m: the median over them.
-    fn scatter(&self, marker: usize) -> f64 {
+    /// The limit of what noise does to the difference of two levels, from so many rows, m: a row is a fault from the tolerance on, rows that
+    /// agree with each other before.
+    pub(super) fn limit(&self, before: usize, after: usize) -> f64 {
+        self.tolerance * (1.0 / before as f64 + 1.0 / after as f64).sqrt()
+    }
+
+    /// Markers whose distances to the others are unsteady, while those of the others among each other are not.
+    fn loose_markers(&self) -> Vec<Finding> {
+        let steady = self.tolerance / 2.0;
+        let mut rest: Vec<usize> = (0..self.markers.len()).collect();
+        let mut loose: Vec<(usize, f64)> = Vec::new();
+        while self.pairs_of(&rest).any(|pair| pair.sigma > steady) {
+            let scatters = rest.iter().map(|&k| (k, self.scatter(k, &rest)));
+            let Some(worst) = scatters.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+                return Vec::new();
+            };
+            loose.push(worst);
+            rest.retain(|&k| k != worst.0);
+        }
+        // A body is what most of its markers agree on, and two distances of a marker must say the same of it.
+        let agreed = 2 * loose.len() < self.markers.len() && self.pairs_of(&rest).next().is_some();
+        if !agreed || loose.iter().any(|(_, scatter)| *scatter <= steady) {
+            return Vec::new();
+        }
+        let finding = |(marker, scatter): (usize, f64)| {
+            self.finding_of(catalog::NOT_RIGID, "loose")
+                .with("marker", Fact::name(self.markers[marker]))
+                .with("scatter", Fact::meters(scatter))
+        };
+        loose.into_iter().map(finding).collect()
+    }
+
+    /// The distances between some of the markers.
+    fn pairs_of(&self, markers: &[usize]) -> impl Iterator<Item = &Pair> {
+        let both = |pair: &&Pair| markers.contains(&pair.i) && markers.contains(&pair.j);
+        self.pairs.iter().filter(both)
+    }
+
+    /// Robust σ of the distances of a marker from others, m: the median over them.
+    fn scatter(&self, marker: usize, others: &[usize]) -> f64 {
         let of_marker = |pair: &&Pair| pair.i == marker || pair.j == marker;
-        let of_marker = self.pairs.iter().filter(of_marker);
-        let mut sigmas: Vec<f64> = of_marker.map(|pair| pair.sigma).collect();
+        let mut sigmas: Vec<f64> = self
+            .pairs_of(others)
+            .filter(of_marker)
+            .map(|pair| pair.sigma)
+            .collect();
         sigmas.sort_by(f64::total_cmp);
         let middle = sigmas.len().saturating_sub(1) / 2;
         sigmas.get(middle).copied().unwrap_or(0.0)
@@ -308,6 +373,19 @@ impl<'a> Body<'a> {
                 .with("plain", Fact::meters(plain))
         })
     }
+}
+
+/// A distance that keeps another value from a row on.
+struct Step<'a> {
+    /// m.
+    change: f64,
+    /// Index of the first row with the new value.
+    row: usize,
+    pair: &'a Pair,
+}
+
+fn level(part: &[(usize, f64)]) -> Option<f64> {
+    median(part.iter().map(|(_, d)| *d).collect())
 }
 
 /// Rows and distances where both are seen.

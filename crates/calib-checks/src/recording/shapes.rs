@@ -6,7 +6,7 @@ use calib_finding::{Fact, Finding, catalog};
 use calib_recording::Poses;
 
 use super::Expectations;
-use super::rigidity::Body;
+use super::rigidity::{Body, Pair};
 use crate::statistics::median;
 
 /// By so much the scale of a tracker changes between two recordings at most.
@@ -36,43 +36,71 @@ pub fn other_shapes(recordings: &[(&str, &Poses)], expected: &Expectations) -> V
             continue;
         };
         for (recording, _, body) in others {
-            if let Some((change, first, second)) = body.unlike(most) {
-                findings.push(
-                    body.finding_of(catalog::BODY_REDEFINED, "between")
-                        .with("first", Fact::name(first))
-                        .with("second", Fact::name(second))
-                        .with("change", Fact::meters(change))
-                        .with("other", Fact::name(*reference))
-                        .in_recording(*recording),
-                );
-            }
+            let unlike = body.unlike(most);
+            let worst = unlike.iter().max_by(|a, b| a.change.total_cmp(&b.change));
+            let Some(worst) = worst.filter(|worst| worst.change > worst.least) else {
+                continue;
+            };
+            let changed = unlike.iter().filter(|pair| pair.change > pair.limit);
+            let changed: Vec<&Pair> = changed.map(|unlike| unlike.pair).collect();
+            let finding = match Body::only_of_one(&changed) {
+                Some(marker) => body
+                    .finding_of(catalog::BODY_REDEFINED, "marker_between")
+                    .with("marker", Fact::name(body.markers[marker])),
+                None => body
+                    .finding_of(catalog::BODY_REDEFINED, "between")
+                    .with("first", Fact::name(body.markers[worst.pair.j]))
+                    .with("second", Fact::name(body.markers[worst.pair.i])),
+            };
+            findings.push(
+                finding
+                    .with("change", Fact::meters(worst.change))
+                    .with("other", Fact::name(*reference))
+                    .in_recording(*recording),
+            );
         }
     }
     findings
 }
 
-impl<'a> Body<'a> {
-    /// The distance that differs most from that of the same body elsewhere, by how much, m, and its markers; `None` where all are alike.
-    fn unlike(&self, other: &Self) -> Option<(f64, &'a str, &'a str)> {
+/// A steady distance, against that of the same body elsewhere.
+struct Unlike<'a> {
+    pair: &'a Pair,
+    /// m.
+    change: f64,
+    /// From which on it is another body, m.
+    least: f64,
+    /// What noise does to it, m.
+    limit: f64,
+}
+
+impl Body<'_> {
+    /// The distances that are steady here and elsewhere; none where the unit is another one.
+    fn unlike(&self, other: &Self) -> Vec<Unlike<'_>> {
         let same: BTreeMap<_, _> = other.pairs.iter().map(|p| ((p.i, p.j), p)).collect();
         let both = self.pairs.iter();
         let both: Vec<_> = both
             .filter_map(|p| Some((p, *same.get(&(p.i, p.j))?)))
             .collect();
-        let ratio = median(both.iter().map(|(a, b)| a.distance / b.distance).collect())?;
+        let ratios = both.iter().map(|(a, b)| a.distance / b.distance);
         // Another unit is said to be one.
-        if !(1.0 - UNIT..1.0 + UNIT).contains(&ratio) {
-            return None;
-        }
+        let Some(ratio) =
+            median(ratios.collect()).filter(|ratio| (1.0 - UNIT..1.0 + UNIT).contains(ratio))
+        else {
+            return Vec::new();
+        };
         let ratio = ratio.clamp(1.0 - SCALE, 1.0 + SCALE);
         let least = self.least_step().max(other.least_step());
         let steady = |sigma: f64| sigma < least;
         both.into_iter()
             .filter(|(a, b)| steady(a.sigma) && steady(b.sigma))
-            .map(|(a, b)| ((a.distance - ratio * b.distance).abs(), a))
-            .filter(|(change, _)| *change > least)
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(change, pair)| (change, self.markers[pair.j], self.markers[pair.i]))
+            .map(|(a, b)| Unlike {
+                pair: a,
+                change: (a.distance - ratio * b.distance).abs(),
+                least,
+                limit: self.limit(a.rows, b.rows),
+            })
+            .collect()
     }
 }
 
@@ -142,8 +170,11 @@ mod tests {
                 let found = other_shapes(&all, &expected);
                 let of: Vec<_> = found.iter().map(|f| &f.subject.recordings).collect();
                 assert_eq!(of, [&["other".to_owned()]], "{count} {seed}: {found:?}");
-                let pair = ["first", "second"].map(|k| found[0].facts.get(k).cloned());
-                assert!(pair.contains(&Some(Fact::name("m1"))), "{found:?}");
+                // One of two distances of a triangle can change by less than the limit: the other one names two markers.
+                let named = ["marker", "first", "second"].map(|k| found[0].facts.get(k));
+                let at = named.iter().position(|name| *name == Some(&Fact::name("m1")));
+                assert!(at.is_some(), "{count} {seed}: {found:?}");
+                assert!(count == 3 || at == Some(0), "{count} {seed}: {found:?}");
             }
         }
     }

@@ -6,9 +6,15 @@ super::topic! {
         "from_row": Error,
             "The distance between `{first}` and `{second}` changes by {change} from row {row} on, and keeps its new value.",
             "Cut the recording at that row: a marker was moved or relabeled, or the body was created again.";
+        "marker_from_row": Error,
+            "Marker `{marker}` moves on the body at row {row} and stays there: only its distances change, by up to {change}.",
+            "Cut the recording at that row, or leave the marker out of the body: it slipped or was relabeled.";
         "between": Error,
             "The distance between `{first}` and `{second}` differs by {change} from that in `{other}`.",
             "Leave one of the recordings out, or give the body another name in it (`names`): a marker was moved or relabeled between them, or the body was created again.";
+        "marker_between": Error,
+            "Marker `{marker}` is at another place of the body than in `{other}`: only its distances differ, by up to {change}.",
+            "Leave the marker out of the body, or give the body another name in one of the recordings (`names`): the marker was moved or relabeled between them.";
     }
     /// A body that is not rigid.
     NOT_RIGID = "not-rigid" {
@@ -18,6 +24,9 @@ super::topic! {
         "bends": Error,
             "The body bends: the distance between `{first}` and `{second}` varies by {range}; {rows:row} affected.",
             "Stiffen the body, or define bodies from markers whose mutual distances are constant.";
+        "one_marker": Error,
+            "Marker `{marker}` moves on the body: only its distances change, by up to {off}; {rows:row} affected.",
+            "Fix the marker, or leave it out of the body.";
         "template": Error,
             "The body differs from its template by up to {difference} in a distance.",
             "Check the order of the markers, or remove the template so that it is learned from the recording.";
