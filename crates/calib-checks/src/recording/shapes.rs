@@ -172,7 +172,9 @@ mod tests {
                 assert_eq!(of, [&["other".to_owned()]], "{count} {seed}: {found:?}");
                 // One of two distances of a triangle can change by less than the limit: the other one names two markers.
                 let named = ["marker", "first", "second"].map(|k| found[0].facts.get(k));
-                let at = named.iter().position(|name| *name == Some(&Fact::name("m1")));
+                let at = named
+                    .iter()
+                    .position(|name| *name == Some(&Fact::name("m1")));
                 assert!(at.is_some(), "{count} {seed}: {found:?}");
                 assert!(count == 3 || at == Some(0), "{count} {seed}: {found:?}");
             }

@@ -426,14 +426,21 @@ mod tests {
         for count in [4] {
             for seed in 0..10 {
                 let place = |k: usize, row: usize| {
-                    let off = if k < 2 { 6e-3 * (1.7 * row as f64).sin() } else { 0.0 };
+                    let off = if k < 2 {
+                        6e-3 * (1.7 * row as f64).sin()
+                    } else {
+                        0.0
+                    };
                     Vector3::from(PLACES[k]) + off * Vector3::new(0.0, 0.6, 0.8)
                 };
                 let found = of_body(count, &body(count, place, seed));
                 let [found] = &found[..] else {
                     panic!("{count} {seed}: {found:?}")
                 };
-                assert!(found.facts.get("first").is_some(), "{count} {seed}: {found:?}");
+                assert!(
+                    found.facts.get("first").is_some(),
+                    "{count} {seed}: {found:?}"
+                );
             }
         }
     }
