@@ -1,6 +1,5 @@
 //! Which robots a fleet has: a YAML list, or a pattern of profiles.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use calib_files::{check_name, folder_of, input};
@@ -52,17 +51,14 @@ pub fn members(fleet: &str, earlier: Option<&Path>) -> Result<Vec<Member>, Batch
         false => of_list(fleet)?,
     };
     let failed = |fault| BatchError::fleet(fleet, fault);
-    let mut known: BTreeMap<String, &Path> = BTreeMap::new();
     for member in &members {
         check_name(&member.name).map_err(|_| failed(FleetFault::Name(member.name.to_string())))?;
-        // One folder on file systems that do not see capitals.
-        let folder = member.name.to_lowercase();
-        if let Some(first) = known.insert(folder, &member.profile) {
-            return Err(failed(FleetFault::SameName {
-                name: member.name.to_string(),
-                profiles: [first, &member.profile].map(Path::to_path_buf),
-            }));
-        }
+    }
+    if let Some([first, second]) = same_folder(&members) {
+        return Err(failed(FleetFault::SameName {
+            name: second.name.to_string(),
+            profiles: [first, second].map(|member| member.profile.to_path_buf()),
+        }));
     }
     if members.is_empty() {
         return Err(failed(FleetFault::Empty));
@@ -74,6 +70,20 @@ pub fn members(fleet: &str, earlier: Option<&Path>) -> Result<Vec<Member>, Batch
         member.earlier = member.earlier.take().or(last);
     }
     Ok(members)
+}
+
+/// The first robot whose name another one has before it: one folder on file systems that do not see capitals. Names are compared where they are: copies
+/// of all of them would stay in the memory of a batch.
+fn same_folder(members: &[Member]) -> Option<[&Member; 2]> {
+    let folder = |k: usize| members[k].name.chars().flat_map(char::to_lowercase);
+    let mut order: Vec<usize> = (0..members.len()).collect();
+    order.sort_by(|&a, &b| folder(a).cmp(folder(b)));
+    let same = order.windows(2).filter_map(|pair| match pair {
+        &[first, second] if folder(first).eq(folder(second)) => Some([first, second]),
+        _ => None,
+    });
+    let first = same.min_by_key(|[_, second]| *second)?;
+    Some(first.map(|k| &members[k]))
 }
 
 fn of_list(fleet: &str) -> Result<Vec<Member>, BatchError> {
