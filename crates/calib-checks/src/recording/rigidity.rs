@@ -184,6 +184,24 @@ impl<'a> Body<'a> {
         [first.i, first.j].into_iter().find(of_all)
     }
 
+    /// That the body is another one: by a marker that is known to have moved, else by the distance that changed most.
+    pub(super) fn redefined_by(
+        &self,
+        marker: Option<usize>,
+        worst: &Pair,
+        [of_marker, of_distance]: [&'static str; 2],
+    ) -> Finding {
+        match marker {
+            Some(k) => self
+                .finding_of(catalog::BODY_REDEFINED, of_marker)
+                .with("marker", Fact::name(self.markers[k])),
+            None => self
+                .finding_of(catalog::BODY_REDEFINED, of_distance)
+                .with("first", Fact::name(self.markers[worst.j]))
+                .with("second", Fact::name(self.markers[worst.i])),
+        }
+    }
+
     /// Another shape from some row on: distances that are steady on both sides of it and differ.
     fn redefined(&self, poses: &Poses) -> Option<Finding> {
         let steps = self.pairs.iter().filter_map(|pair| self.step(pair));
@@ -193,15 +211,8 @@ impl<'a> Body<'a> {
             .iter()
             .filter(|pair| self.changes_at(pair, worst.row))
             .collect();
-        let finding = match Self::only_of_one(&changed) {
-            Some(marker) => self
-                .finding_of(catalog::BODY_REDEFINED, "marker_from_row")
-                .with("marker", Fact::name(self.markers[marker])),
-            None => self
-                .finding_of(catalog::BODY_REDEFINED, "from_row")
-                .with("first", Fact::name(self.markers[worst.pair.j]))
-                .with("second", Fact::name(self.markers[worst.pair.i])),
-        };
+        let marker = Self::only_of_one(&changed);
+        let finding = self.redefined_by(marker, worst.pair, ["marker_from_row", "from_row"]);
         let row = poses.rows[worst.row];
         Some(
             finding
@@ -249,7 +260,7 @@ impl<'a> Body<'a> {
         changed.is_some_and(|(change, threshold)| change > threshold)
     }
 
-    /// By how much two medians of a distance differ, and the limit of what noise does, m; `None` where rows are too few.
+    /// By how much two medians of a distance differ, and the limit of what is no fault, m; `None` where rows are too few.
     fn change_between(
         &self,
         before: &[(usize, f64)],
@@ -262,28 +273,34 @@ impl<'a> Body<'a> {
         Some((change, self.limit(before.len(), after.len())))
     }
 
-    /// The limit of what noise does to the difference of two levels, from so many rows, m: a row is a fault from the tolerance on, rows that
-    /// agree with each other before.
+    /// The limit of what noise and the tracker's distortion do to the difference of two levels, from so many rows, m: a row is a fault from the
+    /// tolerance on, rows that agree with each other before.
     pub(super) fn limit(&self, before: usize, after: usize) -> f64 {
-        self.tolerance * (1.0 / before as f64 + 1.0 / after as f64).sqrt()
+        let noise = self.tolerance * (1.0 / before as f64 + 1.0 / after as f64).sqrt();
+        noise.max(SMALLEST_FAULT)
     }
 
-    /// Markers whose distances to the others are unsteady, while those of the others among each other are not.
+    /// Markers whose distances to the others are unsteady, while those of the others among each other are not; fewer than half of all, or none.
     fn loose_markers(&self) -> Vec<Finding> {
         let steady = self.tolerance / 2.0;
-        let mut rest: Vec<usize> = (0..self.markers.len()).collect();
+        let mut in_rest = vec![true; self.markers.len()];
         let mut loose: Vec<(usize, f64)> = Vec::new();
-        while self.pairs_of(&rest).any(|pair| pair.sigma > steady) {
-            let scatters = rest.iter().map(|&k| (k, self.scatter(k, &rest)));
-            let Some(worst) = scatters.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+        while self.among(&in_rest).any(|pair| pair.sigma > steady) {
+            let rest = (0..in_rest.len()).filter(|&k| in_rest[k]);
+            let scatters = rest.map(|k| (k, self.scatter(k, &in_rest)));
+            let worst = scatters.max_by(|a, b| a.1.total_cmp(&b.1));
+            // A single unsteady distance does not tell which of its markers is loose.
+            let Some(worst) = worst.filter(|(_, scatter)| *scatter > steady) else {
                 return Vec::new();
             };
             loose.push(worst);
-            rest.retain(|&k| k != worst.0);
+            in_rest[worst.0] = false;
+            // A body is what most of its markers agree on.
+            if 2 * loose.len() >= self.markers.len() {
+                return Vec::new();
+            }
         }
-        // A body is what most of its markers agree on, and two distances of a marker must say the same of it.
-        let agreed = 2 * loose.len() < self.markers.len() && self.pairs_of(&rest).next().is_some();
-        if !agreed || loose.iter().any(|(_, scatter)| *scatter <= steady) {
+        if self.among(&in_rest).next().is_none() {
             return Vec::new();
         }
         let finding = |(marker, scatter): (usize, f64)| {
@@ -294,20 +311,18 @@ impl<'a> Body<'a> {
         loose.into_iter().map(finding).collect()
     }
 
-    /// The distances between some of the markers.
-    fn pairs_of(&self, markers: &[usize]) -> impl Iterator<Item = &Pair> {
-        let both = |pair: &&Pair| markers.contains(&pair.i) && markers.contains(&pair.j);
-        self.pairs.iter().filter(both)
+    /// The distances among the markers that are marked.
+    fn among(&self, marked: &[bool]) -> impl Iterator<Item = &Pair> {
+        self.pairs
+            .iter()
+            .filter(|pair| marked[pair.i] && marked[pair.j])
     }
 
-    /// Robust σ of the distances of a marker from others, m: the median over them.
-    fn scatter(&self, marker: usize, others: &[usize]) -> f64 {
+    /// Robust σ of the distances of a marker from those that are marked, m: the median over them.
+    fn scatter(&self, marker: usize, marked: &[bool]) -> f64 {
         let of_marker = |pair: &&Pair| pair.i == marker || pair.j == marker;
-        let mut sigmas: Vec<f64> = self
-            .pairs_of(others)
-            .filter(of_marker)
-            .map(|pair| pair.sigma)
-            .collect();
+        let of_marker = self.among(marked).filter(of_marker);
+        let mut sigmas: Vec<f64> = of_marker.map(|pair| pair.sigma).collect();
         sigmas.sort_by(f64::total_cmp);
         let middle = sigmas.len().saturating_sub(1) / 2;
         sigmas.get(middle).copied().unwrap_or(0.0)

@@ -7,7 +7,7 @@ super::topic! {
             "The distance between `{first}` and `{second}` changes by {change} from row {row} on, and keeps its new value.",
             "Cut the recording at that row: a marker was moved or relabeled, or the body was created again.";
         "marker_from_row": Error,
-            "Marker `{marker}` moves on the body at row {row} and stays there: only its distances change, by up to {change}.",
+            "Marker `{marker}` moved on the body at row {row} and stayed there: only its distances change, by up to {change}.",
             "Cut the recording at that row, or leave the marker out of the body: it slipped or was relabeled.";
         "between": Error,
             "The distance between `{first}` and `{second}` differs by {change} from that in `{other}`.",
@@ -22,10 +22,10 @@ super::topic! {
             "Marker `{marker}` moves on the body: its distances to the others scatter by {scatter}.",
             "Fix the marker, or leave it out of the body.";
         "bends": Error,
-            "The body bends: the distance between `{first}` and `{second}` varies by {range}; {rows:row} affected.",
-            "Stiffen the body, or define bodies from markers whose mutual distances are constant.";
+            "The body is not rigid: the distance between `{first}` and `{second}` varies by {range}; {rows:row} affected. No single marker could be identified as the cause.",
+            "Stiffen the body and fix its markers, or define bodies from markers whose mutual distances are constant.";
         "one_marker": Error,
-            "Marker `{marker}` moves on the body: only its distances change, by up to {off}; {rows:row} affected.",
+            "Marker `{marker}` moves on the body: only its distances change, by up to {range}; {rows:row} affected.",
             "Fix the marker, or leave it out of the body.";
         "template": Error,
             "The body differs from its template by up to {difference} in a distance.",

@@ -72,8 +72,8 @@ pub fn members(fleet: &str, earlier: Option<&Path>) -> Result<Vec<Member>, Batch
     Ok(members)
 }
 
-/// The first robot whose name another one has before it: one folder on file systems that do not see capitals. Names are compared where they are: copies
-/// of all of them would stay in the memory of a batch.
+/// The first robot whose folder is that of an earlier one, where file systems ignore case, and that one before it. Names are compared in place: copies of
+/// all of them would stay in the memory of a batch.
 fn same_folder(members: &[Member]) -> Option<[&Member; 2]> {
     let folder = |k: usize| members[k].name.chars().flat_map(char::to_lowercase);
     let mut order: Vec<usize> = (0..members.len()).collect();
