@@ -29,7 +29,7 @@ pub struct SeriesJoint {
     pub joint: String,
     /// Robots in which it was compared.
     pub robots: u64,
-    /// Robots in which it changed, (1).
+    /// Robots in which it changed, (1), those among them by chance included: [`Statistics::by_chance`].
     pub changed: u64,
     /// Probability of so many where nothing changed, (3).
     pub p_value: f64,
@@ -67,6 +67,14 @@ pub struct Statistics {
     pub alarms: Vec<Alarm>,
     /// Joints of series in which any robot changed, most certain first.
     pub series: Vec<SeriesJoint>,
+}
+
+impl Statistics {
+    /// Robots of a series in which the joint would be said to change if none had: α of them.
+    #[must_use]
+    pub fn by_chance(&self, joint: &SeriesJoint) -> f64 {
+        self.false_alarms * joint.robots as f64
+    }
 }
 
 /// What is kept of each robot while the others are read.
@@ -245,6 +253,7 @@ mod tests {
             (effect.robots, effect.changed, effect.drifts),
             (100, 10, true)
         );
+        assert_eq!(found.by_chance(effect), 1.0);
     }
 
     #[test]

@@ -41,8 +41,12 @@ pub fn text(summary: &Summary) -> String {
     for effect in drift.series.iter().filter(|effect| effect.drifts) {
         let _ = writeln!(
             out,
-            "series {}: joint {} changed in {} of {} robots, more than chance explains",
-            effect.series, effect.joint, effect.changed, effect.robots
+            "series {}: joint {} changed in {} of {} robots, of which chance alone explains about {:.0}",
+            effect.series,
+            effect.joint,
+            effect.changed,
+            effect.robots,
+            drift.by_chance(effect),
         );
     }
     out
