@@ -15,6 +15,7 @@ mod designs;
 mod drift;
 mod effects;
 mod facts;
+mod few_rows;
 mod fit;
 mod fleet;
 mod fleet_faults;

@@ -155,11 +155,26 @@ fn tries(candidates: &[Candidate]) -> f64 {
 }
 
 impl Solution {
+    /// Degrees of freedom from which on tests for effects and changes are true. Of clean recordings of one marker on a robot with five joints, with
+    /// errors of a quarter to half of the priors' σ, a test named something in 28 of 93 at 2, in 19 of 90 at 4, in 8 of 91 at 7, in 2 of 40 at 10, and in
+    /// none of 64 at 13: the levels of the noise are then no better known than what is tested.
+    pub const TESTABLE: f64 = 12.0;
+
+    /// Whether the residuals have enough [degrees of freedom](Solution::TESTABLE) to say whether an effect is missing or something changed.
+    #[must_use]
+    pub fn is_testable(&self) -> bool {
+        self.degrees_of_freedom >= Self::TESTABLE
+    }
+
     /// Score tests of every effect that the problem declares ([`Problem::candidate`](crate::Problem::candidate)) and of those that
     /// follow from the readings alone (gain, eccentricity), plus drift where times are given. Of long recordings
-    /// they look at some thousand samples. `None` when the model cannot be evaluated.
+    /// they look at some thousand samples. `None` when the model cannot be evaluated, and where the fit
+    /// [leaves too little](Solution::is_testable).
     #[must_use]
     pub fn goodness_of_fit(&self) -> Option<GoodnessOfFit> {
+        if !self.is_testable() {
+            return None;
+        }
         let candidates = self.candidates();
         let mut tests = self.score_tests(&candidates, &self.looked_at())?;
         self.with_profiles(&candidates, &mut tests);

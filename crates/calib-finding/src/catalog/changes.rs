@@ -13,13 +13,19 @@ super::topic! {
             "The residuals of successive rows are correlated ({correlation}). The stated uncertainties allow for it and are up to {factor} times larger than for independent noise.",
             "Record the poses in random order and wait between them; switch off filters of the tracker. If an effect is named as missing, enable it first.";
     }
+    /// Too few rows for the tests of the fit.
+    NOT_TESTED = "not-tested" {
+        "": Warning,
+            "The fit leaves {freedom} degrees of freedom, and {needed} are needed to test the residuals: nothing is known of missing effects, and of what moved while the data were recorded.",
+            "Record more postures, or markers on more links.";
+    }
     /// Something moved while the data were recorded.
     CHANGED_WHILE_RECORDING = "changed-while-recording" {
         "body": Warning,
-            "Body `{body}` moved on its link by {distance} ± {sigma} and {angle} between row {before}[[ of `{before_in}`]] and row {row}, or another change affected this part of the data.[[ Nearly as likely: {rivals:code} moved.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
+            "Body `{body}` moved on its link by {distance} ± {sigma}[[ and {angle}]] between row {before}[[ of `{before_in}`]] and row {row}, or another change affected this part of the data.[[ Nearly as likely: {rivals:code} moved.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
             "Fasten the body and record again, or estimate one mount for each part: add `split: {recording: {recording}, at_row: {row}[[, before: {earlier:list}]]}` to the body in the profile, and list held-out recordings that were made before the change under `before` as well.";
         "tracker": Warning,
-            "The tracker, or the whole robot, moved by {distance} ± {sigma} and {angle} between row {before}[[ of `{before_in}`]] and row {row}.[[ Nearly as likely: {rivals:code} moved.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
+            "The tracker, or the whole robot, moved by {distance} ± {sigma}[[ and {angle}]] between row {before}[[ of `{before_in}`]] and row {row}.[[ Nearly as likely: {rivals:code} moved.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
             "Secure the tracker and the robot's stand, and record again; until then keep only the rows of one side.";
         "joint": Warning,
             "The zero of this joint changed by {angle} ± {sigma_angle} between row {before}[[ of `{before_in}`]] and row {row}.[[ Nearly as likely: {rivals:code} moved.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
@@ -37,7 +43,7 @@ super::topic! {
             "The zero of this joint changed by [[{angle}]][[{distance}]] between row {before} and row {row}[[; {later:code} came after]]: with that the recordings fit the nominal robot to {best} rms, without it to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
             "Check the joint's encoder and its coupling, home the robot, and record again; until then keep only the rows of one side.";
         "drift": Warning,
-            "The tracker's frame drifted by {distance} ± {sigma} and {angle} from the first row to the last.[[ Missing physics explains as much: `{physics}`.]]",
+            "The tracker's frame drifted by {distance} ± {sigma}[[ and {angle}]] from the first row to the last.[[ Missing physics explains as much: `{physics}`.]]",
             "Let tracker and robot warm up before recording, and record the poses in random order.";
         "scale": Warning,
             "The tracker reports lengths that differ by {scale:ppm} ± {sigma_scale:ppm} from those of the robot and the stated templates (positive: too long).",

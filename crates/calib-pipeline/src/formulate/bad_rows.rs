@@ -7,7 +7,8 @@
 //! ```
 //!
 //! If a fraction f of the way to another row makes the row right, joints and tracker were read at different times, or the
-//! robot had not settled. e is the body's pose error, rotation and position in units of what is usual.
+//! robot had not settled. e is the body's pose error, rotation and position in units of what is usual. Where an error of one joint alone leaves clearly
+//! less, its reading was wrong.
 
 use calib_geometry::statistics::upper_median;
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,6 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_geometry::so3;
 use calib_profile::Usage;
+use calib_urdf::JointId;
 use nalgebra::{Isometry3, Vector6};
 
 use crate::formulate::formulation::MlFit;
@@ -27,6 +29,8 @@ use crate::prepare::tracks::BodyTrack;
 
 /// What (1) may leave of a row's squared error: by chance a direction of six takes that much in 1 of 150 rows.
 const LEFT: f64 = 0.2;
+/// An error of one joint that leaves less of a row than (1), by so many squared units of what is usual, is what happened: a wrong reading, and no motion.
+const BETTER: f64 = 9.0;
 /// Largest part of the way to a neighbor: beyond it the row would belong to the other posture.
 const LARGEST_FRACTION: f64 = 0.5;
 /// A row that is off by this many times the usual is named although no motion explains it.
@@ -333,6 +337,11 @@ impl<'a> BodyError<'a> {
             })
             .filter(|(fraction, left)| *left < LEFT && fraction.abs() < LARGEST_FRACTION)
             .min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let size = self.weighted(&seen, seen.q, usual)?.norm_squared();
+        let of_one = self.one_joint(&seen, usual);
+        if of_one.is_some_and(|(left, _)| size * (best.1 - left) > BETTER) {
+            return None;
+        }
         let e = self.at(&seen, seen.q)?;
         Some(OnTheWay {
             fraction: best.0,
@@ -383,26 +392,30 @@ impl<'a> BodyError<'a> {
         if ratio < FAR_OFF {
             return None;
         }
+        let joint = self.one_joint(&seen, usual);
+        let joint = joint.filter(|(left, _)| *left < ONE_JOINT_LEFT);
         let model = &self.inputs.robot.model;
-        let link = self.inputs.robot.profile.bodies[self.name].link;
-        let joint = model
-            .chain_to_root(link)
-            .into_iter()
-            .filter(|joint| model.joint(*joint).kind.axis().is_some())
-            .filter_map(|joint| {
-                let mut only = vec![0.0; seen.q.len()];
-                only[joint.index()] = 1.0;
-                let (_, left) = self.explained(&seen, &only, usual)?;
-                Some((left, joint))
-            })
-            .filter(|(left, _)| *left < ONE_JOINT_LEFT)
-            .min_by(|a, b| a.0.total_cmp(&b.0));
         Some(FarOff {
             ratio,
             position: e.fixed_rows::<3>(3).norm(),
             angle: e.fixed_rows::<3>(0).norm(),
             joint: joint.map(|(_, joint)| model.joint(joint).name.clone()),
         })
+    }
+
+    /// The joint whose error alone explains a row best, with the part of the squared error that it leaves.
+    fn one_joint(&self, seen: &SeenRow<'_>, usual: Usual) -> Option<(f64, JointId)> {
+        let model = &self.inputs.robot.model;
+        let link = self.inputs.robot.profile.bodies[self.name].link;
+        let joints = model.chain_to_root(link).into_iter();
+        let moving = joints.filter(|joint| model.joint(*joint).kind.axis().is_some());
+        let left = moving.filter_map(|joint| {
+            let mut only = vec![0.0; seen.q.len()];
+            only[joint.index()] = 1.0;
+            let (_, left) = self.explained(seen, &only, usual)?;
+            Some((left, joint))
+        });
+        left.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 }
 

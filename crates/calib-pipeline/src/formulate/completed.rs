@@ -35,7 +35,12 @@ pub(crate) fn beside(
     fit: &MlFit,
     settings: &Settings,
 ) -> Option<Beside> {
-    let goodness = fit.solution.goodness_of_fit();
+    let mut scanned = ChangeSettings::default();
+    scanned.borders = fit.formulation.borders();
+    let (goodness, scan) = rayon::join(
+        || fit.solution.goodness_of_fit(),
+        || fit.solution.changes(&scanned),
+    );
     let missing = goodness.map_or_else(Vec::new, |g| g.missing);
     let mut parts = of_tests(inputs, &missing);
     for part in before.iter().filter_map(|f| suspected(inputs, f)) {
@@ -43,9 +48,6 @@ pub(crate) fn beside(
             parts.push(part);
         }
     }
-    let mut scanned = ChangeSettings::default();
-    scanned.borders = fit.formulation.borders();
-    let scan = fit.solution.changes(&scanned);
     let change = scan.as_ref().and_then(|scan| scan.significant());
     let moved = change.and_then(|change| split_at(inputs, fit, change));
     if parts.is_empty() && change.is_none() {

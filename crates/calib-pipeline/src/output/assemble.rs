@@ -47,7 +47,10 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
     let motions = motions(e.inputs, joint_sigma);
     let tracks = fates(e.inputs, e.tracks, e.fit, e.held_out.as_ref());
     let limits = limits(&profile.solve.limits, e);
-    let judgment = judge(&facts(e, &findings, &limits, &motions, &tracks));
+    let (judgment, residuals) = rayon::join(
+        || judge(&facts(e, &findings, &limits, &motions, &tracks)),
+        || residuals(e),
+    );
     let verdict = judgment.verdict;
     let parameters = e.fit.map_or_else(Vec::new, parameters);
     let scope = scope(e, &motions);
@@ -82,11 +85,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         estimators: estimators(e),
         fit: e.fit.map(|fit| fit_summary(profile, fit, &parameters)),
         parameters,
-        residuals: Residuals::from_rows(e.residuals).with_standardized(
-            e.fit
-                .and_then(|fit| fit.solution.standardized_residuals())
-                .and_then(|found| standardized(&found)),
-        ),
+        residuals,
         noise: e.fit.map_or_else(Vec::new, |fit| noise(e, fit)),
         noise_choice: e.fit.and_then(noise_choice),
         prior_widths: e.fit.map_or_else(Vec::new, prior_widths),
@@ -123,6 +122,12 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         ..Report::default()
     };
     report.judged(judgment)
+}
+
+fn residuals(e: &Evidence<'_>) -> Residuals {
+    let found = e.fit.and_then(|fit| fit.solution.standardized_residuals());
+    Residuals::from_rows(e.residuals)
+        .with_standardized(found.and_then(|found| standardized(&found)))
 }
 
 /// What the held-out recordings say.

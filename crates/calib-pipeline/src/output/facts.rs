@@ -187,6 +187,8 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
     let s = &fit.solution;
     /// Levels from fewer samples say little.
     const ENOUGH: usize = 20;
+    /// Standard errors of ln σ: by chance one level of 30 000 is as far above.
+    const CERTAIN: f64 = 4.0;
     let of_markers = e.tracks.values().filter_map(|track| track.marker_sigma);
     let rigid = median(of_markers.collect());
     // Means of holds have less noise than the rows that a profile states it of: those are no less certain than stated for it.
@@ -201,7 +203,10 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
     };
     let beside = s.noise.iter().filter_map(|n| {
         let stated = stated_sigma(&e.inputs.robot.profile, &n.name).filter(|s| *s > 0.0)?;
-        let known = n.estimated && n.samples >= ENOUGH && n.kind != NoiseKind::Scale;
+        // Of few samples, what is beyond doubt above what is stated.
+        let certain = |relative: f64| n.sigma * (-CERTAIN * relative).exp() > stated;
+        let told = n.samples >= ENOUGH || n.relative_error.is_some_and(certain);
+        let known = n.estimated && told && n.kind != NoiseKind::Scale;
         known.then(|| FoundNoise {
             group: n.name.clone(),
             factor: n.sigma / stated,

@@ -14,6 +14,9 @@ use crate::prepare::inputs::Inputs;
 /// Standard deviations within which the size of a change lies, 97.5 % on the side that counts.
 const CERTAIN: f64 = 2.0;
 
+/// An angle below it is rounding, rad.
+const ROUNDING: f64 = 1e-9;
+
 /// The scan of the fitted recordings.
 #[must_use]
 pub fn scan(fit: &MlFit) -> Option<ChangeScan> {
@@ -221,8 +224,10 @@ impl Names<'_> {
             6 => {
                 let (angle, _) = size(&change.jump[..3], &change.sigma[..3]);
                 let (distance, sigma) = size(&change.jump[3..], &change.sigma[3..]);
+                // A lone marker shows no rotation.
+                let turned = (angle > ROUNDING).then(|| Fact::radians(angle));
                 finding
-                    .with("angle", Fact::radians(angle))
+                    .with_some("angle", turned)
                     .with("distance", Fact::meters(distance))
                     .with("sigma", Fact::meters(sigma))
             }

@@ -25,10 +25,12 @@ pub(crate) mod tracker_noise;
 
 use std::collections::BTreeMap;
 
-use calib_finding::{Fact, Finding};
+use calib_core::Solution;
+use calib_finding::{About, Fact, Finding, catalog};
 use calib_report::{HeldOut, LoopClosure, ResidualRow};
 
 use crate::formulate::checked::Checked;
+use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::Calibration;
 use crate::formulate::solved::Solved;
 use crate::prepare::inputs::Inputs;
@@ -83,6 +85,7 @@ pub fn verified(
         },
     );
     verified.causes = causes;
+    verified.findings.extend(fit.and_then(not_tested));
     let missing = verified.causes.goodness.as_ref();
     let missing = missing.is_some_and(|g| !g.missing.is_empty());
     if missing && !verified.findings.is_empty() {
@@ -95,6 +98,16 @@ pub fn verified(
         verified.findings = one_cause(changed, verified.findings);
     }
     verified
+}
+
+/// That the fit leaves too little to be tested.
+fn not_tested(fit: &MlFit) -> Option<Finding> {
+    (!fit.solution.is_testable()).then(|| {
+        let freedom = fit.solution.degrees_of_freedom.max(0.0) as usize;
+        Finding::new(catalog::NOT_TESTED, About::Fit)
+            .with("freedom", Fact::count(freedom))
+            .with("needed", Fact::count(Solution::TESTABLE as usize))
+    })
 }
 
 /// What moved within the fitted recordings seems to have moved before the validation too: the fit has the mean of both places.

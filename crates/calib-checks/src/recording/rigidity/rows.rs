@@ -375,6 +375,9 @@ mod tests {
         found.iter().filter_map(name).collect()
     }
 
+    /// A coordinate of a marker by row, m.
+    type Motion<'a> = &'a dyn Fn(usize) -> f64;
+
     /// A marker that slips once, in every third row, or moves all the time: named, with three, four and five markers, also where the
     /// tracker stretches all lengths by 0.2 % from the slip on.
     #[test]
@@ -382,7 +385,7 @@ mod tests {
         let slips = |row: usize| if row < 30 { 0.0 } else { 8e-3 };
         let jumps = |row: usize| if row.is_multiple_of(3) { 8e-3 } else { 0.0 };
         let wanders = |row: usize| 8e-3 * (1.7 * row as f64).sin();
-        let motions: [(&str, &dyn Fn(usize) -> f64, f64); 4] = [
+        let motions: [(&str, Motion<'_>, f64); 4] = [
             ("slips", &slips, 1.0),
             ("slips in a tracker that warms up", &slips, 1.002),
             ("jumps", &jumps, 1.0),

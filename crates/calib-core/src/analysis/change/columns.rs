@@ -43,6 +43,8 @@ pub(crate) struct Candidates {
     scales: Vec<(FrameId, usize)>,
     /// Middle of what each measuring frame sees, m.
     middles: Vec<(FrameId, Vector3<f64>)>,
+    /// Middle of the markers of each body, in its frame, m; of a measured pose its origin.
+    body_middles: Vec<(FrameId, Vector3<f64>)>,
 }
 
 impl Candidates {
@@ -56,6 +58,7 @@ impl Candidates {
             joints: Vec::new(),
             scales: Vec::new(),
             middles: Vec::new(),
+            body_middles: Vec::new(),
         };
         for (measurement, path) in model.problem.measurements.iter().zip(&model.paths) {
             if !sees_places(&measurement.kind) {
@@ -88,6 +91,7 @@ impl Candidates {
             }
         }
         out.find_middles(solution);
+        out.find_body_middles(solution);
         out
     }
 
@@ -123,6 +127,36 @@ impl Candidates {
             }
             self.middles.push((frame, sum / f64::max(count, 1.0)));
         }
+    }
+
+    fn find_body_middles(&mut self, solution: &Solution) {
+        let model = &solution.model;
+        for &(frame, _) in &self.bodies {
+            let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+            for (m, measurement) in model.problem.measurements.iter().enumerate() {
+                let MeasurementKind::Markers(markers) = &measurement.kind else {
+                    continue;
+                };
+                if measurement.to != frame {
+                    continue;
+                }
+                for (_, seen) in &model.of_measurement[m] {
+                    for o in seen.clone() {
+                        let point = markers.observations[model.observations[o].item].point;
+                        sum += model.point_position(point.index(), &solution.values).coords;
+                        count += 1.0;
+                    }
+                }
+            }
+            self.body_middles.push((frame, sum / f64::max(count, 1.0)));
+        }
+    }
+
+    /// What the rotations of a body are about, in its frame, m: the middle of its markers as they were seen, so that a jump of a body whose markers
+    /// do not show its orientation has a size.
+    pub(crate) fn body_middle(&self, frame: FrameId) -> Vector3<f64> {
+        let known = self.body_middles.iter().find(|(f, _)| *f == frame);
+        known.map_or_else(Vector3::zeros, |(_, middle)| *middle)
     }
 
     /// Middle of what a measuring frame sees, m: what its rotations are about.
@@ -170,6 +204,7 @@ impl Candidates {
             });
             let places = sees_places(&own.kind);
             let body = self.bodies.iter().find(|(f, _)| places && *f == own.to);
+            let body_middle = self.body_middle(own.to);
             let reference = self
                 .references
                 .iter()
@@ -178,8 +213,12 @@ impl Candidates {
                 let m = &jacobian.m[i];
                 let mut row = out.row_mut(first + i);
                 if let Some((_, c)) = body {
-                    for d in 0..6 {
-                        row[c + d] = m[d];
+                    // [ω; v] about the middle p̄ is [ω; v + p̄ × ω] at the origin.
+                    let along = Vector3::new(m[3], m[4], m[5]);
+                    let turned = along.cross(&body_middle);
+                    for d in 0..3 {
+                        row[c + d] = m[d] + turned[d];
+                        row[c + 3 + d] = m[3 + d];
                     }
                 }
                 if let Some(r) = reference {

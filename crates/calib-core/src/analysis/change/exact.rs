@@ -168,11 +168,12 @@ impl Solution {
             .enumerate()
         {
             let mut buffer = model.paths[m].buffer();
-            // from_from_to · back · to_from_from for a body, about the middle of what is seen for a reference
+            // from_from_to · back · to_from_from about the middle of its markers for a body, about the middle of what is seen for a reference
             let mut around = |sample: usize| match what {
                 Moved::Body(frame) if measurement.to == frame => {
                     let at = model.paths[m].evaluate(state, sample, Derivatives::None, &mut buffer);
-                    let at = at.isometry();
+                    let middle = Translation3::from(candidates.body_middle(frame));
+                    let at = at.isometry() * middle;
                     Some(at * back * at.inverse())
                 }
                 Moved::Reference(frame) if measurement.from == frame => {

@@ -45,7 +45,8 @@ use sums::{Design, LEAST, SIMULATED};
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Moved {
-    /// Everything that is measured at this frame, by a step; jumps `[ω; v]` in this frame.
+    /// Everything that is measured at this frame, by a step; jumps `[ω; v]` in its axes about the middle of its markers, or the origin of a measured
+    /// pose.
     Body(FrameId),
     /// The measuring frame, by a step; jumps `[ω; v]` in its axes about the middle of what it sees.
     Reference(FrameId),
@@ -156,13 +157,16 @@ const EXPLAINED: f64 = 1.5;
 const EDGES: usize = 384;
 
 impl Solution {
-    /// Scans the samples of the fit for changes. `None` where the model cannot be evaluated or where fewer than
-    /// six samples were used.
+    /// Scans the samples of the fit for changes. `None` where the model cannot be evaluated, where fewer than
+    /// six samples were used, and where the fit [leaves too little](Solution::is_testable).
     ///
     /// A robust fit rejects the rows on the shorter side of a large jump, and what is left shows none. Where most rows at an end of a recording were
     /// rejected, they are scanned as well; a change that leaves no more of them than of the others is why they did not fit.
     #[must_use]
     pub fn changes(&self, settings: &ChangeSettings) -> Option<ChangeScan> {
+        if !self.is_testable() {
+            return None;
+        }
         let kept = self.scan(settings)?;
         let beside = |at: &Self, scan| at.beside_scatter(scan, &settings.borders);
         let all = self.with_rejected(settings);

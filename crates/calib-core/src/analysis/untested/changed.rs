@@ -200,7 +200,10 @@ impl<'a> Changed<'a> {
         let turns = component < 3;
         match self.change.moved {
             Moved::Body(_) if !self.carries => Vector3::zeros(),
-            Moved::Body(_) if turns => posture.turn * axis.cross(&posture.place),
+            Moved::Body(frame) if turns => {
+                let lever = posture.place - self.candidates.body_middle(frame);
+                posture.turn * axis.cross(&lever)
+            }
             Moved::Body(_) => posture.turn * axis,
             Moved::Reference(frame) | Moved::Drift(frame) => {
                 let lever = posture.point.position.coords - self.candidates.middle(frame);
