@@ -1,11 +1,15 @@
 //! Does the process grow with every call?
 
+use std::time::Duration;
+
 /// Calls before and while memory is watched.
 const CALLS: (usize, usize) = (50, 400);
 /// Growth that 400 calls may show: an allocator's own movements stay far below.
 const LIMIT_KIB: u64 = 8 * 1024;
-/// Other threads of the program grow too; a leak grows every time.
-const ROUNDS: usize = 3;
+/// Other threads of the program grow too, for a while; a leak grows every time.
+const ROUNDS: usize = 8;
+/// Between two rounds the others may come to an end.
+const PAUSE: Duration = Duration::from_millis(200);
 
 /// Resident memory of this process, KiB.
 fn resident_kib() -> Option<u64> {
@@ -19,7 +23,10 @@ fn resident_kib() -> Option<u64> {
 pub(super) fn growth(call: impl Fn()) -> Result<Result<(), String>, &'static str> {
     const UNKNOWN: &str = "this system does not say how much memory a process has";
     let mut least = u64::MAX;
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
+        if round > 0 {
+            std::thread::sleep(PAUSE);
+        }
         (0..CALLS.0).for_each(|_| call());
         let before = resident_kib().ok_or(UNKNOWN)?;
         (0..CALLS.1).for_each(|_| call());
