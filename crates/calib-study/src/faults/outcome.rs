@@ -162,7 +162,10 @@ impl CaseResult {
         let outliers = self.cell.fault == Fault::Outliers;
         let few = [Design::Few, Design::Six].contains(&self.cell.design);
         let said_with_reason = |id: &str| {
-            (outliers && true_of_outliers.contains(&id)) || (few && TRUE_OF_FEW.contains(&id))
+            // It counts degrees of freedom.
+            id == "not-tested"
+                || (outliers && true_of_outliers.contains(&id))
+                || (few && TRUE_OF_FEW.contains(&id))
         };
         let untrue = |id: &String| !said_with_reason(id);
         let about_the_model = [
